@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from contextlib import suppress
 
 import numpy as np
 import pytest
 from attrs import evolve
 from cases import every_case
-from click.testing import CliRunner
+from commands import graspsense
 from hypothesis import given
 from hypothesis import strategies as st
 
 from graspsense import WiringError, load_pipeline
-from graspsense.cli.main import cli
 from graspsense.gripper_api import LoadTable, asked_force
 from graspsense.plugin_api import (
     FORCE,
@@ -28,7 +26,7 @@ from graspsense.plugin_api import (
     create,
 )
 from graspsense.testing_api import a_trial, parametrize_checks
-from graspsense_franka_hand import link, protocol
+from graspsense_franka_hand import link
 from graspsense_franka_hand.config import FrankaConfig
 from graspsense_franka_hand.discovery import diagnose
 from graspsense_franka_hand.emulator.hand import FrankaHand
@@ -52,6 +50,7 @@ EMULATED = ["gripper.host=emulated", "gripper.calibration=none"]
 @pytest.mark.slow
 @parametrize_checks(
     "graspsense-franka-hand",
+    wheel=False,  # .ci/grippers runs from the wheel
     keys={"host": "emulated", "calibration": "none"},
     unplugged={"faults": {"unplug_at_s": 1.0}},
     absent={"host": "127.9.9.9", "calibration": "none"},
@@ -97,18 +96,8 @@ def test_less_than_the_least_force_is_refused_before_anything_moves():
 def _trace(times, gaps, phases):
     trace = a_trial().trace
     n = len(times)
-    columns = {
-        name: np.full(n, np.nan)
-        for name in (
-            "velocity_m_s",
-            "effort_n",
-            "force_left_n",
-            "force_right_n",
-            "edge_left_n",
-            "edge_right_n",
-            "command",
-        )
-    }
+    missing = "velocity_m_s effort_n force_left_n force_right_n edge_left_n edge_right_n command"
+    columns = {name: np.full(n, np.nan) for name in missing.split()}
     return evolve(
         trace,
         t_s=np.asarray(times),
@@ -139,7 +128,13 @@ def test_fingers_that_still_move_have_no_last_rest():
     assert set(features.reasons) == {"p_steady", "squeezed", "delta_t"}
 
 
-def _closed(driver, command, frames=120):
+def _opened(**settings):
+    driver = create("sensor-backend", "franka", **{"host": "emulated", "calibration": "none", **settings})
+    driver.open(1)
+    return driver
+
+
+def _closed(driver, command, frames=60):
     read = [driver.read(1.0)]
     for _ in range(frames):
         driver.apply(command)
@@ -147,10 +142,9 @@ def _closed(driver, command, frames=120):
     return [reading.frame for reading in read]
 
 
-@pytest.mark.parametrize("kind", [VELOCITY, POSITION, FORCE])
+@every_case("kind", [VELOCITY, POSITION, FORCE])
 def test_every_kind_of_command_closes_at_its_speed_and_not_again_and_again(kind):
-    driver = create("sensor-backend", "franka", host="emulated", calibration="none")
-    driver.open(1)
+    driver = _opened()
     value = {VELOCITY: -0.02, POSITION: 0.0, FORCE: 40.0}[kind]
     frames = _closed(driver, Command(kind, value, 40.0, 0.02))
     assert driver.report()["orders"] == 1
@@ -162,8 +156,7 @@ def test_every_kind_of_command_closes_at_its_speed_and_not_again_and_again(kind)
 
 
 def test_a_stronger_grasp_waits_until_the_running_one_has_ended_and_an_opening_does_not():
-    driver = create("sensor-backend", "franka", host="emulated", calibration="none")
-    driver.open(1)
+    driver = _opened()
     driver.apply(Command(POSITION, 0.0, 30.0, 0.02))
     for force_n in (35.0, 40.0, 45.0):
         driver.read(1.0)
@@ -178,8 +171,7 @@ def test_a_stronger_grasp_waits_until_the_running_one_has_ended_and_an_opening_d
 
 
 def test_who_is_released_is_not_pressed():
-    driver = create("sensor-backend", "franka", host="emulated", calibration="none")
-    driver.open(1)
+    driver = _opened()
     hand = driver._link.hand
     _closed(driver, Command(POSITION, 0.0, 40.0, 0.05))
     assert hand.pressing
@@ -187,8 +179,7 @@ def test_who_is_released_is_not_pressed():
     assert not hand.pressing
 
 
-@every_case("mood", ["silent", "damaged"])
-@every_case("at_s", [0.5, 2.0, 3.0, 4.0])
+@every_case(("mood", "at_s"), [("silent", 0.5), ("damaged", 2.0), ("silent", 3.0), ("damaged", 4.0)])
 def test_a_hand_lost_in_a_grasp_ends_it(mood, at_s):
     options = [*EMULATED, f"gripper.faults.mood={mood}", f"gripper.faults.mood_at_s={at_s}"]
     trial = load_pipeline("franka", options=options).grasp()
@@ -198,16 +189,14 @@ def test_a_hand_lost_in_a_grasp_ends_it(mood, at_s):
 
 
 def test_another_version_is_no_device():
-    driver = create("sensor-backend", "franka", host="emulated", calibration="none", faults={"mood": "old"})
     with pytest.raises(NoDevice, match="version"):
-        driver.open(0)
+        _opened(faults={"mood": "old"})
 
 
 def test_without_pylibfranka_the_user_is_told_what_to_install(monkeypatch):
     monkeypatch.setattr(link.importlib.util, "find_spec", lambda name: None)
-    driver = create("sensor-backend", "franka", host="127.0.0.1", calibration="none")
     with pytest.raises(PluginUnavailable, match="pip install pylibfranka"):
-        driver.open(0)
+        _opened(host="127.0.0.1")
     [finding] = diagnose(FrankaConfig(host="127.0.0.1"), 1.0)
     assert finding.state == "problem"
     assert "pip install pylibfranka" in finding.advice
@@ -265,13 +254,10 @@ def test_any_bytes_are_requests_or_refused(data):
             assert request.command <= STOP
 
 
-def test_a_state_has_the_layout_of_the_protocol():
-    assert len(protocol.state(5, 0.04, 0.08, True, 30)) == 4 + 8 + 8 + 1 + 2
-
-
 @given(
     st.lists(
-        st.tuples(st.floats(1.0, 100.0), st.floats(1.0, 100.0)),
+        # Readings that are told apart by more than the last bit of a number.
+        st.tuples(st.integers(10, 1000).map(lambda tenths: tenths / 10.0), st.floats(1.0, 100.0)),
         min_size=2,
         max_size=8,
         unique_by=lambda x: x[0],
@@ -288,26 +274,30 @@ def test_the_force_to_ask_for_never_delivers_more_than_is_wanted(readings, wante
         assert load_of(table, asked_n)[0] <= wanted_n * (1.0 + 1e-6) or asked_n == table.pad_n[1]
 
 
-def test_delivered_force_is_stored_and_used(tmp_path):
+def _calibrated(tmp_path, rows):
+    """Run the calibration with these rows of readings."""
     readings = tmp_path / "readings.csv"
-    readings.write_text("asked_n,delivered_n\n20,30\n40,50\n60,70\n60,74\n")
-    options = [
+    readings.write_text(f"asked_n,delivered_n\n{rows}\n")
+    (tmp_path / "kept").mkdir(mode=0o700)
+    gripper = (
         "--gripper",
         "franka",
         "-o",
         "gripper.host=emulated",
         "-o",
         f"gripper.calibration={tmp_path}/kept",
-    ]
-    (tmp_path / "kept").mkdir(mode=0o700)
-    done = CliRunner().invoke(cli, ["calibrate", "delivered-force", str(readings), *options, "--json"])
-    assert done.exit_code == 0, done.output
-    data = json.loads(done.stdout)["data"]
+    )
+    return graspsense("calibrate", "delivered-force", readings, *gripper, "--json")
+
+
+def test_delivered_force_is_stored_and_used(tmp_path):
+    done = _calibrated(tmp_path, "20,30\n40,50\n60,70\n60,74")
+    assert done.returncode == 0, done.stderr
+    data = done.json["data"]
     assert data == {"asked_n": [0.0, 20.0, 40.0, 60.0], "delivered_n": [0.0, 30.0, 50.0, 72.0]}
 
     driver = create("sensor-backend", "franka", host="emulated", calibration=f"{tmp_path}/kept")
-    info = driver.open(1)
-    assert set(info.calibration) == {"delivered-force"}
+    assert set(driver.open(1).calibration) == {"delivered-force"}
     # 50 N are wanted: 40 N are asked for.
     driver.apply(Command(POSITION, 0.0, 50.0, 0.05))
     assert driver._asked.force_n == pytest.approx(40.0)
@@ -315,19 +305,9 @@ def test_delivered_force_is_stored_and_used(tmp_path):
 
 
 def test_damaged_readings_are_refused_with_their_line(tmp_path):
-    readings = tmp_path / "readings.csv"
-    readings.write_text("asked_n,delivered_n\n20,30\n40,\n")
-    options = [
-        "--gripper",
-        "franka",
-        "-o",
-        "gripper.host=emulated",
-        "-o",
-        f"gripper.calibration={tmp_path}/kept",
-    ]
-    done = CliRunner().invoke(cli, ["calibrate", "delivered-force", str(readings), *options])
-    assert isinstance(done.exception, DataDamaged)
-    assert ":3:" in str(done.exception)
+    done = _calibrated(tmp_path, "20,30\n40,")
+    assert done.returncode == DataDamaged.exit_code
+    assert ":3:" in done.stderr
 
 
 def test_a_table_that_stays_level_is_read():
@@ -335,10 +315,7 @@ def test_a_table_that_stays_level_is_read():
 
 
 def test_a_lost_hand_is_said_with_its_address():
-    driver = create(
-        "sensor-backend", "franka", host="emulated", calibration="none", faults={"unplug_at_s": 0.3}
-    )
-    driver.open(0)
+    driver = _opened(faults={"unplug_at_s": 0.3})
     with pytest.raises(DeviceLost, match="emulated"):
         [driver.read(1.0) for _ in range(10)]
     driver.close()

@@ -105,10 +105,11 @@ def test_a_gripper_in_percent_is_told_and_mended(tmp_path):
     assert column(mended, "gap_m") == pytest.approx(0.0008 * (column(plain, "gap_m") - 10.0))
 
 
-def test_a_gripper_in_radians_is_told(tmp_path):
+@every_case(("scale", "unit"), [(0.015, "rad"), (0.01, "share")])
+def test_a_gripper_in_another_unit_than_percent_is_told(tmp_path, scale, unit):
     state = episode()
-    state[:, 1] *= 0.015
-    assert read(write_set(tmp_path / "set", 3, [state]))[0].recording.units["gap"] == "rad"
+    state[:, 1] *= scale
+    assert read(write_set(tmp_path / "set", 3, [state]))[0].recording.units["gap"] == unit
 
 
 def test_a_gripper_whose_number_grows_while_it_closes_is_told(tmp_path):
@@ -146,13 +147,7 @@ def test_missing_frames_are_told_and_divide_the_episode(tmp_path):
     assert [len(squeeze.recording.readings) for squeeze in read(f"{folder}?gaps=cut")] == [88, 84]
 
 
-def test_a_gripper_from_0_to_1_is_told(tmp_path):
-    state = episode()
-    state[:, 1] /= 100.0
-    assert read(write_set(tmp_path / "set", 3, [state]))[0].recording.units["gap"] == "share"
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf])
+@every_case("value", [np.nan, np.inf])
 def test_frames_without_a_number_are_told_and_left_out(tmp_path, value):
     state = episode()
     state[10, 1] = value
@@ -217,9 +212,10 @@ def test_cells_are_known_in_other_styles_of_names(style):
     assert arrays[1].normal == tuple(names[14::3])
 
 
-def test_numbered_joints_are_no_cells():
+def test_numbered_joints_are_no_cells_and_cells_that_are_not_all_there_no_array():
     names = [f"left_joint_{k}" for k in range(7)] + [f"finger_{k}" for k in range(5)]
     assert meaning_of(names).arrays == ()
+    assert [array.name for array in meaning_of(CELLS[:-1]).arrays] == ["f0"]
 
 
 def test_numbers_that_sound_like_touch_and_are_not_understood_are_told(tmp_path):
@@ -302,11 +298,6 @@ def test_a_video_that_is_missing_is_told(tmp_path):
     assert any("missing" in line for line in read(folder)[0].recording.notes if "video" in line)
 
 
-def test_cells_that_are_not_all_there_are_no_array():
-    assert meaning_of(CELLS[:-1]).arrays[0].name == "f0"
-    assert len(meaning_of(CELLS[:-1]).arrays) == 1
-
-
 def damage_info(folder: Path, **changed: object) -> None:
     path = folder / "meta/info.json"
     path.write_text(json.dumps({**json.loads(path.read_text()), **changed}))
@@ -372,10 +363,14 @@ def test_a_damaged_data_set_is_an_error_that_says_what_is_wrong(tmp_path, damage
     with pytest.raises(kind) as caught:
         _refusal(folder)
     assert word in str(caught.value)
-    done = CliRunner().invoke(
-        cli, ["import", f"lerobot:{folder}", "--check", "--plot", str(tmp_path / "p.png")]
-    )
-    assert isinstance(done.exception, kind | SystemExit)
+
+
+@every_case("damage", [_remove(META), _cut(DATA), _episodes(length=[1, 2, 3])])
+def test_a_check_of_a_damaged_data_set_ends_with_an_error_of_ours(tmp_path, damage):
+    folder = write_set(tmp_path / "set", 3)
+    damage(folder)
+    done = CliRunner().invoke(cli, ["import", f"lerobot:{folder}", "--check", "--plot", f"{tmp_path}/p.png"])
+    assert isinstance(done.exception, GraspsenseError | SystemExit)
     assert done.exit_code
 
 
@@ -393,6 +388,7 @@ def test_a_task_that_is_not_described_is_an_error(tmp_path):
         _refusal(folder)
 
 
+@pytest.mark.slow
 def test_more_numbers_than_the_memory_should_hold_are_not_read(tmp_path):
     folder = write_set(tmp_path / "set", 3)
     n = 20_000_000

@@ -8,6 +8,7 @@ from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 
 import pytest
+from cases import every_case
 from lerobot_fake_arm import Clock, FakeArm
 from lerobot_sets import write_set
 
@@ -51,6 +52,7 @@ write_set(Path(EXAMPLES.name) / "set", 3)
 @pytest.mark.slow
 @parametrize_checks(
     "graspsense-lerobot",
+    wheel=False,  # .ci/lerobot runs from the wheel
     keys=KEYS,
     data={"lerobot": f"{EXAMPLES.name}/set"},
     unplugged={"robot_config": {"unplugged_s": 0.5}},
@@ -148,40 +150,26 @@ def test_a_damaged_answer_is_asked_again_and_a_lost_robot_is_told():
     driver.close()
 
 
-@pytest.mark.parametrize(
-    ("robot_config", "word"),
+@every_case(
+    ("keys", "error", "word"),
     [
-        ({"wants_all": True}, "alone"),
-        ({"moves_others": True}, "elbow_flex"),
-        ({"calibrated": False}, "lerobot-calibrate"),
-        ({"port": "nowhere"}, "nowhere"),
+        ({"robot_config": {"wants_all": True}}, NoDevice, "alone"),
+        ({"robot_config": {"moves_others": True}}, NoDevice, "elbow_flex"),
+        ({"robot_config": {"calibrated": False}}, NoDevice, "lerobot-calibrate"),
+        ({"robot_config": {"port": "nowhere"}}, NoDevice, "nowhere"),
+        ({"robot_config": {"driver": False}}, PluginUnavailable, "scservo_sdk"),
+        ({"robot_config": {"nonsense": 1}}, ConfigError, "nonsense"),
+        ({"robot": "no_such_robot"}, ConfigError, "fake_arm"),
+        ({"motor": "claw"}, ConfigError, "gripper.pos"),
     ],
 )
-def test_a_robot_that_cannot_be_used_is_refused_with_the_reason(robot_config, word):
-    with pytest.raises(NoDevice, match=word):
-        gripper(robot_config).open(1)
-    assert not FakeArm.made[-1].connected
-
-
-@pytest.mark.parametrize(
-    ("keys", "word"),
-    [
-        ({"robot": "no_such_robot"}, "fake_arm"),
-        ({"motor": "claw"}, "gripper.pos"),
-        ({"robot_config": {"nonsense": 1}}, "nonsense"),
-    ],
-)
-def test_wrong_settings_are_told(keys, word):
-    with pytest.raises(ConfigError, match=word):
+def test_a_robot_that_cannot_be_used_is_refused_with_the_reason(keys, error, word):
+    with pytest.raises(error, match=word):
         gripper(**keys).open(1)
+    assert not any(arm.connected for arm in FakeArm.made)
 
 
 def test_without_lerobot_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "lerobot.robots", None)
     with pytest.raises(PluginUnavailable, match="pip install lerobot"):
         gripper().open(1)
-
-
-def test_a_robot_without_its_driver_says_so():
-    with pytest.raises(PluginUnavailable, match="scservo_sdk"):
-        gripper({"driver": False}).open(1)

@@ -201,15 +201,16 @@ def test_an_episode_of_an_array_feature_is_read(tmp_path):
     )
 
 
-@pytest.fixture(params=[2, 3])
-def annotated(request, tmp_path):
-    """Return a data set of this version, its store, and its annotated copy."""
-    original = write_set(tmp_path / "set", request.param)
-    printed("import", f"lerobot:{original}?gap_m_per_unit=0.001", "--save", tmp_path / "s")
+@pytest.fixture(scope="module", params=[2, 3])
+def annotated(request, tmp_path_factory):
+    """Return the version of a data set, and the folder of the data set, its store and its annotated copy."""
+    folder = tmp_path_factory.mktemp("annotated")
+    original = write_set(folder / "set", request.param)
+    printed("import", f"lerobot:{original}?gap_m_per_unit=0.001", "--save", folder / "s")
     unchanged = contents(original)
-    printed("export", tmp_path / "s", "--to", f"lerobot:{tmp_path / 'copy'}?annotate={original}")
+    printed("export", folder / "s", "--to", f"lerobot:{folder / 'copy'}?annotate={original}")
     assert contents(original) == unchanged
-    return request.param, original, tmp_path / "copy"
+    return request.param, folder
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -223,8 +224,9 @@ def all_frames(folder: Path) -> Any:
 
 
 def test_a_copy_has_what_it_had_and_phase_event_and_prediction(annotated):
-    _, original, copy = annotated
-    old, new = all_frames(original), all_frames(copy)
+    _, folder = annotated
+    copy = folder / "copy"
+    old, new = all_frames(folder / "set"), all_frames(copy)
     added = ["graspsense.phase", "graspsense.event", "graspsense.prediction"]
     assert [*new.columns] == [*old.columns, *added]
     for key in old:
@@ -241,7 +243,8 @@ def test_a_copy_has_what_it_had_and_phase_event_and_prediction(annotated):
 
 
 def test_a_copy_says_what_each_trial_of_an_episode_was(annotated):
-    version, _, copy = annotated
+    version, folder = annotated
+    copy = folder / "copy"
     if version == 2:
         rows = [json.loads(line) for line in (copy / "meta/episodes.jsonl").read_text().splitlines()]
         trials = [
@@ -257,8 +260,8 @@ def test_a_copy_says_what_each_trial_of_an_episode_was(annotated):
 
 
 def test_an_annotated_copy_reads_as_the_original(annotated):
-    _, original, copy = annotated
-    for a, b in zip(recordings(str(original)), recordings(str(copy)), strict=True):
+    _, folder = annotated
+    for a, b in zip(*(recordings(str(folder / name)) for name in ("set", "copy")), strict=True):
         assert [reading.frame for reading in a.recording.readings] == [
             reading.frame for reading in b.recording.readings
         ]
@@ -272,8 +275,9 @@ def test_trials_of_another_origin_annotate_nothing(tmp_path):
     assert not (tmp_path / "copy").exists()
 
 
+@pytest.mark.slow
 def test_an_annotation_takes_the_place_of_an_earlier_one(annotated, tmp_path):
-    _, _, copy = annotated
+    copy = annotated[1] / "copy"
     printed("import", f"lerobot:{copy}?gap_m_per_unit=0.001", "--save", tmp_path / "s2")
     printed("export", tmp_path / "s2", "--to", f"lerobot:{tmp_path / 'second'}?annotate={copy}")
     assert all_frames(tmp_path / "second").equals(all_frames(copy))
@@ -281,18 +285,19 @@ def test_an_annotation_takes_the_place_of_an_earlier_one(annotated, tmp_path):
 
 
 def test_the_trials_of_another_data_set_annotate_nothing(annotated, tmp_path):
-    version, *_ = annotated
-    other = write_set(tmp_path / "other", version, [episode(), episode(2, peak=3.5), episode()[:, ::1] * 0.9])
-    done = graspsense("export", tmp_path / "s", "--to", f"lerobot:{tmp_path / 'wrong'}?annotate={other}")
+    version, folder = annotated
+    other = write_set(tmp_path / "other", version, [episode(), episode(2, peak=3.5), episode() * 0.9])
+    done = graspsense("export", folder / "s", "--to", f"lerobot:{tmp_path / 'wrong'}?annotate={other}")
     assert done.returncode == 2
     assert "data sets differ" in done.stderr
     assert not (tmp_path / "wrong").exists()
 
 
-def test_a_copy_within_the_original_is_refused(annotated, tmp_path):
-    _, original, _ = annotated
+def test_a_copy_within_the_original_is_refused(annotated):
+    _, folder = annotated
+    original = folder / "set"
     unchanged = contents(original)
-    done = graspsense("export", tmp_path / "s", "--to", f"lerobot:{original / 'copy'}?annotate={original}")
+    done = graspsense("export", folder / "s", "--to", f"lerobot:{original / 'copy'}?annotate={original}")
     assert done.returncode == 2
     assert "not changed" in done.stderr
     assert contents(original) == unchanged
@@ -312,10 +317,7 @@ def test_a_damaged_file_is_copied_and_counted(tmp_path):
     assert (tmp_path / "copy/data/chunk-000/episode_000000.parquet").read_bytes() == damaged.read_bytes()
 
 
-def test_frames_of_the_same_rate_are_written_once_each(tmp_path):
-    printed(
-        "import", f"lerobot:{write_set(tmp_path / 'set', 3)}?gap_m_per_unit=0.001", "--save", tmp_path / "s"
-    )
-    printed("export", tmp_path / "s", "--to", f"lerobot:{tmp_path / 'out'}")
+def test_frames_of_the_same_rate_are_written_once_each(written, tmp_path):
+    printed("export", written[1], "--to", f"lerobot:{tmp_path / 'out'}")
     state = np.stack(frames(tmp_path / "out")["observation.state"])
     assert (np.diff(state, axis=0) != 0.0).any(axis=1).all()

@@ -44,6 +44,7 @@ def alone():
     return {grasp: felt([grasp])[0] for grasp in GRASPS}
 
 
+@pytest.mark.slow
 def test_processes_grasp_as_one_process_does_and_tell_their_progress(alone):
     told = []
     many = felt(GRASPS, workers=2, progress=lambda done, total: told.append((done, total)))
@@ -54,17 +55,17 @@ def test_processes_grasp_as_one_process_does_and_tell_their_progress(alone):
 
 
 @pytest.mark.slow
-@given(order=st.permutations(range(len(GRASPS))), count=st.integers(1, 3), workers=st.integers(1, 3))
-@settings(max_examples=5, deadline=None)
+@given(order=st.permutations(range(len(GRASPS))), count=st.integers(2, 3), workers=st.integers(1, 2))
+@settings(max_examples=3, deadline=None)
 def test_order_and_number_change_no_grasp(alone, order, count, workers):
     grasps = [GRASPS[k] for k in order[:count]]
     assert felt(grasps, workers=workers) == [alone[grasp] for grasp in grasps]
 
 
-def test_a_batch_grasps_as_the_runner_does(alone):
-    for thing, seed in GRASPS[:2]:
-        grasp = run_uninterrupted(GRIPPER.with_object(thing), HYBRID, evolve(RUN, seed=seed))
-        assert (grasp.outcome, Values()(grasp.trace)) == alone[thing, seed][:2]
+def test_a_batch_grasps_as_the_runner_does():
+    (of_a_batch,) = felt(GRASPS[:1])
+    grasp = run_uninterrupted(GRIPPER.with_object("block"), HYBRID, evolve(RUN, seed=1))
+    assert (grasp.outcome, Values()(grasp.trace)) == of_a_batch[:2]
 
 
 def test_an_unknown_thing_ends_the_batch_before_any_grasp():
@@ -74,6 +75,7 @@ def test_an_unknown_thing_ends_the_batch_before_any_grasp():
     assert told == []
 
 
+@pytest.mark.slow
 def test_a_controller_that_other_processes_cannot_make_again_grasps_here(alone):
     class Unregistered(type(HYBRID)):
         pass

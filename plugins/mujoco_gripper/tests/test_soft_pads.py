@@ -57,7 +57,7 @@ def test_a_cell_image_is_the_pressure_of_a_bed_of_springs(tmp_path):
     The tips of the cells are spheres of 1.9 mm, which makes R larger by as much.
     """
     backend = opened(thing_file(tmp_path, 'type="sphere" size="0.02"'))
-    reading = squeezed(backend, 0.0395, 800)
+    reading = squeezed(backend, 0.0395, 600)
     image = np.array(reading.pads.left).reshape(5, 3)
     rows, columns = np.meshgrid([-8, -4, 0, 4, 8], [-4, 0, 4], indexing="ij")
     deeper_m = (rows**2 + columns**2) * 1e-6 / (2.0 * (0.02 + 0.0019))
@@ -67,6 +67,7 @@ def test_a_cell_image_is_the_pressure_of_a_bed_of_springs(tmp_path):
     assert reading.frame.force_left_n == pytest.approx(image.sum())
 
 
+@pytest.mark.slow
 def test_a_flat_thing_presses_on_all_cells_alike(tmp_path):
     backend = opened(thing_file(tmp_path, 'type="box" size="0.02 0.02 0.02"'))
     image = np.array(squeezed(backend, 0.0395, 800).pads.right)
@@ -97,7 +98,7 @@ def scene(folder, *lines):
 
 def test_a_thing_that_is_filled_weighs_more(tmp_path):
     backend = opened(scene(tmp_path, "fill = [[0.0, 0.0], [0.2, 0.3]]"))
-    squeezed(backend, 0.035, 1000)
+    squeezed(backend, 0.035, 700)
     model = backend._model
     masses = [model.body_mass[k] for k in range(model.nbody) if model.body(k).name.startswith("thing/")]
     assert sum(masses) == pytest.approx(0.15 + 0.3)
@@ -106,10 +107,11 @@ def test_a_thing_that_is_filled_weighs_more(tmp_path):
 def test_the_table_rises_as_the_scene_says(tmp_path):
     backend = opened(scene(tmp_path, "table_height = [[0.0, 0.0], [0.2, 0.02]]"))
     resting_m = float(backend._data.mocap_pos[0, 2])
-    squeezed(backend, 0.035, 1200)
+    squeezed(backend, 0.035, 700)
     assert backend._data.mocap_pos[0, 2] - resting_m == pytest.approx(0.02)
 
 
+@pytest.mark.slow
 def test_roughness_disturbs_cells_that_slide_and_no_others(tmp_path):
     backend = opened(scene(tmp_path, "friction = 0.05", "roughness_m = 4e-5"))
     still = [squeezed(backend, 0.0395, 800 if k == 0 else 1).frame.force_left_n for k in range(100)]
@@ -124,21 +126,6 @@ def test_roughness_disturbs_cells_that_slide_and_no_others(tmp_path):
 @every_case("name", ["tugged", "filled", "placed", "shaken"])
 def test_the_scenes_of_the_package_are_read(name):
     assert isinstance(read_scene(name).spec, mujoco.MjSpec)
-
-
-@pytest.mark.parametrize(
-    ("lines", "said"),
-    [
-        (("fill = [[0.0, -1.0]]",), "fill"),
-        (("roughness_m = 1.0",), "roughness_m"),
-        (("table = false", "table_height = [[0.0, 0.0]]"), "table"),
-    ],
-)
-def test_a_scene_that_cannot_be_says_why(tmp_path, lines, said):
-    path = tmp_path / "scene.toml"
-    path.write_text("\n".join(['thing = "block"', *lines]) + "\n")
-    with pytest.raises(ConfigError, match=said):
-        read_scene(str(path))
 
 
 @every_case(
@@ -180,6 +167,7 @@ def bumped(tmp_path, *lines):
     return np.array(edges)
 
 
+@pytest.mark.slow
 def test_a_bump_gives_the_edge_of_the_finger_the_momentum_of_the_ball(tmp_path):
     left, right = bumped(tmp_path, "mass_kg = 0.02", "speed_m_s = 0.5", "touch_s = 0.03").T
     # A rigid finger would return exp(-0.1 pi) = 73 % of the speed; one on a wrist that yields returns less.
@@ -188,6 +176,7 @@ def test_a_bump_gives_the_edge_of_the_finger_the_momentum_of_the_ball(tmp_path):
     assert not right.any()
 
 
+@pytest.mark.slow
 def test_edges_do_not_feel_a_bump_into_the_thing(tmp_path):
     assert not bumped(tmp_path, 'at = "thing"', "speed_m_s = 0.5").any()
 
@@ -198,20 +187,7 @@ def test_a_finger_without_an_edge_sensor_is_not_bumped_into(tmp_path):
         create("sensor-backend", "mujoco", object=str(path)).open(0)
 
 
-@every_case(
-    ("line", "said"),
-    [
-        ("speed_m_s = 0.0", "speed_m_s"),
-        ("mass_kg = nan", "mass_kg"),
-        ("touch_s = 0.2", "touch_s"),
-        ('at = "table"', "finger"),
-    ],
-)
-def test_a_bump_that_cannot_be_says_why(tmp_path, line, said):
-    with pytest.raises(ConfigError, match=said):
-        read_scene(str(scene(tmp_path, "[bump]", "t_s = 0.2", line)))
-
-
+@pytest.mark.slow
 def test_walls_have_a_soft_contact_with_cells_and_a_stiff_one_else():
     stiff, soft = (prepare(MujocoConfig(file=file, object="cup"), 1e-3) for file in ("", "soft_pads"))
     for prepared, contact_s in ((stiff, 0.001), (soft, 0.004)):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import queue
 import sys
 import threading
 from collections import deque
@@ -21,6 +22,7 @@ from graspsense_pr2_gripper.faults import Wire
 from graspsense_pr2_gripper.firmware import Firmware
 from graspsense_pr2_gripper.protocol import Identity
 from graspsense_pr2_gripper.transports import emulated
+from graspsense_pr2_gripper.transports.interface import Transport
 
 
 def identity(**changes: Any) -> Identity:
@@ -34,12 +36,12 @@ def identity(**changes: Any) -> Identity:
     return Identity(**{**numbers, **changes})
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def device_identity() -> Any:
     return identity
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def board() -> Any:
     """Makes a board over a simulated gripper: `board(object="block", faults=..., serial=...)`."""
 
@@ -105,6 +107,46 @@ def answered(monkeypatch: pytest.MonkeyPatch) -> None:
 def calibrations_apart(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
     """No test reads or writes the calibrations of whoever runs it."""
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
+
+
+class Fed(Transport):
+    """A wire that hands over what a test puts in, when it puts it in."""
+
+    def __init__(self, *reports: bytes) -> None:
+        self.reports: queue.SimpleQueue[bytes | Exception] = queue.SimpleQueue()
+        for report in reports:
+            self.reports.put(report)
+        self.longest_wait_s = 60.0
+        self.closed, self.freed = threading.Event(), threading.Event()
+        self.stuck_in_read = self.stuck_in_close = False
+
+    def read(self, timeout_s: float) -> bytes:
+        if self.stuck_in_read:
+            self.freed.wait()
+        try:
+            got = self.reports.get(timeout=min(timeout_s, self.longest_wait_s))
+        except queue.Empty:
+            return b""
+        if isinstance(got, Exception):
+            raise got
+        return got
+
+    def write(self, report: bytes) -> None:
+        raise NotImplementedError
+
+    def feature(self, report_id: int) -> bytes:
+        raise NotImplementedError
+
+    def close(self) -> None:
+        if self.stuck_in_close:
+            self.freed.wait()
+        self.closed.set()
+
+
+@pytest.fixture
+def fed() -> Any:
+    """Makes a wire that hands over these reports."""
+    return Fed
 
 
 class Machine:

@@ -12,10 +12,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
+from attrs import evolve
 
 from graspsense import load_pipeline
 from graspsense.core.grasp.runner import run_grasp
-from graspsense.plugin_api import Samples, create
+from graspsense.plugin_api import DeviceInfo, Reading, Samples, create
 from graspsense.recording.export_trace import write_npz
 from graspsense.recording.reader import read_recorded
 from graspsense.simulator_api import RunConfig
@@ -33,7 +34,6 @@ from graspsense_pr2_gripper.protocol import (
     encode_input,
 )
 from graspsense_pr2_gripper.stream import Stream
-from graspsense_pr2_gripper.transports.interface import Transport
 
 NEAR: dict[str, Any] = {"object": "can:empty_open", "body_config": {"open_gap_m": 0.075}}
 """A can, and fingers that stand near it: a grasp of half the ticks."""
@@ -68,25 +68,6 @@ class Sent(Wire):
         return arriving
 
 
-class Waiting(Transport):
-    """Reports that wait all at once, as after a program that was held up."""
-
-    def __init__(self, *reports: bytes) -> None:
-        self.reports = list(reports)
-
-    def read(self, timeout_s: float) -> bytes:
-        return self.reports.pop(0) if self.reports else b""
-
-    def write(self, report: bytes) -> None:
-        pass
-
-    def feature(self, report_id: int) -> bytes:
-        return b""
-
-    def close(self) -> None:
-        pass
-
-
 def test_a_word_holds_three_signed_axes_and_is_limited_to_the_full_scale() -> None:
     def back(sample: tuple[float, ...]) -> tuple[float, ...]:
         read: Samples = Accelerometer(8).signals(0.0, (word_of(sample, 8),), 1).acceleration
@@ -115,15 +96,15 @@ def test_lost_reports_and_samples_that_the_board_missed_are_counted() -> None:
     assert stream.sampled == 17, "at least one more than the report holds"
 
 
-def test_samples_of_a_report_that_was_skipped_come_with_the_next_one() -> None:
-    link = LockStepLink(Waiting(report(1, (1, 2)), report(2, (3, 4))), 1e-3)
+def test_samples_of_a_report_that_was_skipped_come_with_the_next_one(fed: Any) -> None:
+    link = LockStepLink(fed(report(1, (1, 2)), report(2, (3, 4))), 1e-3)
     arrival = link.next(1e-3)
     assert arrival is not None
     assert (arrival.words, arrival.sampled) == ((1, 2, 3, 4), 4)
 
 
-def test_samples_before_a_gap_are_not_joined_to_those_after_it() -> None:
-    link = LockStepLink(Waiting(report(1, (1, 2)), report(3, (5, 6))), 1e-3)
+def test_samples_before_a_gap_are_not_joined_to_those_after_it(fed: Any) -> None:
+    link = LockStepLink(fed(report(1, (1, 2)), report(3, (5, 6))), 1e-3)
     arrival = link.next(1e-3)
     assert arrival is not None
     assert (arrival.words, arrival.sampled) == ((5, 6), 6)
@@ -145,36 +126,36 @@ def test_every_sample_that_the_board_sends_reaches_the_trace(monkeypatch: pytest
     assert sent[start : start + len(acceleration.values)].tobytes() == acceleration.values.tobytes()
 
 
+def opened_and_read(**settings: Any) -> tuple[DeviceInfo, list[Reading]]:
+    """Return what the emulated gripper with these settings says, and half a second of its readings."""
+    backend = Pr2Backend(evolve(EMULATED, **settings))
+    info = backend.open(1)
+    readings = [backend.read(0.1) for _ in range(500)]
+    backend.close()
+    return info, [reading for reading in readings if reading is not None]
+
+
 def test_reports_that_are_dropped_show_as_lost_samples() -> None:
-    config = Pr2Config(transport="emulated", calibration="none", faults=FaultConfig(drop=0.05), **NEAR)
-    ended = run_grasp(Pr2Backend(config), create("controller", "hybrid"), RunConfig(seed=1))
-    acceleration = ended.trace.signals["acceleration"]
-    assert 0.02 < acceleration.lost / len(acceleration.values) < 0.1
-    assert (np.diff(acceleration.t_s) > 0.0).all()
+    _, readings = opened_and_read(faults=FaultConfig(drop=0.05))
+    samples = [reading.signals.acceleration for reading in readings]
+    arrived = sum(block.new for block in samples)
+    counted = samples[-1].counter - samples[0].counter + samples[0].new
+    assert 0.02 < (counted - arrived) / counted < 0.1
+    assert (np.diff([block.t_s for block in samples]) > 0.0).all()
 
 
-def test_a_board_without_an_accelerometer_grasps_as_before_and_says_so() -> None:
-    old = Pr2Config(
-        transport="emulated",
-        calibration="none",
-        faults=FaultConfig(identity={"accelerometer_g": 0}),
-        **NEAR,
-    )
-    with_it, without = (
-        run_grasp(Pr2Backend(config), create("controller", "hybrid"), RunConfig(seed=1))
-        for config in (EMULATED, old)
-    )
-    assert "the board has no accelerometer" in " ".join(without.device.notes)
-    assert len(without.trace.signals["acceleration"].values) == 0
-    assert without.trace.gap_m.tobytes() == with_it.trace.gap_m.tobytes()
-    assert without.trace.force_left_n.tobytes() == with_it.trace.force_left_n.tobytes()
+def test_a_board_without_an_accelerometer_reads_as_before_and_says_so() -> None:
+    _, with_it = opened_and_read()
+    info, without = opened_and_read(faults=FaultConfig(identity={"accelerometer_g": 0}))
+    assert "the board has no accelerometer" in " ".join(info.notes)
+    assert {reading.signals.acceleration.new for reading in without} == {0}
+    assert repr([reading.frame for reading in without]) == repr([reading.frame for reading in with_it])
 
 
 def test_the_channel_can_be_left_out_by_the_settings() -> None:
-    backend = Pr2Backend(Pr2Config(transport="emulated", calibration="none", accelerometer=False, **NEAR))
-    assert CHANNEL not in backend.channels
-    ended = run_grasp(backend, create("controller", "hybrid"), RunConfig(seed=1))
-    assert ended.trace.signals == {}
+    assert CHANNEL not in Pr2Backend(evolve(EMULATED, accelerometer=False)).channels
+    _, readings = opened_and_read(accelerometer=False)
+    assert {reading.signals for reading in readings} == {()}
 
 
 PROGRAM = """

@@ -56,15 +56,21 @@ def by_cell(sent: list[InputReport]) -> dict[int, list[tuple[int, int]]]:
     return values
 
 
-def healthy_and_faulty(board: Any, **faults: Any) -> tuple[list[InputReport], list[InputReport]]:
-    """Return what a healthy board sends, and what one with these faults sends."""
-    return reports(board()), reports(board(faults=FaultConfig(**faults)))
+@pytest.fixture(scope="module")
+def healthy(board: Any) -> list[InputReport]:
+    """What a healthy board sends."""
+    return reports(board())
 
 
-@every_case("side", SIDES)
-@every_case("kind", ["stuck", "numb", "zero"])
-def test_cells_of_a_fingertip_go_wrong_from_a_time_on(board: Any, kind: Any, side: Any) -> None:
-    healthy, faulty = healthy_and_faulty(board, pad_fault=kind, pad_side=side, pad_at_s=AT_S)
+def faulty_reports(board: Any, **faults: Any) -> list[InputReport]:
+    return reports(board(faults=FaultConfig(**faults)))
+
+
+@every_case(("kind", "side"), [("stuck", "left"), ("numb", "right"), ("zero", "both")])
+def test_cells_of_a_fingertip_go_wrong_from_a_time_on(
+    board: Any, healthy: list[InputReport], kind: Any, side: Any
+) -> None:
+    faulty = faulty_reports(board, pad_fault=kind, pad_side=side, pad_at_s=AT_S)
     good, bad = by_cell(healthy), by_cell(faulty)
     assert {report.status for report in faulty} == {0}
     for cell in range(44):
@@ -84,19 +90,23 @@ def test_cells_of_a_fingertip_go_wrong_from_a_time_on(board: Any, kind: Any, sid
     assert any(len({value for _, value in good[cell]}) > 3 for cell in SIDES[side]), "a healthy cell varies"
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("side", "bits"), [("left", LEFT_ABSENT), ("right", RIGHT_ABSENT), ("both", LEFT_ABSENT | RIGHT_ABSENT)]
 )
-def test_absent_fingertip_sets_its_bit_and_changes_no_cell(board: Any, side: Any, bits: int) -> None:
-    healthy, faulty = healthy_and_faulty(board, pad_fault="absent", pad_side=side, pad_at_s=AT_S)
+def test_absent_fingertip_sets_its_bit_and_changes_no_cell(
+    board: Any, healthy: list[InputReport], side: Any, bits: int
+) -> None:
+    faulty = faulty_reports(board, pad_fault="absent", pad_side=side, pad_at_s=AT_S)
     assert by_cell(faulty) == by_cell(healthy)
     assert {report.status for report in faulty if report.time_us < AT_S * 1e6} == {0}
     assert {report.status for report in faulty if report.time_us >= AT_S * 1e6} == {bits}
 
 
-@pytest.mark.parametrize("side", SIDES)
-def test_cells_drift_on_the_side_and_from_the_time_that_are_set(board: Any, side: Any) -> None:
-    healthy, faulty = healthy_and_faulty(board, drift_counts_s=500.0, pad_side=side, pad_at_s=AT_S)
+@every_case("side", SIDES)
+def test_cells_drift_on_the_side_and_from_the_time_that_are_set(
+    board: Any, healthy: list[InputReport], side: Any
+) -> None:
+    faulty = faulty_reports(board, drift_counts_s=500.0, pad_side=side, pad_at_s=AT_S)
     good, bad = by_cell(healthy), by_cell(faulty)
     for cell in range(44):
         for (time_us, value), (_, drifted) in zip(good[cell], bad[cell], strict=True):
@@ -104,9 +114,12 @@ def test_cells_drift_on_the_side_and_from_the_time_that_are_set(board: Any, side
             assert drifted - value == (round(500.0 * (time_us * 1e-6 - AT_S)) if drifts else 0)
 
 
-def test_image_counter_stands_still_and_only_a_stale_image_tells_its_age(board: Any) -> None:
-    healthy, frozen = healthy_and_faulty(board, image_fault="frozen", image_at_s=AT_S)
-    stale = reports(board(faults=FaultConfig(image_fault="stale", image_at_s=AT_S)))
+def test_image_counter_stands_still_and_only_a_stale_image_tells_its_age(
+    board: Any, healthy: list[InputReport]
+) -> None:
+    frozen, stale = (
+        faulty_reports(board, image_fault=fault, image_at_s=AT_S) for fault in ("frozen", "stale")
+    )
     assert healthy[-1].image == 14, "0.6 s, with an image each 41 ms"
     for sent in (frozen, stale):
         assert [report.image for report in sent[:200]] == [report.image for report in healthy[:200]]
@@ -118,7 +131,7 @@ def test_image_counter_stands_still_and_only_a_stale_image_tells_its_age(board: 
 
 
 def test_status_bits_are_set_from_a_time_on(board: Any) -> None:
-    _, faulty = healthy_and_faulty(board, status_bits=0x8005, status_at_s=AT_S)
+    faulty = faulty_reports(board, status_bits=0x8005, status_at_s=AT_S)
     assert {report.status for report in faulty[:200]} == {0}
     assert {report.status for report in faulty[200:]} == {0x8005}
 
@@ -143,9 +156,9 @@ def test_effort_is_reported_wrongly_while_the_motor_is_right(board: Any) -> None
     assert wire.firmware.largest_effort_n == 15.0
 
 
-@pytest.mark.parametrize("rate", [0.0, 0.5, 2.0])
+@every_case("rate", [0.0, 2.0])
 def test_clock_of_the_device_runs_at_another_rate(board: Any, rate: float) -> None:
-    _, faulty = healthy_and_faulty(board, clock_rate=rate, clock_at_s=AT_S)
+    faulty = faulty_reports(board, clock_rate=rate, clock_at_s=AT_S)
     assert [report.time_us for report in faulty[:201]] == list(range(0, 201_000, 1000))
     assert [report.time_us - 200_000 for report in faulty[200:]] == [
         round(1000 * rate * i) for i in range(400)
@@ -158,11 +171,6 @@ def test_feature_report_has_the_numbers_that_are_set(number: str) -> None:
     body = {"accelerometer_g": 4}.get(number, 77)
     config = Pr2Config(transport="emulated", faults=FaultConfig(identity={number: body}))
     assert getattr(decode_identity(emulated_board(config, 0).wire.feature()), number) == body
-
-
-def test_feature_report_can_be_cut_short(board: Any) -> None:
-    assert len(board(faults=FaultConfig(feature_bytes=10)).feature()) == 10
-    assert board(faults=FaultConfig(feature_bytes=0)).feature() == b""
 
 
 @every_case(

@@ -18,7 +18,7 @@ from graspsense_pr2_gripper.backend import Pr2Backend
 from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
 from graspsense_pr2_gripper.faults import Wire
 
-FAULTS = int(os.environ.get("GRASPSENSE_DEVICE_FAULTS", "240"))
+FAULTS = int(os.environ.get("GRASPSENSE_DEVICE_FAULTS", "120"))
 CONTROLLERS = ("hybrid", "force", "velocity")
 NEAR: dict[str, Any] = {"object": "can:empty_open", "body_config": {"open_gap_m": 0.075}}
 OFF_WITHIN_S = 0.1

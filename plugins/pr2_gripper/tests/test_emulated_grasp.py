@@ -21,7 +21,7 @@ from graspsense_pr2_gripper.backend import Pr2Backend
 from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
 from graspsense_pr2_gripper.faults import Wire
 from graspsense_pr2_gripper.linkage import FRICTION_N
-from graspsense_pr2_gripper.protocol import EFFORT_KIND, ProtocolError, decode_output
+from graspsense_pr2_gripper.protocol import EFFORT_KIND, decode_output
 from graspsense_sim_gripper.run.build import device_info
 
 BARE = "classifier.type=none"
@@ -55,6 +55,8 @@ def test_only_an_emulated_gripper_can_be_given_an_object() -> None:
     holding.close()
     assert any(kind.default for kind in emulated.objects())
     assert not real.objects()
+    with pytest.raises(ConfigError, match="no object named 'blok'"):
+        emulated.with_object("blok").open(0)
     with pytest.raises(ConfigError, match="cannot be given the object 'can:full_open'"):
         real.with_object("can:full_open")
 
@@ -62,7 +64,12 @@ def test_only_an_emulated_gripper_can_be_given_an_object() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("thing", "seed"),
-    [("odwalla:full_closed", 0), ("odwalla:full_open", 3), ("can:empty_open", 1), ("none", 1)],
+    [
+        ("odwalla:full_closed", 0),
+        pytest.param("odwalla:full_open", 3, marks=pytest.mark.long),
+        ("can:empty_open", 1),
+        ("none", 1),
+    ],
 )
 def test_grasp_through_the_driver_is_the_direct_one(
     thing: str, seed: int, monkeypatch: pytest.MonkeyPatch
@@ -215,16 +222,16 @@ def commanded_safely(
 
 
 @pytest.mark.slow
-def test_commands_stay_within_limits_whatever_the_wire_does(monkeypatch: pytest.MonkeyPatch) -> None:
-    outcomes = commanded_safely(monkeypatch, 8, seed=11)
-    assert outcomes["STEADY"] >= 2
-    assert outcomes["DEVICE_LOST"] >= 1
-
-
-@pytest.mark.slow
-def test_commands_stay_within_limits_whatever_the_board_does(monkeypatch: pytest.MonkeyPatch) -> None:
-    outcomes = commanded_safely(monkeypatch, 12, seed=13, faults=random_board_faults)
-    assert outcomes["ABORTED"] >= 2
+@pytest.mark.parametrize(
+    ("grasps", "seed", "faults", "twice"),
+    [(6, 22, random_faults, "STEADY"), (8, 20, random_board_faults, "ABORTED")],
+    ids=["wire", "board"],
+)
+def test_commands_stay_within_limits_whatever_wire_and_board_do(
+    monkeypatch: pytest.MonkeyPatch, grasps: int, seed: int, faults: Any, twice: str
+) -> None:
+    outcomes = commanded_safely(monkeypatch, grasps, seed, faults)
+    assert outcomes[twice] >= 2
     assert outcomes["DEVICE_LOST"] >= 1
 
 
@@ -235,29 +242,28 @@ def test_a_thousand_grasps_with_random_faults(monkeypatch: pytest.MonkeyPatch) -
     assert sum(outcomes.values()) == 1000
 
 
-PHASE_TIMES = {Phase.OPENING: 0.05, Phase.TARING: 0.2, Phase.APPROACH: 1.0, Phase.SQUEEZE: 1.4,
-               Phase.HOLD: 1.7, Phase.RELEASE: 1.9}  # fmt: skip
-"""Of the near can at seed 1; the test checks that these times lie in these phases."""
-
-
-@pytest.mark.parametrize("phase", [pytest.param(p, id=p.name.lower()) for p in PHASE_TIMES])
-def test_cable_pulled_in_every_phase(phase: Phase) -> None:
-    at_s = PHASE_TIMES[phase]
+def test_cable_pulled_in_the_squeeze() -> None:
+    """In test_device_lost.py it is pulled at any time, under every law."""
+    at_s = 1.4
     ended = grasp(Pr2Config(transport="emulated", faults=FaultConfig(unplug_at_s=at_s), **NEAR))
     assert ended.outcome == Outcome.DEVICE_LOST
     assert "cable" in ended.reason
-    assert ended.events[-1].phase == phase
     assert ended.report["let_go_after_s"] <= 0.1
-    if phase >= Phase.APPROACH:
-        assert ended.trace.phase[-1] == phase
-        assert ended.trace.t_s[-1] == pytest.approx(at_s - 0.001), "the trace holds the last frame there was"
+    assert ended.trace.phase[-1] == ended.events[-1].phase == Phase.SQUEEZE
+    assert ended.trace.t_s[-1] == pytest.approx(at_s - 0.001), "the trace holds the last frame there was"
 
 
 @pytest.mark.usefixtures("answered")
-@pytest.mark.parametrize("phase", [pytest.param(p, id=p.name.lower()) for p in PHASE_TIMES])
-@pytest.mark.parametrize("pace", ["lock-step", pytest.param("device", marks=pytest.mark.slow)])
-def test_cable_pulled_between_a_frame_and_its_command(phase: Phase, pace: Any) -> None:
+@pytest.mark.parametrize(
+    "phase",
+    [
+        pytest.param(phase, id=phase.name.lower(), marks=() if phase is Phase.SQUEEZE else pytest.mark.slow)
+        for phase in Phase
+    ],
+)
+def test_cable_pulled_between_a_frame_and_its_command(phase: Phase) -> None:
     """At the instant a phase begins: its frame was read, its command finds nobody."""
+    pace = "device" if phase is Phase.HOLD else "lock-step"
     backend = Pr2Backend(Pr2Config(transport="emulated", pace=pace, **NEAR))
 
     def pull(event: GraspEvent) -> None:
@@ -273,6 +279,7 @@ def test_cable_pulled_between_a_frame_and_its_command(phase: Phase, pace: Any) -
         assert ended.trace.t_s[-1] == ended.events[-1].t_s
 
 
+@pytest.mark.slow
 def test_short_stall_is_survived_and_counted_as_late() -> None:
     ended = grasp(Pr2Config(transport="emulated", faults=FaultConfig(stall_at_s=0.6, stall_s=0.05), **NEAR))
     assert ended.outcome == Outcome.STEADY
@@ -291,16 +298,17 @@ def test_long_stall_is_a_lost_device_that_has_let_go() -> None:
     "faults",
     [
         FaultConfig(drop=0.05),
-        pytest.param(FaultConfig(corrupt=0.05), marks=pytest.mark.slow),
+        FaultConfig(corrupt=0.05),
         FaultConfig(repeat=0.1),
         FaultConfig(reorder=0.1),
-        pytest.param(FaultConfig(delay=0.05), marks=pytest.mark.slow),
+        FaultConfig(delay=0.05),
         FaultConfig(drop_command=0.2),
-        pytest.param(FaultConfig(corrupt_command=0.2), marks=pytest.mark.slow),
-        pytest.param(FaultConfig(freeze_cell=10), marks=pytest.mark.slow),
-        pytest.param(FaultConfig(drift_counts_s=1.0), marks=pytest.mark.slow),
+        FaultConfig(corrupt_command=0.2),
+        FaultConfig(freeze_cell=10),
+        FaultConfig(drift_counts_s=1.0),
     ],
 )
+@pytest.mark.slow
 def test_one_fault_at_a_time_is_survived_and_counted(faults: FaultConfig) -> None:
     ended = grasp(Pr2Config(transport="emulated", faults=faults, **NEAR))
     assert ended.outcome == Outcome.STEADY
@@ -316,50 +324,19 @@ def test_one_fault_at_a_time_is_survived_and_counted(faults: FaultConfig) -> Non
             assert report[counter] == 0
 
 
-@pytest.mark.slow
-def test_object_reaches_the_body_and_an_unknown_one_is_a_users_mistake() -> None:
-    wide = load_pipeline(options=EMULATED).grasp(object="block", seed=1)
-    thin = load_pipeline(options=EMULATED).grasp(object="can:empty_open", seed=1)
-    assert wide.features.values[0] != pytest.approx(thin.features.values[0], abs=1e-3)
-    with pytest.raises(ConfigError, match="no object named 'blok'"):
-        load_pipeline(options=EMULATED).grasp(object="blok")
-
-
 def test_object_with_a_real_wire_is_a_users_mistake() -> None:
     with pytest.raises(ConfigError, match="object is for the emulated gripper"):
         load_pipeline(options=["gripper.type=pr2", 'gripper.object="block"'])
 
 
 def test_body_takes_its_own_keys() -> None:
-    quiet = load_pipeline(options=[*EMULATED, "gripper.body_config.noise_counts=0"]).grasp(seed=1)
-    pads = quiet.trace.pad_left[:20]
-    assert np.ptp(pads, axis=0).max() == 0.0
-
-
-def test_driver_sends_no_effort_that_is_no_number(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The guard stops NaN before; where a caller has no guard, the driver lets go instead."""
-    from graspsense.plugin_api import EFFORT, Command
-
-    backend = Pr2Backend(Pr2Config(transport="emulated"))
-    backend.open(0)
-    try:
-        firmware = backend._open().emulation.wire.firmware  # type: ignore[union-attr]
-        for value, most, speed, expected in [
-            (20.0, math.inf, math.inf, 20_000_000),
-            (math.nan, math.inf, math.inf, 0),
-            (1e12, math.inf, math.inf, 100_000_000),
-            (-math.inf, math.inf, math.inf, -100_000_000),
-            (20.0, math.nan, math.inf, 0),
-            (20.0, math.inf, math.nan, 0),
-            (20.0, 5.0, 0.1, 5_000_000),
-        ]:
-            backend.read(0.1)
-            backend.apply(Command(EFFORT, value, most, speed))
-            assert firmware.effort_un == expected
-    finally:
-        backend.close()
-    with pytest.raises(ProtocolError):
-        decode_output(bytes(64))
+    quiet = Pr2Backend(Pr2Config(transport="emulated", body_config={"noise_counts": 0}))
+    quiet.open(0)
+    pads = [reading.pads for reading in (quiet.read(0.1) for _ in range(300)) if reading is not None]
+    quiet.close()
+    images = {image.counter: image.left for image in pads if image.counter}
+    assert len(images) > 3
+    assert len(set(images.values())) == 1
 
 
 @pytest.mark.slow

@@ -2,74 +2,28 @@
 
 from __future__ import annotations
 
-import queue
 import threading
 import time
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
-from graspsense.gripper_api import DeviceClock
 from graspsense.plugin_api import DeviceLost
 from graspsense_pr2_gripper import link as links
 from graspsense_pr2_gripper.link import ThreadedLink
 from graspsense_pr2_gripper.protocol import InputReport, encode_input
-from graspsense_pr2_gripper.transports.interface import Transport, TransportGone
+from graspsense_pr2_gripper.transports.interface import TransportGone
 
 
 def report(sequence: int, time_us: int) -> bytes:
     return encode_input(InputReport(sequence, time_us, 0, 0, 0, 0, 0, (), 0, 0, (0, 0, 0, 0), 0, 0))
 
 
-class Fed(Transport):
-    """A wire that hands over what the test puts in, when it puts it in."""
-
-    def __init__(self) -> None:
-        self.reports: queue.Queue[bytes | Exception] = queue.Queue()
-        self.closed = threading.Event()
-        self.stuck_in_read = self.stuck_in_close = False
-        self.freed = threading.Event()
-
-    def read(self, timeout_s: float) -> bytes:
-        if self.stuck_in_read:
-            self.freed.wait()
-        try:
-            got = self.reports.get(timeout=timeout_s)
-        except queue.Empty:
-            return b""
-        if isinstance(got, Exception):
-            raise got
-        return got
-
-    def write(self, report: bytes) -> None:
-        raise NotImplementedError
-
-    def feature(self, report_id: int) -> bytes:
-        raise NotImplementedError
-
-    def close(self) -> None:
-        if self.stuck_in_close:
-            self.freed.wait()
-        self.closed.set()
-
-
-def drained(link: ThreadedLink, wire: Fed, count: int) -> None:
+def drained(link: ThreadedLink, wire: Any, count: int) -> None:
     """Wait until the reader has taken `count` reports, however long that takes here."""
     while link.stream.counts.reports < count:
         time.sleep(0.001)
-
-
-def test_oldest_reports_of_a_full_buffer_are_not_acted_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    """hidraw keeps the oldest 64 and loses the newer: after a stall of 300 ms the first are 300 ms old."""
-    host = [100.0]
-    monkeypatch.setattr(links.time, "monotonic", lambda: host[0])
-    clock = DeviceClock()
-    assert clock.age_s(1.000, 100.000) == 0.0
-    host[0] = 100.3
-    ages = [clock.age_s(1.001 + 0.001 * i, host[0]) for i in range(64)]
-    assert ages[0] == pytest.approx(0.299)
-    assert min(ages) > links.OLDEST_S, "the whole buffer is stale"
-    assert clock.age_s(1.3005, 100.3005) < 0.001
 
 
 @pytest.fixture
@@ -80,9 +34,9 @@ def host(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     return now
 
 
-def test_reader_counts_what_was_too_old_and_hands_on_the_fresh_one(host: list[float]) -> None:
+def test_reader_counts_what_was_too_old_and_hands_on_the_fresh_one(host: list[float], fed: Any) -> None:
     """After a stall of 300 ms the buffer holds the 64 reports that came first."""
-    wire = Fed()
+    wire = fed()
     link = ThreadedLink(wire, 0.001)
     try:
         now_us = 10_000_000
@@ -102,8 +56,8 @@ def test_reader_counts_what_was_too_old_and_hands_on_the_fresh_one(host: list[fl
 
 
 @pytest.mark.usefixtures("host")
-def test_newest_report_replaces_the_one_nobody_asked_for() -> None:
-    wire = Fed()
+def test_newest_report_replaces_the_one_nobody_asked_for(fed: Any) -> None:
+    wire = fed()
     link = ThreadedLink(wire, 0.001)
     try:
         for i in range(6):
@@ -120,8 +74,8 @@ def test_newest_report_replaces_the_one_nobody_asked_for() -> None:
         link.close()
 
 
-def test_loss_is_told_with_its_reason() -> None:
-    wire = Fed()
+def test_loss_is_told_with_its_reason(fed: Any) -> None:
+    wire = fed()
     link = ThreadedLink(wire, 0.001)
     wire.reports.put(TransportGone("read error"))
     with pytest.raises(DeviceLost, match=r"read error.*graspsense devices"):
@@ -133,8 +87,8 @@ def test_loss_is_told_with_its_reason() -> None:
     assert wire.closed.is_set()
 
 
-def test_closing_twice_is_closing_once() -> None:
-    wire = Fed()
+def test_closing_twice_is_closing_once(fed: Any) -> None:
+    wire = fed()
     link = ThreadedLink(wire, 0.001)
     assert link.close()
     wire.closed.clear()
@@ -143,10 +97,12 @@ def test_closing_twice_is_closing_once() -> None:
 
 
 @pytest.mark.parametrize("where", ["stuck_in_read", "stuck_in_close"])
-def test_closing_is_bounded_where_the_library_hangs(monkeypatch: pytest.MonkeyPatch, where: str) -> None:
+def test_closing_is_bounded_where_the_library_hangs(
+    monkeypatch: pytest.MonkeyPatch, where: str, fed: Any
+) -> None:
     """pyusb's close was seen to hang for more than 8 s on a device that answers nothing."""
     monkeypatch.setattr(links, "JOIN_S", 0.3)
-    wire = Fed()
+    wire = fed()
     setattr(wire, where, True)
     link = ThreadedLink(wire, 0.001)
     if where == "stuck_in_close":

@@ -202,11 +202,6 @@ def test_documents_report_descriptor_is_the_codecs_and_declares_63_byte_reports(
     assert items[0] == (0x04, 0xFF00)
 
 
-def test_an_image_goes_out_well_within_its_41_ms() -> None:
-    assert protocol.SLICES * protocol.SLICE_CELLS == 44
-    assert protocol.SLICES <= 41 // 3, "so that each slice goes out three times"
-
-
 @every_case("value", [math.nan, math.inf, -math.inf, 3000.0])
 def test_what_no_report_can_hold_is_refused_before_it_is_sent(value: float) -> None:
     with pytest.raises(ProtocolError):

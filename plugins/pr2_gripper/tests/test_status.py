@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from graspsense.gripper_api import revolutions_at
 from graspsense.plugin_api import Pads
 from graspsense_pr2_gripper.backend import Pr2Backend
-from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
+from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.linkage import LINKAGES
 from graspsense_pr2_gripper.measure import Measure
 from graspsense_pr2_gripper.protocol import (
@@ -201,13 +201,3 @@ def test_page_has_the_table_of_the_code() -> None:
     }
     assert printed == {bit: row for bit, row in expected.items() if bit not in reserved}
     assert "| 6 to 15 | unknown bit | " in PAGE.read_text()
-
-
-def test_bits_that_the_board_sets_reach_the_frames() -> None:
-    for bit in range(16):
-        faults = FaultConfig(status_bits=1 << bit, status_at_s=0.002)
-        backend = Pr2Backend(Pr2Config(transport="emulated", faults=faults))
-        backend.open(0)
-        readings = [backend.read(0.1) for _ in range(4)]
-        backend.close()
-        assert [reading.frame.status for reading in readings if reading] == [0, 0, 1 << bit, 1 << bit]

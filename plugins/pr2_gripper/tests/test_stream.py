@@ -77,20 +77,6 @@ def test_late_report_is_not_handed_on_but_its_cells_count() -> None:
     assert stream.image is not None
 
 
-def test_repeated_and_damaged_reports_change_nothing() -> None:
-    stream = Stream()
-    good = reports(0, 3)
-    damaged = bytearray(good[1])
-    damaged[14] ^= 4
-    taken = [
-        stream.take(data) is not None
-        for data in (good[0], good[0], bytes(damaged), good[1], good[0], good[2])
-    ]
-    assert taken == [True, False, False, True, False, True]
-    counts = stream.counts
-    assert (counts.reports, counts.repeated, counts.corrupt, counts.lost) == (3, 2, 1, 0)
-
-
 def test_device_that_begins_anew_is_noticed() -> None:
     stream = Stream()
     stream.take(report(5000))

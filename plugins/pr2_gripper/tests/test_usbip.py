@@ -11,7 +11,6 @@ import struct
 import sys
 import threading
 from collections.abc import Iterator
-from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -111,9 +110,9 @@ class Host:
 class Served:
     """A server with its thread, and the host at the other end."""
 
-    def __init__(self, device: Any) -> None:
+    def __init__(self, server: UsbipServer) -> None:
         ours, theirs = socket.socketpair()
-        self.server = UsbipServer(device, PLUG)
+        self.server = server
         self.server.connect(ours)
         self.thread = threading.Thread(target=self.server.serve)
         self.thread.start()
@@ -134,7 +133,7 @@ def device() -> Taken:
 
 @pytest.fixture
 def served(device: Taken) -> Iterator[Served]:
-    server = Served(device)
+    server = Served(UsbipServer(device, PLUG))
     yield server
     server.close()
 
@@ -174,7 +173,7 @@ def test_a_host_finds_the_device_that_the_document_describes(served: Served) -> 
 def test_every_unlink_is_answered_and_every_transfer_ends_once(does: list[str | int]) -> None:
     """Whatever the device's mood. A host whose unlink is not answered hangs for good."""
     device = Taken()
-    served = Served(device)
+    served = Served(UsbipServer(device, PLUG))
     host = served.host
     try:
         submitted: set[int] = set()
@@ -257,24 +256,20 @@ class SocketPort(Port):
 
     def __init__(self, board: EmulatedBoard, plug: Plug) -> None:
         self.server = UsbipServer(board, plug)
-        self.served: Any = None
+        self.served: Served | None = None
+
+    @property
+    def host(self) -> Host:
+        assert self.served is not None, "it is plugged in"
+        return self.served.host
 
     def plug(self) -> None:
-        ours, theirs = socket.socketpair()
-        self.server.connect(ours)
-        thread = threading.Thread(target=self.server.serve)
-        thread.start()
-        self.host = Host(theirs)
-        self.served = ours, thread
+        self.served = Served(self.server)
 
     def unplug(self) -> None:
         if self.served is not None:
-            ours, thread = self.served
+            self.served.close()
             self.served = None
-            self.server.hang_up()
-            thread.join()
-            ours.close()
-            self.host.connection.close()
 
     def send(self, report: bytes) -> bool:
         return self.server.send(report)

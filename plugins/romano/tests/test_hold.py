@@ -47,7 +47,7 @@ def test_bad_input_is_a_wrong_use(arguments, said):
 
 
 def test_a_gripper_that_is_lost_ends_it_and_was_not_opened():
-    done = graspsense("hold", "--seconds", "30", *PR2, "-o", "gripper.faults.unplug_at_s=2")
+    done = graspsense("hold", "--seconds", "30", *PR2, "-o", "gripper.faults.unplug_at_s=0.7")
     assert done.returncode == 4
     assert "device lost" in done.stdout
     assert "not opened" in done.stderr
@@ -105,8 +105,14 @@ def test_ctrl_c_opens_the_fingers(when):
     assert float(opened.split()[-2]) > 80.0
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["grab", "pick-and-place", "event-detector"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param("pick-and-place", marks=pytest.mark.slow),
+        pytest.param("grab", marks=pytest.mark.long),
+        pytest.param("event-detector", marks=pytest.mark.long),
+    ],
+)
 def test_laws_give_the_same_grasp_compiled_and_plain(name):
     law, runs = create("controller", name), []
     for compiled in ("always", "never"):

@@ -144,8 +144,8 @@ def test_pads_feel_how_heavy_a_bottle_is(felt):
 
 @pytest.mark.slow
 def test_a_model_of_shaken_bottles_tells_another_one(tmp_path):
-    """By its probabilities: after six grasps, another bottle may still count as unknown."""
-    command = "train simulated --pipeline shake --objects flask_half:closed,flask_empty:closed --instances 3 --trials 1"
+    """By its probabilities: after four grasps, another bottle may still count as unknown."""
+    command = "train simulated --pipeline shake --objects flask_half:closed,flask_empty:closed --instances 2 --trials 1"
     with pytest.raises(SystemExit) as ended:
         main([*command.split(), "--classifier", "extra-trees", "--out", str(tmp_path / "model.json")])
     assert ended.value.code in (0, None)

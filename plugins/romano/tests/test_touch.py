@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import scipy
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -46,9 +45,10 @@ def test_a_trade_counts_what_is_above_each_threshold():
     st.lists(st.integers(0, 9), min_size=1, max_size=20), st.lists(st.integers(0, 9), min_size=1, max_size=20)
 )
 def test_the_area_under_a_curve_is_the_statistic_of_mann_and_whitney(positive, negative):
+    """How often a positive value is above a negative one; equal ones count half."""
     share, least, most = area(positive, negative)
-    u = scipy.stats.mannwhitneyu(positive, negative).statistic
-    assert share == pytest.approx(u / (len(positive) * len(negative)))
+    above = [(p > n) + 0.5 * (p == n) for p in positive for n in negative]
+    assert share == pytest.approx(sum(above) / len(above))
     assert 0.0 <= least <= share + 1e-4
     assert share - 1e-4 <= most <= 1.0
 
@@ -89,7 +89,10 @@ def grasped(tmp_path, settings, *options):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("mass_kg", "friction"), [(0.001, 0.05), (0.001, 2.0), (5.0, 0.05), (5.0, 2.0)])
+@pytest.mark.parametrize(
+    ("mass_kg", "friction"),
+    [(0.001, 0.05), pytest.param(0.001, 2.0, marks=pytest.mark.long), (5.0, 0.05), (5.0, 2.0)],
+)
 def test_the_corners_of_weight_and_friction_are_held_or_lost_with_a_reason(tmp_path, mass_kg, friction):
     """With 20 N on each finger: 5 kg need 12.3 N at a friction of 2, and 490 N at 0.05."""
     settings = TouchSettings(mass_kg=mass_kg, friction=friction, lift_s=2.5)

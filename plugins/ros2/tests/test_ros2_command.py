@@ -9,11 +9,13 @@ import sys
 import threading
 import uuid
 from contextlib import contextmanager
+from itertools import product
 
 import pytest
+from cases import every_case
+from commands import graspsense
 from robots import OPTIONS
 
-from graspsense.cli.main import main
 from graspsense_ros2.command import ACTION, GRASP, GRIPPER_COMMAND, TRIGGER
 from graspsense_ros2.message_types import decode, encode
 from graspsense_ros2.node import ServiceFailed
@@ -158,11 +160,10 @@ def test_a_robot_that_dies_ends_the_goal_and_not_the_node(robot, caller):
         assert (answer.success, "nobody publishes" in answer.message) == (False, True)
 
 
-@pytest.mark.parametrize("request_bytes", [b"", b"\0", b"\0\1\0\0", b"\xff" * 4000])
-def test_rubbish_is_answered_with_an_error(robot, caller, request_bytes):
+def test_rubbish_is_answered_with_an_error(robot, caller):
     robot()
     with served("--action"):
-        for ask in caller.asks.values():
+        for request_bytes, ask in product((b"", b"\0", b"\0\1\0\0", b"\xff" * 4000), caller.asks.values()):
             with pytest.raises(ServiceFailed):
                 ask(request_bytes, PATIENCE_S)
         goal, accepted = caller.send(OPEN_M, 5.0)
@@ -170,7 +171,7 @@ def test_rubbish_is_answered_with_an_error(robot, caller, request_bytes):
         assert caller.result(goal).status == SUCCEEDED
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("words", "said"),
     [
         ([], "--grasp"),
@@ -178,8 +179,7 @@ def test_rubbish_is_answered_with_an_error(robot, caller, request_bytes):
         (["--grasp", "-o", "a.b=1"], "a"),
     ],
 )
-def test_wrong_uses(words, said, capsys):
-    with pytest.raises(SystemExit) as ended:
-        main(["ros2", *words])
-    assert ended.value.code == 2
-    assert said in capsys.readouterr().err
+def test_wrong_uses(words, said):
+    done = graspsense("ros2", *words)
+    assert done.returncode == 2
+    assert said in done.stderr

@@ -110,6 +110,10 @@ def received(router):
     return messages
 
 
+def dimensions(message):
+    return [(dim.label, dim.size, dim.stride) for dim in message.layout.dim]
+
+
 def test_a_grasp_arrives_as_topics(received):
     joints = received["joint_states"]
     assert [joint.position[0] for joint in joints] == [0.05, 0.049, 0.048]
@@ -125,12 +129,7 @@ def test_a_grasp_arrives_as_topics(received):
     assert [number.data for number in received["signals/heat"]] == [300.0, 301.0]
     assert json.loads(received["events"][0].data)["what"] == "contact"
     assert json.loads(received["outcome"][0].data) == {"outcome": "steady", "reason": ""}
-
-
-def test_arrays_say_their_shape(received):
-    def dimensions(message):
-        return [(dim.label, dim.size, dim.stride) for dim in message.layout.dim]
-
+    # Arrays say their shape.
     (pads,), (skin,), (sound,) = (received[f] for f in ("tactile/pads_left", "tactile/skin", "signals/sound"))
     assert dimensions(pads) == [("rows", 2, 6), ("columns", 3, 3)]
     assert list(pads.data) == [1, 2, 3, 4, 5, 6]

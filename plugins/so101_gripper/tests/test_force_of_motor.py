@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
-
 import pytest
 from cases import every_case
+from commands import graspsense
 
-from graspsense.cli.main import main
 from graspsense.plugin_api import POSITION, Command, create
 from graspsense_so101_gripper.config import So101Config
 from graspsense_so101_gripper.emulator.motor import CLOSED, GripperMotor
@@ -52,26 +50,17 @@ def calibrated(tmp_path, rows):
     readings = tmp_path / "readings.csv"
     readings.write_text("direction,motor,load_n\n" + "".join(",".join(map(str, row)) + "\n" for row in rows))
     (tmp_path / "kept").mkdir()
-    options = (
-        "--gripper",
-        "so101",
-        "-o",
-        "gripper.port=emulated",
-        "-o",
-        f"gripper.calibration={tmp_path / 'kept'}",
-    )
-    with pytest.raises(SystemExit) as ended:
-        main(["calibrate", "load-cell", str(readings), *options, "--json"])
-    return ended.value.code or 0
+    options = ("-o", "gripper.port=emulated", "-o", f"gripper.calibration={tmp_path / 'kept'}")
+    return graspsense("calibrate", "load-cell", readings, "--gripper", "so101", *options, "--json")
 
 
-def test_the_estimated_force_holds_the_measured_one_within_its_error(tmp_path, capsys):
+@pytest.mark.slow
+def test_the_estimated_force_holds_the_measured_one_within_its_error(tmp_path):
     # Gears without a thing between the jaws need up to 13 % of the load.
     free = [("closing", 0.10 + 0.01 * i, 0.0) for i in range(4)]
     closing = [*free, *(("closing", *pair) for pair in closed_on_a_block(LIMITS))]
     opening = [("opening", 0.05 * i, max(0.05 * i - 0.1, 0.0) * 20.0) for i in range(1, 13)]
-    assert calibrated(tmp_path, closing + opening) == 0
-    data = json.loads(capsys.readouterr().out)["data"]
+    data = calibrated(tmp_path, closing + opening).json["data"]
     assert set(data) == {"closing", "opening"}
     assert data["closing"]["error_n"] > 0.0
 
@@ -108,7 +97,8 @@ def test_the_estimated_force_holds_the_measured_one_within_its_error(tmp_path, c
         ([(d, -0.1 * i, i) for d in ("closing", "opening") for i in range(10)], "0 N or more"),
     ],
 )
-def test_unfit_readings_are_told_and_nothing_is_kept(tmp_path, capsys, rows, words):
-    assert calibrated(tmp_path, rows) in (2, 5)
-    assert words in capsys.readouterr().err
+def test_unfit_readings_are_told_and_nothing_is_kept(tmp_path, rows, words):
+    done = calibrated(tmp_path, rows)
+    assert done.returncode in (2, 5)
+    assert words in done.stderr
     assert list((tmp_path / "kept").iterdir()) == []
