@@ -88,7 +88,10 @@ def test_the_threshold_is_reached_by_90_percent_of_the_trials_that_are_not_recog
     assert threshold(calibrated_by(truth, ["a"] * 19)) == truth[1]
 
 
-@pytest.mark.parametrize(("instances", "each"), [(9, 1), (15, 1), (16, 3)])
+@pytest.mark.parametrize(
+    ("instances", "each"),
+    [(9, 1), *(pytest.param(*shape, marks=pytest.mark.slow) for shape in ((15, 1), (16, 3)))],
+)
 def test_the_thresholds_of_few_instances_cover_what_is_asked_and_little_more(instances, each):
     # Scores of any distribution that is the same for all instances: here those of one instance resemble each other.
     rng = np.random.default_rng(instances)

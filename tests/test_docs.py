@@ -14,6 +14,7 @@ from pathlib import Path
 
 import click
 import numpy
+import pytest
 from cases import every_case
 from test_imports import DOORS, MAY_KNOW, ROOMS
 
@@ -56,10 +57,12 @@ def test_the_page_of_the_terms_is_what_the_code_says():
     assert written == PAGES.terms_page(), "run: python docs/role_pages.py"
 
 
+@pytest.mark.slow
 def test_the_drawing_of_the_packages_is_that_of_the_imports():
     assert DRAWING.FILE.read_text() == DRAWING.drawing(), "run: python docs/package_drawing.py"
 
 
+@pytest.mark.slow
 def test_no_package_imports_in_a_circle():
     for graph in (DRAWING.host_subpackages(), DRAWING.rooms_of_core(), DRAWING.simulator_subpackages()):
         assert not DRAWING.panel(graph).against

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import os
+import re
 import socket
 import struct
 import threading
@@ -21,7 +22,6 @@ from mcap.reader import make_reader
 
 from graspsense import load_pipeline
 from graspsense.core.components.registry import installed
-from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.signals import SQUEEZE
 from graspsense.live.feeds import LiveFeed
 from graspsense.recording.layout import IS_TICK, TICK_FIELDS, TICK_WIRE
@@ -40,11 +40,15 @@ PATIENCE_S = 60.0
 SDK = "foxglove.sdk.v1"
 
 
-@pytest.fixture
-def feed():
+def running_feed():
     running = LiveFeed("graspsense.live.foxglove_process", ["0"])
     yield running
     assert running.close() == ""
+
+
+feed = pytest.fixture(running_feed)
+kept_feed = pytest.fixture(running_feed, scope="module")
+"""For tests of viewers that are refused, which leave it as it was."""
 
 
 def opened(feed, protocol=SDK):
@@ -201,8 +205,8 @@ def test_what_is_kept_for_viewers_who_come_later_does_not_grow(monkeypatch):
 
 
 @every_case("path", ["", "wrong", "wrong/"])
-def test_without_the_token_nothing_is_answered(feed, path):
-    assert refused(feed, f"ws://127.0.0.1:{port_of(feed)}/{path}") == 404
+def test_without_the_token_nothing_is_answered(kept_feed, path):
+    assert refused(kept_feed, f"ws://127.0.0.1:{port_of(kept_feed)}/{path}") == 404
 
 
 @every_case(
@@ -213,8 +217,8 @@ def test_without_the_token_nothing_is_answered(feed, path):
         ({"Origin": "https://app.foxglove.dev.elsewhere.example"}, 403),
     ],
 )
-def test_the_pages_of_others_cannot_listen(feed, headers, status):
-    assert refused(feed, headers=headers) == status
+def test_the_pages_of_others_cannot_listen(kept_feed, headers, status):
+    assert refused(kept_feed, headers=headers) == status
 
 
 @every_case(
@@ -228,10 +232,10 @@ def test_the_pages_of_others_cannot_listen(feed, headers, status):
         ("GET {path} HTTP/1.1\r\n" + "A: 1\r\n" * 500 + "\r\n", None),
     ],
 )
-def test_what_is_no_request_of_a_viewer_is_refused_or_dropped(feed, head, status):
-    address = feed.answer["address"]
-    text = head.format(path="/" + address.split("/", 3)[3], port=port_of(feed))
-    with socket.create_connection(("127.0.0.1", port_of(feed)), PATIENCE_S) as link:
+def test_what_is_no_request_of_a_viewer_is_refused_or_dropped(kept_feed, head, status):
+    address, port = kept_feed.answer["address"], port_of(kept_feed)
+    text = head.format(path="/" + address.split("/", 3)[3], port=port)
+    with socket.create_connection(("127.0.0.1", port), PATIENCE_S) as link:
         with suppress(ConnectionError):
             link.sendall(text.encode())
         answer = b""
@@ -241,14 +245,15 @@ def test_what_is_no_request_of_a_viewer_is_refused_or_dropped(feed, head, status
     assert answer.split(b" ")[1:2] == ([] if status is None else [str(status).encode()])
 
 
-def test_what_is_no_viewer_of_foxglove_is_told_so(feed):
-    assert refused(feed, protocols=()) == 400
-    assert refused(feed, protocols=("chat",)) == 400
+def test_what_is_no_viewer_of_foxglove_is_told_so(kept_feed):
+    assert refused(kept_feed, protocols=()) == 400
+    assert refused(kept_feed, protocols=("chat",)) == 400
 
 
 @every_case("origin", ["https://app.foxglove.dev", "file://"])
-def test_foxglove_itself_is_let_in(feed, origin):
-    with connect(feed.answer["address"], subprotocols=[SDK], additional_headers={"Origin": origin}) as viewer:
+def test_foxglove_itself_is_let_in(kept_feed, origin):
+    headers = {"Origin": origin}
+    with connect(kept_feed.answer["address"], subprotocols=[SDK], additional_headers=headers) as viewer:
         assert json.loads(viewer.recv(timeout=PATIENCE_S))["op"] == "serverInfo"
 
 
@@ -266,14 +271,7 @@ def test_what_is_not_a_subscription_is_an_error_and_the_others_go_on(feed):
             bad.send(sent)
             said = [json.loads(bad.recv(timeout=PATIENCE_S)) for _ in range(3)]
         assert said[-1]["op"] == "status", sent
-    shown(feed)
-    good.wait_for_all()
-    feed.close()
-    check_complete(good.ended())
-
-
-def test_a_viewer_that_sends_more_than_subscriptions_is_dropped(feed):
-    good = Viewer(feed)
+    # More than any subscription.
     with closing(opened(feed)) as bad:
         with suppress(ConnectionClosed):
             bad.send("x" * (2 << 20))
@@ -284,11 +282,11 @@ def test_a_viewer_that_sends_more_than_subscriptions_is_dropped(feed):
     check_complete(good.ended())
 
 
-def test_viewers_beyond_the_limit_are_refused(feed):
+def test_viewers_beyond_the_limit_are_refused(kept_feed):
     with ExitStack() as viewers:
         for _ in range(16):
-            viewers.enter_context(connect(feed.answer["address"], subprotocols=[SDK]))
-        assert refused(feed) == 503
+            viewers.enter_context(connect(kept_feed.answer["address"], subprotocols=[SDK]))
+        assert refused(kept_feed) == 503
 
 
 @pytest.mark.slow
@@ -353,18 +351,15 @@ def test_a_port_that_is_taken_is_an_error_before_the_grasp(tmp_path):
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        with pytest.raises(ConfigError, match=f"--foxglove.*{port}"):
-            LiveFeed("graspsense.live.foxglove_process", [str(port)])
         done = graspsense("run", "--foxglove", port, "--save", tmp_path / "store")
     assert done.returncode == 2
-    assert str(port) in done.stderr
+    assert re.search(f"--foxglove.*{port}", done.stderr)
     assert not (tmp_path / "store").exists()
 
 
 def test_a_grasp_without_a_viewer_is_as_any_other(feed):
     began = time.monotonic()
-    trial = load_pipeline("default").grasp(sinks=[feed])
-    feed.finished(trial)
-    assert (trial.outcome.words, trial.reason, feed.dropped) == ("steady", "", 0)
+    shown(feed)
     assert feed.close() == ""
+    assert feed.dropped == 0
     assert time.monotonic() - began < PATIENCE_S

@@ -188,7 +188,7 @@ def test_a_table_that_is_none_names_the_file(tmp_path, data):
 
 def test_a_cell_of_many_digits_takes_linear_time(tmp_path):
     path = tmp_path / "digits.csv"
-    path.write_text(f"a b c\n{'1' * 1_000_000}x 1 1\n0 1 2\n")
+    path.write_text(f"a b c\n{'1' * 300_000}x 1 1\n0 1 2\n")
     assert "a" in read_text(path)[0].texts
 
 
@@ -304,6 +304,11 @@ def test_toml_out_of_bounds_is_refused_at_once(tmp_path, text):
     path.write_text(text)
     with pytest.raises(ConfigError, match=r"settings\.toml"):
         read_layer(path)
+
+
+def test_every_command_refuses_toml_out_of_bounds(tmp_path):
+    path = tmp_path / "settings.toml"
+    path.write_text("x = " + "[" * 5000 + "]" * 5000)
     for command in (
         ("run", "--pipeline", path),
         ("experiment", path),
@@ -324,8 +329,8 @@ def test_toml_within_the_bounds_is_read():
 
 
 def test_thousands_of_unknown_keys_are_told_in_a_few_lines(tmp_path):
-    path = manifest(tmp_path, "".join(f"k{i} = 1\n" for i in range(20_000)))
-    with pytest.raises(ConfigError, match="19980 more") as refused:
+    path = manifest(tmp_path, "".join(f"k{i} = 1\n" for i in range(2_000)))
+    with pytest.raises(ConfigError, match="1980 more") as refused:
         read_manifest(path)
     assert len(str(refused.value).splitlines()) < 30
 
@@ -395,8 +400,8 @@ def test_a_file_that_is_split_into_too_many_grasps_is_refused(tmp_path, split):
         "[data]\ntrials = 9223372036854775807",
         "[data]\ninstances = 9223372036854775807",
         "[data]\ninstances = 1000\ntrials = 1000000",
-        "[[data.groups]]\ntotal = 1000000\n" * 3000,
-        "[data.named]\n" + "".join(f'k{i} = "can:full_open"\n' for i in range(20_000)),
+        "[[data.groups]]\ntotal = 1000000\n" * 1001,
+        "[data.named]\n" + "".join(f'k{i} = "can:full_open"\n' for i in range(2_000)),
         "[data]\ncheckpoints_s = [" + ", ".join(str(k) for k in range(1, 2000)) + "]\n[judge]\nfolds = 1",
         "seeds = 9223372036854775807",
         "seeds = [9223372036854775807]",
@@ -404,7 +409,7 @@ def test_a_file_that_is_split_into_too_many_grasps_is_refused(tmp_path, split):
         "".join(f'[[variants]]\nname = "v{i}"\n' for i in range(1001)),
         "pipelines = [" + '"default", ' * 1001 + "]",
         "classifiers = [" + '"tree", ' * 1001 + "]",
-        "parts = [" + '"probing_force", ' * 3000 + "]",
+        "parts = [" + '"probing_force", ' * 1001 + "]",
         "[judge]\nfolds = 9223372036854775807",
         "[judge]\ngrasps = 9223372036854775807",
         'classifiers = [{ type = "forest", trees = 9223372036854775807 }]',
@@ -495,7 +500,7 @@ def test_a_long_row_of_arff_takes_linear_time():
     head = f"@relation r\n@attribute a {{{values}}}\n@attribute label {{x, y}}\n@data\n"
     assert len(parse_arff(head + "v1, x\nv8999, y\n").labels) == 2
     with pytest.raises(ArffError, match="values"):
-        parse_arff(head + "v1, " * 100_000 + "x\n")
+        parse_arff(head + "v1, " * 20_000 + "x\n")
 
 
 @every_case(
@@ -517,23 +522,14 @@ def test_arff_out_of_bounds_is_told_with_its_line(text):
 # Fuzzing
 
 
-def fuzzed(seed, number):
-    """Return what a program says that reads so many changed texts of each format, with a limit on its memory."""
-    command = [sys.executable, str(HERE / "hostile_tables.py"), str(seed), str(number)]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr[-2000:]
-    return json.loads(done.stdout)
-
-
-def test_changed_texts_are_answered_by_a_result_or_an_error_that_names_the_file():
-    answers = fuzzed(seed=57, number=5)
-    assert answers["read"] == 50
-    assert answers["bad"] == []
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
-def test_many_changed_texts_are_answered_by_a_result_or_an_error_that_names_the_file(seed):
-    answers = fuzzed(seed, number=400)
+def test_changed_texts_are_answered_by_a_result_or_an_error_that_names_the_file(seed):
+    # A program that reads 400 changed texts of each format, with a limit on its memory.
+    done = subprocess.run(
+        [sys.executable, HERE / "hostile_tables.py", str(seed), "400"], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    answers = json.loads(done.stdout)
     assert answers["read"] == 4000
     assert answers["bad"] == []
