@@ -32,7 +32,7 @@ def trials(n=40, seed=0, missing=0.0):
 
 
 FAST = {
-    "ebm": {"bags": 2, "pairs": 2},
+    "ebm": {"bags": 1, "pairs": 1},
     "boosted": {"stages": 10},
     "forest": {"trees": 10},
     "extra-trees": {"trees": 10},

@@ -137,9 +137,7 @@ def test_doubling_the_lines_of_a_table_changes_no_rate(tmp_path):
     rates = []
     for copies in (1, 2):
         path = table_of_noise(tmp_path / f"{copies}.csv", copies)
-        done = graspsense(
-            "evaluate", path, "--label", "object", "--folds", 2, "--classifier", "knn", "--json"
-        )
+        done = graspsense("evaluate", path, "--label", "object", "--folds", 2, "--json")
         assert done.returncode == 0
         rates.append(json.loads(done.stdout))
     assert rates[0]["headline"] == rates[1]["headline"]

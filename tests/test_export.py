@@ -254,7 +254,7 @@ def test_the_table_of_a_store_is_learned_from_as_the_message_says(folder, tmp_pa
     assert model.exists()
 
 
-@pytest.mark.parametrize("command", ["train", "evaluate"])
+@every_case("command", ["train", "evaluate"])
 def test_a_table_of_arrays_is_refused_as_trials(folder, tmp_path, command):
     table = tmp_path / "t.npz"
     assert export(folder, table)[0] == 0
@@ -263,7 +263,7 @@ def test_a_table_of_arrays_is_refused_as_trials(folder, tmp_path, command):
     assert "name the store as store:DIR, or a table of it as FILE.csv" in done.stderr
 
 
-@pytest.mark.parametrize("ending", ["npz", "parquet", "NPZ", "PARQUET"])
+@pytest.mark.parametrize("ending", ["npz", "PARQUET"])
 def test_an_exported_grasp_is_imported_without_a_kind_before_its_name(folder, tmp_path, ending):
     if ending.lower() == "parquet":
         pytest.importorskip("pyarrow.parquet", reason="needs the extra parquet")
