@@ -280,6 +280,7 @@ def test_every_trace_gives_numbers_or_reasons(rows):
         assert (value != value) == bool(f.reasons.get(name)), name
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(
     "GRASPSENSE_ICUB" not in os.environ,
     reason="needs the iCub Grasp Dataset: name its folder in GRASPSENSE_ICUB",

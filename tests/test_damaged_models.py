@@ -241,6 +241,7 @@ def test_whatever_a_classifier_raises_on_a_file_is_damage_of_the_file(mean):
         classifier_from(StoredValues(kept), component, component.config_class()(), model.names, model.units)
 
 
+@pytest.mark.slow
 class TestKeptAsSkops:
     """The compiled code of scikit-learn trusts its arrays; each that does not fit is refused before it is used."""
 

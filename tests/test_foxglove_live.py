@@ -140,7 +140,7 @@ def check_complete(messages, n=20):
 
 
 def test_viewers_receive_the_messages_and_schemas_of_the_recording_and_late_ones_too(feed, tmp_path):
-    settings = load_pipeline(options=["classifier.type=none"]).settings
+    settings = load_pipeline(options=["classifier.type=none", "gripper.rate_hz=250"]).settings
     early = Viewer(feed)
     with Store.open(tmp_path) as store:
         record_grasp(store, settings, installed(), labels={}, origin="run", sinks=[feed])
