@@ -2,6 +2,7 @@
 
 import csv
 import math
+import shutil
 import sys
 import tomllib
 
@@ -27,15 +28,21 @@ from graspsense.store.export_table import ABOUT_BEFORE
 from graspsense.store.store import Store
 
 
-@pytest.fixture
-def folder(tmp_path):
-    with Store.open(tmp_path / "trials") as store:
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("stored")
+    with Store.open(folder) as store:
         keep(store, "can:full_open", "can#1", values=(0.066, 5.5))
         keep(store, "can:it's open", "can#2", values=(0.1 + 0.2, None))
         keep(store, None, values=(0.05, 1.0))
         set_aside(store, [keep(store)], "undone")
         keep(store, "can:full_open", "can#1", outcome="aborted", values=(None, None))
-    return tmp_path / "trials"
+    return folder
+
+
+@pytest.fixture
+def folder(stored, tmp_path):
+    return shutil.copytree(stored, tmp_path / "trials")
 
 
 def export(source, target):
