@@ -35,8 +35,8 @@ def unequal(rng, candidates):
     return rng.random((candidates, 150)) < rates[:, np.newaxis], rates, None
 
 
-SLOW = [pytest.param(*shape, marks=pytest.mark.slow) for shape in ((4, 100), (12, 60))]
-LONG = [pytest.param(32, 40, marks=pytest.mark.long)]
+SLOW = [pytest.param(*shape, marks=pytest.mark.slow) for shape in ((4, 40), (12, 40))]
+LONG = [pytest.param(*shape, marks=pytest.mark.long) for shape in ((4, 100), (12, 60), (32, 40))]
 
 
 @pytest.mark.parametrize(("candidates", "repeats"), [(4, 3), *SLOW, *LONG])

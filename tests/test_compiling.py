@@ -312,9 +312,11 @@ ASKS = """
 @pytest.mark.usefixtures("_numba")
 def test_compositions_compiled_in_three_processes_stay_themselves_in_a_fourth(tmp_path):
     # Same functions, same types, other parts or other options: under one name, one would run the code of another.
-    program, asks = tmp_path / "source" / "compose.py", tmp_path / "source" / "asks.py"
-    program.parent.mkdir()
-    program.write_text(textwrap.dedent(COMPOSE))
+    source = tmp_path / "source"
+    source.mkdir()
+    program, asks = source / "program.py", source / "asks.py"
+    (source / "compose.py").write_text(textwrap.dedent(COMPOSE))
+    program.write_text("import compose\n")
     asks.write_text(textwrap.dedent(ASKS))
     cache = {"XDG_CACHE_HOME": str(tmp_path / "cache"), "NUMBA_CACHE_DIR": ""}
 
@@ -330,7 +332,7 @@ def test_compositions_compiled_in_three_processes_stay_themselves_in_a_fourth(tm
     ]
     # It is kept in the user's cache and nowhere else.
     assert list((tmp_path / "cache" / "graspsense" / "compiled").rglob("*.nbc"))
-    assert sorted(path.name for path in program.parent.iterdir()) == ["asks.py", "compose.py"]
+    assert sorted(path.name for path in source.iterdir()) == ["asks.py", "compose.py", "program.py"]
 
 
 MAIN = """

@@ -385,7 +385,7 @@ def test_an_experiment_on_simulated_grasps_keeps_trials_curves_and_trees(tmp_pat
     path = tmp_path / "small.toml"
     path.write_text(
         'title = "x"\n[data]\nobjects = ["can:full_open", "can:empty_open"]\ntotal = 7\ninstances = 2\n'
-        "[judge]\nfolds = 2\ncontrols = false\ngrasps = 1\n"
+        '[judge]\nfolds = 2\ncontrols = false\ngrasps = 1\n[gripper]\nsensor = "ideal"\nrate_hz = 250.0\n'
     )
     planned, results = read_experiment(str(path)), Results(tmp_path / "out")
     run_experiment(planned, results, Serial)
@@ -464,6 +464,10 @@ COMPARED = """
 title = "A sweep"
 question = "Does it matter?"
 seeds = {seeds}
+
+[gripper]
+sensor = "ideal"
+rate_hz = 250.0
 
 [controller]
 probing_force_n = {force}
