@@ -203,15 +203,9 @@ def test_it_takes_its_answers_from_a_pipe(tmp_path):
     assert trials_in(tmp_path / "trials") == [(1, "block", None)]
 
 
-def test_a_label_that_the_simulator_does_not_know_is_told(tmp_path):
-    done = collect(tmp_path / "t", "\n", labels="jar:full")
-    assert done.returncode == 2
-    assert "jar" in done.stderr
-
-
 @pytest.mark.parametrize(
     ("labels", "says"),
-    [("", "nothing to collect"), ("block,block", "named twice"), ("a b", "is not a label")],
+    [("", "nothing to collect"), ("block,block", "named twice")],
 )
 def test_labels_that_make_no_sense_are_told(tmp_path, labels, says):
     done = collect(tmp_path / "t", "", labels=labels)

@@ -60,17 +60,6 @@ def test_the_table_as_csv(folder, tmp_path):
     assert (rows[1]["f_steady [N]"], rows[2]["label"], rows[3]["outcome"]) == ("", "", "aborted")
 
 
-def test_a_csv_of_ours_is_a_table_to_learn_from(folder, tmp_path):
-    with Store.open(folder) as store:
-        set_aside(store, [3], "no label")
-    export(folder, tmp_path / "t.csv")
-    trials = read_labelled(
-        tmp_path / "t.csv", "label", instance="instance", order="trial", features=["p_first"]
-    )
-    assert trials.labels == ("can:full_open", "can:it's open")
-    assert trials.table.units == ("m",)
-
-
 def test_an_exported_csv_comes_back_as_the_trials_of_the_store(folder, tmp_path):
     export(folder, tmp_path / "t.csv")
     trials, stored = read_labelled(tmp_path / "t.csv", "label"), labelled_store(str(folder))

@@ -454,6 +454,7 @@ def test_a_channel_of_a_file_has_a_bounded_size(channel):
     [
         "9**9**9", "F**2", "1<<9999999", "9" * 1000, "0x" + "f" * 1900, "1e999*F", "1j*F", "(" * 900 + "F" + ")" * 900,
         "-" * 1900 + "F", "F" + "*1" * 200, "F.__class__", "lambda: 0", "f'{F}'", "[x for x in F]", "F\0", "x" * 2001,
+        "open('x')", "__import__('os').system('true')", "F[F]",
         "F or F", "(F := 1)", "print(F)", "max(*F)", "max(F, key=F)", "F[-1]", "F[0:9]", "F['a']", "a" + " [" * 900,
     ],
 )  # fmt: skip
