@@ -165,6 +165,7 @@ def test_each_grasp_that_run_saves_is_another_one_unless_a_seed_is_given(tmp_pat
     assert "1 trial is left out" in copies_said(trials)[0]
 
 
+@pytest.mark.slow
 def test_a_damaged_recording_and_its_recovered_copy_are_one_trial(tmp_path):
     folder = tmp_path / "s"
     for seed in (0, 1):

@@ -80,7 +80,7 @@ def test_class_and_state_given_the_class():
     by_width = labelled(labels, width)
 
     assert judged(by_width, target="class").headline.rate > 0.95
-    state = judged(by_width, target="state")
+    state = judged(by_width, target="state", folds=10)
     assert state.headline.interval[0] < 0.5 < state.headline.interval[1]
     assert judged(labelled(labels, force), target="state").headline.rate > 0.95
     # Only states of one's own class can be answered.
@@ -287,13 +287,13 @@ def test_the_learning_curve_ends_at_the_headline_and_grows():
     assert len(few) < len(curve)
 
 
-@pytest.mark.parametrize("n", [9, 4])
+@pytest.mark.parametrize("n", [3, 2])
 def test_few_trials_are_said_or_refused(n):
     labels, width, force = four_states()
     trials = labelled(labels, width, force)
     few = trials.rows(np.array([i for i in range(120) if i < 4 * n or labels[i] != "can:full"]))
 
-    assert "labels with fewer trials than folds (10): can:full" in judged(few, folds=10).notes
+    assert "labels with fewer trials than folds (4): can:full" in judged(few).notes
     with pytest.raises(ConfigError, match="cannot be split into 10 folds"):
         judged(trials.rows(np.arange(8)), folds=10)
 

@@ -262,6 +262,7 @@ def test_an_export_declares_the_fingers_and_has_their_forces(grasped, tmp_path, 
     assert most == read_recorded(path).trace().signals["force_index"].max()
 
 
+@pytest.mark.slow
 def test_the_pages_and_the_picture_draw_the_force_of_each_finger(grasped):
     trial, _, _, _ = grasped
     figures = channel_figures(trial.trace, trial.device.channels)

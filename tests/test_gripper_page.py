@@ -75,6 +75,7 @@ def grasp(plugins, *options):
     return load_pipeline(options=[*fixed, *options], plugins=plugins).grasp()
 
 
+@pytest.mark.slow
 def test_it_conforms(plugins):
     examined = examine(
         "lab-hand/lab-hand",
