@@ -123,7 +123,7 @@ def test_whatever_a_task_does_the_others_are_kept(lab, executor):
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs SIGKILL")
-@pytest.mark.parametrize("how", ["SIGKILL", "SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("how", ["SIGKILL", "SIGINT", pytest.param("SIGTERM", marks=pytest.mark.long)])
 def test_a_run_that_is_ended_goes_on_where_it_was(lab, how):
     lab.write("fine", "waits")
     process = lab.start("out", "--executor", "processes", "--workers", "2")
