@@ -148,6 +148,7 @@ COARSE = ("-o", "classifier.type=none", "-o", "gripper.rate_hz=250", "-o", "grip
 """Settings with which a simulated grasp takes a fraction of the time."""
 
 
+@pytest.mark.slow
 def test_each_grasp_that_run_saves_is_another_one_unless_a_seed_is_given(tmp_path):
     store = tmp_path / "s"
 
