@@ -1,6 +1,6 @@
 """Every classifier behind the role: c45 from its own distribution, the others scikit-learn's.
 
-What the role itself asks for, such as valid probabilities and a model that survives JSON, `test_our_parts` checks.
+What the role itself asks for, such as valid probabilities and reasons that fit them, `test_our_parts` checks.
 """
 
 from __future__ import annotations
@@ -105,13 +105,26 @@ class TestEvery:
         turned = table.columns(("noise", "p_first", "f_steady"))
         assert (classifier.probabilities(turned) == classifier.probabilities(table)).all()
 
-    def test_two_labels(self, name):
+    def test_two_labels_and_the_same_seed(self, name):
         table, labels = trials()
         two = [label.partition(":")[0] for label in labels]
-        result = fitted(name, table, two, seed=5)
+        result, again = fitted(name, table, two, seed=5), fitted(name, table, two, seed=5)
 
         assert result.classes() == ("bottle", "can")
         assert rate(result, table, two) > 0.95
+        assert (result.probabilities(table) == again.probabilities(table)).all()
+
+    def test_it_comes_back_from_json_the_same(self, name):
+        classifier = fitted(name, *trials(missing=0.1), seed=3)
+        table, _ = trials(seed=4, missing=0.1)
+        kept = json.loads(json.dumps(classifier.to_json(), allow_nan=False))
+        again = create("classifier", name, **FAST.get(name, {}))
+        again.from_json(kept)
+
+        assert again.classes() == classifier.classes()
+        assert (again.probabilities(table) == classifier.probabilities(table)).all()
+        assert again.explain(table.row(0)) == classifier.explain(table.row(0))
+        assert again.to_json() == classifier.to_json()
 
 
 @every_case("name", ALL[1:])
