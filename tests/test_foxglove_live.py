@@ -307,20 +307,21 @@ def test_rubbish_and_a_thousand_connections_disturb_nobody(feed):
 
 @pytest.mark.slow
 def test_a_viewer_that_stalls_is_dropped_and_no_tick_waits(feed):
-    stalled = opened(feed)
-    stalled.recv(timeout=PATIENCE_S)
-    (tick,) = json.loads(stalled.recv(timeout=PATIENCE_S))["channels"]
-    wanted = [{"id": 1, "channelId": tick["id"]}]
-    stalled.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
-    good = Viewer(feed)
+    stalled, good = opened(feed), Viewer(feed)
     feed.opened(device())
-    n = 300_000
-    for k in range(n):
+    feed.take(reading(0), SQUEEZE, COMMAND)
+    channels = []
+    while len(channels) < 4:
+        channels += json.loads(stalled.recv(timeout=PATIENCE_S)).get("channels", ())
+    wanted = [{"id": channel["id"], "channelId": channel["id"]} for channel in channels]
+    stalled.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
+    n = 120_000
+    for k in range(1, n):
         feed.take(reading(k), SQUEEZE, COMMAND)
         if k % 1000 == 999:
             good.wait_for("/grasp/tick", k + 1)
     assert feed.dropped == 0
-    assert messages_until_the_end(stalled) < n
+    assert messages_until_the_end(stalled) < 4 * n
     feed.close()
     check_complete(good.ended(), n)
 
