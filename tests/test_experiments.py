@@ -92,6 +92,9 @@ def test_an_experiment_is_a_file_and_ends_in_a_page(whole):
 
 def test_what_lies_beside_the_results_gives_the_same_again(whole, tmp_path):
     folder, _ = whole
+    assert "mine.toml" not in (folder / "experiment.toml").read_text(), (
+        "nothing but what was written is needed"
+    )
     again = read_experiment(str(folder / "experiment.toml"))
     run_experiment(again, Results(tmp_path / "again"), Serial)
 

@@ -142,7 +142,7 @@ def test_viewers_receive_the_messages_and_schemas_of_the_recording_and_late_ones
     settings = load_pipeline(options=["classifier.type=none", "gripper.rate_hz=250"]).settings
     early = Viewer(feed)
     with Store.open(tmp_path) as store:
-        record_grasp(store, settings, installed(), labels={}, origin="run", sinks=[feed])
+        feed.finished(record_grasp(store, settings, installed(), labels={}, origin="run", sinks=[feed]).trial)
     (path,) = (tmp_path / "recordings").glob("*.mcap")
     recorded, schemas = {}, {}
     with path.open("rb") as file:
@@ -281,11 +281,11 @@ def test_what_is_not_a_subscription_is_an_error_and_the_others_go_on(feed):
     check_complete(good.ended())
 
 
-def test_viewers_beyond_the_limit_are_refused(kept_feed):
+def test_viewers_beyond_the_limit_are_refused(feed):
     with ExitStack() as viewers:
         for _ in range(16):
-            viewers.enter_context(connect(kept_feed.answer["address"], subprotocols=[SDK]))
-        assert refused(kept_feed) == 503
+            viewers.enter_context(connect(feed.answer["address"], subprotocols=[SDK]))
+        assert refused(feed) == 503
 
 
 @pytest.mark.slow
