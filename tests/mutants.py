@@ -62,6 +62,7 @@ class Mutant:
 
 MUTANTS: list[Mutant] = []
 _numbers = itertools.count()
+_rng = random.Random(3)
 
 
 def mutant(role, check, says, *, config=None, keys=None, **changes):
@@ -396,9 +397,6 @@ def _(command, after, frame):
     return command._replace(effort_limit_n=nan), after
 
 
-_rng = random.Random(3)
-
-
 @ruling("same-tick-same-command", "nothing but its arguments")
 def _(command, after, frame):
     return command._replace(value=command.value + _rng.random()), after
@@ -599,11 +597,48 @@ describing("describes-itself", "must be above 0", rate_hz=0.0)
 describing("describes-itself", "in mm/s", speed_limit_m_s=200.0)
 describing("opening-and-relaxing-are-accepted", "of kind position", opening=Command(POSITION, 0.08, inf, inf))
 describing("rate-is-as-declared", "frames come at 1e+03 Hz", rate_hz=100.0)
+describing("declares-what-protects", "at most half of its effort limit", friction_n=80.0)
+describing(
+    "declares-what-protects", "a physical gripper can hurt what it holds", harmless=True, simulated=False
+)
+describing(
+    "declares-what-protects",
+    "is declared twice",
+    status_bits=(StatusBit(mask=1, name="hot", meaning="too hot"),) * 2,
+)
+describing("hostile-laws-stay-below-the-ceiling", "exerts an effort", relaxed=Command(EFFORT, 5.0, inf, inf))
+describing("objects-can-be-grasped", "give DeviceInfo(simulated=True, ...)", simulated=False)
 
 
-@giving("frames-are-numbers", "gap_m of a frame is 0 of type int: write float(...)")
-def _(reading):
-    return Reading(reading.frame._replace(gap_m=0), reading.pads, reading.signals)
+def framing(check, says, **fields):
+    """Keep a mutant whose frames have these fields: values, or what a function makes of the sound frame."""
+
+    def changed(reading):
+        frame = reading.frame
+        new = {name: value(frame) if callable(value) else value for name, value in fields.items()}
+        return reading._replace(frame=frame._replace(**new))
+
+    giving(check, says)(changed)
+
+
+framing("frames-are-numbers", "gap_m of a frame is 0 of type int: write float(...)", gap_m=0)
+framing("channels-are-those-declared", "NaN in all", edge_left_n=nan)
+framing("time-runs-forward", "each is later than the last", t_s=1.0)
+framing("time-runs-forward", "dt_s is 1 s where", dt_s=1.0)
+framing("gap-is-in-metres", "divide by 1000", gap_m=lambda frame: 1000.0 * frame.gap_m)
+framing("forces-are-in-newtons", "give newtons", force_left_n=3000.0)
+framing(
+    "velocity-is-the-rate-of-the-gap",
+    "mm where the gap moved by",
+    velocity_m_s=lambda frame: 1000.0 * frame.velocity_m_s,
+)
+framing(
+    "velocity-is-the-rate-of-the-gap",
+    "negative while it closes",
+    velocity_m_s=lambda frame: -frame.velocity_m_s,
+)
+framing("same-seed-same-frames", "draw everything from the seed", edge_left_n=lambda frame: _rng.random())
+framing("declares-what-protects", "declare each bit as a StatusBit", status=8)
 
 
 @giving("frames-are-numbers", "a tuple of 22 floats")
@@ -721,27 +756,12 @@ class Listing(Hand):
         return list(ENTRIES["sensor-backend"].channels)
 
 
-@giving("channels-are-those-declared", "NaN in all")
-def _(reading):
-    return Reading(reading.frame._replace(edge_left_n=nan), reading.pads, reading.signals)
-
-
 mutant(
     "sensor-backend",
     "channels-are-those-declared",
     "declare Channel('edge_right', 'N', rate)",
     channels=channels("gap", "velocity", "effort", "force_left", "force_right", "edge_left", "pads"),
 )(Hand)
-
-
-@giving("time-runs-forward", "each is later than the last")
-def _(reading):
-    return Reading(reading.frame._replace(t_s=1.0), reading.pads, reading.signals)
-
-
-@giving("time-runs-forward", "dt_s is 1 s where")
-def _(reading):
-    return Reading(reading.frame._replace(dt_s=1.0), reading.pads, reading.signals)
 
 
 mutant(
@@ -760,32 +780,6 @@ def _(reading):
 @giving("images-count-up", "while its counter stays")
 def _(reading):
     return Reading(reading.frame, reading.pads._replace(left=(reading.frame.t_s,) * 22), reading.signals)
-
-
-@giving("gap-is-in-metres", "divide by 1000")
-def _(reading):
-    return Reading(reading.frame._replace(gap_m=1000.0 * reading.frame.gap_m), reading.pads, reading.signals)
-
-
-@giving("forces-are-in-newtons", "give newtons")
-def _(reading):
-    return Reading(reading.frame._replace(force_left_n=3000.0), reading.pads, reading.signals)
-
-
-@giving("velocity-is-the-rate-of-the-gap", "mm where the gap moved by")
-def _(reading):
-    return Reading(
-        reading.frame._replace(velocity_m_s=1000.0 * reading.frame.velocity_m_s),
-        reading.pads,
-        reading.signals,
-    )
-
-
-@giving("velocity-is-the-rate-of-the-gap", "negative while it closes")
-def _(reading):
-    return Reading(
-        reading.frame._replace(velocity_m_s=-reading.frame.velocity_m_s), reading.pads, reading.signals
-    )
 
 
 @mutant("sensor-backend", "closing-closes", "close the fingers")
@@ -838,12 +832,6 @@ mutant(
 class Picky(Hand):
     def expect(self, controller, run):
         raise ValueError("not that one")
-
-
-@mutant("sensor-backend", "objects-can-be-grasped", "give DeviceInfo(simulated=True, ...)")
-class Conjuring(Hand):
-    def open(self, seed):
-        return evolve(super().open(seed), simulated=False)
 
 
 @mutant("sensor-backend", "objects-can-be-grasped", "it holds the same thing under every label")
@@ -905,11 +893,6 @@ class Once(Hand):
         if self._bench is None and hasattr(self, "_info"):
             raise RuntimeError("closed already")
         super().close()
-
-
-@giving("same-seed-same-frames", "draw everything from the seed")
-def _(reading):
-    return Reading(reading.frame._replace(edge_left_n=_rng.random()), reading.pads, reading.signals)
 
 
 @giving("performs-a-whole-grasp", "ended as aborted")
@@ -978,42 +961,6 @@ class Dreaming(Hand):
     def open(self, seed):
         self.config = HandConfig(vanishes_s=self.config.vanishes_s)
         return super().open(seed)
-
-
-class Described(Hand):
-    """A hand with another description."""
-
-    changes: ClassVar[dict] = {}
-
-    def open(self, seed):
-        return evolve(super().open(seed), **self.changes)
-
-
-@mutant("sensor-backend", "declares-what-protects", "at most half of its effort limit")
-class Rusty(Described):
-    changes: ClassVar = {"friction_n": 80.0}
-
-
-@mutant("sensor-backend", "declares-what-protects", "a physical gripper can hurt what it holds")
-class Reckless(Described):
-    changes: ClassVar = {"harmless": True, "simulated": False}
-
-
-@mutant("sensor-backend", "declares-what-protects", "is declared twice")
-class Repetitive(Described):
-    changes: ClassVar = {"status_bits": (StatusBit(mask=1, name="hot", meaning="too hot"),) * 2}
-
-
-@mutant("sensor-backend", "declares-what-protects", "declare each bit as a StatusBit")
-class Cryptic(Hand):
-    def read(self, timeout_s):
-        reading = super().read(timeout_s)
-        return reading._replace(frame=reading.frame._replace(status=8))
-
-
-@mutant("sensor-backend", "hostile-laws-stay-below-the-ceiling", "exerts an effort")
-class Pressing(Described):
-    changes: ClassVar = {"relaxed": Command(EFFORT, 5.0, inf, inf)}
 
 
 @mutant("sensor-backend", "a-silent-pad-ends-the-grasp", "accept the relaxing command at any time")

@@ -54,16 +54,14 @@ def test_the_zero_is_the_mean_of_all_images_not_the_last():
     assert zero_of([(1.0, 2.0), (3.0, 6.0)]) == (2.0, 4.0)
 
 
-def test_a_tare_is_refused_without_images():
-    with pytest.raises(TareRefused, match="no cell image"):
-        tare([], 1600.0, 7)
-
-
-def test_a_tare_is_refused_while_something_touches_and_moves():
-    with pytest.raises(TareRefused, match=r"left pad varied by .* 0.5 N is allowed"):
-        tare([image(1), image(2, pad=60.0), image(3)], 1600.0, 7)
-
-
-def test_a_tare_is_refused_where_a_fingertip_gives_no_numbers():
-    with pytest.raises(TareRefused, match="not numbers"):
-        tare([image(1, float("nan")), image(2)], 1600.0, 7)
+@every_case(
+    ("images", "says"),
+    [
+        ([], "no cell image"),
+        ([image(1), image(2, pad=60.0), image(3)], r"left pad varied by .* 0.5 N is allowed"),
+        ([image(1, float("nan")), image(2)], "not numbers"),
+    ],
+)
+def test_a_tare_is_refused_without_images_or_numbers_and_while_something_moves(images, says):
+    with pytest.raises(TareRefused, match=says):
+        tare(images, 1600.0, 7)

@@ -74,14 +74,21 @@ def curve():
 
 @pytest.fixture(scope="module")
 def traces():
-    """Ten soft and ten stiff objects of the same width."""
+    """Ten soft and ten stiff objects of the same width: two grasps of each, whose forces differ by some percent."""
     rng = np.random.default_rng(1)
-    stiffness = {"soft": 2000.0, "stiff": 9000.0}
+    grasped = {
+        label: [grasp_of(Watched(0.07, stiffness_n_m * factor)).trace for factor in (0.95, 1.05)]
+        for label, stiffness_n_m in {"soft": 2000.0, "stiff": 9000.0}.items()
+    }
     return [
-        (label, grasp_of(Watched(0.07, k * rng.uniform(0.9, 1.1))).trace)
-        for label, k in stiffness.items()
-        for _ in range(10)
+        (label, _with_forces(traces[k % 2], rng.uniform(0.95, 1.05)))
+        for label, traces in grasped.items()
+        for k in range(10)
     ]
+
+
+def _with_forces(trace, factor):
+    return evolve(trace, force_left_n=factor * trace.force_left_n, force_right_n=factor * trace.force_right_n)
 
 
 @pytest.fixture(scope="module")

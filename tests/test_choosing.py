@@ -101,7 +101,7 @@ def test_the_rate_of_labels_without_information_is_that_of_guessing():
     """Twelve candidates on labels that were drawn at random; the best of them seems better than it is."""
     rng = np.random.default_rng(7)
     right = best = total = 0
-    for repeat in range(10):
+    for repeat in range(6):
         labels = [f"l{k}" for k in rng.permutation(np.repeat(np.arange(2), 20))]
         sets = {f"set{k}": trials(rng.normal(size=(40, 2)), labels) for k in range(12)}
         choice = choose(NEAREST, sets, seed=repeat)

@@ -481,7 +481,7 @@ class TestCompletion:
 
 
 def test_a_reader_that_goes_away_is_no_error():
-    code = "from graspsense.cli.main import main; main(['plugins', 'show', 'graspsense'])"
+    code = "from graspsense.cli.main import main; main(['--help'])"
     child = subprocess.Popen(
         [sys.executable, "-u", "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )

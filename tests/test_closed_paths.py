@@ -214,28 +214,35 @@ def lab(tmp_path):
     return Lab(tmp_path)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("variable", ["NUMBA_CACHE_DIR", "XDG_CACHE_HOME"])
-def test_compiled_code_of_the_users_own_is_used_whatever_the_mask(lab, variable):
-    environ = {variable: str(lab.folder / "cache")}
+@pytest.fixture(scope="module", params=["NUMBA_CACHE_DIR", "XDG_CACHE_HOME"])
+def poisoned(request, tmp_path_factory):
+    """A lab whose folder `cache`, to which this variable leads, is poisoned; and the variable."""
+    pytest.importorskip("numba", reason="numba is not installed")
+    lab = Lab(tmp_path_factory.mktemp("lab"))
+    environ = {request.param: str(lab.folder / "cache")}
     assert lab.run("000", **environ) == ("42.0 False 0", "")
-    assert lab.run("000", **environ) == ("42.0 True 1", "")
-    # The trap of the other tests is a trap: code in the user's own cache runs.
+    assert lab.run("000", **environ) == ("42.0 True 1", ""), (
+        "code of the user's own is used whatever the mask"
+    )
     lab.poison(lab.folder / "cache")
-    lab.run(**environ)
-    assert lab.mark.exists()
+    return lab, request.param
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("variable", ["NUMBA_CACHE_DIR", "XDG_CACHE_HOME"])
+def test_the_trap_is_a_trap_since_code_in_the_users_own_cache_runs(poisoned):
+    lab, variable = poisoned
+    lab.run(**{variable: str(lab.folder / "cache")})
+    assert lab.mark.exists()
+    lab.mark.unlink()
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("change", ["top", "sources", "files", "owner of a file", "owner of all"])
-def test_compiled_code_that_another_user_could_have_put_there_is_not_run(lab, variable, change):
+def test_compiled_code_that_another_user_could_have_put_there_is_not_run(poisoned, tmp_path, change):
     if change.startswith("owner") and not IS_ROOT:
         pytest.skip("only root can give a file away; the variants with modes run for everybody")
-    cache = lab.folder / "cache"
-    environ = {variable: str(cache)}
-    lab.run(**environ)
-    lab.poison(cache)
+    lab, variable = poisoned
+    cache = shutil.copytree(lab.folder / "cache", tmp_path / "cache")
     (index,) = cache.rglob("*.nbi")
     changed = {"top": [cache], "sources": [index.parent], "files": [index], "owner of a file": [index]}
     for path in changed.get(change, [cache, *cache.rglob("*")]):
@@ -243,7 +250,7 @@ def test_compiled_code_that_another_user_could_have_put_there_is_not_run(lab, va
             os.chown(path, STRANGER, STRANGER)
         else:
             path.chmod(0o777)
-    printed, warned = lab.run(**environ)
+    printed, warned = lab.run(**{"XDG_CACHE_HOME": str(tmp_path / "mine"), variable: str(cache)})
     assert printed == "42.0 False 0"
     assert "compiled code" in warned
     assert "not used" in warned

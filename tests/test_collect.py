@@ -6,18 +6,27 @@ import sys
 from collections import Counter
 
 import pytest
+from attrs import evolve
 from cases import every_case
 from commands import graspsense
+from grippers import Scripted, bottle, squeezing
+from kept import BENCH, keep
 
+from graspsense.core.components.config import resolve
+from graspsense.core.components.registry import installed
 from graspsense.core.values.errors import ConfigError
 from graspsense.store.collecting import Collection, Wanted
+from graspsense.store.comparable import check_settings, newest_grasp
 from graspsense.store.store import Store
 
-PLAIN = ["-o", "classifier.type=none"]
+PLAIN = ("-o", "classifier.type=none")
+COARSE = ("-o", "gripper.sensor=ideal", "-o", "gripper.rate_hz=250")
+"""Settings with which a simulated grasp takes a fraction of the time."""
+EMULATED = ("--gripper", "pr2", "-o", "gripper.transport=emulated")
 
 
-def collect(folder, answers, labels="can:full_open,block", each=2, more=()):
-    command = ["collect", "--labels", labels, "--each", str(each), "--save", folder, *PLAIN, *more]
+def collect(folder, answers, labels="can:full_open,block", each=2, more=COARSE):
+    command = ("collect", "--labels", labels, "--each", each, "--save", folder, *PLAIN, *more)
     return graspsense(*command, "--json", answers=answers)
 
 
@@ -26,6 +35,14 @@ def trials_in(folder):
         return [
             (summary.id, summary.label, summary.set_aside) for summary in reversed(store.page(set_aside=None))
         ]
+
+
+@pytest.fixture
+def grasped(tmp_path):
+    """The folder of a store with a trial of the simulated gripper and the settings of the pipeline default."""
+    with Store.open(tmp_path / "grasped") as store:
+        keep(store, device=evolve(BENCH, name="simulated PR2 gripper", serial=""))
+    return tmp_path / "grasped"
 
 
 @pytest.mark.slow
@@ -47,34 +64,29 @@ def test_it_prompts_counts_undoes_retakes_and_stops_when_everything_is_there(tmp
     assert "next: block  (1 of 2)" in done.stderr
 
 
-EMULATED = ("--gripper", "pr2", "-o", "gripper.transport=emulated")
-
-
-@pytest.fixture(scope="module")
-def emulated(tmp_path_factory):
-    """The folder with a grasp of an individual object by an emulated PR2 with a frozen cell, and what was told."""
-    folder = tmp_path_factory.mktemp("emulated") / "t"
+@pytest.mark.slow
+def test_an_emulated_pr2_grasps_what_the_label_says_and_its_fault_is_told_with_the_trial(tmp_path):
     frozen = (*EMULATED, "-o", "gripper.faults.freeze_cell=15")
-    done = collect(folder, "\n", labels="can:full_open#2", each=1, more=frozen)
+    done = collect(tmp_path / "t", "\n\n", labels="block,can:full_open#2", each=1, more=frozen)
+
     assert done.returncode == 0, done.stderr
-    return folder, done.stderr
-
-
-def test_a_fault_that_ends_no_grasp_is_told_with_each_trial(emulated):
-    folder, said = emulated
-    told = [line for line in said.splitlines() if "frozen cells" in line]
-    assert len(told) == 1
+    assert sorted(held(tmp_path / "t")) == [
+        ("block", "block", True),
+        ("can:full_open", "can:full_open#2", True),
+    ]
+    told = [line for line in done.stderr.splitlines() if "frozen cells" in line]
+    assert len(told) == 2
     assert "warning" in told[0]
-    with Store.read(folder) as store:
+    with Store.read(tmp_path / "t") as store:
         assert "(15)" in store.trial(1).result.details["warnings"][0]
 
 
 @pytest.mark.slow
 def test_classes_come_in_rounds_so_that_none_is_recorded_in_one_go(tmp_path):
-    collect(tmp_path / "t", "\n" * 9, labels="block,toy,can:full_open", each=3)
+    collect(tmp_path / "t", "\n" * 6, labels="block,none,can:full_open", each=2)
     labels = [label for _, label, _ in trials_in(tmp_path / "t")]
-    for k in (0, 3, 6):
-        assert sorted(labels[k : k + 3]) == ["block", "can:full_open", "toy"]
+    for k in (0, 3):
+        assert sorted(labels[k : k + 3]) == ["block", "can:full_open", "none"]
 
 
 @pytest.mark.slow
@@ -91,52 +103,53 @@ def test_it_goes_on_where_it_was_with_new_draws(tmp_path):
     assert seeds == [0, 1, 2, 3]
 
 
-@pytest.mark.slow
-def test_other_settings_are_refused_unless_told(tmp_path):
-    collect(tmp_path / "t", "\n")
-    other = ["-o", "controller.probing_force_n=12"]
-    done = collect(tmp_path / "t", "\n", more=other)
+RUN = ("run", "--label", "block", *PLAIN, "--save")
+
+
+@every_case("command", [RUN, ("collect", "--labels", "block,can:full_open", *PLAIN, "--save")])
+@every_case(
+    ("options", "says"),
+    [
+        (("-o", "controller.probing_force_n=12"), "controller.probing_force_n was 20.0 and is 12.0"),
+        (("-o", "features.force=left"), "features.force was 'mean' and is 'left'"),
+        (EMULATED, "gripper.type was 'graspsense-sim-gripper/sim' and is 'graspsense-pr2-gripper/pr2'"),
+    ],
+)
+def test_other_settings_are_refused_before_the_grasp(grasped, command, options, says):
+    done = graspsense(*command, grasped, *options, answers="\n")
     assert done.returncode == 2
-    assert "controller.probing_force_n was 20.0 and is 12.0" in done.stderr
-    assert "--changed" in done.stderr
-    assert len(trials_in(tmp_path / "t")) == 1
-    done = collect(tmp_path / "t", "\nq\n", more=[*other, "--changed"])
-    assert done.returncode == 0
-    assert len(trials_in(tmp_path / "t")) == 2
+    assert says in done.stderr
+    assert "add --changed if this is intended" in done.stderr
+    assert len(trials_in(grasped)) == 1
 
 
-def test_another_classifier_is_no_other_setting(tmp_path):
-    collect(tmp_path / "t", "\n")
-    command = ["collect", "--labels", "block,can:full_open", "--save", str(tmp_path / "t"), *PLAIN]
+@pytest.mark.slow
+def test_other_settings_are_taken_if_it_is_told(grasped):
+    changed = (*COARSE, "-o", "controller.probing_force_n=12", "--changed")
+    assert collect(grasped, "\nq\n", more=changed).returncode == 0
+    assert graspsense(*RUN, grasped, *changed).returncode == 0
+    assert len(trials_in(grasped)) == 3
+
+
+def test_another_classifier_is_no_other_setting(grasped):
+    command = ("collect", "--labels", "block,can:full_open", "--save", grasped)
     done = graspsense(*command, "-o", "classifier.type=knn", answers="q\n")
     assert done.returncode == 0, done.stderr
 
 
 def test_another_gripper_is_refused_before_it_moves(tmp_path):
-    from grippers import Scripted, bottle, squeezing
-
-    from graspsense.core.components.config import resolve
-    from graspsense.core.components.registry import installed
-
-    plugins = installed()
-
     class Serial(Scripted):
-        serial = "A"
         commanded = 0
 
         def open(self, seed):
-            from attrs import evolve
-
-            return evolve(super().open(seed), serial=type(self).serial)
+            return evolve(super().open(seed), serial="B")
 
         def apply(self, command):
             type(self).commanded += 1
             super().apply(command)
 
     def settings_for(word, seed):
-        from attrs import evolve
-
-        settings = resolve("default", plugins=plugins, options=["classifier.type=none", f"run.seed={seed}"])
+        settings = resolve("default", options=["classifier.type=none", f"run.seed={seed}"])
 
         class Choice(type(settings.gripper)):
             def create(self):
@@ -144,35 +157,41 @@ def test_another_gripper_is_refused_before_it_moves(tmp_path):
 
         return evolve(settings, gripper=Choice(settings.gripper.component, settings.gripper.config))
 
-    said = []
-    answers = iter(["", "q"])
+    answers = iter(["", "", "q"])
     with Store.open(tmp_path / "t") as store:
+        keep(store, label="jar:full", device=evolve(BENCH, name="scripted", serial="A"))
         collection = Collection(
             store=store,
             wanted=Wanted(words=("jar:full",), each=5),
-            plugins=plugins,
+            plugins=installed(),
             settings_for=settings_for,
             ask=lambda question: next(answers),
-            say=said.append,
+            say=lambda text: None,
         )
-        collection.run()
-        assert collection.counts() == {"jar:full": 1}
-        Serial.serial, Serial.commanded = "B", 0
-        answers = iter([""])
         with pytest.raises(ConfigError, match="serial was 'A' and is 'B'"):
             collection.run()
         assert Serial.commanded == 0
         assert collection.counts() == {"jar:full": 1}
         assert list(store.recordings.glob("*.part")) == []
         collection.changed = True
-        answers = iter(["", "q"])
         collection.run()
         assert collection.counts() == {"jar:full": 2}
 
 
 @pytest.mark.slow
 def test_it_takes_its_answers_from_a_pipe(tmp_path):
-    command = [sys.executable, "-m", "graspsense", "collect", "--labels", "block", "--each", "1", *PLAIN]
+    command = [
+        sys.executable,
+        "-m",
+        "graspsense",
+        "collect",
+        "--labels",
+        "block",
+        "--each",
+        "1",
+        *PLAIN,
+        *COARSE,
+    ]
     done = subprocess.run(
         command, input="\n", capture_output=True, text=True, cwd=tmp_path, timeout=300, check=False
     )
@@ -184,15 +203,9 @@ def test_it_takes_its_answers_from_a_pipe(tmp_path):
     assert trials_in(tmp_path / "trials") == [(1, "block", None)]
 
 
-def test_a_label_that_the_simulator_does_not_know_is_told(tmp_path):
-    done = collect(tmp_path / "t", "\n", labels="jar:full")
-    assert done.returncode == 2
-    assert "jar" in done.stderr
-
-
 @pytest.mark.parametrize(
     ("labels", "says"),
-    [("", "nothing to collect"), ("block,block", "named twice"), ("a b", "is not a label")],
+    [("", "nothing to collect"), ("block,block", "named twice")],
 )
 def test_labels_that_make_no_sense_are_told(tmp_path, labels, says):
     done = collect(tmp_path / "t", "", labels=labels)
@@ -218,7 +231,7 @@ def test_the_first_trials_are_collected_for_a_model_that_does_not_exist_yet(tmp_
         "note: `collect` works with it, `run` does not yet: there is no model mine.json yet" in valid.stdout
     )
     done = graspsense(
-        *("collect", "--pipeline", "mine.toml", "--labels", kinds, "--each", "2", "--save", "t"),
+        *("collect", "--pipeline", "mine.toml", "--labels", kinds, "--each", "2", "--save", "t", *COARSE),
         answers="\n" * 4,
     )
     assert done.returncode == 0
@@ -252,21 +265,6 @@ def held(folder):
     ]
 
 
-@pytest.mark.slow
-def test_an_emulated_pr2_grasps_what_the_label_says(tmp_path):
-    done = collect(tmp_path / "t", "\n\n", each=1, more=EMULATED)
-
-    assert done.returncode == 0, done.stderr
-    assert sorted(held(tmp_path / "t")) == [
-        ("block", "block", True),
-        ("can:full_open", "can:full_open", True),
-    ]
-
-
-def test_a_label_of_an_individual_object_selects_this_object_on_an_emulated_pr2(emulated):
-    assert held(emulated[0]) == [("can:full_open", "can:full_open#2", True)]
-
-
 @every_case("gripper", [(), EMULATED])
 @every_case("told", [("--object", "toy"), ("-o", "gripper.object=toy")])
 def test_an_object_that_contradicts_a_label_is_refused(tmp_path, gripper, told):
@@ -277,6 +275,7 @@ def test_an_object_that_contradicts_a_label_is_refused(tmp_path, gripper, told):
     assert not (tmp_path / "t").exists()
 
 
+@pytest.mark.slow
 def test_an_object_from_a_file_can_have_any_label(tmp_path):
     scene = tmp_path / "mine.toml"
     scene.write_text('width_m = 0.05\n[[terms]]\ntype = "elastic"\nk1_n_m = 5000.0\n')
@@ -288,10 +287,7 @@ def test_an_object_from_a_file_can_have_any_label(tmp_path):
 
 
 def test_a_gripper_that_cannot_be_told_takes_the_word_of_the_operator(tmp_path):
-    from grippers import Scripted, bottle, squeezing
-
     from graspsense.cli.collect import _label_selects_object
-    from graspsense.core.components.config import resolve
 
     class Choice:
         def create(self):
@@ -304,57 +300,16 @@ def test_a_gripper_that_cannot_be_told_takes_the_word_of_the_operator(tmp_path):
     assert not _label_selects_object(Asked(), ["jar:full"], object_is_named=False)
 
 
-SAVED = ("run", "--label", "block", "-o", "classifier.type=none", "--save")
-
-
-def test_run_into_a_store_with_other_settings_is_refused_before_the_grasp(tmp_path):
-    folder = str(tmp_path / "t")
-    assert graspsense(*SAVED, folder).returncode == 0
-
-    other = graspsense(*SAVED, folder, "-o", "controller.probing_force_n=12", "--seed", "4")
-    assert other.returncode == 2
-    assert "controller.probing_force_n was 20.0 and is 12.0" in other.stderr
-    assert "add --changed if this is intended" in other.stderr
-    gripper = graspsense(*SAVED, folder, *EMULATED)
-    assert gripper.returncode == 2
-    assert (
-        "gripper.type was 'graspsense-sim-gripper/sim' and is 'graspsense-pr2-gripper/pr2'" in gripper.stderr
-    )
-    assert len(trials_in(folder)) == 1
-
-    assert graspsense(*SAVED, folder, "-o", "controller.probing_force_n=12", "--changed").returncode == 0
-    assert len(trials_in(folder)) == 2
-
-
 @pytest.mark.slow
-def test_what_is_grasped_and_what_changes_no_result_may_differ(tmp_path):
-    folder = str(tmp_path / "t")
-    assert graspsense(*SAVED, folder).returncode == 0
-
-    command = ("run", "--label", "toy", "--seed", "3", "-o", "gripper.explain=true", "--save", folder)
-    done = graspsense(*command, "-o", "gripper.compile=never")
+def test_what_is_grasped_and_what_changes_no_result_may_differ(grasped):
+    options = ("--seed", "3", "-o", "gripper.explain=true", "-o", "gripper.compile=never")
+    done = graspsense("run", "--label", "can:empty_open", *PLAIN, *options, "--save", grasped)
     assert done.returncode == 0, done.stderr
-    assert collect(folder, "q\n").returncode == 0
+    assert collect(grasped, "q\n", more=()).returncode == 0
 
 
-def test_collecting_into_a_store_of_runs_with_other_settings_is_refused(tmp_path):
-    folder = str(tmp_path / "t")
-    assert graspsense(*SAVED, folder).returncode == 0
-
-    done = collect(folder, "\n", more=["-o", "features.force=left"])
-
-    assert done.returncode == 2
-    assert "features.force was 'mean' and is 'left'" in done.stderr
-
-
-def test_a_setting_that_is_newer_than_the_trial_had_its_default(tmp_path):
-    from kept import SETTINGS, keep
-
-    from graspsense.core.components.config import resolve
-    from graspsense.store.comparable import check_settings, newest_grasp
-
-    with Store.open(tmp_path / "t") as store:
-        keep(store, settings=SETTINGS)
+def test_a_setting_that_is_newer_than_the_trial_had_its_default(grasped):
+    with Store.read(grasped) as store:
         default_grasp = newest_grasp(store)
         check_settings(store, default_grasp, resolve("default"))
         with pytest.raises(ConfigError, match=r"controller\.ramp_s was 0\.0 and is 0\.1"):
@@ -380,18 +335,8 @@ def test_a_store_and_files_with_spaces_in_their_names_work_everywhere(tmp_path, 
     (tmp_path / "my lab.toml").write_text('extends = "default"\n[classifier]\ntype = "none"\n')
     pipeline, store = ("--pipeline", "my lab.toml"), "my trials"
 
-    command = (
-        "collect",
-        *pipeline,
-        "--labels",
-        "block,toy",
-        "--each",
-        "2",
-        "--operator",
-        "A B",
-        "--save",
-        store,
-    )
+    command = ("collect", *pipeline, *COARSE, "--labels", "block,none", "--each", "2")
+    command += ("--operator", "A B", "--save", store)
     assert graspsense(*command, answers="\n" * 4).returncode == 0
     for command in (
         ("trials", "list", store),

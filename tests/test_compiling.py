@@ -288,7 +288,7 @@ COMPOSE = """
 """
 
 
-def run(program, tmp_path, *arguments, **environment):
+def run(program, *arguments, **environment):
     done = subprocess.run(
         [sys.executable, str(program), *arguments],
         capture_output=True,
@@ -299,22 +299,40 @@ def run(program, tmp_path, *arguments, **environment):
     return done.stdout.splitlines()
 
 
+ASKS = """
+    import sys
+    sys.argv[1:] = []
+    from compose import laws
+    from graspsense.simulator_api import is_on_disk
+    print([is_on_disk(*law) for law in laws.values()], "numba" in sys.modules)
+"""
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("_numba")
 def test_compositions_compiled_in_three_processes_stay_themselves_in_a_fourth(tmp_path):
     # Same functions, same types, other parts or other options: under one name, one would run the code of another.
-    program = tmp_path / "compose.py"
-    program.write_text(textwrap.dedent(COMPOSE))
-    cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    source = tmp_path / "source"
+    source.mkdir()
+    program, asks = source / "program.py", source / "asks.py"
+    (source / "compose.py").write_text(textwrap.dedent(COMPOSE))
+    program.write_text("import compose\n")
+    asks.write_text(textwrap.dedent(ASKS))
+    cache = {"XDG_CACHE_HOME": str(tmp_path / "cache"), "NUMBA_CACHE_DIR": ""}
 
-    assert run(program, tmp_path, "soft", **cache) == ["soft 100.0 0"]
-    assert run(program, tmp_path, "hard", **cache) == ["hard 500.0 0"]
-    assert run(program, tmp_path, "hard, numpy", **cache) == ["hard, numpy inf 0"]
-    assert run(program, tmp_path, "soft", "hard", "hard, numpy", **cache) == [
+    assert run(asks, **cache) == ["[False, False, False] False"]
+    assert run(program, "soft", **cache) == ["soft 100.0 0"]
+    assert run(program, "hard", **cache) == ["hard 500.0 0"]
+    assert run(asks, **cache) == ["[True, True, False] False"]
+    assert run(program, "hard, numpy", **cache) == ["hard, numpy inf 0"]
+    assert run(program, "soft", "hard", "hard, numpy", **cache) == [
         "soft 100.0 1",
         "hard 500.0 1",
         "hard, numpy inf 1",
     ]
+    # It is kept in the user's cache and nowhere else.
+    assert list((tmp_path / "cache" / "graspsense" / "compiled").rglob("*.nbc"))
+    assert sorted(path.name for path in source.iterdir()) == ["asks.py", "compose.py", "program.py"]
 
 
 MAIN = """
@@ -340,12 +358,12 @@ def test_an_edited_helper_or_constant_of_another_module_is_noticed(tmp_path):
     (tmp_path / "numbers_of_law.py").write_text("SCALE = 1.0\n")
     cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
 
-    assert run(main, tmp_path, **cache) == ["2.0 0"]
-    assert run(main, tmp_path, **cache) == ["2.0 1"]
+    assert run(main, **cache) == ["2.0 0"]
+    assert run(main, **cache) == ["2.0 1"]
     (tmp_path / "laws.py").write_text("def helper(x):\n    return 3.0 * x\n")
-    assert run(main, tmp_path, **cache) == ["3.0 0"]
+    assert run(main, **cache) == ["3.0 0"]
     (tmp_path / "numbers_of_law.py").write_text("SCALE = 7.0\n")
-    assert run(main, tmp_path, **cache) == ["21.0 0"]
+    assert run(main, **cache) == ["21.0 0"]
 
 
 @pytest.mark.slow
@@ -353,63 +371,18 @@ def test_an_edited_helper_or_constant_of_another_module_is_noticed(tmp_path):
 def test_code_of_a_version_with_other_types_is_made_anew(tmp_path):
     """The code of the function stays the same, but the type of its argument has another name."""
     (tmp_path / "law.py").write_text("def law(params):\n    return params.stiffness * 2.0\n")
-    run = """
-import shapes
-from law import law
-from graspsense.simulator_api import compile_function
-compiled = compile_function(law)
-print(compiled(shapes.{name}(3.0)), sum(compiled.stats.cache_hits.values()))
-"""
+    program = tmp_path / "program.py"
+    program.write_text(
+        "import sys, shapes\nfrom law import law\nfrom graspsense.simulator_api import compile_function\n"
+        "compiled = compile_function(law)\n"
+        "print(compiled(getattr(shapes, sys.argv[1])(3.0)), sum(compiled.stats.cache_hits.values()))\n"
+    )
     told = []
     for name in ("Spring", "Spring", "Shell", "Shell"):
         lines = ["from typing import NamedTuple", f"class {name}(NamedTuple):", "    stiffness: float"]
         (tmp_path / "shapes.py").write_text("\n".join(lines))
-        environment = {
-            **os.environ,
-            "NUMBA_CACHE_DIR": str(tmp_path / "kept"),
-            "PYTHONDONTWRITEBYTECODE": "1",
-        }
-        done = subprocess.run(
-            [sys.executable, "-c", run.format(name=name)],
-            cwd=tmp_path,
-            env=environment,
-            capture_output=True,
-            text=True,
-        )
-        assert done.returncode == 0, done.stderr
-        told.append(done.stdout.split())
-    assert told == [["6.0", "0"], ["6.0", "1"], ["6.0", "0"], ["6.0", "1"]]
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("_numba")
-def test_compiled_code_is_kept_in_the_users_cache_and_nowhere_else(tmp_path):
-    program = tmp_path / "source" / "compose.py"
-    program.parent.mkdir()
-    program.write_text(textwrap.dedent(COMPOSE))
-    cache = {"XDG_CACHE_HOME": str(tmp_path / "cache"), "NUMBA_CACHE_DIR": ""}
-
-    assert run(program, tmp_path, "soft", **cache) == ["soft 100.0 0"]
-    assert run(program, tmp_path, "soft", **cache) == ["soft 100.0 1"]
-    assert list((tmp_path / "cache" / "graspsense" / "compiled").rglob("*.nbc"))
-    assert [path.name for path in program.parent.iterdir()] == ["compose.py"]
-
-
-@pytest.mark.usefixtures("_numba")
-def test_what_an_earlier_process_compiled_is_known_to_be_on_disk(tmp_path):
-    program, asks = tmp_path / "compose.py", tmp_path / "asks.py"
-    program.write_text(textwrap.dedent(COMPOSE))
-    asks.write_text(
-        "import sys\nsys.argv[1:] = []\nfrom compose import laws\nfrom graspsense.simulator_api import is_on_disk\n"
-        "print([is_on_disk(*law) for law in laws.values()], 'numba' in sys.modules)\n"
-    )
-    cache = {"XDG_CACHE_HOME": str(tmp_path / "cache"), "NUMBA_CACHE_DIR": ""}
-
-    assert run(asks, tmp_path, **cache) == ["[False, False, False] False"]
-    compiles = tmp_path / "compiles.py"
-    compiles.write_text("import sys\nsys.argv[1:] = ['hard']\nimport compose\n")
-    run(compiles, tmp_path, **cache)
-    assert run(asks, tmp_path, **cache) == ["[False, True, False] False"]
+        told += run(program, name, NUMBA_CACHE_DIR=str(tmp_path / "kept"))
+    assert told == ["6.0 0", "6.0 1", "6.0 0", "6.0 1"]
 
 
 @pytest.mark.usefixtures("_numba")
@@ -459,7 +432,7 @@ def test_where_nothing_can_be_kept_functions_are_compiled_all_the_same(tmp_path)
     (tmp_path / "file").touch()
     cache = {"XDG_CACHE_HOME": str(tmp_path / "file"), "NUMBA_CACHE_DIR": ""}
 
-    assert run(program, tmp_path, "soft", **cache) == ["soft 100.0 0"]
+    assert run(program, "soft", **cache) == ["soft 100.0 0"]
 
 
 def test_the_older_half_of_the_compiled_code_is_deleted_where_there_is_much(tmp_path):

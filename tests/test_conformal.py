@@ -88,7 +88,10 @@ def test_the_threshold_is_reached_by_90_percent_of_the_trials_that_are_not_recog
     assert threshold(calibrated_by(truth, ["a"] * 19)) == truth[1]
 
 
-@pytest.mark.parametrize(("instances", "each"), [(9, 1), (15, 1), (16, 3)])
+@pytest.mark.parametrize(
+    ("instances", "each"),
+    [(9, 1), *(pytest.param(*shape, marks=pytest.mark.slow) for shape in ((15, 1), (16, 3)))],
+)
 def test_the_thresholds_of_few_instances_cover_what_is_asked_and_little_more(instances, each):
     # Scores of any distribution that is the same for all instances: here those of one instance resemble each other.
     rng = np.random.default_rng(instances)
@@ -197,8 +200,13 @@ def test_predictions_say_which_labels_are_in_every_set():
     )
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("instances", [3, 4, 8, 9, 12, 20, 60])
+@pytest.mark.parametrize(
+    "instances",
+    [
+        *(pytest.param(n, marks=pytest.mark.slow) for n in (3, 9)),
+        *(pytest.param(n, marks=pytest.mark.long) for n in (4, 8, 12, 20, 60)),
+    ],
+)
 def test_each_label_is_covered_however_few_instances_it_has(instances):
     """Four labels, of which one has few instances; the sets are judged by trials of new instances of each label."""
     covered, draws = np.zeros(4), 40
@@ -384,4 +392,4 @@ def test_the_page_shows_coverage_and_reliability():
 
     assert evaluation.sets.covered.words in section.body
     assert "<svg" in section.body
-    assert "Not measured here: 7 calibration instances" in doubt_section(few.sets, few.reliability).body
+    assert "Not measured here: 6 calibration instances" in doubt_section(few.sets, few.reliability).body

@@ -145,19 +145,22 @@ def test_a_camera_counts_how_much_its_colours_change_in_either_direction():
     assert "shear_first" in f.reasons
 
 
-def test_the_mean_of_the_images_before_the_squeeze_is_the_zero():
-    noise = [np.full(ROWS * COLUMNS, value) for value in (1.0, 3.0)]
-    pressed = bump(5.0, 8.0, 1.0, 1.0, 0.0).ravel()
-    f = extract([*noise, 2.0 + pressed], (Phase.APPROACH, Phase.APPROACH, Phase.SQUEEZE))
-
-    assert f["total"] == pytest.approx(float(np.sum(pressed)))
+PRESSED = bump(5.0, 8.0, 1.0, 1.0, 0.0).ravel()
+NOTHING = np.zeros(ROWS * COLUMNS)
 
 
-def test_a_recording_without_phases_begins_with_its_zero():
-    pressed = bump(5.0, 8.0, 1.0, 1.0, 0.0).ravel()
-    f = extract([np.zeros(ROWS * COLUMNS), pressed, pressed], (Phase.APPROACH,) * 3)
-
-    assert f["total"] == pytest.approx(float(np.sum(pressed)))
+@every_case(
+    ("images", "phases"),
+    [
+        # The zero is the mean of the images before the squeeze, and without phases the first one.
+        ((NOTHING + 1.0, NOTHING + 3.0, PRESSED + 2.0), (Phase.APPROACH, Phase.APPROACH, Phase.SQUEEZE)),
+        ((NOTHING, PRESSED, PRESSED), (Phase.APPROACH,) * 3),
+        # A cell without a number does not change.
+        ((NOTHING, np.concatenate(([math.nan], PRESSED[1:]))), (Phase.APPROACH, Phase.SQUEEZE)),
+    ],
+)
+def test_the_total_is_that_of_the_change_from_the_zero(images, phases):
+    assert extract(images, phases)["total"] == pytest.approx(float(np.sum(PRESSED)), abs=1e-6)
 
 
 @every_case(
@@ -174,15 +177,6 @@ def test_what_an_image_does_not_show_is_missing_with_a_reason(images, missing):
 
     assert missing <= set(f.reasons)
     assert all(math.isnan(f[name]) for name in missing)
-
-
-def test_a_cell_without_a_number_does_not_change():
-    pressed = bump(5.0, 8.0, 1.0, 1.0, 0.0).ravel()
-    broken = pressed.copy()
-    broken[0] = math.nan
-    f = extract([np.zeros(ROWS * COLUMNS), broken])
-
-    assert f["total"] == pytest.approx(float(np.sum(pressed)), abs=1e-6)
 
 
 def test_fingertips_have_features_for_each_side():

@@ -109,7 +109,7 @@ def uneven_times(seed, n):
     return np.unique(np.concatenate(([0.0], uneven, [EVEN[-1]])))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([800, 1500]), st.sampled_from([0.7, 1.0, 1.8]))
 def test_uneven_samples_of_the_same_curve_give_the_same_features(seed, n, exponent):
     """With samples closer than the window of the mean force, what they leave out of the curve is small."""
@@ -137,7 +137,7 @@ def with_samples_between(trace, t_s):
     return trace_of(frames, trace.phase[later].tolist(), [0.0] * len(frames), [], trace.units)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.7, 1.0, 1.8]))
 @example(956894, 1.8)
 @example(332562459, 0.7)
@@ -172,7 +172,7 @@ def test_repeated_forces_between_cell_images_do_not_shift_the_curve():
     assert stairs["hysteresis"] == pytest.approx(even["hysteresis"], abs=0.03)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(st.floats(0.3, 1.0), st.floats(0.6, 2.0))
 def test_swapping_the_fingers_changes_nothing(second_share, exponent):
     trace = grasp(EVEN[::4], second_share=second_share, exponent=exponent)
@@ -180,7 +180,7 @@ def test_swapping_the_fingers_changes_nothing(second_share, exponent):
     assert FEATURES.extract(swapped).values == pytest.approx(FEATURES.extract(trace).values, nan_ok=True)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(st.floats(0.1, 10.0), st.floats(0.1, 10.0), st.floats(0.1, 10.0))
 def test_features_scale_with_their_units(length, force, time):
     """In other units of gap, force and time, each feature is the same quantity."""
@@ -255,7 +255,6 @@ def test_units_of_a_recording_carry_over():
     assert f.units[NAMES.index("stiffness_50")] == "N/m"
 
 
-@settings(max_examples=150, deadline=None)
 @given(
     st.lists(
         st.tuples(
@@ -281,6 +280,7 @@ def test_every_trace_gives_numbers_or_reasons(rows):
         assert (value != value) == bool(f.reasons.get(name)), name
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(
     "GRASPSENSE_ICUB" not in os.environ,
     reason="needs the iCub Grasp Dataset: name its folder in GRASPSENSE_ICUB",

@@ -97,7 +97,7 @@ def resealed(path, change):
     path.write_text(json.dumps({**content, "sha256": digest(content)}))
 
 
-SOME = pytest.param((2, 20, 6), 100, marks=pytest.mark.slow, id="some")
+SOME = pytest.param((2, 12, 5), 50, marks=pytest.mark.slow, id="some")
 EVERY = pytest.param((0, 0, 0), 1000, marks=pytest.mark.long, id="every")
 
 
@@ -241,6 +241,7 @@ def test_whatever_a_classifier_raises_on_a_file_is_damage_of_the_file(mean):
         classifier_from(StoredValues(kept), component, component.config_class()(), model.names, model.units)
 
 
+@pytest.mark.slow
 class TestKeptAsSkops:
     """The compiled code of scikit-learn trusts its arrays; each that does not fit is refused before it is used."""
 

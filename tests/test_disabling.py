@@ -7,9 +7,11 @@ import subprocess
 import sys
 
 import pytest
+from commands import graspsense
 
 from graspsense.cli.plugins import _rows
 from graspsense.core.components.registry import Plugins, builtin_source, installed_sources
+from graspsense.core.components.registry import plugins as loader
 from graspsense.core.components.registry.discovery import config_file, disabled_in_config, write_disabled
 from graspsense.core.values.errors import ConfigError
 
@@ -29,41 +31,50 @@ def home(tmp_path, monkeypatch):
     return tmp_path / "config" / "graspsense" / "plugins.toml"
 
 
-def graspsense(site, *arguments, code=0):
-    environ = {**os.environ, "PYTHONPATH": str(site.folder), "NO_COLOR": "1"}
-    environ["GRASPSENSE_PLUGINS"] = "lab-loud lab-peak lab-other lab-old lab-slow lab-broken lab-sleepy"
-    program = "import sys; from graspsense.cli.main import main; main(sys.argv[1:])"
-    done = subprocess.run(
-        [sys.executable, "-c", program, *arguments], env=environ, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == code, done.stderr
-    return done.stdout + done.stderr
+NAMED = "lab-loud lab-peak lab-other lab-old lab-slow lab-broken lab-sleepy"
 
 
-def test_a_disabled_plugin_is_not_imported_until_it_is_enabled_again(home, site):
+@pytest.fixture
+def run(site, monkeypatch):
+    """Return a function that runs a command as if in a new process, and returns what it prints."""
+    monkeypatch.setenv("GRASPSENSE_PLUGINS", NAMED)
+    monkeypatch.setenv("NO_COLOR", "1")
+
+    def run(*arguments, code=0):
+        monkeypatch.setattr(loader, "_current", None)
+        for name in site.modules:
+            sys.modules.pop(name, None)
+        done = graspsense(*arguments)
+        assert done.returncode == code, done.stderr
+        return done.stdout + done.stderr
+
+    return run
+
+
+def test_a_disabled_plugin_is_not_imported_until_it_is_enabled_again(home, site, run):
     site.install("lab-loud", "import sys; sys.stderr.write('I was imported'); GRASPSENSE_API = (2, 0)")
 
-    assert "I was imported" in graspsense(site, "plugins", "list")
-    said = graspsense(site, "plugins", "disable", "Lab_Loud")
+    assert "I was imported" in run("plugins", "list")
+    said = run("plugins", "disable", "Lab_Loud")
     assert f"lab-loud is disabled, in {home}" in said
     assert "I was imported" not in said
     assert home.read_text() == 'disabled = ["lab-loud"]\n'
 
-    listed = graspsense(site, "plugins", "list")
+    listed = run("plugins", "list")
     assert "I was imported" not in listed
     assert f"in {home} (graspsense plugins enable lab-loud)" in listed
 
-    graspsense(site, "plugins", "enable", "lab-loud")
+    run("plugins", "enable", "lab-loud")
     assert not home.exists()
-    assert "I was imported" in graspsense(site, "plugins", "list")
+    assert "I was imported" in run("plugins", "list")
 
 
-def test_what_cannot_be_disabled_or_enabled(home, site):
+def test_what_cannot_be_disabled_or_enabled(home, site, run):
     site.install("lab-loud", "GRASPSENSE_API = (2, 0)")
 
-    assert "Did you mean 'lab-loud'?" in graspsense(site, "plugins", "disable", "lab-lout", code=2)
-    assert "no installed plugin" in graspsense(site, "plugins", "disable", "graspsense", code=2)
-    assert "lab-loud is not disabled" in graspsense(site, "plugins", "enable", "lab-loud", code=2)
+    assert "Did you mean 'lab-loud'?" in run("plugins", "disable", "lab-lout", code=2)
+    assert "no installed plugin" in run("plugins", "disable", "graspsense", code=2)
+    assert "lab-loud is not disabled" in run("plugins", "enable", "lab-loud", code=2)
 
 
 @pytest.mark.parametrize(
@@ -97,7 +108,11 @@ def test_the_list_says_what_is_to_be_done(home, site):
     site.install("lab-broken", "import no_such_driver")
     site.install("lab-sleepy", "import time; time.sleep(0.7); GRASPSENSE_API = (2, 0)")
 
-    said = graspsense(site, "plugins", "list").partition("To be done:")[2]
+    # A process of its own, for which numpy is not imported yet.
+    environ = {**os.environ, "PYTHONPATH": str(site.folder), "NO_COLOR": "1", "GRASPSENSE_PLUGINS": NAMED}
+    program = "from graspsense.cli.main import main; main(['plugins', 'list'])"
+    done = subprocess.run([sys.executable, "-c", program], env=environ, capture_output=True, text=True)
+    said = done.stdout.partition("To be done:")[2]
 
     assert (
         "lab-peak: the feature set name 'peak' is also that of lab-other/peak: write "

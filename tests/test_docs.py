@@ -10,10 +10,12 @@ import re
 import shlex
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import click
 import numpy
+import pytest
 from cases import every_case
 from test_imports import DOORS, MAY_KNOW, ROOMS
 
@@ -35,31 +37,29 @@ PAGES = script("role_pages")
 DRAWING = script("package_drawing")
 
 
-@every_case("role", PAGES.TITLES)
-def test_the_page_of_a_role_is_what_the_code_says(role):
-    written = (ROOT / "docs" / "roles" / f"{role}.md").read_text()
-    assert written == PAGES.page(role), "run: python docs/role_pages.py"
+MADE_PAGES = {
+    "signals": PAGES.signals_page,
+    "hooks": PAGES.hooks_page,
+    "terms": PAGES.terms_page,
+    "helpers": PAGES.helpers_page,
+    "names": PAGES.names_page,
+    **{role: partial(PAGES.page, role) for role in PAGES.TITLES},
+}
+"""Each page in docs/roles, and what gives its text."""
 
 
-def test_the_page_of_values_and_units_is_what_the_code_says():
-    written = (ROOT / "docs" / "roles" / "signals.md").read_text()
-    assert written == PAGES.signals_page(), "run: python docs/role_pages.py"
+@every_case("name", MADE_PAGES)
+def test_a_page_that_is_made_from_the_code_is_what_the_code_says(name):
+    written = (ROOT / "docs" / "roles" / f"{name}.md").read_text(encoding="utf-8")
+    assert written == MADE_PAGES[name](), "run: python docs/role_pages.py"
 
 
-def test_the_page_of_the_hooks_is_what_the_code_says():
-    written = (ROOT / "docs" / "roles" / "hooks.md").read_text()
-    assert written == PAGES.hooks_page(), "run: python docs/role_pages.py"
-
-
-def test_the_page_of_the_terms_is_what_the_code_says():
-    written = (ROOT / "docs" / "roles" / "terms.md").read_text(encoding="utf-8")
-    assert written == PAGES.terms_page(), "run: python docs/role_pages.py"
-
-
+@pytest.mark.slow
 def test_the_drawing_of_the_packages_is_that_of_the_imports():
     assert DRAWING.FILE.read_text() == DRAWING.drawing(), "run: python docs/package_drawing.py"
 
 
+@pytest.mark.slow
 def test_no_package_imports_in_a_circle():
     for graph in (DRAWING.host_subpackages(), DRAWING.rooms_of_core(), DRAWING.simulator_subpackages()):
         assert not DRAWING.panel(graph).against
@@ -72,14 +72,8 @@ def architecture_rows(title):
     return [line.strip("| ").split(" | ") for line in section.splitlines() if line.startswith("| `")]
 
 
-def test_the_page_of_helpers_is_that_of_their_docstrings():
-    written = (ROOT / "docs" / "roles" / "helpers.md").read_text(encoding="utf-8")
-    assert written == PAGES.helpers_page(), "run: python docs/role_pages.py"
-
-
-def test_the_page_of_public_names_is_that_of_their_tables():
+def test_every_public_name_has_a_meaning_on_its_page():
     written = (ROOT / "docs" / "roles" / "names.md").read_text(encoding="utf-8")
-    assert written == PAGES.names_page(), "run: python docs/role_pages.py"
     undocumented = [
         line for line in written.splitlines() if line.startswith("| `") and line.endswith("` |  |")
     ]

@@ -36,6 +36,7 @@ def test_probabilities_are_those_of_interpret(classes, monkeypatch):
     assert [term.features for term in classifier._model().terms] == list(machines[0].term_features_)
 
 
+@pytest.mark.slow
 def test_a_stored_model_predicts_without_interpret(tmp_path):
     table, labels = trials()
     classifier = fitted("ebm", table, labels, pairs=1, bags=2)

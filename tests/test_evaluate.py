@@ -40,13 +40,12 @@ def labelled(labels, *columns, **more):
 
 
 def judged(trials, name="tree", **more):
-    """Evaluate with one permutation of the labels instead of 19, and without a learning curve, unless it is asked for.
+    """Evaluate with four folds instead of ten, one permutation of the labels instead of 19, and no learning curve.
 
     Each permutation and each point of the curve is a cross-validation of its own.
     """
-    return evaluate(
-        learner(name), trials, **{"classifier": name, "permutations": 1, "learning_curve": False, **more}
-    )
+    few = {"classifier": name, "folds": 4, "permutations": 1, "learning_curve": False}
+    return evaluate(learner(name), trials, **{**few, **more})
 
 
 STATES = ["can:full", "can:empty", "jar:full", "jar:empty"]
@@ -81,7 +80,7 @@ def test_class_and_state_given_the_class():
     by_width = labelled(labels, width)
 
     assert judged(by_width, target="class").headline.rate > 0.95
-    state = judged(by_width, target="state")
+    state = judged(by_width, target="state", folds=10)
     assert state.headline.interval[0] < 0.5 < state.headline.interval[1]
     assert judged(labelled(labels, force), target="state").headline.rate > 0.95
     # Only states of one's own class can be answered.
@@ -113,7 +112,7 @@ def test_a_rate_that_is_the_instance_is_found_out():
     evaluation = judged(labelled(labels, width, instances=tuple(f"thing{k}" for k in things)), "knn")
 
     assert evaluation.protocol == "instance_held_out"
-    assert evaluation.protocols["stratified_10_fold"].rate.rate > 0.95
+    assert evaluation.protocols["stratified_4_fold"].rate.rate > 0.95
     assert evaluation.headline.rate < 0.75
     held = evaluation.controls["instance_held_out"]
     assert held.rate == evaluation.headline
@@ -127,7 +126,7 @@ def test_a_rate_that_is_the_moment_of_the_recording_is_found_out():
     order = np.arange(120)
     labels = [("full", "empty")[(i // 12) % 2] for i in order]
     drift = 0.1 * order + 1e-3 * rng.normal(size=120)
-    evaluation = judged(labelled(labels, drift, order=tuple(order.tolist())), "knn")
+    evaluation = judged(labelled(labels, drift, order=tuple(order.tolist())), "knn", folds=10)
 
     assert evaluation.headline.rate > 0.85
     assert evaluation.controls["recording_order"].rate.rate < 0.7
@@ -141,7 +140,7 @@ def test_what_is_known_before_the_contact_is_a_warning_only_where_it_tells(leak)
     rng = np.random.default_rng(2)
     posture = (width if leak else rng.normal(size=120)) + 0.0
     control = ControlFeatures(table=table(posture, names=("posture",)), what="posture before the grasp")
-    evaluation = judged(labelled(labels, width, force, before_contact=control))
+    evaluation = judged(labelled(labels, width, force, before_contact=control), folds=10)
 
     assert any("before contact" in warning for warning in evaluation.warnings) is leak
     assert evaluation.controls["before_contact"].what == "posture before the grasp"
@@ -216,7 +215,7 @@ def test_what_cannot_be_measured_is_null_with_a_reason():
     labels, width, force = four_states()
     evaluation = to_json(judged(labelled(labels, width, force, no_instances="one thing a class")))
 
-    assert evaluation["protocol"] == "stratified_10_fold"
+    assert evaluation["protocol"] == "stratified_4_fold"
     assert evaluation["controls"]["instance_held_out"]["rate"] is None
     assert evaluation["controls"]["instance_held_out"]["reason"] == "one thing a class"
     for name in ("before_contact", "width_only", "recording_order"):
@@ -275,12 +274,12 @@ def test_the_json_is_whole_and_stable():
 
 
 def test_the_learning_curve_ends_at_the_headline_and_grows():
-    labels, width, force = four_states(n=60)
+    labels, width, force = four_states(n=20)
     evaluation = judged(labelled(labels, width, force), learning_curve=True)
     curve = evaluation.learning_curve
 
     assert curve[-1].rate == evaluation.headline
-    assert [round(point.trained_on) for point in curve] == [20, 44, 88, 152, 216]
+    assert [round(point.trained_on) for point in curve] == [8, 12, 24, 40, 60]
     # Of few trials a tenth and a fifth come to the same ones: that is one point.
     labels, width, force = four_states(n=4)
     few = judged(labelled(labels, width, force), folds=4, learning_curve=True).learning_curve
@@ -288,15 +287,15 @@ def test_the_learning_curve_ends_at_the_headline_and_grows():
     assert len(few) < len(curve)
 
 
-@pytest.mark.parametrize("n", [9, 4])
+@pytest.mark.parametrize("n", [3, 2])
 def test_few_trials_are_said_or_refused(n):
     labels, width, force = four_states()
     trials = labelled(labels, width, force)
     few = trials.rows(np.array([i for i in range(120) if i < 4 * n or labels[i] != "can:full"]))
 
-    assert "labels with fewer trials than folds (10): can:full" in judged(few).notes
+    assert "labels with fewer trials than folds (4): can:full" in judged(few).notes
     with pytest.raises(ConfigError, match="cannot be split into 10 folds"):
-        judged(trials.rows(np.arange(8)))
+        judged(trials.rows(np.arange(8)), folds=10)
 
 
 def test_a_label_of_one_trial_can_never_be_right_and_one_label_is_nothing():
@@ -332,7 +331,7 @@ def test_a_fit_that_refuses_few_trials_costs_its_figure_only():
     labels, width, force = four_states()
     trials = labelled(labels, width, force)
 
-    evaluation = evaluate(Choosy(60), trials, classifier="choosy", permutations=1)
+    evaluation = evaluate(Choosy(60), trials, classifier="choosy", folds=4, permutations=1)
 
     assert evaluation.headline.rate > 0.95
     assert [point.trained_on >= 60 for point in evaluation.learning_curve] == [True, True]
@@ -340,8 +339,8 @@ def test_a_fit_that_refuses_few_trials_costs_its_figure_only():
         "no point at 10% of the trials" in note and "60 trials are needed" in note
         for note in evaluation.notes
     )
-    with pytest.raises(ConfigError, match="refused 108 training trials of 4 labels: 1000 trials are needed"):
-        evaluate(Choosy(1000), trials, classifier="choosy")
+    with pytest.raises(ConfigError, match="refused 90 training trials of 4 labels: 1000 trials are needed"):
+        evaluate(Choosy(1000), trials, classifier="choosy", folds=4)
 
 
 def test_unlike_trials_are_counted():

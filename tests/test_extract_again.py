@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 
 import pytest
 from cases import every_case
@@ -16,13 +17,14 @@ from graspsense.store.dataset import labelled_store, read_dataset
 from graspsense.store.store import Store
 
 
-@pytest.fixture
-def folder(tmp_path):
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
     """Six trials whose pads reach 0.01 N and 0.02 N more in each tick; the stored width is that of other settings."""
-    with Store.open(tmp_path / "trials") as store:
+    folder = tmp_path_factory.mktemp("trials")
+    with Store.open(folder) as store:
         for k in range(6):
             keep(store, ("can:full", "can:empty")[k % 2], f"can#{k}", grasp=k)
-    return str(tmp_path / "trials")
+    return str(folder)
 
 
 def gap_at(force_n):
@@ -83,7 +85,8 @@ def test_what_cannot_be_changed_is_told(folder, option, says):
         labelled_store(folder, [option])
 
 
-def test_a_lost_recording_is_told(folder):
+def test_a_lost_recording_is_told(folder, tmp_path):
+    folder = str(shutil.copytree(folder, tmp_path / "copy"))
     with Store.read(folder) as store:
         store.recording_path(store.summary(3).recording).unlink()
     trials = labelled_store(folder, ["features.force=left"])

@@ -21,11 +21,13 @@ from graspsense.plugin_api import create
 from graspsense.regression.estimators import ESTIMATORS
 from graspsense.regression.model import train_regression
 
+FEW = ["c45", "svm", "knn"]
+REST = [name for name in KINDS if name not in FEW]
 EXTREMES = (1e308, -1e308, 1.7e308, 1e154, 1e39, 5e-324, -5e-324, 0.0)
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
-@every_case("name", KINDS)
+@pytest.mark.parametrize("name", [*FEW, *(pytest.param(name, marks=pytest.mark.slow) for name in REST)])
 def test_a_trial_of_extreme_features_has_probabilities_and_is_unknown_where_it_is_far_away(name):
     model = trained(name)
     rows = [[value, 8.0, 0.0] for value in EXTREMES] + [[value] * 3 for value in EXTREMES]
@@ -56,7 +58,7 @@ def test_a_number_too_large_to_predict_is_refused_by_name():
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
-@every_case("name", KINDS)
+@pytest.mark.parametrize("name", [*FEW, *(pytest.param(name, marks=pytest.mark.slow) for name in REST)])
 @every_case("factor", [1e-320, 1e-300, 1e90])
 def test_features_of_any_usual_size_are_learned(name, factor):
     """Those below the square root of the least number may count as constant; the answer is still one."""
@@ -109,7 +111,9 @@ def test_commands_answer_or_name_the_column(table, tmp_path, name):
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
-@every_case("name", ESTIMATORS)
+@pytest.mark.parametrize(
+    "name", [name if name == "ridge" else pytest.param(name, marks=pytest.mark.slow) for name in ESTIMATORS]
+)
 def test_a_number_is_predicted_from_extreme_features(name, monkeypatch):
     monkeypatch.setattr("graspsense.regression.model.FOLDS", 2)
     given = labelled()

@@ -85,17 +85,34 @@ def test_without_contact_all_six_are_missing_with_the_reason(rows, why):
     assert all(why in reason for reason in reasons.values())
 
 
-def test_contact_but_never_steady_leaves_only_p_first():
-    rows = [(0.06 - 1e-5 * k, 5.0, 5.0) for k in range(500)]
-    missing, reasons = missing_of(made_trace(rows))
-    assert missing == set(NAMES) - {"p_first"}
-    assert "not at rest" in reasons["delta_t"]
-
-
-def test_a_rigid_thing_at_rest_from_the_contact_on_has_no_rates():
-    missing, reasons = missing_of(made_trace([(0.03, 9.0, 9.0)] * 100))
-    assert missing == {"dp_dt", "df_dt"}
-    assert "delta_t is zero" in reasons["dp_dt"]
+@every_case(
+    ("rows", "missing", "name", "why"),
+    [
+        (
+            [(0.06 - 1e-5 * k, 5.0, 5.0) for k in range(500)],
+            set(NAMES) - {"p_first"},
+            "delta_t",
+            "not at rest",
+        ),
+        ([(0.03, 9.0, 9.0)] * 100, {"dp_dt", "df_dt"}, "dp_dt", "delta_t is zero"),
+        (
+            [(0.06, 9.0, 9.0)] * 10 + [(math.nan, 9.0, 9.0)] * 500,
+            set(NAMES) - {"p_first"},
+            "p_steady",
+            "not at rest",
+        ),
+        (
+            [(0.06, 9.0, 9.0)] * 5 + [(0.059, math.nan, math.nan)] * 100,
+            {"f_steady", "df_dt"},
+            "f_steady",
+            "no number",
+        ),
+    ],
+)
+def test_what_a_contact_without_rest_way_gap_or_force_does_not_show_is_missing(rows, missing, name, why):
+    without, reasons = missing_of(made_trace(rows))
+    assert without == missing
+    assert why in reasons[name]
 
 
 def test_the_release_is_no_part_of_the_squeeze():
@@ -113,12 +130,6 @@ def test_a_contact_that_ends_the_grasp_at_once_is_named_as_that():
     missing, reasons = missing_of(trace)
     assert missing == set(NAMES)
     assert "only when the grasp had ended" in reasons["p_first"]
-
-
-def test_a_gap_that_drops_out_after_contact_is_not_rest():
-    rows = [(0.06, 9.0, 9.0)] * 10 + [(math.nan, 9.0, 9.0)] * 500
-    missing, _ = missing_of(made_trace(rows))
-    assert "p_steady" in missing
 
 
 def test_units_of_a_recording_carry_over():
@@ -168,13 +179,6 @@ def test_columns_and_images_are_cut_together():
     trace = made_trace([(0.05, 1.0, 1.0)] * 10)
     assert np.array_equal(trace.until(0.004).gap_m, trace.gap_m[:5])
     assert trace.until(0.004).pad_left.shape == (0, 0), "no image says how many cells there are"
-
-
-def test_pads_that_drop_out_before_the_rest_leave_the_gaps():
-    rows = [(0.06, 9.0, 9.0)] * 5 + [(0.059, math.nan, math.nan)] * 100
-    missing, reasons = missing_of(made_trace(rows))
-    assert missing == {"f_steady", "df_dt"}
-    assert "no number" in reasons["f_steady"]
 
 
 def test_a_value_in_words():

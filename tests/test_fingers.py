@@ -53,7 +53,7 @@ HERE = sys.modules[__name__]
 FORCES = st.lists(st.floats(0.0, 50.0), min_size=5, max_size=5)
 HALF = sqrt(0.75)
 JAWS = tuple(
-    FingerForce(f"force_{name}", "N", 1000.0, side=side, closing=closing)
+    FingerForce(f"force_{name}", "N", 250.0, side=side, closing=closing)
     for name, side, closing in (
         ("thumb", "left", (1.0, 0.0, 0.0)),
         ("index", "right", (-0.5, HALF, 0.0)),
@@ -82,7 +82,7 @@ class ThreeJaws(SensorBackend[JawsConfig]):
 
     def __init__(self, config):
         super().__init__(config)
-        self._gripper = create("sensor-backend", "sim", object=config.object)
+        self._gripper = create("sensor-backend", "sim", object=config.object, rate_hz=250.0)
         self._forces = opposed_forces(JAWS)
 
     @property
@@ -150,7 +150,7 @@ def grasped(tmp_path_factory):
         plugins.add(simulator, "graspsense-sim-gripper")
         plugins.add(HERE, "lab-hand")
         settings = load_pipeline(
-            options=["gripper.type=jaws", "classifier.type=none"], plugins=plugins
+            options=["gripper.type=jaws", "run.hold_s=0.05", "classifier.type=none"], plugins=plugins
         ).settings
         trial = record_grasp(store, settings, plugins, labels={}, origin="run").trial
         (path,) = (folder / "recordings").glob("*.mcap")
@@ -249,7 +249,7 @@ def test_every_finger_is_in_trace_recording_and_replay(grasped):
         assert np.array_equal(signal, replayed.trace.signals[jaw.name])
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".npz"])
+@pytest.mark.parametrize("suffix", [pytest.param(".csv", marks=pytest.mark.slow), ".npz"])
 def test_an_export_declares_the_fingers_and_has_their_forces(grasped, tmp_path, suffix):
     _, _, path, _ = grasped
     file = tmp_path / f"grasp{suffix}"
@@ -262,6 +262,7 @@ def test_an_export_declares_the_fingers_and_has_their_forces(grasped, tmp_path, 
     assert most == read_recorded(path).trace().signals["force_index"].max()
 
 
+@pytest.mark.slow
 def test_the_pages_and_the_picture_draw_the_force_of_each_finger(grasped):
     trial, _, _, _ = grasped
     figures = channel_figures(trial.trace, trial.device.channels)

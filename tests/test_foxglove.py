@@ -21,13 +21,16 @@ from graspsense.store.store import Store
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
-    """A grasp of the simulated gripper and its recording."""
+    """A grasp of the simulated gripper, its recording, and a copy of it with pictures."""
     folder = tmp_path_factory.mktemp("grasp") / "trials"
-    settings = load_pipeline(options=["classifier.type=none", "gripper.object=can:full_open"]).settings
+    settings = load_pipeline(
+        options=["classifier.type=none", "gripper.object=can:full_open", "gripper.rate_hz=250"]
+    ).settings
     with Store.open(folder) as store:
         trial = record_grasp(store, settings, installed(), labels={}, origin="run").trial
     (path,) = (folder / "recordings").glob("*.mcap")
-    return trial, path
+    write_pictures(folder / "pictures.mcap", read_recorded(path))
+    return trial, path, folder / "pictures.mcap"
 
 
 def decoded(path):
@@ -39,10 +42,9 @@ def decoded(path):
         ]
 
 
-def test_every_tactile_image_is_followed_by_its_pictures(recording, tmp_path):
-    trial, path = recording
-    write_pictures(tmp_path / "p.mcap", read_recorded(path))
-    messages = decoded(tmp_path / "p.mcap")
+def test_every_tactile_image_is_followed_by_its_pictures(recording):
+    trial, _, pictures = recording
+    messages = decoded(pictures)
     topics = [topic for topic, *_ in messages if topic != "/grasp/tick"]
     images = len(trial.trace.pad_t_s)
     assert topics == ["/grasp/pads", "/grasp/pictures/pads_left", "/grasp/pictures/pads_right"] * images
@@ -59,10 +61,9 @@ def test_every_tactile_image_is_followed_by_its_pictures(recording, tmp_path):
     assert brightest == 255
 
 
-def test_the_brightest_cell_is_the_one_that_is_pressed_hardest(recording, tmp_path):
-    trial, path = recording
-    write_pictures(tmp_path / "p.mcap", read_recorded(path))
-    left = [value for topic, _, _, value in decoded(tmp_path / "p.mcap") if topic.endswith("pads_left")]
+def test_the_brightest_cell_is_the_one_that_is_pressed_hardest(recording):
+    trial, _, pictures = recording
+    left = [value for topic, _, _, value in decoded(pictures) if topic.endswith("pads_left")]
     rise = trial.trace.pad_left - trial.trace.pad_left[0]
     brightest = int(np.argmax(rise[:, 7:].max(axis=1)))
     picture = np.frombuffer(bytes(left[brightest].data), np.uint8).reshape(
@@ -73,10 +74,9 @@ def test_the_brightest_cell_is_the_one_that_is_pressed_hardest(recording, tmp_pa
 
 
 def test_a_recording_with_pictures_is_read_like_the_recording(recording, tmp_path):
-    _, path = recording
-    write_pictures(tmp_path / "p.mcap", read_recorded(path))
+    _, path, pictures = recording
     write_mcap(tmp_path / "copy.mcap", read_recorded(path))
-    recorded, now = read_recorded(tmp_path / "copy.mcap"), read_recorded(tmp_path / "p.mcap")
+    recorded, now = read_recorded(tmp_path / "copy.mcap"), read_recorded(pictures)
     assert repr(now.readings()) == repr(recorded.readings())
     assert now.metadata == recorded.metadata
     assert now.ticks.tobytes() == recorded.ticks.tobytes()

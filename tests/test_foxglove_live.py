@@ -5,10 +5,10 @@ from __future__ import annotations
 import itertools
 import json
 import os
+import re
 import socket
 import struct
 import threading
-import time
 from contextlib import ExitStack, closing, suppress
 from importlib.resources import files
 from xml.etree import ElementTree
@@ -21,7 +21,6 @@ from mcap.reader import make_reader
 
 from graspsense import load_pipeline
 from graspsense.core.components.registry import installed
-from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.signals import SQUEEZE
 from graspsense.live.feeds import LiveFeed
 from graspsense.recording.layout import IS_TICK, TICK_FIELDS, TICK_WIRE
@@ -40,11 +39,15 @@ PATIENCE_S = 60.0
 SDK = "foxglove.sdk.v1"
 
 
-@pytest.fixture
-def feed():
+def running_feed():
     running = LiveFeed("graspsense.live.foxglove_process", ["0"])
     yield running
     assert running.close() == ""
+
+
+feed = pytest.fixture(running_feed)
+kept_feed = pytest.fixture(running_feed, scope="module")
+"""For tests of viewers that are refused, which leave it as it was."""
 
 
 def opened(feed, protocol=SDK):
@@ -136,10 +139,10 @@ def check_complete(messages, n=20):
 
 
 def test_viewers_receive_the_messages_and_schemas_of_the_recording_and_late_ones_too(feed, tmp_path):
-    settings = load_pipeline(options=["classifier.type=none"]).settings
+    settings = load_pipeline(options=["classifier.type=none", "gripper.rate_hz=250"]).settings
     early = Viewer(feed)
     with Store.open(tmp_path) as store:
-        record_grasp(store, settings, installed(), labels={}, origin="run", sinks=[feed])
+        feed.finished(record_grasp(store, settings, installed(), labels={}, origin="run", sinks=[feed]).trial)
     (path,) = (tmp_path / "recordings").glob("*.mcap")
     recorded, schemas = {}, {}
     with path.open("rb") as file:
@@ -177,14 +180,14 @@ def test_images_samples_and_further_channels_come_too(feed):
 
 
 def test_a_viewer_who_comes_later_sees_the_last_grasp_alone(feed):
+    shown(feed, 30)  # without any viewer, it is shown as well
     early = Viewer(feed)
-    shown(feed, 30)
     early.wait_for_all(30)
     shown(feed, 5)
     early.wait_for_all(35)
     viewer = Viewer(feed)
     viewer.wait_for_all(5)
-    feed.close()
+    assert (feed.close(), feed.dropped) == ("", 0)
     check_complete(viewer.ended(), 5)
 
 
@@ -201,8 +204,8 @@ def test_what_is_kept_for_viewers_who_come_later_does_not_grow(monkeypatch):
 
 
 @every_case("path", ["", "wrong", "wrong/"])
-def test_without_the_token_nothing_is_answered(feed, path):
-    assert refused(feed, f"ws://127.0.0.1:{port_of(feed)}/{path}") == 404
+def test_without_the_token_nothing_is_answered(kept_feed, path):
+    assert refused(kept_feed, f"ws://127.0.0.1:{port_of(kept_feed)}/{path}") == 404
 
 
 @every_case(
@@ -213,8 +216,8 @@ def test_without_the_token_nothing_is_answered(feed, path):
         ({"Origin": "https://app.foxglove.dev.elsewhere.example"}, 403),
     ],
 )
-def test_the_pages_of_others_cannot_listen(feed, headers, status):
-    assert refused(feed, headers=headers) == status
+def test_the_pages_of_others_cannot_listen(kept_feed, headers, status):
+    assert refused(kept_feed, headers=headers) == status
 
 
 @every_case(
@@ -228,10 +231,10 @@ def test_the_pages_of_others_cannot_listen(feed, headers, status):
         ("GET {path} HTTP/1.1\r\n" + "A: 1\r\n" * 500 + "\r\n", None),
     ],
 )
-def test_what_is_no_request_of_a_viewer_is_refused_or_dropped(feed, head, status):
-    address = feed.answer["address"]
-    text = head.format(path="/" + address.split("/", 3)[3], port=port_of(feed))
-    with socket.create_connection(("127.0.0.1", port_of(feed)), PATIENCE_S) as link:
+def test_what_is_no_request_of_a_viewer_is_refused_or_dropped(kept_feed, head, status):
+    address, port = kept_feed.answer["address"], port_of(kept_feed)
+    text = head.format(path="/" + address.split("/", 3)[3], port=port)
+    with socket.create_connection(("127.0.0.1", port), PATIENCE_S) as link:
         with suppress(ConnectionError):
             link.sendall(text.encode())
         answer = b""
@@ -241,14 +244,15 @@ def test_what_is_no_request_of_a_viewer_is_refused_or_dropped(feed, head, status
     assert answer.split(b" ")[1:2] == ([] if status is None else [str(status).encode()])
 
 
-def test_what_is_no_viewer_of_foxglove_is_told_so(feed):
-    assert refused(feed, protocols=()) == 400
-    assert refused(feed, protocols=("chat",)) == 400
+def test_what_is_no_viewer_of_foxglove_is_told_so(kept_feed):
+    assert refused(kept_feed, protocols=()) == 400
+    assert refused(kept_feed, protocols=("chat",)) == 400
 
 
 @every_case("origin", ["https://app.foxglove.dev", "file://"])
-def test_foxglove_itself_is_let_in(feed, origin):
-    with connect(feed.answer["address"], subprotocols=[SDK], additional_headers={"Origin": origin}) as viewer:
+def test_foxglove_itself_is_let_in(kept_feed, origin):
+    headers = {"Origin": origin}
+    with connect(kept_feed.answer["address"], subprotocols=[SDK], additional_headers=headers) as viewer:
         assert json.loads(viewer.recv(timeout=PATIENCE_S))["op"] == "serverInfo"
 
 
@@ -266,14 +270,7 @@ def test_what_is_not_a_subscription_is_an_error_and_the_others_go_on(feed):
             bad.send(sent)
             said = [json.loads(bad.recv(timeout=PATIENCE_S)) for _ in range(3)]
         assert said[-1]["op"] == "status", sent
-    shown(feed)
-    good.wait_for_all()
-    feed.close()
-    check_complete(good.ended())
-
-
-def test_a_viewer_that_sends_more_than_subscriptions_is_dropped(feed):
-    good = Viewer(feed)
+    # More than any subscription.
     with closing(opened(feed)) as bad:
         with suppress(ConnectionClosed):
             bad.send("x" * (2 << 20))
@@ -310,20 +307,21 @@ def test_rubbish_and_a_thousand_connections_disturb_nobody(feed):
 
 @pytest.mark.slow
 def test_a_viewer_that_stalls_is_dropped_and_no_tick_waits(feed):
-    stalled = opened(feed)
-    stalled.recv(timeout=PATIENCE_S)
-    (tick,) = json.loads(stalled.recv(timeout=PATIENCE_S))["channels"]
-    wanted = [{"id": 1, "channelId": tick["id"]}]
-    stalled.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
-    good = Viewer(feed)
+    stalled, good = opened(feed), Viewer(feed)
     feed.opened(device())
-    n = 300_000
-    for k in range(n):
+    feed.take(reading(0), SQUEEZE, COMMAND)
+    channels = []
+    while len(channels) < 4:
+        channels += json.loads(stalled.recv(timeout=PATIENCE_S)).get("channels", ())
+    wanted = [{"id": channel["id"], "channelId": channel["id"]} for channel in channels]
+    stalled.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
+    n = 120_000
+    for k in range(1, n):
         feed.take(reading(k), SQUEEZE, COMMAND)
         if k % 1000 == 999:
             good.wait_for("/grasp/tick", k + 1)
     assert feed.dropped == 0
-    assert messages_until_the_end(stalled) < n
+    assert messages_until_the_end(stalled) < 4 * n
     feed.close()
     check_complete(good.ended(), n)
 
@@ -353,18 +351,7 @@ def test_a_port_that_is_taken_is_an_error_before_the_grasp(tmp_path):
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        with pytest.raises(ConfigError, match=f"--foxglove.*{port}"):
-            LiveFeed("graspsense.live.foxglove_process", [str(port)])
         done = graspsense("run", "--foxglove", port, "--save", tmp_path / "store")
     assert done.returncode == 2
-    assert str(port) in done.stderr
+    assert re.search(f"--foxglove.*{port}", done.stderr)
     assert not (tmp_path / "store").exists()
-
-
-def test_a_grasp_without_a_viewer_is_as_any_other(feed):
-    began = time.monotonic()
-    trial = load_pipeline("default").grasp(sinks=[feed])
-    feed.finished(trial)
-    assert (trial.outcome.words, trial.reason, feed.dropped) == ("steady", "", 0)
-    assert feed.close() == ""
-    assert time.monotonic() - began < PATIENCE_S

@@ -75,6 +75,7 @@ def grasp(plugins, *options):
     return load_pipeline(options=[*fixed, *options], plugins=plugins).grasp()
 
 
+@pytest.mark.slow
 def test_it_conforms(plugins):
     examined = examine(
         "lab-hand/lab-hand",
@@ -131,7 +132,7 @@ def test_answers_that_are_late_are_asked_for_again_and_counted(plugins):
     assert f"{trial.counts['lost_frames']} frames" in trial.reason
 
 
-@pytest.mark.parametrize("right_force_n", [nan, 0.0])
+@pytest.mark.parametrize("right_force_n", [nan, pytest.param(0.0, marks=pytest.mark.slow)])
 def test_a_second_pad_without_a_force_never_touches(hand, plugins, monkeypatch, right_force_n):
     read = hand.TcpHand.read
 

@@ -1,4 +1,4 @@
-"""Every hook has a test `test_hook_NAME`, and an example in its docstring that runs."""
+"""Every hook has a test, `test_hook_NAME` but for those of components, and an example in its docstring that runs."""
 
 from __future__ import annotations
 
@@ -58,31 +58,28 @@ def trial() -> Trial:
     )
 
 
+COMPONENTS = {
+    "graspsense_sensor_backends": ("sensor-backend", "lab-hand", "lab_hand.backend:LabHand"),
+    "graspsense_controllers": ("controller", "gentle", "lab_hand.gentle:GentleController"),
+    "graspsense_feature_sets": ("feature-set", "stiffness", "lab_hand.stiffness:Stiffness"),
+    "graspsense_classifiers": ("classifier", "nearest", "lab_hand.nearest:Nearest"),
+}
+"""Hooks of components; the role, the name and the target of what its example gives."""
+
+
 @every_case("hook", HOOKS)
 def test_every_hook_has_a_test(hook):
-    assert f"test_hook_{hook}" in globals()
+    assert hook in COMPONENTS or f"test_hook_{hook}" in globals()
 
 
-@every_case(
-    ("role", "hook", "name"),
-    [
-        ("sensor-backend", "graspsense_sensor_backends", "lab-hand"),
-        ("controller", "graspsense_controllers", "gentle"),
-        ("feature-set", "graspsense_feature_sets", "stiffness"),
-        ("classifier", "graspsense_classifiers", "nearest"),
-    ],
-)
-def test_a_component_hook_gives_components_of_its_role(role, hook, name):
+@every_case("hook", COMPONENTS)
+def test_a_component_hook_gives_components_of_its_role(hook):
+    role, name, target = COMPONENTS[hook]
     plugins = IsolatedPlugins(example(hook), builtins=False)
 
     assert [(component.role, component.name) for component in plugins.components()] == [(role, name)]
     assert plugins.find(role, name).qualified == f"graspsense-test/{name}"
-
-
-def test_hook_graspsense_sensor_backends():
-    entry = IsolatedPlugins(example("graspsense_sensor_backends")).find("sensor-backend", "lab-hand").entry
-
-    assert (entry.target, entry.needs) == ("lab_hand.backend:LabHand", "pip install pyserial")
+    assert plugins.find(role, name).entry.target == target
 
 
 def test_the_documented_hand_has_the_channels_of_its_fingers():
@@ -103,24 +100,6 @@ def test_the_documented_hand_has_the_channels_of_its_fingers():
         "force_left",
         "force_right",
     ]
-
-
-def test_hook_graspsense_controllers():
-    entry = IsolatedPlugins(example("graspsense_controllers")).find("controller", "gentle").entry
-
-    assert entry.target == "lab_hand.gentle:GentleController"
-
-
-def test_hook_graspsense_feature_sets():
-    entry = IsolatedPlugins(example("graspsense_feature_sets")).find("feature-set", "stiffness").entry
-
-    assert entry.target == "lab_hand.stiffness:Stiffness"
-
-
-def test_hook_graspsense_classifiers():
-    entry = IsolatedPlugins(example("graspsense_classifiers")).find("classifier", "nearest").entry
-
-    assert entry.target == "lab_hand.nearest:Nearest"
 
 
 def test_hook_graspsense_pipelines():

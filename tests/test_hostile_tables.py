@@ -188,7 +188,7 @@ def test_a_table_that_is_none_names_the_file(tmp_path, data):
 
 def test_a_cell_of_many_digits_takes_linear_time(tmp_path):
     path = tmp_path / "digits.csv"
-    path.write_text(f"a b c\n{'1' * 1_000_000}x 1 1\n0 1 2\n")
+    path.write_text(f"a b c\n{'1' * 300_000}x 1 1\n0 1 2\n")
     assert "a" in read_text(path)[0].texts
 
 
@@ -228,7 +228,7 @@ def test_headings_with_many_brackets_take_linear_time():
 
 def test_as_many_labels_as_half_of_the_trials_are_refused_by_every_command(tmp_path):
     """The limit is that of the table, whatever learns from it; each command reads the table in its own way."""
-    path = table(tmp_path / "table.csv", [f"c{i // 2}" for i in range(4000)])
+    path = table(tmp_path / "table.csv", [f"c{i // 2}" for i in range(1000)])
     for command in (
         ("evaluate", path),
         ("train", path, "--out", tmp_path / "model.json"),
@@ -236,7 +236,7 @@ def test_as_many_labels_as_half_of_the_trials_are_refused_by_every_command(tmp_p
     ):
         done = graspsense(*command, "--label", "label")
         assert done.returncode == 2
-        assert "2000 different labels" in done.stderr
+        assert "500 different labels" in done.stderr
         assert limits.CLASSES.variable in done.stderr
 
 
@@ -265,16 +265,16 @@ def test_a_table_with_more_features_than_the_limit_is_refused(tmp_path, monkeypa
     assert limits.FEATURES.variable in done.stderr
 
 
-def test_thousands_of_checkpoints_are_refused(tmp_path):
-    path = table(tmp_path / "table.csv", ["a", "b"] * 4)
-    times = ",".join(map(str, range(1, 9000)))
-    assert graspsense("evaluate", path, "--label", "label", "--checkpoints", times).returncode == 2
-
-
-@pytest.mark.parametrize("seed", ["-1", str(2**63), "9" * 30])
-def test_a_seed_out_of_range_is_wrong_use(tmp_path, seed):
+@every_case(
+    "option",
+    [
+        ("--checkpoints", ",".join(map(str, range(1, 9000)))),
+        *(("--seed", seed) for seed in ("-1", str(2**63), "9" * 30)),
+    ],
+)
+def test_thousands_of_checkpoints_and_a_seed_out_of_range_are_wrong_use(tmp_path, option):
     path = table(tmp_path / "table.csv", ["a", "b"] * 20)
-    assert graspsense("evaluate", path, "--label", "label", "--seed", seed).returncode == 2
+    assert graspsense("evaluate", path, "--label", "label", *option).returncode == 2
 
 
 # TOML
@@ -304,6 +304,11 @@ def test_toml_out_of_bounds_is_refused_at_once(tmp_path, text):
     path.write_text(text)
     with pytest.raises(ConfigError, match=r"settings\.toml"):
         read_layer(path)
+
+
+def test_every_command_refuses_toml_out_of_bounds(tmp_path):
+    path = tmp_path / "settings.toml"
+    path.write_text("x = " + "[" * 5000 + "]" * 5000)
     for command in (
         ("run", "--pipeline", path),
         ("experiment", path),
@@ -324,8 +329,8 @@ def test_toml_within_the_bounds_is_read():
 
 
 def test_thousands_of_unknown_keys_are_told_in_a_few_lines(tmp_path):
-    path = manifest(tmp_path, "".join(f"k{i} = 1\n" for i in range(20_000)))
-    with pytest.raises(ConfigError, match="19980 more") as refused:
+    path = manifest(tmp_path, "".join(f"k{i} = 1\n" for i in range(2_000)))
+    with pytest.raises(ConfigError, match="1980 more") as refused:
         read_manifest(path)
     assert len(str(refused.value).splitlines()) < 30
 
@@ -370,21 +375,27 @@ def test_a_key_of_a_manifest_out_of_bounds_is_answered(tmp_path, key):
     assert not isinstance(answers[0], ConfigError) or "manifest.toml" in str(answers[0])
 
 
-@pytest.mark.parametrize("rate_hz", ["1e9", "1e300", "9223372036854775807"])
-def test_resampling_to_more_samples_than_the_limit_is_refused(tmp_path, rate_hz):
-    (recording,) = read_recordings(str(manifest(tmp_path, MANIFEST + f"resample_hz = {rate_hz}\n")))
-    assert isinstance(recording, UnreadableRecording)
-    assert limits.SAMPLES.variable in str(recording.error)
+TOO_MANY_ROWS = "t,g,F\n" + "".join(f"{k},60,1\n" for k in range(limits.RECORDINGS.default + 1))
 
 
-@pytest.mark.parametrize("split", ["rows", "t"])
-def test_a_file_that_is_split_into_too_many_grasps_is_refused(tmp_path, split):
-    rows = "".join(f"{k},60,1\n" for k in range(limits.RECORDINGS.default + 1))
-    (recording,) = read_recordings(
-        str(manifest(tmp_path, MANIFEST + f'split = "{split}"\n', "t,g,F\n" + rows))
-    )
+@every_case(
+    ("text", "csv", "says"),
+    [
+        *(
+            (f"{MANIFEST}resample_hz = {rate_hz}\n", GRASP, limits.SAMPLES.variable)
+            for rate_hz in ("1e9", "1e300", "9223372036854775807")
+        ),
+        *(
+            (f'{MANIFEST}split = "{split}"\n', TOO_MANY_ROWS, limits.RECORDINGS.variable)
+            for split in ("rows", "t")
+        ),
+        (MANIFEST.replace('"F"', '"F/0"'), GRASP, "no number"),
+    ],
+)
+def test_too_many_samples_or_grasps_or_no_force_are_refused_for_the_recording(tmp_path, text, csv, says):
+    (recording,) = read_recordings(str(manifest(tmp_path, text, csv)))
     assert isinstance(recording, UnreadableRecording)
-    assert limits.RECORDINGS.variable in str(recording.error)
+    assert says in str(recording.error)
 
 
 @every_case(
@@ -395,8 +406,8 @@ def test_a_file_that_is_split_into_too_many_grasps_is_refused(tmp_path, split):
         "[data]\ntrials = 9223372036854775807",
         "[data]\ninstances = 9223372036854775807",
         "[data]\ninstances = 1000\ntrials = 1000000",
-        "[[data.groups]]\ntotal = 1000000\n" * 3000,
-        "[data.named]\n" + "".join(f'k{i} = "can:full_open"\n' for i in range(20_000)),
+        "[[data.groups]]\ntotal = 1000000\n" * 1001,
+        "[data.named]\n" + "".join(f'k{i} = "can:full_open"\n' for i in range(2_000)),
         "[data]\ncheckpoints_s = [" + ", ".join(str(k) for k in range(1, 2000)) + "]\n[judge]\nfolds = 1",
         "seeds = 9223372036854775807",
         "seeds = [9223372036854775807]",
@@ -404,7 +415,7 @@ def test_a_file_that_is_split_into_too_many_grasps_is_refused(tmp_path, split):
         "".join(f'[[variants]]\nname = "v{i}"\n' for i in range(1001)),
         "pipelines = [" + '"default", ' * 1001 + "]",
         "classifiers = [" + '"tree", ' * 1001 + "]",
-        "parts = [" + '"probing_force", ' * 3000 + "]",
+        "parts = [" + '"probing_force", ' * 1001 + "]",
         "[judge]\nfolds = 9223372036854775807",
         "[judge]\ngrasps = 9223372036854775807",
         'classifiers = [{ type = "forest", trees = 9223372036854775807 }]',
@@ -449,18 +460,13 @@ def test_a_channel_of_a_file_has_a_bounded_size(channel):
     [
         "9**9**9", "F**2", "1<<9999999", "9" * 1000, "0x" + "f" * 1900, "1e999*F", "1j*F", "(" * 900 + "F" + ")" * 900,
         "-" * 1900 + "F", "F" + "*1" * 200, "F.__class__", "lambda: 0", "f'{F}'", "[x for x in F]", "F\0", "x" * 2001,
+        "open('x')", "__import__('os').system('true')", "F[F]",
         "F or F", "(F := 1)", "print(F)", "max(*F)", "max(F, key=F)", "F[-1]", "F[0:9]", "F['a']", "a" + " [" * 900,
     ],
 )  # fmt: skip
 def test_an_expression_that_is_out_of_bounds_is_refused(text):
     with pytest.raises(ExpressionError):
         parse(text)
-
-
-def test_division_by_zero_gives_a_missing_force_and_not_an_error(tmp_path):
-    (recording,) = read_recordings(str(manifest(tmp_path, MANIFEST.replace('"F"', '"F/0"'))))
-    assert isinstance(recording, UnreadableRecording)
-    assert "no number" in str(recording.error)
 
 
 def test_an_expression_over_more_cells_than_the_limit_is_refused(monkeypatch):
@@ -495,7 +501,7 @@ def test_a_long_row_of_arff_takes_linear_time():
     head = f"@relation r\n@attribute a {{{values}}}\n@attribute label {{x, y}}\n@data\n"
     assert len(parse_arff(head + "v1, x\nv8999, y\n").labels) == 2
     with pytest.raises(ArffError, match="values"):
-        parse_arff(head + "v1, " * 100_000 + "x\n")
+        parse_arff(head + "v1, " * 20_000 + "x\n")
 
 
 @every_case(
@@ -517,23 +523,16 @@ def test_arff_out_of_bounds_is_told_with_its_line(text):
 # Fuzzing
 
 
-def fuzzed(seed, number):
-    """Return what a program says that reads so many changed texts of each format, with a limit on its memory."""
-    command = [sys.executable, str(HERE / "hostile_tables.py"), str(seed), str(number)]
-    done = subprocess.run(command, capture_output=True, text=True)
+@pytest.mark.parametrize(
+    ("seed", "number"),
+    [pytest.param(1, 200, marks=pytest.mark.slow), pytest.param(2, 400, marks=pytest.mark.long)],
+)
+def test_changed_texts_are_answered_by_a_result_or_an_error_that_names_the_file(seed, number):
+    # A program that reads so many changed texts of each format, with a limit on its memory.
+    done = subprocess.run(
+        [sys.executable, HERE / "hostile_tables.py", str(seed), str(number)], capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stderr[-2000:]
-    return json.loads(done.stdout)
-
-
-def test_changed_texts_are_answered_by_a_result_or_an_error_that_names_the_file():
-    answers = fuzzed(seed=57, number=5)
-    assert answers["read"] == 50
-    assert answers["bad"] == []
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
-def test_many_changed_texts_are_answered_by_a_result_or_an_error_that_names_the_file(seed):
-    answers = fuzzed(seed, number=400)
-    assert answers["read"] == 4000
+    answers = json.loads(done.stdout)
+    assert answers["read"] == 10 * number
     assert answers["bad"] == []

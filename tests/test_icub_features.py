@@ -107,7 +107,8 @@ def test_a_folder_without_grasps_and_a_damaged_file(folder, tmp_path):
 def evaluation():
     labelled = read(os.environ["GRASPSENSE_ICUB"])
     component = installed().find("classifier", "c45")
-    return evaluate(SelectedComponent(component, component.config_class()()), labelled, classifier="c45")
+    learner = SelectedComponent(component, component.config_class()())
+    return evaluate(learner, labelled, classifier="c45", permutations=1, learning_curve=False)
 
 
 @pytest.mark.slow

@@ -30,7 +30,9 @@ def store(tmp_path_factory):
     folder = tmp_path_factory.mktemp("store")
     for name in ("sponge", "block"):
         arguments = ["run", "--object", name, "--save", str(folder), "--label", name]
-        done = CliRunner().invoke(cli, [*arguments, "-o", "classifier.type=none"])
+        done = CliRunner().invoke(
+            cli, [*arguments, "-o", "classifier.type=none", "-o", "gripper.rate_hz=250"]
+        )
         assert done.exit_code == 0, done.output
     return f"store:{folder}"
 

@@ -35,6 +35,7 @@ COUNTERS = {
     "dates": [20260101 + i % 28 + 100 * (i // 28) for i in range(N)],
     "dates of sessions": [20260101 + i // 15 for i in range(N)],
     "times": [20261126093000 + i % 30 + 100 * (i // 30) for i in range(N)],
+    "a counter of each label": [*range(30), *range(30)],
 }
 ORDERS = {"as it is": list, "falling": lambda values: list(values)[::-1], "a swap": swapped, "a tie": tied}
 
@@ -61,10 +62,6 @@ def test_a_number_with_gaps_is_known_by_its_name_where_the_lines_are_shuffled(na
     labels = [LABELS[i] for i in order]
     assert identifies(name, "", values, labels)
     assert not identifies("force", "", values, labels)
-
-
-def test_a_counter_of_each_label_is_no_feature():
-    assert identifies("x", "", [*range(30), *range(30)], LABELS)
 
 
 def test_numbers_of_objects_are_instances_and_no_features():
@@ -136,7 +133,10 @@ def shuffled(values, labels=LABELS, seed=3):
     return np.array(values)[order], [labels[i] for i in order]
 
 
-REPEATED = {
+KNOWN_IN_ANY_ORDER = {
+    "a tenth": [0.1 * i for i in range(N)],
+    "every seventh": [1000 + 7 * i for i in range(N)],
+    "days of a table": [46_000.0 + i * 37 / 1440 + 1e-4 * (i % 3) for i in range(N)],
     "two lines each, falling": [(N - i) // 2 for i in range(N)],
     "three lines each": [(i + 1) // 3 for i in range(N)],
     "days in seconds since 1970": [1_793_404_800 + 86_400 * (i // 10) for i in range(N)],
@@ -144,23 +144,10 @@ REPEATED = {
 }
 
 
-@every_case("counter", REPEATED)
-def test_numbers_that_several_lines_share_are_no_feature_in_any_order(counter):
-    assert identifies("x", "", REPEATED[counter], LABELS)
-    assert identifies("x", "", *shuffled(REPEATED[counter]))
-
-
-@pytest.mark.parametrize(
-    "counter",
-    [
-        [0.1 * i for i in range(N)],
-        [1000 + 7 * i for i in range(N)],
-        [46_000.0 + i * 37 / 1440 + 1e-4 * (i % 3) for i in range(N)],
-    ],
-    ids=["a tenth", "every seventh", "days of a table"],
-)
-def test_steps_that_are_equal_are_a_counter_where_the_lines_are_shuffled(counter):
-    assert identifies("x", "", *shuffled(counter))
+@every_case("counter", KNOWN_IN_ANY_ORDER)
+def test_numbers_with_equal_steps_or_that_several_lines_share_are_no_feature_in_any_order(counter):
+    assert identifies("x", "", KNOWN_IN_ANY_ORDER[counter], LABELS)
+    assert identifies("x", "", *shuffled(KNOWN_IN_ANY_ORDER[counter]))
 
 
 def test_a_time_with_any_steps_is_no_feature():
