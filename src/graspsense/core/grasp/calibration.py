@@ -25,6 +25,8 @@ Offsets also differ between runs, on the PR2 by up to some hundred counts a cell
 """
 LARGEST_COUNT: Final = 65535.0
 """The largest count of 16 bits."""
+PAD_DIGITS: Final = 5
+"""Digits behind the point to which readings have the same pad force: between closer ones a slope is rounding."""
 
 Cells = tuple[float, ...]
 
@@ -185,15 +187,15 @@ class LoadTable(NamedTuple):
 def load_table(readings: Iterable[tuple[float, float]]) -> LoadTable:
     """Return the table that fits these readings (pad, load cell) in N of one fingertip: Fig. 4 of Chitta et al.
 
-    Readings at the same pad force are averaged, and neighbours are averaged until the load rises with the pad force
-    (pool adjacent violators). Raises ConfigError for fewer than two pad forces above zero, and for a reading that is
-    negative or not a number.
+    Readings at the same pad force (to `PAD_DIGITS`) are averaged, and neighbours are averaged until the load rises with
+    the pad force (pool adjacent violators). Raises ConfigError for fewer than two pad forces above zero, and for a
+    reading that is negative or not a number.
     """
     sums: dict[float, list[float]] = {}
     for pad, load in readings:
         if not (0.0 <= pad < float("inf") and 0.0 <= load < float("inf")):
             raise ConfigError(f"load-cell reading ({pad}, {load}): both must be forces of 0 N or more")
-        sums.setdefault(pad, []).append(load)
+        sums.setdefault(round(pad, PAD_DIGITS), []).append(load)
     sums.pop(0.0, None)
     if len(sums) < 2:
         raise ConfigError(f"a load table needs readings at two pad forces above 0 N or more, not {len(sums)}")
