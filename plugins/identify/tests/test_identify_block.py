@@ -25,7 +25,7 @@ def squeezes(scene, gripper, seeds):
     ]
 
 
-@pytest.mark.parametrize("hardening", [None, 1e-3])
+@pytest.mark.parametrize("hardening", [None, pytest.param(1e-3, marks=pytest.mark.slow)])
 def test_the_fingertips_of_known_squeezes_come_back(hardening):
     block = squeezes(
         "block", {"sensor": "ideal", "pad_stiffness_n_m": 6000.0, "pad_hardening_m": hardening}, [1, 2, 3]
@@ -42,6 +42,7 @@ def test_the_fingertips_of_known_squeezes_come_back(hardening):
         assert "twice the linear force at 1 mm" in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gripper", [{"sensor": "ideal"}, {"sensor": "pads"}])
 def test_a_delay_of_which_the_settings_do_not_know_does_not_bias_the_fingertips(gripper):
     config, soft = SimConfig(**gripper), {**gripper, "pad_stiffness_n_m": 6000.0}

@@ -48,7 +48,7 @@ def late_recordings(gripper, late_s, seeds=(1, 2, 3)):
 
 GRIPPERS = ({"sensor": "ideal"}, {"sensor": "pads"}, {"sensor": "pads", "pad_delay_s": 0.01})
 LATE_S = (0.0, 0.01, 0.025)
-IN_CI = ((0, 0.025), (1, 0.0), (1, 0.025), (2, 0.01))
+IN_CI = ((0, 0.0), (1, 0.025), (2, 0.01))
 """The place of a gripper, and a delay."""
 
 

@@ -85,6 +85,7 @@ def test_intervals_of_a_gas_are_wide_where_the_shell_and_the_gas_do_nearly_the_s
     assert "open" in shell.remedy
 
 
+@pytest.mark.slow
 def test_a_shell_that_the_fit_leaves_out_has_an_interval_in_proportion_to_the_force():
     squeeze, model, law, true = behind_pads(2.0, 0.02)
     softest = 1e-3

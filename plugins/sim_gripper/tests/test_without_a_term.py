@@ -55,7 +55,9 @@ def features_of(scene):
     return {**extracted, "peak": grasp.report["true_peak_force_n"]}
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(
+    "name", ["foam", *(pytest.param(name, marks=pytest.mark.slow) for name in SCENES if name != "foam")]
+)
 def test_a_term_changes_what_a_scene_without_it_changes(name):
     terms = SCENES[name]
     rows = explained(scene_of(*terms))
@@ -86,6 +88,7 @@ def test_a_term_that_changes_nothing_can_be_left_out_and_one_that_breaks_the_gra
     assert "the outcome" in shown
 
 
+@pytest.mark.slow
 def test_changes_are_those_of_the_pipelines_own_features():
     backend = SimBackend(config_of(scene_of(SHELL, CREEP), explain=True))
     backend.expect_features(create("feature-set", "curve"))
