@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from attrs import evolve
 from cases import every_case
-from squeezes import DEPTH_M, WIDTH_M, recorded
+from squeezes import DEPTH_M, WIDTH_M, grasped, recorded
 
-from graspsense.core.components.identification import RecordedSqueeze
-from graspsense.plugin_api import ConfigError, create
+from graspsense.plugin_api import ConfigError
 from graspsense_identify.choose import choose
 from graspsense_identify.corners import with_corners
 from graspsense_identify.fit import fit
@@ -280,10 +279,7 @@ def test_a_force_that_falls_while_the_fingers_open_is_no_break():
     ],
 )
 def test_the_release_of_a_container_with_contents_is_no_break(label, sensor):
-    backend, controller = create("sensor-backend", "sim", sensor=sensor), create("controller", "hybrid")
-    for grasp in backend.run_many(controller, [label] * 2, [0, 1], traces=True):
-        squeeze = RecordedSqueeze(name=label, sha256="0" * 64, trace=grasp.trace)
-        assert grasp.report["broken"] is False
+    for squeeze in grasped([label] * 2, {"sensor": sensor}, hold_s=0.25):
         assert prepared(squeeze, 0.0).broken_n is None
 
 
