@@ -430,7 +430,7 @@ def pressed_again(steps):
 )
 def test_fingers_meet_an_object_that_has_not_recovered_its_shape_where_it_ends(steps):
     # Without this event the dampers of the pads acted over the whole tick: 0.37 N too much where the force is 0.46 N.
-    (forces, _), (expected, deep) = pressed_again(steps), pressed_again(Steps(inf, 5e-6))
+    (forces, _), (expected, deep) = pressed_again(steps), pressed_again(Steps(inf, 2e-5))
     # It is pressed again while it is still 6 mm deep.
     assert expected[0] == 0.0 < expected[-1]
     assert deep > 0.006
