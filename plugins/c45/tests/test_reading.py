@@ -27,7 +27,7 @@ from graspsense_c45 import (
     to_rules,
     to_text,
 )
-from graspsense_c45.numbers_as_text import short
+from graspsense_c45.numbers_as_text import short, weka_number, weka_weight
 
 
 def grasp_tree() -> Tree:
@@ -163,6 +163,22 @@ def test_children_that_point_upwards_are_refused() -> None:
     document["nodes"]["n_children"] = [0, 2, 0, 3, 0, 0]
     with pytest.raises(StoredTreeError, match="do not form a tree"):
         from_json(json.dumps(document))
+
+
+def test_numbers_as_weka_prints_them() -> None:
+    assert [weka_number(x) for x in (1.0, -0.25, 1e-9, 80282423097.21323, 2.5e15)] == [
+        "1",
+        "-0.25",
+        "0",
+        "80282423097.21323",
+        "2500000000000000",
+    ]
+    assert [weka_weight(x) for x in (13.0, 2.125, 0.004, 12345678.0)] == [
+        "13.0",
+        "2.13",
+        "0.0",
+        "1.2345678E7",
+    ]
 
 
 def test_short_numbers() -> None:

@@ -197,19 +197,6 @@ def test_what_is_let_go_at_first_comes_back_from_the_tick_on_in_which_it_was(dam
     assert law(params, states, 1e-3, after.compression_m, 1e-3, rate)[0] == pytest.approx(0.0, abs=1e-6)
 
 
-def test_halving_the_step_quarters_the_error_of_the_peak():
-    def peak(steps):
-        params = PlantParams(drive(), thing(Elastic(2e5, 0.0), Maxwell(3e4, 0.02)), Steps(inf, TICK / steps))
-        state = plant_at(0.052, (NoState(), MaxwellState(0.0)), speed_m_s=-0.05)
-        return run(params, state, 30.0, 0.15, (elastic, maxwell)).peak_n
-
-    exact = peak(128)
-    errors = [abs(peak(n) - exact) for n in (2, 4, 8)]
-    assert errors[0] / exact < 0.01
-    assert errors[2] < errors[1] < errors[0]
-    assert errors[0] / errors[2] > 8.0
-
-
 def test_nothing_pulls_when_the_fingers_open_faster_than_the_object_recovers():
     params = PlantParams(drive(), thing(Elastic(500.0, 0.0), Maxwell(3000.0, 0.5), skins=1e4), FINE)
     state = run(params, plant_at(0.0501, (NoState(), MaxwellState(0.0))), 40.0, 1.0, (elastic, maxwell))
@@ -279,38 +266,6 @@ def test_a_stuck_gripper_does_not_creep_over_a_long_hold():
     after = run(params, state, 23.0, 1e6, (elastic, maxwell), dt=1e3)
     assert after.motion.revolutions == state.motion.revolutions
     assert after.contact.left.force_n == pytest.approx(2000.0 * state.contact.left.compression_m, rel=1e-9)
-
-
-@pytest.mark.parametrize("tolerance", [2e-4, 2e-6])
-def test_steps_that_grow_slowly_see_what_rings_after_a_touch(tolerance):
-    # Half a kilogram behind a stiff contact, felt through covers that damp: it rings at some 200 rad/s.
-    free = drive(coulomb=0.0, breakaway=0.0, load=0.0, damping=0.0, link=STRAIGHT)
-    free = free._replace(inertia=100.0 * STRAIGHT.pitch_m**2)
-    body = ObjectModel(0.05, 0.0, PadCompliance(1e4, 50.0), (Surface(0.5, 1e3, 1.0, 2e4),))
-    start = plant_at(0.0501, (OscillatorState(0.0, 0.0),), speed_m_s=-0.1, link=STRAIGHT)
-
-    def force(steps):
-        return plant_move([surface])(PlantParams(free, body, steps), start, 0.0, 5e-3).contact.left_n
-
-    exact = force(Steps(inf, 1e-6))
-    errors = [abs(force(Steps(tolerance, growth=growth)) - exact) / exact for growth in (2.0, 1.1, 1.03)]
-    assert errors[0] > 4.0 * errors[1] > 16.0 * errors[2]
-    assert errors[2] < 1e-4
-
-
-def test_a_tick_that_is_to_settle_is_halved_even_where_no_error_asks_for_it():
-    # Free flight under damping: one step of a loose tolerance takes the whole tick, and is off.
-    free = drive(coulomb=0.0, breakaway=0.0, load=0.0, damping=3e4, link=STRAIGHT)
-    free = free._replace(inertia=100.0 * STRAIGHT.pitch_m**2)
-    start = plant_at(0.06, (NoState(),), speed_m_s=-0.05, link=STRAIGHT)
-    speeds = []
-    for settle in (0.0, 1e-9):
-        after = plant_move([elastic])(
-            PlantParams(free, thing(*SPRING), Steps(1e9, inf, settle)), start, 0.0, TICK
-        )
-        speeds.append(after.motion.speed_rev_s * after.motion.jacobian_m_rev)
-    exact = -0.05 * math.exp(-3e4 / 100.0 * TICK)
-    assert abs(speeds[1] - exact) < 0.01 * abs(speeds[0] - exact)
 
 
 def test_what_stands_is_looked_at_in_steps_no_longer_than_the_longest():
@@ -435,29 +390,6 @@ def test_fingers_meet_an_object_that_has_not_recovered_its_shape_where_it_ends(s
     assert expected[0] == 0.0 < expected[-1]
     assert deep > 0.006
     np.testing.assert_allclose(forces, expected, atol=0.012)
-
-
-def test_steps_are_short_after_a_contact_and_whole_ticks_soon_afterwards():
-    body = thing(Elastic(2000.0, 0.0), Loss(100.0), skins=1.5e4)
-
-    def in_each_tick(steps):
-        params, state = (
-            PlantParams(drive(), body, steps),
-            plant_at(0.0502, (NoState(), NoState()), speed_m_s=-0.05),
-        )
-        move, counts = plant_move((elastic, loss)), []
-        while len(counts) < 8:
-            after = move(params, state, 30.0, TICK)
-            if after.contact.touched == 1:
-                counts.append(after.step.n_steps - state.step.n_steps)
-            state = after
-        return counts
-
-    short, fixed = (in_each_tick(steps) for steps in (a_step_per_tick(), Steps(inf, TICK, growth=inf)))
-    # Up to the contact, and from it on 10, 20, 40 us and so on.
-    assert short[0] + short[1] > 6
-    assert short[3:] == [1] * 5
-    assert fixed == [2] + [1] * 7
 
 
 @pytest.mark.parametrize("before_m", [0.0, 1e-15, 1e-12])
