@@ -11,7 +11,7 @@ from scipy.stats import chi2, norm
 
 from graspsense_identify.fit import fit
 from graspsense_identify.forward import ForwardModel
-from graspsense_identify.interval import normal, student
+from graspsense_identify.interval import interval_of_mean, normal, student
 from graspsense_identify.laws import memories, static_candidates
 from graspsense_identify.path_error import NODES_PER_TICK, on_fine_path, path_bias
 from graspsense_identify.prepare import prepared
@@ -103,3 +103,13 @@ def coverage(squeezes, ratio):
 @every_case("ratio", [1.0, 3.0, 100.0])
 def test_an_interval_covers_at_least_what_it_says_however_much_objects_differ(squeezes, ratio):
     assert 0.899 < coverage(squeezes, ratio) < 0.98
+
+
+def test_the_interval_of_a_mean_is_that_of_student():
+    # t(2, 0.95) = 2.920, and the standard error of 1, 2, 3 is 1 / sqrt(3).
+    low, high = interval_of_mean([1.0, 2.0, 3.0])
+    assert (low + high) / 2.0 == pytest.approx(2.0)
+    assert high - low == pytest.approx(2.0 * 2.91999 / np.sqrt(3.0), rel=1e-5)
+    assert np.isnan(interval_of_mean([1.0])).all()
+    assert normal() == pytest.approx(1.644854, rel=1e-6)
+    assert student(10**6) == pytest.approx(normal(), rel=1e-5)
