@@ -41,8 +41,8 @@ from graspsense_sim_gripper.scene.terms import Term
 from graspsense_sim_gripper.scene.terms.registry import TERMS
 
 CONFIG = SimConfig(sensor="ideal", spread=False)
-NEAR = evolve(CONFIG, open_gap_m=0.053)
-"""The fingers close from 3 mm away on what is `made up`."""
+NEAR = evolve(CONFIG, open_gap_m=0.053, rate_hz=250.0)
+"""The fingers close from 3 mm away on what is `made up`, in few ticks."""
 SHELL = ("elastic", {"k1_n_m": 2000.0, "k3_n_m3": 2e6})
 
 
@@ -338,7 +338,7 @@ def test_a_step_per_tick_is_chosen_where_it_is_accurate_enough_and_not_where_it_
 
 
 def test_a_step_per_tick_that_a_damper_makes_unstable_is_not_chosen():
-    config = evolve(NEAR, pad_stiffness_n_m=math.inf)
+    config = evolve(NEAR, rate_hz=CONFIG.rate_hz, pad_stiffness_n_m=math.inf)
     model = selected(config, thing(SHELL, ("loss", {"damping_n_s_m": 3e5})), hybrid())
     assert model.level == CONTROLLED[0].level(config.accuracy)
     assert model.verification.error <= 0.8 * config.accuracy
