@@ -56,6 +56,8 @@ VARIANTS: dict[str, dict[str, Any]] = {
     },
 }
 SETS = sorted(path.stem for path in (WEKA / "oracle").glob("*.json"))
+FOR_CV = ["default", "rep", "unpruned_nomdl_midpoint", "binary", "laplace"]
+"""The tree of the whole table is compared in every variant."""
 SMALL = ["arff_contact-lenses", "grasp_4c_40", "sk_iris", "ulps", "xor"]
 WITH_CV = [name for name in SETS if name != "arff_weather.nominal"]
 
@@ -216,9 +218,14 @@ def test_cross_validation_on_small_sets(name: str) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    "variants",
+    [FOR_CV, pytest.param(list(VARIANTS), marks=pytest.mark.long)],
+    ids=["one of each pruning", "all"],
+)
 @pytest.mark.parametrize("name", WITH_CV)
-def test_cross_validation(name: str) -> None:
-    assert check_cross_validation(name, list(VARIANTS)) >= 1
+def test_cross_validation(name: str, variants: list[str]) -> None:
+    assert check_cross_validation(name, variants) >= 1
 
 
 def test_where_j48_never_ends_ours_does() -> None:
