@@ -654,15 +654,14 @@ NEAR: Final = SimConfig(sensor="ideal", spread=False, open_gap_m=0.06)
 
 def whole_grasps(short: bool) -> Iterator[Row]:
     """Breaking, stiff contacts, pads, small friction and small Stribeck speeds, in grasps under a controller."""
-    near = evolve(NEAR, open_gap_m=0.053) if short else NEAR
     crushes = (3.0, 10.0, 15.0)
     for force in crushes[:1] if short else crushes:
         for kind in ("hybrid", "force"):
             spec = object_of(("rigid", {"hertz_n_m15": 1e7, "crush_force_n": force}))
-            yield grasped("breaking", [force, kind], near, spec, kind=kind)
+            yield grasped("breaking", [force, kind], NEAR, spec, kind=kind)
     for stiffness in (1e5,) if short else (1e5, 1e6, 1e7, 1e9):
         spec = object_of(("elastic", {"k1_n_m": stiffness}))
-        yield grasped("contact stiffness, whole grasp", stiffness, near, spec)
+        yield grasped("contact stiffness, whole grasp", stiffness, NEAR, spec)
     soft = object_of(("elastic", {"k1_n_m": 5e3}))
     pads: dict[str, dict[str, float]] = {
         "10 N/m": {"pad_stiffness_n_m": 10.0},
@@ -674,11 +673,11 @@ def whole_grasps(short: bool) -> Iterator[Row]:
         "creeps in 1e4 s": {"pad_creep_n_m": 1e4, "pad_creep_s": 1e4},
     }
     for what, changed in list(pads.items())[: 1 if short else None]:
-        yield grasped("pads", what, evolve(near, **changed), soft)
+        yield grasped("pads", what, evolve(NEAR, **changed), soft)
     for speed in (1e-9,) if short else (1e-9, 1e-7, 1e-5, 1e-3):
-        yield grasped("Stribeck speed", speed, evolve(near, stribeck_m_s=speed), soft)
+        yield grasped("Stribeck speed", speed, evolve(NEAR, stribeck_m_s=speed), soft)
     for friction in (1e-9,) if short else (1e-9, 1e-6, 1e-3, 1.0):
-        config = evolve(near, coulomb_n=friction, breakaway_n=2.0 * friction, load_friction_coefficient=0.0)
+        config = evolve(NEAR, coulomb_n=friction, breakaway_n=2.0 * friction, load_friction_coefficient=0.0)
         yield grasped("friction of the drive", friction, config, soft)
 
 
@@ -688,7 +687,7 @@ def masses(short: bool) -> Iterator[Row]:
         config = evolve(BASE, moving_mass_kg=mass, breakaway_n=8.0)
         spec = object_of(("elastic", {"k1_n_m": 2e3}), ("loss", {"damping_n_s_m": 5.0}))
         # The fingers touch the object after 54 ms.
-        row = against_reference(config, spec, seconds=0.07 if short else 0.1, fast=not short)
+        row = against_reference(config, spec, seconds=0.06 if short else 0.1, fast=not short)
         within = max(row["peak_error"], row["rms_error"]) <= config.accuracy
         yield {
             "case": "moving mass",
