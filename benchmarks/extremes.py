@@ -267,7 +267,7 @@ def head_space(short: bool) -> Iterator[Row]:
 
 def vents(short: bool) -> Iterator[Row]:
     """A narrow vent tends to a sealed bottle in proportion to its area; a wide one tends to no gas at all."""
-    areas = (0.0, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
+    areas = (0.0, 1e-7, 1e-3) if short else (0.0, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
     for area in areas:
         row = against_reference(BASE, gas(5e-5, vent_m2=area))
         yield {"case": "vent", "value": area, **row, "holds": row["rms_error"] <= 0.01}
@@ -281,7 +281,7 @@ def branch(tau_s: float) -> ObjectSpec:
 
 def relaxation(short: bool) -> Iterator[Row]:
     """A fast branch tends to a damper k tau, and so to nothing; a slow one to a spring."""
-    times = (1e-9, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e3, 1e6, 1e9)
+    times = (1e-9, 1e-2, 1e9) if short else (1e-9, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e3, 1e6, 1e9)
     for tau in times:
         row = against_reference(BASE, branch(tau))
         yield {"case": "relaxation time", "value": tau, **row, "holds": row["rms_error"] <= 0.01}
@@ -686,7 +686,8 @@ def masses(short: bool) -> Iterator[Row]:
     for mass in (1e-6, 1e6) if short else tuple(10.0**k for k in range(-6, 7)):
         config = evolve(BASE, moving_mass_kg=mass, breakaway_n=8.0)
         spec = object_of(("elastic", {"k1_n_m": 2e3}), ("loss", {"damping_n_s_m": 5.0}))
-        row = against_reference(config, spec, seconds=0.1, fast=not short)
+        # The fingers touch the object after 54 ms.
+        row = against_reference(config, spec, seconds=0.06 if short else 0.1, fast=not short)
         within = max(row["peak_error"], row["rms_error"]) <= config.accuracy
         yield {
             "case": "moving mass",

@@ -28,7 +28,12 @@ def expected_failures(classifier: graspsense_c45.C45Classifier) -> dict[str, str
 
 
 @pytest.mark.parametrize(
-    "options", [{}, asdict(PAPER), {"laplace": True, "pruning": "none"}], ids=["default", "paper", "laplace"]
+    "options",
+    [
+        pytest.param({}, id="default"),
+        pytest.param(asdict(PAPER), id="paper", marks=pytest.mark.slow),
+        pytest.param({"laplace": True, "pruning": "none"}, id="laplace", marks=pytest.mark.slow),
+    ],
 )
 @pytest.mark.filterwarnings("ignore")
 def test_scikit_learns_checks(options: dict[str, Any]) -> None:

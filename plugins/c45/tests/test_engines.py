@@ -64,12 +64,12 @@ def test_same_tree_and_predictions(weights: str, decimals: int | None) -> None:
 @pytest.mark.slow
 def test_same_tree_where_branches_are_raised_and_pruned_again() -> None:
     raised = 0
-    for seed in range(25):
+    for seed in range(8):
         table = grasps(seed, 2_000, 1, "one")
         trees = [fit(table, Options(min_objects=1), engine=engine) for engine in ("numpy", "fast")]
         assert trees[0] == trees[1]
         raised += trees[0] != fit(table, Options(min_objects=1, subtree_raising=False), engine="fast")
-    assert raised > 10
+    assert raised > 3
 
 
 @pytest.mark.slow

@@ -123,7 +123,7 @@ def as_rows(given: Table, rows: list[int]) -> list[tuple[list[float], int]]:
     return [(given.values[i].tolist(), int(given.labels[i])) for i in rows]
 
 
-@every_case("seed", range(40))
+@every_case("seed", range(20))
 def test_tree_is_the_brute_force_one(seed: int) -> None:
     given = table(seed)
     mdl = bool(seed % 2)
@@ -135,7 +135,7 @@ def test_tree_is_the_brute_force_one(seed: int) -> None:
     assert shape(fit(given, options).to_dict()) == shape(expected)
 
 
-@every_case("seed", range(100, 130))
+@every_case("seed", range(100, 115))
 def test_paper_preset_prunes_on_the_held_out_rows(seed: int) -> None:
     given = table(seed)
     n = len(given.labels)

@@ -56,6 +56,9 @@ VARIANTS: dict[str, dict[str, Any]] = {
     },
 }
 SETS = sorted(path.stem for path in (WEKA / "oracle").glob("*.json"))
+FOR_CV = ["default", "rep", "unpruned_nomdl_midpoint", "binary", "laplace"]
+"""The tree of the whole table is compared in every variant."""
+SMALL = ["arff_contact-lenses", "grasp_4c_40", "sk_iris", "ulps", "xor"]
 WITH_CV = [name for name in SETS if name != "arff_weather.nominal"]
 
 
@@ -153,8 +156,13 @@ def test_trees_and_answers(name: str) -> None:
         assert tree.n_leaves == question.answer(variant, "leaves")
 
 
-@every_case("name", SETS)
-def test_text_is_j48s(name: str) -> None:
+@pytest.mark.parametrize("sets", [SMALL, pytest.param(SETS, marks=pytest.mark.slow)], ids=["small", "all"])
+def test_text_is_j48s(sets: list[str]) -> None:
+    for name in sets:
+        assert_same_texts(name)
+
+
+def assert_same_texts(name: str) -> None:
     question = asked(name)
     dumps = [(variant, question.answer(variant, "text")) for variant in VARIANTS]
     dumps = [(variant, dump) for variant, dump in dumps if dump is not None]
@@ -162,7 +170,7 @@ def test_text_is_j48s(name: str) -> None:
     for variant, dump in dumps:
         body = dump.split("------------------\n", 1)[1]
         if isinstance(question.table.schema.classes[0], str):
-            assert to_text(fitted(name, variant)) == body, variant
+            assert to_text(fitted(name, variant)) == body, (name, variant)
 
 
 @every_case("name", SETS)
@@ -204,15 +212,20 @@ def test_folds_are_wekas(name: str) -> None:
         assert [fold.train.tolist() for fold in folds] == question.oracle["folds"]["train_order"]
 
 
-@every_case("name", ["arff_contact-lenses", "grasp_4c_40", "sk_iris", "ulps", "xor"])
+@every_case("name", SMALL)
 def test_cross_validation_on_small_sets(name: str) -> None:
     assert check_cross_validation(name, ["default", "rep"]) >= 1
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    "variants",
+    [FOR_CV, pytest.param(list(VARIANTS), marks=pytest.mark.long)],
+    ids=["one of each pruning", "all"],
+)
 @pytest.mark.parametrize("name", WITH_CV)
-def test_cross_validation(name: str) -> None:
-    assert check_cross_validation(name, list(VARIANTS)) >= 1
+def test_cross_validation(name: str, variants: list[str]) -> None:
+    assert check_cross_validation(name, variants) >= 1
 
 
 def test_where_j48_never_ends_ours_does() -> None:

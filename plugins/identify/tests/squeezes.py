@@ -6,6 +6,8 @@ import numpy as np
 
 from graspsense.core.components.identification import RecordedSqueeze
 from graspsense.core.values.trace import Trace
+from graspsense.plugin_api import create
+from graspsense.simulator_api import RunConfig
 
 WIDTH_M = 0.05
 DEPTH_M = 0.008
@@ -38,3 +40,14 @@ def recorded(force_of=None, *, hold_s=1.0, speed_m_s=0.02, period_s=0.0) -> Reco
         pad_right=np.empty((len(images), 0)),
     )
     return RecordedSqueeze(name="one", sha256="0" * 64, trace=trace)
+
+
+def grasped(scenes, gripper, *, hold_s=1.0) -> list[RecordedSqueeze]:
+    """Return a simulated grasp of each scene with these settings of the gripper; their seeds are 1, 2 and so on."""
+    backend, seeds = create("sensor-backend", "sim", **gripper), range(1, 1 + len(scenes))
+    run = RunConfig(hold_s=hold_s)
+    grasps = backend.run_many(create("controller", "hybrid"), scenes, seeds, run=run, traces=True)
+    return [
+        RecordedSqueeze(name=str(seed), sha256="0" * 64, trace=grasp.trace, gripper=gripper)
+        for seed, grasp in zip(seeds, grasps, strict=True)
+    ]

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from attrs import evolve
 from cases import every_case
-from squeezes import DEPTH_M, WIDTH_M, recorded
+from squeezes import DEPTH_M, WIDTH_M, grasped, recorded
 
-from graspsense.core.components.identification import RecordedSqueeze
-from graspsense.plugin_api import ConfigError, create
+from graspsense.plugin_api import ConfigError
 from graspsense_identify.choose import choose
 from graspsense_identify.corners import with_corners
 from graspsense_identify.fit import fit
@@ -269,13 +268,18 @@ def test_a_force_that_falls_while_the_fingers_open_is_no_break():
     assert prepared(evolve(squeeze, trace=held), 0.0).broken_n is not None
 
 
-@pytest.mark.parametrize("label", ["odwalla:full_open", "odwalla_worn:full_open", "naked:full_open"])
-@pytest.mark.parametrize("sensor", [pytest.param("ideal", marks=pytest.mark.slow), "pads"])
+@pytest.mark.parametrize(
+    ("label", "sensor"),
+    [
+        ("odwalla:full_open", "pads"),
+        *(
+            pytest.param(label, sensor, marks=pytest.mark.slow)
+            for label, sensor in (("odwalla_worn:full_open", "pads"), ("naked:full_open", "ideal"))
+        ),
+    ],
+)
 def test_the_release_of_a_container_with_contents_is_no_break(label, sensor):
-    backend, controller = create("sensor-backend", "sim", sensor=sensor), create("controller", "hybrid")
-    for grasp in backend.run_many(controller, [label] * 3, list(range(3)), traces=True):
-        squeeze = RecordedSqueeze(name=label, sha256="0" * 64, trace=grasp.trace)
-        assert grasp.report["broken"] is False
+    for squeeze in grasped([label] * 2, {"sensor": sensor}, hold_s=0.25):
         assert prepared(squeeze, 0.0).broken_n is None
 
 
@@ -310,17 +314,24 @@ def fitted_snap(squeeze):
     return fit(model, with_corners(model, snap, [squeeze]), [squeeze])
 
 
-@every_case("k2", [1200.0, 2500.0])
-@every_case(("critical_m", "period_s"), [(0.0008, 0.041), (0.001, 0.02), (0.001, 0.041)])
+@every_case(
+    ("critical_m", "period_s", "k2"),
+    [(0.0008, 0.041, 1200.0), (0.001, 0.02, 2500.0), (0.001, 0.041, 1200.0)],
+)
 def test_a_snap_through_early_in_a_squeeze_is_fitted_though_few_images_show_it(critical_m, period_s, k2):
     squeeze = prepared(recorded(shell(3000.0, critical_m, 1.5, 0.0008, k2), period_s=period_s), 0.0)
 
-    # From the grid of its own starts alone, the residual was 0.4 to 1.7 % of the peak in five of these six.
+    # From the grid of its own starts alone, the residual was 0.4 to 1.7 % of the peak.
     assert fitted_snap(squeeze).rms < 0.001
 
 
 @pytest.mark.parametrize(
-    "seed", [*range(3), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(3, 12))]
+    "seed",
+    [
+        0,
+        *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 6)),
+        *(pytest.param(seed, marks=pytest.mark.long) for seed in range(6, 12)),
+    ],
 )
 def test_a_snap_through_is_found_whatever_the_rounding_of_the_forces(seed):
     rng = np.random.default_rng(seed)

@@ -8,11 +8,8 @@ import tomllib
 import numpy as np
 import pytest
 from attrs import evolve
-from squeezes import WIDTH_M, recorded
+from squeezes import WIDTH_M, grasped, recorded
 
-from graspsense.core.components.identification import RecordedSqueeze
-from graspsense.plugin_api import create
-from graspsense.simulator_api import RunConfig
 from graspsense_identify.fit import Fitted
 from graspsense_identify.forward import ForwardModel
 from graspsense_identify.individual import alone
@@ -116,19 +113,12 @@ def test_the_scene_of_objects_that_relax_at_different_rates_has_the_spread_and_i
         '[[terms]]\ntype = "maxwell"\nk_n_m = 500.0\ntau_s = 0.2\nspread = { tau_s = 0.4 }\n'
     )
     gripper = {"sensor": "ideal"}
-    backend, controller = create("sensor-backend", "sim", **gripper), create("controller", "hybrid")
-    objects = [f"{scene}#{k}" for k in range(4)]
-    done = backend.run_many(controller, objects, [1, 2, 3, 4], run=RunConfig(hold_s=1.0), traces=True)
-    recordings = [
-        RecordedSqueeze(
-            name=str(k), sha256="0" * 64, trace=grasp.trace, gripper=gripper, label="cup", instance=f"cup#{k}"
-        )
-        for k, grasp in enumerate(done)
-    ]
+    squeezes = grasped([f"{scene}#{k}" for k in range(4)], gripper)
+    recordings = [evolve(squeeze, label="cup", instance=f"cup#{k}") for k, squeeze in enumerate(squeezes)]
     result = identify(SimConfig(), recordings, lambda *_: None)
     (spread,) = [parameter for parameter in result.parameters if parameter.name.endswith(".spread")]
     assert spread.name == "maxwell.tau_s.spread"
     assert spread.low < 0.4 < spread.high
     (maxwell,) = [term for term in tomllib.loads(result.scene)["terms"] if term["type"] == "maxwell"]
     assert maxwell["spread"] == {"tau_s": pytest.approx(spread.value, rel=1e-4)}
-    backend.run_many(controller, [result.scene], [1], run=RunConfig(hold_s=0.2))
+    grasped([result.scene], gripper)

@@ -1,7 +1,5 @@
 """The command that fits the catalogue's free figures again."""
 
-import tomllib
-
 import fit
 import pytest
 
@@ -23,16 +21,6 @@ def test_what_is_fitted_is_three_figures_of_each_of_four_containers():
             assert (again.share, again.terms) == (spec.share, spec.terms)
 
 
-def test_the_search_begins_where_nothing_was_fitted():
-    spec = catalogue()["odwalla:full_open"]
-    begun = fit.with_figures(spec, *(fit.start()["odwalla", figure] for figure in fit.FIGURES))
-    assert begun.share == catalogue()["block"].share
-    assert begun.stiffness_spread == 0.08
-    assert dict(begun.terms)["loss"]["damping_n_s_m"] == 0.0
-    table = tomllib.loads(fit.as_toml(begun))
-    assert {term["type"]: term for term in table["terms"]}["loss"]["damping_n_s_m"] == 0.0
-
-
 def test_the_authors_tree_and_its_splits():
     long, hit, deep, weak, other = (
         fit.Squeeze(0.6, 0.052, 7.0, 8.0),
@@ -52,19 +40,6 @@ def test_the_authors_tree_and_its_splits():
         "tree_f_steady": 0.75,
         "tree": 1.0,
     }
-
-
-def test_targets_are_those_that_may_be_fitted_to():
-    targets = fit.targets()
-    assert [name for name in targets if name.startswith("table")] == [
-        "table_2",
-        *(f"table_3_{kind}" for kind in fit.TRIALS),
-    ]
-    assert targets["table_2"].rate == 215 / 229
-    assert fit.objective({name: target.rate for name, target in targets.items()}) == 0.0
-    off = {name: target.rate + target.deviation for name, target in targets.items()}
-    assert fit.objective(off) == pytest.approx(9.0)
-    assert fit.objective(off, "tree") == pytest.approx(4.0)
 
 
 def test_the_descent_finds_the_least_of_a_bowl_and_says_what_is_pinned():

@@ -43,6 +43,21 @@ from cases import every_case
 from graspsense_sim_gripper.run.batch import run_many
 
 
+def summary_of(planned, results=None):
+    results = results or {}
+    return Summary(planned=planned, conditions=(), results=results, failed=(), missing=0, seconds=0.0)
+
+
+def with_gripper(planned, config):
+    """Return the experiment with these settings of the gripper in every case."""
+
+    def changed(case):
+        gripper = evolve(case.settings.gripper, config=config)
+        return evolve(case, settings=evolve(case.settings, gripper=gripper))
+
+    return evolve(planned, cases=tuple(map(changed, planned.cases)))
+
+
 def test_printed_matrices_have_the_truth_where_it_is_said_to_be():
     paper = published()
     either = paper.matrix("table_2").confusion.counts
@@ -104,9 +119,7 @@ def test_the_number_of_fitted_parameters_is_that_of_the_catalogue():
     ],
 )
 def test_whether_a_result_is_predicted_follows_from_the_origins_of_the_figures(experiment, about, expected):
-    planned = read_experiment(experiment)
-    summary = Summary(planned=planned, conditions=(), results={}, failed=(), missing=0, seconds=0.0)
-    assert basis(summary, experiment, about) == expected
+    assert basis(summary_of(read_experiment(experiment)), experiment, about) == expected
 
 
 def test_a_result_that_a_setting_of_the_gripper_was_fitted_to_is_not_predicted():
@@ -115,45 +128,17 @@ def test_a_result_that_a_setting_of_the_gripper_was_fitted_to_is_not_predicted()
         friction_n: float = setting(default=7.0, meaning="Friction.", origin="fitted to table_4_17")
 
     planned = read_experiment("table_4")
-
-    def with_gripper(config):
-        settings = planned.cases[0].settings
-        settings = evolve(settings, gripper=evolve(settings.gripper, config=config))
-        cases = tuple(evolve(case, settings=settings) for case in planned.cases)
-        return Summary(
-            planned=evolve(planned, cases=cases), conditions=(), results={}, failed=(), missing=0, seconds=0.0
-        )
-
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("graspsense_paper.basis.simulated_objects", lambda _: ())
-        assert basis(with_gripper(FittedConfig()), "table_4", "table_4_17") == "fitted"
-        assert basis(with_gripper(FittedConfig(friction_n=6.0)), "table_4", "table_4_17") == "predicted"
+        for config, expected in ((FittedConfig(), "fitted"), (FittedConfig(friction_n=6.0), "predicted")):
+            assert basis(summary_of(with_gripper(planned, config)), "table_4", "table_4_17") == expected
 
 
 def test_a_claim_is_built_in_only_where_a_figure_that_gives_it_is_not_zero():
     planned = read_experiment("stiction")
-    frictionless = tuple(
-        evolve(
-            case,
-            settings=evolve(
-                case.settings,
-                gripper=evolve(
-                    case.settings.gripper,
-                    config=evolve(case.settings.gripper.config, coulomb_n=0.0, breakaway_n=0.0),
-                ),
-            ),
-        )
-        for case in planned.cases
-    )
-    summary = Summary(
-        planned=evolve(planned, cases=frictionless),
-        conditions=(),
-        results={},
-        failed=(),
-        missing=0,
-        seconds=0.0,
-    )
-    assert basis(summary, "stiction", "stiction") == "predicted"
+    ours = planned.cases[0].settings.gripper.config
+    frictionless = with_gripper(planned, evolve(ours, coulomb_n=0.0, breakaway_n=0.0))
+    assert basis(summary_of(frictionless), "stiction", "stiction") == "predicted"
 
 
 @pytest.mark.slow
@@ -267,10 +252,7 @@ def eggs(broken, n):
     planned = read_experiment("controllers", ["seeds=1"])
     case = next(case for case in planned.cases if case.levels.get("variant") == "hybrid")
     rows = tuple(GraspRow(label="egg", outcome="steady", broken=i < broken) for i in range(n))
-    result = GraspResult(source="", simulated=True, rows=rows)
-    return Summary(
-        planned=planned, conditions=(), results={(case.name, 0): result}, failed=(), missing=0, seconds=0.0
-    )
+    return summary_of(planned, {(case.name, 0): GraspResult(source="", simulated=True, rows=rows)})
 
 
 @every_case(

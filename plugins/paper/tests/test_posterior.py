@@ -144,7 +144,7 @@ def test_the_density_of_a_proposal_is_that_of_its_samples():
     assert transition.pdf(drawn.iloc[0]) == pytest.approx(transition.pdf(drawn)[0])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_an_inference_of_twenty_figures_finds_a_posterior_that_is_known(tmp_path):
     """Normal figures with linear data and normal errors: mean and standard deviation are known exactly."""
     posterior = pytest.importorskip("posterior", reason="needs pyabc")

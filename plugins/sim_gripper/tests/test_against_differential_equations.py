@@ -9,6 +9,7 @@ object at a set speed, squeeze it with one effort, with a larger one, and are th
 
 import cmath
 import math
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -741,6 +742,7 @@ GRIPPERS = {
 }
 
 
+@cache
 def expected(name, place, gripper):
     """Return what the equations give for an object of this name."""
     link, friction, pads, lag_s = GRIPPERS[gripper]
@@ -806,30 +808,12 @@ def every(count):
             yield name, *pairs[(7 * i + 5 * k) % len(pairs)]
 
 
-QUICK = (
-    ("rigid, breaks", "held off centre", "pr2"),
-    ("maxwell", "centred", "pr2, smooth, creeping pads"),
-    ("gas, with heat", "pushed", "straight"),
-    ("foam, creeping", "heavy, pushed back", "pr2, rigid pads"),
-    ("snap, sudden", "centred", "straight, smooth"),
-    ("worn before", "centred", "pr2, smooth, rigid pads, lag"),
-    ("slosh, damped", "pushed", "straight"),
-    ("liquid", "centred", "pr2"),
-)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "place", "gripper"), QUICK)
-def test_the_reference_is_the_solution_of_the_equations(name, place, gripper):
-    assert max(errors(name, place, gripper)) <= 3e-5
-
-
 def marked(most, few):
     """Return the scenes of `every(most)`: those of `every(few)` for CI, the others among the long tests."""
     ci = set(every(few))
-    scenes = [scene for scene in every(most) if scene not in QUICK]
     return [
-        pytest.param(*scene, marks=pytest.mark.slow if scene in ci else pytest.mark.long) for scene in scenes
+        pytest.param(*scene, marks=pytest.mark.slow if scene in ci else pytest.mark.long)
+        for scene in every(most)
     ]
 
 

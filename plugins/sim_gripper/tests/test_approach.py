@@ -41,14 +41,16 @@ def closing_at(speed_m_s):
         ),
         pytest.param(RINGING, "odwalla:full_closed", id="ringing", marks=pytest.mark.slow),
         # Near the limit of 0.2 m/s, which the guard enforces.
-        pytest.param(closing_at(0.199), "odwalla:full_closed", id="limit"),
+        pytest.param(closing_at(0.199), "odwalla:full_closed", id="limit", marks=pytest.mark.slow),
     ],
 )
 def test_the_fingers_move_as_they_do_tick_by_tick(sensor, law, scene):
     agree(sensor, law, scene)
 
 
-@pytest.mark.parametrize(("rate_hz", "speed_m_s"), [(200.0, 0.04), (500.0, 0.1)])
+@pytest.mark.parametrize(
+    ("rate_hz", "speed_m_s"), [(200.0, 0.04), pytest.param(500.0, 0.1, marks=pytest.mark.slow)]
+)
 def test_a_run_of_long_ticks_ends_with_the_polynomial_of_the_linkage(rate_hz, speed_m_s):
     # The Jacobian changes by more than its polynomial is made for in fewer ticks than a run may have: beyond it, gaps
     # were 7 um off. Single ticks of this length have errors of their own.
@@ -70,6 +72,7 @@ def agree(sensor, law, scene, gap_error_m=3e-7, speed_error_m_s=1e-6, **settings
     np.testing.assert_allclose(velocity, expected, rtol=6e-4, atol=speed_error_m_s)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [HYBRID, RINGING], ids=["default", "ringing"])
 def test_the_speed_that_the_encoder_shows_scatters_as_tick_by_tick(law):
     _, _, velocity = approach("pads", law, "odwalla:full_closed")

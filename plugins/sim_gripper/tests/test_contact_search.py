@@ -18,7 +18,6 @@ from graspsense_sim_gripper.scene.library import find
 from graspsense_sim_gripper.scene.terms.elastic import Elastic, elastic
 from graspsense_sim_gripper.scene.terms.foam import Foam, foam
 from graspsense_sim_gripper.scene.terms.loss import Loss, loss
-from graspsense_sim_gripper.scene.terms.maxwell import Maxwell, MaxwellState, maxwell
 from graspsense_sim_gripper.scene.terms.term import NoState
 from graspsense_sim_gripper.scene.terms.worn import Worn, WornState, worn
 
@@ -86,25 +85,6 @@ def test_the_rate_that_a_damper_needs_is_of_third_order_where_steps_grow_slowly(
     errors = [rate_error((h, ratio * h)) for h in (2e-3, 1e-3, 5e-4)]
     for coarse, fine in itertools.pairwise(errors):
         assert coarse / fine == pytest.approx(2.0**order, rel=0.25)
-
-
-def test_an_object_that_relaxes_is_balanced_with_two_evaluations_of_its_law():
-    # The linearized balance alone takes three: it knows nothing of what relaxes during the step.
-    evaluations = 0
-
-    def counted(params, state, d0, d1, h, v1):
-        nonlocal evaluations
-        evaluations += 1
-        return maxwell(params, state, d0, d1, h, v1)
-
-    solve = bind_reachable(solve_contact, {"object_force": counted})
-    body = ObjectModel(0.06, 0.0, PadCompliance(1.5e4), Maxwell(3000.0, 0.2), balance_rtol=5e-9)
-    now = ContactState(0.0, 0.0, 0.0, MaxwellState(0.0))
-    for k in range(200):
-        closure_m = 5e-3 * math.sin(math.pi * (k + 1) / 400.0)
-        now, unbalanced = solve(body, now, closure_m, 0.0, 1e-3)
-        assert unbalanced == 0
-    assert evaluations <= 2.1 * 200
 
 
 def test_a_dented_object_is_thinner_by_its_dent(tmp_path):

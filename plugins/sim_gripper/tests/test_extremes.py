@@ -19,7 +19,7 @@ def module():
 
 extremes = module()
 SLOW = {"stiffness_and_mass", "head_space", "vents", "relaxation", "thin_object", "ticks"}
-SLOW |= {"hertz_energy", "sliding_again", "cyclic", "whole_grasps", "masses", "batches"}
+SLOW |= {"stuck", "hertz_energy", "sliding_again", "cyclic", "whole_grasps", "masses", "batches"}
 
 
 @pytest.mark.parametrize(

@@ -43,7 +43,7 @@ def test_on_the_block_pure_force_slams_at_least_three_times_the_hybrids_peak():
     assert max(peak["hybrid"]) > 1.05 * min(peak["hybrid"])
 
 
-@pytest.mark.parametrize("eggs", [8, pytest.param(200, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("eggs", [2, pytest.param(100, marks=pytest.mark.slow)])
 def test_the_egg_survives_the_hybrid_and_not_pure_force(eggs):
     seeds = range(eggs)
     hybrid, gentle = peaks("hybrid", 20.0, "egg", seeds)
@@ -56,7 +56,7 @@ def test_the_egg_survives_the_hybrid_and_not_pure_force(eggs):
 
 
 def test_velocity_control_on_its_own_raises_its_effort_after_contact_and_crushes():
-    result = grasp(create("controller", "velocity"), object="egg")
+    result = grasp(create("controller", "velocity"), object="egg", open_gap_m=0.048)
     trace = result.trace
     approaching = trace.command[trace.phase == Phase.APPROACH]
     after = trace.command[trace.phase == Phase.SQUEEZE]
@@ -69,11 +69,11 @@ def test_velocity_control_on_its_own_raises_its_effort_after_contact_and_crushes
 
 @pytest.mark.parametrize("name", ["force", "hybrid"])
 def test_a_force_below_breakaway_does_not_move_the_gripper_at_all(name):
-    options = {"probing_force_n": 6.0, "move_timeout_s": 1.0}
+    options = {"probing_force_n": 6.0, "move_timeout_s": 0.3}
     if name == "hybrid":
         # The velocity loop would raise its effort until it moves; held to the same 6 N it does not either.
         options |= {"velocity_gain_n_s_m": 0.0, "integral_gain_n_m": 0.0, "preload_n": 6.0}
-    result = grasp(create("controller", name, **options), spread=False)
+    result = grasp(create("controller", name, **options), spread=False, fidelity="fixed")
     approach = result.trace.gap_m[result.trace.phase == Phase.APPROACH]
     assert len(set(approach.tolist())) == 1
     assert result.outcome is Outcome.NOTHING_THERE
@@ -82,14 +82,14 @@ def test_a_force_below_breakaway_does_not_move_the_gripper_at_all(name):
 @pytest.mark.slow
 def test_closed_loop_force_settles_at_the_force_asked_for():
     controller = create("controller", "hybrid", loop="closed", probing_force_n=5.0, steady_timeout_s=8.0)
-    result = grasp(controller, object="toy", spread=False)
+    result = grasp(controller, object="toy", spread=False, open_gap_m=0.06)
     assert result.outcome is Outcome.STEADY
     assert FEATURES.extract(result.trace)["f_steady"] == pytest.approx(5.0, abs=0.3)
 
 
 def test_a_ramp_softens_the_switch():
     hard, ramped = (
-        grasp(create("controller", "hybrid", ramp_s=ramp), spread=False, object="block")
+        grasp(create("controller", "hybrid", ramp_s=ramp), spread=False, object="block", open_gap_m=0.033)
         for ramp in (0.0, 0.3)
     )
     jumps = []
@@ -104,13 +104,14 @@ def test_a_ramp_softens_the_switch():
     [
         ({"object": "none"}, Outcome.NOTHING_THERE),
         ({"object": "can:full_closed", "open_gap_m": 0.060}, Outcome.TOO_WIDE),
-        ({"object": "odwalla:empty_open"}, Outcome.STEADY),
+        ({"object": "odwalla:empty_open", "open_gap_m": 0.064}, Outcome.STEADY),
     ],
 )
 def test_outcomes(config, outcome):
     assert grasp(create("controller", "hybrid"), **config).outcome is outcome
 
 
+@pytest.mark.slow
 def test_slow_approaches_stretch_their_time_out():
     slow = create("controller", "hybrid", closing_speed_m_s=0.002)
     assert grasp(slow, object="block").outcome is Outcome.STEADY
@@ -118,7 +119,7 @@ def test_slow_approaches_stretch_their_time_out():
 
 def features(scene, seeds=range(5), **config):
     controller = create("controller", "hybrid", probing_force_n=23.0)
-    done = run_many(SimConfig(**config), controller, [scene] * len(seeds), seeds)
+    done = run_many(SimConfig(**config), controller, [scene] * len(seeds), seeds, compiled=True)
     return np.array([FEATURES.extract(grasp.trace).values for grasp in done])
 
 

@@ -18,7 +18,7 @@ from graspsense_sim_gripper.run.binding import bind_reachable
 from graspsense_sim_gripper.run.compiled.compose import plant_move, step_parts, uncompressed
 from graspsense_sim_gripper.run.compiled.padding import composition_of
 from graspsense_sim_gripper.scene.terms.registry import laws_of
-from graspsense_sim_gripper.solve.macro_step import HALF, macro_step, next_ticks, values_at
+from graspsense_sim_gripper.solve.macro_step import macro_step, next_ticks, values_at
 from graspsense_sim_gripper.solve.scheme import Steps
 from graspsense_sim_gripper.solve.trend import UNKNOWN
 
@@ -50,12 +50,12 @@ class Plant:
             Contact(0.0, 0.0, 0.0, 0, uncompressed(self._kinds), ()),
         )
 
-    def macro_step(self, params, state, effort_n, h, trend=UNKNOWN):
-        return self._macro_step(params, state, effort_n, h, trend)
+    def macro_step(self, state, effort_n, h, trend=UNKNOWN):
+        return self._macro_step(self.params, state, effort_n, h, trend)
 
-    def after(self, state, seconds, effort_n=EFFORT_N):
-        """Return the plant after this time, in steps of 10 us."""
-        fine = self.params._replace(steps=Steps(inf, 1e-5, growth=inf))
+    def after(self, state, seconds, effort_n=EFFORT_N, step_s=1e-5):
+        """Return the plant after this time, in steps of this length."""
+        fine = self.params._replace(steps=Steps(inf, step_s, growth=inf))
         return self._move(fine, state, effort_n, seconds)
 
 
@@ -69,38 +69,21 @@ def speed_m_s(state):
     return state.motion.speed_rev_s * state.motion.jacobian_m_rev
 
 
-def squeezing_or_damped(case):
-    """Return a plant that squeezes, or one without contact, where the damper of the drive is all that there is."""
-    plant, start = squeezing("can:empty_open" if case == "a spring" else "toy")
+@pytest.mark.parametrize("case", ["squeezing", "with damping"])
+def test_with_the_trend_of_the_one_before_several_are_of_fourth_order(case):
+    """The accumulated error of steps of fourth order decreases sixteen times, that of third order eight times."""
+    plant, start = squeezing()
     if case == "with damping":
+        # Without contact, where the damper of the drive is all that there is.
         drive = plant.params.drive
         damped = drive._replace(friction=drive.friction._replace(damping_n_s_m=2000.0))
         plant.params, start = plant.params._replace(drive=damped), plant.state(0.02, -0.01)
-    return plant, start
-
-
-@pytest.mark.parametrize("case", ["squeezing", "with damping"])
-def test_its_error_decreases_with_the_fourth_power_of_its_length(case):
-    plant, start = squeezing_or_damped(case)
-    errors = []
-    for n in (8, 16, 32):
-        step = plant.macro_step(plant.params, start, EFFORT_N, n * TICK)
-        errors.append(abs(speed_m_s(step.after) - speed_m_s(plant.after(start, n * TICK))))
-    assert errors[0] < 1e-6
-    assert 11.0 < errors[1] / errors[0] < 22.0
-    assert 11.0 < errors[2] / errors[1] < 22.0
-
-
-@pytest.mark.parametrize("case", ["squeezing", "a spring", "with damping"])
-def test_with_the_trend_of_the_one_before_several_are_of_fourth_order(case):
-    """The accumulated error of steps of fourth order decreases sixteen times, that of third order eight times."""
-    plant, start = squeezing_or_damped(case)
     expected, errors = speed_m_s(plant.after(start, 0.064)), {}
     for n in (4, 8, 16):
         for keeps in (True, False):
             state, trend = start, UNKNOWN
             for _ in range(64 // n):
-                step = plant.macro_step(plant.params, state, EFFORT_N, n * TICK, trend)
+                step = plant.macro_step(state, EFFORT_N, n * TICK, trend)
                 state, trend = step.after, step.trend if keeps else UNKNOWN
             errors[n, keeps] = abs(speed_m_s(state) - expected)
     for n in (4, 8):
@@ -109,11 +92,11 @@ def test_with_the_trend_of_the_one_before_several_are_of_fourth_order(case):
     assert errors[8, True] < 0.7 * errors[8, False]
 
 
-@every_case("scene", ["toy", "odwalla:full_open", "water:empty_closed", "block"])
+@every_case("scene", ["toy", "odwalla:full_open", "water:empty_closed"])
 def test_a_step_that_is_taken_is_as_exact_as_its_tolerance_says(scene):
     plant, start = squeezing(scene)
     n = 32
-    while not (step := plant.macro_step(plant.params, start, EFFORT_N, n * TICK)).error <= 1.0:
+    while not (step := plant.macro_step(start, EFFORT_N, n * TICK)).error <= 1.0:
         n = next_ticks(n, step.error, step.event_share)
     expected = plant.after(start, n * TICK)
     assert n >= 2
@@ -123,7 +106,7 @@ def test_a_step_that_is_taken_is_as_exact_as_its_tolerance_says(scene):
 
 def test_the_values_within_are_those_of_the_motion():
     plant, start = squeezing()
-    step = plant.macro_step(plant.params, start, EFFORT_N, 8 * TICK)
+    step = plant.macro_step(start, EFFORT_N, 8 * TICK)
     assert step.error <= 1.0
     for k in (0, 1, 3, 4, 7, 8):
         within, expected = values_at(step.values, k / 8), plant.after(start, k * TICK) if k else start
@@ -140,7 +123,7 @@ def test_fingers_that_friction_holds_stay_while_the_object_relaxes():
     revolutions, _, gap, jacobian = start.motion
     effort_n = start.contact.left_n
     held = plant.after(start._replace(motion=Motion(revolutions, 0.0, gap, jacobian)), 0.005, effort_n)
-    step = plant.macro_step(plant.params, held, effort_n, 32 * TICK)
+    step = plant.macro_step(held, effort_n, 32 * TICK)
     assert step.error <= 1.0
     assert step.after.motion == held.motion
     expected = plant.after(held, 32 * TICK, effort_n)
@@ -151,7 +134,7 @@ def test_fingers_that_friction_holds_stay_while_the_object_relaxes():
 def just_before(plant, start, effort_n, happened):
     """Return the plant at most 8 ms before this has happened."""
     for _ in range(200):
-        after = plant.after(start, 0.008, effort_n)
+        after = plant.after(start, 0.008, effort_n, TICK)
         if happened(after):
             return start
         start = after
@@ -177,25 +160,16 @@ def test_a_step_that_would_contain_an_event_is_not_taken():
         ),
     }
     for what, (plant, start, effort_n) in cases.items():
-        assert math.isinf(plant.macro_step(plant.params, start, effort_n, 0.01).error), what
-
-
-def test_the_number_of_ticks_follows_from_the_error():
-    assert next_ticks(16, 0.0, HALF) == 64
-    assert next_ticks(16, 1.0, HALF) == 14
-    assert next_ticks(16, 16.0, HALF) == 7
-    assert next_ticks(16, inf, HALF) == next_ticks(16, math.nan, HALF) == 8
-    assert next_ticks(16, inf, 0.7) == 11
-    assert next_ticks(16, inf, 0.999) == 15
+        assert math.isinf(plant.macro_step(start, effort_n, 0.01).error), what
 
 
 @pytest.mark.parametrize("before_m", [3e-4, 1.3e-3])
 def test_a_step_that_is_repeated_ends_shortly_before_an_event_whose_place_is_known(before_m):
     plant = Plant("toy")
     start = plant.state(CONFIG.open_gap_m - plant.params.object.width_m - before_m, 0.05)
-    too_long = plant.macro_step(plant.params, start, -20.0, 64 * TICK)
+    too_long = plant.macro_step(start, -20.0, 64 * TICK)
     n = next_ticks(64, too_long.error, too_long.event_share)
-    assert plant.macro_step(plant.params, start, -20.0, n * TICK).error <= 1.0
+    assert plant.macro_step(start, -20.0, n * TICK).error <= 1.0
     assert plant.after(start, (n + 2) * TICK, -20.0).motion.gap_m == pytest.approx(
         CONFIG.open_gap_m, abs=1e-12
     )
@@ -226,7 +200,7 @@ def test_the_forces_of_a_release_are_those_of_single_ticks():
 
 @pytest.mark.parametrize(
     "settings",
-    [{"pad_delay_s": 0.017}, {"rate_hz": 250.0}, pytest.param({"rate_hz": 4000.0}, marks=pytest.mark.slow)],
+    [{"rate_hz": 250.0}, pytest.param({"rate_hz": 4000.0, "pad_delay_s": 0.017}, marks=pytest.mark.slow)],
 )
 def test_images_and_outcome_are_those_of_single_ticks(settings):
     law = create("controller", "hybrid")
@@ -254,7 +228,7 @@ class Pulse(type(create("controller", "force"))):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("compiled", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("compiled", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_a_command_within_a_step_takes_effect_in_its_tick(compiled):
     law = Pulse(create("controller", "force").config)
     run = RunConfig(grasp_timeout_s=3.0)

@@ -33,19 +33,6 @@ def test_the_backend_declares_the_papers_containers_in_all_states_as_its_default
     assert {name for kind in kinds for name in kind.full_names} >= {*catalogue(), "sponge"}
 
 
-def test_the_four_containers_have_their_states_and_the_rest_is_there():
-    states = ["full_closed", "full_open", "empty_closed", "empty_open"]
-    for name in ("odwalla", "naked", "water"):
-        assert {f"{name}:{state}" for state in states} <= set(catalogue())
-    # A can is never closed and empty (section III.E).
-    assert {n for n in catalogue() if n.startswith("can:")} == {
-        "can:full_closed",
-        "can:full_open",
-        "can:empty_open",
-    }
-    assert {"block", "toy", "egg"} <= set(catalogue())
-
-
 KEYS = {
     *("summary", "patch", "width_m", "width_spread_m", "stiffness_spread", "offset_spread_m"),
     *("share", "share_spread", "friction", "mass_kg"),
@@ -93,13 +80,6 @@ def test_an_unknown_object_or_state_is_answered_with_what_there_is(name, says):
         find(name)
 
 
-def test_the_same_seed_is_the_same_bottle_and_another_is_another():
-    spec = find("odwalla:full_open")
-    instance, again, other = (sample(spec, seed) for seed in (1, 1, 2))
-    assert instance == again
-    assert instance.terms != other.terms
-
-
 def test_without_a_generator_it_is_the_catalogues_own_figures():
     spec = find("toy")
     instance = sample(spec, None)
@@ -109,7 +89,7 @@ def test_without_a_generator_it_is_the_catalogues_own_figures():
 
 def test_instances_spread_as_the_catalogue_says():
     spec = find("water:empty_open")
-    many = [sample(spec, seed) for seed in range(2000)]
+    many = [sample(spec, seed) for seed in range(800)]
     stiffness = np.log([i.terms[0].k1_n_m / 1300.0 for i in many])
     assert np.std(stiffness) == pytest.approx(spec.stiffness_spread, rel=0.06)
     assert np.mean(stiffness) == pytest.approx(0.0, abs=0.03)

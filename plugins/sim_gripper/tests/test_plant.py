@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from graspsense.gripper_api import gap_and_rate, revolutions_at
-from graspsense.simulator_api import straight_linkage
 from graspsense_sim_gripper.plant.contact import ObjectModel, PadCompliance, solve_contact
 from graspsense_sim_gripper.plant.drive import Drive, Friction, sliding_friction, stribeck_excess
 from graspsense_sim_gripper.plant.drive_models import LINKAGES, STRAIGHT
@@ -81,7 +80,7 @@ def run(params, state, effort, seconds, laws=(elastic,), dt=TICK):
 def test_below_breakaway_nothing_moves_at_all(effort):
     params = PlantParams(drive(), thing(*SPRING), FINE)
     start = plant_at(0.06, (NoState(),))
-    after = run(params, start, effort, 100.0)
+    after = run(params, start, effort, 10.0)
     assert after.motion.revolutions == start.motion.revolutions
     assert after.motion.speed_rev_s == 0.0
 
@@ -99,19 +98,6 @@ def test_a_loaded_gripper_is_stuck_by_as_much_as_its_load_adds():
     for effort, moves in ((22.9, False), (23.1, True), (-2.9, False), (-3.1, True)):
         after = run(params, loaded, effort, 0.2)
         assert (after.motion.revolutions != loaded.motion.revolutions) == moves, effort
-
-
-def test_a_free_drive_falls_as_newton_says():
-    # Without friction: F t / m, with m = (2 pi / rate)^2 J, some 100 kg on the gap.
-    params = PlantParams(drive(0.0, 0.0, 0.0, 0.0), thing(), FINE)
-    start = plant_at(0.08, ())
-    after = run(params, start, 10.0, 0.1, laws=())
-    mass = drive().inertia / start.motion.jacobian_m_rev**2
-    assert mass == pytest.approx(118.0, rel=0.01)
-    # Over the 0.4 mm it travels the transmission's ratio, and with it the mass, changes by 0.1 %.
-    assert after.motion.speed_rev_s * after.motion.jacobian_m_rev == pytest.approx(
-        -10.0 * 0.1 / mass, rel=3e-3
-    )
 
 
 @given(st.floats(-0.02, 0.02).filter(lambda v: abs(abs(v) - 0.009) > 1e-5))
@@ -195,31 +181,6 @@ def test_with_the_drive_off_stored_energy_never_rises(stiffness, speed, coulomb,
         least_j = min(least_j, now) if now < least_j else least_j
 
 
-@pytest.mark.slow
-@settings(max_examples=30, deadline=None)
-@given(
-    st.floats(3.0, 5.5).map(lambda e: 10.0**e),
-    st.floats(0.001, 0.2),
-    st.floats(0.0, 6.0).map(lambda e: 10.0**e if e > 0.5 else 0.0),
-)
-def test_without_friction_a_squeeze_and_the_letting_go_create_no_energy(stiffness, speed, damping):
-    link, terms = straight_linkage(4e-4), (Elastic(stiffness, 0.0), Loss(damping))
-    params = PlantParams(drive(0.0, 0.0, 0.0, 0.0, link), thing(*terms), FINE)
-    params = params._replace(drive=params.drive._replace(inertia=100.0 * link.pitch_m**2))
-    state, move = (
-        plant_at(0.0503, (NoState(), NoState()), speed_m_s=-speed, link=link),
-        plant_move([elastic, loss]),
-    )
-    initial_j = least_j = 50.0 * speed * speed
-    for _ in range(400):
-        state = move(params, state, 0.0, TICK)
-        now = 50.0 * (state.motion.speed_rev_s * state.motion.jacobian_m_rev) ** 2
-        now += 0.5 * stiffness * state.contact.left.compression_m**2
-        # The swing of a kick-drift-kick step, as above.
-        assert now <= least_j + 2e-3 * initial_j
-        least_j = min(least_j, now)
-
-
 @pytest.mark.parametrize("damping", [1.0, 1e3, 1e6])
 def test_what_is_let_go_at_first_comes_back_from_the_tick_on_in_which_it_was(damping):
     law, params = sum_of([elastic, loss]), (Elastic(2e4, 1e9), Loss(damping))
@@ -234,56 +195,6 @@ def test_what_is_let_go_at_first_comes_back_from_the_tick_on_in_which_it_was(dam
     assert after.compression_m < 1e-3
     rate = (after.compression_m - 1e-3) / 1e-3
     assert law(params, states, 1e-3, after.compression_m, 1e-3, rate)[0] == pytest.approx(0.0, abs=1e-6)
-
-
-def test_a_step_on_an_undamped_spring_overshoots_to_twice_its_rest():
-    params = PlantParams(drive(0.0, 0.0, 0.0, 0.0), thing(Elastic(5e4, 0.0)), FINE)
-    state = plant_at(0.05, (NoState(),))
-    move, peak = plant_move([elastic]), 0.0
-    for _ in range(400):
-        state = move(params, state, 20.0, TICK)
-        peak = max(peak, state.peak_n)
-    assert peak == pytest.approx(40.0, rel=2e-3)
-
-
-# Estimates of the plant on paper: 100 kg, Coulomb 8 N, 10 N s/m, 23 N from 30 mm away on a rigid-like contact.
-@pytest.mark.parametrize(
-    ("stiffness", "speed", "peak"), [(1e4, 0.093, 104.0), (5e4, 0.093, 219.0), (2e5, 0.093, 426.0)]
-)
-def test_the_slam_of_a_constant_effort_is_as_large_as_estimated(stiffness, speed, peak):
-    # The linkage of 2009 is nearest 100 kg at small gaps; the rotor is scaled to make it that here.
-    at_contact = gap_and_rate(LINK, revolutions_at(LINK, 0.03))[1]
-    numbers = drive(8.0, 8.0, 0.0, 10.0)._replace(inertia=100.0 * at_contact**2)
-    params = PlantParams(numbers, thing(Elastic(stiffness, 0.0), width=0.03), FINE)
-    state = run(params, plant_at(0.06, (NoState(),)), 23.0, 0.62)
-    move, impact = plant_move([elastic]), 0.0
-    for _ in range(600):
-        impact = max(impact, -state.motion.speed_rev_s * state.motion.jacobian_m_rev)
-        state = move(params, state, 23.0, TICK)
-    assert impact == pytest.approx(speed, rel=0.03)
-    # The softest contact travels 10 mm, over which the mass falls by 4 %; the estimate holds it fixed.
-    assert state.peak_n == pytest.approx(peak, rel=0.05)
-
-
-def test_halving_the_step_quarters_the_error_of_the_peak():
-    def peak(steps):
-        params = PlantParams(drive(), thing(Elastic(2e5, 0.0), Maxwell(3e4, 0.02)), Steps(inf, TICK / steps))
-        state = plant_at(0.052, (NoState(), MaxwellState(0.0)), speed_m_s=-0.05)
-        return run(params, state, 30.0, 0.15, (elastic, maxwell)).peak_n
-
-    exact = peak(512)
-    errors = [abs(peak(n) - exact) for n in (2, 4, 8)]
-    assert errors[0] / exact < 0.01
-    assert errors[2] < errors[1] < errors[0]
-    assert errors[0] / errors[2] > 8.0
-
-
-def test_covers_in_series_share_the_compression():
-    params = PlantParams(drive(), thing(*SPRING, skins=2000.0), FINE)
-    state = run(params, plant_at(0.0501, (NoState(),)), 30.0, 2.0)
-    squeezed = state.contact.left
-    assert squeezed.force_n == pytest.approx(2000.0 * squeezed.compression_m, rel=1e-6)
-    assert squeezed.compression_m == pytest.approx(0.5 * (0.05 - state.motion.gap_m), rel=1e-6)
 
 
 def test_nothing_pulls_when_the_fingers_open_faster_than_the_object_recovers():
@@ -318,26 +229,6 @@ def test_the_mass_of_a_surface_swings_on_when_the_shell_has_its_shape_again():
             break
         assert freed.contact.left.states[1].y_m == pytest.approx(expected.y_m, rel=1e-6, abs=1e-9)
     assert expected.y_m < 0.0  # a quarter of a swing was seen
-
-
-def test_the_finger_that_touches_first_pushes_with_the_tables_friction_until_both_touch():
-    params = PlantParams(drive(), thing(*SPRING, table=1.5), FINE)
-    state, move = plant_at(0.06, (NoState(),), offset=0.003), plant_move([elastic])
-    pushed = []
-    while state.contact.left.force_n < 3.0:
-        state = move(params, state, 12.0, TICK)
-        pushed.append(
-            (state.motion.gap_m, state.contact.left_n, state.contact.right_n, state.contact.offset_m)
-        )
-    for gap, left, right, offset in pushed:
-        if gap > 0.056:
-            assert (left, right) == (0.0, 0.0)
-        elif gap > 0.05:
-            assert (left, right) == (0.0, 1.5)
-            assert offset == pytest.approx(0.5 * (gap - 0.05))
-        elif gap < 0.049:
-            assert left == right > 1.5
-    assert state.contact.offset_m == 0.0
 
 
 def test_the_stops_hold_at_both_ends():
@@ -375,53 +266,6 @@ def test_a_stuck_gripper_does_not_creep_over_a_long_hold():
     after = run(params, state, 23.0, 1e6, (elastic, maxwell), dt=1e3)
     assert after.motion.revolutions == state.motion.revolutions
     assert after.contact.left.force_n == pytest.approx(2000.0 * state.contact.left.compression_m, rel=1e-9)
-
-
-def test_a_damper_in_the_contents_lengthens_the_squeeze():
-    def until_still(*terms, laws, states):
-        params = PlantParams(drive(), thing(*terms, skins=1.5e4), FINE)
-        state, move = plant_at(0.0501, states), plant_move(laws)
-        for k in range(5000):
-            state = move(params, state, 23.0, TICK)
-            if state.contact.touched and abs(state.motion.speed_rev_s * state.motion.jacobian_m_rev) < 1e-4:
-                return k * TICK
-        raise AssertionError("never slower than 0.1 mm/s")
-
-    empty = until_still(*SPRING, laws=(elastic,), states=(NoState(),))
-    full = until_still(*SPRING, Loss(1000.0), laws=(elastic, loss), states=(NoState(), NoState()))
-    assert full > 1.5 * empty
-
-
-@pytest.mark.parametrize("tolerance", [2e-4, 2e-6])
-def test_steps_that_grow_slowly_see_what_rings_after_a_touch(tolerance):
-    # Half a kilogram behind a stiff contact, felt through covers that damp: it rings at some 200 rad/s.
-    free = drive(coulomb=0.0, breakaway=0.0, load=0.0, damping=0.0, link=STRAIGHT)
-    free = free._replace(inertia=100.0 * STRAIGHT.pitch_m**2)
-    body = ObjectModel(0.05, 0.0, PadCompliance(1e4, 50.0), (Surface(0.5, 1e3, 1.0, 2e4),))
-    start = plant_at(0.0501, (OscillatorState(0.0, 0.0),), speed_m_s=-0.1, link=STRAIGHT)
-
-    def force(steps):
-        return plant_move([surface])(PlantParams(free, body, steps), start, 0.0, 5e-3).contact.left_n
-
-    exact = force(Steps(inf, 1e-6))
-    errors = [abs(force(Steps(tolerance, growth=growth)) - exact) / exact for growth in (2.0, 1.1, 1.03)]
-    assert errors[0] > 4.0 * errors[1] > 16.0 * errors[2]
-    assert errors[2] < 1e-4
-
-
-def test_a_tick_that_is_to_settle_is_halved_even_where_no_error_asks_for_it():
-    # Free flight under damping: one step of a loose tolerance takes the whole tick, and is off.
-    free = drive(coulomb=0.0, breakaway=0.0, load=0.0, damping=3e4, link=STRAIGHT)
-    free = free._replace(inertia=100.0 * STRAIGHT.pitch_m**2)
-    start = plant_at(0.06, (NoState(),), speed_m_s=-0.05, link=STRAIGHT)
-    speeds = []
-    for settle in (0.0, 1e-9):
-        after = plant_move([elastic])(
-            PlantParams(free, thing(*SPRING), Steps(1e9, inf, settle)), start, 0.0, TICK
-        )
-        speeds.append(after.motion.speed_rev_s * after.motion.jacobian_m_rev)
-    exact = -0.05 * math.exp(-3e4 / 100.0 * TICK)
-    assert abs(speeds[1] - exact) < 0.01 * abs(speeds[0] - exact)
 
 
 def test_what_stands_is_looked_at_in_steps_no_longer_than_the_longest():
@@ -541,34 +385,11 @@ def pressed_again(steps):
 )
 def test_fingers_meet_an_object_that_has_not_recovered_its_shape_where_it_ends(steps):
     # Without this event the dampers of the pads acted over the whole tick: 0.37 N too much where the force is 0.46 N.
-    (forces, _), (expected, deep) = pressed_again(steps), pressed_again(Steps(inf, 5e-6))
+    (forces, _), (expected, deep) = pressed_again(steps), pressed_again(Steps(inf, 2e-5))
     # It is pressed again while it is still 6 mm deep.
     assert expected[0] == 0.0 < expected[-1]
     assert deep > 0.006
     np.testing.assert_allclose(forces, expected, atol=0.012)
-
-
-def test_steps_are_short_after_a_contact_and_whole_ticks_soon_afterwards():
-    body = thing(Elastic(2000.0, 0.0), Loss(100.0), skins=1.5e4)
-
-    def in_each_tick(steps):
-        params, state = (
-            PlantParams(drive(), body, steps),
-            plant_at(0.0502, (NoState(), NoState()), speed_m_s=-0.05),
-        )
-        move, counts = plant_move((elastic, loss)), []
-        while len(counts) < 8:
-            after = move(params, state, 30.0, TICK)
-            if after.contact.touched == 1:
-                counts.append(after.step.n_steps - state.step.n_steps)
-            state = after
-        return counts
-
-    short, fixed = (in_each_tick(steps) for steps in (a_step_per_tick(), Steps(inf, TICK, growth=inf)))
-    # Up to the contact, and from it on 10, 20, 40 us and so on.
-    assert short[0] + short[1] > 6
-    assert short[3:] == [1] * 5
-    assert fixed == [2] + [1] * 7
 
 
 @pytest.mark.parametrize("before_m", [0.0, 1e-15, 1e-12])

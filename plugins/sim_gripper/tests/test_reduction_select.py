@@ -41,6 +41,8 @@ from graspsense_sim_gripper.scene.terms import Term
 from graspsense_sim_gripper.scene.terms.registry import TERMS
 
 CONFIG = SimConfig(sensor="ideal", spread=False)
+NEAR = evolve(CONFIG, open_gap_m=0.053, rate_hz=250.0)
+"""The fingers close from 3 mm away on what is `made up`, in few ticks."""
 SHELL = ("elastic", {"k1_n_m": 2000.0, "k3_n_m3": 2e6})
 
 
@@ -63,7 +65,11 @@ def thing(*terms):
 
 @pytest.mark.parametrize("accuracy", [0.1, pytest.param(0.001, marks=pytest.mark.slow)])
 def test_without_spread_the_trial_grasp_is_the_grasp_that_runs(accuracy):
-    config, law, odwalla = evolve(CONFIG, accuracy=accuracy), hybrid(), find("odwalla:full_closed")
+    config, law, odwalla = (
+        evolve(CONFIG, accuracy=accuracy, open_gap_m=0.062),
+        hybrid(),
+        find("odwalla:full_closed"),
+    )
     problem, model = Problem(config, odwalla), selected(config, odwalla, law)
     trial = verify.trial_grasps(problem, law, compiled=False, padding=None)
     job = Job(config=config, controller=law.controller, run=law.run, extract=None, traces=True)
@@ -71,11 +77,19 @@ def test_without_spread_the_trial_grasp_is_the_grasp_that_runs(accuracy):
     assert deviation(trial.record(model), ran) == (0.0, "nothing")
 
 
-@pytest.mark.parametrize("accuracy", [0.1, pytest.param(0.001, marks=pytest.mark.slow)])
-@pytest.mark.parametrize(("change", "part"), [({"spread": True}, 0.5), ({}, 0.8)])
+@pytest.mark.parametrize(
+    ("accuracy", "change", "part"),
+    [
+        (0.1, {"spread": True}, 0.5),
+        *(
+            pytest.param(0.001, *case, marks=pytest.mark.slow)
+            for case in (({"spread": True}, 0.5), ({}, 0.8))
+        ),
+    ],
+)
 def test_a_verified_model_says_what_a_trial_grasp_found(accuracy, change, part):
     """Where the grasp is to differ from what is tried it has the rest of the accuracy."""
-    config = evolve(CONFIG, accuracy=accuracy, **change)
+    config = evolve(CONFIG, accuracy=accuracy, open_gap_m=0.065, **change)
     model = selected(config, find("naked:full_open"), hybrid())
     assert model.verification.error <= part * accuracy
     assert model.verification.grasps >= 2
@@ -138,18 +152,18 @@ class Silent(ForceAbove):
         raise ZeroDivisionError
 
 
-@pytest.mark.parametrize("kind", [Shaken, Silent])
-def test_features_that_no_trial_grasp_has_are_not_verified(kind):
-    law = evolve(hybrid(), features=kind(Zero(0.0)))
-    model = selected(CONFIG, thing(SHELL), law)
-    assert model.not_verified == ("features",)
-    # No finer model is tried, since none would have them.
-    assert model.steps == selected(CONFIG, thing(SHELL), hybrid()).steps
+def test_features_that_no_trial_grasp_has_are_not_verified():
+    without = selected(NEAR, thing(SHELL), hybrid())
+    for kind in (Shaken, Silent):
+        model = selected(NEAR, thing(SHELL), evolve(hybrid(), features=kind(Zero(0.0))))
+        assert model.not_verified == ("features",), kind
+        # No finer model is tried, since none would have them.
+        assert model.steps == without.steps, kind
 
 
 def test_features_at_checkpoints_are_verified_as_those_of_the_whole_grasp():
     features = with_checkpoints(create("feature-set", "chitta"), (0.2, 0.4))
-    model = selected(CONFIG, thing(SHELL), evolve(hybrid(), features=features))
+    model = selected(NEAR, thing(SHELL), evolve(hybrid(), features=features))
     assert model.verification is not None
     assert model.not_verified == ()
 
@@ -268,17 +282,20 @@ def test_it_matters_in_which_tick_this_threshold_is_met(stiff):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("off_n", [0.0, 1e-9, -1e-9])
-def test_a_threshold_that_is_met_within_rounding_at_a_tick_is_met_in_it_or_in_the_next(stiff, off_n):
+def test_a_threshold_that_is_met_at_a_tick_within_rounding_or_nearly_is_met_in_it_or_in_the_next(stiff):
     config, met_n = stiff
     reference = evolve(config, fidelity="reference")
-    sides = [course(reference, met_n + side_n) for side_n in (-1e-4, 1e-4)]
-    grasp = course(config, met_n + off_n)
-    assert min(deviation(grasp, side)[0] for side in sides) <= config.accuracy
+    below, above = (course(reference, met_n + off_n) for off_n in (-1e-4, 1e-4))
+    for off_n in (0.0, 1e-9, -1e-9):
+        grasp = course(config, met_n + off_n)
+        assert min(deviation(grasp, side)[0] for side in (below, above)) <= config.accuracy, off_n
+    # Where it is nearly met, the reference decides.
+    for off_n, expected in ((-1e-4, below), (1e-4, above)):
+        assert deviation(course(config, met_n + off_n), expected)[0] <= config.accuracy, off_n
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("off_n", [-1e-4, 1e-4, 1e-3, -1e-3, 0.08])
+@pytest.mark.long
+@pytest.mark.parametrize("off_n", [1e-3, -1e-3, 0.08])
 def test_a_threshold_that_is_nearly_met_at_a_tick_is_decided_as_by_the_reference(stiff, off_n):
     config, met_n = stiff
     expected = course(evolve(config, fidelity="reference"), met_n + off_n)
@@ -288,11 +305,12 @@ def test_a_threshold_that_is_nearly_met_at_a_tick_is_decided_as_by_the_reference
 @pytest.mark.slow
 def test_every_object_of_the_catalogue_has_a_model_of_ordinary_steps():
     for spec in catalogue().values():
-        for config in (CONFIG, evolve(CONFIG, spread=True)):
-            model = selected(config, spec, hybrid())
-            assert model.verification is not None, spec.name
-            ordinary = [scale.level(config.accuracy) for scale in (PLAIN, CONTROLLED[0])]
-            assert model.level in ordinary, spec.name
+        # Without spread, the trial grasps are among these, and may differ by more.
+        config = evolve(CONFIG, spread=True, open_gap_m=min(spec.width_m + 0.01, CONFIG.open_gap_m))
+        model = selected(config, spec, hybrid())
+        assert model.verification is not None, spec.name
+        ordinary = [scale.level(config.accuracy) for scale in (PLAIN, CONTROLLED[0])]
+        assert model.level in ordinary, spec.name
 
 
 @pytest.mark.slow
@@ -320,7 +338,7 @@ def test_a_step_per_tick_is_chosen_where_it_is_accurate_enough_and_not_where_it_
 
 
 def test_a_step_per_tick_that_a_damper_makes_unstable_is_not_chosen():
-    config = evolve(CONFIG, pad_stiffness_n_m=math.inf)
+    config = evolve(NEAR, rate_hz=CONFIG.rate_hz, pad_stiffness_n_m=math.inf)
     model = selected(config, thing(SHELL, ("loss", {"damping_n_s_m": 3e5})), hybrid())
     assert model.level == CONTROLLED[0].level(config.accuracy)
     assert model.verification.error <= 0.8 * config.accuracy
@@ -382,7 +400,12 @@ def test_trial_grasps_end_at_a_limit_of_work_and_the_grasp_runs(monkeypatch):
     ("terms", "further", "unsure"),
     [
         ("k1_n_m = 1000.0", {}, []),
-        ("k1_n_m = 1000.0", {"expected_force_n": 5.0}, ["peak", "trace", "features"]),
+        pytest.param(
+            "k1_n_m = 1000.0",
+            {"expected_force_n": 5.0},
+            ["peak", "trace", "features"],
+            marks=pytest.mark.slow,
+        ),
         ("k1_n_m = 1000.0", {"step_s": 1e-3}, ["peak", "trace", "features"]),
         pytest.param("k1_n_m = 1000.0", {"fidelity": "reference"}, [], marks=pytest.mark.slow),
         ("k1_n_m = 1e7", {"pad_stiffness_n_m": math.inf}, ["trace", "features"]),
@@ -423,22 +446,17 @@ def test_the_report_says_which_quantities_are_not_verified(terms, further, unsur
 @pytest.mark.parametrize(
     ("gripper", "gain", "growth"),
     [
-        ({}, 15000.0, ""),
         # On a free mass of 1 kg, the gain times the tick may be at most 2 kg: 1 - 4 is -3.
-        pytest.param({"transmission": "straight", "moving_mass_kg": 1.0}, 1900.0, "", marks=pytest.mark.slow),
-        ({"transmission": "straight", "moving_mass_kg": 1.0}, 4000.0, "factor of 2.99 in each tick of 1 ms"),
-        pytest.param(
-            {"transmission": "straight", "moving_mass_kg": 1.0, "drive_lag_s": 1e-3},
-            4000.0,
-            "factor of 1.19",
-            marks=pytest.mark.slow,
-        ),
+        ({}, 1900.0, ""),
+        ({}, 4000.0, "factor of 2.99 in each tick of 1 ms"),
+        ({"drive_lag_s": 1e-3}, 4000.0, "factor of 1.19"),
     ],
 )
 def test_an_unstable_sampled_loop_is_named_in_the_report(gripper, gain, growth, tmp_path):
     scene = tmp_path / "scene.toml"
     scene.write_text('width_m = 0.05\n[[terms]]\ntype = "elastic"\nk1_n_m = 1000.0\n')
-    config = evolve(CONFIG, object=str(scene), open_gap_m=0.052, fidelity="fixed", **gripper)
+    light = {"transmission": "straight", "moving_mass_kg": 1.0, **gripper}
+    config = evolve(CONFIG, object=str(scene), open_gap_m=0.052, fidelity="fixed", **light)
     law = create("controller", "hybrid", velocity_gain_n_s_m=gain)
     report = run_grasp(SimBackend(config), law, RunConfig()).report
     (grasped,) = SimBackend(config).run_many(law, [str(scene)], [0])

@@ -26,6 +26,8 @@ from graspsense_sim_gripper.scene.library import find, shipped_scenes, split_num
 from graspsense_sim_gripper.scene.terms.registry import laws_of
 
 HYBRID = create("controller", "hybrid")
+NEAR = SimConfig(fidelity="fixed", open_gap_m=0.062)
+"""The fingers close from 2 mm away, in steps that no trial grasp has to verify."""
 
 BOTTLE = """
     width_m = 0.06
@@ -57,7 +59,7 @@ def test_a_file_needs_no_more_than_a_width_and_its_terms(scene):
 
 
 def test_the_text_of_a_scene_is_grasped_like_its_file(scene):
-    text, config = dedent(BOTTLE), SimConfig(fidelity="fixed")
+    text, config = dedent(BOTTLE), NEAR
     from_file, from_text, other = run_many(config, HYBRID, [scene(BOTTLE), text, f"{text}#3"], [5, 5, 5])
     assert from_text.trace.force_left_n.tolist() == from_file.trace.force_left_n.tolist()
     # It has no spread, so its third instance is the nominal one.
@@ -67,8 +69,7 @@ def test_the_text_of_a_scene_is_grasped_like_its_file(scene):
 
 
 def test_the_report_of_a_grasp_is_of_the_scene_as_it_was_then(scene, tmp_path):
-    config = SimConfig(fidelity="fixed")
-    grasp, again = run_many(config, HYBRID, [scene(BOTTLE)] * 2, [5, 5], traces=False)
+    grasp, again = run_many(NEAR, HYBRID, [scene(BOTTLE)] * 2, [5, 5], traces=False)
     report = grasp.report()
     (tmp_path / "bottle.toml").unlink()
     assert again.report() == report
@@ -109,8 +110,8 @@ spread = { force_n = 0.3 }
 
 def test_a_parameter_with_a_spread_varies_between_instances_and_alone():
     spec, without = find(SPREAD), find(SPREAD.replace("spread = { force_n = 0.3 }", ""))
-    forces = [sample(spec, seed).terms[1].force_n for seed in range(2000)]
-    assert np.std(np.log(forces)) == pytest.approx(0.3, rel=0.05)
+    forces = [sample(spec, seed).terms[1].force_n for seed in range(500)]
+    assert np.std(np.log(forces)) == pytest.approx(0.3, rel=0.07)
     assert np.median(forces) == pytest.approx(6.0, rel=0.05)
     assert sample(spec, None).terms[1].force_n == 6.0
     instance, other = (sample(each, 7, 3) for each in (spec, without))
@@ -256,7 +257,7 @@ def test_covers_that_creep_give_way_and_covers_that_damp_lower_no_force_at_rest(
         spread=False, coulomb_n=0.0, breakaway_n=0.0, load_friction_coefficient=0.0, damping_n_s_m=2000.0,
         pad_creep_n_m=1e5, pad_creep_s=0.5, pad_damping_n_s_m=500.0,
     )  # fmt: skip
-    _, stiff = pressed(plain, 20.0, 20.0, scene=hard)
+    _, stiff = pressed(plain, 20.0, 8.0, scene=hard)
     _, soft = pressed(creeping, 20.0, 20.0, scene=hard)
     assert soft[-1].contact.left.force_n == pytest.approx(20.0, rel=1e-2)
     # The arm has let go: the gap is where the spring alone leaves it, and got there later.
@@ -306,6 +307,7 @@ def test_the_explanation_adds_up_to_the_force_that_was_felt():
     assert rows["maxwell"]["lost_j"] > 0.2 * rows["maxwell"]["work_j"] > 0.0
 
 
+@pytest.mark.slow
 def test_the_explanation_leaves_out_what_happens_in_a_released_object():
     # Released, it springs back against its damper faster than a tick.
     grasp = run_grasp(SimBackend(SimConfig(object="odwalla:full_open", explain=True)), HYBRID, RunConfig())
@@ -344,6 +346,7 @@ PLUGIN = """
 GEL = '''
     """A gel that stiffens as it is pressed."""
 
+    import math
     from typing import NamedTuple
 
     from graspsense_sim_gripper.scene.terms import NoState, Term
@@ -352,12 +355,14 @@ GEL = '''
     class Gel(NamedTuple):
         k_n_m: float
         thickness_m: float
+        limit_n: float
 
 
     def gel(params, state, d0, d1, h, v1):
-        """Return the force: a spring that would be infinitely stiff at its thickness."""
+        """Return the force: a spring that would be infinitely stiff at its thickness; no number above a limit."""
         room = max(params.thickness_m - d1, 1e-6)
-        return params.k_n_m * d1 * params.thickness_m / room, state
+        force = params.k_n_m * d1 * params.thickness_m / room
+        return force if force < params.limit_n else math.nan, state
 
 
     TERM = Term(name="gel", summary="gel", params=Gel, law=gel, positive=("thickness_m",))
@@ -366,14 +371,30 @@ GEL = '''
 PROGRAM = """
     import sys
     import numpy as np
-    from graspsense.plugin_api import create
+    from graspsense.plugin_api import ConfigError, create
     from graspsense_sim_gripper.run.batch import run_many
     from graspsense_sim_gripper.config import SimConfig
+    from graspsense_sim_gripper.scene.library import find
 
-    law, (scene, *compiled) = create("controller", "hybrid"), sys.argv[1:]
-    done = [run_many(SimConfig(spread=False), law, [scene], [0], compiled=one == "yes")[0] for one in compiled]
-    print(done[0].outcome.name, done[0].state.contact.left.force_n, done[0].state.peak_n)
-    print(all(np.array_equal(done[0].trace.gap_m, one.trace.gap_m) for one in done))
+    law, (scene, compiled) = create("controller", "hybrid"), sys.argv[1:]
+    config = SimConfig(spread=False, sensor="ideal", open_gap_m=0.052)
+    ill = scene.replace("limit_n = 100.0", "limit_n = 5.0")
+
+    def grasped(scene, compiled=False):
+        return run_many(config, law, [scene], [0], compiled=compiled)[0]
+
+    done, failed = grasped(scene), grasped(ill)
+    print(done.outcome.name, failed.outcome.name)
+    print(failed.reason)
+    full_name = scene.replace('"gel"', '"lab-terms/gel"')
+    print(find(full_name).terms == find(scene).terms)
+    try:
+        find(scene.replace("0.02", "0.0"))
+    except ConfigError as error:
+        print(error)
+    if compiled == "compiled":
+        fast = grasped(scene, True)
+        print(np.array_equal(fast.trace.gap_m, done.trace.gap_m), grasped(ill, True).reason == failed.reason)
 """
 
 SCENE = """
@@ -382,14 +403,15 @@ SCENE = """
     type = "gel"
     k_n_m = 1000.0
     thickness_m = 0.02
+    limit_n = 100.0
     [[terms]]
     type = "elastic"
     k1_n_m = 500.0
 """
 
 
-@pytest.mark.parametrize("compiled", [("no",), pytest.param(("no", "yes"), marks=pytest.mark.slow)])
-def test_a_term_of_another_distribution_is_composed_like_ours(tmp_path, scene, compiled):
+@pytest.mark.parametrize("compiled", ["plain", pytest.param("compiled", marks=pytest.mark.slow)])
+def test_a_term_of_another_distribution_is_composed_and_checked_like_ours(tmp_path, compiled):
     site = tmp_path / "site"
     info = site / "lab_terms-0.3.dist-info"
     info.mkdir(parents=True)
@@ -397,17 +419,14 @@ def test_a_term_of_another_distribution_is_composed_like_ours(tmp_path, scene, c
     (info / "entry_points.txt").write_text("[graspsense.plugins]\nlab = lab_plugin\n")
     (site / "lab_plugin.py").write_text(dedent(PLUGIN))
     (site / "lab_gel.py").write_text(dedent(GEL))
-    (tmp_path / "program.py").write_text(dedent(PROGRAM))
     paths = [str(site), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
+    command = [sys.executable, "-c", dedent(PROGRAM), dedent(SCENE), compiled]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
 
-    def run(text, *arguments):
-        command = [sys.executable, str(tmp_path / "program.py"), scene(text), *arguments]
-        return subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
-
-    done = run(SCENE, *compiled)
-    assert done.stdout.splitlines()[0].startswith("STEADY"), done.stderr
-    assert done.stdout.splitlines()[1] == "True"
-    # By its only name, too; and checked like ours.
-    assert run(SCENE.replace('"gel"', '"lab-terms/gel"'), "no").stdout == run(SCENE, "no").stdout
-    assert "(gel) thickness_m: must be greater than 0" in run(SCENE.replace("0.02", "0.0"), "no").stderr
+    outcomes, reason, *checks = done.stdout.splitlines() or [done.stderr]
+    assert outcomes == "STEADY ABORTED", done.stderr
+    assert "term 'lab-terms/gel' gave the force nan at a compression of" in reason
+    assert checks[0] == "True"
+    assert "(gel) thickness_m: must be greater than 0" in checks[1]
+    assert checks[2:] == (["True True"] if compiled == "compiled" else [])

@@ -9,17 +9,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from graspsense_sim_gripper.scene.terms.elastic import LEAST_SLOPE, Elastic, elastic, shell_force
-from graspsense_sim_gripper.scene.terms.foam import Foam, foam
+from graspsense_sim_gripper.scene.terms.foam import Foam
 from graspsense_sim_gripper.scene.terms.fracture import Fracture
 from graspsense_sim_gripper.scene.terms.gas import Gas, GasState, gas
-from graspsense_sim_gripper.scene.terms.liquid import GRAVITY_M_S2, Liquid, liquid
-from graspsense_sim_gripper.scene.terms.loss import Loss, loss
+from graspsense_sim_gripper.scene.terms.liquid import Liquid, liquid
+from graspsense_sim_gripper.scene.terms.loss import Loss
 from graspsense_sim_gripper.scene.terms.maxwell import Maxwell, MaxwellState, maxwell
 from graspsense_sim_gripper.scene.terms.oscillator import Forcing, OscillatorState, moved
 from graspsense_sim_gripper.scene.terms.registry import TERMS
 from graspsense_sim_gripper.scene.terms.rigid import Rigid, RigidState, rigid
 from graspsense_sim_gripper.scene.terms.slosh import Slosh, slosh
-from graspsense_sim_gripper.scene.terms.snap import Snap, SnapState, snap
+from graspsense_sim_gripper.scene.terms.snap import Snap
 from graspsense_sim_gripper.scene.terms.surface import Surface, surface
 from graspsense_sim_gripper.scene.terms.term import NoState, Term, WorkingPoint
 from graspsense_sim_gripper.scene.terms.vent import LAMINAR_BELOW_PA, conductance, vented
@@ -39,11 +39,6 @@ def along(term, params, state, path, h):
 
 def ramp(depth, steps):
     return [depth * k / steps for k in range(steps + 1)]
-
-
-def test_elastic_is_its_polynomial():
-    force, _ = elastic(Elastic(2000.0, 3e6), NoState(), 0.0, 0.01, 1e-3, 0.01 / 1e-3)
-    assert force == pytest.approx(2000.0 * 0.01 + 3e6 * 1e-6)
 
 
 @given(st.floats(10.0, 1e6), st.floats(0.1, 100.0), st.floats(0.0, 50.0))
@@ -79,12 +74,6 @@ def test_maxwell_follows_its_exact_solution_whatever_the_step():
         assert forces[-1] == pytest.approx(exact, rel=1e-10)
 
 
-@pytest.mark.parametrize(("tau", "expected"), [(1e-9, 500.0 * 1e-9 * 0.01), (1e9, 500.0 * 0.01)])
-def test_maxwell_tends_to_a_damper_and_to_a_spring(tau, expected):
-    forces, _, _ = along(maxwell, Maxwell(500.0, tau), MaxwellState(0.0), ramp(0.01, 1000), 1e-3)
-    assert forces[-1] == pytest.approx(expected, rel=1e-6)
-
-
 def sealed(volume, bulge=0.0, exponent=1.4, area=1.2e-3):
     return Gas(area, 0.0, volume, 101325.0, exponent, bulge)
 
@@ -94,16 +83,6 @@ def test_sealed_gas_follows_p_v_n():
     forces, _, _ = along(gas, bottle, GasState(0.0), ramp(0.008, 2000), 1e-3)
     pressure = 101325.0 * (15e-6 / (15e-6 - 8e-6)) ** 1.4
     assert forces[-1] == pytest.approx(1e-3 * (pressure - 101325.0), rel=1e-5)
-
-
-def test_the_gas_is_of_second_order_in_its_step():
-    bottle = sealed(15e-6, 1e-10)
-    reference = along(gas, bottle, GasState(0.0), ramp(0.005, 4096), 1e-3)[0][-1]
-    errors = [
-        abs(along(gas, bottle, GasState(0.0), ramp(0.005, n), 1e-3)[0][-1] - reference) for n in (16, 32, 64)
-    ]
-    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
-    assert errors[1] / errors[2] == pytest.approx(4.0, rel=0.1)
 
 
 @pytest.mark.parametrize("heat", [1e-3, 0.1, math.inf])
@@ -118,27 +97,12 @@ def test_gas_that_is_pressed_out_through_its_vent_has_an_answer_and_says_so(heat
     assert along(gas, bottle, GasState(0.0), ramp(0.002, 200), 5e-3)[2].spent == 0
 
 
-def test_without_air_the_walls_bulge_is_what_gives():
-    stiffness = along(gas, sealed(1e-9, 1e-10), GasState(0.0), ramp(1e-4, 50), 1e-3)[0][-1] / 1e-4
-    assert stiffness == pytest.approx(1.2e-3**2 / 1e-10, rel=2e-3)
-
-
-def test_a_great_volume_of_air_gives_no_force():
-    assert along(gas, sealed(1e3), GasState(0.0), ramp(1e-2, 50), 1e-3)[0][-1] == pytest.approx(0.0, abs=1e-4)
-
-
 def test_a_pressurised_can_pushes_nothing_at_rest_and_more_per_millimetre():
     force, _ = gas(Gas(8e-4, 0.0, 15e-6, 3e5, 1.0, 0.0), GasState(0.0), 0.0, 0.0, 1e-3, 0.0)
     assert force == 0.0
     soft = along(gas, Gas(8e-4, 0.0, 15e-6, 1e5, 1.0, 0.0), GasState(0.0), ramp(1e-4, 10), 1e-3)[0][-1]
     hard = along(gas, Gas(8e-4, 0.0, 15e-6, 3e5, 1.0, 0.0), GasState(0.0), ramp(1e-4, 10), 1e-3)[0][-1]
     assert hard / soft == pytest.approx(3.0, rel=0.02)
-
-
-def test_loss_is_a_damper_and_none_at_rest():
-    assert loss(Loss(1000.0), NoState(), 0.0, 1e-5, 1e-3, 1e-5 / 1e-3)[0] == pytest.approx(10.0)
-    assert loss(Loss(1000.0), NoState(), 1e-5, 1e-5, 1e-3, 0.0)[0] == 0.0
-    assert loss(Loss(1000.0), NoState(), 1e-5, 1e-5, 0.0, 0.0)[0] == 0.0
 
 
 # ------------------------------------------------------------------------------------- a vent, and heat
@@ -174,16 +138,6 @@ def test_what_a_vent_leaves_of_a_pressure_is_what_its_flow_goes_by(area, driven,
     assert through == pytest.approx(conductance(area, left), rel=1e-9)
 
 
-def test_a_pinhole_tends_to_sealed_and_an_open_neck_to_nothing():
-    closed = follow(leaking(0.0), 0.5, 0.01, 500)[-1]
-    misses = [abs(follow(leaking(area), 0.5, 0.01, 500)[-1] - closed) for area in (1e-8, 1e-9, 1e-10, 1e-14)]
-    # What leaks is in proportion to the opening.
-    assert misses[1] / misses[0] == pytest.approx(0.1, rel=0.1)
-    assert misses[2] / misses[1] == pytest.approx(0.1, rel=0.02)
-    assert misses[3] < 1e-5 * closed
-    assert follow(leaking(1e-3), 0.5, 0.01, 500)[-1] < 1e-3 * closed
-
-
 @every_case("opening", [1e-6, 1e-5, 1e-4, 1e-3])
 @every_case("steps", [5, 50, 500])
 def test_a_fast_vent_is_the_damper_of_its_orifice_whatever_the_step(opening, steps):
@@ -211,9 +165,14 @@ def test_an_opening_wider_than_another_never_holds_more():
 
 @pytest.mark.parametrize(
     "gas_",
-    [leaking(3e-7, 5e-5, 1e-10), leaking(0.0, 5e-5, 1e-10, heat=0.05), leaking(3e-7, 5e-5, 1e-10, heat=0.05)],
+    [
+        leaking(0.0, 5e-5, 1e-10),
+        leaking(3e-7, 5e-5, 1e-10),
+        leaking(0.0, 5e-5, 1e-10, heat=0.05),
+        leaking(3e-7, 5e-5, 1e-10, heat=0.05),
+    ],
 )
-def test_vent_and_heat_are_of_second_order_in_their_step(gas_):
+def test_gas_vent_and_heat_are_of_second_order_in_their_step(gas_):
     def end(steps):
         path = [0.006 * math.sin(1.4 * k / steps) ** 2 for k in range(steps + 1)]
         return along(gas, gas_, GasState(0.0, 0.0), path, 0.3 / steps)[0][-1]
@@ -246,24 +205,6 @@ def test_a_held_gas_relaxes_to_its_isothermal_force_in_its_time_constant():
 # ------------------------------------------------------------------------------------- the other terms
 
 
-def test_foam_is_its_power_law_with_its_arms_beside_it():
-    sponge = Foam(10.0, 0.02, 2.0, 300.0, 0.1, 100.0, 2.0)
-    # So slow that the arms have let go of everything.
-    slow, _, _ = along(foam, sponge, TERMS["foam"].at_rest, ramp(0.01, 50), 1e3)
-    assert slow[-1] == pytest.approx(10.0 * 0.25, rel=1e-3)
-    quick, _, _ = along(foam, sponge, TERMS["foam"].at_rest, ramp(0.01, 50), 1e-9)
-    assert quick[-1] == pytest.approx(10.0 * 0.25 + 400.0 * 0.01, rel=1e-5)
-
-
-def test_snap_is_continuous_and_falls_between_its_branches():
-    shell = Snap(2000.0, 0.004, 5.0, 0.003, 1500.0)
-    forces, _, _ = along(snap, shell, SnapState(0), ramp(0.01, 1000), 1e-3)
-    assert max(abs(b - a) for a, b in pairwise(forces)) < 0.03
-    assert forces[399] == pytest.approx(8.0)
-    assert forces[699] == pytest.approx(3.0)
-    assert forces[999] == pytest.approx(3.0 + 1500.0 * 0.003)
-
-
 def test_a_worn_shell_is_softer_and_dented_by_as_much_as_its_law_says():
     fresh = Worn(2000.0, 0.0, 0.5, 0.4, 0.002)
     used = fresh._replace(earlier_j=0.5)
@@ -280,24 +221,6 @@ def test_a_worn_shell_is_softer_and_dented_by_as_much_as_its_law_says():
         peaks.append(forces[99])
     assert peaks[0] > peaks[1] > peaks[2]
     assert state.work_j == pytest.approx(3 * 0.5 * 2000.0 * 0.01**2, rel=0.25)
-
-
-def test_a_column_of_liquid_weighs_at_rest_what_it_should():
-    bottle = Liquid(1.2e-3, 5e-4, 0.08, 1e-10)
-    forces, _, _ = along(liquid, bottle, OscillatorState(0.0, 0.0), [*ramp(0.01, 100), *[0.01] * 400], 1.0)
-    # rho g A^2 / A_n: 28 N/m here, far below the wall's 14 kN/m.
-    expected = 1000.0 * GRAVITY_M_S2 * 1.2e-3**2 / 5e-4 * 0.01
-    assert sum(forces[-300:]) / 300 == pytest.approx(expected, rel=0.05)
-
-
-def test_liquid_with_a_stiff_wall_resists_as_its_mass_times_the_acceleration():
-    bottle = Liquid(1.2e-3, 5e-4, 0.08, 1e-13, viscosity_pa_s=1.0)
-    path = [0.5 * 2.0 * (1e-4 * k) ** 2 for k in range(1001)]
-    force = along(liquid, bottle, OscillatorState(0.0, 0.0), path, 1e-4)[0][-1]
-    ratio = 1.2e-3**2 / 5e-4
-    mass, damping = 1000.0 * 0.08 * ratio, 8.0 * math.pi * 1.0 * 0.08 * ratio / 5e-4
-    weight = 1000.0 * GRAVITY_M_S2 * ratio * 0.01
-    assert force == pytest.approx(2.0 * mass + 0.2 * damping + weight, rel=0.02)
 
 
 @given(
@@ -381,14 +304,6 @@ def test_worn_is_of_second_order_in_its_step():
     assert errors[1] / errors[2] == pytest.approx(4.0, rel=0.15)
 
 
-def test_slosh_swings_at_its_frequency_after_a_step():
-    mode = Slosh(0.2, 4.0, 0.01)
-    path = [min(0.05 * 1e-3 * k, 0.005) for k in range(1000)]
-    forces, _, _ = along(slosh, mode, OscillatorState(0.0, 0.0), path, 1e-3)
-    crossings = [k for k, (x, y) in enumerate(pairwise(forces)) if k > 120 and x < 0.0 <= y]
-    assert (crossings[-1] - crossings[0]) / (len(crossings) - 1) == pytest.approx(250.0, rel=0.01)
-
-
 def test_a_surface_rings_on_its_springs_and_a_light_one_is_those_springs_in_series():
     light = Surface(1e-7, 2000.0, 0.05, 20000.0)
     force, state = surface(light, OscillatorState(0.0, 0.0), 0.0, 0.01, 0.5, 0.01 / 0.5)
@@ -445,7 +360,7 @@ def test_every_term_has_a_sample_here():
 
 
 @every_case("name", sorted(VARIANTS))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(
     st.lists(st.floats(0.0, 0.009), min_size=2, max_size=5),
     st.sampled_from([1e-5, 1e-3, 0.1]),
