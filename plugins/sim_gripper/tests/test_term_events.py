@@ -287,6 +287,20 @@ def test_steps_resolve_a_fast_oscillation_in_the_grasp_and_after_the_release():
         assert done.report["resolved"]
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("frequency", "accuracy"), [(300.0, 1e-4), (420.0, 1e-4), (1000.0, 1e-3)])
+def test_steps_without_an_oscillation_do_not_verify_each_other(frequency, accuracy):
+    # Without the slosh the peak is 17.121 N, 3.4 % less than with it.
+    scene = SLOSH.format(mass=0.1, frequency=frequency)
+    gripper = {"accuracy": accuracy, "compile": "always"}
+    (done,), (exact,) = (
+        grasped(scene, {**gripper, **fidelity}, open_gap_m=0.055)
+        for fidelity in ({}, {"fidelity": "reference"})
+    )
+    peak_n, exact_n = done.report["true_peak_force_n"], exact.report["true_peak_force_n"]
+    assert done.report["not_verified"] or peak_n == pytest.approx(exact_n, rel=accuracy)
+
+
 def test_an_oscillation_that_is_too_fast_is_left_out_and_reported():
     scene = SLOSH.format(mass=0.1, frequency=1e6)
     gripper = create("sensor-backend", "sim", sensor="ideal", spread=False, object=scene)

@@ -43,7 +43,8 @@ MAX_SWING_RAD: Final = 1.0
 """The angle of the fastest oscillation of a term over a step: the square root of this share of the accuracy, at most
 one radian. Longer steps see an oscillation at a few phases only, and the error estimate does not notice it."""
 MOST_SWING_STEPS: Final = 500
-"""An oscillation that needs more steps a tick is not resolved: its term is left out, and the report says so."""
+"""An oscillation that needs more steps a tick for the requested accuracy is not resolved: its term is left out, and the
+report says so."""
 PERIOD_RAD: Final = 2.0 * math.pi
 """An oscillation with a period within a tick is computed, but nothing is verified: the finest trial grasps may miss it
 too, and agree."""
@@ -57,15 +58,16 @@ def propose(problem: Problem, grip: Grip | None, scale: LevelScale = CONTROLLED[
     config, setup = problem.model_config, problem.nominal
     kinds, model, dt_s = setup.kinds, setup.plant.object, setup.dt_s
     level = scale.level(config.accuracy)
-    angle = min(math.sqrt(SWING_SHARE * level.step_tol), MAX_SWING_RAD)
     swings = _frequencies(kinds, model)
+    # The same at every level: two levels that both leave a term out would agree.
+    highest_per_s = MOST_SWING_STEPS * _swing_angle(config.accuracy) / dt_s
     too_fast: dict[int, float] = {}
     if grip is not None:
-        too_fast = {i: per_s for i, per_s in swings.items() if per_s * dt_s > MOST_SWING_STEPS * angle}
+        too_fast = {i: per_s for i, per_s in swings.items() if per_s > highest_per_s}
     steps = _with_settings(steps_for(level, dt_s), config)
     fastest = max((per_s for i, per_s in swings.items() if i not in too_fast), default=0.0)
     if fastest > 0.0:
-        touched_s = max(angle / fastest, dt_s / MOST_SWING_STEPS)
+        touched_s = _swing_angle(level.step_tol) / min(fastest, highest_per_s)
         steps = steps._replace(longest_touched_s=min(steps.longest_touched_s, touched_s))
     unresolved: tuple[str, ...] = ()
     frequency, contact = 0.0, "not examined"
@@ -97,6 +99,11 @@ def propose(problem: Problem, grip: Grip | None, scale: LevelScale = CONTROLLED[
         oscillates=any(map(_oscillates, kinds, model.terms)),
         level=level,
     )
+
+
+def _swing_angle(accuracy: float) -> float:
+    """Return the largest angle (rad) of the fastest oscillation over a step."""
+    return min(math.sqrt(SWING_SHARE * accuracy), MAX_SWING_RAD)
 
 
 def _in_words(steps: Steps, dt_s: float) -> str:
