@@ -97,6 +97,7 @@ def test_each_trial_is_predicted_by_a_model_that_was_chosen_and_trained_without_
         assert all(not same & training_rows for training_rows in apart)
 
 
+@pytest.mark.slow
 def test_the_rate_of_labels_without_information_is_that_of_guessing():
     """Twelve candidates on labels that were drawn at random; the best of them seems better than it is."""
     rng = np.random.default_rng(7)

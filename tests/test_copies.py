@@ -133,6 +133,7 @@ def table_of_noise(path, copies):
     return str(path)
 
 
+@pytest.mark.slow
 def test_doubling_the_lines_of_a_table_changes_no_rate(tmp_path):
     rates = []
     for copies in (1, 2):

@@ -100,6 +100,7 @@ def test_the_list_survives_its_file(home):
     assert disabled_in_config() == ("a", "b")
 
 
+@pytest.mark.slow
 def test_the_list_says_what_is_to_be_done(home, site):
     site.install("lab-peak", FEATURES.format(name="peak"))
     site.install("lab-other", FEATURES.format(name="peak"))

@@ -42,6 +42,7 @@ def decoded(path):
         ]
 
 
+@pytest.mark.slow
 def test_every_tactile_image_is_followed_by_its_pictures(recording):
     trial, _, pictures = recording
     messages = decoded(pictures)

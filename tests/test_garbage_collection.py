@@ -32,6 +32,7 @@ def test_of_contexts_that_overlap_in_threads_the_last_restores_what_was_before(c
         (gc.enable if was_enabled else gc.disable)()
 
 
+@pytest.mark.slow
 def test_what_is_there_is_not_collected_and_what_comes_is():
     gone: list[str] = []
 

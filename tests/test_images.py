@@ -558,6 +558,7 @@ def test_a_plot_and_a_notebook_show_cameras():
     assert len(page) < 300_000
 
 
+@pytest.mark.slow
 def test_the_conformance_check_tells_of_an_image_that_is_changed_later(seen, monkeypatch):
     _, _, plugins = seen
     bytes_of_all = bytearray(EYE.numbers)

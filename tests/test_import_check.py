@@ -62,6 +62,7 @@ def test_check_on_a_table_in_words(tmp_path):
     assert all(word in out for word in ("Resolution", "Age, s", "2 in F (N)", "t (ms)' [ms]"))
 
 
+@pytest.mark.slow
 def test_check_on_a_bag_shows_a_topic_that_died(tmp_path):
     pytest.importorskip("rosbags", reason="needs the extra ros")
     from rosbags.rosbag1 import Writer

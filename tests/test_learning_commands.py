@@ -254,6 +254,7 @@ def test_simulated_trials_never_open_a_real_gripper(tmp_path, opened, command):
     assert opened == []
 
 
+@pytest.mark.slow
 def test_a_feature_set_that_raises_on_simulated_grasps_is_named(monkeypatch):
     from graspsense.plugins.features.chitta import ChittaFeatures
 

@@ -27,6 +27,7 @@ def readings(seed, count):
     return [(max(f + g, 0.0) / NEWTONS, f) for f, g in zip(force_n, friction_n, strict=True)]
 
 
+@pytest.mark.slow
 def test_nine_of_ten_further_readings_are_within_the_error():
     inside = []
     for seed in range(20):

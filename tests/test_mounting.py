@@ -45,6 +45,7 @@ def test_what_is_no_mounting_is_refused_with_the_form_of_one(text):
         settings(f'run.mounting.tool="{text}"')
 
 
+@pytest.mark.slow
 def test_the_mounting_of_the_settings_is_kept_with_the_trial_replayed_and_exported(tmp_path):
     given = settings(f'run.mounting.tool="{TOOL}"', f'run.mounting.thumb="{THUMB}"')
     with Store.open(tmp_path / "trials") as store:

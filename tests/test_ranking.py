@@ -25,6 +25,7 @@ def crossed(**other):
     return rank(learners, {"force": trials, "noise": evolve(trials, table=noise)}, **other)
 
 
+@pytest.mark.slow
 def test_features_without_information_are_worse_and_the_same_trials_are_compared():
     ranking = crossed()
 

@@ -138,6 +138,7 @@ def test_hybrid_approaches_gently_and_raises_the_force_in_steps(thing, keys):
     assert trace.force_left_n[(trace.t_s >= contact_s) & (trace.t_s < contact_s + 0.1)].max() < 8.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate_hz", [100.0, pytest.param(1000.0, marks=pytest.mark.slow)])
 def test_hybrid_with_the_simulated_body_behind_such_an_interface(rate_hz):
     body = runpy.run_path(str(BENCHMARK))["OwnLoop"](create("sensor-backend", "sim", object="block"), rate_hz)

@@ -63,6 +63,7 @@ def test_many_features_are_sampled_alike_in_every_call_and_add_up():
     assert shapley_values(interacting, trial, medians) == (start, parts)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
 @every_case("name", NAMES)
 @every_case("features", [FULL_CAN, MISSING])

@@ -54,6 +54,7 @@ def graspsense_sensor_backends():
 GRASPSENSE_API = (2, 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("emulated", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_trial_is_simulated_where_the_gripper_says_so_and_not_by_its_settings(
     tmp_path, monkeypatch, emulated

@@ -95,6 +95,7 @@ def test_the_text_names_the_pipeline_and_the_procedure(store, tmp_path):
     runs(store, tmp_path / "own.toml")
 
 
+@pytest.mark.slow
 def test_components_that_are_given_stay_run_on_a_recording_and_are_not_replaced(store, tmp_path):
     given = ("train", store, "--choose", "-o", "features.type=curve", "--classifier", "knn")
     code, out, err = graspsense(*given, "--out", tmp_path / "own.json", "--json")

@@ -100,6 +100,7 @@ def test_dot_has_every_node_and_edge_and_quotes() -> None:
     assert '[label="a \\"b\\""]' in to_dot(quoted)
 
 
+@pytest.mark.slow
 def test_drawing_names_every_node() -> None:
     import matplotlib as mpl
 

@@ -142,6 +142,7 @@ def _closed(driver, command, frames=60):
     return [reading.frame for reading in read]
 
 
+@pytest.mark.slow
 @every_case("kind", [VELOCITY, POSITION, FORCE])
 def test_every_kind_of_command_closes_at_its_speed_and_not_again_and_again(kind):
     driver = _opened()

@@ -88,6 +88,7 @@ def test_the_import_keeps_trials_in_a_store(tmp_path):
         assert {trial.label for trial in trials} == {"pick_the_red_cup", "squeeze-_sponge"}
 
 
+@pytest.mark.slow
 def test_check_says_what_was_understood(tmp_path):
     folder = write_set(tmp_path / "set", 2)
     told = printed("import", f"lerobot:{folder}", "--check", "--plot", tmp_path / "p.png")

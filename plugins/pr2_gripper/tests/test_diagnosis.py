@@ -189,6 +189,7 @@ def test_a_gripper_that_somebody_else_commands_is_left_alone(
     assert wire.firmware.effort_un == 9_000_000
 
 
+@pytest.mark.slow
 def test_who_may_not_open_it_is_given_the_rule(
     doctor: Doctor, machine: Any, board: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -46,6 +46,7 @@ def driven(backend: Pr2Backend, run: RunConfig, controller: Any = None, **more: 
     return evolve(ended, report=dict(backend.report()))
 
 
+@pytest.mark.slow
 def test_only_an_emulated_gripper_can_be_given_an_object() -> None:
     emulated, real = Pr2Backend(Pr2Config(transport="emulated")), Pr2Backend(Pr2Config())
     holding = emulated.with_object("can:full_open")

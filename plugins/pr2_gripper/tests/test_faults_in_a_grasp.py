@@ -123,6 +123,7 @@ def test_a_pad_that_is_known_to_be_bad_refuses_the_grasp():
     assert grasp.report["largest_effort_n"] == 0.0
 
 
+@pytest.mark.slow
 def test_a_picture_and_a_notebook_show_the_reason_and_the_warnings() -> None:
     from graspsense import load_pipeline
     from graspsense.report.grasp_picture import _words

@@ -20,6 +20,7 @@ REQUEST = encode(f"{TRIGGER}_Request", {})
 RESPONSE = encode(f"{TRIGGER}_Response", {"success": True})
 
 
+@pytest.mark.slow
 def test_a_router_that_comes_later_is_found(monkeypatch):
     port = free_port()
     monkeypatch.setenv("ZENOH_CONFIG_OVERRIDE", f'connect/endpoints=["tcp/127.0.0.1:{port}"]')
@@ -34,6 +35,7 @@ def test_a_router_that_comes_later_is_found(monkeypatch):
         router.close()
 
 
+@pytest.mark.slow
 def test_more_requests_than_are_answered_at_a_time_are_refused(router):
     server, clients = ZenohNode("server"), ZenohNode("client")
     go_on, begun = threading.Event(), threading.Semaphore(0)

@@ -273,6 +273,7 @@ k_n_m = 2000.0
 """
 
 
+@pytest.mark.slow
 def test_the_state_before_a_failure_is_computed_once_before_its_buffers_are_used_again(monkeypatch):
     monkeypatch.setitem(TERMS, "failing", Term(name="failing", summary="", params=Failing, law=no_number))
     config = SimConfig(sensor="ideal", fidelity="scene")
@@ -329,6 +330,7 @@ def test_a_compiled_form_that_raises_is_not_hidden_and_hides_no_events():
         extracted("result")
 
 
+@pytest.mark.slow
 def test_where_numba_cannot_be_imported_grasps_run_in_the_interpreter(tmp_path):
     (tmp_path / "numba").mkdir()
     (tmp_path / "numba" / "__init__.py").write_text("raise ImportError('Numba needs another numpy')")
@@ -423,6 +425,7 @@ def test_processes_end_held_grasps_with_their_hold_too_where_no_release_is_read(
     ]
 
 
+@pytest.mark.slow
 def test_a_batch_takes_the_run_settings_as_the_runner_does():
     # Held twice as long as by default, which a batch once did not notice.
     run = RunConfig(seed=4, hold_s=0.5)

@@ -131,6 +131,7 @@ def test_an_answer_from_five_training_trials_is_no_certain_one(pipeline):
     assert "naked:full_open" in said.prediction_set
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 def test_the_better_pipeline_names_what_the_default_one_confuses():
     said = load_pipeline("best").grasp(object="can:empty_open").prediction

@@ -55,6 +55,7 @@ def test_the_egg_survives_the_hybrid_and_not_pure_force(eggs):
     assert {grasp.outcome for grasp in slammed} == {Outcome.CRUSHED}
 
 
+@pytest.mark.slow
 def test_velocity_control_on_its_own_raises_its_effort_after_contact_and_crushes():
     result = grasp(create("controller", "velocity"), object="egg", open_gap_m=0.048)
     trace = result.trace
@@ -87,6 +88,7 @@ def test_closed_loop_force_settles_at_the_force_asked_for():
     assert FEATURES.extract(result.trace)["f_steady"] == pytest.approx(5.0, abs=0.3)
 
 
+@pytest.mark.slow
 def test_a_ramp_softens_the_switch():
     hard, ramped = (
         grasp(create("controller", "hybrid", ramp_s=ramp), spread=False, object="block", open_gap_m=0.033)

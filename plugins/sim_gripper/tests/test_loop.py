@@ -93,6 +93,7 @@ def test_every_object_and_law_gives_one_trace_plain_and_compiled(number, control
         assert_same(run.trace, fast[seed].trace)
 
 
+@pytest.mark.slow
 def test_the_backend_gives_the_same_whatever_stands_beside_a_grasp():
     backend = SimBackend(SimConfig(**TICK_BY_TICK))
     alone = backend.run_many(HYBRID, ["toy"], [3], traces=True)[0].trace

@@ -68,6 +68,7 @@ def test_numbers_have_their_distributions(seed):
     assert np.abs(lagged).max() < 7e-3
 
 
+@pytest.mark.slow
 def test_grasps_of_neighbouring_seeds_are_independent():
     rows = np.array([drawn(draw_normals, seed, 52) for seed in range(2000)])
     assert scipy.stats.kstest(rows[:, 0], "norm").pvalue > 1e-3

@@ -81,6 +81,7 @@ def test_the_next_process_finds_what_was_selected(trials, folder):
     assert len(trials) == len(list(folder.iterdir())) == 1
 
 
+@pytest.mark.slow
 def test_another_object_accuracy_or_controller_is_tried_by_itself(trials):
     model = select()
     others = select(spec=shell(2001.0)), select(evolve(CONFIG, accuracy=0.2)), select(probing_force_n=19.0)
@@ -107,6 +108,7 @@ def test_a_file_of_any_room_of_the_simulator_belongs_to_its_code(source):
     assert f"graspsense_sim_gripper/{source}.py " in cache._own_code().decode()
 
 
+@pytest.mark.slow
 def test_a_damaged_one_is_made_anew(trials, folder):
     made = select()
     (kept,) = folder.iterdir()

@@ -99,6 +99,7 @@ def test_at_rest_from_the_very_contact_on_there_is_no_rate():
     assert math.isnan(quantities["df_dt"])
 
 
+@pytest.mark.slow
 def test_they_are_the_feature_sets_own_to_a_tick():
     backend = SimBackend(SimConfig(sensor="ideal", spread=False, open_gap_m=0.065))
     trace = run_grasp(backend, create("controller", "hybrid"), RunConfig()).trace

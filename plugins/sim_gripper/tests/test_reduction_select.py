@@ -63,6 +63,7 @@ def thing(*terms):
     return ObjectSpec(name="made up", width_m=0.05, terms=terms)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("accuracy", [0.1, pytest.param(0.001, marks=pytest.mark.slow)])
 def test_without_spread_the_trial_grasp_is_the_grasp_that_runs(accuracy):
     config, law, odwalla = (
@@ -152,6 +153,7 @@ class Silent(ForceAbove):
         raise ZeroDivisionError
 
 
+@pytest.mark.slow
 def test_features_that_no_trial_grasp_has_are_not_verified():
     without = selected(NEAR, thing(SHELL), hybrid())
     for kind in (Shaken, Silent):

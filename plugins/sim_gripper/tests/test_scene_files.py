@@ -217,6 +217,7 @@ def pressed(config, effort_n, seconds, **changes):
     return setup, bodies
 
 
+@pytest.mark.slow
 def test_an_object_held_fast_is_pressed_by_the_finger_that_meets_it_first(scene):
     text = "width_m = 0.06\noffset_m = 0.002\n{}[[terms]]\ntype = 'elastic'\nk1_n_m = 2000.0\n"
     config = SimConfig(

@@ -64,6 +64,7 @@ def test_a_term_changes_what_a_scene_without_it_changes(name):
     assert max(abs(change["change"]) for change in row["changes"].values()) > 0.02
 
 
+@pytest.mark.slow
 def test_a_term_that_changes_nothing_can_be_left_out_and_one_that_breaks_the_grasp_is_said_to(capsys):
     rows = explained(scene_of(SHELL, DRY))
     print_without(rows.values(), 0.01)

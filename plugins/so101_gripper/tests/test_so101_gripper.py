@@ -167,6 +167,7 @@ def test_the_emulated_gripper_keeps_its_own_time_so_that_a_grasp_repeats_exactly
     assert trial.trace.t_s[-1] - trial.trace.t_s[0] == pytest.approx((len(trial.trace.t_s) - 1) / 100.0)
 
 
+@pytest.mark.slow
 @every_case(
     ("mood", "late_s", "outcome"),
     [
@@ -326,6 +327,7 @@ def test_less_than_moves_the_geared_motor_is_refused_before_anything_moves():
         load_pipeline("so101", options=["gripper.port=/dev/nowhere", "controller.approach_force_n=2"])
 
 
+@pytest.mark.slow
 def test_doctor_tells_the_gripper_from_another_motor_from_a_silent_bus_and_from_none(emulated):
     arm = emulated()
     states = {}
