@@ -238,11 +238,11 @@ def test_every_check_of_a_distribution_has_a_mutant():
 @pytest.mark.slow
 def test_what_is_missing_from_the_wheel_is_named(site, tmp_path, monkeypatch):
     folder = tmp_path / "project"
-    (folder / "lab_thing").mkdir(parents=True)
+    (folder / "packed_thing").mkdir(parents=True)
     (folder / "pyproject.toml").write_text(
         '[build-system]\nrequires = ["hatchling"]\nbuild-backend = "hatchling.build"\n'
-        '[project]\nname = "lab-thing"\nversion = "0.2"\n'
-        '[tool.hatch.build.targets.wheel]\npackages = ["lab_thing"]\n'
+        '[project]\nname = "packed-thing"\nversion = "0.2"\n'
+        '[tool.hatch.build.targets.wheel]\npackages = ["packed_thing"]\n'
     )
     plugin = """
 from graspsense.plugin_api import Feature, FeatureSetEntry, PipelineEntry, hookimpl
@@ -251,19 +251,19 @@ GRASPSENSE_API = (2, 0)
 def graspsense_feature_sets():
     peak = Feature("peak", "N", "largest force")
     yield FeatureSetEntry(
-        "summit", "lab_thing.features:Peak", "peak", requires=(), features=(peak,)
+        "summit", "packed_thing.features:Peak", "peak", requires=(), features=(peak,)
     )
 @hookimpl
 def graspsense_pipelines():
-    yield PipelineEntry("lab", "lab_thing:lab.toml", "ours")
+    yield PipelineEntry("lab", "packed_thing:lab.toml", "ours")
 """
     contents = {"__init__.py": "", "plugin.py": plugin, "features.py": "", "lab.toml": "", "table.csv": "1"}
     for name, text in contents.items():
-        (folder / "lab_thing" / name).write_text(text)
+        (folder / "packed_thing" / name).write_text(text)
     site.patch.syspath_prepend(folder)
-    site.modules.extend(["lab_thing", "lab_thing.plugin", "lab_thing.features"])
-    site.metadata("lab-thing", "0.2", "[graspsense.plugins]\nlab = lab_thing.plugin\n")
-    (site.folder / "lab_thing-0.2.dist-info" / "direct_url.json").write_text(
+    site.modules.extend(["packed_thing", "packed_thing.plugin", "packed_thing.features"])
+    site.metadata("packed-thing", "0.2", "[graspsense.plugins]\nlab = packed_thing.plugin\n")
+    (site.folder / "packed_thing-0.2.dist-info" / "direct_url.json").write_text(
         json.dumps({"url": folder.as_uri(), "dir_info": {"editable": True}})
     )
     (check,) = [check for check in CHECKS["distribution"] if check.id == "wheel-is-complete"]
@@ -271,12 +271,12 @@ def graspsense_pipelines():
 
     for lacking, says in (
         ("", ""),
-        ("lab_thing/lab.toml", "has no file lab_thing/lab.toml: it is in the folder"),
-        ("lab_thing/features.py", "has no module lab_thing.features: it is in the"),
-        ("lab_thing/table.csv", "lacks lab_thing/table.csv: it is in the folder"),
+        ("packed_thing/lab.toml", "has no file packed_thing/lab.toml: it is in the folder"),
+        ("packed_thing/features.py", "has no module packed_thing.features: it is in the"),
+        ("packed_thing/table.csv", "lacks packed_thing/table.csv: it is in the folder"),
     ):
         monkeypatch.setattr(package, "_built", partial(without, whole, lacking))
-        result = outcome_of(check, package_of("lab-thing", site.discover()), {})
+        result = outcome_of(check, package_of("packed-thing", site.discover()), {})
 
         assert result.state == ("failed" if says else "passed")
         assert says in result.text
