@@ -16,9 +16,6 @@ from graspsense.store.recover import recover_file, recover_store
 from graspsense.store.store import Store
 from graspsense.store.verify import verify_store
 
-WITHOUT_END = 140
-"""Bytes cut off the end of a file: its footer and a part of its summary."""
-
 
 @pytest.fixture
 def store(tmp_path):
