@@ -12,16 +12,23 @@ from cases import every_case
 from commands import graspsense
 
 from graspsense.plugin_api import create
+from graspsense.testing.controller import LONGEST_S
 from graspsense.testing_api import parametrize_checks
 
 COMMAND = [sys.executable, "-m", "graspsense", "hold"]
 PR2 = ["--gripper", "pr2", "-o", "gripper.transport=emulated", "-o", "controller.sends=effort"]
 
 
+# Laws that wait until the thing is put down are checked with a shorter wait: the default is a minute at 1 kHz.
 @pytest.mark.slow
-@parametrize_checks("graspsense-romano")
+@parametrize_checks("graspsense-romano", keys={"place_timeout_s": 5.0})
 def test_conformance(check):
     check.run()
+
+
+@every_case("name", ["pick-and-place", "release", "event-detector"])
+def test_by_default_a_law_ends_within_the_time_that_conformance_allows(name):
+    assert create("controller", name).params().plan.place_timeout_s <= LONGEST_S
 
 
 @every_case(

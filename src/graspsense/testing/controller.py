@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 from collections.abc import Iterator, Sequence
+from functools import cache
 from math import inf, isfinite, isinf, nan
 from typing import Any, Final, NamedTuple, get_type_hints
 
@@ -112,10 +113,15 @@ def _made_again(value: Any) -> Any:
     return json.loads(json.dumps(value))
 
 
+@cache
+def _annotations(record: type) -> dict[str, Any]:
+    return get_type_hints(record)
+
+
 def _leaves(value: Any, path: str, annotated: Any = None) -> Iterator[tuple[str, Any, Any]]:
     if isinstance(value, tuple):
         names = getattr(value, "_fields", None)
-        hints = get_type_hints(type(value)) if names else {}
+        hints = _annotations(type(value)) if names else {}
         for i, inner in enumerate(value):
             name = names[i] if names else str(i)
             yield from _leaves(inner, f"{path}.{name}", hints.get(name))
