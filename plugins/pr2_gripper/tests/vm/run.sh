@@ -3,6 +3,7 @@
 # software emulation, and tries it there (inside.py). Fails where the machine does not boot.
 #
 #     run.sh PYTHON      PYTHON has graspsense with its plugins
+#     run.sh --packages  only installs what it takes of this system
 #
 # Debian or Ubuntu on x86_64; root, or sudo without a password, where a package is missing.
 set -euo pipefail
@@ -44,6 +45,7 @@ ldconfig -p | grep -q libusb-1.0.so.0 || missing+=(libusb-1.0-0)
 ((EUID != 0 && ${#missing[@]} == 0)) || apt update
 kernel=$(kernel_packages)
 ((${#missing[@]} == 0)) || apt install -y --no-install-recommends "${missing[@]}"
+[[ $python != --packages ]] || exit 0
 [[ -n $kernel ]] || fail "apt knows no package linux-image-amd64 or linux-image-generic"
 printf 'vm: %s after %d s\n' "$(qemu-system-x86_64 --version | head -n 1)" "$SECONDS"
 
