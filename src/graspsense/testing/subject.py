@@ -39,7 +39,7 @@ class Subject:
         """Its role."""
         return self.component.role
 
-    @property
+    @cached_property
     def entry(self) -> Any:
         """The entry by which its plugin declares it, with what its class declares under these settings."""
         return self.component.declared(self.config())
