@@ -95,31 +95,36 @@ def opening_and_relaxing_are_accepted(subject: Subject) -> None:
 def frames_are_numbers(subject: Subject) -> None:
     """Every field of a frame is a Python float, `status` an int; cells are floats, as many as are declared."""
     cells = _cells(subject)
+    # The words of a failure are made where it fails: those of every reading took most of the time of the checks.
     for reading in subject.session.readings:
-        demand(
+        if not (
             isinstance(reading, Reading)
             and isinstance(reading.frame, Frame)
-            and isinstance(reading.pads, Pads),
-            f"read returned {reading!r:.80}: return Reading(Frame(...), Pads(...), signals), with NO_PADS where there "
-            "are no cells and () where there are no further channels",
-        )
+            and isinstance(reading.pads, Pads)
+        ):
+            raise CheckFailed(
+                f"read returned {reading!r:.80}: return Reading(Frame(...), Pads(...), signals), with NO_PADS where "
+                "there are no cells and () where there are no further channels"
+            )
         frame, pads, _ = reading
         for name, value in zip(Frame._fields, frame, strict=True):
             kind = int if name == "status" else float
-            demand(
-                type(value) is kind,
-                f"{name} of a frame is {value!r} of type {type(value).__name__}: write {kind.__name__}(...)",
-            )
+            if type(value) is not kind:
+                raise CheckFailed(
+                    f"{name} of a frame is {value!r} of type {type(value).__name__}: write {kind.__name__}(...)"
+                )
         demand(
             type(pads.counter) is int and type(pads.t_s) is float,
             f"an image has counter {pads.counter!r} and t_s {pads.t_s!r}: an int and a float",
         )
         for side in (pads.left, pads.right):
-            demand(
-                isinstance(side, tuple) and len(side) == cells and all(type(cell) is float for cell in side),
-                f"an image of a fingertip has the cells {side!r:.80}: give a tuple of {cells} floats, as many as the "
-                "channel 'pads' declares (NaN for a cell without a value)",
-            )
+            if not (
+                isinstance(side, tuple) and len(side) == cells and all(type(cell) is float for cell in side)
+            ):
+                raise CheckFailed(
+                    f"an image of a fingertip has the cells {side!r:.80}: give a tuple of {cells} floats, as many as "
+                    "the channel 'pads' declares (NaN for a cell without a value)"
+                )
 
 
 def _cells(subject: Subject) -> int:
@@ -181,13 +186,15 @@ def signals_are_those_declared(subject: Subject) -> None:
             "signal_type(self.channels) with a value for each, in this order",
         )
         for channel, empty, value in zip(channels, nothing, reading.signals, strict=True):
-            demand(
-                type(value) is type(empty)
-                and (shape_of(value), dtype_of(value)) == (shape_of(empty), dtype_of(empty)),
-                f"{channel.name!r} is {value!r:.80}: give {type(empty).__name__}"
-                + (f" of the declared shape {shape_of(empty)}" if shape_of(empty) else "")
-                + (f" and the declared dtype {dtype_of(empty)}" if dtype_of(empty) != FLOATS else ""),
-            )
+            if type(value) is not type(empty) or (shape_of(value), dtype_of(value)) != (
+                shape_of(empty),
+                dtype_of(empty),
+            ):
+                raise CheckFailed(
+                    f"{channel.name!r} is {value!r:.80}: give {type(empty).__name__}"
+                    + (f" of the declared shape {shape_of(empty)}" if shape_of(empty) else "")
+                    + (f" and the declared dtype {dtype_of(empty)}" if dtype_of(empty) != FLOATS else "")
+                )
     for channel in channels:
         values = [getattr(reading.signals, channel.name) for reading in session.readings]
         if isinstance(channel, TactileArray) and channel.dtype != FLOATS:

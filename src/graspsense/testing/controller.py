@@ -35,7 +35,7 @@ from graspsense.core.values.signals import (
     no_pads,
 )
 from graspsense.testing import component
-from graspsense.testing.checks import checks_of, demand, raises_nothing
+from graspsense.testing.checks import CheckFailed, checks_of, demand, raises_nothing
 from graspsense.testing.model_gripper import CELLS, CHANNELS_OF_FIELD, OBJECTS, model_gripper
 from graspsense.testing.subject import Subject
 
@@ -201,11 +201,11 @@ def types_do_not_change(subject: Subject) -> None:
         for (path, a, _), (_, b, _) in zip(
             _leaves(tick.state, "state"), _leaves(tick.after, "state"), strict=True
         ):
-            demand(
-                type(a) is type(b) and getattr(a, "dtype", "") == getattr(b, "dtype", ""),
-                f"{path} goes from {a!r} ({type(a).__name__}) to {b!r} ({type(b).__name__}) at t = "
-                f"{tick.frame.t_s:.3f} s: keep one type throughout",
-            )
+            if type(a) is not type(b) or getattr(a, "dtype", "") != getattr(b, "dtype", ""):
+                raise CheckFailed(
+                    f"{path} goes from {a!r} ({type(a).__name__}) to {b!r} ({type(b).__name__}) at t = "
+                    f"{tick.frame.t_s:.3f} s: keep one type throughout"
+                )
 
 
 def commands_are_numbers(subject: Subject) -> None:
