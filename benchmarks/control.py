@@ -1,6 +1,6 @@
-"""One control tick of the PR2 driver, and how late the host wakes up for a report. No hardware.
+"""One control tick of the PR2 driver, alone, with predictions, and with each sink. No hardware.
 
-    python benchmarks/control.py [--grasps N] [--seconds S] [--short]
+    python benchmarks/control.py [--grasps N] [--short]
 
 The tick is what the runner does from the moment a report's bytes are in the process to the moment the command's are
 handed to the wire: decode, count, convert, the hybrid controller's step, the guard, encode. The reports are those of
@@ -12,9 +12,7 @@ the sinks: a live page (*live*) and Foxglove (*foxglove*) that a viewer receives
 of a plugin (*observer*). Within each grasp the sink takes every other block of ticks, so that ticks with and without it
 meet the same machine. The last table says how much more the 99th percentile of the tick is in the blocks that it takes,
 with a 95 % interval over pairs of blocks, from when the report is in the process (*working*) and from when it is due
-(*due*); *handed over* is what the runner spends on the sink after the command of a tick. The wake-up is measured apart,
-against a board that runs by the clock in a thread of the same process: how long after the report with the shortest
-delay, in device time, a report was in the driver's hands.
+(*due*); *handed over* is what the runner spends on the sink after the command of a tick.
 """
 
 from __future__ import annotations
@@ -305,39 +303,21 @@ def added_p99(pairs: Sequence[tuple[Sequence[float], Sequence[float]]]) -> tuple
     return added(range(len(pairs))), [float(end) for end in np.quantile(draws, [0.025, 0.975])]
 
 
-def wake_ups_us(seconds: float) -> list[float]:
-    paced = Pr2Config(transport="emulated", pace="device", object="none", calibration="none")
-    board = opening.open_board(paced, 0, 0.0)
-    taken: list[tuple[float, float]] = []
-    try:
-        until = time.monotonic() + seconds
-        while time.monotonic() < until:
-            arrival = board.link.next(0.1)
-            if arrival is not None:
-                taken.append((arrival.report.time_us * 1e-6, time.monotonic()))
-    finally:
-        board.link.close()
-    offset_s = min(host_s - device_s for device_s, host_s in taken)
-    return [(host_s - device_s - offset_s) * 1e6 for device_s, host_s in taken]
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--grasps", type=int, default=5, help="how often the grasp is played back")
-    parser.add_argument("--seconds", type=float, default=5.0, help="how long the wake-ups are watched")
     parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     asked = parser.parse_args()
     if asked.short:
-        asked.grasps, asked.seconds = 1, 0.5
+        asked.grasps = 1
     sent, feature = recorded()
     paced = paced_us(asked.grasps, sent, feature)
     added, spent = watched_us(asked.grasps, sent, feature)
     times_us = {
         "tick": ticks_us(asked.grasps, sent, feature),
         **paced,
-        "wake-up": wake_ups_us(asked.seconds),
         **spent,
     }
     quantiles = (0.5, 0.99, 0.999, 1.0)

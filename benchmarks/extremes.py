@@ -22,7 +22,7 @@ from typing import Any, Final
 import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
-from random_scenes import controller_is_stable, error_of
+from random_scenes import controller_is_stable, error_of, flags_of
 
 from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import ConfigError, create
@@ -32,7 +32,7 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.state import PlantState
 from graspsense_sim_gripper.run.accuracy.model import Reduction
 from graspsense_sim_gripper.run.accuracy.probe import grip_of
-from graspsense_sim_gripper.run.accuracy.propose import NOT_VERIFIED, propose
+from graspsense_sim_gripper.run.accuracy.propose import propose
 from graspsense_sim_gripper.run.accuracy.select import select
 from graspsense_sim_gripper.run.batch.job import FinishedGrasp, Job, grasp_plain
 from graspsense_sim_gripper.run.build import Problem, instantiate
@@ -443,26 +443,16 @@ def cyclic(short: bool) -> Iterator[Row]:
         }
 
 
-def whole_grasp(
-    config: SimConfig, spec: ObjectSpec, controller: Any, seed: int = 0
-) -> tuple[FinishedGrasp, str]:
-    """Return a grasp in the model that a user gets, and what its report says of it: nothing if it is verified.
+def whole_grasp(config: SimConfig, spec: ObjectSpec, controller: Any) -> tuple[FinishedGrasp, list[str]]:
+    """Return a grasp in the model that a user gets, and what its report says against it.
 
     Raises ConfigError if the scene is refused.
     """
-    run = RunConfig(grasp_timeout_s=20.0)
-    problem = Problem(config, spec)
+    run, problem = RunConfig(grasp_timeout_s=20.0), Problem(config, spec)
     reduction = select(problem, GraspController(controller, run))
-    setup = instantiate(problem, reduction, seed)
     job = Job(config=config, controller=controller, run=run, extract=None, traces=True)
-    done = grasp_plain(job, setup)
-    state = done.state
-    said = [] if reduction.verification is not None else ["not verified"]
-    if state.step.unresolved + state.contact.unbalanced > 0:
-        said.append("not resolved")
-    if reduction.unresolved:
-        said.append(NOT_VERIFIED)
-    return done, ", ".join(said)
+    done = grasp_plain(job, instantiate(problem, reduction, 0))
+    return done, flags_of(done, reduction, config)
 
 
 def grasped(case: str, value: Any, config: SimConfig, spec: ObjectSpec, **controller: Any) -> Row:
@@ -483,7 +473,7 @@ def grasped(case: str, value: Any, config: SimConfig, spec: ObjectSpec, **contro
         "peak_error": abs(done.state.peak_n - peak) / max(peak, 1.0),
         "error": error,
         "of": quantity,
-        "said": said,
+        "said": ", ".join(said),
         "flagged": bool(said),
         "finite": math.isfinite(done.state.peak_n),
         "holds": error <= config.accuracy or bool(said),

@@ -23,14 +23,13 @@ from typing import Any, Final
 
 import numpy as np
 from attrs import evolve
-from random_scenes import Bench, Scene, controller_is_stable, record_of
+from random_scenes import Bench, Scene, controller_is_stable, flags_of, record_of
 
 from graspsense.evaluation.intervals import wilson
 from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import ConfigError
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.error import deviation
-from graspsense_sim_gripper.run.accuracy.propose import NOT_VERIFIED
 from graspsense_sim_gripper.run.batch.job import FinishedGrasp
 from graspsense_sim_gripper.scene.spec import ObjectSpec
 from graspsense_sim_gripper.scene.terms.registry import in_order
@@ -142,18 +141,10 @@ def _case(
     except ArithmeticError as error:
         return {"error": math.inf, "refused": f"{type(error).__name__}: {error}"}
     error, quantity = deviation(record_of(done, dt_s), record_of(reference, dt_s))
-    state = done.state
-    flags = []
-    if reduction.unresolved:
-        flags.append(NOT_VERIFIED)
-    if state.step.unresolved + state.contact.unbalanced > 0:
-        flags.append("not resolved")
-    if reduction.verification is None and not job.config.has_forced_steps:
-        flags.append("not verified")
     return {
         "error": error,
         "of": quantity,
-        "flags": flags,
+        "flags": flags_of(done, reduction, job.config),
         "chosen": reduction.decisions[0].decision,
     }
 
