@@ -7,7 +7,6 @@ Times are CPU seconds of this process, the contenders taking turns; a ratio is o
 
 from __future__ import annotations
 
-import argparse
 import importlib.util
 import statistics
 import time
@@ -15,6 +14,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from arguments import parser_of
 from numpy.typing import NDArray
 
 from graspsense.experiments.versions import where_measured
@@ -78,10 +78,9 @@ def measure(n_rows: int, repeats: int, names: list[str]) -> list[list[str]]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser = parser_of(__doc__)
     parser.add_argument("--rows", type=lambda text: int(float(text)), nargs="+", default=list(ROWS))
     parser.add_argument("--repeats", type=int, default=5, help="fits of each contender")
-    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     given = parser.parse_args()
     if given.short:
         given.rows, given.repeats = [1_000], 1

@@ -17,7 +17,6 @@ with a 95 % interval over pairs of blocks, from when the report is in the proces
 
 from __future__ import annotations
 
-import argparse
 import os
 import subprocess
 import sys
@@ -29,6 +28,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+from arguments import parser_of
 from attrs import evolve
 
 from graspsense.core.components.config import resolve
@@ -304,11 +304,8 @@ def added_p99(pairs: Sequence[tuple[Sequence[float], Sequence[float]]]) -> tuple
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = parser_of(__doc__)
     parser.add_argument("--grasps", type=int, default=5, help="how often the grasp is played back")
-    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     asked = parser.parse_args()
     if asked.short:
         asked.grasps = 1

@@ -13,13 +13,13 @@ runs the cases of these functions.
 
 from __future__ import annotations
 
-import argparse
 import math
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from typing import Any, Final
 
 import numpy as np
+from arguments import parser_of
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 from random_scenes import controller_is_stable, error_of, flags_of
@@ -574,10 +574,7 @@ def line(case: str, rows: list[Row]) -> list[str]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--short", action="store_true", help="fewer values a case")
+    parser = parser_of(__doc__)
     names = [case.__name__ for case in CASES]
     parser.add_argument(
         "--only", nargs="+", choices=names, default=names, metavar="NAME", help=", ".join(names)

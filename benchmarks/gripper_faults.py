@@ -15,12 +15,12 @@ alone has to endure.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterable, Iterator, Mapping
 from math import inf
 from typing import Any, Final
 
 import numpy as np
+from arguments import parser_of
 from attrs import evolve, frozen
 
 from graspsense.core.components.run_config import RunConfig
@@ -232,11 +232,8 @@ def pushed(instances: int) -> list[str]:
 
 def main() -> None:
     """Run the grasps and print the table."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = parser_of(__doc__)
     parser.add_argument("--pushed", action="store_true", help="how far one pad pushes a sound object")
-    parser.add_argument("--short", action="store_true")
     given = parser.parse_args()
     if given.pushed:
         print("\n".join(pushed(1 if given.short else 12)))

@@ -13,11 +13,11 @@ everything runs. All is simulated.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from statistics import median
 
+from arguments import parser_of
 from attrs import frozen
 from peer_engines import REFERENCE_STEPS, located_rk4, loops, mujoco_engines, ours, prepared, solvers, timed
 from peer_scenes import SCENES, PeerScene
@@ -58,10 +58,7 @@ class Row:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--short", action="store_true", help="two scenes once: that everything runs")
+    parser = parser_of(__doc__)
     parser.add_argument("--scenes", default="", help="parts of the names of scenes, separated by commas")
     parser.add_argument("--repeats", type=int, default=5)
     given = parser.parse_args()

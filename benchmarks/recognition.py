@@ -29,6 +29,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from arguments import parser_of
 from scipy import stats
 
 from graspsense.cli.choosing import chosen
@@ -227,11 +228,8 @@ def mean_over(rankings: Sequence[Ranking]) -> list[str]:
 def main() -> None:
     words = sys.argv[1:]
     sources = list(takewhile(lambda word: not word.startswith("-"), words))
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = parser_of(__doc__)
     parser.add_argument("--aeon-python", metavar="PATH", help="the Python of an environment with aeon")
-    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     given, options = parser.parse_known_args(words[len(sources) :])
     options += SHORT.split() if given.short else ()
     rankings = []

@@ -21,7 +21,6 @@ With an environment of its own with aeon 1.6 (`pip install aeon==1.6.0`), which 
 
 from __future__ import annotations
 
-import argparse
 import importlib.util
 import json
 import sys
@@ -29,6 +28,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from arguments import parser_of
 
 GROUPS, KERNELS, LENGTH = 64, 8, 9
 TREES = 300
@@ -181,15 +181,10 @@ def synthetic() -> dict:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = parser_of(__doc__)
     parser.add_argument("trials", type=Path, nargs="?")
     parser.add_argument("answers", type=Path, nargs="?")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument(
-        "--short", action="store_true", help="a few synthetic trials, only to show that it runs"
-    )
     given = parser.parse_args()
     if given.short:
         print(json.dumps(answers_of(synthetic(), given.seed)))

@@ -12,7 +12,6 @@ resampled rounds.
 
 from __future__ import annotations
 
-import argparse
 import random
 import tempfile
 import time
@@ -22,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from arguments import parser_of
 
 from graspsense.core.components.channels import cells_of
 from graspsense.core.components.run_config import RunConfig
@@ -169,12 +169,9 @@ def row(name: str, runs: dict[bool, list[list[float]]]) -> list[str]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = parser_of(__doc__)
     parser.add_argument("--rounds", type=int, default=10)
     parser.add_argument("--seconds", type=float, default=4.0)
-    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     given = parser.parse_args()
     if given.short:
         given.rounds, given.seconds = 1, 0.5

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from arguments import parser_of
 from attrs import evolve
 from random_scenes import Bench, Scene, controller_is_stable, flags_of, record_of
 
@@ -173,13 +174,10 @@ def run(measure: Callable[[int], Row], file: Path | None, scenes: int, first_sce
 
 def options(description: str | None, scenes: int) -> argparse.ArgumentParser:
     """Return the options of a program that measures random scenes."""
-    parser = argparse.ArgumentParser(
-        description=description, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = parser_of(description)
     parser.add_argument("--scenes", type=int, default=scenes)
     parser.add_argument("--first", type=int)
     parser.add_argument("--rows", type=Path, help="JSON lines of the finished scenes, to go on with later")
-    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     return parser
 
 

@@ -26,7 +26,6 @@ import statistics
 import subprocess
 import sys
 import tempfile
-import tomllib
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from datetime import date
@@ -34,6 +33,7 @@ from pathlib import Path
 from typing import IO, Any, Final
 
 import numpy as np
+from arguments import parser_of
 from attrs import field, frozen
 
 ROOT: Final = Path(__file__).resolve().parent.parent
@@ -183,13 +183,9 @@ def base_version(base: str, keep: Path) -> Version:
 
 def catalogue() -> list[str]:
     """Return the names of all objects of the catalogue, each in each of its states."""
-    (path,) = (ROOT / "plugins" / "sim_gripper" / "src").rglob("catalogue.toml")
-    tables = tomllib.loads(path.read_text(encoding="utf-8"))
-    names = []
-    for name, table in tables.items():
-        states = table.get("states")
-        names += [f"{name}:{state}" for state in states] if states else [name]
-    return names
+    from graspsense_sim_gripper.scene.library import catalogue as specs
+
+    return list(specs())
 
 
 def scene_files(count: int, folder: Path) -> list[dict[str, Any]]:
@@ -269,7 +265,7 @@ def time_in_turn(probes: Sequence[Probe], request: dict[str, Any], rounds: int) 
 
 
 def parsed() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description="Compare two versions of the project to the last bit.")
+    parser = parser_of(__doc__)
     parser.add_argument(
         "base", nargs="?", default=str(ROOT), help="a commit, or a folder with a checkout (this checkout)"
     )
@@ -283,7 +279,6 @@ def parsed() -> argparse.Namespace:
     parser.add_argument(
         "--keep", type=Path, help="folder that keeps the environment of BASE for the next time"
     )
-    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     given = parser.parse_args()
     if given.short:
         given.rounds, given.only = 0, COMPARED[:1]

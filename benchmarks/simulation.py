@@ -21,6 +21,8 @@ import time
 from statistics import median
 from typing import Final
 
+from arguments import parser_of
+
 from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import create
 from graspsense.sources.simulated import BATCH_WITHOUT_TRACES
@@ -33,10 +35,7 @@ SENSORS: Final = ("ideal", "pads")
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--short", action="store_true", help="300 grasps once, nothing compiled anew")
+    parser = parser_of(__doc__)
     parser.add_argument("--only", default="many,compile")
     parser.add_argument("--grasps", type=int, default=4000)
     parser.add_argument("--repeats", type=int, default=10)

@@ -8,7 +8,6 @@ that of the work in a process that has started; the median of several.
 
 from __future__ import annotations
 
-import argparse
 import random
 import statistics
 import tempfile
@@ -17,6 +16,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from arguments import parser_of
 
 from graspsense.core.components.registry import installed
 from graspsense.core.learn.model import train
@@ -80,11 +80,8 @@ def median_s(work: Callable[[], object]) -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = parser_of(__doc__)
     parser.add_argument("--trials", type=int, default=100_000)
-    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     given = parser.parse_args()
     if given.short:
         given.trials = 5_000

@@ -1,6 +1,6 @@
 """Fits the twelve free figures of the simulator's containers again, from values that were not fitted. Simulated.
 
-    python plugins/paper/benchmarks/fit.py [--seeds 4] [--rounds 2] [--short]
+    python plugins/paper/benchmarks/fit.py [--short]
 
 For each container three figures may be fitted: the share of the force that lands on the cells, the loss in its full,
 open state, and a scale on the spread of stiffness. The targets are Tables II and III of the paper, at 20 N, and the
@@ -371,24 +371,22 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
-    parser.add_argument("--seeds", type=int, default=4)
-    parser.add_argument("--rounds", type=int, default=2)
     given = parser.parse_args()
-    grids = GRIDS
+    n, rounds, grids = 4, 2, GRIDS
     if given.short:
-        given.seeds, given.rounds, grids = 1, 1, {name: grid[:1] for name, grid in GRIDS.items()}
+        n, rounds, grids = 1, 1, {name: grid[:1] for name, grid in GRIDS.items()}
     began = time.time()
-    seeds, others = range(given.seeds), range(given.seeds, 2 * given.seeds)
+    seeds, others = range(n), range(n, 2 * n)
     descent = descend(
         lambda values: objective(rates_of(values, seeds)),
         start(),
         grids,
-        given.rounds,
+        rounds,
         lambda text: print(f"{text} ({time.time() - began:.0f} s)", file=sys.stderr),
     )
     columns = {"start": start(), "found": descent.values, "catalogue": fitted()}
     print("\n".join(report(descent, columns, seeds, others)))
-    print(f"\n{given.seeds} seeds, {time.time() - began:.0f} s; {where_measured()}")
+    print(f"\n{n} seeds, {time.time() - began:.0f} s; {where_measured()}")
 
 
 def report(descent: Descent, columns: Mapping[str, Values], seeds: range, others: range) -> Iterator[str]:

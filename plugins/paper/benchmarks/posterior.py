@@ -1,7 +1,6 @@
 """A posterior of the uncertain figures of the simulator, given results of the paper. Simulated.
 
-    python plugins/paper/benchmarks/posterior.py --out FOLDER --markdown FILE
-        [--particles 150] [--generations 6] [--minutes 30] [--short]
+    python plugins/paper/benchmarks/posterior.py --out FOLDER --markdown FILE [--minutes 30] [--short]
 
 It infers the figures of `paper_model.PRIORS`, with the explanations of `paper_model.EXPLANATIONS`, by approximate
 Bayesian computation with sequential Monte Carlo (pyABC; T. Toni et al., J. R. Soc. Interface 6 (2009) 187). Each
@@ -108,6 +107,10 @@ class Size(NamedTuple):
     """Particles that are predicted from, at most."""
     alone: int
     """Replicates of each explanation alone."""
+
+
+FULL: Final = Size(particles=150, generations=6, minutes=30.0, predicted=1000, alone=40)
+SHORT: Final = Size(particles=4, generations=1, minutes=30.0, predicted=4, alone=2)
 
 
 class Weighted(NamedTuple):
@@ -582,19 +585,13 @@ def main() -> None:
     )
     parser.add_argument("--out", type=Path, help="folder of the run; it is continued if it exists")
     parser.add_argument("--markdown", type=Path, help="the page to write; printed without")
-    parser.add_argument("--particles", type=int, default=150)
-    parser.add_argument("--generations", type=int, default=6, help="at most")
     parser.add_argument("--minutes", type=float, default=30.0, help="limit of the time of the inference")
-    parser.add_argument("--predicted", type=int, default=1000, help="particles to predict from, at most")
-    parser.add_argument("--alone", type=int, default=40, help="replicates of each explanation alone")
     parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     given = parser.parse_args()
     if given.out is None and not given.short:
         parser.error("name a folder for the run: --out FOLDER")
     logging.getLogger("ABC").setLevel(logging.WARNING)
-    size = Size(given.particles, given.generations, given.minutes, given.predicted, given.alone)
-    if given.short:
-        size = Size(particles=4, generations=1, minutes=30.0, predicted=4, alone=2)
+    size = (SHORT if given.short else FULL)._replace(minutes=given.minutes)
     began = time.time()
 
     def say(text: str) -> None:

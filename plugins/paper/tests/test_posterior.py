@@ -49,7 +49,8 @@ def test_the_page_has_every_figure_of_the_model_and_of_the_data():
 
 
 def test_no_bayes_factor_is_given_where_too_few_particles_have_an_explanation_or_lack_it():
-    posterior = pytest.importorskip("posterior", reason="needs pyabc")
+    pytest.importorskip("pyabc")
+    posterior = pytest.importorskip("posterior")
     w = np.full(100, 0.01)
     assert posterior.factor(np.arange(100) < 1, w) == "too few particles (1)"
     assert posterior.factor(np.arange(100) < 98, w) == "too few particles (2)"
@@ -132,7 +133,8 @@ def test_the_density_of_a_proposal_is_that_of_its_samples():
 @pytest.mark.long
 def test_an_inference_of_twenty_figures_finds_a_posterior_that_is_known(tmp_path):
     """Normal figures with linear data and normal errors: mean and standard deviation are known exactly."""
-    posterior = pytest.importorskip("posterior", reason="needs pyabc")
+    pytest.importorskip("pyabc")
+    posterior = pytest.importorskip("posterior")
     rng = np.random.default_rng(3)
     np.random.seed(3)  # noqa: NPY002 (pyABC draws from it)
     names = [f"x{k}" for k in range(20)]
