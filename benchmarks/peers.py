@@ -1,10 +1,10 @@
 """The simulator beside other ways to integrate the same grasps: six scenes, the controller closed everywhere.
 
     pip install -c constraints.txt -r benchmarks/requirements.txt
-    python benchmarks/peers.py [--scenes linear,...] [--repeats 5] [--short] > benchmarks/results/peers.md
+    python benchmarks/peers.py [--short] > benchmarks/results/peers.md
 
 `peer_scenes.py` has the scenes, written down apart from the simulator; `peer_engines.py` the engines. All engines of a
-scene are prepared first (set-up: compiling, choosing a model, loading), then each grasps in turn, `--repeats` times.
+scene are prepared first (set-up: compiling, choosing a model, loading), then each grasps in turn, five times.
 What is given is the median of the processor time of one grasp on one thread with its trace, and the least and greatest;
 the rms error of the force trace over the peak force; and the error of the peak force; both against a reference with
 every event located. `--short` runs two scenes once, without the solvers with error control, and checks only that
@@ -27,6 +27,8 @@ from graspsense.report.simulation import markdown_table
 
 WARM_S = 0.1
 """A shorter grasp is preceded by one that is not timed, since the engine before has left other data in the caches."""
+REPEATS = 5
+SHORT = ("linear contact", "snap")
 BOUND = 1e-2
 """Rms error within which the engines are compared."""
 SHOWS = (
@@ -58,18 +60,14 @@ class Row:
 
 
 def main() -> None:
-    parser = parser_of(__doc__)
-    parser.add_argument("--scenes", default="", help="parts of the names of scenes, separated by commas")
-    parser.add_argument("--repeats", type=int, default=5)
-    given = parser.parse_args()
-    if given.short:
-        given.scenes, given.repeats = "snap,linear", 1
+    short = parser_of(__doc__).parse_args().short
+    repeats = 1 if short else REPEATS
     rows = {
-        scene: compared(scene, given.repeats, adaptive=not given.short)
+        scene: compared(scene, repeats, adaptive=not short)
         for scene in SCENES
-        if any(name in scene.name for name in given.scenes.split(","))
+        if not short or scene.name in SHORT
     }
-    print("\n".join(page(rows, given.repeats)))
+    print("\n".join(page(rows, repeats)))
 
 
 def compared(scene: PeerScene, repeats: int, *, adaptive: bool) -> list[Row]:
