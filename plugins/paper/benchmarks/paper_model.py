@@ -14,25 +14,25 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from attrs import evolve
 from fit import (
+    FOLDS,
     SPLITS,
     SPREAD,
     TRIALS,
     Observed,
     Squeeze,
-    Tree,
-    answers,
     as_toml,
     by_the_splits,
     rate,
-    rate_of,
     rates_of_tables,
     squeeze_of,
 )
+from sklearn.model_selection import PredefinedSplit, cross_val_predict
 
-from graspsense.classifier_api import table_of
 from graspsense.core.values.trace import Trace
-from graspsense.plugin_api import Classifier, Features, create
+from graspsense.evaluation.folds import stratified
+from graspsense.plugin_api import Features, create
 from graspsense.sources.simulated import OBJECTS_PER_SEED, TRIALS_PER_SEED, Group, PlannedTrial
+from graspsense_c45 import C45Classifier
 from graspsense_paper.claims import split_by
 from graspsense_paper.grasping import measures
 from graspsense_paper.inference import Prior
@@ -372,16 +372,21 @@ def squeeze(
     return Trials([trial.label for _, trial in planned], [trial.extracted for trial in done])
 
 
-def tree_of(features: Sequence[Features], labels: Sequence[str]) -> Classifier[Any]:
-    """Return the C4.5 tree of these trials."""
-    tree = Tree().create()
-    tree.fit(table_of(features), labels, 0)
-    return tree
+def matrix_of(features: Sequence[Features]) -> Any:
+    """Return the features as an array, shape (trials, features)."""
+    return np.array([feature.values for feature in features])
 
 
-def answers_of(tree: Classifier[Any], features: Sequence[Features]) -> list[str]:
-    """Return the most probable label of each trial."""
-    return [tree.classes()[k] for k in tree.probabilities(table_of(features)).argmax(axis=1)]
+def answers(features: Sequence[Features], labels: Sequence[str], seed: int) -> list[str]:
+    """Return what a C4.5 tree with J48's defaults answers for each trial, in ten stratified folds."""
+    folds = PredefinedSplit(stratified(labels, FOLDS, seed))
+    predicted = cross_val_predict(C45Classifier(), matrix_of(features), list(labels), cv=folds)
+    return [str(label) for label in predicted]
+
+
+def rate_of(features: Sequence[Features], labels: Sequence[str], seed: int) -> float:
+    """Return how often a label is told, in ten stratified folds."""
+    return rate(answers(features, labels, seed), labels)
 
 
 def split(
@@ -467,10 +472,13 @@ def predictions(values: Values, seed: int) -> dict[str, float]:
     without_water = {kind: TRIALS[kind] for kind in CONTAINERS if kind != "water"}
     eleven = squeeze(without_water, values, seed, 20.0, feature_set.extract)
     figures["eleven_classes"] = rate_of(eleven.extracted, eleven.labels, seed)
-    tree = tree_of(trials.extracted, [state_of(label) for label in trials.labels])
+    states = [state_of(label) for label in trials.labels]
+    tree = C45Classifier().fit(matrix_of(trials.extracted), states)
     for name, kind in (("worn_bottles", "odwalla_worn"), ("other_new_bottles", "odwalla")):
         tested = squeeze({kind: TABLE_IV}, values, seed, 23.0, feature_set.extract, first_instance=500)
-        figures[name] = rate(answers_of(tree, tested.extracted), [state_of(label) for label in tested.labels])
+        figures[name] = rate(
+            tree.predict(matrix_of(tested.extracted)).tolist(), [state_of(label) for label in tested.labels]
+        )
     return {**figures, **_figures(values, seed)}
 
 
