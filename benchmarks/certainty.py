@@ -11,12 +11,12 @@ of its interval, or if a coverage lies below the one asked for by more than chan
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from arguments import parser_of
 from scipy.special import ndtri
 
 from graspsense.core.components.config import resolve
@@ -35,13 +35,10 @@ SMALL: Final = 10
 
 def main() -> int:
     """Grasp, predict, and print the tables."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = parser_of(__doc__)
     parser.add_argument("pipeline", nargs="?", default="default")
     parser.add_argument("--seed", type=int, default=7001)
     parser.add_argument("--instances", type=int, default=67)
-    parser.add_argument("--short", action="store_true", help="few grasps: shows that the program works")
     asked = parser.parse_args()
     if asked.short:
         asked.instances = 2

@@ -1,6 +1,6 @@
-"""One control tick of the PR2 driver, and how late the host wakes up for a report. No hardware.
+"""One control tick of the PR2 driver, alone, with predictions, and with each sink. No hardware.
 
-    python benchmarks/control.py [--grasps N] [--seconds S] [--json] [--short]
+    python benchmarks/control.py [--grasps N] [--short]
 
 The tick is what the runner does from the moment a report's bytes are in the process to the moment the command's are
 handed to the wire: decode, count, convert, the hybrid controller's step, the guard, encode. The reports are those of
@@ -10,17 +10,13 @@ its checkpoints, in turn: *paced* is the time from when a report is due to its c
 the same in the ticks during which the thread beside the loop computes. Further times they are played back with each of
 the sinks: a live page (*live*) and Foxglove (*foxglove*) that a viewer receives, a file of Rerun (*rerun*), an observer
 of a plugin (*observer*). Within each grasp the sink takes every other block of ticks, so that ticks with and without it
-meet the same machine. `added_p99` is how much more the 99th percentile of the tick is in the blocks that it takes, with
-a 95 % interval over pairs of blocks, once from when the report is in the process and once from when it is due
-(*due*); *handed_over* is what the runner spends on the sink after the command of a tick. The wake-up is measured apart,
-against a board that runs by the clock in a thread of the same process: how long after the report with the shortest
-delay, in device time, a report was in the driver's hands.
+meet the same machine. The last table says how much more the 99th percentile of the tick is in the blocks that it takes,
+with a 95 % interval over pairs of blocks, from when the report is in the process (*working*) and from when it is due
+(*due*); *handed over* is what the runner spends on the sink after the command of a tick.
 """
 
 from __future__ import annotations
 
-import argparse
-import math
 import os
 import subprocess
 import sys
@@ -32,8 +28,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+from arguments import parser_of
 from attrs import evolve
-from paced import tell
 
 from graspsense.core.components.config import resolve
 from graspsense.core.components.registry import installed
@@ -41,9 +37,10 @@ from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import Sink, run_grasp
 from graspsense.core.learn.model import model_for
 from graspsense.core.pipeline.anytime import Anytime, anytime_of
-from graspsense.experiments.versions import measured_on
+from graspsense.experiments.versions import where_measured
 from graspsense.live.feeds import FILE_TIMEOUT_S, LiveFeed
 from graspsense.plugin_api import SQUEEZE, DeviceInfo, create
+from graspsense.report.simulation import markdown_table
 from graspsense_pr2_gripper import backend as driver
 from graspsense_pr2_gripper import emulation, opening
 from graspsense_pr2_gripper.backend import Pr2Backend
@@ -218,7 +215,7 @@ def paced_us(grasps: int, sent: Sequence[bytes], feature: bytes) -> dict[str, li
     settings = resolve("default")
     model = model_for(settings, installed())
     period_s = 1.0 / decode_identity(feature).report_rate_hz
-    times_us: dict[str, list[float]] = {"paced": [], "paced_with_predictions": [], "predicting": []}
+    times_us: dict[str, list[float]] = {"paced": [], "paced with predictions": [], "predicting": []}
     for _ in range(grasps):
         for predicts in (False, True):
             wire = Playback(sent, feature, period_s)
@@ -230,7 +227,7 @@ def paced_us(grasps: int, sent: Sequence[bytes], feature: bytes) -> dict[str, li
                 if anytime is not None:
                     anytime.end()
             us = [ns / 1e3 for ns in wire.ticks_ns]
-            times_us["paced_with_predictions" if predicts else "paced"] += [us[k] for k in watched.squeeze]
+            times_us["paced with predictions" if predicts else "paced"] += [us[k] for k in watched.squeeze]
             times_us["predicting"] += [us[k] for k in watched.predicting]
     return times_us
 
@@ -268,10 +265,12 @@ def watched_feeds(folder: Path) -> Iterator[dict[str, LiveFeed]]:
         assert viewer.wait() == 0
 
 
-def watched_us(grasps: int, sent: Sequence[bytes], feature: bytes) -> dict[str, Any]:
-    """Return the times of the ticks with each sink and without it, and what the sinks take."""
+def watched_us(
+    grasps: int, sent: Sequence[bytes], feature: bytes
+) -> tuple[list[list[str]], dict[str, list[float]]]:
+    """Return what each sink adds to the ticks, as rows of a table, and the times that the runner spends on it (us)."""
     period_s = 1.0 / decode_identity(feature).report_rate_hz
-    pairs: dict[str, dict[str, list[tuple[list[float], list[float]]]]] = {}
+    pairs: dict[str, list[tuple[list[float], list[float]]]] = {}
     spent: dict[str, list[float]] = {}
     with TemporaryDirectory() as folder, watched_feeds(Path(folder)) as feeds:
         for grasp in range(grasps):
@@ -279,23 +278,17 @@ def watched_us(grasps: int, sent: Sequence[bytes], feature: bytes) -> dict[str, 
                 wire = Playback(sent, feature, period_s)
                 sink = InTurn(feed, wire, begins=grasp % 2 == 1)
                 played(wire, feature, sinks=[sink])
-                for column, ns in {"": wire.working_ns, "_due": wire.ticks_ns}.items():
+                for since, ns in {"working": wire.working_ns, "due": wire.ticks_ns}.items():
                     blocks = [[ns[k] / 1e3 for k in block] for block in sink.blocks]
-                    block_pairs = pairs.setdefault(name, {}).setdefault(column, [])
                     without, taken = (blocks[k::2] for k in (sink.begins, not sink.begins))
-                    block_pairs += zip(without, taken, strict=False)
-                spent.setdefault(name, []).extend(sink.us)
-    result: dict[str, Any] = {}
-    for name, columns in pairs.items():
-        for column, blocks in columns.items():
-            added_us, interval = added_p99(blocks)
-            result[f"{name}{column}_added_p99_us"] = round(added_us, 1)
-            result[f"{name}{column}_added_p99_us_interval"] = [round(end, 1) for end in interval]
-            for said, which in {"without": 0, "with": 1}.items():
-                ticks_us = [us for pair in blocks for us in pair[which]]
-                result |= distribution(f"{name}{column}_{said}", ticks_us)
-        result |= distribution(f"{name}_handed_over", spent[name])
-    return result
+                    pairs.setdefault(f"{name}, {since}", []).extend(zip(without, taken, strict=False))
+                spent.setdefault(f"{name}, handed over", []).extend(sink.us)
+    rows = []
+    for name, blocks in pairs.items():
+        added_us, (low_us, high_us) = added_p99(blocks)
+        p99 = (f"{np.quantile(np.concatenate([pair[k] for pair in blocks]), 0.99):.1f}" for k in (0, 1))
+        rows.append([name, *p99, f"{added_us:.1f} ({low_us:.1f} to {high_us:.1f})"])
+    return rows, spent
 
 
 def added_p99(pairs: Sequence[tuple[Sequence[float], Sequence[float]]]) -> tuple[float, list[float]]:
@@ -310,66 +303,30 @@ def added_p99(pairs: Sequence[tuple[Sequence[float], Sequence[float]]]) -> tuple
     return added(range(len(pairs))), [float(end) for end in np.quantile(draws, [0.025, 0.975])]
 
 
-def wake_ups_us(seconds: float) -> list[float]:
-    paced = Pr2Config(transport="emulated", pace="device", object="none", calibration="none")
-    board = opening.open_board(paced, 0, 0.0)
-    taken: list[tuple[float, float]] = []
-    try:
-        until = time.monotonic() + seconds
-        while time.monotonic() < until:
-            arrival = board.link.next(0.1)
-            if arrival is not None:
-                taken.append((arrival.report.time_us * 1e-6, time.monotonic()))
-    finally:
-        board.link.close()
-    offset_s = min(host_s - device_s for device_s, host_s in taken)
-    return [(host_s - device_s - offset_s) * 1e6 for device_s, host_s in taken]
-
-
-def distribution(name: str, values: Sequence[float]) -> dict[str, Any]:
-    ordered = sorted(values)
-
-    def quantile(share: float) -> float:
-        return round(ordered[min(math.ceil(share * len(ordered)), len(ordered)) - 1], 1)
-
-    histogram: dict[str, int] = {}
-    for value in ordered:
-        below = 1 << max(math.ceil(value), 1).bit_length()
-        histogram[f"below {below}"] = histogram.get(f"below {below}", 0) + 1
-    return {
-        f"{name}_count": len(ordered),
-        f"{name}_p50_us": quantile(0.5),
-        f"{name}_p90_us": quantile(0.9),
-        f"{name}_p99_us": quantile(0.99),
-        f"{name}_p999_us": quantile(0.999),
-        f"{name}_max_us": quantile(1.0),
-        f"{name}_histogram_us": histogram,
-    }
-
-
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = parser_of(__doc__)
     parser.add_argument("--grasps", type=int, default=5, help="how often the grasp is played back")
-    parser.add_argument("--seconds", type=float, default=5.0, help="how long the wake-ups are watched")
-    parser.add_argument("--json", action="store_true")
-    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     asked = parser.parse_args()
     if asked.short:
-        asked.grasps, asked.seconds = 1, 0.5
+        asked.grasps = 1
     sent, feature = recorded()
     paced = paced_us(asked.grasps, sent, feature)
-    watched = watched_us(asked.grasps, sent, feature)
-    result = {
-        **measured_on(),
-        "scheduler": SCHEDULERS.get(os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK, "other"),
-        **distribution("tick", ticks_us(asked.grasps, sent, feature)),
-        **{key: value for name, us in paced.items() if us for key, value in distribution(name, us).items()},
-        **watched,
-        **distribution("wake_up", wake_ups_us(asked.seconds)),
+    added, spent = watched_us(asked.grasps, sent, feature)
+    times_us = {
+        "tick": ticks_us(asked.grasps, sent, feature),
+        **paced,
+        **spent,
     }
-    tell(result, asked.json)
+    quantiles = (0.5, 0.99, 0.999, 1.0)
+    rows = [
+        [name, str(len(us)), *(f"{np.quantile(us, share):.1f}" for share in quantiles)]
+        for name, us in times_us.items()
+        if us
+    ]
+    scheduler = SCHEDULERS.get(os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK, "other")
+    print(f"{where_measured()}, scheduler {scheduler}\n")
+    print("\n".join(markdown_table(("time in µs", "number", "median", "99 %", "99.9 %", "most"), rows)))
+    print("\n".join(("", *markdown_table(("sink", "99 % without", "with", "added, 95 %"), added))))
 
 
 if __name__ == "__main__":

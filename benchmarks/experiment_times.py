@@ -10,10 +10,11 @@ first experiment alone.
 
 from __future__ import annotations
 
-import argparse
 import os
 import time
 from statistics import median
+
+from arguments import parser_of
 
 from graspsense.experiments.executors.serial import Serial
 from graspsense.experiments.experiment import number_of_trials, read_experiment, shipped
@@ -36,9 +37,8 @@ def seconds_per_trial(name: str) -> tuple[str, float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = parser_of(__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME")
-    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     given = parser.parse_args()
     asked = given.names or [name for name in shipped() if not read_experiment(name).parts]
     of_kind: dict[str, list[float]] = {}

@@ -1,31 +1,27 @@
 """Inject faults in every phase of a grasp with an emulated PR2 gripper, and print what its fingers then did.
 
-    python benchmarks/gripper_faults.py [--write benchmarks/results/pr2.md] [--json] [--short]
-    python benchmarks/gripper_faults.py --pushed [--short]
+    python benchmarks/gripper_faults.py [--pushed] [--short]
 
 The emulated board is treated as a real gripper, with the limits of a first closing. Each fault begins at five times:
 while the fingers open, early and late in the approach, in the squeeze, and in the hold; those times are taken from a
 grasp without a fault. The fault is on the left fingertip, then on the right one. The controllers are the three of
 graspsense, and four hostile ones. Effort and force are those of the simulated body, whatever the board reported.
 
-The table has a row for each fault and group of controllers, with the worst of its grasps. `--write` puts it between
-the marks of the page. `--pushed` prints instead how far one pad pushes a
-sound object before the other pad feels it, on the simulated gripper: what a limit on one finger alone has to endure.
+The table has a row for each fault and group of controllers, with the worst of its grasps. `--pushed` prints instead how
+far one pad pushes a sound object before the other pad feels it, on the simulated gripper: what a limit on one finger
+alone has to endure.
 `--short` runs a few of the grasps. Emulated and simulated; nothing was measured on a gripper.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
-import sys
 from collections.abc import Iterable, Iterator, Mapping
 from math import inf
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from attrs import asdict, evolve, frozen
+from arguments import parser_of
+from attrs import evolve, frozen
 
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import Grasp, run_grasp
@@ -38,6 +34,7 @@ from graspsense.plugin_api import (
     SensorBackend,
     create,
 )
+from graspsense.report.simulation import markdown_table
 from graspsense.testing.hostile import HOSTILE
 from graspsense_pr2_gripper.backend import Pr2Backend
 from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
@@ -45,9 +42,6 @@ from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
 OBJECT: Final = "odwalla:full_open"
 SEED: Final = 0
 CONTROLLERS: Final = ("hybrid", "velocity", "force")
-BEGIN, END = "<!-- faults: begin -->", "<!-- faults: end -->"
-
-
 RUN: Final = RunConfig(grasp_timeout_s=10.0)
 
 
@@ -184,31 +178,35 @@ def hostile() -> Iterator[FaultyGrasp]:
         yield result_of("fingertip stuck", "left", "2 s", name, 2.0, grasped(controller_named(name), stuck))
 
 
-def table(rows: Iterable[FaultyGrasp]) -> str:
+def table(rows: Iterable[FaultyGrasp]) -> list[str]:
     """Return the worst of each fault and controller as a table in Markdown."""
     groups: dict[tuple[str, str], list[FaultyGrasp]] = {}
     for row in rows:
         groups.setdefault((row.fault, row.controller), []).append(row)
-    lines = [
-        "| fault | controller | grasps | greatest effort | longest above 30 N | greatest force on a pad "
-        "| longest until release | outcomes | told |",
-        "|---|---|---|---|---|---|---|---|---|",
-    ]
+    cells = []
     for (fault, controller), group in groups.items():
         outcomes = ", ".join(dict.fromkeys(row.outcome for row in group))
         told = ", ".join(dict.fromkeys(word for row in group for word in row.words.split("; ") if word))
-        # A fault in the opening counts from the moment at which the fingers close.
-        longest = max(row.released_after_s for row in group)
-        released = "" if longest == -inf else f"{longest:.2f} s"
-        lines.append(
-            f"| {fault} | {controller} | {len(group)} | {max(row.largest_effort_n for row in group):.1f} N "
-            f"| {max(row.strong_s for row in group):.2f} s | {max(row.largest_force_n for row in group):.1f} N "
-            f"| {released} | {outcomes} | {told} |"
+        effort_n, strong_s, force_n, released_s = (
+            max(getattr(row, name) for row in group)
+            for name in ("largest_effort_n", "strong_s", "largest_force_n", "released_after_s")
         )
-    return "\n".join(lines)
+        # A fault in the opening counts from the moment at which the fingers close.
+        released = "" if released_s == -inf else f"{released_s:.2f} s"
+        figures = (f"{effort_n:.1f} N", f"{strong_s:.2f} s", f"{force_n:.1f} N", released)
+        cells.append((fault, controller, str(len(group)), *figures, outcomes, told))
+    heads = (
+        "fault",
+        "controller",
+        "grasps",
+        "greatest effort",
+        "longest above 30 N",
+        "greatest force on a pad",
+    )
+    return markdown_table((*heads, "longest until release", "outcomes", "told"), cells)
 
 
-def pushed(instances: int) -> str:
+def pushed(instances: int) -> list[str]:
     """Return as a table how far, how long and how hard one pad pushes each object of the catalogue, at most."""
     gripper, controller = create("sensor-backend", "sim"), create("controller", "hybrid")
     contact_n = controller.contact_force_n()
@@ -223,42 +221,26 @@ def pushed(instances: int) -> str:
         travel_m, time_s = trace.gap_m[begin] - trace.gap_m[end], trace.t_s[end] - trace.t_s[begin]
         return float(travel_m), float(time_s), float(forces.max(initial=0.0))
 
-    lines = ["| object | travel | time | force |", "|---|---|---|---|"]
+    rows = []
     for name in (name for kind in gripper.objects() for name in kind.full_names):
         scenes = [f"{name}#{number}" for number in range(instances)]
         grasps = gripper.run_many(controller, scenes, list(range(instances)), run=RunConfig(), extract=push)
         travel_m, time_s, force_n = np.max([grasp.extracted for grasp in grasps], axis=0)
-        lines.append(f"| {name} | {travel_m * 1e3:.1f} mm | {time_s:.2f} s | {force_n:.1f} N |")
-    return "\n".join(lines)
+        rows.append((name, f"{travel_m * 1e3:.1f} mm", f"{time_s:.2f} s", f"{force_n:.1f} N"))
+    return markdown_table(("object", "travel", "time", "force"), rows)
 
 
 def main() -> None:
     """Run the grasps and print the table."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--write", type=Path, help="page whose table is replaced")
-    parser.add_argument("--json", action="store_true")
+    parser = parser_of(__doc__)
     parser.add_argument("--pushed", action="store_true", help="how far one pad pushes a sound object")
-    parser.add_argument("--short", action="store_true")
     given = parser.parse_args()
     if given.pushed:
-        print(pushed(1 if given.short else 12))
+        print("\n".join(pushed(1 if given.short else 12)))
         return
     rows = list(injected(("hybrid",), FAULTS[:1], ("left",)) if given.short else injected(CONTROLLERS))
     rows += hostile()
-    if given.json:
-        json.dump([asdict(row) for row in rows], sys.stdout, indent=1)
-        return
-    text = table(rows)
-    print(text)
-    if given.write is not None:
-        page = given.write.read_text(encoding="utf-8")
-        head, _, tail = page.partition(BEGIN)
-        _, mark, tail = tail.partition(END)
-        if not mark:
-            sys.exit(f"{given.write} has no {BEGIN} and {END} to put the table between")
-        given.write.write_text(f"{head}{BEGIN}\n{text}\n{END}{tail}", encoding="utf-8")
+    print("\n".join(table(rows)))
 
 
 if __name__ == "__main__":

@@ -11,10 +11,10 @@ the mean of all repeats.
 
 from __future__ import annotations
 
-import argparse
 import math
 
 import numpy as np
+from arguments import parser_of
 from scipy.special import stdtrit
 
 from graspsense.core.components.config import SelectedComponent
@@ -96,11 +96,8 @@ def evaluated(k: int, repeats: int, classifier: str = "c45") -> dict[str, float]
 
 def main() -> None:
     """Print both tables."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = parser_of(__doc__)
     parser.add_argument("--repeats", type=int, default=2000)
-    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     given = parser.parse_args()
     repeats = 2 if given.short else given.repeats
     print(f"{where_measured()}, {repeats} repeats\n")

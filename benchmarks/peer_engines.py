@@ -7,7 +7,6 @@ choosing a model, loading) is set-up and timed apart.
 from __future__ import annotations
 
 import ctypes
-import math
 import time
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
@@ -151,29 +150,6 @@ def euler(scene: PeerScene, count: int) -> Engine:
     return _engine("numba loop, Euler", f"{1e3 / count:g} us", loop, scene)
 
 
-def linear_by_hand(count: int) -> Engine:
-    """Return the thirty lines that somebody would write for linear contact only: scalars, dampers implicit."""
-    h = TICK / count
-
-    @njit
-    def loop(_: Any, xs: Any, forces: Any, us: Any) -> None:
-        x = v = y = w = integral = 0.0
-        since = -1.0
-        jaw, light = 1.0 / (1.0 + h * B / M), 1.0 / (1.0 + h * C / LIGHT)
-        for tick in range(TICKS):
-            force = KC * max(x - y - X0, 0.0)
-            u, integral, since = law(tick * TICK, x, v, force, integral, since)
-            xs[tick], forces[tick], us[tick] = x, force, u
-            for _ in range(count):
-                force = KC * max(x - y - X0, 0.0)
-                v = (v + h * (u - force) / M) * jaw
-                w = (w + h * (force - K * y) / LIGHT) * light
-                x += h * v
-                y += h * w
-
-    return _engine("numba loop by hand, Euler", f"{1e3 / count:g} us", loop, SCENES[0])
-
-
 def _rk4_step(scene: PeerScene) -> Any:
     rates = scene.rates
 
@@ -191,30 +167,6 @@ def _rk4_step(scene: PeerScene) -> Any:
             k[4, i] = s[i] + h / 6.0 * (k[0, i] + 2.0 * k[1, i] + 2.0 * k[2, i] + k[3, i])
 
     return step
-
-
-def rk4(scene: PeerScene, count: int) -> Engine:
-    """Return a classical Runge-Kutta loop of fixed steps. Events count from the end of a step."""
-    output, settle, step, n_guards = scene.output, settled(scene), _rk4_step(scene), scene.n_guards
-    h = TICK / count
-
-    @njit
-    def loop(start: Any, xs: Any, forces: Any, us: Any) -> None:
-        n = len(start)
-        s, k, middle = start.copy(), np.zeros((5, n)), np.zeros(n)
-        mode, g = np.zeros(MODES, np.int64), np.zeros(n_guards)
-        integral, since = 0.0, -1.0
-        for tick in range(TICKS):
-            x, v, force = output(s, mode)
-            u, integral, since = law(tick * TICK, x, v, force, integral, since)
-            xs[tick], forces[tick], us[tick] = x, force, u
-            settle(s, u, mode, g)
-            for _ in range(count):
-                step(s, u, mode, h, k, middle)
-                s[:] = k[4]
-                settle(s, u, mode, g)
-
-    return _engine("numba loop, RK4", f"{1e3 / count:g} us", loop, scene)
 
 
 def located_rk4(scene: PeerScene, count: int) -> Engine:
@@ -269,13 +221,8 @@ def located_rk4(scene: PeerScene, count: int) -> Engine:
 
 def loops(scene: PeerScene) -> Iterator[Callable[[], Engine]]:
     """Yield what prepares each loop."""
-    if scene is SCENES[0]:
-        for count in (1, 4, 16):
-            yield lambda count=count: linear_by_hand(count)
     for count in (1, 4, 16):
         yield lambda count=count: euler(scene, count)
-    for count in (1, 4, 16):
-        yield lambda count=count: rk4(scene, count)
     for count in (1, 4):
         yield lambda count=count: located_rk4(scene, count)
 
@@ -395,7 +342,7 @@ def solvers(scene: PeerScene) -> Iterator[Callable[[], Engine]]:
 
 NATIVE = f"""
 <mujoco>
-  <option timestep="{{step:.12g}}" integrator="{{integrator}}" gravity="0 0 0">
+  <option timestep="{{step:.12g}}" integrator="Euler" gravity="0 0 0">
     <flag contact="disable" constraint="disable"/>
   </option>
   <worldbody>
@@ -412,7 +359,7 @@ NATIVE = f"""
 
 APPLIED = """
 <mujoco>
-  <option timestep="{step:.12g}" integrator="{integrator}" gravity="0 0 0">
+  <option timestep="{step:.12g}" integrator="Euler" gravity="0 0 0">
     <flag contact="disable" constraint="disable"/>
   </option>
   <worldbody>
@@ -424,28 +371,25 @@ APPLIED = """
 """A joint with the inertia of the drive; the loop applies the force of object and friction in each step."""
 
 
-def mujoco_engine(scene: PeerScene, integrator: str, count: int, *, native: bool) -> Engine:
+def mujoco_engine(scene: PeerScene, count: int) -> Engine:
     """Return MuJoCo's step, called as C from the compiled loop, with the controller closed.
 
-    `native`: object and contact are MuJoCo's own springs and dampers, with its own implicit treatment of dampers.
-    Otherwise the loop computes the force in each step and integrates the states that are not the joint's.
+    In the first scene object and contact are MuJoCo's own springs and dampers, with its own implicit treatment of
+    dampers. Elsewhere the loop computes the force in each step and integrates the states that are not the joint's.
     """
     import mujoco
 
     # The profiling clock that the Python package installs takes a large part of each step.
     mujoco.set_mjcb_time(None)
-    h = TICK / count
+    h, native, inertia = TICK / count, scene is SCENES[0], scene.inertia
     xml = NATIVE if native else APPLIED
-    model = mujoco.MjModel.from_xml_string(
-        xml.format(step=h, integrator=integrator, armature=scene.inertia - 1e-6)
-    )
+    model = mujoco.MjModel.from_xml_string(xml.format(step=h, armature=inertia - 1e-6))
     data = mujoco.MjData(model)
     (library,) = Path(mujoco.__file__).parent.glob("libmujoco.so*")
     mj_step = ctypes.CDLL(str(library)).mj_step
     mj_step.argtypes, mj_step.restype = (ctypes.c_size_t, ctypes.c_size_t), None
     model_at, data_at = model._address, data._address
     rates, output, settle, n_guards = scene.rates, scene.output, settled(scene), scene.n_guards
-    inertia, own = scene.inertia, native
 
     @njit
     def loop(start: Any, xs: Any, forces: Any, us: Any, position: Any, speed: Any, applied: Any) -> None:
@@ -458,7 +402,7 @@ def mujoco_engine(scene: PeerScene, integrator: str, count: int, *, native: bool
             xs[tick], forces[tick], us[tick] = x, force, u
             settle(s, u, mode, g)
             for _ in range(count):
-                if own:
+                if native:
                     applied[0] = u
                     mj_step(model_at, data_at)
                     s[0], s[1], s[2], s[3] = position[0], speed[0], position[1], speed[1]
@@ -481,21 +425,15 @@ def mujoco_engine(scene: PeerScene, integrator: str, count: int, *, native: bool
     grasp()
     how = "own springs" if native else "forces applied"
     return Engine(
-        name=f"MuJoCo {mujoco.__version__} {integrator}, {how}", setting=f"{1e3 / count:g} us", grasp=grasp
+        name=f"MuJoCo {mujoco.__version__} Euler", setting=f"{how}, {1e3 / count:g} us", grasp=grasp
     )
 
 
 def mujoco_engines(scene: PeerScene) -> Iterator[Callable[[], Engine]]:
     """Yield what prepares MuJoCo, if it is installed."""
-    if find_spec("mujoco") is None:
-        return
-    native = scene is SCENES[0]
-    for count in (1, 4):
-        yield lambda count=count: mujoco_engine(scene, "Euler", count, native=native)
-    if native:
-        yield lambda: mujoco_engine(scene, "implicitfast", 1, native=True)
+    if find_spec("mujoco") is not None:
         for count in (1, 4):
-            yield lambda count=count: mujoco_engine(scene, "RK4", count, native=True)
+            yield lambda count=count: mujoco_engine(scene, count)
 
 
 def prepared(prepare: Callable[[], Engine]) -> tuple[Engine, float]:
@@ -509,5 +447,4 @@ def timed(engine: Engine) -> tuple[Run, float]:
     """Return one grasp, and its processor time (s)."""
     began = time.thread_time()
     run = engine.grasp()
-    seconds = time.thread_time() - began
-    return run, seconds if math.isfinite(seconds) else math.nan
+    return run, time.thread_time() - began

@@ -18,6 +18,7 @@ from graspsense.simulator_api import RunConfig
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.error import GraspRecord, deviation
 from graspsense_sim_gripper.run.accuracy.model import Reduction
+from graspsense_sim_gripper.run.accuracy.propose import NOT_VERIFIED
 from graspsense_sim_gripper.run.accuracy.select import select
 from graspsense_sim_gripper.run.batch.buffers import Storage
 from graspsense_sim_gripper.run.batch.compiled_grasps import CompiledStart, grasp_compiled
@@ -136,6 +137,16 @@ def error_of(grasp: FinishedGrasp, reference: FinishedGrasp) -> tuple[float, str
     """Return the largest error of all quantities, and the quantity."""
     dt = 1.0 / SimConfig().rate_hz
     return deviation(record_of(grasp, dt), record_of(reference, dt))
+
+
+def flags_of(done: FinishedGrasp, reduction: Reduction, config: SimConfig) -> list[str]:
+    """Return what the report of a grasp says against its trace; nothing if it is verified."""
+    flags = [NOT_VERIFIED] if reduction.unresolved else []
+    if done.state.step.unresolved + done.state.contact.unbalanced > 0:
+        flags.append("not resolved")
+    if reduction.verification is None and not config.has_forced_steps:
+        flags.append("not verified")
+    return flags
 
 
 class Bench:

@@ -11,8 +11,7 @@ With `--folds 5` there is a row of `graspsense train SOURCE --choose`: the rate 
 each fold is made without this fold. Its time is that of all candidates.
 
 Prints a table for each source as Markdown. For several sources, the mean over them follows, with the difference from
-the best of the others and its 95 % interval: Student's t over the sources. `--mean FILE` prints that for the tables in
-a file.
+the best of the others and its 95 % interval: Student's t over the sources.
 """
 
 from __future__ import annotations
@@ -20,7 +19,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import re
 import subprocess
 import sys
 import tempfile
@@ -31,6 +29,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from arguments import parser_of
 from scipy import stats
 
 from graspsense.cli.choosing import chosen
@@ -45,6 +44,7 @@ from graspsense.evaluation.choosing import FOLDS
 from graspsense.evaluation.intervals import percentage, percentages
 from graspsense.evaluation.ranking import OutsideAnswers, Ranking, protocols_of, rank
 from graspsense.recording.reader import read_recorded
+from graspsense.report.simulation import markdown_table
 from graspsense.sources.trial_source import STORE, TrialSource, labelled_trials
 from graspsense.store.store import COUNTS, Store
 
@@ -55,18 +55,7 @@ POINTS = 128
 """Number of times of a curve."""
 LONGEST = 0.95
 """Quantile of the durations up to which curves are compared; the last value of a shorter one goes on."""
-SHORT = [
-    "--classifiers",
-    "tree",
-    "--feature-sets",
-    "chitta,catch22",
-    "--instances",
-    "3",
-    "--trials",
-    "1",
-    "--folds",
-    "3",
-]
+SHORT = "--classifiers tree --feature-sets chitta,catch22 --instances 3 --trials 1 --folds 3"
 
 
 def measured(source: str, given: argparse.Namespace, options: Sequence[str]) -> Ranking:
@@ -193,78 +182,62 @@ def told(what: str, done: int, total: int) -> None:
 
 def markdown(ranking: Ranking) -> str:
     """Return the verdict and the table of a comparison."""
-    lines = [
-        f"{ranking.trials} {ranking.source}, compared by {ranking.protocol.replace('_', ' ')}. {ranking.verdict}",
-        "",
-        "| classifier | features | recognised | loss in points | standing | sets cover | training |",
-        "|" + "---|" * 7,
-    ]
+    rows = []
     for candidate in ranking.candidates:
-        rate = candidate.rates[ranking.protocol]
+        rate, sets = candidate.rates[ranking.protocol], candidate.sets
         interval = f" ({percentages(rate.interval)})" if rate.interval else ""
-        covered = candidate.sets.covered if candidate.sets is not None else None
-        cells = [
-            f"`{candidate.classifier}`" if candidate.sets is not None else candidate.classifier,
-            f"`{candidate.features}`" if candidate.sets is not None else candidate.features,
-            percentage(rate.rate) + interval,
-            "" if candidate.loss is None else candidate.loss.points,
-            candidate.standing,
-            "" if covered is None else percentage(covered.rate),
-            f"{candidate.training_s:.2g} s",
-        ]
-        lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join([*lines, "", *(f"- {note}" for note in ranking.notes)])
+        names = (candidate.classifier, candidate.features)
+        covered = sets.covered if sets is not None else None
+        rows.append(
+            (
+                *(names if sets is None else (f"`{name}`" for name in names)),
+                percentage(rate.rate) + interval,
+                "" if candidate.loss is None else candidate.loss.points,
+                candidate.standing,
+                "" if covered is None else percentage(covered.rate),
+                f"{candidate.training_s:.2g} s",
+            )
+        )
+    heads = ("classifier", "features", "recognised", "loss in points", "standing", "sets cover", "training")
+    compared = f"{ranking.trials} {ranking.source}, compared by {ranking.protocol.replace('_', ' ')}."
+    notes = (f"- {note}" for note in ranking.notes)
+    return "\n".join((f"{compared} {ranking.verdict}", "", *markdown_table(heads, rows), "", *notes))
 
 
-def mean_over(text: str) -> str:
-    """Return a table of the means over the tables in a text, with the differences from the best of the others."""
-    sources = re.findall(r"^\d+ (?:\w+:)?(\S+), compared by", text, re.MULTILINE)
+def mean_over(rankings: Sequence[Ranking]) -> list[str]:
+    """Return a table of the means over the sources, with the differences from the best of the others."""
     rates: dict[str, list[float]] = {}
-    for name, features, rate in re.findall(r"^\| (\S[^|]*) \| ([^|]+) \| ([0-9.]+) %", text, re.MULTILINE):
-        rates.setdefault(f"{name} with {features}", []).append(float(rate))
-    complete = {name: np.array(shares) for name, shares in rates.items() if len(shares) == len(sources)}
+    for ranking in rankings:
+        for candidate in ranking.candidates:
+            name = f"{candidate.classifier} with {candidate.features}"
+            rates.setdefault(name, []).append(100.0 * candidate.rates[ranking.protocol].rate)
+    complete = {name: np.array(shares) for name, shares in rates.items() if len(shares) == len(rankings)}
     others = [name for name in complete if name.endswith(CURVES)]
     best = max(others, key=lambda name: complete[name].mean())
-    lines = [
-        f"| candidate | {' | '.join(Path(source).name for source in sources)} | mean | difference from {best} |",
-        "|" + "---|" * (len(sources) + 3),
-    ]
+    rows = []
     for name, shares in sorted(complete.items(), key=lambda item: -item[1].mean()):
         apart = shares - complete[best]
         half = stats.t.ppf(0.975, len(shares) - 1) * apart.std(ddof=1) / np.sqrt(len(shares))
         words = f"{apart.mean():+.1f} ({apart.mean() - half:+.1f} to {apart.mean() + half:+.1f})"
-        cells = [
-            name,
-            *(f"{rate:.1f}" for rate in shares),
-            f"{shares.mean():.1f}",
-            "" if name == best else words,
-        ]
-        lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines)
+        means = (f"{rate:.1f}" for rate in (*shares, shares.mean()))
+        rows.append((name, *means, "" if name == best else words))
+    sources = (ranking.source.rpartition(":")[2].rpartition("/")[2] for ranking in rankings)
+    return markdown_table(("candidate", *sources, "mean", f"difference from {best}"), rows)
 
 
 def main() -> None:
     words = sys.argv[1:]
     sources = list(takewhile(lambda word: not word.startswith("-"), words))
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = parser_of(__doc__)
     parser.add_argument("--aeon-python", metavar="PATH", help="the Python of an environment with aeon")
-    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
-    parser.add_argument(
-        "--mean", metavar="FILE", help="print the mean over the tables in this file, nothing else"
-    )
     given, options = parser.parse_known_args(words[len(sources) :])
-    if given.mean:
-        print(mean_over(Path(given.mean).read_text(encoding="utf-8")))
-        return
-    options += SHORT if given.short else ()
-    tables = []
+    options += SHORT.split() if given.short else ()
+    rankings = []
     for source in sources or ["simulated"]:
-        tables.append(markdown(measured(source, given, options)))
-        print(tables[-1], end="\n\n", flush=True)
-    if len(tables) > 1:
-        print(mean_over("\n".join(tables)))
+        rankings.append(measured(source, given, options))
+        print(markdown(rankings[-1]), end="\n\n", flush=True)
+    if len(rankings) > 1:
+        print("\n".join(mean_over(rankings)))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,6 @@
 """Classifiers of others on the trials and folds of benchmarks/recognition.py.
 
     python benchmarks/recognition_peers.py TRIALS.npz ANSWERS.json
-    python benchmarks/recognition_peers.py --short
 
 With the environment of graspsense:
 
@@ -167,38 +166,18 @@ def answers_of(data: dict, seed: int) -> dict:
     return answers
 
 
-def synthetic() -> dict:
-    """Return a few trials of two labels, for the short form."""
-    rng = np.random.default_rng(0)
-    labels = np.array(["soft", "stiff"] * 12)
-    steep = np.where(labels == "stiff", 2.0, 1.0)
-    curves = steep[:, np.newaxis, np.newaxis] * np.linspace(0.0, 1.0, 128)
-    curves = curves + 0.05 * rng.normal(size=(24, 2, 128))
-    return {
-        "labels": labels, "instances": np.arange(24) // 2, "features": curves.mean(axis=2), "curves": curves,
-        "folds": np.arange(24) // 2 % 2,
-    }  # fmt: skip
-
-
-def main() -> int:
+def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("trials", type=Path, nargs="?")
-    parser.add_argument("answers", type=Path, nargs="?")
+    parser.add_argument("trials", type=Path)
+    parser.add_argument("answers", type=Path)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument(
-        "--short", action="store_true", help="a few synthetic trials, only to show that it runs"
-    )
     given = parser.parse_args()
-    if given.short:
-        print(json.dumps(answers_of(synthetic(), given.seed)))
-        return 0
     with np.load(given.trials) as stored:
         data = {name: stored[name] for name in stored.files}
     given.answers.write_text(json.dumps(answers_of(data, given.seed)), encoding="utf-8")
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

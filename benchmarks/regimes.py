@@ -1,6 +1,6 @@
 """Where the chosen steps have the accuracy that is asked for. Simulated.
 
-    python benchmarks/regimes.py [--scenes 1500] [--rows FILE] [--markdown FILE] [--first N] [--short]
+    python benchmarks/regimes.py [--scenes 1500] [--rows FILE] [--first N] [--short]
 
 The scenes are drawn from the ranges that gripper, object and controller may physically have, not from those in which
 the simulator works, and apart from those of `random_scenes.py`. Their seeds are fresh unless `--first` names the first.
@@ -17,21 +17,20 @@ import json
 import math
 import secrets
 import sys
-import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from arguments import parser_of
 from attrs import evolve
-from random_scenes import Bench, Scene, controller_is_stable, record_of
+from random_scenes import Bench, Scene, controller_is_stable, flags_of, record_of
 
 from graspsense.evaluation.intervals import wilson
 from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import ConfigError
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.error import deviation
-from graspsense_sim_gripper.run.accuracy.propose import NOT_VERIFIED
 from graspsense_sim_gripper.run.batch.job import FinishedGrasp
 from graspsense_sim_gripper.scene.spec import ObjectSpec
 from graspsense_sim_gripper.scene.terms.registry import in_order
@@ -143,37 +142,43 @@ def _case(
     except ArithmeticError as error:
         return {"error": math.inf, "refused": f"{type(error).__name__}: {error}"}
     error, quantity = deviation(record_of(done, dt_s), record_of(reference, dt_s))
-    state = done.state
-    flags = []
-    if reduction.unresolved:
-        flags.append(NOT_VERIFIED)
-    if state.step.unresolved + state.contact.unbalanced > 0:
-        flags.append("not resolved")
-    if reduction.verification is None and not job.config.has_forced_steps:
-        flags.append("not verified")
     return {
         "error": error,
         "of": quantity,
-        "flags": flags,
+        "flags": flags_of(done, reduction, job.config),
         "chosen": reduction.decisions[0].decision,
     }
 
 
-def run(bench: Bench, file: Path, scenes: int, first_scene: int) -> list[Row]:
+def run(measure: Callable[[int], Row], file: Path | None, scenes: int, first_scene: int | None) -> list[Row]:
     """Measure scenes until the file holds as many, and append them; return all rows.
 
-    The file may be the rows of several runs, one after the other.
+    The file may be the rows of several runs, one after the other. The seeds are fresh without a number of the first.
     """
-    rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
-    begin = rows[-1]["scene"] + 1 if rows else first_scene
-    for number in range(begin, begin + scenes - len(rows)):
-        row = {"scene": number, **measured(bench, scene_of(number))}
-        rows.append(row)
-        with file.open("a") as out:
-            out.write(json.dumps(row) + "\n")
+    rows: list[Row] = []
+    if file is not None and file.exists():
+        rows = [json.loads(line) for line in file.read_text().splitlines()]
+    if rows:
+        first_scene = rows[-1]["scene"] + 1
+    elif first_scene is None:
+        first_scene = secrets.randbelow(2**31)
+    for number in range(first_scene, first_scene + scenes - len(rows)):
+        rows.append({"scene": number, **measure(number)})
+        if file is not None:
+            with file.open("a") as out:
+                out.write(json.dumps(rows[-1]) + "\n")
         print(f"\r{len(rows)} scenes", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
     return rows
+
+
+def options(description: str | None, scenes: int) -> argparse.ArgumentParser:
+    """Return the options of a program that measures random scenes."""
+    parser = parser_of(description)
+    parser.add_argument("--scenes", type=int, default=scenes)
+    parser.add_argument("--first", type=int)
+    parser.add_argument("--rows", type=Path, help="JSON lines of the finished scenes, to go on with later")
+    return parser
 
 
 def share_words(n: int, total: int) -> str:
@@ -193,7 +198,7 @@ def page(rows: Sequence[Row]) -> str:
         "# Regimes of the simulator",
         "",
         *_summary(stable),
-        "Written by `python benchmarks/regimes.py --markdown benchmarks/results/regimes.md`. Simulated.",
+        "Written by `python benchmarks/regimes.py > benchmarks/results/regimes.md`. Simulated.",
         "Scenes are drawn from physical ranges, apart from the scenes on which the simulator was developed:",
         "contact stiffness 1e2 to 1e7 N/m, moving mass 0.5 to 300 kg, mass ratio 1e-5 to 10, damping ratio",
         "1e-3 to 30, head space 1e-7 to 2e-3 m³, vent 0 to 1e-4 m², relaxation time 1e-6 to 1e4 s,",
@@ -303,26 +308,11 @@ def _misses(rows: Sequence[Row]) -> Iterator[str]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--scenes", type=int, default=1500)
-    parser.add_argument("--first", type=int)
-    parser.add_argument("--rows", type=Path, help="JSON lines of the finished scenes, to go on with later")
-    parser.add_argument("--markdown", type=Path)
-    parser.add_argument("--interpreter", action="store_true", help="compile nothing, for a few scenes")
-    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
-    given = parser.parse_args()
-    first_scene = given.first if given.first is not None else secrets.randbelow(2**31)
+    given = options(__doc__, 1500).parse_args()
     if given.short:
-        given.scenes, first_scene = 1, 1  # a scene drawn anew may take minutes
-    with tempfile.TemporaryDirectory() as folder:
-        bench = Bench(compiled=not (given.short or given.interpreter))
-        rows = run(bench, given.rows or Path(folder) / "rows.jsonl", given.scenes, first_scene)
-    if given.markdown:
-        given.markdown.write_text(page(rows), encoding="utf-8")
-    else:
-        print(page(rows))
+        given.scenes, given.first = 1, 1  # a scene drawn anew may take minutes
+    bench = Bench(compiled=not given.short)
+    print(page(run(lambda number: measured(bench, scene_of(number)), given.rows, given.scenes, given.first)))
 
 
 if __name__ == "__main__":

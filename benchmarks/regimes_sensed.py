@@ -21,22 +21,16 @@ result.
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
-import secrets
-import sys
-import tempfile
 from collections.abc import Sequence
 from contextlib import suppress
-from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
 from random_scenes import KINDS, Bench, Scene, controller_is_stable
-from regimes import scene_of, share_words
+from regimes import options, run, scene_of, share_words
 from scipy.stats import binomtest
 
 from graspsense.experiments.versions import where_measured
@@ -162,7 +156,7 @@ def finest(bench: Bench, scene: Scene) -> Grasps:
 
 def measured(bench: Bench, number: int, instances: int) -> Row:
     """Return the distances of a scene, from so many instances."""
-    scene, row = sensed(scene_of(number)), {"scene": number}
+    scene, row = sensed(scene_of(number)), {}
     try:
         best = finest(bench, scene)
         row["by"] = best.job.config.fidelity
@@ -258,31 +252,13 @@ def page(rows: Sequence[Row], instances: int) -> list[str]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--scenes", type=int, default=500)
+    parser = options(__doc__, 500)
     parser.add_argument("--instances", type=int, default=640)
-    parser.add_argument("--first", type=int)
-    parser.add_argument("--rows", type=Path, help="JSON lines of the finished scenes, to go on with later")
-    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     given = parser.parse_args()
-    first_scene = given.first if given.first is not None else secrets.randbelow(2**31)
     if given.short:
-        given.scenes, given.instances, first_scene = 1, 5, 1
-    with tempfile.TemporaryDirectory() as folder:
-        file = given.rows or Path(folder) / "rows.jsonl"
-        rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
-        first_scene = rows[0]["scene"] if rows else first_scene
-        known = {row["scene"] for row in rows}
-        bench = Bench(compiled=not given.short)
-        for number in range(first_scene, first_scene + given.scenes):
-            if number in known:
-                continue
-            rows.append(measured(bench, number, given.instances))
-            with file.open("a") as out:
-                out.write(json.dumps(rows[-1]) + "\n")
-            print(f"\r{len(rows)} scenes", end="", file=sys.stderr, flush=True)
+        given.scenes, given.instances, given.first = 1, 5, 1
+    bench = Bench(compiled=not given.short)
+    rows = run(lambda number: measured(bench, number, given.instances), given.rows, given.scenes, given.first)
     print("\n".join(page(rows, given.instances)))
 
 

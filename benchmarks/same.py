@@ -1,6 +1,6 @@
 """Compare two versions of the project to the last bit, and their speed in turn. Simulated grasps.
 
-    python benchmarks/same.py [BASE] [--scenes 60] [--rounds 9] [--only NAME ...] [--keep FOLDER] [--json] [--short]
+    python benchmarks/same.py [BASE] [--scenes 60] [--rounds 9] [--only NAME ...] [--keep FOLDER] [--short]
 
 BASE is a commit, or a folder with a checkout; without it, this checkout is compared with itself. It is compared with
 the checkout that this file belongs to, which the running interpreter has installed. BASE gets an environment of its
@@ -26,7 +26,6 @@ import statistics
 import subprocess
 import sys
 import tempfile
-import tomllib
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from datetime import date
@@ -34,6 +33,7 @@ from pathlib import Path
 from typing import IO, Any, Final
 
 import numpy as np
+from arguments import parser_of
 from attrs import field, frozen
 
 ROOT: Final = Path(__file__).resolve().parent.parent
@@ -183,13 +183,9 @@ def base_version(base: str, keep: Path) -> Version:
 
 def catalogue() -> list[str]:
     """Return the names of all objects of the catalogue, each in each of its states."""
-    (path,) = (ROOT / "plugins" / "sim_gripper" / "src").rglob("catalogue.toml")
-    tables = tomllib.loads(path.read_text(encoding="utf-8"))
-    names = []
-    for name, table in tables.items():
-        states = table.get("states")
-        names += [f"{name}:{state}" for state in states] if states else [name]
-    return names
+    from graspsense_sim_gripper.scene.library import catalogue as specs
+
+    return list(specs())
 
 
 def scene_files(count: int, folder: Path) -> list[dict[str, Any]]:
@@ -233,11 +229,10 @@ def versions_of(version: Version) -> dict[str, str]:
     return versions
 
 
-def compare(
-    probes: Sequence[Probe], names: Sequence[str], request: dict[str, Any], folder: Path
-) -> list[dict[str, Any]]:
-    """Record each group in both versions, side by side, and return what differs."""
-    groups = []
+def compare(probes: Sequence[Probe], names: Sequence[str], request: dict[str, Any], folder: Path) -> bool:
+    """Record each group in both versions, side by side, print what differs, and return whether anything does."""
+    differ = False
+    print(f"{'group':<20} {'compared':>9} {'different':>9}")
     for name in names:
         files = [folder / f"{k}.npz" for k in range(2)]
         for probe, path in zip(probes, files, strict=True):
@@ -245,59 +240,32 @@ def compare(
         for probe in probes:
             probe.answer()
         count, unlike = differences(*files)
-        groups.append({"group": name, "compared": count, "different": unlike})
-        print(f"same: {name}: {len(unlike)} of {count} differ", file=sys.stderr)
-    return groups
+        print(f"{name:<20} {count:>9} {len(unlike):>9}", flush=True)
+        for array in unlike[:LISTED]:
+            print(f"  {array.name}: {array.what} (largest {array.largest:g})")
+        if len(unlike) > LISTED:
+            print(f"  and {len(unlike) - LISTED} more")
+        differ = differ or bool(unlike)
+    return differ
 
 
-def time_in_turn(probes: Sequence[Probe], request: dict[str, Any], rounds: int) -> list[dict[str, Any]]:
-    """Return the ratio of times, this checkout over BASE, of each thing that is timed."""
+def time_in_turn(probes: Sequence[Probe], request: dict[str, Any], rounds: int) -> None:
+    """Print the ratio of times, this checkout over BASE, of each thing that is timed."""
     names, _ = [probe.ask({**request, "prepare": True})["timings"] for probe in probes]
-    rows = []
+    print(f"\n{'processor time':<32} {'BASE s':>9} {'here s':>9} {'ratio':>6}  range")
     for name in names:
         pairs = [[probe.ask({"time": name})["s"] for probe in probes] for _ in range(rounds)]
-        ratios = sorted(here_s / base_s for base_s, here_s in pairs)
-        rows.append(
-            {
-                "timed": name,
-                "base_s": statistics.median(base_s for base_s, _ in pairs),
-                "here_s": statistics.median(here_s for _, here_s in pairs),
-                "ratio": statistics.median(ratios),
-                "ratio_least": ratios[0],
-                "ratio_most": ratios[-1],
-            }
+        base_s, here_s = (statistics.median(times_s) for times_s in zip(*pairs, strict=True))
+        ratios = sorted(here / base for base, here in pairs)
+        print(
+            f"{name:<32} {base_s:>9.4f} {here_s:>9.4f} {statistics.median(ratios):>6.3f}"
+            f"  {ratios[0]:.3f} to {ratios[-1]:.3f}",
+            flush=True,
         )
-    return rows
-
-
-def text_of(result: Mapping[str, Any]) -> str:
-    """Return the result as a person reads it."""
-    lines = [
-        f"{result['base']} (BASE) and {result['here']} (this checkout), {result['date']}, {result['machine']}",
-        "",
-    ]
-    if result["versions_base"] != result["versions_here"]:
-        lines += [f"Packages differ: {result['versions_base']} and {result['versions_here']}.", ""]
-    lines.append(f"{'group':<20} {'compared':>9} {'different':>9}")
-    for group in result["groups"]:
-        lines.append(f"{group['group']:<20} {group['compared']:>9} {len(group['different']):>9}")
-    for group in result["groups"]:
-        for unlike in group["different"][:LISTED]:
-            lines.append(f"  {group['group']}: {unlike.name}: {unlike.what} (largest {unlike.largest:g})")
-        if len(group["different"]) > LISTED:
-            lines.append(f"  {group['group']}: and {len(group['different']) - LISTED} more")
-    if result["times"]:
-        lines += ["", f"{'processor time':<32} {'BASE s':>9} {'here s':>9} {'ratio':>6}  range"]
-    for row in result["times"]:
-        lines.append(
-            f"{row['timed']:<32} {row['base_s']:>9.4f} {row['here_s']:>9.4f} {row['ratio']:>6.3f}"
-            f"  {row['ratio_least']:.3f} to {row['ratio_most']:.3f}"
-        )
-    return "\n".join(lines)
 
 
 def parsed() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description="Compare two versions of the project to the last bit.")
+    parser = parser_of(__doc__)
     parser.add_argument(
         "base", nargs="?", default=str(ROOT), help="a commit, or a folder with a checkout (this checkout)"
     )
@@ -311,8 +279,6 @@ def parsed() -> argparse.Namespace:
     parser.add_argument(
         "--keep", type=Path, help="folder that keeps the environment of BASE for the next time"
     )
-    parser.add_argument("--json", action="store_true", help="print the result as JSON")
-    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     given = parser.parse_args()
     if given.short:
         given.rounds, given.only = 0, COMPARED[:1]
@@ -338,26 +304,17 @@ def main() -> int:
             stack.enter_context(Probe(version, folder / f"cache{k}"))
             for k, version in enumerate((base, here))
         ]
-        result = {
-            "base": base.name,
-            "here": run("git", "describe", "--always", "--dirty").strip(),
-            "date": date.today().isoformat(),
-            "machine": f"{platform.machine()}, {os.cpu_count()} processors, {platform.system()}",
-            "versions_base": versions_of(base),
-            "versions_here": versions_of(here),
-            "groups": compare(probes, given.only, request, folder),
-            "times": time_in_turn(probes, request, given.rounds) if given.rounds else [],
-        }
-    if given.json:
-        from attrs import asdict
-
-        groups = [
-            {**group, "different": [asdict(d) for d in group["different"]]} for group in result["groups"]
-        ]
-        print(json.dumps({**result, "groups": groups}, indent=1))
-    else:
-        print(text_of(result))
-    return 1 if any(group["different"] for group in result["groups"]) else 0
+        print(
+            f"{base.name} (BASE) and {run('git', 'describe', '--always', '--dirty').strip()} (this checkout)"
+        )
+        print(f"{date.today()}, {platform.machine()}, {os.cpu_count()} processors, {platform.system()}\n")
+        packages = [versions_of(version) for version in (base, here)]
+        if packages[0] != packages[1]:
+            print(f"Packages differ: {packages[0]} and {packages[1]}.\n")
+        differ = compare(probes, given.only, request, folder)
+        if given.rounds:
+            time_in_turn(probes, request, given.rounds)
+    return 1 if differ else 0
 
 
 if __name__ == "__main__":

@@ -15,11 +15,9 @@ import statistics
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
-import attrs
 import numpy as np
 
 from graspsense import load_pipeline
@@ -79,24 +77,8 @@ def recorded(name: str, trace: Any, outcome: Any, figures: Sequence[float] = ())
     return arrays
 
 
-FORMER_KEYS: Final = {
-    "pad_stiffness_n_m": "skin_n_m",
-    "pad_damping_n_s_m": "skin_damping_n_s_m",
-    "pad_creep_n_m": "skin_creep_n_m",
-    "pad_creep_s": "skin_creep_s",
-}
-"""Keys of the simulator, with their names in older versions."""
-
-
-@cache
-def keys_of_sim() -> frozenset[str]:
-    return frozenset(field.name for field in attrs.fields(type(create("sensor-backend", "sim").config)))
-
-
 def sim(config: Mapping[str, Any]) -> Any:
-    known = keys_of_sim()
-    values = {key if key in known else FORMER_KEYS.get(key, key): value for key, value in config.items()}
-    return create("sensor-backend", "sim", **values)
+    return create("sensor-backend", "sim", **config)
 
 
 def reported(report: Mapping[str, Any]) -> list[float]:

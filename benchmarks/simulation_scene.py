@@ -1,4 +1,4 @@
-"""A scene of linear contact: its exact solution and its control law.
+"""A scene of linear contact and its control law.
 
     M x'' = u - B x' - f,    m y'' = f - k y - c y',    f = kc max(0, x - y - x0)
 
@@ -10,12 +10,10 @@ drive of constant mass with the ideal sensor, x being 70 mm less the gap; the co
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 from attrs import frozen
-from scipy.linalg import expm
 
 from graspsense.plugin_api import (
     APPROACH,
@@ -101,13 +99,11 @@ class Law(Controller[None]):
 
 @frozen(kw_only=True, eq=False)
 class Run:
-    """One run: gap closed x (m), force (N) and what was commanded, at each millisecond; processor seconds."""
+    """One run: gap closed x (m), force (N) and what was commanded, at each millisecond."""
 
     x: Any
     force: Any
     u: Any
-    seconds: float = math.nan
-    what: str = ""
 
     def error(self, reference: Run) -> tuple[float, float]:
         """Return the rms error of the force over the peak force, and that of the peak, both relative."""
@@ -116,94 +112,3 @@ class Run:
             return math.inf, math.inf
         rms = float(np.sqrt(np.mean((self.force - reference.force) ** 2))) / peak
         return rms, abs(float(np.max(self.force)) - peak) / peak
-
-
-# ------------------------------------------------------------------------------------------------ exact
-
-
-def _rates(touching: bool) -> Any:
-    """Return the matrix of (x, v, y, w, u, 1)."""
-    kc = KC if touching else 0.0
-    a = np.zeros((6, 6))
-    a[0, 1] = a[2, 3] = 1.0
-    a[1, [0, 1, 2, 4, 5]] = np.array([-kc, -B, kc, 1.0, kc * X0]) / M
-    a[3, [0, 2, 3, 5]] = np.array([kc, -K - kc, -C, -kc * X0]) / LIGHT
-    return a
-
-
-PIECES = 200
-
-
-def exact(u_of: Callable[[int, float, float, float], float], ticks: int = TICKS) -> Run:
-    """Return the solution by matrix exponentials, looking at the contact 200 times a millisecond and bisecting.
-
-    `u_of(tick, x, v, f)` gives what is commanded at the beginning of each tick.
-    """
-    rates = {touching: _rates(touching) for touching in (False, True)}
-    steps = {touching: expm(a * TICK / PIECES) for touching, a in rates.items()}
-    powers = {}
-    for touching, piece in steps.items():
-        power, rows = np.eye(6), []
-        for _ in range(PIECES):
-            power = piece @ power
-            rows.append(power)
-        powers[touching] = np.array(rows)
-    state = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
-    xs, forces, us = np.zeros(ticks), np.zeros(ticks), np.zeros(ticks)
-    touching = False
-    for tick in range(ticks):
-        force = KC * max(state[0] - state[2] - X0, 0.0)
-        xs[tick], forces[tick] = state[0], force
-        us[tick] = state[4] = u_of(tick, state[0], state[1], force)
-        left = TICK
-        while left > 0.0:
-            path = powers[touching] @ state
-            pressed = path[:, 0] - path[:, 2] > X0
-            whole = min(int(left / TICK * PIECES + 1e-9), PIECES)
-            turned = np.flatnonzero(pressed[:whole] != touching)
-            if not len(turned):
-                if whole:
-                    state = path[whole - 1]
-                remainder = left - whole * TICK / PIECES
-                if remainder > 1e-15:
-                    ahead = expm(rates[touching] * remainder) @ state
-                    if (ahead[0] - ahead[2] > X0) != touching:
-                        spent, state = _turn(rates[touching], state, touching, remainder)
-                        left, touching = remainder - spent, not touching
-                        continue
-                    state = ahead
-                break
-            k = int(turned[0])
-            last_state = path[k - 1] if k else state
-            spent, state = _turn(rates[touching], last_state, touching, TICK / PIECES)
-            left -= k * TICK / PIECES + spent
-            touching = not touching
-    return Run(x=xs, force=forces, u=us, what="exact")
-
-
-def _turn(rates: Any, state: Any, touching: bool, span: float) -> tuple[float, Any]:
-    """Return when within `span` the contact changes, and the state just after."""
-    least, most = 0.0, span
-    for _ in range(50):
-        middle = 0.5 * (least + most)
-        ahead = expm(rates * middle) @ state
-        if (ahead[0] - ahead[2] > X0) == touching:
-            least = middle
-        else:
-            most = middle
-    return most, expm(rates * most) @ state
-
-
-def exact_closed() -> Run:
-    integral, since = 0.0, -1.0
-
-    def u_of(tick: int, x: float, v: float, f: float) -> float:
-        nonlocal integral, since
-        u, integral, since = closed_law(tick * TICK, x, v, f, integral, since)
-        return u
-
-    return exact(u_of)
-
-
-def exact_open(us: Any) -> Run:
-    return exact(lambda tick, x, v, f: float(us[tick]))

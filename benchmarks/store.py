@@ -1,6 +1,6 @@
 """How fast a store of 100 000 trials is searched, read as a table, and predicted on.
 
-    python benchmarks/store.py [--json] [--trials 100000] [--folder DIR] [--short]
+    python benchmarks/store.py [--trials 100000] [--short]
 
 The rows are made up and their recordings are not there: what is timed is the database. The time of a command is
 that of the work in a process that has started; the median of several.
@@ -8,10 +8,7 @@ that of the work in a process that has started; the median of several.
 
 from __future__ import annotations
 
-import argparse
-import json
 import random
-import sqlite3
 import statistics
 import tempfile
 import time
@@ -19,11 +16,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from arguments import parser_of
 
 from graspsense.core.components.registry import installed
-from graspsense.core.learn.model import load_model, train
-from graspsense.core.values.errors import GraspsenseError
-from graspsense.experiments.versions import measured_on
+from graspsense.core.learn.model import train
+from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import create
 from graspsense.recording.recording_info import RecordingInfo
 from graspsense.recording.trial_record import DeviceRecord, FeatureValues, TrialRecord, TrialResult
@@ -83,70 +80,35 @@ def median_s(work: Callable[[], object]) -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--json", action="store_true")
+    parser = parser_of(__doc__)
     parser.add_argument("--trials", type=int, default=100_000)
-    parser.add_argument("--folder", help="Keep the store here and use it again.")
-    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     given = parser.parse_args()
     if given.short:
         given.trials = 5_000
     with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(given.folder or scratch)
+        folder = Path(scratch)
         with Store.open(folder) as store:
-            there = store.query("SELECT count(*) FROM trial")[0][0]
-            began = time.perf_counter()
-            fill(store, max(0, given.trials - there))
-            filling_s = time.perf_counter() - began
-        result = measure(folder)
-    result["filling_s"] = filling_s
-    if given.json:
-        print(json.dumps(result, indent=2))
-        return
-    for key, value in result.items():
-        print(f"{key:<34}{value if not isinstance(value, float) else round(value, 4)}")
+            fill(store, given.trials)
+        print(f"{given.trials} trials; {where_measured()}")
+        for name, value in measured(folder).items():
+            print(f"{name:<24}{value:.4f} s")
 
 
-def measure(folder: Path) -> dict[str, object]:
-    """Return what was found, with the machine."""
-    labelled = labelled_store(str(folder))
-    plugins = installed()
-    try:
-        component = plugins.find("classifier", "c45")
-        config = create("classifier", "c45").config
-    except GraspsenseError:
-        component = plugins.find("classifier", "tree")
-        config = create("classifier", "tree").config
-    few = labelled.rows(np.arange(2000))
+def measured(folder: Path) -> dict[str, float]:
+    """Return the time of each kind of work."""
+    component, config = installed().find("classifier", "c45"), create("classifier", "c45").config
+    few = labelled_store(str(folder)).rows(np.arange(2000))
     model = train(component, config, few, name="benchmark")
-    with tempfile.TemporaryDirectory() as scratch:
-        path = Path(scratch) / "model.json"
-        path.write_text(json.dumps(model.as_json()))
-        model = load_model(str(path), plugins)
 
-    def page() -> None:
+    def page(label: str) -> list[object]:
         with Store.read(folder) as store:
-            assert store.page(label=LABELS[0])
-
-    def rare_page() -> None:
-        with Store.read(folder) as store:
-            store.page(label=LABELS[1])
-
-    def predict() -> None:
-        model.answers(labelled_store(str(folder)).table)
+            return store.page(label=label)
 
     return {
-        **measured_on(),
-        "sqlite": sqlite3.sqlite_version,
-        "trials": len(labelled),
-        "store_bytes": (folder / "store.sqlite").stat().st_size,
-        "page_s": median_s(page),
-        "page_without_a_hit_s": median_s(rare_page),
-        "table_s": median_s(lambda: labelled_store(str(folder))),
-        "predict_s": median_s(predict),
-        "classifier": component.qualified,
+        "page": median_s(lambda: page(LABELS[0])),
+        "page without a hit": median_s(lambda: page("no such label")),
+        "table": median_s(lambda: labelled_store(str(folder))),
+        "predict (c45)": median_s(lambda: model.answers(labelled_store(str(folder)).table)),
     }
 
 

@@ -11,7 +11,6 @@ those of gap and force without the cells.
 
 from __future__ import annotations
 
-import argparse
 import json
 import subprocess
 import sys
@@ -19,18 +18,18 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+from arguments import parser_of
 
 POINTS = 128
 CLASSIFIER = "extra-trees"
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = parser_of(__doc__)
     parser.add_argument("store", type=Path, nargs="?")
     parser.add_argument("arrays", nargs="?", default="", help="names of channels, comma-separated")
     parser.add_argument("--sessions", type=int, default=0, help="number of folds; 0: one for each order")
     parser.add_argument("--aeon-python", default="")
-    parser.add_argument("--short", action="store_true", help="numbers made here, without a store")
     given = parser.parse_args()
     if given.short:
         return short()

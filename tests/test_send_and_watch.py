@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import runpy
 import sys
 from math import inf
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -31,11 +29,11 @@ from graspsense.plugin_api import (
 from graspsense.plugins.controllers.force import ForceConfig, ForceController
 from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
 from graspsense.plugins.controllers.send_and_watch import SendAndWatchConfig, SendAndWatchController
+from graspsense.plugins.controllers.velocity import VelocityConfig, closing_effort, velocity_loop
 from graspsense.simulator_api import CHANNELS
 from graspsense.testing.model_gripper import OBJECTS, ModelGripper
 
 HERE = sys.modules[__name__]
-BENCHMARK = Path(__file__).parents[1] / "benchmarks" / "own_loop.py"
 WITH_PADS = ("gap", "velocity", "effort", "force_left", "force_right")
 PADLESS = ("gap", "velocity", "effort")
 
@@ -138,10 +136,66 @@ def test_hybrid_approaches_gently_and_raises_the_force_in_steps(thing, keys):
     assert trace.force_left_n[(trace.t_s >= contact_s) & (trace.t_s < contact_s + 0.1)].max() < 8.0
 
 
+class OwnLoop(SensorBackend):
+    """The simulated gripper as one that closes to a target on its own at 1 kHz, and answers at a lower rate."""
+
+    accepts = ("position",)
+    closes_itself = {"position": "the target, with its speed and force"}  # noqa: RUF012
+    body_hz = 1000.0
+    friction_n = 7.0
+    """What the own loop adds to the force that it is sent, so that this force reaches the fingers."""
+    near_s = 0.02
+    """The own loop slows down over the way of this time at its speed."""
+
+    def __init__(self, body, rate_hz):
+        super().__init__(body.config)
+        self._body, self._rate_hz, self._ticks = body, rate_hz, round(self.body_hz / rate_hz)
+        self._loop = velocity_loop(VelocityConfig())
+
+    @property
+    def channels(self):
+        return tuple(
+            evolve(channel, rate_hz=min(channel.rate_hz, self._rate_hz)) for channel in self._body.channels
+        )
+
+    def open(self, seed):
+        self._integral_n, self._last, self._command = 0.0, None, None
+        return evolve(self._body.open(seed), rate_hz=self._rate_hz, channels=self.channels)
+
+    def read(self, timeout_s):
+        for _ in range(1 if self._last is None else self._ticks):
+            if self._last is not None:
+                self._body.apply(self._effort(self._last.frame))
+            self._last = self._body.read(timeout_s)
+        frame = self._last.frame
+        return self._last._replace(frame=frame._replace(dt_s=1.0 / self._rate_hz))
+
+    def apply(self, command):
+        self._command = command
+
+    def tare(self, images):
+        self._body.tare(images)
+
+    def close(self):
+        self._body.close()
+
+    def _effort(self, frame):
+        kind, target_m, force_n, speed_m_s = self._command
+        if kind != POSITION:
+            return self._command
+        speed = min(max((frame.gap_m - target_m) / self.near_s, -speed_m_s), speed_m_s)
+        loop = self._loop._replace(closing_speed_m_s=speed)
+        effort, integral = closing_effort(loop, self._integral_n, frame.velocity_m_s, 1.0 / self.body_hz)
+        most_n = force_n + self.friction_n
+        if abs(effort) < most_n:
+            self._integral_n = integral
+        return Command(EFFORT, min(max(effort, -most_n), most_n), inf, inf)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("rate_hz", [100.0, pytest.param(1000.0, marks=pytest.mark.slow)])
 def test_hybrid_with_the_simulated_body_behind_such_an_interface(rate_hz):
-    body = runpy.run_path(str(BENCHMARK))["OwnLoop"](create("sensor-backend", "sim", object="block"), rate_hz)
+    body = OwnLoop(create("sensor-backend", "sim", object="block"), rate_hz)
     grasp = run_grasp(body, HybridController(HybridConfig(sends="position")), RunConfig(seed=1))
     assert grasp.outcome is Outcome.STEADY, grasp.reason
     trace = grasp.trace

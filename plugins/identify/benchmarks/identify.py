@@ -1,24 +1,15 @@
 """Whether `graspsense identify` brings known scenes back, and at how many recordings a simulator stops paying.
 
-    python plugins/identify/benchmarks/identify.py [--repeats 4] [--only NAME...] [--sensors NAME...] [...]
-    python plugins/identify/benchmarks/identify.py --delays 0 0.01 0.025 [...] [--rows FILE] [--markdown FILE]
-    python plugins/identify/benchmarks/identify.py --spreads 0 0.3 [...] [--rows FILE] [--markdown FILE]
-    python plugins/identify/benchmarks/identify.py --rows FILE --markdown FILE
-    python plugins/identify/benchmarks/identify.py --transfer [--rows FILE] [--markdown FILE] [--png FILE]
+    python plugins/identify/benchmarks/identify.py [--repeats 4] [--only NAME...] [--sensors NAME...] [--rows FILE]
+    python plugins/identify/benchmarks/identify.py --transfer [--rows FILE]
 
 Each scene below is grasped in simulation by the hybrid controller with a hold, with ideal sensors, with PR2 pads, and
 with pads at the 60 Hz of Robotiq's TSF-85 whose fingertips harden, once, three times and ten times. In each repeat,
 every value of the scene is multiplied by a factor from 0.74 to 1.35. With three and ten grasps the stiffness differs
 between objects (10 %). The scene is then identified from these grasps. A row says whether the true terms were
 chosen, and how many of the 90 % intervals hold the true values where they were. An interval of a single squeeze is of
-this squeeze, whose object has the nominal stiffness. Rows are appended to the file of `--rows`, and `--markdown` writes
-its tables between the marks of a page.
-
-With `--delays`: the forces of the recordings are late by these times (s), of which the settings of the gripper do not
-know, and their table is that of the delays that come back.
-
-With `--spreads`: one parameter of each scene of `OWN_SPREADS` differs between objects by these standard deviations of
-its logarithm, and their table is that of the spreads that are claimed.
+this squeeze, whose object has the nominal stiffness. Rows are appended to the file of `--rows`, whose tables are
+printed; with `--repeats 0` nothing is run.
 
 With `--transfer`: four containers of the catalogue are the real world. From 1, 3, 10 and 30 recordings of each,
 a classifier is trained on the recordings, and another on simulated squeezes of the scenes that they were identified as.
@@ -31,31 +22,30 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import sys
 import tempfile
 import time
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby, product
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from attrs import asdict, evolve, frozen
+from attrs import asdict, frozen
 
 from graspsense import load_pipeline
 from graspsense.classifier_api import table_of
-from graspsense.core.components.identification import Identification, RecordedSqueeze
-from graspsense.evaluation.intervals import wilson
+from graspsense.core.components.identification import RecordedSqueeze
+from graspsense.evaluation.intervals import clustered, wilson
 from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import create
+from graspsense.report.simulation import markdown_table
 from graspsense.simulator_api import RunConfig
 from graspsense_identify.gas import combinations
-from graspsense_identify.interval import interval_of_mean
 from graspsense_identify.laws import SLOTS
 from graspsense_identify.run import identify
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.scene.instance import _draws_of_number
-from graspsense_sim_gripper.scene.library import SCENE_IN_MEMORY
 from graspsense_sim_gripper.scene.terms.gas import Gas
 
 WIDTH_M: Final = 0.05
@@ -123,8 +113,6 @@ SENSORS: Final[Mapping[str, Mapping[str, Any]]] = {
 FACTOR: Final = 0.3
 """The logarithm of the largest factor on the values of a scene."""
 STIFFNESS_SPREAD: Final = 0.1
-OWN_SPREADS: Final = {"creeping": "maxwell.tau_s", "stiffening": "elastic.k3_n_m3", "foam": "foam.exponent"}
-"""The parameter with a spread of its own in the rows of `--spreads`."""
 HOLD_S: Final = 1.5
 TOLD_APART: Final = 1.03
 """Terms whose fits differ by less than this factor are not told apart by the data."""
@@ -152,14 +140,6 @@ class Row:
     parameters: tuple[tuple[str, float, float, float, float], ...]
     """Each parameter with its true value, its value, and the ends of its interval, where the true terms were chosen."""
     seconds: float
-    late_s: float = 0.0
-    """By how much the forces of the recordings were late."""
-    delay: tuple[float, float, float, bool] | None = None
-    """The identified delay, the ends of its interval, and whether it was used; None if none was determined."""
-    own_spread: float = 0.0
-    """The spread of the parameter of `OWN_SPREADS`."""
-    spreads: tuple[tuple[str, float, float, float], ...] = ()
-    """The parameters for which a spread of their own was claimed, with it and the ends of its interval."""
 
 
 def drawn(terms: Sequence[Mapping[str, Any]], repeat: int) -> list[dict[str, Any]]:
@@ -176,17 +156,12 @@ def drawn(terms: Sequence[Mapping[str, Any]], repeat: int) -> list[dict[str, Any
     ]
 
 
-def scene_text(
-    terms: Sequence[Mapping[str, Any]], spread: float, own: str = "", own_spread: float = 0.0
-) -> str:
-    """Return the text of a scene with these terms. `own`: the parameter with a spread of its own."""
+def scene_text(terms: Sequence[Mapping[str, Any]], spread: float) -> str:
+    """Return the text of a scene with these terms."""
     lines = [f"width_m = {WIDTH_M}", f"stiffness_spread = {spread}", "share = 0.6", "share_spread = 0.01"]
     for term in terms:
         lines.append("[[terms]]")
         lines += [f"{key} = {json.dumps(value)}" for key, value in term.items()]
-        kind, _, name = own.partition(".")
-        if own_spread > 0.0 and kind == term["type"]:
-            lines.append(f"spread = {{ {name} = {own_spread} }}")
     return "\n".join(lines) + "\n"
 
 
@@ -212,22 +187,6 @@ def squeezes_of(
         )
         for name, seed, grasp in zip(names, seeds, done, strict=True)
     ]
-
-
-def delayed(squeeze: RecordedSqueeze, late_s: float) -> RecordedSqueeze:
-    """Return the recording of a sensor whose forces, and times of images, are late by a number of ticks."""
-    trace = squeeze.trace
-    ticks = round(late_s / float(np.median(np.diff(trace.t_s))))
-    last = len(trace.t_s) - ticks
-
-    def late(force: Any) -> Any:
-        return np.concatenate([np.full(ticks, force[0]), force[:last]])
-
-    left, right = late(trace.force_left_n), late(trace.force_right_n)
-    return evolve(
-        squeeze,
-        trace=evolve(trace, pad_t_s=trace.pad_t_s + late_s, force_left_n=left, force_right_n=right),
-    )
 
 
 def true_values(terms: Sequence[Mapping[str, Any]], identified: str) -> dict[str, float]:
@@ -278,32 +237,13 @@ def seeds_of(name: str, sensor: str, count: int, repeat: int) -> list[int]:
     return [100_000 * (series + 1) + 100 * repeat + i for i in range(count)]
 
 
-def mean_is_covered(row: Mapping[str, Any]) -> bool:
-    """Return whether the 90 % interval of Student's t from the stiffness of the row's objects covers the true mean.
-
-    It uses what was drawn and no measurement: where it does not cover, no identification would.
-    """
-    seeds = seeds_of(row["scene"], row["sensor"], row["recordings"], row["repeat"])
-    drawn = np.array([_draws_of_number(SCENE_IN_MEMORY, seed, 2)[0] for seed in seeds])
-    low, high = interval_of_mean(drawn)
-    return low < 0.0 < high
-
-
-def measured(
-    name: str,
-    sensor: str,
-    count: int,
-    repeat: int,
-    late_s: float = 0.0,
-    own_spread: float = 0.0,
-) -> Row:
+def measured(name: str, sensor: str, count: int, repeat: int) -> Row:
     """Return the row of a scene."""
     terms = drawn(ALL_SCENES[name], repeat)
-    text = scene_text(terms, STIFFNESS_SPREAD if count > 1 else 0.0, OWN_SPREADS.get(name, ""), own_spread)
+    text = scene_text(terms, STIFFNESS_SPREAD if count > 1 else 0.0)
     seeds = seeds_of(name, sensor, count, repeat)
     squeezes = squeezes_of(text, name, SENSORS[sensor], [str(seed) for seed in seeds], seeds)
-    late = [delayed(squeeze, late_s) for squeeze in squeezes]
-    result = identify(SimConfig(), late, lambda *_: None)
+    result = identify(SimConfig(), squeezes, lambda *_: None)
     chosen = next(candidate for candidate in result.candidates if candidate.chosen)
     true = next((candidate for candidate in result.candidates if candidate.terms == named(terms)), None)
     right = true is chosen
@@ -323,35 +263,6 @@ def measured(
             for parameter in known
         ),
         seconds=result.seconds,
-        late_s=late_s,
-        delay=_delay(result),
-        own_spread=own_spread,
-        spreads=tuple(
-            (parameter.name.removesuffix(".spread"), parameter.value, parameter.low, parameter.high)
-            for parameter in result.parameters
-            if parameter.name.endswith(".spread")
-        ),
-    )
-
-
-def _delay(result: Identification) -> tuple[float, float, float, bool] | None:
-    """Return the delay, the ends of its interval, and whether it was used; None if it was refused."""
-    delay = next((parameter for parameter in result.parameters if parameter.name == "delay_s"), None)
-    refused = any(undetermined.what == "delay of the sensor" for undetermined in result.undetermined)
-    used = tomllib.loads(result.scene)["identified"]["sensor"]["delay_s"] != 0.0
-    return None if delay is None or (refused and not used) else (delay.value, delay.low, delay.high, used)
-
-
-def in_words(row: Row) -> str:
-    """Return a row as a line of text."""
-    errors = ", ".join(f"{100.0 * (value / truth - 1.0):+.2f}" for _, truth, value, *_ in row.parameters)
-    covered = _covered([row.parameters])
-    right = (
-        "right terms" if row.right_terms else f"{row.chosen}{'' if row.told_apart else ' (as good a fit)'}"
-    )
-    return (
-        f"{row.scene:20} {row.sensor:10} {row.recordings:3} {right}, covered {sum(covered)} of {len(covered)}, "
-        f"errors {errors} %, {row.seconds:.1f} s"
     )
 
 
@@ -368,31 +279,21 @@ def _share(part: int, whole: int) -> str:
 
 
 def _covered_share(group: Sequence[Mapping[str, Any]]) -> str:
-    """Return the share of the intervals that cover, with the Wilson interval of the effective number of intervals.
-
-    The intervals of a scene share their error, so that they count as fewer: by the design effect, which is the variance
-    between scenes over that of independent intervals (Korn and Graubard, Survey Methodology 24, 1998).
-    """
-    sizes = np.array([len(row["parameters"]) for row in group if row["parameters"]])
-    if not len(sizes):
-        return "–"
-    hits = np.array([sum(_covered([row["parameters"]])) for row in group if row["parameters"]])
-    whole, part, scenes = int(sizes.sum()), int(hits.sum()), len(sizes)
-    share = part / whole
-    effective = float(scenes)
-    if scenes > 1 and 0 < part < whole:
-        between = float(np.sum((hits - share * sizes) ** 2)) * scenes / (scenes - 1) / whole**2
-        effective = min(share * (1.0 - share) / max(between, 1e-12), float(whole))
-    low, high = wilson(share * effective, effective)
-    return f"{100.0 * share:.0f} % ({part} of {whole}; {100.0 * low:.0f} to {100.0 * high:.0f})"
+    """Return the share of the intervals that cover. The intervals of a scene share their error: they are clustered."""
+    covered = _covered([row["parameters"] for row in group])
+    scenes = [str(k) for k, row in enumerate(group) for _ in row["parameters"]]
+    if len(set(scenes)) < 2:
+        return f"{sum(covered)} of {len(covered)}"
+    low, high = clustered(covered, scenes)
+    share = f"{100.0 * sum(covered) / len(covered):.0f} % ({sum(covered)} of {len(covered)}"
+    return f"{share}; {100.0 * low:.0f} to {100.0 * high:.0f})"
 
 
-def as_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Return the tables of these rows: by sensor and number of recordings, and by scene."""
+def tables(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Yield the tables of these rows: by sensor and number of recordings, and by scene."""
 
     def line(head: Sequence[str], group: Sequence[Mapping[str, Any]]) -> Sequence[str]:
         apart = [row for row in group if row["told_apart"]]
-        several = [row for row in group if row["recordings"] > 1]
         errors = [abs(value / truth - 1.0) for row in group for _, truth, value, *_ in row["parameters"]]
         return (
             *head,
@@ -400,27 +301,18 @@ def as_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
             _share(sum(row["right_terms"] for row in group), len(group)),
             _share(sum(row["right_terms"] for row in apart), len(apart)),
             _covered_share(group),
-            _share(sum(mean_is_covered(row) for row in several), len(several)),
             f"{100.0 * float(np.median(errors)):.2g} %" if errors else "–",
             f"{float(np.median([row['seconds'] for row in group])):.1f} s",
         )
 
     columns = ("scenes", "right terms", "where the data tell them apart", "90 % intervals that cover")
-    columns += ("scenes whose drawn objects cover", "median error", "median time")
-    by_sensor = [line(map(str, head), group) for head, group in grouped(rows, "sensor", "recordings")]
-    by_scene = [line(head, group) for head, group in grouped(rows, "scene")]
-    return "\n\n".join(
-        (
-            table(("sensor", "squeezes", *columns), [*by_sensor, line(("all", "all"), rows)]),
-            table(("scene", *columns), by_scene),
-        )
+    columns += ("median error", "median time")
+    by_sensor = [line([*map(str, head)], group) for head, group in grouped(rows, "sensor", "recordings")]
+    yield from markdown_table(("sensor", "squeezes", *columns), [*by_sensor, line(("all", "all"), rows)])
+    yield ""
+    yield from markdown_table(
+        ("scene", *columns), [line(head, group) for head, group in grouped(rows, "scene")]
     )
-
-
-def table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table in Markdown."""
-    head, *lines = (f"| {' | '.join(cells)} |" for cells in (columns, *rows))
-    return "\n".join((head, "|" + "---|" * len(columns), *lines))
 
 
 def grouped(
@@ -437,69 +329,6 @@ def grouped(
 
     for group_values, group in groupby(sorted(rows, key=place), key=values):
         yield group_values, list(group)
-
-
-def delays_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Return the table of the delays: by sensor, number of recordings, and delay."""
-    columns = ("sensor", "squeezes", "forces late by", "scenes", "delay used", "not determined")
-    columns += ("90 % intervals of the delay that cover", "median error of the delay", "right terms")
-    columns += ("90 % intervals of the parameters that cover",)
-    lines = []
-    for (sensor, count, late_s), group in grouped(rows, "sensor", "recordings", "late_s"):
-        delays = [row["delay"] for row in group if row["delay"]]
-        errors = [1e3 * abs(value - late_s) for value, *_ in delays]
-        covered = _covered([row["parameters"] for row in group])
-        lines.append(
-            (
-                *(sensor, str(count), f"{1e3 * late_s:.0f} ms", str(len(group))),
-                *(str(sum(delay[3] for delay in delays)), str(len(group) - len(delays))),
-                _share(sum(low <= late_s <= high for _, low, high, _ in delays), len(delays)),
-                f"{float(np.median(errors)):.2g} ms" if errors else "–",
-                _share(sum(row["right_terms"] for row in group), len(group)),
-                _share(sum(covered), len(covered)),
-            )
-        )
-    return table(columns, lines)
-
-
-def spreads_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Return the table of the spreads: by sensor, number of objects, parameter and spread."""
-    columns = (
-        "sensor",
-        "objects",
-        "parameter",
-        "its spread",
-        "scenes",
-        "claimed",
-        "claimed of another parameter",
-    )
-    columns += ("90 % intervals that cover", "median of what was claimed")
-    lines = []
-    for (sensor, count, scene, spread), group in grouped(rows, "sensor", "recordings", "scene", "own_spread"):
-        parameter = OWN_SPREADS[scene]
-        claims = [claim for row in group for claim in row["spreads"] if claim[0] == parameter]
-        others = sum(any(claim[0] != parameter for claim in row["spreads"]) for row in group)
-        lines.append(
-            (
-                *(sensor, str(count), f"`{parameter}`", f"{spread:g}", str(len(group))),
-                *(_share(len(claims), len(group)), str(others)),
-                _share(sum(low <= spread <= high for *_, low, high in claims), len(claims))
-                if spread
-                else "–",
-                f"{float(np.median([value for _, value, *_ in claims])):.2g}" if claims else "–",
-            )
-        )
-    return table(columns, lines)
-
-
-def write_between(path: Path, mark: str, text: str) -> None:
-    """Replace what is between the two comments `mark` of a page by a text."""
-    begin, end = f"<!-- {mark} -->", f"<!-- end of {mark} -->"
-    head, _, tail = path.read_text(encoding="utf-8").partition(begin)
-    _, has_end, after = tail.partition(end)
-    if not has_end:
-        raise SystemExit(f"{path} has no lines {begin} and {end}")
-    path.write_text(f"{head}{begin}\n{text}\n{end}{after}", encoding="utf-8")
 
 
 def transfer(counts: Sequence[int], tested: int, classifier: str = "forest") -> Iterator[dict[str, float]]:
@@ -561,40 +390,12 @@ _CURVES: Final = (
 )
 
 
-def transfer_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Return the table of the transfer."""
-    return table(
-        ("recordings a class", *(f"trained on {name}" for _, name in _CURVES)),
-        [
-            (str(row["recordings"]), *(_share(int(row[key]), int(row["tested"])) for key, _ in _CURVES))
-            for row in rows
-        ],
-    )
-
-
-def draw_transfer(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
-    """Draw the rates over the number of recordings."""
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(figsize=(6.4, 3.8), layout="constrained")
-    counts = [row["recordings"] for row in rows]
-    for key, name in _CURVES:
-        rates = [100.0 * row[key] / row["tested"] for row in rows]
-        ends = [wilson(int(row[key]), int(row["tested"])) for row in rows]
-        low = [rate - 100.0 * end[0] for rate, end in zip(rates, ends, strict=True)]
-        high = [100.0 * end[1] - rate for rate, end in zip(rates, ends, strict=True)]
-        axes.errorbar(counts, rates, yerr=[low, high], marker="o", capsize=3.0, label=f"trained on {name}")
-    axes.set_xscale("log")
-    axes.set_xticks(counts, [str(count) for count in counts])
-    axes.minorticks_off()
-    axes.set_xlabel("recordings a class")
-    axes.set_ylabel("recognised, % (95 % interval)")
-    axes.grid(alpha=0.3)
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2, frameon=False)
-    figure.savefig(path, dpi=140)
+def transfer_table(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Yield the table of the transfer."""
+    header = ("recordings a class", *(f"trained on {name}" for _, name in _CURVES))
+    shares = ([_share(int(row[key]), int(row["tested"])) for key, _ in _CURVES] for row in rows)
+    cells = [(str(row["recordings"]), *share) for row, share in zip(rows, shares, strict=True)]
+    yield from markdown_table(header, cells)
 
 
 def main() -> None:
@@ -606,63 +407,29 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=list(ALL_SCENES), default=list(SCENES))
     parser.add_argument("--sensors", nargs="+", choices=list(SENSORS), default=list(SENSORS))
     parser.add_argument("--recordings", nargs="+", type=int, help="the numbers of recordings")
-    parser.add_argument("--delays", nargs="+", type=float, help="the times by which the forces are late (s)")
-    parser.add_argument(
-        "--spreads", nargs="+", type=float, help="the spreads of the parameters of OWN_SPREADS"
-    )
     parser.add_argument("--transfer", action="store_true")
     parser.add_argument("--rows", type=Path, help="append the rows to this file (JSON lines)")
-    parser.add_argument(
-        "--markdown", type=Path, help="write the tables of --rows to this page, and run nothing"
-    )
-    parser.add_argument("--png", type=Path, help="draw the transfer of --rows, and run nothing")
     parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     asked = parser.parse_args()
-    if asked.markdown or asked.png:
-        if asked.rows is None:
-            parser.error("--markdown and --png need --rows FILE")
-        rows = [json.loads(line) for line in asked.rows.read_text(encoding="utf-8").splitlines()]
-        if asked.png:
-            draw_transfer(rows, asked.png)
-        if asked.markdown:
-            write_between(asked.markdown, *published(asked, rows))
-        return
     if asked.short:
         asked.only, asked.recordings, asked.repeats = ["creeping"], [1], 1
         asked.sensors = ["PR2 pads"]
     begin, rows = time.monotonic(), []
-    # A run that is stopped has all scenes in its rows.
-    for row in transfer(asked.recordings or TRANSFER_COUNTS, TESTED) if asked.transfer else scenes(asked):
+    if asked.rows and asked.rows.exists():
+        rows = [json.loads(line) for line in asked.rows.read_text(encoding="utf-8").splitlines()]
+    counts = asked.recordings or (TRANSFER_COUNTS if asked.transfer else COUNTS)
+    repeats = range(asked.first, asked.first + asked.repeats)
+    cases = product(repeats, counts, asked.sensors, asked.only)
+    known = (asdict(measured(name, sensor, count, repeat)) for repeat, count, sensor, name in cases)
+    for row in transfer(counts if asked.repeats else (), TESTED) if asked.transfer else known:
+        print(json.dumps(row), file=sys.stderr, flush=True)
         rows.append(row)
+        # A run that is stopped has all scenes in its rows.
         if asked.rows:
             with asked.rows.open("a", encoding="utf-8") as out:
                 out.write(f"{json.dumps(row)}\n")
-    print(published(asked, rows)[1])
-    print(f"{where_measured()}, {time.monotonic() - begin:.0f} s")
-
-
-def scenes(asked: argparse.Namespace) -> Iterator[dict[str, Any]]:
-    """Yield the rows of the scenes that are asked for."""
-    repeats = range(asked.first, asked.first + asked.repeats)
-    for repeat, count, sensor, name, late_s, own in product(
-        *(repeats, asked.recordings or COUNTS, asked.sensors, asked.only),
-        *(asked.delays or [0.0], asked.spreads or [0.0]),
-    ):
-        row = measured(name, sensor, count, repeat, late_s, own)
-        print(in_words(row), flush=True)
-        yield asdict(row)
-
-
-def published(asked: argparse.Namespace, rows: Sequence[Mapping[str, Any]]) -> tuple[str, str]:
-    """Return the mark on the page, and the tables, of rows of what is asked for."""
-    if asked.transfer:
-        return "transfer", transfer_markdown(rows)
-    if asked.spreads:
-        return "spreads", spreads_markdown(rows)
-    if asked.delays:
-        return "delays", delays_markdown(rows)
-    of_gas = all(row["scene"] in SCENES_WITH_GAS for row in rows)
-    return "gas" if of_gas else "known scenes", as_markdown(rows)
+    print("\n".join(transfer_table(rows) if asked.transfer else tables(rows)))
+    print(f"\n{where_measured()}, {time.monotonic() - begin:.0f} s")
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from attrs import evolve
 
 from graspsense.core.components.identification import RecordedSqueeze
 from graspsense.core.values.trace import Trace
@@ -51,3 +52,19 @@ def grasped(scenes, gripper, *, hold_s=1.0) -> list[RecordedSqueeze]:
         RecordedSqueeze(name=str(seed), sha256="0" * 64, trace=grasp.trace, gripper=gripper)
         for seed, grasp in zip(seeds, grasps, strict=True)
     ]
+
+
+def delayed(squeeze: RecordedSqueeze, late_s: float) -> RecordedSqueeze:
+    """Return the recording of a sensor whose forces, and times of images, are late by a number of ticks."""
+    trace = squeeze.trace
+    ticks = round(late_s / float(np.median(np.diff(trace.t_s))))
+    last = len(trace.t_s) - ticks
+
+    def late(force):
+        return np.concatenate([np.full(ticks, force[0]), force[:last]])
+
+    left, right = late(trace.force_left_n), late(trace.force_right_n)
+    return evolve(
+        squeeze,
+        trace=evolve(trace, pad_t_s=trace.pad_t_s + late_s, force_left_n=left, force_right_n=right),
+    )

@@ -6,8 +6,7 @@ import re
 
 import pytest
 from attrs import evolve
-from identify import delayed
-from squeezes import grasped
+from squeezes import delayed, grasped
 
 from graspsense.plugin_api import ConfigError
 from graspsense_identify.block import lag_of_block, with_fingertips_of_block

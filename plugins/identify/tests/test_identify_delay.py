@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 from cases import every_case
-from identify import delayed
-from squeezes import grasped, recorded
+from squeezes import delayed, grasped, recorded
 
 from graspsense_identify.delay import Delay, Lag
 from graspsense_identify.forward import RIGID_PADS, ForwardModel

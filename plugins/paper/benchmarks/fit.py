@@ -1,6 +1,6 @@
 """Fits the twelve free figures of the simulator's containers again, from values that were not fitted. Simulated.
 
-    python plugins/paper/benchmarks/fit.py [--list] [--short] [--seeds 4] [--rounds 2] [--json]
+    python plugins/paper/benchmarks/fit.py [--short]
 
 For each container three figures may be fitted: the share of the force that lands on the cells, the loss in its full,
 open state, and a scale on the spread of stiffness. The targets are Tables II and III of the paper, at 20 N, and the
@@ -18,33 +18,30 @@ deviation of Table III for Odwalla. Nine targets that differ as by chance give 9
 reproduce adds 118 for any figures. The rate of the whole tree is printed and is not a target.
 
 Printed are the start, the end and the catalogue with their objectives, also on seeds that were not used for fitting,
-and for each figure the values of its grid that are about as good. `--list` prints only those of the catalogue. The fit
-takes ten to fifteen minutes on two cores; `--short` uses one value of each grid, one seed and one round,
-to show that it runs.
+and for each figure the values of its grid that are about as good. The fit takes ten to fifteen minutes on two cores;
+`--short` uses one value of each grid, one seed and one round, to show that it runs.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
-import os
-import platform
 import re
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
-from datetime import date
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from attrs import evolve, field, frozen
+from attrs import evolve, frozen
 
 from graspsense.classifier_api import table_of
 from graspsense.core.values.trace import Trace
 from graspsense.evaluation.crossval import cross_validate
 from graspsense.evaluation.folds import stratified
+from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import Classifier, Features, create
 from graspsense.sources.simulated import OBJECTS_PER_SEED, TRIALS_PER_SEED, Group
 from graspsense_paper.published import published
@@ -133,6 +130,14 @@ class Squeeze(NamedTuple):
     peak_n: float
 
 
+def squeeze_of(trace: Trace) -> Squeeze:
+    """Return what the authors' tree looks at in a trace."""
+    felt = create("feature-set", "chitta", force="left").extract(trace)
+    by_name = dict(zip(felt.names, felt.values, strict=True))
+    peak_n = float(np.max(trace.force_left_n))
+    return Squeeze(by_name["delta_t"], by_name["p_steady"], by_name["f_steady"], peak_n)
+
+
 LONG_S: Final = 0.542
 PEAK_N: Final = 9.1
 DEEP_M: Final = 0.049578
@@ -171,24 +176,28 @@ def by_the_splits(states: Sequence[str], squeezes: Sequence[Squeeze]) -> dict[st
     }
 
 
-class Target(NamedTuple):
-    """A rate that is printed, and its standard deviation."""
+class Observed(NamedTuple):
+    """A published figure and its standard deviation."""
 
-    rate: float
+    value: float
     deviation: float
 
 
-def targets() -> dict[str, Target]:
-    """Return what is fitted to: the class (`table_2`), the state in each container, the authors' splits."""
-    targets_by_name = {}
-    for rate in published().rates:
-        if rate.id.startswith(("table_2", "table_3_")):
-            assert rate.n is not None
-            targets_by_name[rate.id] = Target(rate.rate, (rate.rate * (1.0 - rate.rate) / rate.n) ** 0.5)
-    return {
-        **targets_by_name,
-        **dict.fromkeys(SPLITS, Target(1.0, targets_by_name["table_3_odwalla"].deviation)),
-    }
+def rates_of_tables() -> dict[str, Observed]:
+    """Return what the paper prints at 20 N: the class (`table_2`), and the state in each container."""
+    observed = {}
+    for printed in published().rates:
+        if printed.id.startswith(("table_2", "table_3_")):
+            assert printed.n is not None
+            deviation = (printed.rate * (1.0 - printed.rate) / printed.n) ** 0.5
+            observed[printed.id] = Observed(printed.rate, deviation)
+    return observed
+
+
+def targets() -> dict[str, Observed]:
+    """Return what is fitted to: the rates of the tables, and the authors' splits."""
+    rates = rates_of_tables()
+    return {**rates, **dict.fromkeys(SPLITS, Observed(1.0, rates["table_3_odwalla"].deviation))}
 
 
 @frozen
@@ -207,47 +216,31 @@ class Trials(NamedTuple):
     tree: Mapping[str, float]
 
 
-@frozen(eq=False)
-class Bench:
-    """Tries values. What one container's give is kept, for most tries change one of them."""
-
-    seeds: range
-    known: dict[tuple[Any, ...], Any] = field(factory=dict, init=False)
-
-    def rates(self, values: Values) -> dict[str, float]:
-        """Return the rate for each target."""
-        trials = {kind: self._of(kind, values) for kind in TRIALS}
-        by_name = {}
-        for kind, trial in trials.items():
-            by_name[f"table_3_{kind}"] = self._state_rate(kind, values)
-            by_name.update(trial.tree)
-        rates = []
-        for i, seed in enumerate(self.seeds):
-            features = [f for trial in trials.values() for f in trial.features[i]]
-            classes = [kind for kind, trial in trials.items() for _ in trial.labels]
-            rates.append(judged(features, classes, seed))
-        return {"table_2": float(np.mean(rates)), **by_name}
-
-    def _of(self, kind: str, values: Values) -> Trials:
-        figures = tuple(values[kind, figure] for figure in FIGURES)
-        return self._once(("trials", kind, *figures), lambda: grasped(kind, figures, self.seeds))
-
-    def _state_rate(self, kind: str, values: Values) -> float:
-        trials = self._of(kind, values)
-        return self._once(
-            ("rate", kind, *(values[kind, figure] for figure in FIGURES)),
-            lambda: float(
-                np.mean([judged(trials.features[i], trials.labels, s) for i, s in enumerate(self.seeds)])
-            ),
-        )
-
-    def _once(self, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
-        if key not in self.known:
-            self.known[key] = make()
-        return self.known[key]
+def rates_of(values: Values, seeds: range) -> dict[str, float]:
+    """Return the rate for each target. What one container gives is kept, for most tries change one of them."""
+    figures = {kind: tuple(values[kind, figure] for figure in FIGURES) for kind in TRIALS}
+    trials = {kind: grasped(kind, figures[kind], seeds) for kind in TRIALS}
+    classes = [kind for kind, trial in trials.items() for _ in trial.labels]
+    of_classes = [
+        rate_of([f for trial in trials.values() for f in trial.features[i]], classes, seed)
+        for i, seed in enumerate(seeds)
+    ]
+    rates = {"table_2": float(np.mean(of_classes))}
+    for kind, trial in trials.items():
+        rates[f"table_3_{kind}"] = rate_of_states(kind, figures[kind], seeds)
+        rates |= trial.tree
+    return rates
 
 
-def grasped(kind: str, figures: Sequence[float], seeds: range) -> Trials:
+@cache
+def rate_of_states(kind: str, figures: tuple[float, ...], seeds: range) -> float:
+    """Return how often the state of a container with these figures is told, the mean over the seeds."""
+    trials = grasped(kind, figures, seeds)
+    return float(np.mean([rate_of(trials.features[i], trials.labels, seed) for i, seed in enumerate(seeds)]))
+
+
+@cache
+def grasped(kind: str, figures: tuple[float, ...], seeds: range) -> Trials:
     """Grasp a container with these figures as the paper did, once a seed."""
     with tempfile.TemporaryDirectory() as folder:
         named = {}
@@ -267,15 +260,7 @@ def grasped(kind: str, figures: Sequence[float], seeds: range) -> Trials:
         labels, extracted = _run(named, TRIALS[kind], 20.0, features.extract, seeds, offset)
         tree: dict[str, float] = {}
         if kind == "odwalla":
-            one_pad = create("feature-set", "chitta", force="left")
-
-            def squeeze(trace: Trace) -> Squeeze:
-                felt = one_pad.extract(trace)
-                by_name = dict(zip(felt.names, felt.values, strict=True))
-                peak = float(np.max(trace.force_left_n))
-                return Squeeze(by_name["delta_t"], by_name["p_steady"], by_name["f_steady"], peak)
-
-            true, felt = _run(named, TREE_TRIALS, 23.0, squeeze, seeds, 0)
+            true, felt = _run(named, TREE_TRIALS, 23.0, squeeze_of, seeds, 0)
             states = [label.partition(":")[2] for label in true] * len(seeds)
             tree = by_the_splits(states, [squeezed for squeezes in felt for squeezed in squeezes])
     return Trials(labels, extracted, tree)
@@ -303,19 +288,26 @@ def _run(
     return [trial.label for trial in dealt], [extracted[n * i : n * (i + 1)] for i in range(len(seeds))]
 
 
-def judged(features: Sequence[Features], labels: Sequence[str], seed: int) -> float:
-    """Return how often a label is told, in stratified folds."""
-    rows = np.arange(len(labels))
-    folds = stratified(labels, FOLDS, seed)
-    return float(
-        np.mean(cross_validate(Tree(), table_of(features), labels, [rows], [folds], seed=seed).right(labels))
-    )
+def answers(features: Sequence[Features], labels: Sequence[str], seed: int) -> list[str]:
+    """Return what a C4.5 tree answers for each trial, in ten stratified folds."""
+    rows, folds = np.arange(len(labels)), stratified(labels, FOLDS, seed)
+    return list(cross_validate(Tree(), table_of(features), labels, [rows], [folds], seed=seed).predicted)
+
+
+def rate(predicted: Sequence[str], labels: Sequence[str]) -> float:
+    """Return the share of answers that are the label."""
+    return float(np.mean([a == b for a, b in zip(predicted, labels, strict=True)]))
+
+
+def rate_of(features: Sequence[Features], labels: Sequence[str], seed: int) -> float:
+    """Return how often a label is told, in ten stratified folds."""
+    return rate(answers(features, labels, seed), labels)
 
 
 def objective(rates: Mapping[str, float], prefix: str = "t") -> float:
     """Return the sum of squared misfits in standard deviations, of the targets whose names begin like this."""
     return sum(
-        ((rates[name] - target.rate) / target.deviation) ** 2
+        ((rates[name] - target.value) / target.deviation) ** 2
         for name, target in targets().items()
         if name.startswith(prefix)
     )
@@ -378,83 +370,53 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--list", action="store_true")
     parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
-    parser.add_argument("--seeds", type=int, default=4)
-    parser.add_argument("--rounds", type=int, default=2)
-    parser.add_argument("--json", action="store_true")
     given = parser.parse_args()
-    shipped = fitted()
-    result: dict[str, Any] = {
-        "date": date.today().isoformat(),
-        "machine": f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}",
-        "fitted_parameters": len(shipped),
-    }
-    columns = {"catalogue": shipped}
-    if not given.list:
-        began = time.time()
-        n = 1 if given.short else given.seeds
-        bench, further = Bench(range(n)), Bench(range(n, 2 * n))
-        descent = descend(
-            lambda values: objective(bench.rates(values)),
-            start(),
-            {name: grid[:1] if given.short else grid for name, grid in GRIDS.items()},
-            1 if given.short else given.rounds,
-            lambda text: print(f"{text} ({time.time() - began:.0f} s)", file=sys.stderr),
-        )
-        columns = {"start": start(), "found": descent.values, "catalogue": shipped}
-        rates = {name: bench.rates(values) for name, values in columns.items()}
-        others = {name: further.rates(values) for name, values in columns.items()}
-        result.update(
-            seeds=n,
-            seconds=round(time.time() - began),
-            targets={name: target._asdict() for name, target in targets().items()},
-            rates=rates,
-            objectives={
-                what: {name: objective(figures, prefix) for name, figures in which.items()}
-                for what, which, prefix in (
-                    ("objective", rates, "t"),
-                    ("  of the tables", rates, "table"),
-                    ("  of the tree's splits", rates, "tree"),
-                    ("on as many other seeds", others, "t"),
-                )
-            },
-            pinned={".".join(key): descent.pinned(key, PINNED_BY) for key in shipped},
-        )
-    result["values"] = {
-        name: {f"{kind}.{figure}": value for (kind, figure), value in values.items()}
-        for name, values in columns.items()
-    }
-    print(json.dumps(result, indent=2) if given.json else as_text(result))
+    n, rounds, grids = 4, 2, GRIDS
+    if given.short:
+        n, rounds, grids = 1, 1, {name: grid[:1] for name, grid in GRIDS.items()}
+    began = time.time()
+    seeds, others = range(n), range(n, 2 * n)
+    descent = descend(
+        lambda values: objective(rates_of(values, seeds)),
+        start(),
+        grids,
+        rounds,
+        lambda text: print(f"{text} ({time.time() - began:.0f} s)", file=sys.stderr),
+    )
+    columns = {"start": start(), "found": descent.values, "catalogue": fitted()}
+    print("\n".join(report(descent, columns, seeds, others)))
+    print(f"\n{n} seeds, {time.time() - began:.0f} s; {where_measured()}")
 
 
-def as_text(result: Mapping[str, Any]) -> str:
-    """Return the tables that are printed."""
-    columns = result["values"]
-    pinned = result.get("pinned")
-    lines = [f"{'figure':<26}" + "".join(f"{name:>12}" for name in columns)]
-    if pinned:
-        lines[0] += f"   alike within {PINNED_BY:g}"
+def report(descent: Descent, columns: Mapping[str, Values], seeds: range, others: range) -> Iterator[str]:
+    """Yield the tables: the figures, the targets, and the objectives."""
+
+    def row(name: str, cells: Iterable[str]) -> str:
+        return f"{name:<26}" + "".join(f"{cell:>12}" for cell in cells)
+
+    yield f"{row('figure', columns)}   alike within {PINNED_BY:g}"
     for key in columns["catalogue"]:
-        row = f"{key:<26}" + "".join(f"{values[key]:>12.4g}" for values in columns.values())
-        lines.append(row + (f"   {pinned[key][0]:g} to {pinned[key][1]:g}" if pinned else ""))
-    if pinned:
-        lines += [
-            "",
-            f"{'target':<26}" + "".join(f"{name:>12}" for name in (*columns, "printed", "its s.d.")),
-        ]
-        for key, target in result["targets"].items():
-            rates = (*(result["rates"][name][key] for name in columns), target["rate"], target["deviation"])
-            lines.append(f"{key:<26}" + "".join(f"{rate:>12.3f}" for rate in rates))
-        whole = "".join(f"{result['rates'][name]['tree']:>12.3f}" for name in columns)
-        lines += [f"{'(the tree as a whole)':<26}{whole}", ""]
-        for what, row in result["objectives"].items():
-            lines.append(f"{what:<26}" + "".join(f"{row[name]:>12.1f}" for name in columns))
-        lines += [
-            "",
-            f"{result['seeds']} seeds, {result['seconds']} s; {result['date']}, {result['machine']}",
-        ]
-    return "\n".join([*lines, f"{result['fitted_parameters']} fitted parameters"])
+        low, high = descent.pinned(key, PINNED_BY)
+        yield (
+            row(".".join(key), (f"{values[key]:.4g}" for values in columns.values()))
+            + f"   {low:g} to {high:g}"
+        )
+    rates = [rates_of(values, seeds) for values in columns.values()]
+    yield ""
+    yield row("target", (*columns, "printed", "its s.d."))
+    for name, target in targets().items():
+        yield row(name, (f"{value:.3f}" for value in (*(rate[name] for rate in rates), *target)))
+    yield row("(the tree as a whole)", (f"{rate['tree']:.3f}" for rate in rates))
+    yield ""
+    elsewhere = [rates_of(values, others) for values in columns.values()]
+    for what, measured, prefix in (
+        ("objective", rates, "t"),
+        ("  of the tables", rates, "table"),
+        ("  of the tree's splits", rates, "tree"),
+        ("on as many other seeds", elsewhere, "t"),
+    ):
+        yield row(what, (f"{objective(by_name, prefix):.1f}" for by_name in measured))
 
 
 if __name__ == "__main__":

@@ -13,22 +13,29 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 from attrs import evolve
-from fit import FOLDS, SPLITS, SPREAD, TRIALS, Squeeze, as_toml, by_the_splits
+from fit import (
+    FOLDS,
+    SPLITS,
+    SPREAD,
+    TRIALS,
+    Observed,
+    Squeeze,
+    as_toml,
+    by_the_splits,
+    rate,
+    rates_of_tables,
+    squeeze_of,
+)
+from sklearn.model_selection import PredefinedSplit, cross_val_predict
 
 from graspsense.core.values.trace import Trace
 from graspsense.evaluation.folds import stratified
 from graspsense.plugin_api import Features, create
 from graspsense.sources.simulated import OBJECTS_PER_SEED, TRIALS_PER_SEED, Group, PlannedTrial
-from graspsense_c45.fitting import fit
-from graspsense_c45.options import Options
-from graspsense_c45.prediction import distributions
-from graspsense_c45.schema import Attribute, Schema
-from graspsense_c45.table import make_table
-from graspsense_c45.tree import Tree
+from graspsense_c45 import C45Classifier
 from graspsense_paper.claims import split_by
 from graspsense_paper.grasping import measures
 from graspsense_paper.inference import Prior
-from graspsense_paper.published import published
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.batch import run_many
 from graspsense_sim_gripper.scene.library import catalogue, object_kinds
@@ -370,43 +377,16 @@ def matrix_of(features: Sequence[Features]) -> Any:
     return np.array([feature.values for feature in features])
 
 
-class StateTree(NamedTuple):
-    """A C4.5 tree with J48's defaults."""
-
-    classes: tuple[str, ...]
-    tree: Tree
-
-    def answers(self, features: Any) -> list[str]:
-        """Return the most probable label of each trial."""
-        return [self.classes[k] for k in distributions(self.tree, features).argmax(axis=1)]
-
-
-def tree_of(features: Any, labels: Sequence[str]) -> StateTree:
-    """Return the tree of these trials."""
-    classes = tuple(sorted(set(labels)))
-    schema = Schema(tuple(Attribute(f"x{k}") for k in range(features.shape[1])), classes)
-    table = make_table(schema, features, [classes.index(label) for label in labels])
-    return StateTree(classes, fit(table, Options(), engine="fast"))
-
-
 def answers(features: Sequence[Features], labels: Sequence[str], seed: int) -> list[str]:
-    """Return what a C4.5 tree answers for each trial, in ten stratified folds."""
-    values, folds = matrix_of(features), stratified(labels, FOLDS, seed)
-    known, predicted = np.array(labels), np.empty(len(labels), dtype=object)
-    for fold in range(int(folds.max()) + 1):
-        test = folds == fold
-        if not test.any():
-            continue
-        if len(set(known[~test])) == 1:
-            predicted[test] = known[~test][0]
-            continue
-        predicted[test] = tree_of(values[~test], known[~test].tolist()).answers(values[test])
+    """Return what a C4.5 tree with J48's defaults answers for each trial, in ten stratified folds."""
+    folds = PredefinedSplit(stratified(labels, FOLDS, seed))
+    predicted = cross_val_predict(C45Classifier(), matrix_of(features), list(labels), cv=folds)
     return [str(label) for label in predicted]
 
 
-def rate(predicted: Sequence[str], labels: Sequence[str]) -> float:
-    """Return the share of answers that are the label."""
-    return float(np.mean([a == b for a, b in zip(predicted, labels, strict=True)]))
+def rate_of(features: Sequence[Features], labels: Sequence[str], seed: int) -> float:
+    """Return how often a label is told, in ten stratified folds."""
+    return rate(answers(features, labels, seed), labels)
 
 
 def split(
@@ -437,7 +417,7 @@ def rates_at_20_n(values: Values, seed: int) -> dict[str, float]:
     statistics = {"table_2": rate(predicted, classes), "confused": alike / len(pairs) if pairs else 0.0}
     for kind in CONTAINERS:
         own = trials.of_containers(kind)
-        statistics[f"table_3_{kind}"] = rate(answers(own.extracted, own.labels, seed), own.labels)
+        statistics[f"table_3_{kind}"] = rate_of(own.extracted, own.labels, seed)
     lowest, bottles = 1.0, 0.0
     for i, a in enumerate(CONTAINERS):
         for b in CONTAINERS[i + 1 :]:
@@ -454,22 +434,9 @@ def rates_at_20_n(values: Values, seed: int) -> dict[str, float]:
     return statistics
 
 
-class Observed(NamedTuple):
-    """A published figure and its standard deviation."""
-
-    value: float
-    deviation: float
-
-
 def observed() -> dict[str, Observed]:
     """Return the published figures that a posterior is conditioned on."""
-    figures = {}
-    for printed in published().rates:
-        if printed.id.startswith(("table_2", "table_3_")):
-            assert printed.n is not None
-            figures[printed.id] = Observed(
-                printed.rate, (printed.rate * (1.0 - printed.rate) / printed.n) ** 0.5
-            )
+    figures = rates_of_tables()
     figures["confused"] = Observed(9 / 14, (9 / 14 * 5 / 14 / 14) ** 0.5)
     for name in ("p_first_separates", "p_first_does_not_separate", "f_steady_separates"):
         figures[name] = Observed(0.0, 0.05)
@@ -482,42 +449,49 @@ def gain(values: Values, seed: int) -> float:
     rates = []
     for force_n in (FORCES_N[0], FORCES_N[-1]):
         trials = squeeze({"odwalla": TABLE_IV}, values, seed, force_n, extract)
-        rates.append(rate(answers(trials.extracted, trials.labels, seed), trials.labels))
+        rates.append(rate_of(trials.extracted, trials.labels, seed))
     return rates[1] - rates[0]
-
-
-def table_4(values: Values, seed: int) -> dict[str, Any]:
-    """Return the rates of Table IV, and the trials at 23 N with the squeezes as the authors' tree sees them."""
-    both, one_pad = create("feature-set", "chitta"), create("feature-set", "chitta", force="left")
-
-    def extract(trace: Trace) -> tuple[Features, Squeeze]:
-        felt = one_pad.extract(trace)
-        by_name = dict(zip(felt.names, felt.values, strict=True))
-        peak = float(np.max(trace.force_left_n))
-        return both.extract(trace), Squeeze(
-            by_name["delta_t"], by_name["p_steady"], by_name["f_steady"], peak
-        )
-
-    figures: dict[str, Any] = {}
-    for force_n in FORCES_N:
-        trials = squeeze({"odwalla": TABLE_IV}, values, seed, force_n, extract)
-        features = [extracted for extracted, _ in trials.extracted]
-        figures[f"table_4_{force_n:g}"] = rate(answers(features, trials.labels, seed), trials.labels)
-    figures["gain"] = figures["table_4_23"] - figures["table_4_17"]
-    return {
-        **figures,
-        "trials": Trials(trials.labels, features),
-        "squeezes": [s for _, s in trials.extracted],
-    }
 
 
 def predictions(values: Values, seed: int) -> dict[str, float]:
     """Return one replicate of the predictions: Tables IV and V, section III.F, Figs. 4 to 6, the tree's splits."""
-    table = table_4(values, seed)
-    trials, squeezes = table.pop("trials"), table.pop("squeezes")
-    states = [label.partition(":")[2] for label in trials.labels]
+    feature_set = create("feature-set", "chitta")
+
+    def extract(trace: Trace) -> tuple[Features, Squeeze]:
+        return feature_set.extract(trace), squeeze_of(trace)
+
+    figures: dict[str, float] = {}
+    for force_n in FORCES_N:
+        grasps = squeeze({"odwalla": TABLE_IV}, values, seed, force_n, extract)
+        trials = Trials(grasps.labels, [features for features, _ in grasps.extracted])
+        figures[f"table_4_{force_n:g}"] = rate_of(trials.extracted, trials.labels, seed)
+    figures["gain"] = figures["table_4_23"] - figures["table_4_17"]
+    # The trials at 23 N, the last ones.
+    squeezes = [squeezed for _, squeezed in grasps.extracted]
+    figures |= _squeezes(trials, squeezes)
+    without_water = {kind: TRIALS[kind] for kind in CONTAINERS if kind != "water"}
+    eleven = squeeze(without_water, values, seed, 20.0, feature_set.extract)
+    figures["eleven_classes"] = rate_of(eleven.extracted, eleven.labels, seed)
+    states = [state_of(label) for label in trials.labels]
+    tree = C45Classifier().fit(matrix_of(trials.extracted), states)
+    for name, kind in (("worn_bottles", "odwalla_worn"), ("other_new_bottles", "odwalla")):
+        tested = squeeze({kind: TABLE_IV}, values, seed, 23.0, feature_set.extract, first_instance=500)
+        figures[name] = rate(
+            tree.predict(matrix_of(tested.extracted)).tolist(), [state_of(label) for label in tested.labels]
+        )
+    return {**figures, **_figures(values, seed)}
+
+
+def state_of(label: str) -> str:
+    """Return the state in a label."""
+    return label.partition(":")[2]
+
+
+def _squeezes(trials: Trials, squeezes: Sequence[Squeeze]) -> dict[str, float]:
+    """Return what section III.F says of squeezes at 23 N, and how the authors' tree sorts them."""
+    states = [state_of(label) for label in trials.labels]
     splits = by_the_splits(states, squeezes)
-    figures: dict[str, float] = {**table, **{name: splits[name] for name in (*SPLITS, "tree")}}
+    figures = {name: splits[name] for name in (*SPLITS, "tree")}
     for feature, state, others in (
         ("f_steady", "empty_open", ("empty_closed",)),
         ("p_steady", "full_closed", ("full_open", "empty_closed", "empty_open")),
@@ -525,25 +499,15 @@ def predictions(values: Values, seed: int) -> dict[str, float]:
         figures[f"{feature}_splits"] = split(
             trials,
             feature,
-            lambda label, state=state: label == f"odwalla:{state}",  # type: ignore[misc]
-            lambda label, others=others: label.partition(":")[2] in others,  # type: ignore[misc]
+            lambda label, state=state: state_of(label) == state,  # type: ignore[misc]
+            lambda label, others=others: state_of(label) in others,  # type: ignore[misc]
         )
-    times = [squeeze.delta_t_s for squeeze in squeezes]
-    medians = {
-        s: np.nanmedian([t for t, state in zip(times, states, strict=True) if state == s])
-        for s in set(states)
+    times = {
+        state: np.nanmedian([s.delta_t_s for s, own in zip(squeezes, states, strict=True) if own == state])
+        for state in set(states)
     }
-    figures["full_open_longest"] = float(max(medians, key=lambda s: medians[s]) == "full_open")
-    extract = create("feature-set", "chitta").extract
-    without_water = {kind: TRIALS[kind] for kind in CONTAINERS if kind != "water"}
-    eleven = squeeze(without_water, values, seed, 20.0, extract)
-    figures["eleven_classes"] = rate(answers(eleven.extracted, eleven.labels, seed), eleven.labels)
-    tree = tree_of(matrix_of(trials.extracted), states)
-    for name, kind in (("worn_bottles", "odwalla_worn"), ("other_new_bottles", "odwalla")):
-        tested = squeeze({kind: TABLE_IV}, values, seed, 23.0, extract, first_instance=500)
-        true = [label.partition(":")[2] for label in tested.labels]
-        figures[name] = rate(tree.answers(matrix_of(tested.extracted)), true)
-    return {**figures, **_figures(values, seed)}
+    figures["full_open_longest"] = float(max(times, key=lambda state: times[state]) == "full_open")
+    return figures
 
 
 def _figures(values: Values, seed: int) -> dict[str, float]:

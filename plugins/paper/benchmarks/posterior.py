@@ -1,8 +1,6 @@
 """A posterior of the uncertain figures of the simulator, given results of the paper. Simulated.
 
-    python plugins/paper/benchmarks/posterior.py --out FOLDER
-        [--particles 150] [--generations 6] [--minutes 30] [--short]
-    python plugins/paper/benchmarks/posterior.py --out FOLDER --markdown plugins/paper/benchmarks/results/posterior.md
+    python plugins/paper/benchmarks/posterior.py --out FOLDER --markdown FILE [--minutes 30] [--short]
 
 It infers the figures of `paper_model.PRIORS`, with the explanations of `paper_model.EXPLANATIONS`, by approximate
 Bayesian computation with sequential Monte Carlo (pyABC; T. Toni et al., J. R. Soc. Interface 6 (2009) 187). Each
@@ -21,16 +19,14 @@ Genetics 162 (2002) 2025).
 The data are Tables II and III of Chitta, Piccoli and Sturm (2010) and what the paper says of 20 N. From the particles
 it predicts what was not used: Tables IV and V, section III.F, Figs. 4 to 6 and the authors' tree at 23 N.
 Each explanation of the rise of the rate with the force is on or off with equal prior probability, so the posterior odds
-are its Bayes factor. With the rates of Table IV as data too, the odds are those of a logistic regression over the
-particles, at the printed rates (M. A. Beaumont, in Simulations, Genetics and Human Prehistory (2008) 135).
+are its Bayes factor.
 
 Simulation-based calibration: each simulation from the prior is taken as the data in turn, and its posterior is made
 from the nearest other simulations, with the same weights and adjustment. The ranks of the true figures should be
 uniform.
 
 Every step is kept in FOLDER, and a run that was stopped continues there; `--minutes` limits the time of the inference.
-The result is `result.json`; `--markdown` writes the page from it. `--short` uses the least work, to show that it runs.
-Needs the extra `inference`.
+FILE is the page with the tables. `--short` uses the least work, to show that it runs. Needs the extra `inference`.
 """
 
 from __future__ import annotations
@@ -39,15 +35,11 @@ import argparse
 import json
 import logging
 import math
-import os
-import platform
 import sys
 import tempfile
 import time
-from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from datetime import date
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -75,9 +67,10 @@ from paper_model import (
     rates_at_20_n,
 )
 from scipy.stats import norm, sem, t
-from sklearn.linear_model import LogisticRegression
 
-from graspsense.evaluation.intervals import Z, wilson
+from graspsense.evaluation.intervals import Z, percentage, percentages, wilson
+from graspsense.experiments.versions import where_measured
+from graspsense.report.simulation import markdown_table
 from graspsense_paper.inference import (
     Prior,
     contraction,
@@ -87,7 +80,6 @@ from graspsense_paper.inference import (
     uniformity_p,
     weighted_quantiles,
 )
-from graspsense_paper.published import published
 
 LEVELS: Final = (0.025, 0.5, 0.975)
 NEAREST: Final = 0.2
@@ -96,8 +88,8 @@ BINS: Final = 5
 """Parts of a rank histogram."""
 SEEDS: Final = 1_000_000
 SIMULATIONS: Final = "simulations.jsonl"
-BOOTSTRAPS: Final = 400
-"""Resamplings of the particles for the interval of a logistic regression."""
+MIN_PARTICLES: Final = 5
+"""Effective number of particles with an explanation, or without it, below which no Bayes factor is given."""
 FARTHEST: Final = 5.0
 """Normal scores beyond this count as this, so that no figure is at the end of an unbounded prior."""
 
@@ -115,6 +107,10 @@ class Size(NamedTuple):
     """Particles that are predicted from, at most."""
     alone: int
     """Replicates of each explanation alone."""
+
+
+FULL: Final = Size(particles=150, generations=6, minutes=30.0, predicted=1000, alone=40)
+SHORT: Final = Size(particles=4, generations=1, minutes=30.0, predicted=4, alone=2)
 
 
 class Weighted(NamedTuple):
@@ -379,210 +375,208 @@ PREDICTED: Final[Mapping[str, tuple[str, Observed | None]]] = {
 """What is predicted, with the published figure."""
 
 
-def summarise(
-    folder: Folder, history: pyabc.History, size: Size, say: Callable[[str], None]
-) -> dict[str, Any]:
-    """Return the result as JSON values."""
+TITLES: Final = {
+    "table_2": "Table II: container class",
+    "table_3_odwalla": "Table III: state of an Odwalla bottle",
+    "table_3_naked": "Table III: state of a Naked bottle",
+    "table_3_can": "Table III: state of a can",
+    "table_3_water": "Table III: state of a water bottle",
+    "confused": "Table II: share of the errors that confuse Odwalla and Naked",
+    "p_first_separates": "section III.F: what p_first lacks to separate 90 % of every other pair",
+    "p_first_does_not_separate": "section III.F: what p_first separates above 90 % of Odwalla and Naked",
+    "f_steady_separates": "section III.F: what f_steady lacks to separate 90 % of Odwalla and Naked",
+}
+"""What the inference is given."""
+
+
+def page(folder: Folder, history: pyabc.History, size: Size, say: Callable[[str], None]) -> Iterator[str]:
+    """Yield the lines of the page."""
     simulations = folder.lines(SIMULATIONS)
-    nearby = nearest(simulations, history, NAMES, observed(), size.particles)
-    w = nearby.weights
-    sample = sample_of(nearby.scores, w)
+    near = nearest(simulations, history, NAMES, observed(), size.particles)
+    sample = sample_of(near.scores, near.weights)
     predicted = predict(folder, sample, len(simulations), size.predicted, say)
     alone = gains_alone(folder, sample, len(simulations), size.alone)
     say("explanations alone")
-    from_each = Counter(simulation["t"] for simulation in simulations)
-    scores = np.array([[simulation["scores"][name] for name in NAMES] for simulation in simulations])
-    every = mixture_weights(scores, np.array([simulation["t"] for simulation in simulations]), history, NAMES)
-    populations = history.get_all_populations()
-    w_predicted = sample.weight[: len(predicted)]
-    return {
-        "simulated": True,
-        "date": date.today().isoformat(),
-        "machine": f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}",
-        "pyabc": pyabc.__version__,
-        "particles": len(w),
-        "simulations": len(simulations),
-        "effective_sample_size": effective_sample_size(w),
-        "generation_epsilon": [float(epsilon) for epsilon in populations["epsilon"][populations["t"] >= 0]],
-        "simulations_by_proposal": [from_each[t] for t in sorted(from_each)],
-        "epsilon": float(nearby.distances.max()),
-        "least_epsilon": least_epsilon(),
-        "median_distance": weighted_quantiles(nearby.distances, w, (0.5,))[0],
-        "moved": float(np.average(np.abs(nearby.scores - nearby.unadjusted).mean(axis=1), weights=w)),
-        "conditioned_on": {name: figure._asdict() for name, figure in observed().items()},
-        "accepted": {
-            name: list(weighted_quantiles([statistic[name] for statistic in nearby.statistics], w, LEVELS))
-            for name in observed()
-        },
-        "figures": _figures(sample),
-        "predicted_particles": len(predicted),
-        "predicted_effective_sample_size": effective_sample_size(w_predicted) if predicted else 0.0,
-        "predictions": _predictions(predicted, w_predicted),
-        "explanations": _explanations(sample, sample_of(nearby.unadjusted, w), predicted, alone),
-        "calibration": _calibration(calibrate(simulations, every)),
-    }
+    yield "# A posterior of the simulator's uncertain figures"
+    yield ""
+    yield (
+        "All grasps are simulated, with models of gripper and objects. `docs/posterior.md` says what follows. "
+        "Made by `python plugins/paper/benchmarks/posterior.py --out FOLDER --markdown FILE`, "
+        f"{where_measured()}, pyABC {pyabc.__version__}."
+    )
+    yield ""
+    yield from _inference(near, simulations)
+    yield from _section(
+        "What the data determine",
+        "Median and 95 % interval. The contraction is 1 - var(posterior) / var(prior): 1 if the data determine a "
+        "figure, 0 if they say nothing. The last figures are explanations: up to 0.5 an explanation is absent, above "
+        "that its strength rises to its limit at 1.",
+        ("figure", "unit", "origin", "reason", "prior", "posterior", "contraction"),
+        _figures(sample),
+    )
+    yield from _section(
+        "The data",
+        "Published, its standard deviation, and the accepted simulations before the adjustment. A claim without a "
+        "number counts by what is missing to it, with an assumed deviation of 5 points.",
+        ("figure at 20 N", "published", "standard deviation", "accepted: median, 95 %"),
+        _data(near),
+    )
+    yield from _section(
+        "Predictions",
+        "None of these were used for the inference. The interval is that of one replicate with the numbers of trials "
+        f"of the paper, over {len(predicted)} particles.",
+        ("figure", "published", "predicted mean", "95 % of one replicate", "published within that"),
+        _predictions(predicted, sample.weight[: len(predicted)]),
+    )
+    yield from _section(
+        "Explanations of the rise of the rate with the force",
+        "Each explanation is on or off with equal prior probability, beside all other figures. The Bayes factor is the "
+        "posterior odds that it is on, by the data at 20 N. Its interval counts the size of the sample, not the error "
+        "of the adjustment. Points are the rate at 23 N minus that at 17 N, printed: +25.0. *Alone* is at full "
+        "strength with all others off, whether or not the data at 20 N allow it; *explains* is that minus the rise "
+        f"with none of them, in the same {len(alone['none'])} particles. Intervals are 95 % of the mean.",
+        ("explanation", "Bayes factor, 20 N", "before the adjustment", "points alone", "explains"),
+        _explanations(near, sample, predicted, alone),
+    )
+    yield from _calibration(simulations, history)
 
 
-def _figures(sample: Weighted) -> dict[str, Any]:
-    figures = {}
-    for name in NAMES:
-        prior = prior_of(name)
-        contracted = contraction(prior, [v[name] for v in sample.values], sample.weight)
-        figures[name] = {
-            "unit": prior.unit,
-            "origin": prior.origin,
-            "reason": prior.reason,
-            "prior": list(contracted.prior),
-            "posterior": list(contracted.posterior),
-            "contraction": contracted.contraction,
-        }
-    return figures
+def _section(title: str, text: str, header: Sequence[str], rows: Iterator[tuple[str, ...]]) -> Iterator[str]:
+    yield from ("", f"## {title}", "", text, "", *markdown_table(header, list(rows)))
 
 
-def _predictions(predicted: list[dict[str, float]], w: Any) -> dict[str, Any]:
-    predictions = {}
-    for name, (what, printed) in PREDICTED.items() if predicted else ():
-        values = np.array([row[name] for row in predicted], dtype=np.float64)
-        known = ~np.isnan(values)
-        predictions[name] = {
-            "what": what,
-            "published": None if printed is None else printed.value,
-            "deviation": None if printed is None or math.isnan(printed.deviation) else printed.deviation,
-            "mean": float(np.average(values[known], weights=w[known])),
-            "interval": list(weighted_quantiles(values[known], w[known], (0.025, 0.975))),
-        }
-    return predictions
-
-
-def _explanations(
-    sample: Weighted,
-    unadjusted: Weighted,
-    predicted: list[dict[str, float]],
-    alone: Mapping[str, list[float]],
-) -> dict[str, Any]:
-    """Return the Bayes factors of the explanations, without and with Table IV, and the points that they give."""
-    every, w = sample.weight, sample.weight[: len(predicted)]
-    gains = np.array([row["gain"] for row in predicted])
-    rates = np.array([[row["table_4_17"], row["table_4_23"]] for row in predicted])
-    printed = {rate.id: rate.rate for rate in published().rates}
-    printed_rates = np.array([printed["table_4_17"], printed["table_4_23"]])
-    by_name: dict[str, Any] = {}
-    for name, explanation in EXPLANATIONS.items():
-        on = np.array([is_on(name, v) for v in sample.values])
-        of_predicted = on[: len(predicted)]
-        by_name[name] = {
-            "says": explanation.says,
-            "figure": explanation.figure,
-            "full_strength": explanation.limit,
-            "unit": explanation.unit,
-            "at_20_n": _odds(on, every),
-            "before_adjustment": _odds(np.array([is_on(name, v) for v in unadjusted.values]), every),
-            "with_table_4": _regressed_odds(of_predicted, w, rates, printed_rates),
-            "gain_if_on": _mean(gains, w, of_predicted),
-            "gain_if_off": _mean(gains, w, ~of_predicted),
-            "alone": _mean_of(alone[name]),
-            "explains": _mean_of(_differences(alone[name], alone["none"])),
-        }
-    return {
-        "gain": _mean(gains, w, np.ones(len(gains), dtype=bool)),
-        "greatest_gain": float(gains.max()) if predicted else None,
-        "none": _mean_of(alone["none"]),
-        "all": {
-            "alone": _mean_of(alone["all"]),
-            "explains": _mean_of(_differences(alone["all"], alone["none"])),
-        },
-        "of": by_name,
-    }
-
-
-def _regressed_odds(on: Any, w: Any, rates: Any, printed: Any) -> dict[str, float] | None:
-    """Return the odds that an explanation is on at the rates `at`, by logistic regression on the simulated rates.
-
-    The interval is that of resampled particles. None if the particles do not have both answers.
-    """
-    if not len(on) or on.all() or not on.any():
-        return None
-    spread = rates.std(axis=0) + 1e-9
-    centred = (rates - printed) / spread
-    size = max(round(effective_sample_size(w)), 4)
-    rng, intercepts = np.random.default_rng(0), []
-    for _ in range(BOOTSTRAPS):
-        drawn = rng.choice(len(on), size, p=w / w.sum())
-        if len(set(on[drawn])) == 2:
-            intercepts.append(LogisticRegression().fit(centred[drawn], on[drawn]).intercept_[0])
-    if not intercepts:
-        return None
-    middle = float(LogisticRegression().fit(centred, on, sample_weight=w * size / w.sum()).intercept_[0])
-    low, high = np.quantile(intercepts, (0.025, 0.975))
-    return dict(
-        zip(
-            ("bayes_factor", "bayes_factor_low", "bayes_factor_high"),
-            (math.exp(log_odds) for log_odds in (middle, float(low), float(high))),
-            strict=True,
-        )
+def _inference(near: Sample, simulations: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Yield how large and how near to the data the sample is."""
+    moved = np.average(np.abs(near.scores - near.unadjusted).mean(axis=1), weights=near.weights)
+    (median,) = weighted_quantiles(near.distances, near.weights, (0.5,))
+    from_prior = sum(simulation["t"] == 0 for simulation in simulations)
+    yield (
+        f"Of {len(simulations)} simulations, {from_prior} from the prior, the {len(near.weights)} nearest to the data "
+        "are accepted, weighted by prior over proposals: the **effective sample size is "
+        f"{effective_sample_size(near.weights):.1f}**. Their median distance is {median:.1f} and the greatest "
+        f"{near.distances.max():.1f}; two replicates of the same model differ by about {least_epsilon():.1f}. The "
+        f"adjustment to the data moves a score by {moved:.2f} on average. Where no accepted simulation is near the "
+        "data, it extrapolates."
     )
 
 
-def _differences(ones: Sequence[float], others: Sequence[float]) -> list[float]:
-    return [a - b for a, b in zip(ones, others, strict=True)]
+def _range(quantiles: Sequence[float]) -> str:
+    low, middle, high = quantiles
+    return f"{middle:.3g} ({low:.3g} to {high:.3g})"
 
 
-def _odds(on: Any, w: Any) -> dict[str, float]:
-    """Return the probability that an explanation is on, its Bayes factor, and an interval for it.
+def _figures(sample: Weighted) -> Iterator[tuple[str, ...]]:
+    for name in NAMES:
+        prior = prior_of(name)
+        contracted = contraction(prior, [v[name] for v in sample.values], sample.weight)
+        ranges = _range(contracted.prior), _range(contracted.posterior)
+        told = prior.unit, prior.origin, prior.reason
+        yield f"`{name}`", *told, *ranges, f"{contracted.contraction:.2f}"
+
+
+def _data(near: Sample) -> Iterator[tuple[str, ...]]:
+    for name, printed in observed().items():
+        simulated = [statistics[name] for statistics in near.statistics]
+        low, middle, high = weighted_quantiles(simulated, near.weights, LEVELS)
+        accepted = f"{percentage(middle)} ({percentages((low, high))})"
+        yield TITLES[name], percentage(printed.value), percentage(printed.deviation), accepted
+
+
+def _predictions(predicted: list[dict[str, float]], w: Any) -> Iterator[tuple[str, ...]]:
+    for name, (what, printed) in PREDICTED.items() if predicted else ():
+        values = np.array([row[name] for row in predicted], dtype=np.float64)
+        known = ~np.isnan(values)
+        mean = float(np.average(values[known], weights=w[known]))
+        low, high = weighted_quantiles(values[known], w[known], (0.025, 0.975))
+        told, verdict = "", ""
+        if printed is not None:
+            told = _shown(name, printed.value)
+            if not math.isnan(printed.deviation):
+                verdict = "yes" if low <= printed.value <= high else "no"
+        yield what, told, _shown(name, mean), f"{_shown(name, low)} to {_shown(name, high)}", verdict
+
+
+def _shown(name: str, value: float) -> str:
+    if name == "gain":
+        return f"{100 * value:+.1f} points"
+    return f"{value:.4g}" if name.startswith("fig_") else percentage(value)
+
+
+def _explanations(
+    near: Sample, sample: Weighted, predicted: list[dict[str, float]], alone: Mapping[str, list[float]]
+) -> Iterator[tuple[str, ...]]:
+    """Yield the Bayes factors of the explanations, and the points that they give."""
+    if predicted:
+        w = sample.weight[: len(predicted)]
+        gains = np.array([row["gain"] for row in predicted])
+        mean = float(np.average(gains, weights=w))
+        half = Z * math.sqrt(float(np.average((gains - mean) ** 2, weights=w)) / effective_sample_size(w))
+        yield "as far as the data at 20 N allow", "", "", _points(mean, (mean - half, mean + half)), ""
+    yield "none of them", "", "", _mean(alone["none"]), ""
+    unadjusted = sample_of(near.unadjusted, near.weights)
+    for name, explanation in EXPLANATIONS.items():
+        strength = f"{explanation.limit:.3g} {explanation.unit}".removesuffix(" 1")
+        factors = (
+            factor([is_on(name, v) for v in some.values], some.weight) for some in (sample, unadjusted)
+        )
+        yield (
+            f"{explanation.says} (`{explanation.figure}`, full strength {strength})",
+            *factors,
+            _mean(alone[name]),
+            _mean(np.subtract(alone[name], alone["none"])),
+        )
+    yield "all of them", "", "", _mean(alone["all"]), _mean(np.subtract(alone["all"], alone["none"]))
+
+
+def factor(on: Sequence[bool], w: Any) -> str:
+    """Return the Bayes factor of an explanation with its interval, if enough particles have it, and do not have it.
 
     The interval is Wilson's of a share of as many independent particles as the effective sample size.
     """
-    p, n = float(w[on].sum()), effective_sample_size(w)
-    low, high = wilson(p * n, n)
+    p, n = float(w[np.array(on)].sum()), effective_sample_size(w)
+    fewer = n * min(p, 1.0 - p)
+    if fewer < MIN_PARTICLES:
+        return f"too few particles ({fewer:.0f})"
     prior = (1.0 - OFF_BELOW) / OFF_BELOW
-    return {
-        "probability": p,
-        "low": low,
-        "high": high,
-        "bayes_factor": p / max(1.0 - p, 1e-9) / prior,
-        "bayes_factor_low": low / max(1.0 - low, 1e-9) / prior,
-        "bayes_factor_high": high / max(1.0 - high, 1e-9) / prior,
-    }
+    low, middle, high = (share / max(1.0 - share, 1e-9) / prior for share in sorted((p, *wilson(p * n, n))))
+    return f"{middle:.2g} ({low:.2g} to {high:.2g})"
 
 
-def _mean(values: Any, w: Any, chosen: Any) -> dict[str, Any] | None:
-    """Return the weighted mean of those values, its 95 % interval, and that of one replicate; None without any."""
-    if not chosen.any():
-        return None
-    v, w = np.asarray(values, dtype=np.float64)[chosen], w[chosen]
-    mean, n = float(np.average(v, weights=w)), effective_sample_size(w)
-    half = Z * math.sqrt(float(np.average((v - mean) ** 2, weights=w)) / n)
-    return {
-        "mean": mean,
-        "interval_of_mean": [mean - half, mean + half],
-        "interval": list(weighted_quantiles(v, w, (0.025, 0.975))),
-        "effective_sample_size": n,
-    }
+def _mean(values: Sequence[float]) -> str:
+    """Return the mean of independent replicates with its 95 % interval (Student's t)."""
+    if len(values) < 2:
+        return "not simulated"
+    mean = float(np.mean(values))
+    return _points(mean, t.interval(0.95, len(values) - 1, mean, sem(values)))
 
 
-def _mean_of(values: list[float]) -> dict[str, Any] | None:
-    """Return the mean of independent replicates with its 95 % interval (Student's t), and their number.
-
-    None for fewer than two.
-    """
-    n = len(values)
-    if n < 2:
-        return None
-    interval = t.interval(0.95, n - 1, np.mean(values), sem(values))
-    return {"mean": float(np.mean(values)), "interval": list(interval), "replicates": n}
+def _points(mean: float, ends: tuple[float, float]) -> str:
+    return f"{100 * mean:+.1f} ({100 * ends[0]:+.1f} to {100 * ends[1]:+.1f})"
 
 
-def _calibration(ranks: Mapping[str, list[float]]) -> dict[str, Any]:
+def _calibration(simulations: list[dict[str, Any]], history: pyabc.History) -> Iterator[str]:
+    scores = np.array([[simulation["scores"][name] for name in NAMES] for simulation in simulations])
+    proposed = np.array([simulation["t"] for simulation in simulations])
+    ranks = calibrate(simulations, mixture_weights(scores, proposed, history, NAMES))
     every = [rank for own in ranks.values() for rank in own]
-    return {
-        "runs": len(next(iter(ranks.values()))),
-        "accepted": NEAREST,
-        "bins": BINS,
-        "histograms": {name: rank_histogram(own, BINS).tolist() for name, own in ranks.items()},
-        "p": {name: uniformity_p(rank_histogram(own, BINS)) for name, own in ranks.items()},
-        "all": rank_histogram(every, BINS).tolist(),
-        "coverage_90": float(np.mean([0.05 <= rank <= 0.95 for rank in every])),
-    }
+    covered = float(np.mean([0.05 <= rank <= 0.95 for rank in every]))
+    histograms = {name: rank_histogram(own, BINS) for name, own in ranks.items()}
+    yield from _section(
+        "Is the inference calibrated?",
+        f"Each of {len(every) // len(ranks)} simulations that were drawn from the prior was taken as the data in turn. "
+        f"Its posterior are the {percentage(NEAREST)} of the others that are nearest to it, weighted and adjusted to "
+        "it in the same way. A rank histogram counts where the true figure lies within this posterior; it should be "
+        f"flat. Of all true figures, {percentage(covered)} lie within the 90 % interval.",
+        (
+            "figure",
+            f"ranks in {BINS} equal parts",
+            f"p that it is flat (below {0.05 / len(ranks):.4f}: it is not)",
+        ),
+        (
+            (f"`{name}`", " ".join(map(str, counts)), f"{uniformity_p(counts):.5f}")
+            for name, counts in histograms.items()
+        ),
+    )
 
 
 def main() -> None:
@@ -590,30 +584,14 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--out", type=Path, help="folder of the run; it is continued if it exists")
-    parser.add_argument("--particles", type=int, default=150)
-    parser.add_argument("--generations", type=int, default=6, help="at most")
+    parser.add_argument("--markdown", type=Path, help="the page to write; printed without")
     parser.add_argument("--minutes", type=float, default=30.0, help="limit of the time of the inference")
-    parser.add_argument("--predicted", type=int, default=1000, help="particles to predict from, at most")
-    parser.add_argument("--alone", type=int, default=40, help="replicates of each explanation alone")
     parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
-    parser.add_argument(
-        "--markdown", type=Path, help="write the page from the result of FOLDER, and run nothing"
-    )
     given = parser.parse_args()
     if given.out is None and not given.short:
         parser.error("name a folder for the run: --out FOLDER")
-    if given.markdown is not None:
-        from posterior_page import page
-
-        result = given.out / "result.json"
-        if not result.exists():
-            parser.error(f"{result} does not exist: make it by a run with --out {given.out}")
-        given.markdown.write_text(page(json.loads(result.read_text(encoding="utf-8"))), encoding="utf-8")
-        return
     logging.getLogger("ABC").setLevel(logging.WARNING)
-    size = Size(given.particles, given.generations, given.minutes, given.predicted, given.alone)
-    if given.short:
-        size = Size(particles=4, generations=1, minutes=30.0, predicted=4, alone=2)
+    size = (SHORT if given.short else FULL)._replace(minutes=given.minutes)
     began = time.time()
 
     def say(text: str) -> None:
@@ -622,10 +600,11 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as place:
         folder = Folder(given.out or Path(place))
         folder.path.mkdir(parents=True, exist_ok=True)
-        result = summarise(folder, infer(folder, size, say), size, say)
-        text = json.dumps(result, indent=2)
-        (folder.path / "result.json").write_text(text + "\n", encoding="utf-8")
-    print(text)
+        text = "\n".join(page(folder, infer(folder, size, say), size, say)) + "\n"
+    if given.markdown is None:
+        print(text)
+    else:
+        given.markdown.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,30 +1,20 @@
 """The extremes that the simulator has to bear: a row of benchmarks/extremes.py a test."""
 
-import importlib.util
-import sys
-from pathlib import Path
+import math
 
+import extremes
 import pytest
 
-BENCHMARK = Path(__file__).parents[3] / "benchmarks" / "extremes.py"
-
-
-def module():
-    spec = importlib.util.spec_from_file_location("extremes", BENCHMARK)
-    benchmark = importlib.util.module_from_spec(spec)
-    sys.modules["extremes"] = benchmark
-    spec.loader.exec_module(benchmark)
-    return benchmark
-
-
-extremes = module()
-SLOW = {"stiffness_and_mass", "head_space", "vents", "relaxation", "thin_object", "ticks"}
-SLOW |= {"stuck", "hertz_energy", "sliding_again", "cyclic", "whole_grasps", "masses", "batches"}
+from graspsense.plugin_api import ConfigError
+from graspsense_sim_gripper.config import SimConfig
 
 
 @pytest.mark.parametrize(
     "case",
-    [pytest.param(case, marks=pytest.mark.slow if case.__name__ in SLOW else ()) for case in extremes.CASES],
+    [
+        pytest.param(case, marks=() if case is extremes.approach else pytest.mark.slow)
+        for case in extremes.CASES
+    ],
     ids=lambda case: case.__name__,
 )
 def test_what_must_hold_holds(case):
@@ -38,3 +28,12 @@ def test_what_must_hold_holds(case):
 def test_every_row_holds():
     rows = [row for case in extremes.CASES for row in case(short=False)]
     assert [row for row in rows if not row["holds"]] == []
+
+
+def test_what_no_gripper_and_no_object_has_is_refused_by_name():
+    wrong = {"rotor_kg_m2": 1e-30, "noise_counts": math.inf, "damping_n_s_m": math.inf, "accuracy": 0.0}
+    for name, value in wrong.items():
+        with pytest.raises((ConfigError, ValueError, TypeError), match=name):
+            SimConfig(**{name: value})
+    with pytest.raises(ConfigError, match="width_m"):
+        extremes.ready(extremes.BASE, extremes.object_of(width_m=0.2, file="wide.toml"))
