@@ -12,10 +12,9 @@ from scipy.stats import chi2, norm
 from graspsense_identify.fit import fit
 from graspsense_identify.forward import ForwardModel
 from graspsense_identify.interval import interval_of_mean, normal, student
-from graspsense_identify.laws import memories, static_candidates
+from graspsense_identify.laws import memories, scale_of, static_candidates
 from graspsense_identify.path_error import NODES_PER_TICK, on_fine_path, path_bias
 from graspsense_identify.prepare import prepared
-from graspsense_identify.run import _scale
 from graspsense_identify.share import measured_share
 from graspsense_identify.spread import at_least
 from graspsense_sim_gripper.config import SimConfig
@@ -33,7 +32,7 @@ def errors_of(name):
     """Return the errors of the fitted logarithms, with an ideal sensor, before and after that of the path is taken."""
     squeeze = prepared(squeeze_of(name, sensor="ideal", accuracy=1e-3), 0.0)
     model = ForwardModel(pads=drive_and_pads(SimConfig())[1])
-    scale = _scale([squeeze])
+    scale = scale_of([squeeze])
     true = [value for term in SCENES[name] for key, value in term.items() if key != "type"]
     keys = [key for term in SCENES[name] for key in term if key != "type"]
     spring = static_candidates(scale)[0]
@@ -41,7 +40,7 @@ def errors_of(name):
     (candidate,) = (candidate for candidate in joined if [free.name for free in candidate.free] == keys)
     fitted = fit(model, candidate, [squeeze])
     biased = np.log(np.array(fitted.values) / true)
-    return biased, biased - path_bias(model, fitted, [squeeze])
+    return biased, biased - path_bias(fitted)
 
 
 @pytest.mark.slow
@@ -69,8 +68,8 @@ def test_a_recording_with_fewer_ticks_than_nodes_has_no_finer_path():
         assert np.min(np.diff(fine.t_s)) > 1e-9
     coarse = evolve(squeeze, course=(times[::100], gaps[::100]))
     model = ForwardModel(pads=drive_and_pads(SimConfig())[1])
-    fitted = fit(model, static_candidates(_scale([squeeze]))[0], [squeeze])
-    assert not path_bias(model, fitted, [coarse]).any()
+    fitted = fit(model, static_candidates(scale_of([squeeze]))[0], [squeeze])
+    assert not path_bias(evolve(fitted, squeezes=[coarse])).any()
 
 
 @pytest.mark.parametrize("name", ["spring", pytest.param("stiffening", marks=pytest.mark.slow)])

@@ -13,9 +13,9 @@ from identify import delayed
 from squeezes import grasped, recorded
 
 from graspsense_identify.delay import Delay, Lag
-from graspsense_identify.forward import RIGID_PADS, ForwardModel
 from graspsense_identify.prepare import prepared
 from graspsense_identify.run import identify
+from graspsense_identify.share import WHOLE
 from graspsense_identify.used_delay import Timed, with_delay
 from graspsense_sim_gripper.config import SimConfig
 
@@ -84,7 +84,7 @@ class FoundWithAll(NamedTuple):
 
     lag_s: float
 
-    def lag(self, model, squeezes):
+    def lag(self):
         return Lag(lag_s=self.lag_s, error_s=1e-3)
 
 
@@ -100,7 +100,7 @@ class FoundWithAll(NamedTuple):
 )
 def test_a_delay_is_used_only_if_the_terms_that_are_chosen_with_it_show_it(found_s, shown, used_s):
     def timed(lag):
-        return Timed([], [], [], FoundWithAll(found_s), lag)
+        return Timed(WHOLE, FoundWithAll(found_s), lag)
 
     def delay(used):
         shown_s = shown(used.lag.lag_s)
@@ -112,7 +112,7 @@ def test_a_delay_is_used_only_if_the_terms_that_are_chosen_with_it_show_it(found
             high_s=shown_s + 0.00151,
         )
 
-    used, told = with_delay(timed, delay, ForwardModel(pads=RIGID_PADS))
+    used, told = with_delay(timed, delay)
     assert told.used_s == pytest.approx(used_s, abs=1e-9)
     assert used.lag.lag_s == told.used_s
 

@@ -12,11 +12,12 @@ from squeezes import WIDTH_M, grasped, recorded
 from graspsense_identify.choose import choose
 from graspsense_identify.fit import fit
 from graspsense_identify.forward import RIGID_PADS, ForwardModel
-from graspsense_identify.gas import AREA_M2, combinations, parameters_of
+from graspsense_identify.gas import AREA_M2, combinations, without_combinations
 from graspsense_identify.laws import DataScale, static_candidates
 from graspsense_identify.prepare import prepared
 from graspsense_identify.refuse import undetermined
 from graspsense_identify.run import identify
+from graspsense_identify.share import WHOLE
 from graspsense_identify.spread import _scale_errors, uncertainty
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.contact import PadCompliance
@@ -33,8 +34,8 @@ AIR = {"area_slope_m": 0.0, "pressure_pa": 101325.0, "exponent": 1.0, "bulge_m3_
     ],
 )
 def test_a_gas_made_from_combinations_has_them(combined):
-    own = {"area_m2": AREA_M2, **parameters_of(combined, AREA_M2)}
-    assert combinations(Gas(**own, **AIR)) == pytest.approx(combined)
+    own = without_combinations({"area_m2": AREA_M2, **AIR, **combined})
+    assert combinations(Gas(**own)) == pytest.approx(combined)
 
 
 def test_a_gas_that_is_hardly_compressed_is_not_told_from_a_spring():
@@ -48,7 +49,7 @@ def test_a_gas_that_is_hardly_compressed_is_not_told_from_a_spring():
     for length, chosen in ((500.0, "elastic (k1)"), (1.5, "elastic (k1) + gas (closed)")):
         clean = model.forces(squeeze, with_gas, (300.0, 600.0, length * depth), WIDTH_M, 1.0)
         noisy = evolve(squeeze, force_n=clean + 0.005 * rng.standard_normal(len(clean)))
-        done = choose(model, [noisy], scale, has_memory=False, progress=lambda done, total: None)
+        done = choose(model, [noisy], scale, False, lambda done, total: None)
         assert done.fitted.candidate.name == chosen
     assert done.fitted.values == pytest.approx((300.0, 600.0, 1.5 * depth), rel=0.05)
 
@@ -68,17 +69,14 @@ def behind_pads(length, noise_n):
 @pytest.mark.slow
 def test_intervals_of_a_gas_are_wide_where_the_shell_and_the_gas_do_nearly_the_same():
     squeeze, model, law, true = behind_pads(3.0, 0.03)
-    intervals = uncertainty(model, fit(model, law, [squeeze]), [squeeze])
+    fitted = fit(model, law, [squeeze])
+    intervals = uncertainty(fitted)
     assert all(
         low < value < high for low, value, high in zip(intervals.low, true, intervals.high, strict=True)
     )
     # The stiffness of the shell is not determined beside that of the gas.
     assert intervals.high[0] > 4.0 * intervals.low[0]
-    (shell,) = [
-        part
-        for part in undetermined(fit(model, law, [squeeze]), intervals, [squeeze], [1.0], cells=False)
-        if part.what == "elastic.k1_n_m"
-    ]
+    (shell,) = [part for part in undetermined(fitted, intervals, WHOLE) if part.what == "elastic.k1_n_m"]
     assert "open" in shell.remedy
 
 
@@ -87,15 +85,15 @@ def test_a_shell_that_the_fit_leaves_out_has_an_interval_in_proportion_to_the_fo
     squeeze, model, law, true = behind_pads(2.0, 0.02)
     softest = 1e-3
     none = evolve(fit(model, law, [squeeze]), values=(softest, 900.0, true[2]))
-    assert uncertainty(model, none, [squeeze]).high[0] > 100.0
+    assert uncertainty(none).high[0] > 100.0
 
 
 def test_an_error_of_the_scale_of_the_force_changes_lengths_behind_compliant_fingertips():
     squeeze, model, law, _ = behind_pads(1.3, 0.0)
-    errors = np.sqrt(np.diag(_scale_errors(model, fit(model, law, [squeeze]), [squeeze], 0.05)))
+    errors = np.sqrt(np.diag(_scale_errors(fit(model, law, [squeeze]), 0.05)))
     assert errors[2] > 2e-3
     rigid = ForwardModel(pads=RIGID_PADS)
-    errors = np.sqrt(np.diag(_scale_errors(rigid, fit(rigid, law, [squeeze]), [squeeze], 0.05)))
+    errors = np.sqrt(np.diag(_scale_errors(fit(rigid, law, [squeeze]), 0.05)))
     assert errors == pytest.approx((0.05, 0.05, 0.0), abs=1e-4)
 
 

@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 
 from graspsense.simulator_api import IdentifiedParameter, Undetermined
 from graspsense_identify.fit import Fitted
-from graspsense_identify.forward import ForwardModel, Runs
-from graspsense_identify.interval import student
+from graspsense_identify.interval import NO_INTERVAL, identified, student
 from graspsense_identify.prepare import BREAK_SHARE, Squeeze
 from graspsense_identify.random_effects import FALSE_CLAIMS, Scatter, between
 
@@ -56,33 +55,15 @@ class FractureFit:
     @property
     def parameters(self) -> list[IdentifiedParameter]:
         """The identified parameters."""
-        unit = "N" if self.name == "force_n" else "m"
         basis = f"{self.broken} of {self.broken + self.whole} squeezes broke the object"
-        identified = [
-            IdentifiedParameter(
-                name=f"fracture.{self.name}",
-                unit=unit,
-                value=self.value,
-                low=self.low,
-                high=self.high,
-                basis=basis,
-            ),
-            IdentifiedParameter(
-                name="fracture.left", unit="", value=self.left, low=math.nan, high=math.nan, basis="median"
-            ),
+        name = f"fracture.{self.name}"
+        parameters = [
+            identified(name, self.value, (self.low, self.high), basis),
+            identified("fracture.left", self.left, NO_INTERVAL, "median"),
         ]
         if self.spread is not None:
-            identified.append(
-                IdentifiedParameter(
-                    name=f"fracture.{self.name}.spread",
-                    unit="",
-                    value=self.spread.value,
-                    low=self.spread.low,
-                    high=self.spread.high,
-                    basis=basis,
-                )
-            )
-        return identified
+            parameters.append(identified(f"{name}.spread", self.spread.value, self.spread[1:], basis))
+        return parameters
 
     @property
     def undetermined(self) -> list[Undetermined]:
@@ -108,9 +89,7 @@ class FractureFit:
         return open_
 
 
-def fracture_of(
-    model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze], force_scatter: float = 0.0
-) -> FractureFit | None:
+def fracture_of(fitted: Fitted, force_scatter: float = 0.0) -> FractureFit | None:
     """Return the fracture of these squeezes; None if none of them broke the object.
 
     `force_scatter`: standard deviation of the logarithm of the force's scale between squeezes.
@@ -118,9 +97,9 @@ def fracture_of(
     breaks: dict[str, list[float]] = {"force_n": [], "compression_m": []}
     survived: dict[str, list[float]] = {"force_n": [], "compression_m": []}
     errors: dict[str, list[float]] = {"force_n": [], "compression_m": []}
-    left = []
+    left, squeezes = [], fitted.squeezes
     for i, squeeze in enumerate(squeezes):
-        forces, compressions = _whole(model, fitted, squeeze, i)
+        forces, compressions = _whole(fitted, i)
         if squeeze.broken_n is None:
             survived["force_n"].append(float(np.max(forces)))
             survived["compression_m"].append(float(np.max(compressions)))
@@ -193,13 +172,11 @@ def _spread(logs: Floats, variances: Floats, likeliest: float) -> Scatter | None
     return Scatter(likeliest, ratio * scatter.low, ratio * scatter.high)
 
 
-def _whole(model: ForwardModel, fitted: Fitted, squeeze: Squeeze, i: int) -> tuple[Floats, Floats]:
+def _whole(fitted: Fitted, i: int) -> tuple[Floats, Floats]:
     """Return the forces and compressions that the object would have had at the nodes, if it had not broken."""
-    numbers = fitted.candidate.numbers(np.array([fitted.values]), np.array([fitted.factors[i]]))
-    width = fitted.widths_m[i]
-    runs = Runs(np.zeros(1, np.int64), np.array([width]), numbers, fitted.candidate.active)
-    forces = model.run(model.paths([squeeze]), runs)[0]
-    return forces, width - squeeze.gap_m - model.compressed_m(forces)
+    squeeze, width = fitted.squeezes[i], fitted.widths_m[i]
+    forces = fitted.model.at_nodes(squeeze, fitted.candidate, fitted.values, width, fitted.factors[i])
+    return forces, width - squeeze.gap_m - fitted.model.compressed_m(forces)
 
 
 def _lognormal(breaks: Floats, survived: Floats) -> tuple[float, float]:

@@ -12,10 +12,9 @@ atmosphere, a gas at the temperature of its walls (n = 1), no bulge, and, behind
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import Any, Final
-
-import numpy as np
+from typing import Final
 
 from graspsense_sim_gripper.run.identification import AIR_KG_M3, DISCHARGE, Gas
 
@@ -37,18 +36,22 @@ LENGTH: Final = "length_m"
 RESISTANCE: Final = "resistance_n_s2_m2"
 
 
-def parameters_of(combined: Mapping[str, Any], area_m2: float) -> dict[str, Any]:
-    """Return area, volume and vent of a gas with these combinations, numbers or arrays.
+def without_combinations(parameters: Mapping[str, float]) -> dict[str, float]:
+    """Return the parameters of a gas with area, volume and vent in place of their combinations.
 
-    With a length it is closed, otherwise vented, with the area `area_m2`.
+    With a length it is closed. Otherwise it is vented, and the area is among the parameters.
     """
-    stiffness = combined[STIFFNESS]
-    if LENGTH in combined:
-        area = stiffness * combined[LENGTH] / (EXPONENT * PRESSURE_PA)
-        return {"area_m2": area, "volume_m3": area * combined[LENGTH]}
-    volume = EXPONENT * PRESSURE_PA * area_m2 * area_m2 / stiffness
-    vent = np.sqrt(0.5 * AIR_KG_M3 * area_m2**3 / combined[RESISTANCE]) / DISCHARGE
-    return {"volume_m3": volume, "vent_m2": vent}
+    own = dict(parameters)
+    stiffness = own.pop(STIFFNESS)
+    if LENGTH in own:
+        length = own.pop(LENGTH)
+        own["area_m2"] = stiffness * length / (EXPONENT * PRESSURE_PA)
+        own["volume_m3"] = own["area_m2"] * length
+        return own
+    area = own["area_m2"]
+    own["volume_m3"] = EXPONENT * PRESSURE_PA * area * area / stiffness
+    own["vent_m2"] = math.sqrt(0.5 * AIR_KG_M3 * area**3 / own.pop(RESISTANCE)) / DISCHARGE
+    return own
 
 
 def combinations(gas: Gas) -> dict[str, float]:

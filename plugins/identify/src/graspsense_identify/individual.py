@@ -14,23 +14,21 @@ import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
 
-from graspsense_identify.choose import Choice, chosen_instead, information_of
+from graspsense_identify.choose import Choice, chosen_instead
 from graspsense_identify.delay import EVIDENCE, Lag, lag_beyond_settings
-from graspsense_identify.fit import Fitted, fit
-from graspsense_identify.forward import ForwardModel
-from graspsense_identify.prepare import Squeeze
+from graspsense_identify.fit import Fitted, information
 from graspsense_identify.spread import LEAST_INSTANCES
 from graspsense_identify.threads import in_threads
 
 Floats = NDArray[np.float64]
 
 
-def alone(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) -> list[Fitted]:
+def alone(fitted: Fitted) -> list[Fitted]:
     """Return the fits of a candidate to each squeeze by itself; none with fewer than three objects with names."""
-    names = {squeeze.instance for squeeze in squeezes}
+    names = {squeeze.instance for squeeze in fitted.squeezes}
     if "" in names or len(names) < LEAST_INSTANCES:
         return []
-    return in_threads(lambda i: _alone(model, fitted, squeezes[i], i), range(len(squeezes)))
+    return in_threads(lambda i: fitted.part([i]).refitted(), range(len(fitted.squeezes)))
 
 
 class Individual(NamedTuple):
@@ -42,12 +40,12 @@ class Individual(NamedTuple):
     varies: bool
     """Whether common values fit worse than noise would make them."""
 
-    def lag(self, model: ForwardModel, squeezes: Sequence[Squeeze]) -> Lag:
+    def lag(self) -> Lag:
         """Return the lag of the force beyond the settings."""
         if not self.varies:
-            return lag_beyond_settings(model, self.choice.refined, squeezes)
-        by_candidate = in_threads(lambda fitted: _alone(model, fitted, squeezes[0], 0), self.choice.refined)
-        return lag_beyond_settings(model, by_candidate, squeezes[:1])
+            return lag_beyond_settings(self.choice.refined)
+        by_candidate = in_threads(lambda fitted: fitted.part([0]).refitted(), self.choice.refined)
+        return lag_beyond_settings(by_candidate)
 
     @property
     def of_each(self) -> Fitted:
@@ -66,14 +64,14 @@ class Individual(NamedTuple):
         )
 
 
-def simplest_alone(model: ForwardModel, choice: Choice, squeezes: Sequence[Squeeze]) -> Individual:
+def simplest_alone(choice: Choice) -> Individual:
     """Return the choice, or that of a simpler candidate whose values differ between objects."""
-    own = alone(model, choice.fitted, squeezes)
+    own = alone(choice.fitted)
     if not own or _evidence(own) > _common_evidence(choice.fitted) - EVIDENCE:
         return Individual(choice, own, varies=False)
     simpler = [fitted for fitted in choice.refined if fitted.parameters < choice.fitted.parameters]
-    for fitted in sorted(simpler, key=lambda law: (law.parameters, law.cost)):
-        fits = alone(model, fitted, squeezes)
+    for fitted in sorted(simpler, key=lambda law: (law.parameters, law.rms)):
+        fits = alone(fitted)
         if _evidence(fits) < min(_evidence(own), _common_evidence(choice.fitted)) - EVIDENCE:
             chosen = chosen_instead(choice, fitted, "simpler, with values of each object")
             return Individual(chosen, fits, varies=True)
@@ -84,12 +82,12 @@ def _evidence(fits: Sequence[Fitted]) -> float:
     """Return half of the Bayesian information criterion of fits to each squeeze, less a constant."""
     residuals = np.concatenate([fitted.residuals for fitted in fits])
     free = sum(len(fitted.values) for fitted in fits)
-    return information_of(float(np.sqrt(np.mean(residuals**2))), free, len(residuals))
+    return information(float(np.sqrt(np.mean(residuals**2))), free, len(residuals))
 
 
 def _common_evidence(fitted: Fitted) -> float:
     """Return that of a fit with common values, and a factor of each squeeze on the stiffness."""
-    return information_of(fitted.rms, len(fitted.values) + len(fitted.factors) - 1, len(fitted.residuals))
+    return information(fitted.rms, len(fitted.values) + len(fitted.factors) - 1, len(fitted.residuals))
 
 
 def stiffnesses(fitted: Fitted) -> list[int]:
@@ -100,13 +98,3 @@ def stiffnesses(fitted: Fitted) -> list[int]:
 def reference_stiffness(fitted: Fitted, values: Floats) -> int | None:
     """Return the stiffness that differs least between the squeezes: the others vary with it, and beyond it."""
     return min(stiffnesses(fitted), key=lambda i: float(np.var(values[:, i])), default=None)
-
-
-def _alone(model: ForwardModel, fitted: Fitted, squeeze: Squeeze, i: int) -> Fitted:
-    factor = fitted.factors[i]
-    own = tuple(
-        value * factor if parameter.is_stiffness else value
-        for parameter, value in zip(fitted.candidate.free, fitted.values, strict=True)
-    )
-    start = evolve(fitted, values=own, widths_m=(fitted.widths_m[i],), factors=(1.0,))
-    return fit(model, fitted.candidate, [squeeze], start=start)

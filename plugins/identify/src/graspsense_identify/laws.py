@@ -5,26 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from itertools import product
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
-from graspsense_identify.gas import AREA_M2, FIXED, LENGTH, RESISTANCE, STIFFNESS, parameters_of
-from graspsense_sim_gripper.run.identification import (
-    Elastic,
-    Foam,
-    Gas,
-    Loss,
-    Maxwell,
-    Rigid,
-    Snap,
-    Switchable,
-    find_term,
-)
+from graspsense_identify.gas import AREA_M2, FIXED, LENGTH, RESISTANCE, STIFFNESS, without_combinations
+from graspsense_identify.prepare import Squeeze
+from graspsense_sim_gripper.run.identification import Switchable, find_term
 
-Floats = NDArray[np.float64]
+Values = Sequence[float] | NDArray[np.float64]
+"""Values of the free parameters of a candidate."""
 
 SLOTS: Final = ("elastic", "rigid", "maxwell", "maxwell", "loss", "foam", "snap", "gas")
 """The terms of the compiled law, of which a candidate switches some on. All candidates share its code."""
@@ -42,6 +34,18 @@ class DataScale(NamedTuple):
     """The longest time over which a memory of the object shows: the compression and the hold."""
     sample_s: float
     """Time between samples of the force."""
+
+
+def scale_of(squeezes: Sequence[Squeeze]) -> DataScale:
+    """Return the size of these squeezes."""
+    times = [squeeze.stretches for squeeze in squeezes]
+    return DataScale(
+        force_n=float(np.median([squeeze.peak_n for squeeze in squeezes])),
+        depth_m=float(np.median([squeeze.depth_m for squeeze in squeezes])),
+        load_s=float(np.median([timing.load_s for timing in times])),
+        memory_s=max(timing.load_s + timing.hold_s for timing in times),
+        sample_s=float(np.median([np.median(np.diff(squeeze.t_s[squeeze.sample])) for squeeze in squeezes])),
+    )
 
 
 @frozen(kw_only=True)
@@ -74,10 +78,10 @@ class FreeParameter:
         """Whether it is proportional to the scale of the force: a force, or one per length or speed."""
         return "_n_" in f"{self.name}_"
 
-    @property
+    @cached_property
     def is_stiffness(self) -> bool:
         """Whether it varies with the stiffness of the object."""
-        return self.name in find_term(SLOTS[self.slot])[1].stiffnesses
+        return self.name in TERMS[self.slot].stiffnesses
 
 
 class FitStart(NamedTuple):
@@ -98,7 +102,7 @@ class CandidateLaw:
     more_starts: tuple[FitStart, ...] = ()
     """Where a fit starts besides the combinations of the starts of each parameter."""
 
-    @property
+    @cached_property
     def slots(self) -> tuple[int, ...]:
         """The slots of its terms."""
         return tuple(sorted({parameter.slot for parameter in self.free}))
@@ -124,65 +128,27 @@ class CandidateLaw:
         """Return the candidate with the terms of both."""
         return CandidateLaw(free=self.free + other.free, fixed={**self.fixed, **other.fixed})
 
-    def parameters(self, values: Sequence[float]) -> dict[int, dict[str, float]]:
-        """Return the parameters of each of its terms, by slot, for these values of the free ones."""
+    def parameters(self, values: Values, factor: float = 1.0) -> dict[int, dict[str, float]]:
+        """Return the parameters of each of its terms, by slot, for these values of the free ones.
+
+        Every stiffness is multiplied by `factor`.
+        """
         of_slot: dict[int, dict[str, float]] = {slot: {} for slot in self.slots}
         for (slot, name), value in self.fixed.items():
             of_slot[slot][name] = value
-        combined = {}
         for parameter, value in zip(self.free, values, strict=True):
-            if parameter.slot == GAS:
-                combined[parameter.name] = float(value)
-            else:
-                of_slot[parameter.slot][parameter.name] = parameter.sign * float(value)
-        if combined:
-            of_slot[GAS] |= {name: float(value) for name, value in self._of_gas(combined).items()}
+            scale = parameter.sign * factor if parameter.is_stiffness else parameter.sign
+            of_slot[parameter.slot][parameter.name] = scale * float(value)
+        if GAS in of_slot:
+            of_slot[GAS] = without_combinations(of_slot[GAS])
         return of_slot
 
-    def _of_gas(self, combined: Mapping[str, Any]) -> dict[str, Any]:
-        return parameters_of(combined, self.fixed.get((GAS, "area_m2"), AREA_M2))
-
-    @cached_property
-    def active(self) -> NDArray[np.int64]:
-        """Whether each of the slots is active (1)."""
-        return np.array([int(slot in self.slots) for slot in range(len(SLOTS))])
-
-    @cached_property
-    def _numbers(self) -> tuple[Floats, list[int], list[float], list[int]]:
-        """The numbers of all terms, of which the free ones are 1, the columns and signs of the free ones but those of a
-        gas, and the columns of stiffnesses."""
-        numbers, stiff = np.ones(N_NUMBERS), []
-        for slot in self.slots:
-            term = find_term(SLOTS[slot])[1]
-            fixed = {name: value for (own, name), value in self.fixed.items() if own == slot}
-            for name, value in {**_defaults(term.params), **fixed}.items():
-                numbers[_column(slot, name)] = value
-            stiff += [_column(slot, name) for name in term.stiffnesses]
-        own = [parameter for parameter in self.free if parameter.slot != GAS]
-        return (
-            numbers,
-            [_column(parameter.slot, parameter.name) for parameter in own],
-            [parameter.sign for parameter in own],
-            stiff,
-        )
-
-    def numbers(self, values: Floats, factors: Floats) -> Floats:
-        """Return the numbers of the terms, as `terms_of` reads them, with every stiffness times the factor of its row.
-
-        `values`: (n, free parameters); `factors`: (n,). The result has shape (n, `N_NUMBERS`).
-        """
-        base, columns, signs, stiff = self._numbers
-        numbers = np.tile(base, (len(values), 1))
-        own = [i for i, parameter in enumerate(self.free) if parameter.slot != GAS]
-        numbers[:, columns] = values[:, own] * np.array(signs)
-        if len(own) < len(self.free):
-            combined = {
-                parameter.name: values[:, i] for i, parameter in enumerate(self.free) if parameter.slot == GAS
-            }
-            for name, value in self._of_gas(combined).items():
-                numbers[:, _column(GAS, name)] = value
-        numbers[:, stiff] *= factors[:, np.newaxis]
-        return numbers
+    def terms(self, values: Values, factor: float = 1.0) -> tuple[Switchable, ...]:
+        """Return the terms of all slots with these parameters, those of other candidates switched off."""
+        terms = list(SWITCHED_OFF)
+        for slot, own in self.parameters(values, factor).items():
+            terms[slot] = Switchable(1, TERMS[slot].params(**own))
+        return tuple(terms)
 
     def starts(self) -> list[tuple[float, ...]]:
         """Return combinations of the values to start from."""
@@ -199,70 +165,8 @@ class CandidateLaw:
         return evolve(self, free=free, more_starts=())
 
 
-def _defaults(params: Any) -> dict[str, float]:
-    return dict(params._field_defaults)
-
-
-def _column(slot: int, name: str) -> int:
-    """Return the column of a parameter among the numbers of all terms."""
-    fields: tuple[str, ...] = _PARAMS[slot]._fields
-    return _FIRST[slot] + fields.index(name)
-
-
-_PARAMS: Final[tuple[Any, ...]] = tuple(find_term(kind)[1].params for kind in SLOTS)
-_FIRST: Final = tuple(sum(len(param._fields) for param in _PARAMS[:slot]) for slot in range(len(SLOTS)))
-"""The first column of each slot."""
-N_NUMBERS: Final = sum(len(param._fields) for param in _PARAMS)
-"""The number of parameters of the terms of all slots."""
-
-
-def terms_of(active: Any, numbers: Any, r: int) -> tuple[Switchable, ...]:
-    """Return the parameters of the terms of all slots from row r of the numbers.
-
-    It runs compiled, so it spells them out.
-    """
-    return (
-        Switchable(int(active[0]), Elastic(float(numbers[r, 0]), float(numbers[r, 1]))),
-        Switchable(int(active[1]), Rigid(float(numbers[r, 2]), float(numbers[r, 3]), float(numbers[r, 4]))),
-        Switchable(int(active[2]), Maxwell(float(numbers[r, 5]), float(numbers[r, 6]))),
-        Switchable(int(active[3]), Maxwell(float(numbers[r, 7]), float(numbers[r, 8]))),
-        Switchable(int(active[4]), Loss(float(numbers[r, 9]))),
-        Switchable(
-            int(active[5]),
-            Foam(
-                float(numbers[r, 10]),
-                float(numbers[r, 11]),
-                float(numbers[r, 12]),
-                float(numbers[r, 13]),
-                float(numbers[r, 14]),
-                float(numbers[r, 15]),
-                float(numbers[r, 16]),
-            ),
-        ),
-        Switchable(
-            int(active[6]),
-            Snap(
-                float(numbers[r, 17]),
-                float(numbers[r, 18]),
-                float(numbers[r, 19]),
-                float(numbers[r, 20]),
-                float(numbers[r, 21]),
-            ),
-        ),
-        Switchable(
-            int(active[7]),
-            Gas(
-                float(numbers[r, 22]),
-                float(numbers[r, 23]),
-                float(numbers[r, 24]),
-                float(numbers[r, 25]),
-                float(numbers[r, 26]),
-                float(numbers[r, 27]),
-                float(numbers[r, 28]),
-                float(numbers[r, 29]),
-            ),
-        ),
-    )
+TERMS: Final = tuple(find_term(kind)[1] for kind in SLOTS)
+SWITCHED_OFF: Final = tuple(Switchable(0, term.params(*(1.0 for _ in term.params._fields))) for term in TERMS)
 
 
 def static_candidates(scale: DataScale) -> list[CandidateLaw]:

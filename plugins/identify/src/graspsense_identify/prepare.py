@@ -85,18 +85,14 @@ class Squeeze:
     sample: NDArray[np.int64]
     """Nodes at which the force was measured."""
     force_n: Floats
-    """The force at these nodes: the mean of both pads, over `share`."""
+    """The force at these nodes: the mean of both pads."""
     averaged_s2: Floats
     """Variance of the times of the measurements of which each of these forces is the mean; 0 for a single one."""
     width_m: float
     """The gap at contact, as a first estimate."""
-    noise_n: float
-    """Standard deviation of the force before the contact."""
     stretches: Stretches
     pad_difference: float
     """The largest difference of the forces on both pads, over the largest mean force; 0 with a single pad."""
-    share: float = 1.0
-    """The share of the force that the pads measure."""
     broken_n: float | None = None
     """The force at the last node, right after the object broke, where the squeeze is cut; None if it did not break."""
     course: tuple[Floats, Floats]
@@ -104,8 +100,19 @@ class Squeeze:
 
     def delayed(self, lag_s: float) -> Squeeze:
         """Return the squeeze if its force lagged behind the gap by so much: at every node, the gap of that time."""
+        if lag_s == 0.0:
+            return self
         gap = np.interp(self.t_s - lag_s, *self.course)
         return evolve(self, gap_m=gap, speed_m_s=-np.gradient(gap, self.t_s))
+
+    def only(self, is_kept: NDArray[np.bool_]) -> Squeeze:
+        """Return the squeeze with some of its samples."""
+        return evolve(
+            self,
+            sample=self.sample[is_kept],
+            force_n=self.force_n[is_kept],
+            averaged_s2=self.averaged_s2[is_kept],
+        )
 
     @cached_property
     def averaging(self) -> tuple[Floats, Floats]:
@@ -130,10 +137,19 @@ class Squeeze:
         return mean
 
     @cached_property
-    def measured_path(self) -> tuple[Floats, Floats]:
-        """The measured force at every node, and its rate."""
-        force = np.interp(self.t_s, self.t_s[self.sample], self.force_n)
-        return force, np.gradient(force, self.t_s)
+    def loading(self) -> slice:
+        """The samples until the gap is smallest."""
+        return slice(0, int(np.argmin(self.gap_m[self.sample])) + 1)
+
+    def work_j(self, force_n: Floats) -> float:
+        """Return the work of forces at the samples until the gap is smallest."""
+        force, gap = force_n[self.loading], self.gap_m[self.sample][self.loading]
+        return -float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(gap)))
+
+    def with_share(self, share: float) -> Squeeze:
+        """Return the squeeze with the whole force, of which this share was measured."""
+        broken_n = None if self.broken_n is None else self.broken_n / share
+        return evolve(self, force_n=self.force_n / share, broken_n=broken_n)
 
     @cached_property
     def peak_n(self) -> float:
@@ -185,7 +201,7 @@ def prepared(
     trace = squeeze.trace
     times, forces = _samples(squeeze.name, trace, delay_s, lag_s)
     peak = float(np.max(forces))
-    noise, threshold, touching = _contact(squeeze.name, forces, peak)
+    threshold, touching = _contact(squeeze.name, forces, peak)
     onset = int(touching[0])
     begin = min(times[max(onset - 1, 0)] - BEFORE_S, _begin(trace, times[onset]))
     last, broken = int(touching[-1]), None
@@ -216,15 +232,13 @@ def prepared(
         broken_n=broken_n,
         course=course,
         width_m=width,
-        noise_n=noise,
         pad_difference=_pad_difference(trace, begin, float(times[-1])) / peak,
         stretches=_stretches(nodes, gap, width, has_approach=onset > 1),
     )
 
 
-def _contact(name: str, forces: Floats, peak: float) -> tuple[float, float, NDArray[np.int64]]:
-    """Return the noise before the contact, the force from which on the object counts as touched, and the samples beyond
-    it. Raises NoSqueeze."""
+def _contact(name: str, forces: Floats, peak: float) -> tuple[float, NDArray[np.int64]]:
+    """Return the force from which on the object counts as touched, and the samples beyond it. Raises NoSqueeze."""
     scatter = SCATTER * float(np.median(np.abs(np.diff(forces)))) if len(forces) > MIN_SAMPLES else 0.0
     onset = int(np.argmax(forces > CONTACT_SHARE * peak))
     noise = float(np.std(forces[: max(onset - 2, 0)])) if onset > 6 else 0.0
@@ -237,7 +251,7 @@ def _contact(name: str, forces: Floats, peak: float) -> tuple[float, float, NDAr
             f"{name}: {len(touching)} measurements of the force in contact, and at least {MIN_SAMPLES} are "
             "needed: squeeze more slowly, or measure at a higher rate"
         )
-    return noise, threshold, touching
+    return threshold, touching
 
 
 def _samples(name: str, trace: Trace, delay_s: float, lag_s: float) -> tuple[Floats, Floats]:

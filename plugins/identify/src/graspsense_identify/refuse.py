@@ -13,6 +13,7 @@ from graspsense_identify.fit import Fitted
 from graspsense_identify.held_out import CONFIRMS
 from graspsense_identify.laws import ELASTIC, GAS, SNAP
 from graspsense_identify.prepare import BREAK_SHARE, Squeeze
+from graspsense_identify.share import Shares
 from graspsense_identify.spread import LEAST_INSTANCES, Uncertainty
 
 LEAST_HOLD_S: Final = 0.2
@@ -84,15 +85,14 @@ def shows_memory(squeezes: Sequence[Squeeze]) -> bool:
     return bool(speeds) and max(speeds) >= SPEED_RATIO * min(speeds)
 
 
-def undetermined(
-    fitted: Fitted, intervals: Uncertainty, squeezes: Sequence[Squeeze], shares: Sequence[float], cells: bool
-) -> list[Undetermined]:
-    """Return what these squeezes leave open. `shares`: those of each squeeze, `cells`: whether cells measured them."""
-    open_ = _memory(fitted, squeezes) if not shows_memory(squeezes) else []
-    open_ += _parameters(fitted, intervals, squeezes)
-    open_ += _falls(fitted, squeezes)
+def undetermined(fitted: Fitted, intervals: Uncertainty, shares: Shares) -> list[Undetermined]:
+    """Return what these squeezes leave open. `shares`: those of the force that cells measure."""
+    squeezes = fitted.squeezes
+    open_ = _memory(squeezes) if not shows_memory(squeezes) else []
+    open_ += _parameters(fitted, intervals)
+    open_ += _falls(fitted)
     open_ += _spreads(intervals, squeezes)
-    if cells and not any(math.isfinite(share) for share in shares):
+    if shares.has_cells and not len(shares.known):
         open_.append(
             Undetermined(
                 what="share",
@@ -152,23 +152,22 @@ def _gas(fitted: Fitted) -> Undetermined:
     )
 
 
-def _falls(fitted: Fitted, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
+def _falls(fitted: Fitted) -> list[Undetermined]:
     """Return the falls of the force that are too small for a break, if no term of the candidate describes them."""
     if SNAP in fitted.candidate.slots:
         return []
     forces = []
-    for squeeze in squeezes:
-        gap = squeeze.gap_m[squeeze.sample]
-        loading = slice(0, int(np.argmin(gap)) + 1)
-        drops = -np.diff(squeeze.force_n[loading])
+    for squeeze in fitted.squeezes:
+        drops = -np.diff(squeeze.force_n[squeeze.loading])
         if len(drops) and float(np.max(drops)) > FALL_SHARE * squeeze.peak_n:
-            forces.append(float(squeeze.force_n[loading][int(np.argmax(drops))]))
+            forces.append(float(squeeze.force_n[int(np.argmax(drops))]))
     if not forces:
         return []
+    total = len(fitted.squeezes)
     return [
         Undetermined(
             what="a fall of the force",
-            reason=f"the force falls by more than {FALL_SHARE:.0%} of the peak in {len(forces)} of {len(squeezes)} "
+            reason=f"the force falls by more than {FALL_SHARE:.0%} of the peak in {len(forces)} of {total} "
             f"squeezes (at {min(forces):.3g} to {max(forces):.3g} N) while the fingers close. It is neither a break (a "
             f"fall by {BREAK_SHARE:.0%} at once) nor described by a snap",
             remedy='cut the recordings there (cut = "rupture" in a manifest), or squeeze more slowly, so that the '
@@ -177,7 +176,7 @@ def _falls(fitted: Fitted, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
     ]
 
 
-def _memory(fitted: Fitted, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
+def _memory(squeezes: Sequence[Squeeze]) -> list[Undetermined]:
     load_s = max(squeeze.stretches.load_s for squeeze in squeezes)
     return [
         Undetermined(
@@ -188,9 +187,9 @@ def _memory(fitted: Fitted, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
     ]
 
 
-def _parameters(fitted: Fitted, uncertainty: Uncertainty, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
-    hold_s = max(squeeze.stretches.hold_s for squeeze in squeezes)
-    depth_mm = 1e3 * max(squeeze.depth_m for squeeze in squeezes)
+def _parameters(fitted: Fitted, uncertainty: Uncertainty) -> list[Undetermined]:
+    hold_s = max(squeeze.stretches.hold_s for squeeze in fitted.squeezes)
+    depth_mm = 1e3 * max(squeeze.depth_m for squeeze in fitted.squeezes)
     open_ = []
     for i, parameter in enumerate(fitted.candidate.free):
         at_bound = fitted.at_bound(i)
@@ -199,12 +198,7 @@ def _parameters(fitted: Fitted, uncertainty: Uncertainty, squeezes: Sequence[Squ
         interval = f"its 90 % interval is {uncertainty.low[i]:.3g} to {uncertainty.high[i]:.3g}"
         reason = "the fit is at the end of the range" if at_bound else interval
         if parameter.name == "tau_s" or parameter.term.startswith("maxwell"):
-            tau = next(
-                value
-                for other, value in zip(fitted.candidate.free, fitted.values, strict=True)
-                if other.slot == parameter.slot and other.name == "tau_s"
-            )
-            needed = max(HOLD_TIMES * tau, 2.0 * hold_s)
+            needed = max(HOLD_TIMES * fitted.by_label[f"{parameter.term}.tau_s"], 2.0 * hold_s)
             remedy = f"hold for {needed:.2g} s (the longest hold is {hold_s:.2g} s)"
         elif parameter.slot == ELASTIC and GAS in fitted.candidate.slots:
             remedy = _SHELL_OR_GAS
@@ -218,7 +212,7 @@ def _parameters(fitted: Fitted, uncertainty: Uncertainty, squeezes: Sequence[Squ
 
 def _spreads(uncertainty: Uncertainty, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
     open_ = []
-    if math.isnan(uncertainty.between_objects):
+    if math.isnan(uncertainty.stiffness.objects):
         names = {squeeze.instance for squeeze in squeezes if squeeze.instance}
         count = (
             "one object"

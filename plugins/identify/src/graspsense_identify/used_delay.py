@@ -11,36 +11,30 @@ from typing import Final, NamedTuple
 
 from attrs import evolve
 
-from graspsense.simulator_api import RecordedSqueeze
 from graspsense_identify.delay import PATH_ERROR_S, Delay, Lag
-from graspsense_identify.forward import ForwardModel
 from graspsense_identify.individual import Individual
-from graspsense_identify.prepare import Squeeze
+from graspsense_identify.share import Shares
 
 MAX_ROUNDS: Final = 3
 """How often the lag is corrected by that which the terms chosen with it show."""
 
 
 class Timed(NamedTuple):
-    """The squeezes at the times that a lag of the force gives them, and the choice for these."""
+    """The shares of the cells, and the choice, for the squeezes at the times that a lag of the force gives them."""
 
-    recorded: list[RecordedSqueeze]
-    ready: list[Squeeze]
-    shares: list[float]
+    shares: Shares
     individual: Individual
     lag: Lag
 
 
-def with_delay(
-    timed: Callable[[Lag], Timed], delay: Callable[[Timed], Delay], model: ForwardModel
-) -> tuple[Timed, Delay]:
+def with_delay(timed: Callable[[Lag], Timed], delay: Callable[[Timed], Delay]) -> tuple[Timed, Delay]:
     """Return the choice with the delay that is used.
 
     `timed` makes the choice with a lag, and `delay` returns what the recordings show for it. That of the settings is
     used where the interval of the chosen terms holds it, and where the lag does not settle.
     """
     recorded = timed(Lag())
-    lag = recorded.individual.lag(model, recorded.ready)
+    lag = recorded.individual.lag()
     for _ in range(MAX_ROUNDS):
         if lag.lag_s == 0.0:
             break
