@@ -17,15 +17,15 @@ from numpy.typing import NDArray
 
 from graspsense.simulator_api import CandidateScore
 from graspsense_identify.corners import with_corners
-from graspsense_identify.fit import LEAST_ERROR, Fitted, fit, held_out_rms
+from graspsense_identify.fit import LEAST_ERROR, Fitted, fit
 from graspsense_identify.forward import ForwardModel
+from graspsense_identify.held_out import held_out_errors
 from graspsense_identify.laws import GAS, DataScale, memories, static_candidates
 from graspsense_identify.prepare import Squeeze
 from graspsense_identify.threads import in_threads
 
 Floats = NDArray[np.float64]
 
-MAX_FOLDS: Final = 5
 STRETCHES: Final = 9
 STRETCH_FOLDS: Final = 3
 STATIC_KEPT: Final = 3
@@ -158,26 +158,18 @@ def _rank(score: CandidateScore) -> tuple[bool, float, float]:
 
 def _held_out(fitted: Fitted) -> Floats:
     """Return the errors of a candidate on squeezes, or on stretches of a single one, that it was not fitted to."""
-    n = len(fitted.squeezes)
-    errors: list[float] = []
-    if n == 1:
-        (squeeze,) = fitted.squeezes
-        samples = len(squeeze.force_n)
-        stretch = np.minimum(np.arange(samples) * STRETCHES // samples, STRETCHES - 1)
-        for k in range(STRETCH_FOLDS):
-            is_left_out = stretch % STRETCH_FOLDS == k
-            part = evolve(fitted, squeezes=[squeeze.only(~is_left_out)]).refitted()
-            (forces,) = evolve(part, squeezes=[squeeze]).forces()
-            residuals = (forces - squeeze.force_n)[is_left_out] / squeeze.peak_n
-            errors.append(float(np.sqrt(np.mean(residuals**2))))
-        return np.array(errors)
-    folds = min(n, MAX_FOLDS)
-    for k in range(folds):
-        part = fitted.part([i for i in range(n) if i % folds != k]).refitted()
-        errors += [
-            held_out_rms(part, fitted.squeezes[i], fitted.widths_m[i], own_stiffness=True)
-            for i in range(k, n, folds)
-        ]
+    if len(fitted.squeezes) > 1:
+        return np.array(held_out_errors(fitted, own_stiffness=True))
+    (squeeze,) = fitted.squeezes
+    samples = len(squeeze.force_n)
+    stretch = np.minimum(np.arange(samples) * STRETCHES // samples, STRETCHES - 1)
+    errors = []
+    for k in range(STRETCH_FOLDS):
+        is_left_out = stretch % STRETCH_FOLDS == k
+        part = evolve(fitted, squeezes=[squeeze.only(~is_left_out)]).refitted()
+        (forces,) = evolve(part, squeezes=[squeeze]).forces()
+        residuals = (forces - squeeze.force_n)[is_left_out] / squeeze.peak_n
+        errors.append(np.sqrt(np.mean(residuals**2)))
     return np.array(errors)
 
 

@@ -2,15 +2,15 @@
 
 Between its corners a snap-through is a straight line. For given corners its force is linear in the two stiffnesses, the
 drop, and the product of stiffness and an error of the width. So the corners are tried on a grid, and the other numbers
-follow from linear least squares (separable least squares: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973). The grid
-is then made finer around its minima. The derivatives of a fit jump where a corner passes a sample, so the minimum that
-it reaches from coarse corners can depend on rounding.
+follow from linear least squares (separable least squares: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973). Its
+minima are then refined. The derivatives of a fit jump where a corner passes a sample, so the minimum that it reaches
+from coarse corners can depend on rounding.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from attrs import evolve
@@ -30,13 +30,11 @@ TRIED: Final = 12
 """Minima of the grid that are refined."""
 BEST: Final = 4
 """Refined minima from which a fit starts."""
-FINER: Final = np.array([(i, j) for i in range(-2, 3) for j in range(-2, 3)]) / 2.0
-"""Corners that are tried around a minimum, in units of the reach of a step."""
 REACH: Final = (0.02, 0.26)
-"""First reach: of the critical compression over the largest one, and of the logarithm of the length of the fall."""
-STEPS: Final = 12
-"""Times that a minimum is refined; the reach is reduced by `SHRINK` each time."""
-SHRINK: Final = 0.6
+"""First steps of the refinement: of the critical compression over the largest one, and of the logarithm of the fall's
+length."""
+EVALUATIONS: Final = 80
+"""Of the refinement of a minimum."""
 LEAST_SAMPLES: Final = 6
 """Of a squeeze during the compression; four numbers follow from them."""
 WIDTH_WEIGHT: Final = 0.01
@@ -102,7 +100,7 @@ def _minima(loads: Sequence[_Load]) -> list[_Corners]:
     neighbours = np.lib.stride_tricks.sliding_window_view(bordered, (3, 3)).min(axis=(2, 3))
     minima = np.flatnonzero((cost <= neighbours) & np.isfinite(cost))
     minima = minima[np.argsort(tried.cost[minima], kind="stable")][:TRIED]
-    refined = [_refined(loads, _pair(tried, k)) for k in minima.tolist()]
+    refined = [_refined(loads, float(critical[k]), float(fall[k])) for k in minima.tolist()]
     # Corners between the same samples often explain them equally well, so only the best of these is kept.
     by_division: dict[tuple[int, ...], _Corners] = {}
     for corners in sorted(refined, key=lambda corners: float(corners.cost[0])):
@@ -116,20 +114,21 @@ def _division(loads: Sequence[_Load], corners: _Corners) -> tuple[int, ...]:
     return tuple(int(np.count_nonzero(load.compression < end)) for load in loads for end in ends)
 
 
-def _refined(loads: Sequence[_Load], best: _Corners) -> _Corners:
-    """Return the minimum near these corners, by a grid that becomes finer."""
-    for step in range(STEPS):
-        moves = FINER * REACH * SHRINK**step
-        critical = np.maximum(best.critical + moves[:, 0], 0.5 * CRITICAL[0])
-        tried = _at_corners(loads, critical, best.fall * np.exp(moves[:, 1]))
-        k = int(np.argmin(tried.cost))
-        if tried.cost[k] < best.cost[0]:
-            best = _pair(tried, k)
-    return best
+def _refined(loads: Sequence[_Load], critical: float, fall: float) -> _Corners:
+    """Return the minimum near these corners, by a simplex: the slope of the cost jumps at each sample."""
+    from scipy.optimize import minimize
 
+    def corners(x: Floats) -> _Corners:
+        return _at_corners(loads, np.maximum(x[:1], 0.5 * CRITICAL[0]), np.exp(x[1:]))
 
-def _pair(tried: _Corners, k: int) -> _Corners:
-    return _Corners(*(column[k : k + 1] for column in tried))
+    def cost(x: Floats) -> float:
+        return float(corners(x).cost[0])
+
+    start = np.array([critical, np.log(fall)])
+    simplex = start + np.array([(0.0, 0.0), (REACH[0], 0.0), (0.0, REACH[1])])
+    options: Any = {"initial_simplex": simplex, "maxfev": EVALUATIONS}
+    best = minimize(cost, start, method="Nelder-Mead", options=options)
+    return corners(best.x)
 
 
 def _at_corners(loads: Sequence[_Load], critical: Floats, fall: Floats) -> _Corners:

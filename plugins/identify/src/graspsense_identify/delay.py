@@ -19,7 +19,7 @@ from graspsense.simulator_api import IdentifiedParameter, Undetermined
 from graspsense_identify.choose import LEAST_GAIN
 from graspsense_identify.fit import Fitted
 from graspsense_identify.interval import identified, normal
-from graspsense_identify.laws import LOSS, CandidateLaw
+from graspsense_identify.laws import LOSS, damper, scale_of
 from graspsense_identify.prepare import MAX_LAG_S
 from graspsense_identify.refuse import shows_memory
 from graspsense_identify.spread import refits
@@ -135,10 +135,10 @@ def _is_dominated(fitted: Fitted, others: Sequence[Fitted]) -> bool:
     )
 
 
-def delay_of(fitted: Fitted, damper: CandidateLaw, settings_s: float, lag: Lag) -> Delay:
+def delay_of(fitted: Fitted, settings_s: float, lag: Lag) -> Delay:
     """Return the delay of the sensor.
 
-    `fitted`: the chosen fit, to squeezes whose force lags by `lag`. `damper`: the term that looks like a lag.
+    `fitted`: the chosen fit, to squeezes whose force lags by `lag`.
     """
     used_s = settings_s + lag.lag_s
     if not shows_memory(fitted.squeezes):
@@ -153,11 +153,9 @@ def delay_of(fitted: Fitted, damper: CandidateLaw, settings_s: float, lag: Lag) 
     shown = used_s + lagging.lag_s
     beside = math.nan
     if lag.lag_s != 0.0 and LOSS not in fitted.candidate.slots:
-        damped = evolve(
-            fitted,
-            candidate=fitted.candidate.joined(damper),
-            values=(*fitted.values, *(parameter.starts[0] for parameter in damper.free)),
-        )
+        loss = damper(scale_of(fitted.squeezes))
+        values = (*fitted.values, *loss.starts()[0])
+        damped = evolve(fitted, candidate=fitted.candidate.joined(loss), values=values)
         beside = damped.refitted(has_lag=True).lag_error_s
     return Delay(
         settings_s=settings_s,

@@ -210,7 +210,7 @@ class _Problem:
     def _of_squeeze(self, squeeze: Squeeze, points: Sequence[tuple[Floats, float, float]]) -> Floats:
         """Return the residuals of a squeeze at these values, widths and factors, a row for each."""
         forces = [self.model.at_nodes(squeeze, self.candidate, *point) for point in points]
-        return _relative(squeeze.at_samples(np.array(forces)) - squeeze.force_n, squeeze.peak_n)
+        return relative(squeeze.at_samples(np.array(forces)) - squeeze.force_n, squeeze.peak_n)
 
     def residuals(self, x: Floats) -> Floats:
         if self._last is None or not np.array_equal(self._last[0], x):
@@ -307,28 +307,7 @@ def _lag_error_s(jacobian: Floats, residuals: Floats) -> float:
     return LAG_UNIT_S * error / max(alone, 1e-12)
 
 
-def _relative(errors: Floats, peak_n: float) -> Floats:
+def relative(errors: Floats, peak_n: float) -> Floats:
     """Return errors of forces over the peak, all of them finite."""
     relative = errors / peak_n
     return np.clip(np.where(np.isfinite(relative), relative, NO_FORCE), -LARGEST_RESIDUAL, LARGEST_RESIDUAL)
-
-
-def held_out_rms(fitted: Fitted, squeeze: Squeeze, width_m: float, *, own_stiffness: bool) -> float:
-    """Return the rms residual over the peak of a squeeze that was not fitted, with a width of its own.
-
-    `width_m`: the width to start from. `own_stiffness`: whether it has a factor of its own on the stiffness, too.
-    """
-    from scipy.optimize import least_squares
-
-    def residuals(x: Floats) -> Floats:
-        factor = math.exp(x[1]) if own_stiffness else 1.0
-        width = width_m + x[0] * squeeze.depth_m
-        forces = fitted.model.forces(squeeze, fitted.candidate, fitted.values, width, factor)
-        return _relative(forces - squeeze.force_n, squeeze.peak_n)
-
-    limits = np.array([WIDTH_RANGE, FACTOR_RANGE][: 1 + own_stiffness])
-    start, steps = np.zeros(len(limits)), [STEP] * len(limits)
-    solution = least_squares(
-        residuals, start, bounds=(-limits, limits), max_nfev=15, diff_step=steps, ftol=TOLERANCE
-    )
-    return float(np.sqrt(np.mean(solution.fun**2)))

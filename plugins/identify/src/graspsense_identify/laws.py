@@ -35,6 +35,11 @@ class DataScale(NamedTuple):
     sample_s: float
     """Time between samples of the force."""
 
+    @property
+    def speed_m_s(self) -> float:
+        """The speed of the compression."""
+        return self.depth_m / max(self.load_s, 1e-3)
+
 
 def scale_of(squeezes: Sequence[Squeeze]) -> DataScale:
     """Return the size of these squeezes."""
@@ -169,75 +174,60 @@ TERMS: Final = tuple(find_term(kind)[1] for kind in SLOTS)
 SWITCHED_OFF: Final = tuple(Switchable(0, term.params(*(1.0 for _ in term.params._fields))) for term in TERMS)
 
 
+def _free(
+    slot: int, name: str, unit: float, limits: tuple[float, float], *starts: float, sign: float = 1.0
+) -> FreeParameter:
+    """Return a free parameter whose range and starts are given in a unit of the squeezes."""
+    low, high = (limit * unit for limit in limits)
+    inside = tuple(start * unit for start in starts)
+    return FreeParameter(slot=slot, name=name, low=low, high=high, starts=inside, sign=sign)
+
+
 def static_candidates(scale: DataScale) -> list[CandidateLaw]:
     """Return the candidates without memory, the simplest first."""
     force, depth = scale.force_n, scale.depth_m
-    k = force / depth
-    cubic = force / depth**3
-    power = force / depth**1.5
-    k1 = FreeParameter(slot=ELASTIC, name="k1_n_m", low=1e-4 * k, high=100.0 * k, starts=(k, 0.4 * k))
-    k3 = FreeParameter(
-        slot=ELASTIC, name="k3_n_m3", low=1e-4 * cubic, high=100.0 * cubic, starts=(0.5 * cubic, 0.05 * cubic)
-    )
+    k, cubic, power = force / depth, force / depth**3, force / depth**1.5
+    k1 = _free(ELASTIC, "k1_n_m", k, (1e-4, 100.0), 1.0, 0.4)
+    k3 = _free(ELASTIC, "k3_n_m3", cubic, (1e-4, 100.0), 0.5, 0.05)
+    stiffer = _free(ELASTIC, "k1_n_m", k, (1e-4, 100.0), 1.3, 2.5)
     # Down to where the shell has softened completely at a quarter of the compression.
-    softening = FreeParameter(
-        slot=ELASTIC, name="k3_n_m3", low=1e-3 * cubic, high=20.0 * cubic, starts=(0.3 * cubic,), sign=-1.0
-    )
-    softer = evolve(k1, starts=(1.3 * k, 2.5 * k))
-    hertz = FreeParameter(
-        slot=RIGID, name="hertz_n_m15", low=1e-3 * power, high=1e4 * power, starts=(power, 3.0 * power)
-    )
+    softening = _free(ELASTIC, "k3_n_m3", cubic, (1e-3, 20.0), 0.3, sign=-1.0)
+    hertz = _free(RIGID, "hertz_n_m15", power, (1e-3, 1e4), 1.0, 3.0)
     foam = (
-        FreeParameter(
-            slot=FOAM, name="force_n", low=1e-3 * force, high=100.0 * force, starts=(force, 0.5 * force)
-        ),
-        FreeParameter(slot=FOAM, name="exponent", low=0.3, high=6.0, starts=(1.2, 2.0)),
+        _free(FOAM, "force_n", force, (1e-3, 100.0), 1.0, 0.5),
+        _free(FOAM, "exponent", 1.0, (0.3, 6.0), 1.2, 2.0),
     )
     snap = (
-        FreeParameter(slot=SNAP, name="k1_n_m", low=0.05 * k, high=100.0 * k, starts=(1.2 * k, 2.0 * k)),
-        FreeParameter(
-            slot=SNAP,
-            name="critical_m",
-            low=0.03 * depth,
-            high=depth,
-            starts=tuple(share * depth for share in (0.25, 0.4, 0.55, 0.7, 0.85)),
-        ),
-        FreeParameter(slot=SNAP, name="drop_n", low=0.01 * force, high=3.0 * force, starts=(0.2 * force,)),
-        FreeParameter(
-            slot=SNAP, name="fall_m", low=0.01 * depth, high=2.0 * depth, starts=(0.1 * depth, 0.3 * depth)
-        ),
-        FreeParameter(slot=SNAP, name="k2_n_m", low=0.01 * k, high=100.0 * k, starts=(k,)),
+        _free(SNAP, "k1_n_m", k, (0.05, 100.0), 1.2, 2.0),
+        _free(SNAP, "critical_m", depth, (0.03, 1.0), 0.25, 0.4, 0.55, 0.7, 0.85),
+        _free(SNAP, "drop_n", force, (0.01, 3.0), 0.2),
+        _free(SNAP, "fall_m", depth, (0.01, 2.0), 0.1, 0.3),
+        _free(SNAP, "k2_n_m", k, (0.01, 100.0), 1.0),
     )
+    beside_gas = _free(ELASTIC, "k1_n_m", k, (1e-4, 100.0), 0.5, 0.1)
     return [
         CandidateLaw(free=(k1,)),
         CandidateLaw(free=(hertz,)),
         CandidateLaw(free=(k1, k3)),
-        CandidateLaw(free=(softer, softening)),
+        CandidateLaw(free=(stiffer, softening)),
         CandidateLaw(free=foam, fixed={(FOAM, "at_m"): float(f"{depth:.2g}")}),
         CandidateLaw(free=snap),
-        CandidateLaw(free=(evolve(k1, starts=(0.5 * k, 0.1 * k)),)).joined(_closed_gas(scale)),
+        CandidateLaw(free=(beside_gas,)).joined(_closed_gas(scale)),
     ]
 
 
 def _gas_stiffness(scale: DataScale) -> FreeParameter:
-    k = scale.force_n / scale.depth_m
-    return FreeParameter(slot=GAS, name=STIFFNESS, low=1e-3 * k, high=100.0 * k, starts=(0.3 * k, k))
+    return _free(GAS, STIFFNESS, scale.force_n / scale.depth_m, (1e-3, 100.0), 0.3, 1.0)
 
 
 def _closed_gas(scale: DataScale) -> CandidateLaw:
-    depth = scale.depth_m
-    length = FreeParameter(
-        slot=GAS, name=LENGTH, low=0.7 * depth, high=100.0 * depth, starts=(1.3 * depth, 3.0 * depth)
-    )
+    length = _free(GAS, LENGTH, scale.depth_m, (0.7, 100.0), 1.3, 3.0)
     return CandidateLaw(free=(_gas_stiffness(scale), length), fixed=_fixed_gas())
 
 
 def _vented_gas(scale: DataScale) -> CandidateLaw:
-    speed = scale.depth_m / max(scale.load_s, 1e-3)
-    drag = scale.force_n / speed**2
-    resistance = FreeParameter(
-        slot=GAS, name=RESISTANCE, low=1e-4 * drag, high=1e4 * drag, starts=(0.1 * drag, 3.0 * drag)
-    )
+    drag = scale.force_n / scale.speed_m_s**2
+    resistance = _free(GAS, RESISTANCE, drag, (1e-4, 1e4), 0.1, 3.0)
     fixed = {**_fixed_gas(), (GAS, "area_m2"): AREA_M2}
     return CandidateLaw(free=(_gas_stiffness(scale), resistance), fixed=fixed)
 
@@ -246,32 +236,22 @@ def _fixed_gas() -> dict[tuple[int, str], float]:
     return {(GAS, name): value for name, value in FIXED.items()}
 
 
+def damper(scale: DataScale) -> CandidateLaw:
+    """Return a damper, which looks like a lag of the sensor."""
+    unit = scale.force_n / scale.speed_m_s
+    return CandidateLaw(free=(_free(LOSS, "damping_n_s_m", unit, (1e-4, 10.0), 0.1),))
+
+
 def memories(scale: DataScale) -> list[CandidateLaw]:
     """Return the terms with a memory that a candidate may have beside the others, the simplest first."""
     k = scale.force_n / scale.depth_m
     shortest, longest = 0.3 * scale.sample_s, 5.0 * scale.memory_s
-    rate = scale.depth_m / max(scale.load_s, 1e-3)
 
-    def branch(slot: int, share: float, starts_s: tuple[float, ...]) -> CandidateLaw:
-        inside = tuple(min(max(tau, 1.5 * shortest), 0.5 * longest) for tau in starts_s)
-        return CandidateLaw(
-            free=(
-                FreeParameter(
-                    slot=slot, name="k_n_m", low=1e-3 * k, high=100.0 * k, starts=(share * k, 2.0 * share * k)
-                ),
-                FreeParameter(slot=slot, name="tau_s", low=shortest, high=longest, starts=inside),
-            )
-        )
+    def branch(slot: int, share: float, *shares_of_time: float) -> CandidateLaw:
+        times_s = [min(max(part * scale.memory_s, 1.5 * shortest), 0.5 * longest) for part in shares_of_time]
+        stiffness = _free(slot, "k_n_m", k, (1e-3, 100.0), share, 2.0 * share)
+        return CandidateLaw(free=(stiffness, _free(slot, "tau_s", 1.0, (shortest, longest), *times_s)))
 
-    damper = scale.force_n / rate
-    single = branch(MAXWELL, 0.3, (0.2 * scale.memory_s, 0.03 * scale.memory_s))
-    loss = CandidateLaw(
-        free=(
-            FreeParameter(
-                slot=LOSS, name="damping_n_s_m", low=1e-4 * damper, high=10.0 * damper, starts=(0.1 * damper,)
-            ),
-        )
-    )
-    fast = branch(MAXWELL, 0.2, (0.04 * scale.memory_s,))
-    slow = branch(SECOND, 0.2, (0.4 * scale.memory_s,))
+    loss, single = damper(scale), branch(MAXWELL, 0.3, 0.2, 0.03)
+    fast, slow = branch(MAXWELL, 0.2, 0.04), branch(SECOND, 0.2, 0.4)
     return [loss, single, fast.joined(slow), single.joined(loss), _vented_gas(scale)]

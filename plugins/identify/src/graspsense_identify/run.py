@@ -23,7 +23,7 @@ from graspsense_identify.fracture import fracture_of, not_broken
 from graspsense_identify.held_out import held_out_errors
 from graspsense_identify.individual import simplest_alone
 from graspsense_identify.interval import identified, identified_mean
-from graspsense_identify.laws import memories, scale_of
+from graspsense_identify.laws import scale_of
 from graspsense_identify.path_error import without_path_error
 from graspsense_identify.prepare import FULL, NoSqueeze, Squeeze, prepared, resolution
 from graspsense_identify.random_effects import own_spreads
@@ -73,7 +73,9 @@ def identify(
         )
         return Timed(shares, simplest_alone(choice), lag)
 
-    used, delay = with_delay(timed, lambda used: _delay(used, config.force_delay_s))
+    used, delay = with_delay(
+        timed, lambda used: delay_of(used.individual.choice.fitted, config.force_delay_s, used.lag)
+    )
     progress("computing intervals", 0, 1)
     chosen, shares = used.individual.choice, used.shares
     fitted, intervals = _with_uncertainty(used, delay)
@@ -81,9 +83,8 @@ def identify(
     values, parameters = _values(fitted, intervals, shares)
     parameters += delay.parameters
     parameters += own_spreads(chosen.fitted, used.individual.fits, shares.scatter)
-    parameters += fracture.parameters if fracture else []
-    open_ = [*delay.undetermined, *undetermined(fitted, intervals, shares)]
-    open_ += fracture.undetermined if fracture else []
+    parameters += fracture.parameters
+    open_ = [*delay.undetermined, *undetermined(fitted, intervals, shares), *fracture.undetermined]
     fits, held_out = _fits(fitted), held_out_errors(chosen.fitted)
     result = Identification(
         label=next((squeeze.label for squeeze in recorded if squeeze.label), ""),
@@ -100,13 +101,6 @@ def identify(
     )
     scene = scene_text(result, fitted, values, _fingertips(config), delay)
     return evolve(result, scene=scene, seconds=time.monotonic() - begin)
-
-
-def _delay(used: Timed, settings_s: float) -> Delay:
-    """Return the delay that the recordings show for the terms of a choice."""
-    fitted = used.individual.choice.fitted
-    damper = memories(scale_of(fitted.squeezes))[0]
-    return delay_of(fitted, damper, settings_s, used.lag)
 
 
 def _distinct(squeezes: Sequence[RecordedSqueeze], notes: list[str]) -> list[RecordedSqueeze]:
