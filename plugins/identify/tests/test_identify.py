@@ -99,7 +99,6 @@ def test_every_force_has_the_error_of_the_scale_of_the_force_and_no_length_or_ti
         "tau_s",
         "critical_m",
         "fall_m",
-        "length_m",
     }
 
 

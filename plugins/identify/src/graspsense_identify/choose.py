@@ -20,7 +20,7 @@ from graspsense_identify.corners import with_corners
 from graspsense_identify.fit import LEAST_ERROR, Fitted, fit
 from graspsense_identify.forward import ForwardModel
 from graspsense_identify.held_out import held_out_errors
-from graspsense_identify.laws import GAS, DataScale, memories, static_candidates
+from graspsense_identify.laws import DataScale, memories, static_candidates
 from graspsense_identify.prepare import Squeeze
 from graspsense_identify.threads import in_threads
 
@@ -93,12 +93,7 @@ def choose(
         pairs = zip(tried[: len(laws)], tried[len(laws) :], strict=True)
         rough = [min(pair, key=lambda fitted: fitted.rms) for pair in pairs]
     kept = _kept(rough)
-    joined = [
-        laws[k].joined(memory).starting_at(rough[k].by_label)
-        for k in kept
-        for memory in with_memory
-        if laws[k].can_join(memory)
-    ]
+    joined = [laws[k].joined(memory).starting_at(rough[k].by_label) for k in kept for memory in with_memory]
     fits = [alone[k] for k in kept] + in_threads(lambda law: fit(model, law, squeezes), joined, done)
     least = min(fitted.error for fitted in fits)
     worth = [
@@ -131,10 +126,8 @@ def chosen_instead(choice: Choice, fitted: Fitted, verdict: str) -> Choice:
 def _kept(rough: Sequence[Fitted]) -> list[int]:
     """Return which laws are tried with every memory: those that fit best."""
     order = np.argsort([fitted.rms for fitted in rough], kind="stable").tolist()
-    # A gas takes no other law's place: it resembles a spring that stiffens.
-    solid = [k for k in order if GAS not in rough[k].candidate.slots][:STATIC_KEPT]
     # The simplest law stays among the candidates, so that the table shows what it costs to leave the others out.
-    return sorted({0, *solid, *order[:STATIC_KEPT]})
+    return sorted({0, *order[:STATIC_KEPT]})
 
 
 def _adds_nothing(fitted: Fitted, fits: Sequence[Fitted]) -> bool:

@@ -22,7 +22,6 @@ UNITS: Final = {
     "m": "m",
     "s": "s",
     "n_s_m": "N s/m",
-    "n_s2_m2": "N s2/m2",
 }
 """The units by the ends of names."""
 

@@ -11,16 +11,15 @@ import numpy as np
 from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
-from graspsense_identify.gas import AREA_M2, FIXED, LENGTH, RESISTANCE, STIFFNESS, without_combinations
 from graspsense_identify.prepare import Squeeze
 from graspsense_sim_gripper.run.identification import Switchable, find_term
 
 Values = Sequence[float] | NDArray[np.float64]
 """Values of the free parameters of a candidate."""
 
-SLOTS: Final = ("elastic", "rigid", "maxwell", "maxwell", "loss", "foam", "snap", "gas")
+SLOTS: Final = ("elastic", "rigid", "maxwell", "maxwell", "loss", "foam", "snap")
 """The terms of the compiled law, of which a candidate switches some on. All candidates share its code."""
-ELASTIC, RIGID, MAXWELL, SECOND, LOSS, FOAM, SNAP, GAS = range(len(SLOTS))
+ELASTIC, RIGID, MAXWELL, SECOND, LOSS, FOAM, SNAP = range(len(SLOTS))
 MAX_STARTS: Final = 40
 
 
@@ -57,8 +56,7 @@ def scale_of(squeezes: Sequence[Squeeze]) -> DataScale:
 class FreeParameter:
     """A parameter that is fitted, by its logarithm: its slot, its name, its range, and values to start from.
 
-    These are positive; the parameter of the term is `sign` times the value. Those of a gas are combinations of the
-    parameters of its term (`identify.gas`).
+    These are positive; the parameter of the term is `sign` times the value.
     """
 
     slot: int
@@ -120,14 +118,7 @@ class CandidateLaw:
             cubic = [parameter.sign for parameter in self.free if parameter.name == "k3_n_m3"]
             form = "softening" if cubic == [-1.0] else "k1, k3" if cubic else "k1"
             words.append(f"elastic ({form})" if slot == ELASTIC else SLOTS[slot])
-            if slot == GAS:
-                vented = any(parameter.name == RESISTANCE for parameter in self.free)
-                words[-1] += " (vented)" if vented else " (closed)"
         return " + ".join(words)
-
-    def can_join(self, other: CandidateLaw) -> bool:
-        """Whether it has none of the terms of the other."""
-        return not set(self.slots) & set(other.slots)
 
     def joined(self, other: CandidateLaw) -> CandidateLaw:
         """Return the candidate with the terms of both."""
@@ -144,8 +135,6 @@ class CandidateLaw:
         for parameter, value in zip(self.free, values, strict=True):
             scale = parameter.sign * factor if parameter.is_stiffness else parameter.sign
             of_slot[parameter.slot][parameter.name] = scale * float(value)
-        if GAS in of_slot:
-            of_slot[GAS] = without_combinations(of_slot[GAS])
         return of_slot
 
     def terms(self, values: Values, factor: float = 1.0) -> tuple[Switchable, ...]:
@@ -204,7 +193,6 @@ def static_candidates(scale: DataScale) -> list[CandidateLaw]:
         _free(SNAP, "fall_m", depth, (0.01, 2.0), 0.1, 0.3),
         _free(SNAP, "k2_n_m", k, (0.01, 100.0), 1.0),
     )
-    beside_gas = _free(ELASTIC, "k1_n_m", k, (1e-4, 100.0), 0.5, 0.1)
     return [
         CandidateLaw(free=(k1,)),
         CandidateLaw(free=(hertz,)),
@@ -212,28 +200,7 @@ def static_candidates(scale: DataScale) -> list[CandidateLaw]:
         CandidateLaw(free=(stiffer, softening)),
         CandidateLaw(free=foam, fixed={(FOAM, "at_m"): float(f"{depth:.2g}")}),
         CandidateLaw(free=snap),
-        CandidateLaw(free=(beside_gas,)).joined(_closed_gas(scale)),
     ]
-
-
-def _gas_stiffness(scale: DataScale) -> FreeParameter:
-    return _free(GAS, STIFFNESS, scale.force_n / scale.depth_m, (1e-3, 100.0), 0.3, 1.0)
-
-
-def _closed_gas(scale: DataScale) -> CandidateLaw:
-    length = _free(GAS, LENGTH, scale.depth_m, (0.7, 100.0), 1.3, 3.0)
-    return CandidateLaw(free=(_gas_stiffness(scale), length), fixed=_fixed_gas())
-
-
-def _vented_gas(scale: DataScale) -> CandidateLaw:
-    drag = scale.force_n / scale.speed_m_s**2
-    resistance = _free(GAS, RESISTANCE, drag, (1e-4, 1e4), 0.1, 3.0)
-    fixed = {**_fixed_gas(), (GAS, "area_m2"): AREA_M2}
-    return CandidateLaw(free=(_gas_stiffness(scale), resistance), fixed=fixed)
-
-
-def _fixed_gas() -> dict[tuple[int, str], float]:
-    return {(GAS, name): value for name, value in FIXED.items()}
 
 
 def damper(scale: DataScale) -> CandidateLaw:
@@ -254,4 +221,4 @@ def memories(scale: DataScale) -> list[CandidateLaw]:
 
     loss, single = damper(scale), branch(MAXWELL, 0.3, 0.2, 0.03)
     fast, slow = branch(MAXWELL, 0.2, 0.04), branch(SECOND, 0.2, 0.4)
-    return [loss, single, fast.joined(slow), single.joined(loss), _vented_gas(scale)]
+    return [loss, single, fast.joined(slow), single.joined(loss)]

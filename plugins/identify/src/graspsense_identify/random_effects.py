@@ -23,7 +23,6 @@ from graspsense.simulator_api import IdentifiedParameter
 from graspsense_identify.fit import Fitted, linear_covariance
 from graspsense_identify.individual import reference_stiffness, stiffnesses
 from graspsense_identify.interval import LEVEL, identified
-from graspsense_identify.laws import GAS
 from graspsense_identify.spread import LEAST_INSTANCES, corner_errors
 from graspsense_sim_gripper.run.identification import MOST_SPREAD
 
@@ -76,9 +75,7 @@ def own_spreads(fitted: Fitted, fits: Sequence[Fitted], force_scatter: float) ->
     values = np.log([fit.values for fit in fits])
     covariances = np.array([_covariance(fit) for fit in fits])
     stiff, reference = stiffnesses(fitted), reference_stiffness(fitted, values)
-    tested = [
-        i for i, parameter in enumerate(fitted.candidate.free) if i != reference and parameter.slot != GAS
-    ]
+    tested = [i for i in range(len(fitted.values)) if i != reference]
     spreads = []
     for i in tested:
         logs, variances = values[:, i], covariances[:, i, i]

@@ -11,7 +11,7 @@ import numpy as np
 from graspsense.simulator_api import SqueezeFit, Undetermined, repeatability
 from graspsense_identify.fit import Fitted
 from graspsense_identify.held_out import CONFIRMS
-from graspsense_identify.laws import ELASTIC, GAS, SNAP
+from graspsense_identify.laws import SNAP
 from graspsense_identify.prepare import BREAK_SHARE, Squeeze
 from graspsense_identify.share import Shares
 from graspsense_identify.spread import LEAST_INSTANCES, Uncertainty
@@ -29,6 +29,11 @@ FALL_SHARE: Final = 0.25
 """A fall of the force by this share of the peak between two samples needs a term of its own."""
 
 _NOT_FITTED: Final = (
+    (
+        "gas",
+        "gas that is hardly compressed is a spring, and what escapes relaxes: both are part of the other terms here",
+        "measure the area that moves, the volume and the vent, and write the term by hand",
+    ),
     (
         "liquid",
         "only two combinations of its five numbers change the force, and these by a ringing that pads are too slow for",
@@ -52,21 +57,8 @@ _NOT_FITTED: Final = (
 )
 """The terms that are not fitted, why, and what would determine them."""
 
-_GAS_UNTOLD: Final = Undetermined(
-    what="gas",
-    reason="gas that is hardly compressed and does not escape is a spring, and part of the other terms here",
-    remedy="squeeze once sealed and once open, or until a fifth of the volume is displaced",
-)
-_GAS_COMBINED: Final = (
-    "the squeezes determine the stiffness n p A^2 / V of the gas and {other}; fixed are {fixed}: every other gas with "
-    "these combinations has the same force"
-)
-_SHELL_OR_GAS: Final = "squeeze deeper, or squeeze the object open, too, which shows its shell alone"
 _REMEDIES: Final = {
     "k1_n_m": "squeeze deeper",
-    "stiffness_n_m": "squeeze deeper",
-    "length_m": "squeeze deeper",
-    "resistance_n_s2_m2": "squeeze at two speeds that differ by a factor of two or more, and hold",
     "k3_n_m3": "squeeze deeper",
     "exponent": "squeeze deeper",
     "critical_m": "squeeze beyond the drop of the force",
@@ -109,7 +101,6 @@ def undetermined(fitted: Fitted, intervals: Uncertainty, shares: Shares) -> list
                 in_scene=True,
             )
         )
-    open_.append(_gas(fitted))
     open_ += [Undetermined(what=what, reason=reason, remedy=remedy) for what, reason, remedy in _NOT_FITTED]
     return open_
 
@@ -133,23 +124,6 @@ def refusals(
             f"{100.0 * limit:.1f} % are needed"
         )
     return tuple(reasons)
-
-
-def _gas(fitted: Fitted) -> Undetermined:
-    """Return what stays open of a gas: whether there is one, or its numbers one by one."""
-    law = fitted.candidate
-    if GAS not in law.slots:
-        return _GAS_UNTOLD
-    vented = (GAS, "area_m2") in law.fixed
-    other = "rho A^3 / (2 C_d^2 vent^2)" if vented else "the length V / A"
-    fixed = ", ".join(f"{name} = {value:g}" for (slot, name), value in law.fixed.items() if slot == GAS)
-    return Undetermined(
-        what="gas: area, volume, pressure and vent one by one"
-        if vented
-        else "gas: pressure, exponent and bulge",
-        reason=_GAS_COMBINED.format(other=other, fixed=fixed),
-        remedy="measure the area that moves, or the volume, and write the others by hand",
-    )
 
 
 def _falls(fitted: Fitted) -> list[Undetermined]:
@@ -200,8 +174,6 @@ def _parameters(fitted: Fitted, uncertainty: Uncertainty) -> list[Undetermined]:
         if parameter.name == "tau_s" or parameter.term.startswith("maxwell"):
             needed = max(HOLD_TIMES * fitted.by_label[f"{parameter.term}.tau_s"], 2.0 * hold_s)
             remedy = f"hold for {needed:.2g} s (the longest hold is {hold_s:.2g} s)"
-        elif parameter.slot == ELASTIC and GAS in fitted.candidate.slots:
-            remedy = _SHELL_OR_GAS
         else:
             remedy = _REMEDIES.get(parameter.name, "record more squeezes")
             if "deeper" in remedy:

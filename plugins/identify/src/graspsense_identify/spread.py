@@ -19,9 +19,7 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from graspsense_identify.fit import Fitted, linear_covariance
-from graspsense_identify.gas import AREA_FACTOR
 from graspsense_identify.interval import normal, student
-from graspsense_identify.laws import GAS
 from graspsense_identify.prepare import Squeeze
 from graspsense_identify.threads import in_threads
 
@@ -107,7 +105,6 @@ def uncertainty(
     if lag_error_s > 0.0:
         later = [squeeze.delayed(lag_error_s) for squeeze in fitted.squeezes]
         own += _of_shift(fitted, evolve(fitted, squeezes=later))
-    own += _area_errors(fitted)
     covariance = covariance + own * (normal() / factor) ** 2
     spread = np.sqrt(np.diag(covariance))
     best = np.array(fitted.values)
@@ -199,15 +196,6 @@ def refits(fitted: Fitted, rng: np.random.Generator, *, has_lag: bool) -> Refits
     what = "objects" if _instances(squeezes) >= LEAST_INSTANCES else "squeezes"
     basis = f"between {g} {what if g == len(groups) else 'groups'}"
     return Refits(fits, (g - 1) / g, student(g - 1), basis)
-
-
-def _area_errors(fitted: Fitted) -> Floats:
-    """Return the covariance of the logarithms that the conventional area of a vented gas causes."""
-    law, key = fitted.candidate, (GAS, "area_m2")
-    if key not in law.fixed:
-        return np.zeros((len(fitted.values), len(fitted.values)))
-    wider = evolve(law, fixed={**law.fixed, key: AREA_FACTOR * law.fixed[key]})
-    return _of_shift(fitted, evolve(fitted, candidate=wider))
 
 
 def corner_errors(fitted: Fitted) -> Floats:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from graspsense.simulator_api import Identification, IdentifiedParameter
 from graspsense_identify.delay import Delay
 from graspsense_identify.fit import Fitted
-from graspsense_identify.laws import SLOTS, CandidateLaw
+from graspsense_identify.laws import SLOTS
 
 
 def scene_text(
@@ -37,8 +37,7 @@ def scene_text(
     for slot, given in law.parameters(fitted.values).items():
         labels = {parameter.name: parameter.label for parameter in law.free if parameter.slot == slot}
         known = {name: by_name[label] for name, label in labels.items()}
-        comments = {name: _not_fitted(law, slot, name) for name in given if name not in known}
-        lines += _term(SLOTS[slot], given, known, comments, by_name)
+        lines += _term(SLOTS[slot], given, known, by_name)
     fracture = {
         parameter.name.removeprefix("fracture."): parameter
         for parameter in result.parameters
@@ -46,7 +45,7 @@ def scene_text(
     }
     if fracture:
         numbers = {name: parameter.value for name, parameter in fracture.items()}
-        lines += _term("fracture", numbers, fracture, {}, by_name)
+        lines += _term("fracture", numbers, fracture, by_name)
     return "\n".join([*lines, "", *_identified(result, fitted, gripper, delay)]) + "\n"
 
 
@@ -54,27 +53,19 @@ def _term(
     kind: str,
     values: Mapping[str, float],
     known: Mapping[str, IdentifiedParameter],
-    comments: Mapping[str, str],
     by_name: Mapping[str, IdentifiedParameter],
 ) -> list[str]:
-    """Return the lines of a term. `known`: its identified parameters. `comments`: on the others."""
+    """Return the lines of a term. `known`: its identified parameters."""
     lines = ["", "[[terms]]", f'type = "{kind}"']
     for name, value in values.items():
-        lines.append(
-            f"{name} = {_number(value)}  # {_interval(known[name]) if name in known else comments[name]}"
-        )
+        comment = _interval(known[name]) if name in known else "not fitted: a conventional value"
+        lines.append(f"{name} = {_number(value)}  # {comment}")
     names = {name: f"{parameter.name}.spread" for name, parameter in known.items()}
     spreads = {name: by_name[label] for name, label in names.items() if label in by_name}
     if spreads:
         numbers = ", ".join(f"{name} = {_number(spread.value)}" for name, spread in spreads.items())
         lines.append(f"spread = {{ {numbers} }}  # {', '.join(map(_interval, spreads.values()))}")
     return lines
-
-
-def _not_fitted(law: CandidateLaw, slot: int, name: str) -> str:
-    if (slot, name) in law.fixed:
-        return "not fitted: a conventional value"
-    return "follows from the fitted combinations, gas. in [identified.intervals]"
 
 
 def _identified(
