@@ -50,6 +50,22 @@ class Choice:
     refined: tuple[Fitted, ...]
     """The candidates whose residual is near the least one, chosen or not."""
     scores: tuple[CandidateScore, ...]
+    alone: Sequence[Fitted] = ()
+    """The fits of the chosen candidate to each squeeze by itself; none with fewer than three objects with names."""
+    varies: bool = False
+    """Whether common values fit worse than noise would make them."""
+
+    def instead(self, fitted: Fitted, verdict: str) -> Choice:
+        """Return the choice of another of the refined candidates."""
+        scores = [
+            evolve(score, chosen=True, verdict=f"chosen: {verdict}")
+            if score.terms == fitted.candidate.name
+            else evolve(score, chosen=False, verdict="only common values need its terms")
+            if score.chosen
+            else score
+            for score in self.scores
+        ]
+        return evolve(self, fitted=fitted, scores=tuple(sorted(scores, key=_rank)))
 
 
 @frozen(kw_only=True, eq=False)
@@ -108,19 +124,6 @@ def choose(
         refined=tuple(fitted for fitted in fits if fitted.rms <= WORTH_KEEPING * least),
         scores=tuple(sorted(scores, key=_rank)),
     )
-
-
-def chosen_instead(choice: Choice, fitted: Fitted, verdict: str) -> Choice:
-    """Return the choice of another of the refined candidates."""
-    scores = [
-        evolve(score, chosen=True, verdict=f"chosen: {verdict}")
-        if score.terms == fitted.candidate.name
-        else evolve(score, chosen=False, verdict="only common values need its terms")
-        if score.chosen
-        else score
-        for score in choice.scores
-    ]
-    return Choice(fitted=fitted, refined=choice.refined, scores=tuple(sorted(scores, key=_rank)))
 
 
 def _kept(rough: Sequence[Fitted]) -> list[int]:

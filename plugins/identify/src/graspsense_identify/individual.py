@@ -8,13 +8,12 @@ then that of a single squeeze.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
 
-from graspsense_identify.choose import Choice, chosen_instead
+from graspsense_identify.choose import Choice
 from graspsense_identify.delay import EVIDENCE, Lag, lag_beyond_settings
 from graspsense_identify.fit import Fitted, information
 from graspsense_identify.spread import LEAST_INSTANCES
@@ -31,51 +30,43 @@ def alone(fitted: Fitted) -> list[Fitted]:
     return in_threads(lambda i: fitted.part([i]).refitted(), range(len(fitted.squeezes)))
 
 
-class Individual(NamedTuple):
-    """A choice, and the fits of its candidate to each squeeze by itself."""
-
-    choice: Choice
-    fits: list[Fitted]
-    """None with fewer than three objects with names."""
-    varies: bool
-    """Whether common values fit worse than noise would make them."""
-
-    def lag(self) -> Lag:
-        """Return the lag of the force beyond the settings."""
-        if not self.varies:
-            return lag_beyond_settings(self.choice.refined)
-        by_candidate = in_threads(lambda fitted: fitted.part([0]).refitted(), self.choice.refined)
-        return lag_beyond_settings(by_candidate)
-
-    @property
-    def of_each(self) -> Fitted:
-        """The chosen fit with the width of each squeeze, and its factor on the stiffness: where the values vary, those
-        that it has by itself."""
-        fitted = self.choice.fitted
-        if not self.varies:
-            return fitted
-        values = np.log([fitted.values for fitted in self.fits])
-        reference = reference_stiffness(fitted, values)
-        logs = np.log(fitted.factors) if reference is None else values[:, reference]
-        return evolve(
-            fitted,
-            widths_m=tuple(fitted.widths_m[0] for fitted in self.fits),
-            factors=tuple(np.exp(logs - logs.mean()).tolist()),
-        )
-
-
-def simplest_alone(choice: Choice) -> Individual:
-    """Return the choice, or that of a simpler candidate whose values differ between objects."""
+def with_own_values(choice: Choice) -> Choice:
+    """Return the choice with the fits to each squeeze, or that of a simpler candidate whose values differ."""
     own = alone(choice.fitted)
+    choice = evolve(choice, alone=own)
     if not own or _evidence(own) > _common_evidence(choice.fitted) - EVIDENCE:
-        return Individual(choice, own, varies=False)
+        return choice
+    least = min(_evidence(own), _common_evidence(choice.fitted))
     simpler = [fitted for fitted in choice.refined if fitted.parameters < choice.fitted.parameters]
     for fitted in sorted(simpler, key=lambda law: (law.parameters, law.rms)):
         fits = alone(fitted)
-        if _evidence(fits) < min(_evidence(own), _common_evidence(choice.fitted)) - EVIDENCE:
-            chosen = chosen_instead(choice, fitted, "simpler, with values of each object")
-            return Individual(chosen, fits, varies=True)
-    return Individual(choice, own, varies=True)
+        if _evidence(fits) < least - EVIDENCE:
+            choice = evolve(choice.instead(fitted, "simpler, with values of each object"), alone=fits)
+            break
+    return evolve(choice, varies=True)
+
+
+def lag_of(choice: Choice) -> Lag:
+    """Return the lag of the force beyond the settings."""
+    if not choice.varies:
+        return lag_beyond_settings(choice.refined)
+    return lag_beyond_settings(in_threads(lambda fitted: fitted.part([0]).refitted(), choice.refined))
+
+
+def of_each(choice: Choice) -> Fitted:
+    """Return the chosen fit with the width of each squeeze, and its factor on the stiffness: where the values vary,
+    those that it has by itself."""
+    fitted = choice.fitted
+    if not choice.varies:
+        return fitted
+    values = np.log([fitted.values for fitted in choice.alone])
+    reference = reference_stiffness(fitted, values)
+    logs = np.log(fitted.factors) if reference is None else values[:, reference]
+    return evolve(
+        fitted,
+        widths_m=tuple(fitted.widths_m[0] for fitted in choice.alone),
+        factors=tuple(np.exp(logs - logs.mean()).tolist()),
+    )
 
 
 def _evidence(fits: Sequence[Fitted]) -> float:

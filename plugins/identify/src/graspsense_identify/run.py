@@ -21,7 +21,7 @@ from graspsense_identify.fit import Fitted
 from graspsense_identify.forward import ForwardModel, path_forces
 from graspsense_identify.fracture import fracture_of, not_broken
 from graspsense_identify.held_out import held_out_errors
-from graspsense_identify.individual import simplest_alone
+from graspsense_identify.individual import lag_of, of_each, with_own_values
 from graspsense_identify.interval import identified, identified_mean
 from graspsense_identify.laws import scale_of
 from graspsense_identify.path_error import without_path_error
@@ -71,18 +71,19 @@ def identify(
         choice = choose(
             model, ready, scale_of(ready), shows_memory(ready), partial(progress, "fitting candidates")
         )
-        return Timed(shares, simplest_alone(choice), lag)
+        return Timed(shares, with_own_values(choice), lag)
 
-    used, delay = with_delay(
-        timed, lambda used: delay_of(used.individual.choice.fitted, config.force_delay_s, used.lag)
-    )
+    def shown(used: Timed) -> Delay:
+        return delay_of(used.choice.fitted, config.force_delay_s, used.lag)
+
+    used, delay = with_delay(timed, lag_of, shown)
     progress("computing intervals", 0, 1)
-    chosen, shares = used.individual.choice, used.shares
+    chosen, shares = used.choice, used.shares
     fitted, intervals = _with_uncertainty(used, delay)
     fracture = fracture_of(chosen.fitted, shares.scatter)
     values, parameters = _values(fitted, intervals, shares)
     parameters += delay.parameters
-    parameters += own_spreads(chosen.fitted, used.individual.fits, shares.scatter)
+    parameters += own_spreads(chosen.fitted, chosen.alone, shares.scatter)
     parameters += fracture.parameters
     open_ = [*delay.undetermined, *undetermined(fitted, intervals, shares), *fracture.undetermined]
     fits, held_out = _fits(fitted), held_out_errors(chosen.fitted)
@@ -119,10 +120,10 @@ def _distinct(squeezes: Sequence[RecordedSqueeze], notes: list[str]) -> list[Rec
 
 def _with_uncertainty(used: Timed, delay: Delay) -> tuple[Fitted, Uncertainty]:
     """Return the chosen fit and its uncertainty, both without the error of the path."""
-    fitted = used.individual.choice.fitted
+    fitted = used.choice.fitted
     scale = used.shares.error / math.sqrt(len(fitted.squeezes))
     lag_error_s = math.hypot(used.lag.error_s, delay.error_s)
-    return without_path_error(fitted, uncertainty(fitted, scale, lag_error_s, used.individual.of_each))
+    return without_path_error(fitted, uncertainty(fitted, scale, lag_error_s, of_each(used.choice)))
 
 
 def _ready(

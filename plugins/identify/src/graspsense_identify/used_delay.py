@@ -11,8 +11,8 @@ from typing import Final, NamedTuple
 
 from attrs import evolve
 
+from graspsense_identify.choose import Choice
 from graspsense_identify.delay import PATH_ERROR_S, Delay, Lag
-from graspsense_identify.individual import Individual
 from graspsense_identify.share import Shares
 
 MAX_ROUNDS: Final = 3
@@ -23,18 +23,21 @@ class Timed(NamedTuple):
     """The shares of the cells, and the choice, for the squeezes at the times that a lag of the force gives them."""
 
     shares: Shares
-    individual: Individual
+    choice: Choice
     lag: Lag
 
 
-def with_delay(timed: Callable[[Lag], Timed], delay: Callable[[Timed], Delay]) -> tuple[Timed, Delay]:
+def with_delay(
+    timed: Callable[[Lag], Timed], lag_of: Callable[[Choice], Lag], delay: Callable[[Timed], Delay]
+) -> tuple[Timed, Delay]:
     """Return the choice with the delay that is used.
 
-    `timed` makes the choice with a lag, and `delay` returns what the recordings show for it. That of the settings is
+    `timed` makes the choice with a lag, `lag_of` returns that which all candidates show, and `delay` what the chosen
+    terms show. That of the settings is
     used where the interval of the chosen terms holds it, and where the lag does not settle.
     """
     recorded = timed(Lag())
-    lag = recorded.individual.lag()
+    lag = lag_of(recorded.choice)
     for _ in range(MAX_ROUNDS):
         if lag.lag_s == 0.0:
             break
