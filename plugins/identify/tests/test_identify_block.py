@@ -56,7 +56,6 @@ def test_a_delay_of_which_the_settings_do_not_know_does_not_bias_the_fingertips(
     assert "which these squeezes show" in said
     # With the delay of the settings, they seem 4 % stiffer with the ideal sensor, and 6 % with pads.
     share = measured_shares(config, [squeeze.trace for squeeze in late], ready(late)).mean
-    share = share if gripper["sensor"] == "pads" else 1.0
     wrong, said = with_fingertips_of_block(config, [squeeze.with_share(share) for squeeze in ready(late)])
     assert wrong.pad_stiffness_n_m > 1.035 * in_time.pad_stiffness_n_m
     assert "the delay of the settings" in said

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import cache, cached_property
+from functools import cache
 from typing import Any, Final
 
 import numpy as np
@@ -35,9 +35,6 @@ from graspsense_sim_gripper.run.identification import (
 Floats = NDArray[np.float64]
 
 RIGID_PADS: Final = PadCompliance(math.inf, 0.0, 0.0, 1.0)
-TABLE: Final = 400
-LARGEST_N: Final = 1000.0
-"""Entries, and the largest force, of the table of the compression of nonlinear fingertips."""
 SHORTEST_S: Final = 1e-6
 """The shortest time since a contact in the node after it."""
 
@@ -101,17 +98,9 @@ class ForwardModel:
         """Whether the fingertips are nonlinear."""
         return self.pads.hardening_m < math.inf
 
-    @cached_property
-    def _table(self) -> tuple[Floats, Floats]:
-        """Forces (N), and the compression (m) of both fingertips under them."""
-        forces = np.concatenate([[0.0], np.geomspace(1e-3, LARGEST_N, TABLE)])
-        return forces, np.array([pad_compression(self.pads, float(force)) for force in forces])
-
     def compressed_m(self, force_n: Floats) -> Floats:
         """Return the compression of both fingertips at rest under these forces."""
-        if not self.hardens:
-            return force_n / self.pads.stiffness_n_m
-        return np.interp(force_n, *self._table)
+        return np.array([pad_compression(self.pads, force) for force in force_n.tolist()])
 
     def at_nodes(
         self, squeeze: Squeeze, law: CandidateLaw, values: Values, width_m: float, factor: float

@@ -35,9 +35,10 @@ def held_out_errors(fitted: Fitted, *, own_stiffness: bool = False) -> tuple[flo
     def of_fold(k: int) -> list[float]:
         train = fitted.part([i for i in range(n) if i % folds != k]).refitted()
         beyond_m = float(np.mean(np.array(train.widths_m) - [squeeze.width_m for squeeze in train.squeezes]))
+        # With a stiffness of its own, a width far from that of the fit may lead to another minimum.
+        widths_m = fitted.widths_m if own_stiffness else [own.width_m + beyond_m for own in fitted.squeezes]
         return [
-            _predicted_rms(train, squeeze, squeeze.width_m + beyond_m, own_stiffness)
-            for squeeze in fitted.squeezes[k::folds]
+            _predicted_rms(train, fitted.squeezes[i], widths_m[i], own_stiffness) for i in range(k, n, folds)
         ]
 
     of_folds = in_threads(of_fold, range(folds))

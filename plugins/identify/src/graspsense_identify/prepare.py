@@ -380,14 +380,8 @@ def _stretches(t_s: Floats, gap: Floats, width: float, *, has_approach: bool) ->
     held = (
         np.abs(gap - float(np.median(gap[gap < width - (1.0 - 5 * HOLD_SHARE) * depth]))) < HOLD_SHARE * depth
     )
-    longest, begin = 0.0, math.nan
-    for i, is_held in enumerate(held):
-        if is_held and math.isnan(begin):
-            begin = float(t_s[i])
-        elif not is_held:
-            begin = math.nan
-        if is_held:
-            longest = max(longest, float(t_s[i]) - begin)
+    changes = np.flatnonzero(np.diff(held.astype(np.int64), prepend=0, append=0))
+    longest = float(np.max(t_s[changes[1::2] - 1] - t_s[changes[::2]], initial=0.0))
     return Stretches(
         load_s=load_s,
         hold_s=longest,

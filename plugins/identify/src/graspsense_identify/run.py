@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, Final
@@ -217,20 +218,18 @@ def _used(squeezes: Sequence[RecordedSqueeze], notes: list[str]) -> Sequence[Rec
     """Return at most `MAX_SQUEEZES` squeezes, of as many objects as possible; a note says if some are left out."""
     if len(squeezes) <= MAX_SQUEEZES:
         return squeezes
-    turn: dict[str, int] = {}
-    turns = []
+    turns: dict[int, list[int]] = defaultdict(list)
+    counts: Counter[str] = Counter()
     for i, squeeze in enumerate(squeezes):
-        turn[squeeze.instance] = turn.get(squeeze.instance, -1) + 1
-        turns.append((turn[squeeze.instance], i))
-    # The first squeeze of every object, then the second ones; among these evenly over the whole order.
-    order = [i for _, i in sorted(turns)]
-    last = turns[order[MAX_SQUEEZES - 1]][0]
-    earlier = [i for i in order if turns[i][0] < last]
-    same = [i for i in order if turns[i][0] == last]
-    missing = MAX_SQUEEZES - len(earlier)
-    chosen = sorted(earlier + [same[k * len(same) // missing] for k in range(missing)])
+        turns[counts[squeeze.instance]].append(i)
+        counts[squeeze.instance] += 1
+    # The first squeeze of every object, then the second ones; among the last of these evenly over the whole order.
+    chosen: list[int] = []
+    for turn in turns.values():
+        missing = min(MAX_SQUEEZES - len(chosen), len(turn))
+        chosen += [turn[k * len(turn) // missing] for k in range(missing)]
     notes.append(f"{MAX_SQUEEZES} of the {len(squeezes)} recordings are used, of as many objects as possible")
-    return [squeezes[i] for i in chosen]
+    return [squeezes[i] for i in sorted(chosen)]
 
 
 def _has_cells(config: SimConfig, squeezes: Sequence[RecordedSqueeze]) -> bool:

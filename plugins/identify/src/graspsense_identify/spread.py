@@ -92,7 +92,6 @@ def uncertainty(
     widths and factors, of which the spreads are.
     """
     rng = np.random.default_rng(0)
-    fitted_logs = np.log(fitted.values)
     names = [squeeze.instance for squeeze in fitted.squeezes]
     again = refits(fitted, rng, has_lag=lag_error_s > 0.0)
     table = np.log([refit.values for refit in again.fits])
@@ -100,7 +99,7 @@ def uncertainty(
     factor, basis = again.factor, again.basis
     linear = linear_covariance(fitted, PATH_FORCE_ERROR)
     covariance = at_least(again.scale * deviations.T @ deviations, linear * (normal() / factor) ** 2)
-    own = _scale_errors(fitted, force_scale) + PATH_ERROR**2 * np.eye(len(fitted_logs))
+    own = _scale_errors(fitted, force_scale) + PATH_ERROR**2 * np.eye(len(fitted.values))
     own += np.diag(corner_errors(fitted) ** 2)
     if lag_error_s > 0.0:
         later = [squeeze.delayed(lag_error_s) for squeeze in fitted.squeezes]
@@ -109,15 +108,12 @@ def uncertainty(
     spread = np.sqrt(np.diag(covariance))
     best = np.array(fitted.values)
     low, high = best * _changed(-factor * spread), best * _changed(factor * spread)
-    values, vectors = np.linalg.eigh(covariance)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    widening = factor / normal()
-    draws = best * _changed(widening * rng.standard_normal((DRAWS, len(fitted_logs))) @ root.T)
+    drawn = rng.multivariate_normal(np.zeros(len(best)), covariance, DRAWS, method="eigh")
     return Uncertainty(
         low=tuple(low.tolist()),
         high=tuple(high.tolist()),
         basis=basis,
-        draws=draws,
+        draws=best * _changed(factor / normal() * drawn),
         stiffness=_components(np.log((of_each or fitted).factors), names),
         width_m=_components(np.array((of_each or fitted).widths_m), names),
     )
