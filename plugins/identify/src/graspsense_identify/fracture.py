@@ -33,7 +33,7 @@ SAME_DEPTH: Final = 0.9
 """A squeeze as deep as this share of another one is compared with it."""
 
 
-class Fracture(NamedTuple):
+class IdentifiedFracture(NamedTuple):
     """What the breaks give: the parameters of the term `fracture`, and what they leave open."""
 
     parameters: list[IdentifiedParameter]
@@ -45,7 +45,7 @@ class Fracture(NamedTuple):
     undetermined: list[Undetermined]
 
 
-def fracture_of(fitted: Fitted, force_scatter: float = 0.0) -> Fracture:
+def fracture_of(fitted: Fitted, force_scatter: float = 0.0) -> IdentifiedFracture:
     """Return the fracture of these squeezes; nothing if none of them broke the object.
 
     `force_scatter`: standard deviation of the logarithm of the force's scale between squeezes.
@@ -68,7 +68,7 @@ def fracture_of(fitted: Fitted, force_scatter: float = 0.0) -> Fracture:
             left.append(squeeze.broken_n / max(float(courses["force_n"][-1]), 1e-9))
     broken = len(left)
     if not broken:
-        return Fracture([], [])
+        return IdentifiedFracture([], [])
     fits = {name: _lognormal(np.array(breaks[name]), np.array(survived[name])) for name in breaks}
     name = "force_n"
     if broken >= LEAST_BROKEN and fits["compression_m"][1] < fits["force_n"][1]:
@@ -84,7 +84,7 @@ def fracture_of(fitted: Fitted, force_scatter: float = 0.0) -> Fracture:
     variances = np.array(errors[name]) ** 2 + (force_scatter**2 if name == "force_n" else 0.0)
     if broken >= LEAST_BROKEN and (scatter := _spread(np.log(breaks[name]), variances, spread)):
         parameters.append(identified(f"fracture.{name}.spread", scatter.value, scatter[1:], basis))
-    return Fracture(parameters, _undetermined(fitted.squeezes, broken))
+    return IdentifiedFracture(parameters, _undetermined(fitted.squeezes, broken))
 
 
 def _undetermined(squeezes: Sequence[Squeeze], broken: int) -> list[Undetermined]:

@@ -162,22 +162,6 @@ class Squeeze:
         return float(self.width_m - np.min(self.gap_m))
 
 
-class Resolution(NamedTuple):
-    """Into how many nodes and samples a squeeze is divided."""
-
-    nodes: int = MAX_NODES
-    samples: int = MAX_SAMPLES
-
-
-FULL: Final = Resolution()
-
-
-def resolution(squeezes: int) -> Resolution:
-    """Return the resolution for a number of squeezes."""
-    share = min(MANY / squeezes, 1.0)
-    return Resolution(max(int(share * MAX_NODES), LEAST_NODES), max(int(share * MAX_SAMPLES), LEAST_SAMPLES))
-
-
 class NoSqueeze(ConfigError):
     """A recording in which nothing, or too little, was squeezed."""
 
@@ -185,16 +169,16 @@ class NoSqueeze(ConfigError):
 def prepared(
     squeeze: RecordedSqueeze,
     delay_s: float,
-    parts: Resolution = FULL,
     lag_s: float = 0.0,
     *,
+    squeezes: int = 1,
     may_break: bool = True,
 ) -> Squeeze:
     """Return the squeeze of a recording.
 
     `delay_s`: by how much a force without a time of its own lags behind the gap, by the settings of the sensor. The
-    times of images contain this delay. `lag_s`: by how much every force lags beyond that. `may_break`: whether the
-    squeeze ends where the object seems to break.
+    times of images contain this delay. `lag_s`: by how much every force lags beyond that. `squeezes`: how many are
+    fitted together. `may_break`: whether the squeeze ends where the object seems to break.
 
     Raises ConfigError if it has no gap, no force, no contact, or too few samples in contact.
     """
@@ -212,8 +196,10 @@ def prepared(
     broken_n = None if broken is None else float(forces[broken])
     progress = _progress(trace, np.append(times[window], after))
     touched = int(np.searchsorted(np.flatnonzero(window), onset))
-    times, forces, averaged_s2 = _in_blocks(times[window], forces[window], touched, progress, parts.samples)
-    nodes, sample = _nodes(np.append(times, after), progress, parts.nodes)
+    share = min(MANY / squeezes, 1.0)
+    samples, pieces = max(int(share * MAX_SAMPLES), LEAST_SAMPLES), max(int(share * MAX_NODES), LEAST_NODES)
+    times, forces, averaged_s2 = _in_blocks(times[window], forces[window], touched, progress, samples)
+    nodes, sample = _nodes(np.append(times, after), progress, pieces)
     sample = sample[: len(times)]
     course = _smooth_course(trace, nodes)
     gap = np.interp(nodes, *course)

@@ -26,7 +26,7 @@ from graspsense_identify.individual import lag_of, of_each, with_own_values
 from graspsense_identify.interval import identified, identified_mean
 from graspsense_identify.laws import scale_of
 from graspsense_identify.path_error import without_path_error
-from graspsense_identify.prepare import FULL, NoSqueeze, Squeeze, prepared, resolution
+from graspsense_identify.prepare import NoSqueeze, Squeeze, prepared
 from graspsense_identify.random_effects import own_spreads
 from graspsense_identify.refuse import refusals, shows_memory, undetermined
 from graspsense_identify.share import WHOLE, Shares, measured_shares
@@ -142,17 +142,17 @@ def _ready(
     """
     ready: dict[int, Squeeze] = {}
     refused: list[NoSqueeze] = []
-    parts = resolution(len(squeezes))
+    prepare = partial(prepared, delay_s=config.force_delay_s, lag_s=lag_s, squeezes=len(squeezes))
     for i, squeeze in enumerate(squeezes):
         try:
-            ready[i] = prepared(squeeze, config.force_delay_s, parts, lag_s)
+            ready[i] = prepare(squeeze)
         except NoSqueeze as refusal:
             refused.append(refusal)
     if not ready:
         raise refused[0]
     kept = list(ready)
     for k in not_broken(list(ready.values())):
-        ready[kept[k]] = prepared(squeezes[kept[k]], config.force_delay_s, parts, lag_s, may_break=False)
+        ready[kept[k]] = prepare(squeezes[kept[k]], may_break=False)
     notes += [f"left out: {refusal}" for refusal in refused]
     apart = max(squeeze.pad_difference for squeeze in ready.values())
     if apart > PADS_DIFFER:
@@ -175,7 +175,7 @@ def _settings(
     if not block:
         return config, notes
     lag_s = lag_of_block(config, block)
-    ready = [prepared(squeeze, config.force_delay_s, FULL, lag_s) for squeeze in block]
+    ready = [prepared(squeeze, config.force_delay_s, lag_s) for squeeze in block]
     if _has_cells(config, block):
         share = measured_shares(config, [squeeze.trace for squeeze in block], ready).mean
         ready = [squeeze.with_share(share) for squeeze in ready]
