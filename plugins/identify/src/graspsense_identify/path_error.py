@@ -77,13 +77,10 @@ def on_fine_path(squeeze: Squeeze) -> Squeeze:
     nodes = nodes[
         np.diff(nodes, prepend=-np.inf) > SHORTEST / NODES_PER_TICK * float(np.median(np.diff(ticks)))
     ]
-    gap = np.interp(nodes, ticks, gap)
     return evolve(
         squeeze,
         t_s=nodes,
-        gap_m=gap,
-        speed_m_s=-np.gradient(gap, nodes),
-        step_s=np.diff(nodes, prepend=nodes[0] - squeeze.step_s[0]),
+        gap_m=np.interp(nodes, ticks, gap),
         sample=np.arange(len(nodes)),
         force_n=np.zeros(len(nodes)),
         averaged_s2=np.zeros(len(nodes)),

@@ -78,10 +78,6 @@ class Squeeze:
     sha256: str
     t_s: Floats
     gap_m: Floats
-    speed_m_s: Floats
-    """Closing speed at the nodes."""
-    step_s: Floats
-    """Time since the node before."""
     sample: NDArray[np.int64]
     """Nodes at which the force was measured."""
     force_n: Floats
@@ -102,8 +98,7 @@ class Squeeze:
         """Return the squeeze if its force lagged behind the gap by so much: at every node, the gap of that time."""
         if lag_s == 0.0:
             return self
-        gap = np.interp(self.t_s - lag_s, *self.course)
-        return evolve(self, gap_m=gap, speed_m_s=-np.gradient(gap, self.t_s))
+        return evolve(self, gap_m=np.interp(self.t_s - lag_s, *self.course))
 
     def only(self, is_kept: NDArray[np.bool_]) -> Squeeze:
         """Return the squeeze with some of its samples."""
@@ -113,6 +108,16 @@ class Squeeze:
             force_n=self.force_n[is_kept],
             averaged_s2=self.averaged_s2[is_kept],
         )
+
+    @cached_property
+    def speed_m_s(self) -> Floats:
+        """The closing speed at the nodes."""
+        return -np.gradient(self.gap_m, self.t_s)
+
+    @cached_property
+    def step_s(self) -> Floats:
+        """The time since the node before."""
+        return np.diff(self.t_s, prepend=self.t_s[0] - BEFORE_S)
 
     @cached_property
     def averaging(self) -> tuple[Floats, Floats]:
@@ -194,14 +199,15 @@ def prepared(
     window = (times >= begin) & (np.arange(len(times)) <= last)
     after = times[:0] if broken is None else times[broken : broken + 1]
     broken_n = None if broken is None else float(forces[broken])
-    progress = _progress(trace, np.append(times[window], after))
+    ends = float(times[window][0]), float(np.append(times[window], after)[-1])
+    course = _smooth_course(trace, *ends)
+    progress = _progress(course, *ends)
     touched = int(np.searchsorted(np.flatnonzero(window), onset))
     share = min(MANY / squeezes, 1.0)
     samples, pieces = max(int(share * MAX_SAMPLES), LEAST_SAMPLES), max(int(share * MAX_NODES), LEAST_NODES)
     times, forces, averaged_s2 = _in_blocks(times[window], forces[window], touched, progress, samples)
     nodes, sample = _nodes(np.append(times, after), progress, pieces)
     sample = sample[: len(times)]
-    course = _smooth_course(trace, nodes)
     gap = np.interp(nodes, *course)
     width = float(np.interp(times[max(int(np.argmax(forces > threshold)) - 1, 0)], nodes, gap))
     return Squeeze(
@@ -210,8 +216,6 @@ def prepared(
         sha256=squeeze.sha256,
         t_s=nodes,
         gap_m=gap,
-        speed_m_s=-np.gradient(gap, nodes),
-        step_s=np.diff(nodes, prepend=nodes[0] - BEFORE_S),
         sample=sample,
         force_n=forces,
         averaged_s2=averaged_s2,
@@ -268,11 +272,11 @@ def _pad_difference(trace: Trace, begin_s: float, end_s: float) -> float:
     return float(np.max(apart[np.isfinite(apart)], initial=0.0))
 
 
-def _progress(trace: Trace, times: Floats) -> tuple[Floats, Floats]:
+def _progress(course: tuple[Floats, Floats], begin_s: float, end_s: float) -> tuple[Floats, Floats]:
     """Return times of a squeeze, and a measure from 0 to 1 that rises by half with the time and by half with the way of
     the fingers: nodes at equal distances in it are dense where the force changes, and follow a long hold too."""
-    t = np.linspace(times[0], times[-1], MAX_NODES)
-    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(np.interp(t, *_smooth_course(trace, t)))))])
+    t = np.linspace(begin_s, end_s, MAX_NODES)
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(np.interp(t, *course))))])
     return t, 0.5 * (t - t[0]) / (t[-1] - t[0]) + 0.5 * way / max(float(way[-1]), 1e-12)
 
 
@@ -336,19 +340,19 @@ def _nodes(times: Floats, progress: tuple[Floats, Floats], nodes: int) -> tuple[
     return np.interp(np.arange(sample[-1] + 1), sample, times), sample
 
 
-def _smooth_course(trace: Trace, nodes: Floats) -> tuple[Floats, Floats]:
-    """Return times and gaps around these nodes, averaged over the ticks between two nodes."""
+def _smooth_course(trace: Trace, begin_s: float, end_s: float) -> tuple[Floats, Floats]:
+    """Return times and gaps around these two times, averaged over the ticks between two nodes."""
     known = np.isfinite(trace.gap_m)
     times, gap = trace.t_s[known], trace.gap_m[known]
-    per_node = (nodes[-1] - nodes[0]) / MAX_NODES / max(float(np.median(np.diff(times))), 1e-9)
+    per_node = (end_s - begin_s) / MAX_NODES / max(float(np.median(np.diff(times))), 1e-9)
     width = 2 * int(per_node // 2) + 1
     if width > 1:
         # A mean flattens a curved course. What it takes away, a second mean takes away once more: it is added again.
         once = _moving_mean(gap, width)
         gap = 2.0 * once - _moving_mean(once, width)
     part = slice(
-        max(int(np.searchsorted(times, nodes[0] - MAX_LAG_S)) - 1, 0),
-        int(np.searchsorted(times, nodes[-1] + MAX_LAG_S)) + 2,
+        max(int(np.searchsorted(times, begin_s - MAX_LAG_S)) - 1, 0),
+        int(np.searchsorted(times, end_s + MAX_LAG_S)) + 2,
     )
     return times[part], gap[part]
 
