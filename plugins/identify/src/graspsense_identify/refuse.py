@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 import numpy as np
@@ -77,32 +77,34 @@ def shows_memory(squeezes: Sequence[Squeeze]) -> bool:
     return bool(speeds) and max(speeds) >= SPEED_RATIO * min(speeds)
 
 
-def undetermined(fitted: Fitted, intervals: Uncertainty, shares: Shares) -> list[Undetermined]:
-    """Return what these squeezes leave open. `shares`: those of the force that cells measure."""
+def undetermined(fitted: Fitted, intervals: Uncertainty, shares: Shares) -> Iterator[Undetermined]:
+    """Yield what these squeezes leave open. `shares`: those of the force that cells measure."""
     squeezes = fitted.squeezes
-    open_ = _memory(squeezes) if not shows_memory(squeezes) else []
-    open_ += _parameters(fitted, intervals)
-    open_ += _falls(fitted)
-    open_ += _spreads(intervals, squeezes)
+    if not shows_memory(squeezes):
+        load_s = max(squeeze.stretches.load_s for squeeze in squeezes)
+        yield Undetermined(
+            what="relaxation (maxwell, loss)",
+            reason=f"a ramp only, of {load_s:.2g} s at one speed, shows no relaxation time",
+            remedy="hold for 5 s, or squeeze at two speeds that differ by a factor of two or more",
+        )
+    yield from _parameters(fitted, intervals)
+    yield from _falls(fitted)
+    yield from _spreads(intervals, squeezes)
     if shares.has_cells and not len(shares.known):
-        open_.append(
-            Undetermined(
-                what="share",
-                reason="the cells measure a share of the force, and the effort of the drive is not recorded",
-                remedy="record the effort, or weigh the object's contact with a force gauge",
-            )
+        yield Undetermined(
+            what="share",
+            reason="the cells measure a share of the force, and the effort of the drive is not recorded",
+            remedy="record the effort, or weigh the object's contact with a force gauge",
         )
     if not all(squeeze.stretches.has_approach for squeeze in squeezes):
-        open_.append(
-            Undetermined(
-                what="width_m",
-                reason="a recording begins in contact: where the contact was follows from the law alone",
-                remedy="record from before the contact",
-                in_scene=True,
-            )
+        yield Undetermined(
+            what="width_m",
+            reason="a recording begins in contact: where the contact was follows from the law alone",
+            remedy="record from before the contact",
+            in_scene=True,
         )
-    open_ += [Undetermined(what=what, reason=reason, remedy=remedy) for what, reason, remedy in _NOT_FITTED]
-    return open_
+    for what, reason, remedy in _NOT_FITTED:
+        yield Undetermined(what=what, reason=reason, remedy=remedy)
 
 
 def refusals(
@@ -126,20 +128,16 @@ def refusals(
     return tuple(reasons)
 
 
-def _falls(fitted: Fitted) -> list[Undetermined]:
-    """Return the falls of the force that are too small for a break, if no term of the candidate describes them."""
-    if SNAP in fitted.candidate.slots:
-        return []
+def _falls(fitted: Fitted) -> Iterator[Undetermined]:
+    """Yield the falls of the force that are too small for a break, if no term of the candidate describes them."""
     forces = []
     for squeeze in fitted.squeezes:
         drops = -np.diff(squeeze.force_n[squeeze.loading])
         if len(drops) and float(np.max(drops)) > FALL_SHARE * squeeze.peak_n:
             forces.append(float(squeeze.force_n[int(np.argmax(drops))]))
-    if not forces:
-        return []
-    total = len(fitted.squeezes)
-    return [
-        Undetermined(
+    if forces and SNAP not in fitted.candidate.slots:
+        total = len(fitted.squeezes)
+        yield Undetermined(
             what="a fall of the force",
             reason=f"the force falls by more than {FALL_SHARE:.0%} of the peak in {len(forces)} of {total} "
             f"squeezes (at {min(forces):.3g} to {max(forces):.3g} N) while the fingers close. It is neither a break (a "
@@ -147,65 +145,44 @@ def _falls(fitted: Fitted) -> list[Undetermined]:
             remedy='cut the recordings there (cut = "rupture" in a manifest), or squeeze more slowly, so that the '
             "fall has several measurements",
         )
-    ]
 
 
-def _memory(squeezes: Sequence[Squeeze]) -> list[Undetermined]:
-    load_s = max(squeeze.stretches.load_s for squeeze in squeezes)
-    return [
-        Undetermined(
-            what="relaxation (maxwell, loss)",
-            reason=f"a ramp only, of {load_s:.2g} s at one speed, shows no relaxation time",
-            remedy="hold for 5 s, or squeeze at two speeds that differ by a factor of two or more",
-        )
-    ]
-
-
-def _parameters(fitted: Fitted, uncertainty: Uncertainty) -> list[Undetermined]:
+def _parameters(fitted: Fitted, uncertainty: Uncertainty) -> Iterator[Undetermined]:
+    """Yield the parameters whose intervals are wide, or which are at the end of their range."""
     hold_s = max(squeeze.stretches.hold_s for squeeze in fitted.squeezes)
     depth_mm = 1e3 * max(squeeze.depth_m for squeeze in fitted.squeezes)
-    open_ = []
     for i, parameter in enumerate(fitted.candidate.free):
         at_bound = fitted.at_bound(i)
         if not at_bound and uncertainty.high[i] <= WIDE * uncertainty.low[i]:
             continue
         interval = f"its 90 % interval is {uncertainty.low[i]:.3g} to {uncertainty.high[i]:.3g}"
-        reason = "the fit is at the end of the range" if at_bound else interval
-        if parameter.name == "tau_s" or parameter.term.startswith("maxwell"):
+        remedy = _REMEDIES.get(parameter.name, "record more squeezes")
+        if parameter.term.startswith("maxwell"):
             needed = max(HOLD_TIMES * fitted.by_label[f"{parameter.term}.tau_s"], 2.0 * hold_s)
             remedy = f"hold for {needed:.2g} s (the longest hold is {hold_s:.2g} s)"
-        else:
-            remedy = _REMEDIES.get(parameter.name, "record more squeezes")
-            if "deeper" in remedy:
-                remedy += f" (the deepest is {depth_mm:.2g} mm)"
-        open_.append(Undetermined(what=parameter.label, reason=reason, remedy=remedy, in_scene=True))
-    return open_
-
-
-def _spreads(uncertainty: Uncertainty, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
-    open_ = []
-    if math.isnan(uncertainty.stiffness.objects):
-        names = {squeeze.instance for squeeze in squeezes if squeeze.instance}
-        count = (
-            "one object"
-            if len(names) == 1
-            else f"{len(names)} objects"
-            if names
-            else "objects without numbers"
+        elif "deeper" in remedy:
+            remedy += f" (the deepest is {depth_mm:.2g} mm)"
+        yield Undetermined(
+            what=parameter.label,
+            reason="the fit is at the end of the range" if at_bound else interval,
+            remedy=remedy,
+            in_scene=True,
         )
-        open_.append(
-            Undetermined(
-                what="spread between objects",
-                reason=f"the recordings are of {count}",
-                remedy=f"record {LEAST_INSTANCES} objects or more, labelled cup#1, cup#2, cup#3",
-            )
+
+
+def _spreads(uncertainty: Uncertainty, squeezes: Sequence[Squeeze]) -> Iterator[Undetermined]:
+    """Yield the spreads that so many objects and squeezes do not show."""
+    if math.isnan(uncertainty.stiffness.objects):
+        number = len({squeeze.instance for squeeze in squeezes if squeeze.instance})
+        objects = {0: "objects without numbers", 1: "one object"}.get(number, f"{number} objects")
+        yield Undetermined(
+            what="spread between objects",
+            reason=f"the recordings are of {objects}",
+            remedy=f"record {LEAST_INSTANCES} objects or more, labelled cup#1, cup#2, cup#3",
         )
     if len(squeezes) == 1:
-        open_.append(
-            Undetermined(
-                what="spread between squeezes",
-                reason="there is a single squeeze; its intervals hold for it alone",
-                remedy="record the same object three times or more, and put it down anew each time",
-            )
+        yield Undetermined(
+            what="spread between squeezes",
+            reason="there is a single squeeze; its intervals hold for it alone",
+            remedy="record the same object three times or more, and put it down anew each time",
         )
-    return open_
