@@ -11,7 +11,7 @@ section 5.2).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -84,31 +84,25 @@ def fracture_of(fitted: Fitted, force_scatter: float = 0.0) -> IdentifiedFractur
     variances = np.array(errors[name]) ** 2 + (force_scatter**2 if name == "force_n" else 0.0)
     if broken >= LEAST_BROKEN and (scatter := _spread(np.log(breaks[name]), variances, spread)):
         parameters.append(identified(f"fracture.{name}.spread", scatter.value, scatter[1:], basis))
-    return IdentifiedFracture(parameters, _undetermined(fitted.squeezes, broken))
+    return IdentifiedFracture(parameters, list(_undetermined(fitted.squeezes, broken)))
 
 
-def _undetermined(squeezes: Sequence[Squeeze], broken: int) -> list[Undetermined]:
-    """Return what so many breaks leave open."""
-    open_ = []
+def _undetermined(squeezes: Sequence[Squeeze], broken: int) -> Iterator[Undetermined]:
+    """Yield what so many breaks leave open."""
     if broken < LEAST_BROKEN:
-        open_.append(
-            Undetermined(
-                what="fracture by force or by compression, and its spread",
-                reason=f"{broken} squeezes broke the object",
-                remedy=f"break {LEAST_BROKEN} objects or more",
-            )
+        yield Undetermined(
+            what="fracture by force or by compression, and its spread",
+            reason=f"{broken} squeezes broke the object",
+            remedy=f"break {LEAST_BROKEN} objects or more",
         )
     unseen = broken - sum(bears_again(squeezes, i) is False for i in range(len(squeezes)))
     if unseen > 0:
-        open_.append(
-            Undetermined(
-                what="whether the objects broke",
-                reason=f"{unseen} of {broken} falls of the force are in the last squeeze of their object, or in that "
-                "of an object without a number",
-                remedy="squeeze each object once more after the fall, labelled cup#1, cup#2, cup#3",
-            )
+        yield Undetermined(
+            what="whether the objects broke",
+            reason=f"{unseen} of {broken} falls of the force are in the last squeeze of their object, or in that of an "
+            "object without a number",
+            remedy="squeeze each object once more after the fall, labelled cup#1, cup#2, cup#3",
         )
-    return open_
 
 
 def not_broken(squeezes: Sequence[Squeeze]) -> list[int]:

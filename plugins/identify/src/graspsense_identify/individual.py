@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from graspsense_identify.choose import Choice
 from graspsense_identify.delay import EVIDENCE, Lag, lag_beyond_settings
 from graspsense_identify.fit import Fitted, information
-from graspsense_identify.spread import LEAST_INSTANCES
+from graspsense_identify.spread import has_objects
 from graspsense_identify.threads import in_threads
 
 Floats = NDArray[np.float64]
@@ -24,8 +24,7 @@ Floats = NDArray[np.float64]
 
 def alone(fitted: Fitted) -> list[Fitted]:
     """Return the fits of a candidate to each squeeze by itself; none with fewer than three objects with names."""
-    names = {squeeze.instance for squeeze in fitted.squeezes}
-    if "" in names or len(names) < LEAST_INSTANCES:
+    if not has_objects(fitted.squeezes):
         return []
     return in_threads(lambda i: fitted.part([i]).refitted(), range(len(fitted.squeezes)))
 

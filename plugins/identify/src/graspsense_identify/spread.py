@@ -189,7 +189,7 @@ def refits(fitted: Fitted, rng: np.random.Generator, *, has_lag: bool) -> Refits
     kept = [fitted.part([i for i in range(len(squeezes)) if i not in group]) for group in groups]
     fits = in_threads(lambda part: part.refitted(has_lag=has_lag), kept)
     g = len(groups)
-    what = "objects" if _instances(squeezes) >= LEAST_INSTANCES else "squeezes"
+    what = "objects" if has_objects(squeezes) else "squeezes"
     basis = f"between {g} {what if g == len(groups) else 'groups'}"
     return Refits(fits, (g - 1) / g, student(g - 1), basis)
 
@@ -229,18 +229,19 @@ def _on_falling_part(fitted: Fitted, critical_m: float, fall_m: float) -> int:
     return count
 
 
-def _instances(squeezes: Sequence[Squeeze]) -> int:
-    return len({squeeze.instance for squeeze in squeezes if squeeze.instance})
+def has_objects(squeezes: Sequence[Squeeze]) -> bool:
+    """Return whether every squeeze is of an object with a number, and there are at least three of these."""
+    names = {squeeze.instance for squeeze in squeezes}
+    return "" not in names and len(names) >= LEAST_INSTANCES
 
 
 def _groups(squeezes: Sequence[Squeeze]) -> list[list[int]]:
     """Return the squeezes that are left out together: those of an object, or each alone."""
-    n = len(squeezes)
-    if _instances(squeezes) >= LEAST_INSTANCES and all(squeeze.instance for squeeze in squeezes):
+    if has_objects(squeezes):
         names = sorted({squeeze.instance for squeeze in squeezes})
         groups = [[i for i, squeeze in enumerate(squeezes) if squeeze.instance == name] for name in names]
     else:
-        groups = [[i] for i in range(n)]
+        groups = [[i] for i in range(len(squeezes))]
     if len(groups) > MAX_GROUPS:
         groups = [list(chain.from_iterable(groups[k::MAX_GROUPS])) for k in range(MAX_GROUPS)]
     return groups
