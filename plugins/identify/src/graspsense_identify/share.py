@@ -4,7 +4,7 @@ From the contact at speed v0 to the standstill, the effort F works against frict
 
     int (F - friction(v)) dx + m v0^2 / 2 = (1 + mu) int N dx,
 
-with the load friction mu and the mass m of the drive (`dynamics.drive`). The cells measure a share of the force N.
+with the load friction mu and the mass m of the drive (`plant.drive`). The cells measure a share of the force N.
 """
 
 from __future__ import annotations
