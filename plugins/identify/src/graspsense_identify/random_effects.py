@@ -20,10 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graspsense.simulator_api import IdentifiedParameter
+from graspsense_identify.corners import corner_errors
 from graspsense_identify.fit import Fitted, linear_covariance
 from graspsense_identify.individual import reference_stiffness, stiffnesses
 from graspsense_identify.interval import LEVEL, identified
-from graspsense_identify.spread import LEAST_INSTANCES, corner_errors
+from graspsense_identify.spread import LEAST_INSTANCES
 from graspsense_sim_gripper.run.identification import MOST_SPREAD
 
 Floats = NDArray[np.float64]

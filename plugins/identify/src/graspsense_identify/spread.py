@@ -18,6 +18,7 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
+from graspsense_identify.corners import corner_errors
 from graspsense_identify.fit import Fitted, linear_covariance
 from graspsense_identify.interval import normal, student
 from graspsense_identify.prepare import Squeeze
@@ -33,14 +34,6 @@ BLOCKS: Final = 12
 DRAWS: Final = 200
 LARGEST: Final = math.log(30.0)
 """A logarithm changes by at most this in proportion to the force. A larger change is one of a value near zero."""
-MOVING_SHARE: Final = 0.3
-"""Where the gap changes by at least this share of its largest change between measurements, the fingers move."""
-LEAST_FALLING: Final = 2
-"""Samples on the falling part of a snap-through that determine its line."""
-MEAN_OVER_CORNER: Final = 0.015
-"""Rms error of the mean over a sample in which the law has a corner, over the change of its slope and the distance
-between samples: `Squeeze.at_samples` knows the forces at the ends and in the middle only. The rms is over corners that
-lie anywhere in the sample."""
 PATH_ERROR: Final = 3e-4
 """Standard deviation of the logarithm of a value that the finite number of nodes of a path causes, at least."""
 PATH_FORCE_ERROR: Final = 3e-5
@@ -192,41 +185,6 @@ def refits(fitted: Fitted, rng: np.random.Generator, *, has_lag: bool) -> Refits
     what = "objects" if has_objects(squeezes) else "squeezes"
     basis = f"between {g} {what if g == len(groups) else 'groups'}"
     return Refits(fits, (g - 1) / g, student(g - 1), basis)
-
-
-def corner_errors(fitted: Fitted) -> Floats:
-    """Return the relative errors of the parameters of a snap-through that the distance between two samples causes.
-
-    With two samples on the falling part, all three lines of the law are determined, and so are their corners. With
-    fewer, the corners that were fitted and the true ones lie anywhere between two samples, and a bootstrap leaves them
-    where they are.
-    """
-    labels = [parameter.label for parameter in fitted.candidate.free]
-    if "snap.critical_m" not in labels:
-        return np.zeros(len(labels))
-    squeezes, values = fitted.squeezes, fitted.by_label
-    ways = [np.abs(np.diff(squeeze.gap_m[squeeze.sample])) for squeeze in squeezes]
-    moving = np.concatenate([way[way > MOVING_SHARE * np.max(way)] for way in ways])
-    share = math.sqrt(1.0 / 6.0)
-    if _on_falling_part(fitted, values["snap.critical_m"], values["snap.fall_m"]) >= LEAST_FALLING:
-        share = MEAN_OVER_CORNER if any(np.any(squeeze.averaged_s2 > 0.0) for squeeze in squeezes) else 0.0
-    error_m = share * float(np.median(moving)) / math.sqrt(len(squeezes))
-    errors = {
-        "snap.critical_m": error_m,
-        "snap.fall_m": math.sqrt(2.0) * error_m,
-        "snap.drop_n": error_m * (values["snap.k1_n_m"] + values["snap.k2_n_m"]),
-    }
-    return np.array([errors.get(label, 0.0) / values[label] for label in labels])
-
-
-def _on_falling_part(fitted: Fitted, critical_m: float, fall_m: float) -> int:
-    """Return how many samples lie on the falling part of a snap-through while the fingers close."""
-    count = 0
-    for squeeze, width in zip(fitted.squeezes, fitted.widths_m, strict=True):
-        closure = width - squeeze.gap_m[squeeze.sample]
-        compression = (closure - fitted.model.compressed_m(squeeze.force_n))[: int(np.argmax(closure)) + 1]
-        count += int(np.sum((compression > critical_m) & (compression < critical_m + fall_m)))
-    return count
 
 
 def has_objects(squeezes: Sequence[Squeeze]) -> bool:
