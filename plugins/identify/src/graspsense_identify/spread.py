@@ -101,7 +101,10 @@ def uncertainty(
     spread = np.sqrt(np.diag(covariance))
     best = np.array(fitted.values)
     low, high = best * _changed(-factor * spread), best * _changed(factor * spread)
-    drawn = rng.multivariate_normal(np.zeros(len(best)), covariance, DRAWS, method="eigh")
+    # An undetermined direction has a variance beside which the rounding of others may be negative.
+    drawn = rng.multivariate_normal(
+        np.zeros(len(best)), covariance, DRAWS, check_valid="ignore", method="eigh"
+    )
     return Uncertainty(
         low=tuple(low.tolist()),
         high=tuple(high.tolist()),
