@@ -42,11 +42,9 @@ from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import create
 from graspsense.report.simulation import markdown_table
 from graspsense.simulator_api import RunConfig
-from graspsense_identify.gas import combinations
 from graspsense_identify.laws import SLOTS
 from graspsense_identify.run import identify
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.scene.terms.gas import Gas
 
 WIDTH_M: Final = 0.05
 AT_M: Final = 0.01
@@ -90,19 +88,6 @@ SCENES: Final[Mapping[str, tuple[Mapping[str, Any], ...]]] = {
         {"type": "loss", "damping_n_s_m": 40.0},
     ),
 }
-AIR: Final = {"pressure_pa": 101325.0, "exponent": 1.0, "bulge_m3_pa": 0.0, "area_slope_m": 0.0}
-SCENES_WITH_GAS: Final[Mapping[str, tuple[Mapping[str, Any], ...]]] = {
-    "closed gas": (
-        {"type": "elastic", "k1_n_m": 500.0},
-        {"type": "gas", "area_m2": 2e-4, "volume_m3": 2.4e-6, **AIR},
-    ),
-    "vented gas": (
-        {"type": "elastic", "k1_n_m": 1300.0},
-        {"type": "gas", "area_m2": 1.2e-3, "volume_m3": 1e-4, "vent_m2": 7e-7, **AIR},
-    ),
-}
-ALL_SCENES: Final = {**SCENES, **SCENES_WITH_GAS}
-"""Of those with gas, the combinations of `graspsense_identify.gas` come back, and not each number."""
 COUNTS: Final = (1, 3, 10)
 SENSORS: Final[Mapping[str, Mapping[str, Any]]] = {
     "ideal": {"sensor": "ideal"},
@@ -147,9 +132,7 @@ def drawn(terms: Sequence[Mapping[str, Any]], repeat: int) -> list[dict[str, Any
     rng = np.random.default_rng([repeat, len(terms)])
     return [
         {
-            key: value
-            if key in ("type", "at_m") or (term["type"] == "gas" and key in AIR)
-            else value * math.exp(rng.uniform(-FACTOR, FACTOR))
+            key: value if key in ("type", "at_m") else value * math.exp(rng.uniform(-FACTOR, FACTOR))
             for key, value in term.items()
         }
         for term in terms
@@ -205,10 +188,6 @@ def true_values(terms: Sequence[Mapping[str, Any]], identified: str) -> dict[str
     values = {}
     for term in terms:
         name = "maxwell 2" if term["type"] == "maxwell" and term is not branches[0] else term["type"]
-        if name == "gas":
-            numbers = {key: value for key, value in term.items() if key != "type"}
-            values |= {f"gas.{key}": value for key, value in combinations(Gas(**numbers)).items()}
-            continue
         for key, value in term.items():
             if key in ("type", "at_m"):
                 continue
@@ -223,9 +202,7 @@ def named(terms: Sequence[Mapping[str, Any]]) -> str:
     cubic = sum(term.get("k3_n_m3", 0.0) for term in terms)
     form = "softening" if cubic < 0.0 else "k1, k3" if cubic > 0.0 else "k1"
     kinds = sorted((term["type"] for term in terms), key=SLOTS.index)
-    vented = any(term.get("vent_m2") for term in terms)
-    words = {"elastic": f"elastic ({form})", "gas": "gas (vented)" if vented else "gas (closed)"}
-    return " + ".join(words.get(kind, kind) for kind in kinds)
+    return " + ".join(f"elastic ({form})" if kind == "elastic" else kind for kind in kinds)
 
 
 def seeds_of(name: str, sensor: str, count: int, repeat: int) -> list[int]:
@@ -233,13 +210,13 @@ def seeds_of(name: str, sensor: str, count: int, repeat: int) -> list[int]:
 
     They are others in every row: the number of an object fixes its stiffness, whatever its terms.
     """
-    series = (list(ALL_SCENES).index(name) * 10 + list(SENSORS).index(sensor)) * 100 + count
+    series = (list(SCENES).index(name) * 10 + list(SENSORS).index(sensor)) * 100 + count
     return [100_000 * (series + 1) + 100 * repeat + i for i in range(count)]
 
 
 def measured(name: str, sensor: str, count: int, repeat: int) -> Row:
     """Return the row of a scene."""
-    terms = drawn(ALL_SCENES[name], repeat)
+    terms = drawn(SCENES[name], repeat)
     text = scene_text(terms, STIFFNESS_SPREAD if count > 1 else 0.0)
     seeds = seeds_of(name, sensor, count, repeat)
     squeezes = squeezes_of(text, name, SENSORS[sensor], [str(seed) for seed in seeds], seeds)
@@ -324,7 +301,7 @@ def grouped(
         return tuple(row[key] for key in keys)
 
     def place(row: Mapping[str, Any]) -> tuple[Any, ...]:
-        order = {"sensor": list(SENSORS), "scene": list(ALL_SCENES)}
+        order = {"sensor": list(SENSORS), "scene": list(SCENES)}
         return tuple(order[key].index(row[key]) if key in order else row[key] for key in keys)
 
     for group_values, group in groupby(sorted(rows, key=place), key=values):
@@ -404,7 +381,7 @@ def main() -> None:
     )
     parser.add_argument("--repeats", type=int, default=4)
     parser.add_argument("--first", type=int, default=0, help="number of the first repeat")
-    parser.add_argument("--only", nargs="+", choices=list(ALL_SCENES), default=list(SCENES))
+    parser.add_argument("--only", nargs="+", choices=list(SCENES), default=list(SCENES))
     parser.add_argument("--sensors", nargs="+", choices=list(SENSORS), default=list(SENSORS))
     parser.add_argument("--recordings", nargs="+", type=int, help="the numbers of recordings")
     parser.add_argument("--transfer", action="store_true")

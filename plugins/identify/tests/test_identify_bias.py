@@ -8,17 +8,18 @@ from attrs import evolve
 from cases import every_case
 from identify import SCENES, scene_text, squeezes_of
 from scipy.stats import chi2, norm
+from squeezes import recorded
 
 from graspsense_identify.fit import fit
-from graspsense_identify.forward import ForwardModel
+from graspsense_identify.forward import RIGID_PADS, ForwardModel
 from graspsense_identify.interval import interval_of_mean, normal, student
-from graspsense_identify.laws import memories, static_candidates
+from graspsense_identify.laws import memories, scale_of, static_candidates
 from graspsense_identify.path_error import NODES_PER_TICK, on_fine_path, path_bias
 from graspsense_identify.prepare import prepared
-from graspsense_identify.run import _scale
 from graspsense_identify.share import measured_share
-from graspsense_identify.spread import at_least
+from graspsense_identify.spread import _scale_errors, at_least, uncertainty
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.plant.contact import PadCompliance
 from graspsense_sim_gripper.run.build import drive_and_pads
 
 
@@ -33,7 +34,7 @@ def errors_of(name):
     """Return the errors of the fitted logarithms, with an ideal sensor, before and after that of the path is taken."""
     squeeze = prepared(squeeze_of(name, sensor="ideal", accuracy=1e-3), 0.0)
     model = ForwardModel(pads=drive_and_pads(SimConfig())[1])
-    scale = _scale([squeeze])
+    scale = scale_of([squeeze])
     true = [value for term in SCENES[name] for key, value in term.items() if key != "type"]
     keys = [key for term in SCENES[name] for key in term if key != "type"]
     spring = static_candidates(scale)[0]
@@ -41,7 +42,7 @@ def errors_of(name):
     (candidate,) = (candidate for candidate in joined if [free.name for free in candidate.free] == keys)
     fitted = fit(model, candidate, [squeeze])
     biased = np.log(np.array(fitted.values) / true)
-    return biased, biased - path_bias(model, fitted, [squeeze])
+    return biased, biased - path_bias(fitted)
 
 
 @pytest.mark.slow
@@ -69,8 +70,8 @@ def test_a_recording_with_fewer_ticks_than_nodes_has_no_finer_path():
         assert np.min(np.diff(fine.t_s)) > 1e-9
     coarse = evolve(squeeze, course=(times[::100], gaps[::100]))
     model = ForwardModel(pads=drive_and_pads(SimConfig())[1])
-    fitted = fit(model, static_candidates(_scale([squeeze]))[0], [squeeze])
-    assert not path_bias(model, fitted, [coarse]).any()
+    fitted = fit(model, static_candidates(scale_of([squeeze]))[0], [squeeze])
+    assert not path_bias(evolve(fitted, squeezes=[coarse])).any()
 
 
 @pytest.mark.parametrize("name", ["spring", pytest.param("stiffening", marks=pytest.mark.slow)])
@@ -97,6 +98,28 @@ def coverage(squeezes, ratio):
     variances = np.array([at_least(np.array([[variance]]), least)[0, 0] for variance in scatter])
     half = np.sqrt(variances / ratio) * student(degrees)
     return float(np.mean(2.0 * norm.cdf(half) - 1.0))
+
+
+def test_an_error_of_the_scale_of_the_force_changes_more_than_forces_behind_compliant_fingertips():
+    squeeze = prepared(recorded(lambda closure: 1e5 * closure**2), 0.0)
+    foam = static_candidates(scale_of([squeeze]))[4]
+    errors = np.sqrt(np.diag(_scale_errors(fit(ForwardModel(pads=RIGID_PADS), foam, [squeeze]), 0.05)))
+    assert errors == pytest.approx((0.05, 0.0), abs=1e-4)
+    pads = PadCompliance(15000.0, 0.0, 0.0, 1.0, 0.002, 2.0)
+    errors = np.sqrt(np.diag(_scale_errors(fit(ForwardModel(pads=pads), foam, [squeeze]), 0.05)))
+    assert errors[1] > 2e-3
+
+
+def test_a_stiffness_that_the_fit_leaves_out_has_an_interval_in_proportion_to_the_force():
+    rng = np.random.default_rng(0)
+    squeeze = prepared(
+        recorded(lambda closure: 2e7 * closure**3 + 0.02 * rng.standard_normal(len(closure))), 0.0
+    )
+    cubic = static_candidates(scale_of([squeeze]))[2]
+    fitted = fit(ForwardModel(pads=RIGID_PADS), cubic, [squeeze])
+    none = evolve(fitted, values=(1e-3, fitted.values[1]))
+    # The linearised change of the logarithm is thousands of times 1.
+    assert 1.0 < uncertainty(none).high[0] < 100.0
 
 
 @every_case("squeezes", [2, 3, 10])

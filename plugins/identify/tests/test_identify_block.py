@@ -10,7 +10,9 @@ from squeezes import delayed, grasped
 
 from graspsense.plugin_api import ConfigError
 from graspsense_identify.block import lag_of_block, with_fingertips_of_block
-from graspsense_identify.run import _settings, _shares, identify
+from graspsense_identify.prepare import prepared
+from graspsense_identify.run import _settings, identify
+from graspsense_identify.share import measured_shares
 from graspsense_sim_gripper.config import SimConfig
 
 
@@ -19,10 +21,14 @@ def squeezes(scene, gripper, count=3):
     return [evolve(squeeze, gripper={}) for squeeze in grasped([scene] * count, gripper, hold_s=0.5)]
 
 
+def ready(block):
+    return [prepared(squeeze, 0.0) for squeeze in block]
+
+
 @pytest.mark.parametrize("hardening", [None, pytest.param(1e-3, marks=pytest.mark.slow)])
 def test_the_fingertips_of_known_squeezes_come_back(hardening):
     block = squeezes("block", {"sensor": "ideal", "pad_stiffness_n_m": 6000.0, "pad_hardening_m": hardening})
-    config, said = with_fingertips_of_block(SimConfig(sensor="ideal"), block, [1.0] * 3)
+    config, said = with_fingertips_of_block(SimConfig(sensor="ideal"), ready(block))
     assert config.pad_stiffness_n_m == pytest.approx(6000.0, rel=0.015)
     low, high = map(float, re.search(r"90 %: (\S+) to (\S+)\)", said).groups())
     assert low < 6000.0 < high
@@ -48,7 +54,8 @@ def test_a_delay_of_which_the_settings_do_not_know_does_not_bias_the_fingertips(
     assert settings.pad_stiffness_n_m == pytest.approx(in_time.pad_stiffness_n_m, rel=2e-3)
     assert "which these squeezes show" in said
     # With the delay of the settings, they seem 4 % stiffer with the ideal sensor, and 6 % with pads.
-    wrong, said = with_fingertips_of_block(config, late, _shares(config, late, 0.0))
+    share = measured_shares(config, [squeeze.trace for squeeze in late], ready(late)).mean
+    wrong, said = with_fingertips_of_block(config, [squeeze.with_share(share) for squeeze in ready(late)])
     assert wrong.pad_stiffness_n_m > 1.035 * in_time.pad_stiffness_n_m
     assert "the delay of the settings" in said
 
@@ -56,7 +63,7 @@ def test_a_delay_of_which_the_settings_do_not_know_does_not_bias_the_fingertips(
 def test_a_squeeze_of_nothing_is_refused():
     (empty,) = squeezes("none", {"sensor": "ideal"}, 1)
     with pytest.raises(ConfigError, match="nothing was touched"):
-        with_fingertips_of_block(SimConfig(sensor="ideal"), [empty], [1.0])
+        _settings(SimConfig(sensor="ideal"), [empty], [empty])
 
 
 @pytest.mark.slow

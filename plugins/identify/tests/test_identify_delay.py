@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tomllib
-from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -12,9 +11,9 @@ from cases import every_case
 from squeezes import delayed, grasped, recorded
 
 from graspsense_identify.delay import Delay, Lag
-from graspsense_identify.forward import RIGID_PADS, ForwardModel
 from graspsense_identify.prepare import prepared
 from graspsense_identify.run import identify
+from graspsense_identify.share import WHOLE
 from graspsense_identify.used_delay import Timed, with_delay
 from graspsense_sim_gripper.config import SimConfig
 
@@ -78,15 +77,6 @@ def test_the_delay_that_is_reported_is_the_one_that_is_used(shown_s):
     )
 
 
-class FoundWithAll(NamedTuple):
-    """A choice of terms, with the lag that was found with all candidates."""
-
-    lag_s: float
-
-    def lag(self, model, squeezes):
-        return Lag(lag_s=self.lag_s, error_s=1e-3)
-
-
 @every_case(
     ("found_s", "shown", "used_s"),
     [
@@ -99,7 +89,7 @@ class FoundWithAll(NamedTuple):
 )
 def test_a_delay_is_used_only_if_the_terms_that_are_chosen_with_it_show_it(found_s, shown, used_s):
     def timed(lag):
-        return Timed([], [], [], FoundWithAll(found_s), lag)
+        return Timed(WHOLE, None, lag)
 
     def delay(used):
         shown_s = shown(used.lag.lag_s)
@@ -111,7 +101,7 @@ def test_a_delay_is_used_only_if_the_terms_that_are_chosen_with_it_show_it(found
             high_s=shown_s + 0.00151,
         )
 
-    used, told = with_delay(timed, delay, ForwardModel(pads=RIGID_PADS))
+    used, told = with_delay(timed, lambda choice: Lag(lag_s=found_s, error_s=1e-3), delay)
     assert told.used_s == pytest.approx(used_s, abs=1e-9)
     assert used.lag.lag_s == told.used_s
 

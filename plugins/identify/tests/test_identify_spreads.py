@@ -27,8 +27,8 @@ NOISE = 0.0025
 
 
 def of_objects(law, values, varying, spread, seed):
-    """Return noisy squeezes of objects whose stiffness differs by 10 %, and a parameter by its spread; with the fit of
-    the common values."""
+    """Return the fit of the common values to noisy squeezes of objects whose stiffness differs by 10 %, and a parameter
+    by its spread."""
     rng = np.random.default_rng(seed)
     squeeze = prepared(recorded(period_s=1.0 / 60.0), 0.0)
     factors = np.exp(0.1 * rng.standard_normal(OBJECTS))
@@ -40,14 +40,15 @@ def of_objects(law, values, varying, spread, seed):
         noisy = forces + NOISE * forces.max() * rng.standard_normal(len(forces))
         squeezes.append(evolve(squeeze, force_n=noisy, instance=f"cup#{k}"))
     fitted = Fitted(
+        model=MODEL,
         candidate=law,
+        squeezes=squeezes,
         values=tuple(values),
         widths_m=(WIDTH_M,) * OBJECTS,
         factors=tuple(factors.tolist()),
-        cost=0.0,
         residuals=np.zeros(1),
     )
-    return squeezes, fitted
+    return fitted
 
 
 def laws():
@@ -60,9 +61,9 @@ def laws():
 
 def claimed(name, spread, seed):
     law, values, varying = laws()[name]
-    squeezes, fitted = of_objects(law, values, varying, spread, seed)
-    spreads = own_spreads(MODEL, fitted, alone(MODEL, fitted, squeezes), squeezes, 0.0)
-    return {law.free[spread.place].name: spread.scatter for spread in spreads}
+    fitted = of_objects(law, values, varying, spread, seed)
+    spreads = own_spreads(fitted, alone(fitted), 0.0)
+    return {spread.name.split(".")[1]: spread for spread in spreads}
 
 
 def test_scatter_that_the_errors_make_is_not_claimed_and_other_scatter_is():
@@ -100,10 +101,10 @@ def test_where_only_the_stiffness_varies_no_other_spread_is_claimed(name):
 
 def test_objects_without_names_have_no_spreads_of_their_own():
     law, values, varying = laws()["k3_n_m3"]
-    squeezes, fitted = of_objects(law, values, varying, 0.3, 0)
-    nameless = [evolve(squeeze, instance="") for squeeze in squeezes]
-    assert alone(MODEL, fitted, nameless) == []
-    assert own_spreads(MODEL, fitted, [], nameless, 0.0) == []
+    fitted = of_objects(law, values, varying, 0.3, 0)
+    nameless = evolve(fitted, squeezes=[evolve(squeeze, instance="") for squeeze in fitted.squeezes])
+    assert alone(nameless) == []
+    assert own_spreads(nameless, [], 0.0) == []
 
 
 @pytest.mark.slow

@@ -8,7 +8,6 @@ that of the mean over a set.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -16,7 +15,6 @@ from numpy.typing import NDArray
 
 from graspsense.simulator_api import PredictiveCheck
 from graspsense_identify.fit import Fitted
-from graspsense_identify.forward import ForwardModel
 from graspsense_identify.prepare import Squeeze
 from graspsense_identify.spread import Uncertainty
 
@@ -31,27 +29,19 @@ STATISTICS: Final = (
 )
 
 
-def predictive_checks(
-    model: ForwardModel, fitted: Fitted, intervals: Uncertainty, squeezes: Sequence[Squeeze], seed: int = 1
-) -> tuple[PredictiveCheck, ...]:
+def predictive_checks(fitted: Fitted, intervals: Uncertainty) -> tuple[PredictiveCheck, ...]:
     """Return a check of each statistic."""
-    rng = np.random.default_rng(seed)
-    used = list(squeezes[:MAX_SQUEEZES])
+    rng = np.random.default_rng(1)
+    used = list(fitted.squeezes[:MAX_SQUEEZES])
     recorded = np.array([_statistics(squeeze, squeeze.force_n) for squeeze in used])
-    spread = math.hypot(
-        *(
-            spread if math.isfinite(spread) else 0.0
-            for spread in (intervals.between_objects, intervals.between_squeezes)
-        )
-    )
-    residual = float(np.sqrt(np.mean(fitted.residuals**2)))
+    spread = intervals.stiffness.whole
     means, every = [], []
     for draw in intervals.draws[:SETS]:
         rows = []
         for squeeze, width, factor in zip(used, fitted.widths_m, fitted.factors, strict=False):
             own = math.exp(spread * rng.standard_normal()) if len(used) > 1 else factor
-            forces = model.forces(squeeze, fitted.candidate, draw.tolist(), width, own)
-            noisy = forces + residual * squeeze.peak_n * rng.standard_normal(len(forces))
+            forces = fitted.model.forces(squeeze, fitted.candidate, draw.tolist(), width, own)
+            noisy = forces + fitted.rms * squeeze.peak_n * rng.standard_normal(len(forces))
             rows.append(_statistics(squeeze, noisy))
         means.append(np.mean(rows, axis=0))
         every.append(rows)
@@ -73,8 +63,5 @@ def _statistics(squeeze: Squeeze, force_n: Floats) -> tuple[float, float, float]
     """Return peak force, work (mJ) until the gap is smallest, and the force there at the end of the hold, relative."""
     gap = squeeze.gap_m[squeeze.sample]
     peak = int(np.argmax(force_n))
-    least = int(np.argmin(gap))
-    closing = -np.diff(gap[: least + 1])
-    work = float(np.sum(0.5 * (force_n[1 : least + 1] + force_n[:least]) * closing))
-    held = np.flatnonzero(gap < gap[least] + 0.03 * squeeze.depth_m)
-    return float(force_n[peak]), 1e3 * work, float(force_n[int(held[-1])] / force_n[peak])
+    held = np.flatnonzero(gap < np.min(gap) + 0.03 * squeeze.depth_m)
+    return float(force_n[peak]), 1e3 * squeeze.work_j(force_n), float(force_n[int(held[-1])] / force_n[peak])

@@ -1,21 +1,25 @@
-"""Where the fit of a snap-through starts: the corners of the law that explain the measured forces best.
+"""The corners of a snap-through: where its fit starts, and the errors of its numbers between two samples.
+
+A fit starts at the corners of the law that explain the measured forces best.
 
 Between its corners a snap-through is a straight line. For given corners its force is linear in the two stiffnesses, the
 drop, and the product of stiffness and an error of the width. So the corners are tried on a grid, and the other numbers
-follow from linear least squares (separable least squares: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973). The grid
-is then made finer around its minima. The derivatives of a fit jump where a corner passes a sample, so the minimum that
+follow from linear least squares (separable least squares: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973). The
+minima of the grid are then refined. The derivatives of a fit jump where a corner passes a sample, so the minimum that
 it reaches from coarse corners can depend on rounding.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
 
+from graspsense_identify.fit import Fitted
 from graspsense_identify.forward import ForwardModel
 from graspsense_identify.laws import SNAP, CandidateLaw, FitStart
 from graspsense_identify.prepare import CONTACT_SHARE, Squeeze
@@ -30,13 +34,11 @@ TRIED: Final = 12
 """Minima of the grid that are refined."""
 BEST: Final = 4
 """Refined minima from which a fit starts."""
-FINER: Final = np.array([(i, j) for i in range(-2, 3) for j in range(-2, 3)]) / 2.0
-"""Corners that are tried around a minimum, in units of the reach of a step."""
 REACH: Final = (0.02, 0.26)
-"""First reach: of the critical compression over the largest one, and of the logarithm of the length of the fall."""
-STEPS: Final = 12
-"""Times that a minimum is refined; the reach is reduced by `SHRINK` each time."""
-SHRINK: Final = 0.6
+"""First steps of the refinement: of the critical compression over the largest one, and of the logarithm of the fall's
+length."""
+EVALUATIONS: Final = 80
+"""Of the refinement of a minimum."""
 LEAST_SAMPLES: Final = 6
 """Of a squeeze during the compression; four numbers follow from them."""
 WIDTH_WEIGHT: Final = 0.01
@@ -47,6 +49,14 @@ RIDGE: Final = np.diag([WIDTH_WEIGHT**2, 1e-12, 1e-12, 1e-12])
 sample shows a stiffness or a drop."""
 LEAST_NUMBER: Final = 1e-6
 """A stiffness or a drop, over those of the squeeze, that is smaller is shown by no sample."""
+MOVING_SHARE: Final = 0.3
+"""Where the gap changes by at least this share of its largest change between measurements, the fingers move."""
+LEAST_FALLING: Final = 2
+"""Samples on the falling part of a snap-through that determine its line."""
+MEAN_OVER_CORNER: Final = 0.015
+"""Rms error of the mean over a sample in which the law has a corner, over the change of its slope and the distance
+between samples: `Squeeze.at_samples` knows the forces at the ends and in the middle only. The rms is over corners that
+lie anywhere in the sample."""
 
 
 class _Load(NamedTuple):
@@ -102,7 +112,7 @@ def _minima(loads: Sequence[_Load]) -> list[_Corners]:
     neighbours = np.lib.stride_tricks.sliding_window_view(bordered, (3, 3)).min(axis=(2, 3))
     minima = np.flatnonzero((cost <= neighbours) & np.isfinite(cost))
     minima = minima[np.argsort(tried.cost[minima], kind="stable")][:TRIED]
-    refined = [_refined(loads, _pair(tried, k)) for k in minima.tolist()]
+    refined = [_refined(loads, float(critical[k]), float(fall[k])) for k in minima.tolist()]
     # Corners between the same samples often explain them equally well, so only the best of these is kept.
     by_division: dict[tuple[int, ...], _Corners] = {}
     for corners in sorted(refined, key=lambda corners: float(corners.cost[0])):
@@ -116,20 +126,21 @@ def _division(loads: Sequence[_Load], corners: _Corners) -> tuple[int, ...]:
     return tuple(int(np.count_nonzero(load.compression < end)) for load in loads for end in ends)
 
 
-def _refined(loads: Sequence[_Load], best: _Corners) -> _Corners:
-    """Return the minimum near these corners, by a grid that becomes finer."""
-    for step in range(STEPS):
-        moves = FINER * REACH * SHRINK**step
-        critical = np.maximum(best.critical + moves[:, 0], 0.5 * CRITICAL[0])
-        tried = _at_corners(loads, critical, best.fall * np.exp(moves[:, 1]))
-        k = int(np.argmin(tried.cost))
-        if tried.cost[k] < best.cost[0]:
-            best = _pair(tried, k)
-    return best
+def _refined(loads: Sequence[_Load], critical: float, fall: float) -> _Corners:
+    """Return the minimum near these corners, by a simplex: the slope of the cost jumps at each sample."""
+    from scipy.optimize import minimize
 
+    def corners(x: Floats) -> _Corners:
+        return _at_corners(loads, np.maximum(x[:1], 0.5 * CRITICAL[0]), np.exp(x[1:]))
 
-def _pair(tried: _Corners, k: int) -> _Corners:
-    return _Corners(*(column[k : k + 1] for column in tried))
+    def cost(x: Floats) -> float:
+        return float(corners(x).cost[0])
+
+    start = np.array([critical, np.log(fall)])
+    simplex = start + np.array([(0.0, 0.0), (REACH[0], 0.0), (0.0, REACH[1])])
+    options: Any = {"initial_simplex": simplex, "maxfev": EVALUATIONS}
+    best = minimize(cost, start, method="Nelder-Mead", options=options)
+    return corners(best.x)
 
 
 def _at_corners(loads: Sequence[_Load], critical: Floats, fall: Floats) -> _Corners:
@@ -167,3 +178,38 @@ def _start(corners: _Corners, depth: float, peak_n: float) -> FitStart:
     stiffness = peak_n / depth
     units = (stiffness, depth, peak_n, depth, stiffness)
     return FitStart(tuple(np.multiply(shares, units).tolist()), wider * depth)
+
+
+def corner_errors(fitted: Fitted) -> Floats:
+    """Return the relative errors of the parameters of a snap-through that the distance between two samples causes.
+
+    With two samples on the falling part, all three lines of the law are determined, and so are their corners. With
+    fewer, the corners that were fitted and the true ones lie anywhere between two samples, and a bootstrap leaves them
+    where they are.
+    """
+    labels = [parameter.label for parameter in fitted.candidate.free]
+    if "snap.critical_m" not in labels:
+        return np.zeros(len(labels))
+    squeezes, values = fitted.squeezes, fitted.by_label
+    ways = [np.abs(np.diff(squeeze.gap_m[squeeze.sample])) for squeeze in squeezes]
+    moving = np.concatenate([way[way > MOVING_SHARE * np.max(way)] for way in ways])
+    share = math.sqrt(1.0 / 6.0)
+    if _on_falling_part(fitted, values["snap.critical_m"], values["snap.fall_m"]) >= LEAST_FALLING:
+        share = MEAN_OVER_CORNER if any(np.any(squeeze.averaged_s2 > 0.0) for squeeze in squeezes) else 0.0
+    error_m = share * float(np.median(moving)) / math.sqrt(len(squeezes))
+    errors = {
+        "snap.critical_m": error_m,
+        "snap.fall_m": math.sqrt(2.0) * error_m,
+        "snap.drop_n": error_m * (values["snap.k1_n_m"] + values["snap.k2_n_m"]),
+    }
+    return np.array([errors.get(label, 0.0) / values[label] for label in labels])
+
+
+def _on_falling_part(fitted: Fitted, critical_m: float, fall_m: float) -> int:
+    """Return how many samples lie on the falling part of a snap-through while the fingers close."""
+    count = 0
+    for squeeze, width in zip(fitted.squeezes, fitted.widths_m, strict=True):
+        closure = width - squeeze.gap_m[squeeze.sample]
+        compression = (closure - fitted.model.compressed_m(squeeze.force_n))[: int(np.argmax(closure)) + 1]
+        count += int(np.sum((compression > critical_m) & (compression < critical_m + fall_m)))
+    return count

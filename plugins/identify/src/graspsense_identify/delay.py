@@ -16,12 +16,11 @@ import numpy as np
 from attrs import evolve, frozen
 
 from graspsense.simulator_api import IdentifiedParameter, Undetermined
-from graspsense_identify.choose import LEAST_GAIN, information, least_error
-from graspsense_identify.fit import Fitted, fit
-from graspsense_identify.forward import ForwardModel
-from graspsense_identify.interval import normal
-from graspsense_identify.laws import LOSS, CandidateLaw
-from graspsense_identify.prepare import MAX_LAG_S, Squeeze
+from graspsense_identify.choose import LEAST_GAIN
+from graspsense_identify.fit import Fitted
+from graspsense_identify.interval import identified, normal
+from graspsense_identify.laws import LOSS, damper, scale_of
+from graspsense_identify.prepare import MAX_LAG_S
 from graspsense_identify.refuse import shows_memory
 from graspsense_identify.spread import refits
 from graspsense_identify.threads import in_threads
@@ -55,25 +54,13 @@ class Delay:
     or if the delay of the settings is used."""
 
     @property
-    def is_used(self) -> bool:
-        """Whether the object was identified with a delay of the recordings, not that of the settings."""
-        return self.used_s != self.settings_s
-
-    @property
     def parameters(self) -> list[IdentifiedParameter]:
         """The delay that is used, with an interval that holds it and what the recordings show; nothing without that."""
         if math.isnan(self.shown_s):
             return []
-        return [
-            IdentifiedParameter(
-                name="delay_s",
-                unit="s",
-                value=self.used_s,
-                low=min(self.low_s, self.used_s),
-                high=max(self.high_s, self.used_s),
-                basis=f"{self.basis}; of the {'recordings' if self.is_used else 'settings'}",
-            )
-        ]
+        interval = min(self.low_s, self.used_s), max(self.high_s, self.used_s)
+        source = "recordings" if self.used_s != self.settings_s else "settings"
+        return [identified("delay_s", self.used_s, interval, f"{self.basis}; of the {source}")]
 
     @property
     def error_s(self) -> float:
@@ -119,23 +106,21 @@ class Lag:
     """Its standard deviation from the choice of the terms, and from the finite number of nodes."""
 
 
-def lag_beyond_settings(model: ForwardModel, refined: Sequence[Fitted], squeezes: Sequence[Squeeze]) -> Lag:
+def lag_beyond_settings(refined: Sequence[Fitted]) -> Lag:
     """Return the lag without which none of these candidates fits as well.
 
     `refined`: fits with the times as they are.
     """
-    if not shows_memory(squeezes):
+    if not shows_memory(refined[0].squeezes):
         return Lag()
-    lagging = in_threads(
-        lambda fitted: fit(model, fitted.candidate, squeezes, start=fitted, has_lag=True), refined
-    )
-    best = min(lagging, key=information)
+    lagging = in_threads(lambda fitted: fitted.refitted(has_lag=True), refined)
+    best = min(lagging, key=lambda fitted: fitted.information)
     own = refined[lagging.index(best)]
-    gained = information(best) <= min(information(fitted) for fitted in refined) - EVIDENCE
-    better = least_error(best) <= (1.0 - LEAST_GAIN) * least_error(own)
+    gained = best.information <= min(fitted.information for fitted in refined) - EVIDENCE
+    better = best.error <= (1.0 - LEAST_GAIN) * own.error
     if not gained or not better or abs(best.lag_s) > 0.98 * MAX_LAG_S:
         return Lag()
-    near = [fitted for fitted in lagging if information(fitted) <= information(best) + PLAUSIBLE]
+    near = [fitted for fitted in lagging if fitted.information <= best.information + PLAUSIBLE]
     lags = [fitted.lag_s for fitted in near if not _is_dominated(fitted, near)]
     return Lag(
         lag_s=best.lag_s,
@@ -146,27 +131,20 @@ def lag_beyond_settings(model: ForwardModel, refined: Sequence[Fitted], squeezes
 def _is_dominated(fitted: Fitted, others: Sequence[Fitted]) -> bool:
     """Return whether a simpler candidate has more evidence."""
     return any(
-        other.parameters < fitted.parameters and information(other) < information(fitted) for other in others
+        other.parameters < fitted.parameters and other.information < fitted.information for other in others
     )
 
 
-def delay_of(
-    model: ForwardModel,
-    fitted: Fitted,
-    damper: CandidateLaw,
-    squeezes: Sequence[Squeeze],
-    settings_s: float,
-    lag: Lag,
-) -> Delay:
+def delay_of(fitted: Fitted, settings_s: float, lag: Lag) -> Delay:
     """Return the delay of the sensor.
 
-    `fitted`: the chosen fit, to squeezes whose force lags by `lag`. `damper`: the term that looks like a lag.
+    `fitted`: the chosen fit, to squeezes whose force lags by `lag`.
     """
     used_s = settings_s + lag.lag_s
-    if not shows_memory(squeezes):
+    if not shows_memory(fitted.squeezes):
         return Delay(settings_s=settings_s, used_s=used_s)
-    lagging = fit(model, fitted.candidate, squeezes, start=fitted, has_lag=True)
-    again = refits(model, lagging, squeezes, np.random.default_rng(0), has_lag=True)
+    lagging = fitted.refitted(has_lag=True)
+    again = refits(lagging, np.random.default_rng(0), has_lag=True)
     lags = np.array([fitted.lag_s for fitted in again.fits])
     scattered = again.factor * math.sqrt(again.scale * float(np.sum((lags - lags.mean()) ** 2)))
     # Where the motion does not show a lag, the fits stay where they begin and do not scatter.
@@ -175,12 +153,10 @@ def delay_of(
     shown = used_s + lagging.lag_s
     beside = math.nan
     if lag.lag_s != 0.0 and LOSS not in fitted.candidate.slots:
-        damped = evolve(
-            fitted,
-            candidate=fitted.candidate.joined(damper),
-            values=(*fitted.values, *(parameter.starts[0] for parameter in damper.free)),
-        )
-        beside = fit(model, damped.candidate, squeezes, start=damped, has_lag=True).lag_error_s
+        loss = damper(scale_of(fitted.squeezes))
+        values = (*fitted.values, *loss.starts()[0])
+        damped = evolve(fitted, candidate=fitted.candidate.joined(loss), values=values)
+        beside = damped.refitted(has_lag=True).lag_error_s
     return Delay(
         settings_s=settings_s,
         used_s=used_s,

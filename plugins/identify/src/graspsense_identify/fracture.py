@@ -11,17 +11,15 @@ section 5.2).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Iterator, Sequence
+from typing import Final, NamedTuple
 
 import numpy as np
-from attrs import frozen
 from numpy.typing import NDArray
 
 from graspsense.simulator_api import IdentifiedParameter, Undetermined
 from graspsense_identify.fit import Fitted
-from graspsense_identify.forward import ForwardModel, Runs
-from graspsense_identify.interval import student
+from graspsense_identify.interval import NO_INTERVAL, identified, student
 from graspsense_identify.prepare import BREAK_SHARE, Squeeze
 from graspsense_identify.random_effects import FALSE_CLAIMS, Scatter, between
 
@@ -35,83 +33,20 @@ SAME_DEPTH: Final = 0.9
 """A squeeze as deep as this share of another one is compared with it."""
 
 
-@frozen(kw_only=True)
-class FractureFit:
-    """The parameters of the term `fracture`: its limit by force or by compression, with its spread."""
+class IdentifiedFracture(NamedTuple):
+    """What the breaks give: the parameters of the term `fracture`, and what they leave open."""
 
-    name: str
-    """`force_n` or `compression_m`."""
-    value: float
-    low: float
-    high: float
-    spread: Scatter | None
-    """Standard deviation of the logarithm between objects; None if fewer than three broke, or if they differ by no more
-    than the measurements leave open."""
-    left: float
-    broken: int
-    whole: int
-    seen_again: int
-    """Of the broken ones, those whose next squeeze shows that the force does not come back."""
+    parameters: list[IdentifiedParameter]
+    """The limit, `force_n` or `compression_m`, the share of the force that is left, and the spread of the limit.
 
-    @property
-    def parameters(self) -> list[IdentifiedParameter]:
-        """The identified parameters."""
-        unit = "N" if self.name == "force_n" else "m"
-        basis = f"{self.broken} of {self.broken + self.whole} squeezes broke the object"
-        identified = [
-            IdentifiedParameter(
-                name=f"fracture.{self.name}",
-                unit=unit,
-                value=self.value,
-                low=self.low,
-                high=self.high,
-                basis=basis,
-            ),
-            IdentifiedParameter(
-                name="fracture.left", unit="", value=self.left, low=math.nan, high=math.nan, basis="median"
-            ),
-        ]
-        if self.spread is not None:
-            identified.append(
-                IdentifiedParameter(
-                    name=f"fracture.{self.name}.spread",
-                    unit="",
-                    value=self.spread.value,
-                    low=self.spread.low,
-                    high=self.spread.high,
-                    basis=basis,
-                )
-            )
-        return identified
-
-    @property
-    def undetermined(self) -> list[Undetermined]:
-        """What the breaks leave open."""
-        open_ = []
-        if self.broken < LEAST_BROKEN:
-            open_.append(
-                Undetermined(
-                    what="fracture by force or by compression, and its spread",
-                    reason=f"{self.broken} squeezes broke the object",
-                    remedy=f"break {LEAST_BROKEN} objects or more",
-                )
-            )
-        if self.seen_again < self.broken:
-            open_.append(
-                Undetermined(
-                    what="whether the objects broke",
-                    reason=f"{self.broken - self.seen_again} of {self.broken} falls of the force are in the last "
-                    "squeeze of their object, or in that of an object without a number",
-                    remedy="squeeze each object once more after the fall, labelled cup#1, cup#2, cup#3",
-                )
-            )
-        return open_
+    The spread, the standard deviation of the logarithm between objects, is missing if fewer than three broke, or if
+    they differ by no more than the measurements leave open.
+    """
+    undetermined: list[Undetermined]
 
 
-def fracture_of(
-    model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze], force_scatter: float = 0.0
-) -> FractureFit | None:
-    """Return the fracture of these squeezes; None if none of them broke the object.
+def fracture_of(fitted: Fitted, force_scatter: float = 0.0) -> IdentifiedFracture:
+    """Return the fracture of these squeezes; nothing if none of them broke the object.
 
     `force_scatter`: standard deviation of the logarithm of the force's scale between squeezes.
     """
@@ -119,38 +54,55 @@ def fracture_of(
     survived: dict[str, list[float]] = {"force_n": [], "compression_m": []}
     errors: dict[str, list[float]] = {"force_n": [], "compression_m": []}
     left = []
-    for i, squeeze in enumerate(squeezes):
-        forces, compressions = _whole(model, fitted, squeeze, i)
-        if squeeze.broken_n is None:
-            survived["force_n"].append(float(np.max(forces)))
-            survived["compression_m"].append(float(np.max(compressions)))
-            continue
+    for i, squeeze in enumerate(fitted.squeezes):
+        courses = _whole(fitted, i)
         last = squeeze.sample[-1]
-        for name, course in (("force_n", forces), ("compression_m", compressions)):
+        for name, course in courses.items():
+            if squeeze.broken_n is None:
+                survived[name].append(float(np.max(course)))
+                continue
             breaks[name].append(0.5 * float(course[last] + course[-1]))
             # Anywhere between the two measurements.
             errors[name].append(abs(math.log(float(course[-1]) / float(course[last]))) / math.sqrt(12.0))
-        left.append(squeeze.broken_n / max(float(forces[-1]), 1e-9))
-    if not left:
-        return None
+        if squeeze.broken_n is not None:
+            left.append(squeeze.broken_n / max(float(courses["force_n"][-1]), 1e-9))
+    broken = len(left)
+    if not broken:
+        return IdentifiedFracture([], [])
     fits = {name: _lognormal(np.array(breaks[name]), np.array(survived[name])) for name in breaks}
     name = "force_n"
-    if len(left) >= LEAST_BROKEN and fits["compression_m"][1] < fits["force_n"][1]:
+    if broken >= LEAST_BROKEN and fits["compression_m"][1] < fits["force_n"][1]:
         name = "compression_m"
     mean, spread = fits[name]
+    half = student(broken - 1) * spread / math.sqrt(broken) if broken > 1 else math.nan
+    basis = f"{broken} of {len(fitted.squeezes)} squeezes broke the object"
+    median = min(max(float(np.median(left)), 0.0), MOST_LEFT)
+    parameters = [
+        identified(f"fracture.{name}", math.exp(mean), (math.exp(mean - half), math.exp(mean + half)), basis),
+        identified("fracture.left", median, NO_INTERVAL, "median"),
+    ]
     variances = np.array(errors[name]) ** 2 + (force_scatter**2 if name == "force_n" else 0.0)
-    half = student(len(left) - 1) * spread / math.sqrt(len(left)) if len(left) > 1 else math.nan
-    return FractureFit(
-        name=name,
-        value=math.exp(mean),
-        low=math.exp(mean - half),
-        high=math.exp(mean + half),
-        spread=_spread(np.log(breaks[name]), variances, spread) if len(left) >= LEAST_BROKEN else None,
-        left=min(max(float(np.median(left)), 0.0), MOST_LEFT),
-        broken=len(left),
-        whole=len(squeezes) - len(left),
-        seen_again=sum(bears_again(squeezes, i) is False for i in range(len(squeezes))),
-    )
+    if broken >= LEAST_BROKEN and (scatter := _spread(np.log(breaks[name]), variances, spread)):
+        parameters.append(identified(f"fracture.{name}.spread", scatter.value, scatter[1:], basis))
+    return IdentifiedFracture(parameters, list(_undetermined(fitted.squeezes, broken)))
+
+
+def _undetermined(squeezes: Sequence[Squeeze], broken: int) -> Iterator[Undetermined]:
+    """Yield what so many breaks leave open."""
+    if broken < LEAST_BROKEN:
+        yield Undetermined(
+            what="fracture by force or by compression, and its spread",
+            reason=f"{broken} squeezes broke the object",
+            remedy=f"break {LEAST_BROKEN} objects or more",
+        )
+    unseen = broken - sum(bears_again(squeezes, i) is False for i in range(len(squeezes)))
+    if unseen > 0:
+        yield Undetermined(
+            what="whether the objects broke",
+            reason=f"{unseen} of {broken} falls of the force are in the last squeeze of their object, or in that of an "
+            "object without a number",
+            remedy="squeeze each object once more after the fall, labelled cup#1, cup#2, cup#3",
+        )
 
 
 def not_broken(squeezes: Sequence[Squeeze]) -> list[int]:
@@ -193,13 +145,11 @@ def _spread(logs: Floats, variances: Floats, likeliest: float) -> Scatter | None
     return Scatter(likeliest, ratio * scatter.low, ratio * scatter.high)
 
 
-def _whole(model: ForwardModel, fitted: Fitted, squeeze: Squeeze, i: int) -> tuple[Floats, Floats]:
+def _whole(fitted: Fitted, i: int) -> dict[str, Floats]:
     """Return the forces and compressions that the object would have had at the nodes, if it had not broken."""
-    numbers = fitted.candidate.numbers(np.array([fitted.values]), np.array([fitted.factors[i]]))
-    width = fitted.widths_m[i]
-    runs = Runs(np.zeros(1, np.int64), np.array([width]), numbers, fitted.candidate.active)
-    forces = model.run(model.paths([squeeze]), runs)[0]
-    return forces, width - squeeze.gap_m - model.compressed_m(forces)
+    squeeze, width = fitted.squeezes[i], fitted.widths_m[i]
+    forces = fitted.model.at_nodes(squeeze, fitted.candidate, fitted.values, width, fitted.factors[i])
+    return {"force_n": forces, "compression_m": width - squeeze.gap_m - fitted.model.compressed_m(forces)}
 
 
 def _lognormal(breaks: Floats, survived: Floats) -> tuple[float, float]:

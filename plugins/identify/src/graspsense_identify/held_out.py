@@ -6,40 +6,58 @@ object stands between the fingers: a sensor of 24 Hz shows it to some 0.4 mm. It
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from graspsense_identify.choose import MAX_FOLDS
-from graspsense_identify.fit import Fitted, fit_to, held_out_rms
-from graspsense_identify.forward import ForwardModel
+from graspsense_identify.fit import FACTOR_RANGE, STEP, TOLERANCE, WIDTH_RANGE, Fitted, relative
 from graspsense_identify.prepare import Squeeze
 from graspsense_identify.threads import in_threads
 
+MAX_FOLDS: Final = 5
 CONFIRMS: Final = 0.1
 """A held-out squeeze that is predicted to this share of its peak confirms the object, and so does one that is predicted
 as closely as the squeezes are alike (`repeatability`)."""
 
 
-def held_out_errors(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) -> tuple[float, ...]:
-    """Return the rms error over the peak of each squeeze, predicted from others; nothing for a single squeeze."""
-    n = len(squeezes)
+def held_out_errors(fitted: Fitted, *, own_stiffness: bool = False) -> tuple[float, ...]:
+    """Return the rms error over the peak of each squeeze, predicted from others; nothing for a single squeeze.
+
+    `own_stiffness`: whether a held-out squeeze has a factor of its own on the stiffness, too.
+    """
+    n = len(fitted.squeezes)
     folds = min(n, MAX_FOLDS)
     if n < 2:
         return ()
-    of_folds = in_threads(lambda k: _of_fold(model, fitted, squeezes, range(k, n, folds)), range(folds))
-    errors = {i: error for fold in of_folds for i, error in fold.items()}
-    return tuple(errors[i] for i in range(n))
+
+    def of_fold(k: int) -> list[float]:
+        train = fitted.part([i for i in range(n) if i % folds != k]).refitted()
+        beyond_m = float(np.mean(np.array(train.widths_m) - [squeeze.width_m for squeeze in train.squeezes]))
+        # With a stiffness of its own, a width far from that of the fit may lead to another minimum.
+        widths_m = fitted.widths_m if own_stiffness else [own.width_m + beyond_m for own in fitted.squeezes]
+        return [
+            _predicted_rms(train, fitted.squeezes[i], widths_m[i], own_stiffness) for i in range(k, n, folds)
+        ]
+
+    of_folds = in_threads(of_fold, range(folds))
+    return tuple(of_folds[i % folds][i // folds] for i in range(n))
 
 
-def _of_fold(
-    model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze], held_out: range
-) -> dict[int, float]:
-    train = [i for i in range(len(squeezes)) if i not in held_out]
-    part = fit_to(model, fitted, squeezes, train)
-    beyond_m = float(np.mean(np.array(part.widths_m) - [squeezes[i].width_m for i in train]))
-    return {
-        i: held_out_rms(model, part, squeezes[i], squeezes[i].width_m + beyond_m, own_stiffness=False)
-        for i in held_out
-    }
+def _predicted_rms(fitted: Fitted, squeeze: Squeeze, width_m: float, own_stiffness: bool) -> float:
+    """Return the rms residual over the peak of a squeeze that was not fitted. `width_m`: the width to start from."""
+    from scipy.optimize import least_squares
+
+    def residuals(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        factor = math.exp(x[1]) if own_stiffness else 1.0
+        width = width_m + x[0] * squeeze.depth_m
+        forces = fitted.model.forces(squeeze, fitted.candidate, fitted.values, width, factor)
+        return relative(forces - squeeze.force_n, squeeze.peak_n)
+
+    limits = np.array([WIDTH_RANGE, FACTOR_RANGE][: 1 + own_stiffness])
+    start, steps = np.zeros(len(limits)), [STEP] * len(limits)
+    solution = least_squares(
+        residuals, start, bounds=(-limits, limits), max_nfev=15, diff_step=steps, ftol=TOLERANCE
+    )
+    return float(np.sqrt(np.mean(solution.fun**2)))

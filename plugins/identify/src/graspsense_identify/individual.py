@@ -8,88 +8,76 @@ then that of a single squeeze.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
 
-from graspsense_identify.choose import Choice, chosen_instead, information_of
+from graspsense_identify.choose import Choice
 from graspsense_identify.delay import EVIDENCE, Lag, lag_beyond_settings
-from graspsense_identify.fit import Fitted, fit
-from graspsense_identify.forward import ForwardModel
-from graspsense_identify.prepare import Squeeze
-from graspsense_identify.spread import LEAST_INSTANCES
+from graspsense_identify.fit import Fitted, information
+from graspsense_identify.spread import has_objects
 from graspsense_identify.threads import in_threads
 
 Floats = NDArray[np.float64]
 
 
-def alone(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) -> list[Fitted]:
+def alone(fitted: Fitted) -> list[Fitted]:
     """Return the fits of a candidate to each squeeze by itself; none with fewer than three objects with names."""
-    names = {squeeze.instance for squeeze in squeezes}
-    if "" in names or len(names) < LEAST_INSTANCES:
+    if not has_objects(fitted.squeezes):
         return []
-    return in_threads(lambda i: _alone(model, fitted, squeezes[i], i), range(len(squeezes)))
+    return in_threads(lambda i: fitted.part([i]).refitted(), range(len(fitted.squeezes)))
 
 
-class Individual(NamedTuple):
-    """A choice, and the fits of its candidate to each squeeze by itself."""
-
-    choice: Choice
-    fits: list[Fitted]
-    """None with fewer than three objects with names."""
-    varies: bool
-    """Whether common values fit worse than noise would make them."""
-
-    def lag(self, model: ForwardModel, squeezes: Sequence[Squeeze]) -> Lag:
-        """Return the lag of the force beyond the settings."""
-        if not self.varies:
-            return lag_beyond_settings(model, self.choice.refined, squeezes)
-        by_candidate = in_threads(lambda fitted: _alone(model, fitted, squeezes[0], 0), self.choice.refined)
-        return lag_beyond_settings(model, by_candidate, squeezes[:1])
-
-    @property
-    def of_each(self) -> Fitted:
-        """The chosen fit with the width of each squeeze, and its factor on the stiffness: where the values vary, those
-        that it has by itself."""
-        fitted = self.choice.fitted
-        if not self.varies:
-            return fitted
-        values = np.log([fitted.values for fitted in self.fits])
-        reference = reference_stiffness(fitted, values)
-        logs = np.log(fitted.factors) if reference is None else values[:, reference]
-        return evolve(
-            fitted,
-            widths_m=tuple(fitted.widths_m[0] for fitted in self.fits),
-            factors=tuple(np.exp(logs - logs.mean()).tolist()),
-        )
-
-
-def simplest_alone(model: ForwardModel, choice: Choice, squeezes: Sequence[Squeeze]) -> Individual:
-    """Return the choice, or that of a simpler candidate whose values differ between objects."""
-    own = alone(model, choice.fitted, squeezes)
+def with_own_values(choice: Choice) -> Choice:
+    """Return the choice with the fits to each squeeze, or that of a simpler candidate whose values differ."""
+    own = alone(choice.fitted)
+    choice = evolve(choice, alone=own)
     if not own or _evidence(own) > _common_evidence(choice.fitted) - EVIDENCE:
-        return Individual(choice, own, varies=False)
+        return choice
+    least = min(_evidence(own), _common_evidence(choice.fitted))
     simpler = [fitted for fitted in choice.refined if fitted.parameters < choice.fitted.parameters]
-    for fitted in sorted(simpler, key=lambda law: (law.parameters, law.cost)):
-        fits = alone(model, fitted, squeezes)
-        if _evidence(fits) < min(_evidence(own), _common_evidence(choice.fitted)) - EVIDENCE:
-            chosen = chosen_instead(choice, fitted, "simpler, with values of each object")
-            return Individual(chosen, fits, varies=True)
-    return Individual(choice, own, varies=True)
+    for fitted in sorted(simpler, key=lambda law: (law.parameters, law.rms)):
+        fits = alone(fitted)
+        if _evidence(fits) < least - EVIDENCE:
+            choice = evolve(choice.instead(fitted, "simpler, with values of each object"), alone=fits)
+            break
+    return evolve(choice, varies=True)
+
+
+def lag_of(choice: Choice) -> Lag:
+    """Return the lag of the force beyond the settings."""
+    if not choice.varies:
+        return lag_beyond_settings(choice.refined)
+    return lag_beyond_settings(in_threads(lambda fitted: fitted.part([0]).refitted(), choice.refined))
+
+
+def of_each(choice: Choice) -> Fitted:
+    """Return the chosen fit with the width of each squeeze, and its factor on the stiffness: where the values vary,
+    those that it has by itself."""
+    fitted = choice.fitted
+    if not choice.varies:
+        return fitted
+    values = np.log([fitted.values for fitted in choice.alone])
+    reference = reference_stiffness(fitted, values)
+    logs = np.log(fitted.factors) if reference is None else values[:, reference]
+    return evolve(
+        fitted,
+        widths_m=tuple(fitted.widths_m[0] for fitted in choice.alone),
+        factors=tuple(np.exp(logs - logs.mean()).tolist()),
+    )
 
 
 def _evidence(fits: Sequence[Fitted]) -> float:
     """Return half of the Bayesian information criterion of fits to each squeeze, less a constant."""
     residuals = np.concatenate([fitted.residuals for fitted in fits])
     free = sum(len(fitted.values) for fitted in fits)
-    return information_of(float(np.sqrt(np.mean(residuals**2))), free, len(residuals))
+    return information(float(np.sqrt(np.mean(residuals**2))), free, len(residuals))
 
 
 def _common_evidence(fitted: Fitted) -> float:
     """Return that of a fit with common values, and a factor of each squeeze on the stiffness."""
-    return information_of(fitted.rms, len(fitted.values) + len(fitted.factors) - 1, len(fitted.residuals))
+    return information(fitted.rms, len(fitted.values) + len(fitted.factors) - 1, len(fitted.residuals))
 
 
 def stiffnesses(fitted: Fitted) -> list[int]:
@@ -100,13 +88,3 @@ def stiffnesses(fitted: Fitted) -> list[int]:
 def reference_stiffness(fitted: Fitted, values: Floats) -> int | None:
     """Return the stiffness that differs least between the squeezes: the others vary with it, and beyond it."""
     return min(stiffnesses(fitted), key=lambda i: float(np.var(values[:, i])), default=None)
-
-
-def _alone(model: ForwardModel, fitted: Fitted, squeeze: Squeeze, i: int) -> Fitted:
-    factor = fitted.factors[i]
-    own = tuple(
-        value * factor if parameter.is_stiffness else value
-        for parameter, value in zip(fitted.candidate.free, fitted.values, strict=True)
-    )
-    start = evolve(fitted, values=own, widths_m=(fitted.widths_m[i],), factors=(1.0,))
-    return fit(model, fitted.candidate, [squeeze], start=start)

@@ -9,15 +9,13 @@ all ticks and between them are fitted in place of the measured ones, and what co
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
 
-from graspsense_identify.fit import Fitted, fit
-from graspsense_identify.forward import ForwardModel
+from graspsense_identify.fit import Fitted
 from graspsense_identify.prepare import Squeeze
 from graspsense_identify.spread import Uncertainty
 
@@ -33,11 +31,9 @@ SHORTEST: Final = 0.1
 """The shortest distance between two nodes of the fine path, over their usual distance."""
 
 
-def without_path_error(
-    model: ForwardModel, fitted: Fitted, intervals: Uncertainty, squeezes: Sequence[Squeeze]
-) -> tuple[Fitted, Uncertainty]:
+def without_path_error(fitted: Fitted, intervals: Uncertainty) -> tuple[Fitted, Uncertainty]:
     """Return the fit and its uncertainty without the error of the path."""
-    factors = np.exp(-path_bias(model, fitted, squeezes))
+    factors = np.exp(-path_bias(fitted))
     values = tuple((np.array(fitted.values) * factors).tolist())
     return evolve(fitted, values=values), evolve(
         intervals,
@@ -47,27 +43,21 @@ def without_path_error(
     )
 
 
-def path_bias(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) -> Floats:
+def path_bias(fitted: Fitted) -> Floats:
     """Return by how much the logarithms of the values are too large; zeros if the recordings have no finer path."""
     none = np.zeros(len(fitted.values))
-    finest = [on_fine_path(squeeze) for squeeze in squeezes]
-    if any(
-        len(fine.t_s) <= NODES_PER_TICK * len(squeeze.t_s)
-        for fine, squeeze in zip(finest, squeezes, strict=True)
-    ):
+    finest = [on_fine_path(squeeze) for squeeze in fitted.squeezes]
+    pairs = list(zip(fitted.squeezes, finest, strict=True))
+    if any(len(fine.t_s) <= NODES_PER_TICK * len(squeeze.t_s) for squeeze, fine in pairs):
         return none
+    forces = evolve(fitted, squeezes=finest).forces()
     simulated = [
-        evolve(
-            squeeze,
-            force_n=_measured(squeeze, fine, model.forces(fine, fitted.candidate, fitted.values, *own)),
-        )
-        for squeeze, fine, own in zip(
-            squeezes, finest, zip(fitted.widths_m, fitted.factors, strict=True), strict=True
-        )
+        evolve(squeeze, force_n=_measured(squeeze, fine, force_n))
+        for (squeeze, fine), force_n in zip(pairs, forces, strict=True)
     ]
     if not all(np.isfinite(squeeze.force_n).all() for squeeze in simulated):
         return none
-    back = fit(model, fitted.candidate, simulated, start=fitted)
+    back = evolve(fitted, squeezes=simulated).refitted()
     bias: Floats = np.log(back.values) - np.log(fitted.values)
     return bias if float(np.max(np.abs(bias))) <= LARGEST_BIAS else none
 
@@ -87,13 +77,10 @@ def on_fine_path(squeeze: Squeeze) -> Squeeze:
     nodes = nodes[
         np.diff(nodes, prepend=-np.inf) > SHORTEST / NODES_PER_TICK * float(np.median(np.diff(ticks)))
     ]
-    gap = np.interp(nodes, ticks, gap)
     return evolve(
         squeeze,
         t_s=nodes,
-        gap_m=gap,
-        speed_m_s=-np.gradient(gap, nodes),
-        step_s=np.diff(nodes, prepend=nodes[0] - squeeze.step_s[0]),
+        gap_m=np.interp(nodes, ticks, gap),
         sample=np.arange(len(nodes)),
         force_n=np.zeros(len(nodes)),
         averaged_s2=np.zeros(len(nodes)),

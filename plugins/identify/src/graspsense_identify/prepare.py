@@ -78,25 +78,17 @@ class Squeeze:
     sha256: str
     t_s: Floats
     gap_m: Floats
-    speed_m_s: Floats
-    """Closing speed at the nodes."""
-    step_s: Floats
-    """Time since the node before."""
     sample: NDArray[np.int64]
     """Nodes at which the force was measured."""
     force_n: Floats
-    """The force at these nodes: the mean of both pads, over `share`."""
+    """The force at these nodes: the mean of both pads."""
     averaged_s2: Floats
     """Variance of the times of the measurements of which each of these forces is the mean; 0 for a single one."""
     width_m: float
     """The gap at contact, as a first estimate."""
-    noise_n: float
-    """Standard deviation of the force before the contact."""
     stretches: Stretches
     pad_difference: float
     """The largest difference of the forces on both pads, over the largest mean force; 0 with a single pad."""
-    share: float = 1.0
-    """The share of the force that the pads measure."""
     broken_n: float | None = None
     """The force at the last node, right after the object broke, where the squeeze is cut; None if it did not break."""
     course: tuple[Floats, Floats]
@@ -104,8 +96,28 @@ class Squeeze:
 
     def delayed(self, lag_s: float) -> Squeeze:
         """Return the squeeze if its force lagged behind the gap by so much: at every node, the gap of that time."""
-        gap = np.interp(self.t_s - lag_s, *self.course)
-        return evolve(self, gap_m=gap, speed_m_s=-np.gradient(gap, self.t_s))
+        if lag_s == 0.0:
+            return self
+        return evolve(self, gap_m=np.interp(self.t_s - lag_s, *self.course))
+
+    def only(self, is_kept: NDArray[np.bool_]) -> Squeeze:
+        """Return the squeeze with some of its samples."""
+        return evolve(
+            self,
+            sample=self.sample[is_kept],
+            force_n=self.force_n[is_kept],
+            averaged_s2=self.averaged_s2[is_kept],
+        )
+
+    @cached_property
+    def speed_m_s(self) -> Floats:
+        """The closing speed at the nodes."""
+        return -np.gradient(self.gap_m, self.t_s)
+
+    @cached_property
+    def step_s(self) -> Floats:
+        """The time since the node before."""
+        return np.diff(self.t_s, prepend=self.t_s[0] - BEFORE_S)
 
     @cached_property
     def averaging(self) -> tuple[Floats, Floats]:
@@ -130,10 +142,19 @@ class Squeeze:
         return mean
 
     @cached_property
-    def measured_path(self) -> tuple[Floats, Floats]:
-        """The measured force at every node, and its rate."""
-        force = np.interp(self.t_s, self.t_s[self.sample], self.force_n)
-        return force, np.gradient(force, self.t_s)
+    def loading(self) -> slice:
+        """The samples until the gap is smallest."""
+        return slice(0, int(np.argmin(self.gap_m[self.sample])) + 1)
+
+    def work_j(self, force_n: Floats) -> float:
+        """Return the work of forces at the samples until the gap is smallest."""
+        force, gap = force_n[self.loading], self.gap_m[self.sample][self.loading]
+        return -float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(gap)))
+
+    def with_share(self, share: float) -> Squeeze:
+        """Return the squeeze with the whole force, of which this share was measured."""
+        broken_n = None if self.broken_n is None else self.broken_n / share
+        return evolve(self, force_n=self.force_n / share, broken_n=broken_n)
 
     @cached_property
     def peak_n(self) -> float:
@@ -146,22 +167,6 @@ class Squeeze:
         return float(self.width_m - np.min(self.gap_m))
 
 
-class Resolution(NamedTuple):
-    """Into how many nodes and samples a squeeze is divided."""
-
-    nodes: int = MAX_NODES
-    samples: int = MAX_SAMPLES
-
-
-FULL: Final = Resolution()
-
-
-def resolution(squeezes: int) -> Resolution:
-    """Return the resolution for a number of squeezes."""
-    share = min(MANY / squeezes, 1.0)
-    return Resolution(max(int(share * MAX_NODES), LEAST_NODES), max(int(share * MAX_SAMPLES), LEAST_SAMPLES))
-
-
 class NoSqueeze(ConfigError):
     """A recording in which nothing, or too little, was squeezed."""
 
@@ -169,23 +174,23 @@ class NoSqueeze(ConfigError):
 def prepared(
     squeeze: RecordedSqueeze,
     delay_s: float,
-    parts: Resolution = FULL,
     lag_s: float = 0.0,
     *,
+    squeezes: int = 1,
     may_break: bool = True,
 ) -> Squeeze:
     """Return the squeeze of a recording.
 
     `delay_s`: by how much a force without a time of its own lags behind the gap, by the settings of the sensor. The
-    times of images contain this delay. `lag_s`: by how much every force lags beyond that. `may_break`: whether the
-    squeeze ends where the object seems to break.
+    times of images contain this delay. `lag_s`: by how much every force lags beyond that. `squeezes`: how many are
+    fitted together. `may_break`: whether the squeeze ends where the object seems to break.
 
     Raises ConfigError if it has no gap, no force, no contact, or too few samples in contact.
     """
     trace = squeeze.trace
     times, forces = _samples(squeeze.name, trace, delay_s, lag_s)
     peak = float(np.max(forces))
-    noise, threshold, touching = _contact(squeeze.name, forces, peak)
+    threshold, touching = _contact(squeeze.name, forces, peak)
     onset = int(touching[0])
     begin = min(times[max(onset - 1, 0)] - BEFORE_S, _begin(trace, times[onset]))
     last, broken = int(touching[-1]), None
@@ -194,12 +199,15 @@ def prepared(
     window = (times >= begin) & (np.arange(len(times)) <= last)
     after = times[:0] if broken is None else times[broken : broken + 1]
     broken_n = None if broken is None else float(forces[broken])
-    progress = _progress(trace, np.append(times[window], after))
+    ends = float(times[window][0]), float(np.append(times[window], after)[-1])
+    course = _smooth_course(trace, *ends)
+    progress = _progress(course, *ends)
     touched = int(np.searchsorted(np.flatnonzero(window), onset))
-    times, forces, averaged_s2 = _in_blocks(times[window], forces[window], touched, progress, parts.samples)
-    nodes, sample = _nodes(np.append(times, after), progress, parts.nodes)
+    share = min(MANY / squeezes, 1.0)
+    samples, pieces = max(int(share * MAX_SAMPLES), LEAST_SAMPLES), max(int(share * MAX_NODES), LEAST_NODES)
+    times, forces, averaged_s2 = _in_blocks(times[window], forces[window], touched, progress, samples)
+    nodes, sample = _nodes(np.append(times, after), progress, pieces)
     sample = sample[: len(times)]
-    course = _smooth_course(trace, nodes)
     gap = np.interp(nodes, *course)
     width = float(np.interp(times[max(int(np.argmax(forces > threshold)) - 1, 0)], nodes, gap))
     return Squeeze(
@@ -208,23 +216,19 @@ def prepared(
         sha256=squeeze.sha256,
         t_s=nodes,
         gap_m=gap,
-        speed_m_s=-np.gradient(gap, nodes),
-        step_s=np.diff(nodes, prepend=nodes[0] - BEFORE_S),
         sample=sample,
         force_n=forces,
         averaged_s2=averaged_s2,
         broken_n=broken_n,
         course=course,
         width_m=width,
-        noise_n=noise,
         pad_difference=_pad_difference(trace, begin, float(times[-1])) / peak,
         stretches=_stretches(nodes, gap, width, has_approach=onset > 1),
     )
 
 
-def _contact(name: str, forces: Floats, peak: float) -> tuple[float, float, NDArray[np.int64]]:
-    """Return the noise before the contact, the force from which on the object counts as touched, and the samples beyond
-    it. Raises NoSqueeze."""
+def _contact(name: str, forces: Floats, peak: float) -> tuple[float, NDArray[np.int64]]:
+    """Return the force from which on the object counts as touched, and the samples beyond it. Raises NoSqueeze."""
     scatter = SCATTER * float(np.median(np.abs(np.diff(forces)))) if len(forces) > MIN_SAMPLES else 0.0
     onset = int(np.argmax(forces > CONTACT_SHARE * peak))
     noise = float(np.std(forces[: max(onset - 2, 0)])) if onset > 6 else 0.0
@@ -237,7 +241,7 @@ def _contact(name: str, forces: Floats, peak: float) -> tuple[float, float, NDAr
             f"{name}: {len(touching)} measurements of the force in contact, and at least {MIN_SAMPLES} are "
             "needed: squeeze more slowly, or measure at a higher rate"
         )
-    return noise, threshold, touching
+    return threshold, touching
 
 
 def _samples(name: str, trace: Trace, delay_s: float, lag_s: float) -> tuple[Floats, Floats]:
@@ -268,11 +272,11 @@ def _pad_difference(trace: Trace, begin_s: float, end_s: float) -> float:
     return float(np.max(apart[np.isfinite(apart)], initial=0.0))
 
 
-def _progress(trace: Trace, times: Floats) -> tuple[Floats, Floats]:
+def _progress(course: tuple[Floats, Floats], begin_s: float, end_s: float) -> tuple[Floats, Floats]:
     """Return times of a squeeze, and a measure from 0 to 1 that rises by half with the time and by half with the way of
     the fingers: nodes at equal distances in it are dense where the force changes, and follow a long hold too."""
-    t = np.linspace(times[0], times[-1], MAX_NODES)
-    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(np.interp(t, *_smooth_course(trace, t)))))])
+    t = np.linspace(begin_s, end_s, MAX_NODES)
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(np.interp(t, *course))))])
     return t, 0.5 * (t - t[0]) / (t[-1] - t[0]) + 0.5 * way / max(float(way[-1]), 1e-12)
 
 
@@ -336,19 +340,19 @@ def _nodes(times: Floats, progress: tuple[Floats, Floats], nodes: int) -> tuple[
     return np.interp(np.arange(sample[-1] + 1), sample, times), sample
 
 
-def _smooth_course(trace: Trace, nodes: Floats) -> tuple[Floats, Floats]:
-    """Return times and gaps around these nodes, averaged over the ticks between two nodes."""
+def _smooth_course(trace: Trace, begin_s: float, end_s: float) -> tuple[Floats, Floats]:
+    """Return times and gaps around these two times, averaged over the ticks between two nodes."""
     known = np.isfinite(trace.gap_m)
     times, gap = trace.t_s[known], trace.gap_m[known]
-    per_node = (nodes[-1] - nodes[0]) / MAX_NODES / max(float(np.median(np.diff(times))), 1e-9)
+    per_node = (end_s - begin_s) / MAX_NODES / max(float(np.median(np.diff(times))), 1e-9)
     width = 2 * int(per_node // 2) + 1
     if width > 1:
         # A mean flattens a curved course. What it takes away, a second mean takes away once more: it is added again.
         once = _moving_mean(gap, width)
         gap = 2.0 * once - _moving_mean(once, width)
     part = slice(
-        max(int(np.searchsorted(times, nodes[0] - MAX_LAG_S)) - 1, 0),
-        int(np.searchsorted(times, nodes[-1] + MAX_LAG_S)) + 2,
+        max(int(np.searchsorted(times, begin_s - MAX_LAG_S)) - 1, 0),
+        int(np.searchsorted(times, end_s + MAX_LAG_S)) + 2,
     )
     return times[part], gap[part]
 
@@ -366,14 +370,8 @@ def _stretches(t_s: Floats, gap: Floats, width: float, *, has_approach: bool) ->
     held = (
         np.abs(gap - float(np.median(gap[gap < width - (1.0 - 5 * HOLD_SHARE) * depth]))) < HOLD_SHARE * depth
     )
-    longest, begin = 0.0, math.nan
-    for i, is_held in enumerate(held):
-        if is_held and math.isnan(begin):
-            begin = float(t_s[i])
-        elif not is_held:
-            begin = math.nan
-        if is_held:
-            longest = max(longest, float(t_s[i]) - begin)
+    changes = np.flatnonzero(np.diff(held.astype(np.int64), prepend=0, append=0))
+    longest = float(np.max(t_s[changes[1::2] - 1] - t_s[changes[::2]], initial=0.0))
     return Stretches(
         load_s=load_s,
         hold_s=longest,

@@ -20,16 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graspsense.simulator_api import IdentifiedParameter
+from graspsense_identify.corners import corner_errors
 from graspsense_identify.fit import Fitted, linear_covariance
-from graspsense_identify.forward import ForwardModel
 from graspsense_identify.individual import reference_stiffness, stiffnesses
-from graspsense_identify.interval import LEVEL
-from graspsense_identify.laws import GAS
-from graspsense_identify.prepare import Squeeze
-from graspsense_identify.spread import (
-    LEAST_INSTANCES,
-    corner_errors,
-)
+from graspsense_identify.interval import LEVEL, identified
+from graspsense_identify.spread import LEAST_INSTANCES
 from graspsense_sim_gripper.run.identification import MOST_SPREAD
 
 Floats = NDArray[np.float64]
@@ -54,13 +49,6 @@ class Scatter(NamedTuple):
     high: float
 
 
-class OwnSpread(NamedTuple):
-    """The spread of a parameter that differs between objects, by its place among the free ones."""
-
-    place: int
-    scatter: Scatter
-
-
 def between(values: Floats, variances: Floats, level: float) -> Scatter | None:
     """Return the scatter beyond the errors of these values; None if errors of these variances make it by themselves.
 
@@ -76,27 +64,19 @@ def between(values: Floats, variances: Floats, level: float) -> Scatter | None:
     return Scatter(_at(values, variances, float(degrees)), *ends)
 
 
-def own_spreads(
-    model: ForwardModel,
-    fitted: Fitted,
-    fits: Sequence[Fitted],
-    squeezes: Sequence[Squeeze],
-    force_scatter: float,
-) -> list[OwnSpread]:
-    """Return the parameters that differ between the objects by more than the fits leave.
+def own_spreads(fitted: Fitted, fits: Sequence[Fitted], force_scatter: float) -> list[IdentifiedParameter]:
+    """Return the spreads of the parameters that differ between the objects by more than the fits leave.
 
     `fitted`: with common values. `fits`: those to each squeeze by itself. `force_scatter`: standard deviation of the
     logarithm of the force's scale between squeezes.
     """
     if not fits:
         return []
-    names = [squeeze.instance for squeeze in squeezes]
+    names = [squeeze.instance for squeeze in fitted.squeezes]
     values = np.log([fit.values for fit in fits])
-    covariances = np.array([_covariance(model, *each) for each in zip(fits, squeezes, strict=True)])
+    covariances = np.array([_covariance(fit) for fit in fits])
     stiff, reference = stiffnesses(fitted), reference_stiffness(fitted, values)
-    tested = [
-        i for i, parameter in enumerate(fitted.candidate.free) if i != reference and parameter.slot != GAS
-    ]
+    tested = [i for i in range(len(fitted.values)) if i != reference]
     spreads = []
     for i in tested:
         logs, variances = values[:, i], covariances[:, i, i]
@@ -107,29 +87,16 @@ def own_spreads(
             variances = variances + force_scatter**2
         scatter = _of_objects(logs, variances, names, FALSE_CLAIMS / len(tested))
         if scatter is not None and not fitted.at_bound(i):
-            spreads.append(OwnSpread(i, scatter))
+            label = fitted.candidate.free[i].label
+            basis = "between objects, beyond what a fit to one squeeze leaves"
+            spreads.append(identified(f"{label}.spread", min(scatter.value, MOST_SPREAD), scatter[1:], basis))
     return spreads
 
 
-def as_parameters(fitted: Fitted, spreads: Sequence[OwnSpread]) -> list[IdentifiedParameter]:
-    """Return the spreads as identified parameters."""
-    return [
-        IdentifiedParameter(
-            name=f"{fitted.candidate.free[place].label}.spread",
-            unit="",
-            value=min(scatter.value, MOST_SPREAD),
-            low=scatter.low,
-            high=scatter.high,
-            basis="between objects, beyond what a fit to one squeeze leaves",
-        )
-        for place, scatter in spreads
-    ]
-
-
-def _covariance(model: ForwardModel, fitted: Fitted, squeeze: Squeeze) -> Floats:
+def _covariance(fitted: Fitted) -> Floats:
     """Return the covariance of the logarithms of the values that one squeeze has by itself."""
-    errors = LEAST_ERROR_ALONE**2 + corner_errors(model, fitted, [squeeze]) ** 2
-    return linear_covariance(model, fitted, [squeeze], LEAST_FORCE_ERROR_ALONE) + np.diag(errors)
+    errors = LEAST_ERROR_ALONE**2 + corner_errors(fitted) ** 2
+    return linear_covariance(fitted, LEAST_FORCE_ERROR_ALONE) + np.diag(errors)
 
 
 def _of_objects(logs: Floats, variances: Floats, names: Sequence[str], level: float) -> Scatter | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 import numpy as np
@@ -11,8 +11,9 @@ import numpy as np
 from graspsense.simulator_api import SqueezeFit, Undetermined, repeatability
 from graspsense_identify.fit import Fitted
 from graspsense_identify.held_out import CONFIRMS
-from graspsense_identify.laws import ELASTIC, GAS, SNAP
+from graspsense_identify.laws import SNAP
 from graspsense_identify.prepare import BREAK_SHARE, Squeeze
+from graspsense_identify.share import Shares
 from graspsense_identify.spread import LEAST_INSTANCES, Uncertainty
 
 LEAST_HOLD_S: Final = 0.2
@@ -28,6 +29,11 @@ FALL_SHARE: Final = 0.25
 """A fall of the force by this share of the peak between two samples needs a term of its own."""
 
 _NOT_FITTED: Final = (
+    (
+        "gas",
+        "gas that is hardly compressed is a spring, and what escapes relaxes: both are part of the other terms here",
+        "measure the area that moves, the volume and the vent, and write the term by hand",
+    ),
     (
         "liquid",
         "only two combinations of its five numbers change the force, and these by a ringing that pads are too slow for",
@@ -51,21 +57,8 @@ _NOT_FITTED: Final = (
 )
 """The terms that are not fitted, why, and what would determine them."""
 
-_GAS_UNTOLD: Final = Undetermined(
-    what="gas",
-    reason="gas that is hardly compressed and does not escape is a spring, and part of the other terms here",
-    remedy="squeeze once sealed and once open, or until a fifth of the volume is displaced",
-)
-_GAS_COMBINED: Final = (
-    "the squeezes determine the stiffness n p A^2 / V of the gas and {other}; fixed are {fixed}: every other gas with "
-    "these combinations has the same force"
-)
-_SHELL_OR_GAS: Final = "squeeze deeper, or squeeze the object open, too, which shows its shell alone"
 _REMEDIES: Final = {
     "k1_n_m": "squeeze deeper",
-    "stiffness_n_m": "squeeze deeper",
-    "length_m": "squeeze deeper",
-    "resistance_n_s2_m2": "squeeze at two speeds that differ by a factor of two or more, and hold",
     "k3_n_m3": "squeeze deeper",
     "exponent": "squeeze deeper",
     "critical_m": "squeeze beyond the drop of the force",
@@ -84,34 +77,34 @@ def shows_memory(squeezes: Sequence[Squeeze]) -> bool:
     return bool(speeds) and max(speeds) >= SPEED_RATIO * min(speeds)
 
 
-def undetermined(
-    fitted: Fitted, intervals: Uncertainty, squeezes: Sequence[Squeeze], shares: Sequence[float], cells: bool
-) -> list[Undetermined]:
-    """Return what these squeezes leave open. `shares`: those of each squeeze, `cells`: whether cells measured them."""
-    open_ = _memory(fitted, squeezes) if not shows_memory(squeezes) else []
-    open_ += _parameters(fitted, intervals, squeezes)
-    open_ += _falls(fitted, squeezes)
-    open_ += _spreads(intervals, squeezes)
-    if cells and not any(math.isfinite(share) for share in shares):
-        open_.append(
-            Undetermined(
-                what="share",
-                reason="the cells measure a share of the force, and the effort of the drive is not recorded",
-                remedy="record the effort, or weigh the object's contact with a force gauge",
-            )
+def undetermined(fitted: Fitted, intervals: Uncertainty, shares: Shares) -> Iterator[Undetermined]:
+    """Yield what these squeezes leave open. `shares`: those of the force that cells measure."""
+    squeezes = fitted.squeezes
+    if not shows_memory(squeezes):
+        load_s = max(squeeze.stretches.load_s for squeeze in squeezes)
+        yield Undetermined(
+            what="relaxation (maxwell, loss)",
+            reason=f"a ramp only, of {load_s:.2g} s at one speed, shows no relaxation time",
+            remedy="hold for 5 s, or squeeze at two speeds that differ by a factor of two or more",
+        )
+    yield from _parameters(fitted, intervals)
+    yield from _falls(fitted)
+    yield from _spreads(intervals, squeezes)
+    if shares.has_cells and not len(shares.known):
+        yield Undetermined(
+            what="share",
+            reason="the cells measure a share of the force, and the effort of the drive is not recorded",
+            remedy="record the effort, or weigh the object's contact with a force gauge",
         )
     if not all(squeeze.stretches.has_approach for squeeze in squeezes):
-        open_.append(
-            Undetermined(
-                what="width_m",
-                reason="a recording begins in contact: where the contact was follows from the law alone",
-                remedy="record from before the contact",
-                in_scene=True,
-            )
+        yield Undetermined(
+            what="width_m",
+            reason="a recording begins in contact: where the contact was follows from the law alone",
+            remedy="record from before the contact",
+            in_scene=True,
         )
-    open_.append(_gas(fitted))
-    open_ += [Undetermined(what=what, reason=reason, remedy=remedy) for what, reason, remedy in _NOT_FITTED]
-    return open_
+    for what, reason, remedy in _NOT_FITTED:
+        yield Undetermined(what=what, reason=reason, remedy=remedy)
 
 
 def refusals(
@@ -135,111 +128,61 @@ def refusals(
     return tuple(reasons)
 
 
-def _gas(fitted: Fitted) -> Undetermined:
-    """Return what stays open of a gas: whether there is one, or its numbers one by one."""
-    law = fitted.candidate
-    if GAS not in law.slots:
-        return _GAS_UNTOLD
-    vented = (GAS, "area_m2") in law.fixed
-    other = "rho A^3 / (2 C_d^2 vent^2)" if vented else "the length V / A"
-    fixed = ", ".join(f"{name} = {value:g}" for (slot, name), value in law.fixed.items() if slot == GAS)
-    return Undetermined(
-        what="gas: area, volume, pressure and vent one by one"
-        if vented
-        else "gas: pressure, exponent and bulge",
-        reason=_GAS_COMBINED.format(other=other, fixed=fixed),
-        remedy="measure the area that moves, or the volume, and write the others by hand",
-    )
-
-
-def _falls(fitted: Fitted, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
-    """Return the falls of the force that are too small for a break, if no term of the candidate describes them."""
-    if SNAP in fitted.candidate.slots:
-        return []
+def _falls(fitted: Fitted) -> Iterator[Undetermined]:
+    """Yield the falls of the force that are too small for a break, if no term of the candidate describes them."""
     forces = []
-    for squeeze in squeezes:
-        gap = squeeze.gap_m[squeeze.sample]
-        loading = slice(0, int(np.argmin(gap)) + 1)
-        drops = -np.diff(squeeze.force_n[loading])
+    for squeeze in fitted.squeezes:
+        drops = -np.diff(squeeze.force_n[squeeze.loading])
         if len(drops) and float(np.max(drops)) > FALL_SHARE * squeeze.peak_n:
-            forces.append(float(squeeze.force_n[loading][int(np.argmax(drops))]))
-    if not forces:
-        return []
-    return [
-        Undetermined(
+            forces.append(float(squeeze.force_n[int(np.argmax(drops))]))
+    if forces and SNAP not in fitted.candidate.slots:
+        total = len(fitted.squeezes)
+        yield Undetermined(
             what="a fall of the force",
-            reason=f"the force falls by more than {FALL_SHARE:.0%} of the peak in {len(forces)} of {len(squeezes)} "
+            reason=f"the force falls by more than {FALL_SHARE:.0%} of the peak in {len(forces)} of {total} "
             f"squeezes (at {min(forces):.3g} to {max(forces):.3g} N) while the fingers close. It is neither a break (a "
             f"fall by {BREAK_SHARE:.0%} at once) nor described by a snap",
             remedy='cut the recordings there (cut = "rupture" in a manifest), or squeeze more slowly, so that the '
             "fall has several measurements",
         )
-    ]
 
 
-def _memory(fitted: Fitted, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
-    load_s = max(squeeze.stretches.load_s for squeeze in squeezes)
-    return [
-        Undetermined(
-            what="relaxation (maxwell, loss)",
-            reason=f"a ramp only, of {load_s:.2g} s at one speed, shows no relaxation time",
-            remedy="hold for 5 s, or squeeze at two speeds that differ by a factor of two or more",
-        )
-    ]
-
-
-def _parameters(fitted: Fitted, uncertainty: Uncertainty, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
-    hold_s = max(squeeze.stretches.hold_s for squeeze in squeezes)
-    depth_mm = 1e3 * max(squeeze.depth_m for squeeze in squeezes)
-    open_ = []
+def _parameters(fitted: Fitted, uncertainty: Uncertainty) -> Iterator[Undetermined]:
+    """Yield the parameters whose intervals are wide, or which are at the end of their range."""
+    hold_s = max(squeeze.stretches.hold_s for squeeze in fitted.squeezes)
+    depth_mm = 1e3 * max(squeeze.depth_m for squeeze in fitted.squeezes)
     for i, parameter in enumerate(fitted.candidate.free):
         at_bound = fitted.at_bound(i)
         if not at_bound and uncertainty.high[i] <= WIDE * uncertainty.low[i]:
             continue
         interval = f"its 90 % interval is {uncertainty.low[i]:.3g} to {uncertainty.high[i]:.3g}"
-        reason = "the fit is at the end of the range" if at_bound else interval
-        if parameter.name == "tau_s" or parameter.term.startswith("maxwell"):
-            tau = next(
-                value
-                for other, value in zip(fitted.candidate.free, fitted.values, strict=True)
-                if other.slot == parameter.slot and other.name == "tau_s"
-            )
-            needed = max(HOLD_TIMES * tau, 2.0 * hold_s)
+        remedy = _REMEDIES.get(parameter.name, "record more squeezes")
+        if parameter.term.startswith("maxwell"):
+            needed = max(HOLD_TIMES * fitted.by_label[f"{parameter.term}.tau_s"], 2.0 * hold_s)
             remedy = f"hold for {needed:.2g} s (the longest hold is {hold_s:.2g} s)"
-        elif parameter.slot == ELASTIC and GAS in fitted.candidate.slots:
-            remedy = _SHELL_OR_GAS
-        else:
-            remedy = _REMEDIES.get(parameter.name, "record more squeezes")
-            if "deeper" in remedy:
-                remedy += f" (the deepest is {depth_mm:.2g} mm)"
-        open_.append(Undetermined(what=parameter.label, reason=reason, remedy=remedy, in_scene=True))
-    return open_
-
-
-def _spreads(uncertainty: Uncertainty, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
-    open_ = []
-    if math.isnan(uncertainty.between_objects):
-        names = {squeeze.instance for squeeze in squeezes if squeeze.instance}
-        count = (
-            "one object"
-            if len(names) == 1
-            else f"{len(names)} objects"
-            if names
-            else "objects without numbers"
+        elif "deeper" in remedy:
+            remedy += f" (the deepest is {depth_mm:.2g} mm)"
+        yield Undetermined(
+            what=parameter.label,
+            reason="the fit is at the end of the range" if at_bound else interval,
+            remedy=remedy,
+            in_scene=True,
         )
-        open_.append(
-            Undetermined(
-                what="spread between objects",
-                reason=f"the recordings are of {count}",
-                remedy=f"record {LEAST_INSTANCES} objects or more, labelled cup#1, cup#2, cup#3",
-            )
+
+
+def _spreads(uncertainty: Uncertainty, squeezes: Sequence[Squeeze]) -> Iterator[Undetermined]:
+    """Yield the spreads that so many objects and squeezes do not show."""
+    if math.isnan(uncertainty.stiffness.objects):
+        number = len({squeeze.instance for squeeze in squeezes if squeeze.instance})
+        objects = {0: "objects without numbers", 1: "one object"}.get(number, f"{number} objects")
+        yield Undetermined(
+            what="spread between objects",
+            reason=f"the recordings are of {objects}",
+            remedy=f"record {LEAST_INSTANCES} objects or more, labelled cup#1, cup#2, cup#3",
         )
     if len(squeezes) == 1:
-        open_.append(
-            Undetermined(
-                what="spread between squeezes",
-                reason="there is a single squeeze; its intervals hold for it alone",
-                remedy="record the same object three times or more, and put it down anew each time",
-            )
+        yield Undetermined(
+            what="spread between squeezes",
+            reason="there is a single squeeze; its intervals hold for it alone",
+            remedy="record the same object three times or more, and put it down anew each time",
         )
-    return open_

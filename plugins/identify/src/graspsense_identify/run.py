@@ -4,39 +4,36 @@ from __future__ import annotations
 
 import math
 import time
+from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
 from attrs import evolve, fields_dict
 
 from graspsense.plugin_api import ConfigError
-from graspsense.simulator_api import (
-    Identification,
-    IdentifiedParameter,
-    RecordedSqueeze,
-    SqueezeFit,
-)
+from graspsense.simulator_api import Identification, IdentifiedParameter, RecordedSqueeze, SqueezeFit
 from graspsense_identify.block import lag_of_block, with_fingertips_of_block
 from graspsense_identify.check import predictive_checks
 from graspsense_identify.choose import choose
 from graspsense_identify.delay import Delay, Lag, delay_of
 from graspsense_identify.fit import Fitted
-from graspsense_identify.forward import ForwardModel
-from graspsense_identify.fracture import FractureFit, fracture_of, not_broken
+from graspsense_identify.forward import ForwardModel, path_forces
+from graspsense_identify.fracture import fracture_of, not_broken
 from graspsense_identify.held_out import held_out_errors
-from graspsense_identify.individual import Individual, simplest_alone
-from graspsense_identify.interval import interval_of_mean
-from graspsense_identify.laws import DataScale, memories
+from graspsense_identify.individual import lag_of, of_each, with_own_values
+from graspsense_identify.interval import identified, identified_mean
+from graspsense_identify.laws import scale_of
 from graspsense_identify.path_error import without_path_error
-from graspsense_identify.prepare import FULL, NoSqueeze, Squeeze, prepared, resolution
-from graspsense_identify.random_effects import OwnSpread, as_parameters, own_spreads
+from graspsense_identify.prepare import NoSqueeze, Squeeze, prepared
+from graspsense_identify.random_effects import own_spreads
 from graspsense_identify.refuse import refusals, shows_memory, undetermined
-from graspsense_identify.share import measured_share
+from graspsense_identify.share import WHOLE, Shares, measured_shares
 from graspsense_identify.spread import Uncertainty, uncertainty
 from graspsense_identify.used_delay import Timed, with_delay
-from graspsense_identify.write import SceneFacts, scene_text
-from graspsense_sim_gripper.run.identification import CELLS, Drive, SimConfig, drive_and_pads
+from graspsense_identify.write import scene_text
+from graspsense_sim_gripper.run.identification import CELLS, SimConfig, drive_and_pads
 
 Progress = Callable[[str, int, int], None]
 
@@ -44,18 +41,6 @@ PADS_DIFFER: Final = 0.2
 """Share of the largest force by which the forces on both pads may differ without a note."""
 MAX_SQUEEZES: Final = 30
 """More recordings hardly narrow the intervals, and a fit of all takes minutes."""
-
-UNITS: Final = {
-    "n_m": "N/m",
-    "n_m3": "N/m3",
-    "n_m15": "N/m1.5",
-    "n": "N",
-    "m": "m",
-    "s": "s",
-    "n_s_m": "N s/m",
-    "n_s2_m2": "N s2/m2",
-}
-"""The units by the ends of names."""
 OF_FINGERTIPS: Final = (
     *("pad_stiffness_n_m", "pad_damping_n_s_m", "pad_creep_n_m", "pad_creep_s"),
     *("pad_hardening_m", "pad_exponent"),
@@ -77,57 +62,47 @@ def identify(
     """
     begin = time.monotonic()
     config, notes = _settings(config, squeezes, block)
-    (model := ForwardModel(pads=drive_and_pads(config)[1])).compile()
-    recorded, cells = _used(_distinct(squeezes, notes), notes), _has_cells(config, squeezes)
+    model = ForwardModel(pads=drive_and_pads(config)[1])
+    # Compiled before several threads call it.
+    path_forces(model.hardens)
+    recorded, has_cells = _used(_distinct(squeezes, notes), notes), _has_cells(config, squeezes)
 
     def timed(lag: Lag) -> Timed:
-        parts = _ready(config, recorded, [] if lag.lag_s else notes, cells=cells, lag_s=lag.lag_s)
-        return Timed(*parts, _chosen(model, parts[1], progress), lag)
+        ready, shares = _ready(config, recorded, [] if lag.lag_s else notes, has_cells, lag.lag_s)
+        choice = choose(
+            model, ready, scale_of(ready), shows_memory(ready), partial(progress, "fitting candidates")
+        )
+        return Timed(shares, with_own_values(choice), lag)
 
-    used, delay = with_delay(timed, lambda used: _delay(model, used, config.force_delay_s), model)
+    def shown(used: Timed) -> Delay:
+        return delay_of(used.choice.fitted, config.force_delay_s, used.lag)
+
+    used, delay = with_delay(timed, lag_of, shown)
     progress("computing intervals", 0, 1)
-    ready, shares, choice = used.ready, used.shares, used.individual.choice
-    share_error = _share_error(config, ready) if cells else 0.0
-    fitted, intervals = _with_uncertainty(model, used, share_error, delay)
-    values, parameters = _values(fitted, intervals, shares if cells else (), share_error)
-    own, fracture = _between_objects(model, used.individual, ready, shares)
-    open_ = [*delay.undetermined, *undetermined(fitted, intervals, ready, shares, cells)]
-    open_ += fracture.undetermined if fracture else []
-    parameters += [*delay.parameters, *as_parameters(fitted, own), *(fracture.parameters if fracture else [])]
-    fits, held_out = _fits(model, fitted, ready), held_out_errors(model, choice.fitted, ready)
-    facts = SceneFacts(
-        label=next((squeeze.label for squeeze in used.recorded if squeeze.label), ""),
-        fitted=fitted,
-        parameters=parameters,
-        values=values,
-        gripper=_fingertips(config),
-        delay=delay,
-        squeezes=ready,
-        candidates=choice.scores,
-        undetermined=open_,
-        spreads={spread.place: spread.scatter.value for spread in own},
-        fracture=fracture,
-    )
-    return Identification(
-        label=facts.label,
-        scene=scene_text(facts),
+    chosen, shares = used.choice, used.shares
+    fitted, intervals = _with_uncertainty(used, delay)
+    fracture = fracture_of(chosen.fitted, shares.scatter)
+    values, parameters = _values(fitted, intervals, shares)
+    parameters += delay.parameters
+    parameters += own_spreads(chosen.fitted, chosen.alone, shares.scatter)
+    parameters += fracture.parameters
+    open_ = [*delay.undetermined, *undetermined(fitted, intervals, shares), *fracture.undetermined]
+    fits, held_out = _fits(fitted), held_out_errors(chosen.fitted)
+    result = Identification(
+        label=next((squeeze.label for squeeze in recorded if squeeze.label), ""),
+        scene="",
         parameters=tuple(parameters),
-        candidates=choice.scores,
+        candidates=chosen.scores,
         undetermined=tuple(open_),
         fits=tuple(fits),
         held_out=held_out,
         refusals=refusals(open_, fits, held_out),
-        checks=predictive_checks(model, fitted, intervals, ready),
+        checks=predictive_checks(fitted, intervals),
         draws=intervals.draws,
         notes=tuple(notes),
-        seconds=time.monotonic() - begin,
     )
-
-
-def _delay(model: ForwardModel, used: Timed, settings_s: float) -> Delay:
-    """Return the delay that the recordings show for the terms of a choice."""
-    damper = memories(_scale(used.ready))[0]
-    return delay_of(model, used.individual.choice.fitted, damper, used.ready, settings_s, used.lag)
+    scene = scene_text(result, fitted, values, _fingertips(config), delay)
+    return evolve(result, scene=scene, seconds=time.monotonic() - begin)
 
 
 def _distinct(squeezes: Sequence[RecordedSqueeze], notes: list[str]) -> list[RecordedSqueeze]:
@@ -144,92 +119,52 @@ def _distinct(squeezes: Sequence[RecordedSqueeze], notes: list[str]) -> list[Rec
     return list(by_content.values())
 
 
-def _chosen(model: ForwardModel, squeezes: Sequence[Squeeze], progress: Progress) -> Individual:
-    choice = choose(
-        model,
-        squeezes,
-        _scale(squeezes),
-        has_memory=shows_memory(squeezes),
-        progress=lambda done, total: progress("fitting candidates", done, total),
-    )
-    return simplest_alone(model, choice, squeezes)
-
-
-def _with_uncertainty(
-    model: ForwardModel, used: Timed, share_error: float, delay: Delay
-) -> tuple[Fitted, Uncertainty]:
+def _with_uncertainty(used: Timed, delay: Delay) -> tuple[Fitted, Uncertainty]:
     """Return the chosen fit and its uncertainty, both without the error of the path."""
-    fitted, scale = used.individual.choice.fitted, share_error / math.sqrt(len(used.ready))
+    fitted = used.choice.fitted
+    scale = used.shares.error / math.sqrt(len(fitted.squeezes))
     lag_error_s = math.hypot(used.lag.error_s, delay.error_s)
-    intervals = uncertainty(model, fitted, used.ready, scale, lag_error_s, used.individual.of_each)
-    return without_path_error(model, fitted, intervals, used.ready)
+    return without_path_error(fitted, uncertainty(fitted, scale, lag_error_s, of_each(used.choice)))
 
 
 def _ready(
     config: SimConfig,
     squeezes: Sequence[RecordedSqueeze],
     notes: list[str],
-    *,
-    cells: bool,
+    has_cells: bool,
     lag_s: float = 0.0,
-) -> tuple[list[RecordedSqueeze], list[Squeeze], list[float]]:
-    """Return the squeezes that can be fitted, as recorded and prepared, and the share of the force that `cells` measure
-    in each.
+) -> tuple[list[Squeeze], Shares]:
+    """Return the squeezes with contact and enough measurements, with their whole forces, and the shares that cells
+    measure.
 
-    The forces of the prepared ones are whole. A note names each other squeeze. `lag_s`: by how much the force lags
-    beyond the delay of the settings. Raises NoSqueeze if there is none.
+    A note names each other squeeze. `lag_s`: by how much the force lags beyond the delay of the settings. Raises
+    NoSqueeze if there is none.
     """
-    kept, ready = _fit_to_use(config, squeezes, notes, lag_s)
-    if not cells:
-        return kept, ready, [1.0] * len(ready)
-    drive, _ = drive_and_pads(config)
-    shares = _measured_shares(kept, ready, drive)
-    share = _share(shares)
-    return kept, [_with_share(squeeze, share) for squeeze in ready], shares
-
-
-def _fit_to_use(
-    config: SimConfig, squeezes: Sequence[RecordedSqueeze], notes: list[str], lag_s: float = 0.0
-) -> tuple[list[RecordedSqueeze], list[Squeeze]]:
-    """Return the squeezes with contact and enough measurements, as recorded and prepared."""
-    kept, ready, refusals = [], [], []
-    for squeeze in squeezes:
+    ready: dict[int, Squeeze] = {}
+    refused: list[NoSqueeze] = []
+    prepare = partial(prepared, delay_s=config.force_delay_s, lag_s=lag_s, squeezes=len(squeezes))
+    for i, squeeze in enumerate(squeezes):
         try:
-            ready.append(prepared(squeeze, config.force_delay_s, resolution(len(squeezes)), lag_s))
+            ready[i] = prepare(squeeze)
         except NoSqueeze as refusal:
-            refusals.append(refusal)
-        else:
-            kept.append(squeeze)
+            refused.append(refusal)
     if not ready:
-        raise refusals[0]
-    for i in not_broken(ready):
-        parts = resolution(len(squeezes))
-        ready[i] = prepared(kept[i], config.force_delay_s, parts, lag_s, may_break=False)
-    notes += [f"left out: {refusal}" for refusal in refusals]
-    apart = max(squeeze.pad_difference for squeeze in ready)
+        raise refused[0]
+    kept = list(ready)
+    for k in not_broken(list(ready.values())):
+        ready[kept[k]] = prepare(squeezes[kept[k]], may_break=False)
+    notes += [f"left out: {refusal}" for refusal in refused]
+    apart = max(squeeze.pad_difference for squeeze in ready.values())
     if apart > PADS_DIFFER:
         notes.append(
             f"the forces on the two pads differ by up to {apart:.0%} of the largest force. If the object is fixed off "
             "the centre, one finger touches it before the other, and the chosen terms are wrong: centre it, or let it "
             "stand free"
         )
-    return kept, ready
-
-
-def _shares(config: SimConfig, block: Sequence[RecordedSqueeze], lag_s: float) -> list[float]:
-    """Return the share of the force that the cells measure in squeezes of a block: one for all of them."""
-    if not _has_cells(config, block):
-        return [1.0] * len(block)
-    drive, _ = drive_and_pads(config)
-    ready = [prepared(squeeze, config.force_delay_s, FULL, lag_s) for squeeze in block]
-    return [_share(_measured_shares(block, ready, drive))] * len(block)
-
-
-def _measured_shares(
-    recorded: Sequence[RecordedSqueeze], ready: Sequence[Squeeze], drive: Drive
-) -> list[float]:
-    """Return the share of each squeeze by itself; NaN where it cannot be measured."""
-    return [measured_share(squeeze.trace, two, drive) for squeeze, two in zip(recorded, ready, strict=True)]
+    shares = WHOLE
+    if has_cells:
+        shares = measured_shares(config, [squeezes[i].trace for i in kept], list(ready.values()))
+    return [squeeze.with_share(shares.mean) for squeeze in ready.values()], shares
 
 
 def _settings(
@@ -240,7 +175,11 @@ def _settings(
     if not block:
         return config, notes
     lag_s = lag_of_block(config, block)
-    config, said = with_fingertips_of_block(config, block, _shares(config, block, lag_s), lag_s)
+    ready = [prepared(squeeze, config.force_delay_s, lag_s) for squeeze in block]
+    if _has_cells(config, block):
+        share = measured_shares(config, [squeeze.trace for squeeze in block], ready).mean
+        ready = [squeeze.with_share(share) for squeeze in ready]
+    config, said = with_fingertips_of_block(config, ready, lag_s)
     return config, [said]
 
 
@@ -279,20 +218,18 @@ def _used(squeezes: Sequence[RecordedSqueeze], notes: list[str]) -> Sequence[Rec
     """Return at most `MAX_SQUEEZES` squeezes, of as many objects as possible; a note says if some are left out."""
     if len(squeezes) <= MAX_SQUEEZES:
         return squeezes
-    turn: dict[str, int] = {}
-    turns = []
+    turns: dict[int, list[int]] = defaultdict(list)
+    counts: Counter[str] = Counter()
     for i, squeeze in enumerate(squeezes):
-        turn[squeeze.instance] = turn.get(squeeze.instance, -1) + 1
-        turns.append((turn[squeeze.instance], i))
-    # The first squeeze of every object, then the second ones; among these evenly over the whole order.
-    order = [i for _, i in sorted(turns)]
-    last = turns[order[MAX_SQUEEZES - 1]][0]
-    earlier = [i for i in order if turns[i][0] < last]
-    same = [i for i in order if turns[i][0] == last]
-    missing = MAX_SQUEEZES - len(earlier)
-    chosen = sorted(earlier + [same[k * len(same) // missing] for k in range(missing)])
+        turns[counts[squeeze.instance]].append(i)
+        counts[squeeze.instance] += 1
+    # The first squeeze of every object, then the second ones; among the last of these evenly over the whole order.
+    chosen: list[int] = []
+    for turn in turns.values():
+        missing = min(MAX_SQUEEZES - len(chosen), len(turn))
+        chosen += [turn[k * len(turn) // missing] for k in range(missing)]
     notes.append(f"{MAX_SQUEEZES} of the {len(squeezes)} recordings are used, of as many objects as possible")
-    return [squeezes[i] for i in chosen]
+    return [squeezes[i] for i in sorted(chosen)]
 
 
 def _has_cells(config: SimConfig, squeezes: Sequence[RecordedSqueeze]) -> bool:
@@ -304,152 +241,47 @@ def _has_cells(config: SimConfig, squeezes: Sequence[RecordedSqueeze]) -> bool:
     )
 
 
-def _share(shares: Sequence[float]) -> float:
-    """Return the mean share. The scatter of a median is a quarter larger, which `_share_error` does not count."""
-    known = [share for share in shares if math.isfinite(share)]
-    return min(float(np.mean(known)), 1.0) if known else 1.0
-
-
-def _between_objects(
-    model: ForwardModel, individual: Individual, squeezes: Sequence[Squeeze], shares: Sequence[float]
-) -> tuple[list[OwnSpread], FractureFit | None]:
-    """Return the parameters that differ between the objects, and how the objects broke."""
-    fitted, force_scatter = individual.choice.fitted, _force_scatter(shares)
-    own = own_spreads(model, fitted, individual.fits, squeezes, force_scatter)
-    return own, fracture_of(model, fitted, squeezes, force_scatter)
-
-
-def _force_scatter(shares: Sequence[float]) -> float:
-    """Return the standard deviation of the logarithm of the share between squeezes."""
-    known = [share for share in shares if math.isfinite(share)]
-    return float(np.std(np.log(known), ddof=1)) if len(known) > 1 else 0.0
-
-
 def _fingertips(config: SimConfig) -> dict[str, float]:
     """Return the settings of the fingertips that are set."""
     values = {name: getattr(config, name) for name in OF_FINGERTIPS}
     return {name: float(value) for name, value in values.items() if value is not None}
 
 
-def _share_error(config: SimConfig, squeezes: Sequence[Squeeze]) -> float:
-    """Return the relative error of the share of one squeeze: that of the Coulomb friction over the mean force.
-
-    The mean is over the way of the fingers, as in the balance of energy that the share follows from.
-    """
-    drive, _ = drive_and_pads(config)
-    mean_n = float(np.median([_mean_over_way(squeeze) for squeeze in squeezes]))
-    return float(config.coulomb_spread_n / ((1.0 + drive.friction.load_friction_coefficient) * mean_n))
-
-
-def _mean_over_way(squeeze: Squeeze) -> float:
-    """Return the mean force during the compression, over the way of the fingers."""
-    gap = squeeze.gap_m[squeeze.sample]
-    closing = slice(0, int(np.argmin(gap)) + 1)
-    force, way = squeeze.force_n[closing], gap[closing]
-    work_j = -float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(way)))
-    return max(work_j / squeeze.depth_m, 0.1 * squeeze.peak_n)
-
-
-def _with_share(squeeze: Squeeze, share: float) -> Squeeze:
-    """Return the squeeze with the whole force in place of the measured share."""
-    broken = None if squeeze.broken_n is None else squeeze.broken_n / share
-    force, noise = squeeze.force_n / share, squeeze.noise_n / share
-    return evolve(squeeze, force_n=force, noise_n=noise, share=share, broken_n=broken)
-
-
-def _scale(squeezes: Sequence[Squeeze]) -> DataScale:
-    times = [squeeze.stretches for squeeze in squeezes]
-    return DataScale(
-        force_n=float(np.median([squeeze.peak_n for squeeze in squeezes])),
-        depth_m=float(np.median([squeeze.depth_m for squeeze in squeezes])),
-        load_s=float(np.median([timing.load_s for timing in times])),
-        memory_s=max(timing.load_s + timing.hold_s for timing in times),
-        sample_s=float(np.median([np.median(np.diff(squeeze.t_s[squeeze.sample])) for squeeze in squeezes])),
-    )
-
-
 def _values(
-    fitted: Fitted, intervals: Uncertainty, shares: Sequence[float], share_error: float
+    fitted: Fitted, intervals: Uncertainty, shares: Shares
 ) -> tuple[dict[str, float], list[IdentifiedParameter]]:
-    """Return the keys of the scene's object, and every identified parameter.
-
-    `shares`: those of each squeeze, none without cells. `share_error`: the relative error of each.
-    """
-    widths = np.array(fitted.widths_m)
-    known = np.array([share for share in shares if math.isfinite(share)])
-    parameters = [_mean("width_m", "m", widths)]
-    values = {"width_m": float(widths.mean())}
-    width_spread = (
-        intervals.width_objects_m if math.isfinite(intervals.width_objects_m) else intervals.width_squeezes_m
-    )
-    if math.isfinite(width_spread) and width_spread > 0.0:
-        values["width_spread_m"] = width_spread
-    # Without numbers of the objects, the spread is that between squeezes, whatever it comes from.
-    between = (
-        intervals.between_objects if math.isfinite(intervals.between_objects) else intervals.between_squeezes
-    )
-    if math.isfinite(between) and between > 0.0:
-        values["stiffness_spread"] = between
-    if len(known):
-        values["share"] = _share(shares)
-        parameters.append(_mean("share", "", known))
-        beyond = share_spread(known.tolist(), share_error)
-        if beyond > 0.0:
-            values["share_spread"] = beyond
+    """Return the keys of the scene's object, and every identified parameter."""
+    parameters = [identified_mean("width_m", fitted.widths_m)]
+    if len(shares.known):
+        parameters.append(identified_mean("share", shares.known))
     for i, parameter in enumerate(fitted.candidate.free):
-        ends = sorted((parameter.sign * intervals.low[i], parameter.sign * intervals.high[i]))
-        parameters.append(
-            IdentifiedParameter(
-                name=parameter.label,
-                unit=_unit(parameter.name),
-                value=parameter.sign * fitted.values[i],
-                low=ends[0],
-                high=ends[1],
-                basis=intervals.basis,
-            )
+        value, *interval = (
+            parameter.sign * number for number in (fitted.values[i], intervals.low[i], intervals.high[i])
         )
-    return values, parameters
+        parameters.append(identified(parameter.label, value, (interval[0], interval[1]), intervals.basis))
+    # Without numbers of the objects, a spread is that between squeezes, whatever it comes from.
+    spreads = {
+        "width_spread_m": intervals.width_m.of_scene,
+        "stiffness_spread": intervals.stiffness.of_scene,
+        "share_spread": shares.spread,
+    }
+    values = {parameter.name: parameter.value for parameter in parameters if "." not in parameter.name}
+    if "share" in values:
+        values["share"] = shares.mean
+    return values | {name: spread for name, spread in spreads.items() if spread > 0.0}, parameters
 
 
-def share_spread(shares: Sequence[float], share_error: float) -> float:
-    """Return the standard deviation of the share beyond the relative error of each of these; 0 if there is none.
-
-    The error is that of the friction of the drive. It varies in every simulated squeeze, too.
-    """
-    if len(shares) < 2:
-        return 0.0
-    error = float(np.mean(shares)) * share_error
-    return math.sqrt(max(float(np.var(shares, ddof=1)) - error * error, 0.0))
-
-
-def _mean(name: str, unit: str, values: Any) -> IdentifiedParameter:
-    """Return the mean of a quantity of each squeeze, with the interval of Student's t; a single one has none."""
-    n, (low, high) = len(values), interval_of_mean(values)
-    basis = f"between {n} squeezes" if n > 1 else "one squeeze: no interval"
-    return IdentifiedParameter(
-        name=name, unit=unit, value=float(np.mean(values)), low=low, high=high, basis=basis
-    )
-
-
-def _unit(name: str) -> str:
-    ends = sorted((end for end in UNITS if name.endswith(f"_{end}")), key=len)
-    return UNITS[ends[-1]] if ends else ""
-
-
-def _fits(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) -> list[SqueezeFit]:
-    result = []
-    for squeeze, width, factor in zip(squeezes, fitted.widths_m, fitted.factors, strict=True):
-        forces = model.forces(squeeze, fitted.candidate, fitted.values, width, factor)
-        closure = width - squeeze.gap_m[squeeze.sample]
-        result.append(
-            SqueezeFit(
-                name=squeeze.name,
-                t_s=squeeze.t_s[squeeze.sample],
-                compression_m=closure - model.compressed_m(forces),
-                measured_n=squeeze.force_n,
-                fitted_n=forces,
-                rms_n=float(np.sqrt(np.mean((forces - squeeze.force_n) ** 2))),
-                peak_n=squeeze.peak_n,
-            )
+def _fits(fitted: Fitted) -> list[SqueezeFit]:
+    """Return the measured and the fitted forces of each squeeze."""
+    return [
+        SqueezeFit(
+            name=squeeze.name,
+            t_s=squeeze.t_s[squeeze.sample],
+            compression_m=width - squeeze.gap_m[squeeze.sample] - fitted.model.compressed_m(forces),
+            measured_n=squeeze.force_n,
+            fitted_n=forces,
+            rms_n=float(np.sqrt(np.mean((forces - squeeze.force_n) ** 2))),
+            peak_n=squeeze.peak_n,
         )
-    return result
+        for squeeze, width, forces in zip(fitted.squeezes, fitted.widths_m, fitted.forces(), strict=True)
+    ]

@@ -18,12 +18,9 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
-from graspsense_identify.choose import fit_residuals
-from graspsense_identify.fit import Fitted, fit, fit_to, linear_covariance
-from graspsense_identify.forward import ForwardModel
-from graspsense_identify.gas import AREA_FACTOR
+from graspsense_identify.corners import corner_errors
+from graspsense_identify.fit import Fitted, linear_covariance
 from graspsense_identify.interval import normal, student
-from graspsense_identify.laws import GAS, SNAP
 from graspsense_identify.prepare import Squeeze
 from graspsense_identify.threads import in_threads
 
@@ -37,20 +34,31 @@ BLOCKS: Final = 12
 DRAWS: Final = 200
 LARGEST: Final = math.log(30.0)
 """A logarithm changes by at most this in proportion to the force. A larger change is one of a value near zero."""
-MOVING_SHARE: Final = 0.3
-"""Where the gap changes by at least this share of its largest change between measurements, the fingers move."""
-LEAST_FALLING: Final = 2
-"""Samples on the falling part of a snap-through that determine its line."""
-MEAN_OVER_CORNER: Final = 0.015
-"""Rms error of the mean over a sample in which the law has a corner, over the change of its slope and the distance
-between samples: `Squeeze.at_samples` knows the forces at the ends and in the middle only. The rms is over corners that
-lie anywhere in the sample."""
 PATH_ERROR: Final = 3e-4
 """Standard deviation of the logarithm of a value that the finite number of nodes of a path causes, at least."""
 PATH_FORCE_ERROR: Final = 3e-5
 """The same of the force, over the peak. With both, the intervals from one squeeze with an ideal sensor cover more than
 nine of ten (`benchmarks/identify.py --sensors ideal --recordings 1`): `path_error` takes most of the error away, and
 what is left is mostly that of the simulated recordings. No recording of a real sensor is as exact."""
+
+
+class Components(NamedTuple):
+    """The standard deviations of a quantity between objects, and between squeezes of one object."""
+
+    objects: float
+    """NaN with fewer than three objects."""
+    squeezes: float
+    """NaN with a single squeeze of each object."""
+
+    @property
+    def of_scene(self) -> float:
+        """That of a scene: without numbers of the objects, that between squeezes, whatever it comes from."""
+        return self.squeezes if math.isnan(self.objects) else self.objects
+
+    @property
+    def whole(self) -> float:
+        """That of a squeeze of another object."""
+        return float(np.sqrt(np.nansum(np.square(self))))
 
 
 @frozen(kw_only=True, eq=False)
@@ -62,21 +70,13 @@ class Uncertainty:
     basis: str
     draws: Floats
     """(draws, parameters)"""
-    between_objects: float
-    """Standard deviation of the logarithm of the stiffness; NaN with fewer than three objects."""
-    between_squeezes: float
-    """The same between squeezes of one object; NaN with a single squeeze of each."""
-    width_objects_m: float
-    width_squeezes_m: float
+    stiffness: Components
+    """Of its logarithm."""
+    width_m: Components
 
 
 def uncertainty(
-    model: ForwardModel,
-    fitted: Fitted,
-    squeezes: Sequence[Squeeze],
-    force_scale: float = 0.0,
-    lag_error_s: float = 0.0,
-    of_each: Fitted | None = None,
+    fitted: Fitted, force_scale: float = 0.0, lag_error_s: float = 0.0, of_each: Fitted | None = None
 ) -> Uncertainty:
     """Return the uncertainty of a fit.
 
@@ -85,33 +85,33 @@ def uncertainty(
     widths and factors, of which the spreads are.
     """
     rng = np.random.default_rng(0)
-    fitted_logs = np.log(fitted.values)
-    again = refits(model, fitted, squeezes, rng, has_lag=lag_error_s > 0.0)
+    names = [squeeze.instance for squeeze in fitted.squeezes]
+    again = refits(fitted, rng, has_lag=lag_error_s > 0.0)
     table = np.log([refit.values for refit in again.fits])
     deviations = table - table.mean(axis=0)
     factor, basis = again.factor, again.basis
-    linear = linear_covariance(model, fitted, squeezes, PATH_FORCE_ERROR)
+    linear = linear_covariance(fitted, PATH_FORCE_ERROR)
     covariance = at_least(again.scale * deviations.T @ deviations, linear * (normal() / factor) ** 2)
-    own = _scale_errors(model, fitted, squeezes, force_scale) + PATH_ERROR**2 * np.eye(len(fitted_logs))
-    own += np.diag(corner_errors(model, fitted, squeezes) ** 2)
+    own = _scale_errors(fitted, force_scale) + PATH_ERROR**2 * np.eye(len(fitted.values))
+    own += np.diag(corner_errors(fitted) ** 2)
     if lag_error_s > 0.0:
-        later = [squeeze.delayed(lag_error_s) for squeeze in squeezes]
-        own += _of_shift(fitted, fit(model, fitted.candidate, later, start=fitted))
-    own += _area_errors(model, fitted, squeezes)
+        later = [squeeze.delayed(lag_error_s) for squeeze in fitted.squeezes]
+        own += _of_shift(fitted, evolve(fitted, squeezes=later))
     covariance = covariance + own * (normal() / factor) ** 2
     spread = np.sqrt(np.diag(covariance))
     best = np.array(fitted.values)
     low, high = best * _changed(-factor * spread), best * _changed(factor * spread)
-    values, vectors = np.linalg.eigh(covariance)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    widening = factor / normal()
-    draws = best * _changed(widening * rng.standard_normal((DRAWS, len(fitted_logs))) @ root.T)
+    # An undetermined direction has a variance beside which the rounding of others may be negative.
+    drawn = rng.multivariate_normal(
+        np.zeros(len(best)), covariance, DRAWS, check_valid="ignore", method="eigh"
+    )
     return Uncertainty(
         low=tuple(low.tolist()),
         high=tuple(high.tolist()),
         basis=basis,
-        draws=draws,
-        **_spreads(fitted if of_each is None else of_each, squeezes),
+        draws=best * _changed(factor / normal() * drawn),
+        stiffness=_components(np.log((of_each or fitted).factors), names),
+        width_m=_components(np.array((of_each or fitted).widths_m), names),
     )
 
 
@@ -137,14 +137,15 @@ def at_least(covariance: Floats, other: Floats) -> Floats:
 
 
 def _of_shift(fitted: Fitted, shifted: Fitted) -> Floats:
-    """Return the covariance of the logarithms if an error of one standard deviation leads to another fit."""
-    shift = np.log(shifted.values) - np.log(fitted.values)
+    """Return the covariance of the logarithms of an error whose standard deviation leads to other squeezes or laws.
+
+    `shifted`: where the fit to these starts.
+    """
+    shift = np.log(shifted.refitted().values) - np.log(fitted.values)
     return np.outer(shift, shift)
 
 
-def _scale_errors(
-    model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze], force_scale: float
-) -> Floats:
+def _scale_errors(fitted: Fitted, force_scale: float) -> Floats:
     """Return the covariance of the logarithms that an error of the scale of the force causes.
 
     It is common to all squeezes, so that none of them shows it. Through compliant fingertips, it changes lengths, too.
@@ -152,13 +153,12 @@ def _scale_errors(
     if force_scale == 0.0:
         return np.zeros((len(fitted.values), len(fitted.values)))
     more = math.exp(force_scale)
-    stronger = [evolve(squeeze, force_n=more * squeeze.force_n) for squeeze in squeezes]
+    stronger = [evolve(squeeze, force_n=more * squeeze.force_n) for squeeze in fitted.squeezes]
     scaled = [
         value * more if parameter.is_force else value
         for parameter, value in zip(fitted.candidate.free, fitted.values, strict=True)
     ]
-    start = evolve(fitted, values=tuple(scaled))
-    return _of_shift(fitted, fit(model, fitted.candidate, stronger, start=start))
+    return _of_shift(fitted, evolve(fitted, values=tuple(scaled), squeezes=stronger))
 
 
 class Refits(NamedTuple):
@@ -172,145 +172,66 @@ class Refits(NamedTuple):
     basis: str
 
 
-def refits(
-    model: ForwardModel,
-    fitted: Fitted,
-    squeezes: Sequence[Squeeze],
-    rng: np.random.Generator,
-    *,
-    has_lag: bool,
-) -> Refits:
+def refits(fitted: Fitted, rng: np.random.Generator, *, has_lag: bool) -> Refits:
     """Return the fits without each group of squeezes in turn, or to a single squeeze with residuals drawn again."""
+    squeezes = fitted.squeezes
     groups = _groups(squeezes)
     if len(groups) < 2:
         # The fit follows a part of the residuals' own errors, with as many directions as it has parameters.
         degrees = max(BLOCKS - len(fitted.values) - int(has_lag) - 1, 1)
-        fits = _bootstrapped(model, fitted, squeezes[0], rng, has_lag=has_lag)
+        fits = _bootstrapped(fitted, rng, has_lag=has_lag)
         scale = BLOCKS / degrees / (BOOTSTRAPS - 1)
         return Refits(fits, scale, student(degrees), "within one squeeze; not between squeezes")
-    kept = [[i for i in range(len(squeezes)) if i not in group] for group in groups]
-    fits = in_threads(lambda left: fit_to(model, fitted, squeezes, left, has_lag=has_lag), kept)
+    kept = [fitted.part([i for i in range(len(squeezes)) if i not in group]) for group in groups]
+    fits = in_threads(lambda part: part.refitted(has_lag=has_lag), kept)
     g = len(groups)
-    what = "objects" if _instances(squeezes) >= LEAST_INSTANCES else "squeezes"
+    what = "objects" if has_objects(squeezes) else "squeezes"
     basis = f"between {g} {what if g == len(groups) else 'groups'}"
     return Refits(fits, (g - 1) / g, student(g - 1), basis)
 
 
-def _area_errors(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) -> Floats:
-    """Return the covariance of the logarithms that the conventional area of a vented gas causes."""
-    law, key = fitted.candidate, (GAS, "area_m2")
-    if key not in law.fixed:
-        return np.zeros((len(fitted.values), len(fitted.values)))
-    wider = evolve(law, fixed={**law.fixed, key: AREA_FACTOR * law.fixed[key]})
-    return _of_shift(fitted, fit(model, wider, squeezes, start=fitted))
-
-
-def corner_errors(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) -> Floats:
-    """Return the relative errors of the parameters of a snap-through that the distance between two samples causes.
-
-    With two samples on the falling part, all three lines of the law are determined, and so are their corners. With
-    fewer, the corners that were fitted and the true ones lie anywhere between two samples, and a bootstrap leaves them
-    where they are.
-    """
-    values = {
-        parameter.name: value for parameter, value in zip(fitted.candidate.free, fitted.values, strict=True)
-    }
-    if "critical_m" not in values:
-        return np.zeros(len(fitted.values))
-    ways = [np.abs(np.diff(squeeze.gap_m[squeeze.sample])) for squeeze in squeezes]
-    moving = np.concatenate([way[way > MOVING_SHARE * np.max(way)] for way in ways])
-    share = math.sqrt(1.0 / 6.0)
-    if _on_falling_part(model, fitted, squeezes, values["critical_m"], values["fall_m"]) >= LEAST_FALLING:
-        share = MEAN_OVER_CORNER if any(np.any(squeeze.averaged_s2 > 0.0) for squeeze in squeezes) else 0.0
-    error_m = share * float(np.median(moving)) / math.sqrt(len(squeezes))
-    along_n = error_m * (values["k1_n_m"] + values["k2_n_m"])
-    errors = {
-        "critical_m": error_m / values["critical_m"],
-        "fall_m": math.sqrt(2.0) * error_m / values["fall_m"],
-        "drop_n": along_n / values["drop_n"],
-    }
-    return np.array(
-        [
-            errors.get(parameter.name, 0.0) if parameter.slot == SNAP else 0.0
-            for parameter in fitted.candidate.free
-        ]
-    )
-
-
-def _on_falling_part(
-    model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze], critical_m: float, fall_m: float
-) -> int:
-    """Return how many samples lie on the falling part of a snap-through while the fingers close."""
-    count = 0
-    for squeeze, width in zip(squeezes, fitted.widths_m, strict=True):
-        closure = width - squeeze.gap_m[squeeze.sample]
-        compression = (closure - model.compressed_m(squeeze.force_n))[: int(np.argmax(closure)) + 1]
-        count += int(np.sum((compression > critical_m) & (compression < critical_m + fall_m)))
-    return count
-
-
-def _instances(squeezes: Sequence[Squeeze]) -> int:
-    return len({squeeze.instance for squeeze in squeezes if squeeze.instance})
+def has_objects(squeezes: Sequence[Squeeze]) -> bool:
+    """Return whether every squeeze is of an object with a number, and there are at least three of these."""
+    names = {squeeze.instance for squeeze in squeezes}
+    return "" not in names and len(names) >= LEAST_INSTANCES
 
 
 def _groups(squeezes: Sequence[Squeeze]) -> list[list[int]]:
     """Return the squeezes that are left out together: those of an object, or each alone."""
-    n = len(squeezes)
-    if _instances(squeezes) >= LEAST_INSTANCES and all(squeeze.instance for squeeze in squeezes):
+    if has_objects(squeezes):
         names = sorted({squeeze.instance for squeeze in squeezes})
         groups = [[i for i, squeeze in enumerate(squeezes) if squeeze.instance == name] for name in names]
     else:
-        groups = [[i] for i in range(n)]
+        groups = [[i] for i in range(len(squeezes))]
     if len(groups) > MAX_GROUPS:
         groups = [list(chain.from_iterable(groups[k::MAX_GROUPS])) for k in range(MAX_GROUPS)]
     return groups
 
 
-def _bootstrapped(
-    model: ForwardModel,
-    fitted: Fitted,
-    squeeze: Squeeze,
-    rng: np.random.Generator,
-    *,
-    has_lag: bool,
-) -> list[Fitted]:
-    """Return refits to the fitted force with blocks of residuals drawn again."""
-    residuals = fit_residuals(model, fitted, squeeze) * squeeze.peak_n
-    clean = squeeze.force_n + residuals
+def _bootstrapped(fitted: Fitted, rng: np.random.Generator, *, has_lag: bool) -> list[Fitted]:
+    """Return refits to the fitted force of a single squeeze with blocks of residuals drawn again."""
+    (squeeze,), (clean,) = fitted.squeezes, fitted.forces()
+    residuals = clean - squeeze.force_n
     length = max(len(residuals) // BLOCKS, 1)
     drawn_again = []
     for _ in range(BOOTSTRAPS):
         starts = rng.integers(0, max(len(residuals) - length, 1), size=-(-len(residuals) // length))
         drawn = np.concatenate([residuals[s : s + length] for s in starts])[: len(residuals)]
-        drawn_again.append(evolve(squeeze, force_n=clean - drawn * rng.choice((-1.0, 1.0))))
-    return in_threads(
-        lambda drawn: fit(model, fitted.candidate, [drawn], start=fitted, has_lag=has_lag), drawn_again
-    )
+        forces = clean - drawn * rng.choice((-1.0, 1.0))
+        drawn_again.append(evolve(fitted, squeezes=[evolve(squeeze, force_n=forces)]))
+    return in_threads(lambda start: start.refitted(has_lag=has_lag), drawn_again)
 
 
-def _spreads(fitted: Fitted, squeezes: Sequence[Squeeze]) -> dict[str, float]:
-    """Return the spreads between objects and between squeezes of an object, of stiffness and width."""
-    names = [squeeze.instance or "" for squeeze in squeezes]
-    stiffness = _components(np.log(fitted.factors), names)
-    width = _components(np.array(fitted.widths_m), names)
-    return {
-        "between_objects": stiffness[0],
-        "between_squeezes": stiffness[1],
-        "width_objects_m": width[0],
-        "width_squeezes_m": width[1],
-    }
-
-
-def _components(values: Floats, names: Sequence[str]) -> tuple[float, float]:
-    """Return the standard deviations between and within groups of these names (analysis of variance)."""
+def _components(values: Floats, names: Sequence[str]) -> Components:
+    """Return the standard deviations between and within objects of these names (analysis of variance)."""
     groups = [values[[i for i, own in enumerate(names) if own == name]] for name in sorted(set(names))]
     degrees = sum(len(group) - 1 for group in groups)
     within = math.nan
     if degrees > 0:
         within = math.sqrt(sum(float(np.sum((group - group.mean()) ** 2)) for group in groups) / degrees)
     if len(groups) < LEAST_INSTANCES:
-        return math.nan, within
+        return Components(math.nan, within)
     means = np.array([group.mean() for group in groups])
     size = len(values) / len(groups)
     inside = 0.0 if math.isnan(within) else within * within / size
-    return math.sqrt(max(float(np.var(means, ddof=1)) - inside, 0.0)), within
+    return Components(math.sqrt(max(float(np.var(means, ddof=1)) - inside, 0.0)), within)

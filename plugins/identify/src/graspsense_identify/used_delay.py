@@ -11,36 +11,33 @@ from typing import Final, NamedTuple
 
 from attrs import evolve
 
-from graspsense.simulator_api import RecordedSqueeze
+from graspsense_identify.choose import Choice
 from graspsense_identify.delay import PATH_ERROR_S, Delay, Lag
-from graspsense_identify.forward import ForwardModel
-from graspsense_identify.individual import Individual
-from graspsense_identify.prepare import Squeeze
+from graspsense_identify.share import Shares
 
 MAX_ROUNDS: Final = 3
 """How often the lag is corrected by that which the terms chosen with it show."""
 
 
 class Timed(NamedTuple):
-    """The squeezes at the times that a lag of the force gives them, and the choice for these."""
+    """The shares of the cells, and the choice, for the squeezes at the times that a lag of the force gives them."""
 
-    recorded: list[RecordedSqueeze]
-    ready: list[Squeeze]
-    shares: list[float]
-    individual: Individual
+    shares: Shares
+    choice: Choice
     lag: Lag
 
 
 def with_delay(
-    timed: Callable[[Lag], Timed], delay: Callable[[Timed], Delay], model: ForwardModel
+    timed: Callable[[Lag], Timed], lag_of: Callable[[Choice], Lag], delay: Callable[[Timed], Delay]
 ) -> tuple[Timed, Delay]:
     """Return the choice with the delay that is used.
 
-    `timed` makes the choice with a lag, and `delay` returns what the recordings show for it. That of the settings is
+    `timed` makes the choice with a lag, `lag_of` returns that which all candidates show, and `delay` what the chosen
+    terms show. That of the settings is
     used where the interval of the chosen terms holds it, and where the lag does not settle.
     """
     recorded = timed(Lag())
-    lag = recorded.individual.lag(model, recorded.ready)
+    lag = lag_of(recorded.choice)
     for _ in range(MAX_ROUNDS):
         if lag.lag_s == 0.0:
             break

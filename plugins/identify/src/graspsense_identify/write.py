@@ -4,127 +4,105 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
-from attrs import frozen
-
-from graspsense.simulator_api import CandidateScore, IdentifiedParameter, Undetermined
+from graspsense.simulator_api import Identification, IdentifiedParameter
 from graspsense_identify.delay import Delay
 from graspsense_identify.fit import Fitted
-from graspsense_identify.fracture import FractureFit
 from graspsense_identify.laws import SLOTS
-from graspsense_identify.prepare import Squeeze
 
 
-@frozen(kw_only=True, eq=False)
-class SceneFacts:
-    """What is written to a scene file."""
+def scene_text(
+    result: Identification,
+    fitted: Fitted,
+    values: Mapping[str, float],
+    gripper: Mapping[str, float],
+    delay: Delay,
+) -> str:
+    """Return the text of the scene file.
 
-    label: str
-    fitted: Fitted
-    parameters: Sequence[IdentifiedParameter]
-    values: Mapping[str, float]
-    """The keys of the object."""
-    gripper: Mapping[str, float]
-    """The settings of the fingertips."""
-    delay: Delay
-    squeezes: Sequence[Squeeze]
-    candidates: Sequence[CandidateScore]
-    undetermined: Sequence[Undetermined]
-    spreads: Mapping[int, float]
-    """Spreads of parameters of their own, by the place of the parameter among the free ones."""
-    fracture: FractureFit | None = None
-
-
-def scene_text(facts: SceneFacts) -> str:
-    """Return the text of the scene file."""
-    n = len(facts.squeezes)
-    what = f"{facts.label or 'object'}, identified from {n} squeeze{'s' if n > 1 else ''}"
+    `values`: the keys of the object. `gripper`: the settings of the fingertips.
+    """
+    n = len(result.fits)
+    what = f"{result.label or 'object'}, identified from {n} squeeze{'s' if n > 1 else ''}"
+    by_name = {parameter.name: parameter for parameter in result.parameters}
     lines = [
         "# Written by `graspsense identify`. Numbers in brackets are 90 % intervals.",
         f"summary = {json.dumps(what)}",
     ]
-    intervals = {parameter.name: parameter for parameter in facts.parameters}
-    for key, value in facts.values.items():
-        interval = intervals.get(key)
+    for key, value in values.items():
+        interval = by_name.get(key)
         lines.append(f"{key} = {_number(value)}" + ("" if interval is None else f"  # {_interval(interval)}"))
-    for slot, given in facts.fitted.candidate.parameters(facts.fitted.values).items():
-        lines += ["", "[[terms]]", f'type = "{SLOTS[slot]}"']
-        labels = {
-            parameter.name: parameter.label
-            for parameter in facts.fitted.candidate.free
-            if parameter.slot == slot
-        }
-        for name, value in given.items():
-            interval = intervals.get(labels.get(name, ""))
-            comment = _not_fitted(facts, slot, name) if interval is None else _interval(interval)
-            lines.append(f"{name} = {_number(value)}  # {comment}")
-        lines += _spread(facts, slot, intervals)
-    if facts.fracture is not None:
-        lines += _fracture(facts.fracture, intervals)
-    return "\n".join([*lines, "", *_identified(facts)]) + "\n"
+    law = fitted.candidate
+    for slot, given in law.parameters(fitted.values).items():
+        labels = {parameter.name: parameter.label for parameter in law.free if parameter.slot == slot}
+        known = {name: by_name[label] for name, label in labels.items()}
+        lines += _term(SLOTS[slot], given, known, by_name)
+    fracture = {
+        parameter.name.removeprefix("fracture."): parameter
+        for parameter in result.parameters
+        if parameter.name.startswith("fracture.") and not parameter.name.endswith(".spread")
+    }
+    if fracture:
+        numbers = {name: parameter.value for name, parameter in fracture.items()}
+        lines += _term("fracture", numbers, fracture, by_name)
+    return "\n".join([*lines, "", *_identified(result, fitted, gripper, delay)]) + "\n"
 
 
-def _spread(facts: SceneFacts, slot: int, intervals: Mapping[str, IdentifiedParameter]) -> list[str]:
-    """Return the line with the spreads of a term's parameters, if there are any."""
-    free = facts.fitted.candidate.free
-    own = {free[place]: value for place, value in facts.spreads.items() if free[place].slot == slot}
-    if not own:
-        return []
-    values = ", ".join(f"{parameter.name} = {_number(value)}" for parameter, value in own.items())
-    known = ", ".join(_interval(intervals[f"{parameter.label}.spread"]) for parameter in own)
-    return [f"spread = {{ {values} }}  # {known}"]
+def _term(
+    kind: str,
+    values: Mapping[str, float],
+    known: Mapping[str, IdentifiedParameter],
+    by_name: Mapping[str, IdentifiedParameter],
+) -> list[str]:
+    """Return the lines of a term. `known`: its identified parameters."""
+    lines = ["", "[[terms]]", f'type = "{kind}"']
+    for name, value in values.items():
+        comment = _interval(known[name]) if name in known else "not fitted: a conventional value"
+        lines.append(f"{name} = {_number(value)}  # {comment}")
+    names = {name: f"{parameter.name}.spread" for name, parameter in known.items()}
+    spreads = {name: by_name[label] for name, label in names.items() if label in by_name}
+    if spreads:
+        numbers = ", ".join(f"{name} = {_number(spread.value)}" for name, spread in spreads.items())
+        lines.append(f"spread = {{ {numbers} }}  # {', '.join(map(_interval, spreads.values()))}")
+    return lines
 
 
-def _not_fitted(facts: SceneFacts, slot: int, name: str) -> str:
-    if (slot, name) in facts.fitted.candidate.fixed:
-        return "not fitted: a conventional value"
-    return "follows from the fitted combinations, gas. in [identified.intervals]"
-
-
-def _fracture(fit: FractureFit, intervals: Mapping[str, IdentifiedParameter]) -> list[str]:
-    interval = _interval(intervals[f"fracture.{fit.name}"])
-    lines = ["", "[[terms]]", 'type = "fracture"', f"{fit.name} = {_number(fit.value)}  # {interval}"]
-    lines.append(f"left = {_number(fit.left)}")
-    if fit.spread is None:
-        return lines
-    known = _interval(intervals[f"fracture.{fit.name}.spread"])
-    return [*lines, f"spread = {{ {fit.name} = {_number(fit.spread.value)} }}  # {known}"]
-
-
-def _identified(facts: SceneFacts) -> list[str]:
-    intervals = [parameter for parameter in facts.parameters if not math.isnan(parameter.low)]
+def _identified(
+    result: Identification, fitted: Fitted, gripper: Mapping[str, float], delay: Delay
+) -> list[str]:
     return [
         "# What the scene was identified from. The simulator checks this table and does not use it.",
         "[identified]",
-        f"label = {json.dumps(facts.label)}",
+        f"label = {json.dumps(result.label)}",
         "",
         "[identified.gripper]",
-        *(f"{key} = {_number(value)}" for key, value in facts.gripper.items()),
+        *(f"{key} = {_number(value)}" for key, value in gripper.items()),
         "",
         "[identified.sensor]",
-        f"delay_s = {_number(facts.delay.used_s)}  # that of the settings: {_number(facts.delay.settings_s)}",
+        f"delay_s = {_number(delay.used_s)}  # that of the settings: {_number(delay.settings_s)}",
         "",
         "[identified.intervals]",
         *(
             f"{json.dumps(interval.name)} = [{_number(interval.low)}, {_number(interval.high)}]  # {interval.basis}"
-            for interval in intervals
+            for interval in result.parameters
+            if not math.isnan(interval.low)
         ),
         "",
         "[identified.recordings]",
-        *(f"{json.dumps(squeeze.name)} = {json.dumps(squeeze.sha256)}" for squeeze in facts.squeezes),
+        *(f"{json.dumps(squeeze.name)} = {json.dumps(squeeze.sha256)}" for squeeze in fitted.squeezes),
         "",
         "# The error by which the candidates were compared, over the peak force; nan where it was not computed.",
         "[identified.candidates]",
         *(
             f"{json.dumps(candidate.terms)} = {_number(candidate.error)}  # {candidate.verdict}"
-            for candidate in facts.candidates
+            for candidate in result.candidates
         ),
         "",
         "[identified.undetermined]",
         *(
             f"{json.dumps(undetermined.what)} = {json.dumps(f'{undetermined.reason}; {undetermined.remedy}')}"
-            for undetermined in facts.undetermined
+            for undetermined in result.undetermined
         ),
     ]
 
