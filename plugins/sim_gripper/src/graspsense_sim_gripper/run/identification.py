@@ -27,37 +27,20 @@ from graspsense_sim_gripper.run.compiled.compose import (
 )
 from graspsense_sim_gripper.run.compiled.jit import compile_part
 from graspsense_sim_gripper.scene.spec import MOST_SPREAD
-from graspsense_sim_gripper.scene.terms.elastic import Elastic
-from graspsense_sim_gripper.scene.terms.foam import Foam
-from graspsense_sim_gripper.scene.terms.gas import Gas
-from graspsense_sim_gripper.scene.terms.loss import Loss
-from graspsense_sim_gripper.scene.terms.maxwell import Maxwell
 from graspsense_sim_gripper.scene.terms.registry import active_laws, find_term, laws_of
-from graspsense_sim_gripper.scene.terms.rigid import Rigid
-from graspsense_sim_gripper.scene.terms.snap import Snap
 from graspsense_sim_gripper.scene.terms.switchable import Switchable
 from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
-from graspsense_sim_gripper.scene.terms.vent import AIR_KG_M3, DISCHARGE
 
 __all__ = [
-    "AIR_KG_M3",
     "BALANCE_RTOL",
     "CELLS",
-    "DISCHARGE",
     "LAW_ERRORS",
     "MOST_SPREAD",
     "ContactState",
     "Drive",
-    "Elastic",
-    "Foam",
-    "Gas",
-    "Loss",
-    "Maxwell",
     "ObjectModel",
     "PadCompliance",
-    "Rigid",
     "SimConfig",
-    "Snap",
     "Switchable",
     "compiled_with_laws",
     "drive_and_pads",
