@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
 from cases import every_case
 
 from graspsense.experiments.answer import answer, headline
@@ -55,6 +56,18 @@ def test_equal_rates_of_few_grasps_are_not_said_to_agree():
     assert "cannot be told" in told(0.5, n=4)
     assert "cannot be told" in told(0.5, 1.0, n=4)
     assert "cannot be told" not in told(0.5, 0.6, 0.7, n=2000)
+
+
+@every_case(("simulated", "seeds"), [(False, 1), (True, 30)])
+def test_among_many_cases_that_are_guesses_the_best_is_hardly_ever_said_to_be_better(simulated, seeds):
+    """Of 20 cases that guess, the best and the worst differ by chance; a claim may be wrong once in 20 times."""
+    rng = np.random.default_rng(0)
+    claims = 0
+    for _ in range(40):
+        rates = rng.binomial(60, 0.5, size=(20, seeds)) / 60
+        cases = [condition(f"{k} N", *rate, n=60, simulated=simulated) for k, rate in enumerate(rates)]
+        claims += "is better than" in answer(SimpleNamespace(conditions=cases))
+    assert claims <= 3
 
 
 @every_case("rates", [(0.8, 1.0), (1.0, 0.8), (0.5,), (1.0, 1.0, 0.0)])
