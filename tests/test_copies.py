@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from attrs import evolve
 from cases import every_case
 from commands import graspsense, printed
 from hypothesis import given
@@ -109,6 +110,20 @@ def test_trials_that_were_learned_from_are_not_tested_on():
     assert "7 trials" in copies_said(kept)[0]
     with pytest.raises(ConfigError, match="every trial"):
         apart_from(training, training)
+
+
+def test_copies_are_found_among_columns_in_another_order_and_other_units_are_refused():
+    training = labelled(measured())
+    table = training.table
+    turned = evolve(training, table=table.columns(table.names[::-1]))
+    with pytest.raises(ConfigError, match="every trial"):
+        apart_from(turned, training)
+    in_m, in_mm = (
+        evolve(labelled(measured(seed=seed)), table=evolve(table, units=(unit, "", "")))
+        for seed, unit in enumerate(("m", "mm"))
+    )
+    with pytest.raises(ConfigError, match="f0 in m; here it is in mm"):
+        apart_from(in_mm, in_m)
 
 
 def readings(force, ticks=40):

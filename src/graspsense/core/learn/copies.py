@@ -18,6 +18,7 @@ from attrs import evolve
 
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import ConfigError, counted
+from graspsense.core.values.features import misfit
 from graspsense.core.values.nominal import with_codes
 
 if TYPE_CHECKING:
@@ -67,14 +68,18 @@ def without_copies(labelled: Labelled) -> Labelled:
 
 
 def apart_from(tested: Labelled, training: Labelled) -> Labelled:
-    """Return the trials of `tested` whose features are not those of a trial of `training`, with a note on the others.
+    """Return the trials of `tested` with the features of `training`, without those that are copies of its trials.
 
-    Raises ConfigError if there are none.
+    A note tells of the copies. Raises ConfigError if there are no other trials, if a feature is missing or in another
+    unit.
     """
-    if tested.table.names != training.table.names:
-        return tested
-    values = np.concatenate([training.table.values, tested.table.values])
-    original, _ = _originals(evolve(tested.table, values=values), None)
+    names, units = training.table.names, training.table.units
+    if why := misfit(f"what learns from {training.source}", names, units, tested.table):
+        raise ConfigError(f"{tested.source} cannot be tested on: {why}")
+    table = tested.table.columns(names)
+    tested = evolve(tested, table=table)
+    values = np.concatenate([training.table.values, table.values])
+    original, _ = _originals(evolve(table, values=values), None)
     n = len(training)
     kept = np.flatnonzero(~np.isin(original[n:], original[:n]))
     if len(kept) == len(tested):

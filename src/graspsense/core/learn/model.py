@@ -48,6 +48,7 @@ from graspsense.core.values.features import (
     Features,
     FeatureTable,
     Prediction,
+    misfit,
     table_of,
 )
 from graspsense.core.values.json_values import json_ready, settings_from_json
@@ -269,17 +270,7 @@ class Model:
 
     def misfit(self, given: Features | FeatureTable) -> str:
         """Return why the model cannot be applied to these features; empty if it can."""
-        lacking = [name for name in self.names if name not in given.names]
-        if lacking:
-            return (
-                f"model {self.name!r} takes the features {', '.join(self.names)}; there is no "
-                f"{', '.join(lacking)} here (there are: {', '.join(given.names)})"
-            )
-        units = dict(zip(given.names, given.units, strict=True))
-        for name, unit in zip(self.names, self.units, strict=True):
-            if unit and units[name] and unit != units[name]:
-                return f"model {self.name!r} takes {name} in {unit}; here it is in {units[name]}"
-        return ""
+        return misfit(f"model {self.name!r}", self.names, self.units, given)
 
     def _refuse_improbable(self, shares: NDArray[np.float64]) -> None:
         try:
