@@ -269,7 +269,8 @@ def _made_of(summary: Summary, results: Results) -> Section:
     made = results.provenance()
     experiment = summary.planned.experiment
     result = next(iter(summary.results.values()), None)
-    notes = result.notes if isinstance(result, RecognitionResult) else ()
+    told = [] if not isinstance(result, RecognitionResult) else [result, *result.classifiers]
+    notes = list(dict.fromkeys(note for part in told for note in part.notes))
     pairs = [
         ("experiment", f"{summary.planned.name} ({experiment.kind})"),
         ("command", str(made.get("command", ""))),

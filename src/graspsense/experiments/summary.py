@@ -187,6 +187,8 @@ class Summary:
                     "prediction_interval": None
                     if condition.rate.prediction is None
                     else list(condition.rate.prediction),
+                    "warnings": list(condition.of_first_seed.warnings),
+                    "notes": list(condition.of_first_seed.notes),
                 }
                 for condition in self.conditions
             ],
