@@ -386,9 +386,9 @@ def test_train_here_test_there(file, tmp_path):
 def test_trials_of_few_objects_to_test_on_have_no_interval_and_those_learned_from_are_said(file, tmp_path):
     header, *lines = wayward.CSV.splitlines()
     # Forty trials of four objects tell less than forty objects would; two of the four are learned from.
-    for name, first in (("mine.csv", 0), ("other.csv", 2)):
-        rows = [f"{line},bottle {first + k % 4}" for k, line in enumerate(lines)]
-        shifted = [row.replace(".", f".{first}", 1) for row in rows]
+    for name, offset in (("mine.csv", 0), ("other.csv", 2)):
+        rows = [f"{line},bottle {offset + k % 4}" for k, line in enumerate(lines)]
+        shifted = [row.replace(".", f".{offset}", 1) for row in rows]
         (tmp_path / name).write_text("\n".join([f"{header},bottle", *shifted]) + "\n")
     other = '[test]\nsource = "other.csv"\nlabel = "what"\ninstance = "bottle"\n'
     file.write_text(
