@@ -102,6 +102,36 @@ def test_train_then_predict(csv, tmp_path):
     assert "unknown counts as wrong" in out
 
 
+def test_a_rate_of_trials_that_were_learned_from_has_no_interval_and_says_so(csv, tmp_path):
+    model, others = tmp_path / "mine.json", tmp_path / "others.csv"
+    header, *lines = csv.read_text().splitlines()
+    # As a spreadsheet saves them: columns in another order, and a value of 66.0 mm without its zero.
+    turned = [",".join([line.split(",")[k] for k in (3, 2, 1, 0)]) for line in [header, *lines]]
+    others.write_text("\n".join(turned).replace("00,", ",") + "\n")
+    graspsense("train", csv, "--label", "what", "--instance", "thing", "--out", model)
+
+    answer = json.loads(printed("predict", model, others, "--label", "what", "--json"))
+    assert answer["rate"]["rate"] > 0.9
+    assert answer["rate"]["interval"] is None
+    assert any("120 of 120 trials were learned from" in warning for warning in answer["warnings"])
+
+
+def test_a_rate_of_predictions_counts_the_objects_of_the_trials(csv, tmp_path):
+    model, others = tmp_path / "mine.json", tmp_path / "others.csv"
+    header, *lines = csv.read_text().splitlines()
+    others.write_text(
+        "\n".join([header, *(f"{line}1" for line in lines)]) + "\n"
+    )  # one digit more: other trials
+    graspsense("train", csv, "--label", "what", "--instance", "thing", "--out", model)
+
+    arguments = ("predict", model, others, "--label", "what", "--json")
+    alone, of_objects = (
+        json.loads(printed(*arguments, *more))["rate"] for more in ((), ("--instance", "thing"))
+    )
+    assert of_objects["instances"] == 6  # in place of 120 independent trials
+    assert of_objects["interval"][0] < alone["interval"][0]
+
+
 def test_a_model_of_states_or_classes(csv, tmp_path):
     model = tmp_path / "states.json"
     code, _, err = graspsense("train", csv, "--label", "what", "--out", model, "--target", "state")

@@ -14,6 +14,7 @@ from graspsense.cli.terminal import Style, correct_style, echo, echo_entry, echo
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from graspsense.core.learn.labelled import Labelled
     from graspsense.core.learn.model import Model
     from graspsense.core.values.features import FeatureTable, Prediction
 
@@ -38,9 +39,10 @@ MOST_WITH_REASONS: Final = 1000
 def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     """Predict and print."""
     from graspsense.core.components.registry import installed
+    from graspsense.core.learn.copies import learned_from
     from graspsense.core.learn.model import load_model
     from graspsense.core.values.errors import ConfigError
-    from graspsense.evaluation.intervals import RecognitionRate
+    from graspsense.evaluation.intervals import rate_of
     from graspsense.evaluation.json_codec import to_json
     from graspsense.regression.model import is_regression
 
@@ -52,7 +54,8 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     if given["target_value"]:
         raise click.UsageError(f"--target-value: model {model} predicts a label, not a number")
     asked = load_model(model, installed())
-    table, labels, notes, provenance = _trials(asked, source, given)
+    table, labelled, notes = _trials(asked, source, given)
+    provenance = {} if labelled is None else labelled.provenance
     mismatch = asked.misfit(table)
     if mismatch:
         raise ConfigError(mismatch)
@@ -64,11 +67,16 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
         predictions = asked.predictions(table, provenance)
     else:
         predictions = [asked.predict(table.row(i), provenance=provenance) for i in range(len(table))]
-    rate = None
-    if labels is not None:
-        pairs = zip(predictions, labels, strict=True)
-        rate = RecognitionRate(sum(prediction.label == label for prediction, label in pairs), len(labels))
+    rate, learned = None, learned_from(asked.learned_from, table.columns(asked.names))
+    labels = None if labelled is None else labelled.labels
+    if labelled is not None:
+        right = [
+            prediction.label == label for prediction, label in zip(predictions, labelled.labels, strict=True)
+        ]
+        rate = rate_of(right, labelled.instances, learned or labelled.no_interval)
     warnings = list(dict.fromkeys(warning for prediction in predictions for warning in prediction.warnings))
+    if learned:
+        warnings.append(f"{learned}: their predictions say nothing of other trials")
     if as_json:
         echo_json(
             {
@@ -110,14 +118,14 @@ def _refuse_swapped(model: str, source: str) -> None:
 
 def _trials(
     model: Model, source: str, given: Mapping[str, Any]
-) -> tuple[FeatureTable, tuple[str, ...] | None, tuple[str, ...], Mapping[str, Any]]:
-    """Return the features of the trials, their labels (None if the source has none), notes, and how they were made."""
+) -> tuple[FeatureTable, Labelled | None, tuple[str, ...]]:
+    """Return the features of the trials, the trials with labels (None if the source has none), and notes."""
     from graspsense.cli.progress import ProgressLine
 
     if is_csv(source) and not given["label"]:
         from graspsense.sources.features_csv import read_table
 
-        return read_table(Path(source), model.names), None, (), {}
+        return read_table(Path(source), model.names), None, ()
     with ProgressLine() as progress:
         labelled = trials_of(
             source,
@@ -125,7 +133,7 @@ def _trials(
             {**given, "features": given["features"] or model.names},
             copies=True,
         )
-    return labelled.table, labelled.aimed(model.target).labels, labelled.notes, labelled.provenance
+    return labelled.table, labelled.aimed(model.target), labelled.notes
 
 
 def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) -> None:

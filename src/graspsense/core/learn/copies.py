@@ -8,9 +8,10 @@ another one in a single feature, as an edited copy does.
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -34,6 +35,8 @@ _ROUNDING: Final = 1e-9
 """Differences below this share of a range are rounding errors."""
 _COMPARED: Final = 32
 """Features that are compared with each other, those with the most values."""
+_HASH_DIGITS: Final = 12
+"""Two of a million different trials have the same hash with a probability below 1 in 500."""
 _FEW: Final = 5
 """With fewer different values than this, their differences do not show the resolution of a column."""
 
@@ -90,6 +93,20 @@ def apart_from(tested: Labelled, training: Labelled) -> Labelled:
         )
     note = f"{counted(len(tested) - len(kept), 'trial')} to test on left out: copies of trials to learn from"
     return evolve(tested.rows(kept), notes=(*tested.notes, note))
+
+
+def row_hashes(table: FeatureTable) -> tuple[str, ...]:
+    """Return a hash of the features of each trial, by which it is known again in another table."""
+    values = table.values + 0.0  # -0.0 and 0.0 are the same number
+    values[np.isnan(values)] = np.nan
+    return tuple(hashlib.sha256(row.tobytes()).hexdigest()[:_HASH_DIGITS] for row in values)
+
+
+def learned_from(known: Iterable[str], table: FeatureTable) -> str:
+    """Return in words how many of these trials are among those that have the hashes `known`; empty if none is."""
+    hashes, learned = row_hashes(table), frozenset(known)
+    seen = sum(text in learned for text in hashes)
+    return f"{seen} of {counted(len(hashes), 'trial')} were learned from" if seen else ""
 
 
 def _left_out(labelled: Labelled, left_out: NDArray[np.int64], original: NDArray[np.int64]) -> str:

@@ -28,6 +28,7 @@ from graspsense.core.components.setting import CHANGES_NO_RESULT, NAMES_INPUT, U
 from graspsense.core.files.whole_file import write_whole
 from graspsense.core.learn.certainty import Certainty, certainty_from, with_certainty
 from graspsense.core.learn.conformal import COVERAGES, Answers, PredictionSets, scores_of, sets_from
+from graspsense.core.learn.copies import row_hashes
 from graspsense.core.learn.model_content import digest, model_bytes, parsed, sealed_content
 from graspsense.core.learn.novelty import Novelty, novelty_from, novelty_of
 from graspsense.core.learn.stored_values import StoredValueError, StoredValues
@@ -101,6 +102,8 @@ class Model:
     """How often its answers are right, by their support; None in a model that is not calibrated."""
     temperature: float | None = None
     """The temperature (`learn.temperature`) of the probabilities of the labels that are not predicted."""
+    learned_from: tuple[str, ...] = ()
+    """The hashes (`learn.copies`) of the recorded trials that it was trained on."""
     checkpoints: tuple[tuple[float, Model], ...] = ()
     """The models for grasps that go on: each with the seconds after the contact up to which it knows them."""
 
@@ -343,6 +346,7 @@ class Model:
             "certainty": None if self.certainty is None else self.certainty.to_json(),
             **({} if self.temperature is None else {"temperature": self.temperature}),
             "model": self.classifier.to_json(),
+            **({} if not self.learned_from else {"learned_from": list(self.learned_from)}),
             **(
                 {}
                 if not self.checkpoints
@@ -565,6 +569,7 @@ def train(
         units=labelled.table.units,
         target=target,
         novelty=novelty_of(labelled.table, labelled.labels),
+        learned_from=() if labelled.provenance.get("simulated") else row_hashes(labelled.table),
         provenance={
             "source": labelled.source,
             "trials": len(labelled),
@@ -641,6 +646,7 @@ def _restored(stored: StoredValues, name: str, plugins: Plugins, component: Comp
         sets=_sets_from(stored, classifier),
         certainty=_certainty_from(stored),
         temperature=_temperature_from(stored),
+        learned_from=stored.texts("learned_from") if "learned_from" in stored else (),
     )
     return evolve(model, checkpoints=_checkpoints_from(stored, model, component, config))
 
