@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from graspsense.core.learn.labelled import Labelled
     from graspsense.core.learn.model import Model
     from graspsense.core.values.features import FeatureTable, Prediction
+    from graspsense.evaluation.intervals import RecognitionRate
 
 MOST_WITH_REASONS: Final = 1000
 """Largest number of trials whose predictions are given with reasons, which take about a millisecond each."""
@@ -42,7 +43,6 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     from graspsense.core.learn.copies import learned_from
     from graspsense.core.learn.model import load_model
     from graspsense.core.values.errors import ConfigError
-    from graspsense.evaluation.intervals import rate_of
     from graspsense.evaluation.json_codec import to_json
     from graspsense.regression.model import is_regression
 
@@ -67,13 +67,9 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
         predictions = asked.predictions(table, provenance)
     else:
         predictions = [asked.predict(table.row(i), provenance=provenance) for i in range(len(table))]
-    rate, learned = None, learned_from(asked.learned_from, table.columns(asked.names))
+    learned = learned_from(asked.learned_from, table.columns(asked.names))
     labels = None if labelled is None else labelled.labels
-    if labelled is not None:
-        right = [
-            prediction.label == label for prediction, label in zip(predictions, labelled.labels, strict=True)
-        ]
-        rate = rate_of(right, labelled.instances, learned or labelled.no_interval)
+    rate = None if labelled is None else _rate(predictions, labelled, learned)
     warnings = list(dict.fromkeys(warning for prediction in predictions for warning in prediction.warnings))
     if learned:
         warnings.append(f"{learned}: their predictions say nothing of other trials")
@@ -134,6 +130,16 @@ def _trials(
             copies=True,
         )
     return labelled.table, labelled.aimed(model.target), labelled.notes
+
+
+def _rate(predictions: Sequence[Prediction], labelled: Labelled, learned: str) -> RecognitionRate:
+    """Return the rate of these predictions; `learned` says which trials were learned from, and leaves no interval."""
+    from graspsense.evaluation.intervals import rate_of
+
+    right = [
+        prediction.label == label for prediction, label in zip(predictions, labelled.labels, strict=True)
+    ]
+    return rate_of(right, labelled.instances, learned or labelled.no_interval)
 
 
 def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) -> None:
