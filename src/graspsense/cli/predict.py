@@ -42,7 +42,6 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     from graspsense.core.components.registry import installed
     from graspsense.core.learn.copies import learned_from
     from graspsense.core.learn.model import load_model
-    from graspsense.core.values.errors import ConfigError
     from graspsense.evaluation.json_codec import to_json
     from graspsense.regression.model import is_regression
 
@@ -55,18 +54,9 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
         raise click.UsageError(f"--target-value: model {model} predicts a label, not a number")
     asked = load_model(model, installed())
     table, labelled, notes = _trials(asked, source, given)
-    provenance = {} if labelled is None else labelled.provenance
-    mismatch = asked.misfit(table)
-    if mismatch:
-        raise ConfigError(mismatch)
+    predictions = _predictions(asked, table, {} if labelled is None else labelled.provenance)
     if len(table) > MOST_WITH_REASONS:
-        notes = (
-            *notes,
-            f"more than {MOST_WITH_REASONS} trials: the predictions have no reasons",
-        )
-        predictions = asked.predictions(table, provenance)
-    else:
-        predictions = [asked.predict(table.row(i), provenance=provenance) for i in range(len(table))]
+        notes = (*notes, f"more than {MOST_WITH_REASONS} trials: the predictions have no reasons")
     learned = learned_from(asked.learned_from, table.columns(asked.names))
     labels = None if labelled is None else labelled.labels
     rate = None if labelled is None else _rate(predictions, labelled, learned)
@@ -130,6 +120,17 @@ def _trials(
             copies=True,
         )
     return labelled.table, labelled.aimed(model.target), labelled.notes
+
+
+def _predictions(asked: Model, table: FeatureTable, provenance: Mapping[str, Any]) -> list[Prediction]:
+    """Return the prediction of each trial, with reasons unless there are many. Raises ConfigError, DataDamaged."""
+    from graspsense.core.values.errors import ConfigError
+
+    if mismatch := asked.misfit(table):
+        raise ConfigError(mismatch)
+    if len(table) > MOST_WITH_REASONS:
+        return asked.predictions(table, provenance)
+    return [asked.predict(table.row(i), provenance=provenance) for i in range(len(table))]
 
 
 def _rate(predictions: Sequence[Prediction], labelled: Labelled, learned: str) -> RecognitionRate:
