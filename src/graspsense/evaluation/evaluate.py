@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import groupby
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -15,7 +16,8 @@ from attrs import frozen
 
 from graspsense.core.components.config import select_component
 from graspsense.core.learn.labelled import TARGETS, ControlFeatures, Labelled, Target, class_of
-from graspsense.core.values.errors import ConfigError, counted
+from graspsense.core.values.errors import ConfigError, counted, listed
+from graspsense.core.values.label_text import spelled_alike
 from graspsense.evaluation.confusion import confusion
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, Groups, Pooled, cross_validate
 from graspsense.evaluation.doubt import reliability, set_coverage
@@ -160,7 +162,8 @@ class _Evaluator:
         self.predicted_by_control: dict[str, tuple[Pooled, list[int]]] = {}
         """The predictions of the controls with other features, and the trials that these are of."""
         self._note_small_labels()
-        self._note_few_instances()
+        self._note_instances()
+        self._note_blocks()
 
     def measure_protocols(self) -> tuple[_Headline, dict[str, Measurement]]:
         """Measure the rate under each protocol. The headline holds out whole instances if that is possible."""
@@ -307,14 +310,41 @@ class _Evaluator:
         if few:
             self.notes.append(f"labels with fewer trials than folds ({self.k}): {', '.join(few)}")
 
-    def _note_few_instances(self) -> None:
-        if self.trials.instances is not None:
-            count = len(set(self.trials.instances))
-            if count < MIN_INSTANCES:
-                self.notes.append(
-                    f"{counted(count, 'instance')}: with fewer than {MIN_INSTANCES}, rates and differences have "
-                    "no interval, and the controls give no warning"
-                )
+    def _note_instances(self) -> None:
+        """Note what makes the instances of these trials less than other objects."""
+        if self.trials.instances is None:
+            return
+        count = len(set(self.trials.instances))
+        if count < MIN_INSTANCES:
+            self.notes.append(
+                f"{counted(count, 'instance')}: with fewer than {MIN_INSTANCES}, rates and differences have "
+                "no interval, and the controls give no warning"
+            )
+        if count == len(self.labels) and not self.trials.provenance.get("simulated"):
+            self.notes.append(
+                "each trial has an instance of its own: if these are numbers of trials, grasps of the same object are "
+                "in training and test, and the rate is not that of other objects"
+            )
+        if pairs := spelled_alike(self.trials.instances):
+            alike = listed([f"{name!r} and {other!r}" for name, other in pairs])
+            self.notes.append(
+                f"instances that differ in spelling only count as two: {alike}. If they are one object, its grasps are "
+                "in training and test"
+            )
+
+    def _note_blocks(self) -> None:
+        """Note that drift can tell recorded labels, and that no control shows it, where each label is one block."""
+        order = self.trials.order
+        if order is None or self.trials.provenance.get("simulated"):
+            return
+        in_time = [self.labels[i] for i in np.argsort(order, kind="stable").tolist()]
+        blocks = sum(1 for _ in groupby(in_time))
+        if blocks == len(set(in_time)) < len(in_time):
+            self.notes.append(
+                "in the order of recording, the trials of each label are one block: what changes with time, such as a "
+                "temperature or the zero of a sensor, may tell the labels, and recording_order cannot show it. Grasp "
+                "the objects in turn"
+            )
 
     def _folds(self, assign: Callable[[Sequence[str], Any], Folds]) -> list[Folds]:
         return [assign([self.labels[i] for i in rows], rows) for rows in self.groups]

@@ -51,9 +51,15 @@ _PROPORTIONAL: Final = 1.0 - 1e-6
 
 
 def doubts(
-    columns: CsvColumns, labels: Sequence[str], names: Sequence[str], table: FeatureTable
+    columns: CsvColumns,
+    labels: Sequence[str],
+    names: Sequence[str],
+    table: FeatureTable,
+    target: Sequence[float] | None = None,
 ) -> list[str]:
-    """Return notes on those of these columns that are used as features and may reveal the labels."""
+    """Return notes on those of these columns that are features and may reveal the labels, or the number to predict."""
+    if target is not None:
+        return _doubts_of_target(columns, target, table)
     used = [name for name in names if set(columns.columns_of(name)) <= set(table.names)]
     numbers = _numbers(columns, [name for name in used if not columns.is_nominal(name)])
     rising = [name for name, values in numbers.items() if keeps_rising(values)]
@@ -92,7 +98,7 @@ def doubts(
     return notes + _mixed(numbers)
 
 
-def doubts_of_target(columns: CsvColumns, target: Sequence[float], table: FeatureTable) -> list[str]:
+def _doubts_of_target(columns: CsvColumns, target: Sequence[float], table: FeatureTable) -> list[str]:
     """Return notes on features that may be the number to predict itself, or that hold two kinds of numbers."""
     numbers = _numbers(columns, [name for name in columns.names if name in table.names])
     rising = [name for name, values in numbers.items() if keeps_rising(values)]

@@ -20,14 +20,14 @@ from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.target_value import TargetValue
 from graspsense.core.values.errors import ConfigError, DataDamaged, counted, listed
 from graspsense.core.values.features import UNKNOWN, FeatureTable
-from graspsense.core.values.label_text import is_missing_label, label_text
+from graspsense.core.values.label_text import is_missing_label, label_text, spelled_alike
 from graspsense.core.values.nominal import splits_of
 from graspsense.core.values.written_numbers import is_missing
 from graspsense.recording.atomic_file import write_or_replace
 from graspsense.recording.controls import Controls, controls
 from graspsense.sources.arff_columns import ArffColumns
 from graspsense.sources.csv_columns import CsvColumns
-from graspsense.sources.doubtful_columns import doubts, doubts_of_target
+from graspsense.sources.doubtful_columns import doubts
 from graspsense.sources.exported_table import ExportedTable, exported
 from graspsense.sources.identifiers import identifies, names_a_recording, text_identifies
 
@@ -80,11 +80,7 @@ def read_labelled(
     table = _feature_table(columns, features, reserved, identified, notes)
     if export is None:
         others = [name for name in columns.names if name not in reserved]
-        notes += (
-            doubts(columns, labels, others, table)
-            if target is None
-            else doubts_of_target(columns, target.values, table)
-        )
+        notes += doubts(columns, labels, others, table, None if target is None else target.values)
     _note_similar_labels(labels, notes)
     return Labelled(
         source=str(path),
@@ -191,11 +187,9 @@ def _labels(columns: CsvColumns, label: str | None, notes: list[str]) -> list[st
 
 
 def _note_similar_labels(labels: Sequence[str], notes: list[str]) -> None:
-    folded = {label.casefold(): label for label in labels}
-    for label in sorted(set(labels)):
-        other = folded[label.casefold()]
-        if other != label:
-            notes.append(f"labels {label!r} and {other!r} differ in case only and count as two")
+    if pairs := spelled_alike(labels):
+        alike = listed([f"{label!r} and {other!r}" for label, other in pairs])
+        notes.append(f"labels that differ in spelling only count as two: {alike}")
 
 
 def _ranks(columns: CsvColumns, order: str | None, notes: list[str]) -> tuple[int, ...]:
