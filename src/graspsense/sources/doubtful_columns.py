@@ -94,7 +94,7 @@ def doubts(
             f"If the recording is the reason, and not the object, it reveals the labels: {leave_out}",
         ),
     )
-    notes = [f"used, although {what}: {listed(found)}. {advice}" for what, found, advice in checks if found]
+    notes = [f"used, although {what}: {listed(doubted)}. {advice}" for what, doubted, advice in checks if doubted]
     return notes + _mixed(numbers)
 
 
