@@ -94,7 +94,9 @@ def doubts(
             f"If the recording is the reason, and not the object, it reveals the labels: {leave_out}",
         ),
     )
-    notes = [f"used, although {what}: {listed(doubted)}. {advice}" for what, doubted, advice in checks if doubted]
+    notes = [
+        f"used, although {what}: {listed(doubted)}. {advice}" for what, doubted, advice in checks if doubted
+    ]
     return notes + _mixed(numbers)
 
 
