@@ -18,6 +18,7 @@ import numpy as np
 from attrs import evolve
 
 from graspsense.core.learn.labelled import Labelled
+from graspsense.core.learn.near_copies import note_on_near_copies
 from graspsense.core.values.errors import ConfigError, counted
 from graspsense.core.values.features import misfit
 from graspsense.core.values.nominal import with_codes
@@ -65,9 +66,12 @@ def without_copies(labelled: Labelled) -> Labelled:
             f"trials that differ from another one in a single feature: {len(edited)} (trial {copy} from trial {row})"
             ". They count: make sure that they are no copies with a value that was changed"
         )
+    remaining = labelled.rows(kept) if len(left_out) else labelled
+    if not by_chance and not edited and not labelled.provenance.get("simulated"):
+        notes += filter(None, [note_on_near_copies(remaining)])
     if len(notes) == len(labelled.notes):
         return labelled
-    return evolve(labelled.rows(kept) if len(left_out) else labelled, notes=tuple(notes))
+    return evolve(remaining, notes=tuple(notes))
 
 
 def apart_from(tested: Labelled, training: Labelled) -> Labelled:
@@ -163,16 +167,19 @@ def _edited_copies(values: NDArray[np.float64]) -> list[tuple[int, int]]:
     cells = np.array([1.0 if len(column) < _FEW else cells_in_range(column) for column in columns])
     copies: dict[int, int] = {}
     for left_out in range(values.shape[1]):
-        combinations = np.delete(cells, left_out)
-        if (combinations > 1.0).sum() < 2:
-            continue
+        others, cells_of = np.delete(values, left_out, axis=1), np.delete(cells, left_out)
+        known = ~np.isnan(others)
+        judged = (known & (cells_of > 1.0)).sum(axis=1) >= 2
+        with np.errstate(over="ignore"):
+            combinations = np.where(known, cells_of, 1.0).prod(axis=1)
+        by_chance = float((len(values) / (2.0 * combinations[judged])).sum())
         seen: dict[bytes, int] = {}
         pairs = {}
-        for i, row in zip(candidates, np.delete(values[candidates], left_out, axis=1), strict=True):
-            earlier = seen.setdefault(row.tobytes(), i)
+        for i in candidates:
+            earlier = seen.setdefault(others[i].tobytes(), i) if judged[i] else i
             if earlier != i:
                 pairs[i] = earlier
-        if len(pairs) > _SURE_OF_ALL * len(values) ** 2 / (2.0 * math.prod(combinations.tolist())):
+        if len(pairs) > _SURE_OF_ALL * by_chance:
             copies |= pairs
     return [(earlier, i) for i, earlier in sorted(copies.items())]
 
