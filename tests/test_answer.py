@@ -7,6 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 from cases import every_case
 
+from graspsense.core.learn.labelled import Labelled
+from graspsense.core.values.features import FeatureTable
 from graspsense.experiments.answer import answer, headline
 from graspsense.experiments.summary import ConditionResult
 from graspsense.experiments.task_results import ClassifierResult
@@ -76,3 +78,19 @@ def test_the_interval_of_recorded_trials_in_several_folds_is_around_their_mean(r
     low, high = rate.interval
     assert low <= rate.mean <= high
     assert high - low > 0.1
+
+
+def test_the_interval_of_a_single_run_counts_the_objects_of_its_trials():
+    """Five objects are always recognised and one never: that is what six objects tell, and not sixty trials."""
+    objects = [k % 6 for k in range(60)]
+    trials = Labelled(
+        source="made here",
+        table=FeatureTable(names=("x",), units=("",), values=np.zeros((60, 1))),
+        labels=("can",) * 60,
+        instances=tuple(f"can#{k}" for k in objects),
+    )
+    predicted = ["jar" if k == 0 else "can" for k in objects]
+    low, high = ClassifierResult.from_answers(
+        "c45", "both", "p", trials.labels, predicted, trials
+    ).rate.interval
+    assert high - low > 0.5

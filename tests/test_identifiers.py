@@ -241,6 +241,11 @@ NOISE = RNG.normal(6.0, 1.0, N).round(3).tolist()
 DOUBTFUL = {
     "values of one label each": ("x", [(1, 2, 3, 4)[i // 15] for i in range(N)]),
     "a time": ("elapsed_h", np.cumsum(RNG.exponential(0.1, N)).round(4).tolist()),
+    "a noisy counter": ("x", (np.arange(N) + RNG.normal(0.0, 0.3, N)).round(3).tolist()),
+    "seconds since 1970 in thousands": (
+        "x",
+        (1.77e6 + 0.037 * np.arange(N) + RNG.uniform(0, 0.02, N)).tolist(),
+    ),
     "values of one label only": ("x", [*NOISE[:30], *[""] * 30]),
     "a number for what is missing": ("x", [value if i % 4 else -999 for i, value in enumerate(NOISE)]),
     "millimetres and metres": ("x", [*NOISE[:30], *[f"{value / 1000:.6f}" for value in NOISE[30:]]]),

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from attrs import evolve, field, frozen
+from attrs import field, frozen
 from attrs.validators import ge, le
 
 from graspsense.core.components.config import SelectedComponent, build, settings_from
@@ -18,7 +18,6 @@ from graspsense.core.values.errors import ConfigError, counted, listed
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.evaluation.folds import trials_by_class
 from graspsense.evaluation.gathered_warnings import gathered_warnings
-from graspsense.evaluation.intervals import rate_among
 from graspsense.experiments.task_results import (
     MOST_KEPT_GRASPS,
     ClassifierResult,
@@ -196,11 +195,9 @@ def _on_other_trials(
         f"trained on {counted(len(data), 'trial')} of {data.source}, tested on {len(true)} of {test.source}"
     )
     notes = (note, *_note_same_objects(data, test), *test.notes, *told)
-    result = ClassifierResult.from_answers(
-        name, target, OTHER_TRIALS, true, predicted, notes=notes, tree=tree
+    return ClassifierResult.from_answers(
+        name, target, OTHER_TRIALS, true, predicted, test, notes=notes, tree=tree
     )
-    right = [answer == label for answer, label in zip(predicted, true, strict=True)]
-    return evolve(result, rate=rate_among(test, right))
 
 
 def _note_same_objects(data: Labelled, test: Labelled) -> list[str]:
