@@ -132,6 +132,29 @@ def test_a_rate_of_predictions_counts_the_objects_of_the_trials(csv, tmp_path):
     assert of_objects["interval"][0] < alone["interval"][0]
 
 
+@pytest.mark.slow
+def test_a_certainty_by_trials_is_said_to_be_that_of_the_same_objects(tmp_path):
+    # Every object has a width of its own, which its label does not determine: a new one is recognised by chance.
+    rng = np.random.default_rng(2)
+    widths = rng.normal(60.0, 5.0, 40)
+    rows = [
+        f"{('can', 'jar')[k % 2]},thing {k},{widths[k] + 0.05 * rng.normal():.4f}"
+        for k in range(40)
+        for _ in range(4)
+    ]
+    for name, some in (("known.csv", rows[:80]), ("new.csv", rows[80:])):
+        (tmp_path / name).write_text("\n".join(["what,thing,p_first [mm]", *some]) + "\n")
+    said = {}
+    for more in ((), ("--instance", "thing")):
+        model = tmp_path / "m.json"
+        graspsense("train", tmp_path / "known.csv", "--label", "what", *more, "--out", model, "--overwrite")
+        said[more] = json.loads(printed("predict", model, tmp_path / "new.csv", "--label", "what", "--json"))
+    by_trials, by_objects = said.values()
+    assert by_trials["rate"]["rate"] < 0.75
+    assert any("of other objects it knows less" in warning for warning in by_trials["warnings"])
+    assert not any("of other objects" in warning for warning in by_objects["warnings"])
+
+
 def test_a_model_of_states_or_classes(csv, tmp_path):
     model = tmp_path / "states.json"
     code, _, err = graspsense("train", csv, "--label", "what", "--out", model, "--target", "state")

@@ -322,7 +322,17 @@ class Model:
                     )
 
     def _kind_warnings(self, differences: Sequence[str]) -> Iterator[str]:
-        """Yield what holds for all predictions of a model of simulated grasps, unless a difference says more."""
+        """Yield what holds for all predictions of this model, unless a difference says more."""
+        if (
+            self.certainty is not None
+            and self.sets is not None
+            and self.sets.unit == "trials"
+            and not differences
+        ):
+            yield (
+                "certainty and sets were measured with grasps of the objects that it was trained on: of other objects "
+                "it knows less"
+            )
         if self.sets is not None and self.sets.uncalibrated and not differences:
             names = ", ".join(self.sets.uncalibrated)
             yield f"in every set, because too few {self.sets.unit} calibrate it: {names}"
