@@ -317,6 +317,13 @@ def test_no_part_of_a_result_is_taken_for_one(end):
         TaskResult.from_text(text[: end % len(text)])
 
 
+def test_a_result_with_a_changed_digit_is_not_read():
+    """A rate that was edited, or damaged on the disk, is valid JSON; only the hash tells."""
+    text = TaskResult(key="k", name="n", state="done", result={"rate": 0.5}).to_text()
+    with pytest.raises(ValueError, match="sha256"):
+        TaskResult.from_text(text.replace("0.5", "0.6"))
+
+
 def test_rates_over_seeds():
     """By hand: s = 0.0645497, and Student's t at 97.5 % with 3 degrees of freedom is 3.182446."""
     rate = OverSeeds((0.8, 0.9, 0.85, 0.95), 10_000)

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Any, Literal
 from attrs import field, frozen
 
 from graspsense.core.components.caller import option
+from graspsense.core.learn.model_content import digest
 from graspsense.core.values.errors import FAILURES, ConfigError, DataDamaged, GraspsenseError, listed, named
-from graspsense.core.values.json_values import json_text
+from graspsense.core.values.json_values import json_ready, json_text
 from graspsense.evaluation.json_codec import from_json, to_json
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.versions import versions
@@ -93,22 +94,23 @@ class TaskResult:
         return decoded
 
     def to_text(self) -> str:
-        """Return JSON in one line."""
-        return json_text(
-            {
-                "key": self.key,
-                "name": self.name,
-                "state": self.state,
-                "result": self.result,
-                "reason": self.reason,
-                "made": self.made,
-            }
-        )
+        """Return JSON in one line, with the hash of its content."""
+        content: dict[str, Any] = {
+            "key": self.key,
+            "name": self.name,
+            "state": self.state,
+            "result": self.result,
+            "reason": self.reason,
+            "made": self.made,
+        }
+        return json_text({**content, "sha256": digest(json_ready(content))})
 
     @classmethod
     def from_text(cls, text: str) -> TaskResult:
         """Return the result that `to_text` wrote. Raises ValueError, KeyError or TypeError for any other text."""
         values = json.loads(text)
+        if values.pop("sha256") != digest(values):
+            raise ValueError("its sha256 does not match")
         if values["state"] not in ("done", "failed") or (values["result"] is None) != (
             values["state"] == "failed"
         ):
