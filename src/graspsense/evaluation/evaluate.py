@@ -130,11 +130,15 @@ def _check_arguments(labelled: object, target: str) -> None:
 
 @frozen
 class _Headline:
-    """The predictions that the headline is about, with their protocol and folds."""
+    """The predictions that the headline is about, with their protocol and folds.
+
+    `assign` makes such folds for other labels of the same trials.
+    """
 
     protocol: str
     pooled: Pooled
     folds: list[Folds]
+    assign: Callable[[Sequence[str]], list[Folds]]
 
 
 class _Evaluator:
@@ -167,9 +171,13 @@ class _Evaluator:
 
     def measure_protocols(self) -> tuple[_Headline, dict[str, Measurement]]:
         """Measure the rate under each protocol. The headline holds out whole instances if that is possible."""
-        folds = self._folds(lambda labels, rows: stratified(labels, self.k, self.seed))
+
+        def assign(labels: Sequence[str]) -> list[Folds]:
+            return self._folds(lambda of_group, rows: stratified(of_group, self.k, self.seed), labels)
+
+        folds = assign(self.labels)
         plain = self._pooled(self.stratified_name, self.trials.table, folds)
-        headline = _Headline(self.stratified_name, plain, folds)
+        headline = _Headline(self.stratified_name, plain, folds, assign)
         held, measured = self._instance_held_out(plain)
         if held is not None:
             self.pooled_by_protocol[INSTANCE_HELD_OUT] = held.pooled
@@ -346,8 +354,12 @@ class _Evaluator:
                 "the objects in turn"
             )
 
-    def _folds(self, assign: Callable[[Sequence[str], Any], Folds]) -> list[Folds]:
-        return [assign([self.labels[i] for i in rows], rows) for rows in self.groups]
+    def _folds(
+        self, assign: Callable[[Sequence[str], Any], Folds], labels: Sequence[str] | None = None
+    ) -> list[Folds]:
+        """Return the folds of each group, for these labels (default: those of the trials)."""
+        labels = self.labels if labels is None else labels
+        return [assign([labels[i] for i in rows], rows) for rows in self.groups]
 
     def _pooled(
         self,
@@ -394,14 +406,21 @@ class _Evaluator:
         if single:
             reason = f"labels with a single instance, which cannot be held out: {', '.join(single)}"
             return None, Measurement(what, reason=reason)
-        folds = self._folds(
-            lambda labels, rows: instance_held_out(labels, [instances[i] for i in rows], self.k, self.seed)
-        )
+
+        def assign(labels: Sequence[str]) -> list[Folds]:
+            return self._folds(
+                lambda of_group, rows: instance_held_out(
+                    of_group, [instances[i] for i in rows], self.k, self.seed
+                ),
+                labels,
+            )
+
+        folds = assign(self.labels)
         try:
             held = self._pooled(INSTANCE_HELD_OUT, self.trials.table, folds)
         except FitRefused as refusal:
             return None, Measurement(what, reason=str(refusal))
-        headline = _Headline(INSTANCE_HELD_OUT, held, folds)
+        headline = _Headline(INSTANCE_HELD_OUT, held, folds, assign)
         return headline, self._against(what, held, plain, self.stratified_name)
 
     def _in_order(self) -> Measurement:
@@ -470,17 +489,20 @@ class _Evaluator:
         """Measure the rate on labels that carry no information, and the permutation p of the headline.
 
         The labels of whole instances are exchanged, so that shuffled trials depend on each other as the real ones do.
+        The folds are stratified by the shuffled labels: in those of the real ones, a label that is frequent in a fold
+        would be rare in its training trials, so that shuffled rates would be too low.
         p is (b + 1) / (m + 1), with b of m permutations at least as good as the headline (B. Phipson and G. K. Smyth,
         Stat. Appl. Genet. Mol. Biol. 9 (2010) 39).
         """
-        what = f"mean of {permutations} permutations of the labels, in the folds of the headline"
+        what = f"mean of {permutations} permutations of the labels, each in folds like those of the headline"
         rng = np.random.default_rng(self.seed)
         counts = []
         for k in range(permutations):
             shuffled = self._permuted(rng)
             name = f"shuffled_labels {k + 1}/{permutations}"
             try:
-                pooled = self._pooled(name, self.trials.table, headline.folds, labels=shuffled)
+                folds = headline.assign(shuffled)
+                pooled = self._pooled(name, self.trials.table, folds, labels=shuffled)
             except FitRefused as refusal:
                 return Measurement(what, reason=str(refusal))
             counts.append(sum(pooled.right(shuffled)))
