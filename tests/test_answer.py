@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
 from cases import every_case
 
+from graspsense.core.learn.labelled import Labelled
+from graspsense.core.values.features import FeatureTable
 from graspsense.experiments.answer import answer, headline
 from graspsense.experiments.summary import ConditionResult
 from graspsense.experiments.task_results import ClassifierResult
@@ -57,9 +60,37 @@ def test_equal_rates_of_few_grasps_are_not_said_to_agree():
     assert "cannot be told" not in told(0.5, 0.6, 0.7, n=2000)
 
 
+@every_case(("simulated", "seeds"), [(False, 1), (True, 30)])
+def test_among_many_cases_that_are_guesses_the_best_is_hardly_ever_said_to_be_better(simulated, seeds):
+    """Of 20 cases that guess, the best and the worst differ by chance; a claim may be wrong once in 20 times."""
+    rng = np.random.default_rng(0)
+    claims = 0
+    for _ in range(40):
+        rates = rng.binomial(60, 0.5, size=(20, seeds)) / 60
+        cases = [condition(f"{k} N", *rate, n=60, simulated=simulated) for k, rate in enumerate(rates)]
+        claims += "is better than" in answer(SimpleNamespace(conditions=cases))
+    assert claims <= 3
+
+
 @every_case("rates", [(0.8, 1.0), (1.0, 0.8), (0.5,), (1.0, 1.0, 0.0)])
 def test_the_interval_of_recorded_trials_in_several_folds_is_around_their_mean(rates):
     rate = condition("17 N", *rates, n=20, simulated=False).rate
     low, high = rate.interval
     assert low <= rate.mean <= high
     assert high - low > 0.1
+
+
+def test_the_interval_of_a_single_run_counts_the_objects_of_its_trials():
+    """Five objects are always recognised and one never: that is what six objects tell, and not sixty trials."""
+    objects = [k % 6 for k in range(60)]
+    trials = Labelled(
+        source="made here",
+        table=FeatureTable(names=("x",), units=("",), values=np.zeros((60, 1))),
+        labels=("can",) * 60,
+        instances=tuple(f"can#{k}" for k in objects),
+    )
+    predicted = ["jar" if k == 0 else "can" for k in objects]
+    low, high = ClassifierResult.from_answers(
+        "c45", "both", "p", trials.labels, predicted, trials
+    ).rate.interval
+    assert high - low > 0.5

@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from attrs import evolve
 from cases import every_case
 from commands import graspsense, printed
 from hypothesis import given
@@ -111,6 +112,20 @@ def test_trials_that_were_learned_from_are_not_tested_on():
         apart_from(training, training)
 
 
+def test_copies_are_found_among_columns_in_another_order_and_other_units_are_refused():
+    training = labelled(measured())
+    table = training.table
+    turned = evolve(training, table=table.columns(table.names[::-1]))
+    with pytest.raises(ConfigError, match="every trial"):
+        apart_from(turned, training)
+    in_m, in_mm = (
+        evolve(labelled(measured(seed=seed)), table=evolve(table, units=(unit, "", "")))
+        for seed, unit in enumerate(("m", "mm"))
+    )
+    with pytest.raises(ConfigError, match="f0 in m; here it is in mm"):
+        apart_from(in_mm, in_m)
+
+
 def readings(force, ticks=40):
     # Without a force, nothing moves.
     frames = (
@@ -202,3 +217,51 @@ def test_copies_with_one_value_changed_are_told(change, column):
     assert any("single feature: 40 (trial 41 from trial 1)" in note for note in kept.notes)
     alone = FeatureTable(names=("x", "y", "z"), units=("",) * 3, values=values)
     assert without_copies(Labelled(source="t", table=alone, labels=labels)).notes == ()
+
+
+NEAR = {
+    "rounded": lambda values, rng: values.round(3),
+    "shifted digits": lambda values, rng: values + 1e-5 * rng.normal(size=values.shape),
+    "scaled": lambda values, rng: 1.001 * values,
+    "augmented with noise": lambda values, rng: values + 0.02 * rng.normal(size=values.shape),
+}
+
+
+@every_case("change", NEAR)
+def test_copies_with_other_digits_are_said(change):
+    values = measured(30)
+    changed = NEAR[change](values, np.random.default_rng(1))
+    kept = without_copies(labelled(np.concatenate([values, changed])))
+    assert len(kept) == 60
+    assert any("closer to another trial" in note for note in kept.notes)
+
+
+@given(seed=st.integers(0, 10_000), features=st.integers(2, 5), repeatability=st.sampled_from([0.1, 0.5]))
+def test_measured_trials_are_not_taken_for_near_copies(seed, features, repeatability):
+    rng = np.random.default_rng(seed)
+    objects = rng.normal(size=(12, features))
+    grasps = np.repeat(objects, 5, axis=0) + repeatability * rng.normal(size=(60, features))
+    one_number = rng.normal(size=(60, 1)) + 0.02 * rng.normal(size=(60, features))
+    for values in (
+        rng.normal(size=(60, features)),
+        grasps,
+        one_number,
+        rng.lognormal(0, 1.5, (60, features)),
+    ):
+        assert not any("closer to" in note for note in without_copies(labelled(values)).notes)
+
+
+def test_grasps_of_one_named_object_may_be_close():
+    grasps = np.repeat(measured(12), 5, axis=0) + 0.01 * measured(60, seed=1)
+    unnamed = labelled(grasps, [f"{k // 5 % 2}" for k in range(60)])
+    named = evolve(unnamed, instances=tuple(f"bottle {k // 5}" for k in range(60)))
+    assert any("closer to 4 other trials" in note for note in without_copies(unnamed).notes)
+    assert not without_copies(named).notes
+
+
+def test_trials_without_features_are_not_taken_for_edited_copies():
+    """Where a feature set finds no contact, it gives no features, or one that has few values."""
+    values = measured(60, 4)
+    values[:20] = np.nan
+    values[:10, 0] = np.arange(10) % 3
+    assert not any("single feature" in note for note in without_copies(labelled(values)).notes)

@@ -9,6 +9,7 @@ from attrs import evolve
 from cases import every_case
 from kept import keep
 
+from graspsense.core.components.registry import installed
 from graspsense.core.values.errors import ConfigError
 from graspsense.experiments.executors.serial import Serial
 from graspsense.experiments.experiment import _located, read_experiment
@@ -221,6 +222,28 @@ def test_the_components_of_a_task_are_inputs(tmp_path):
         task.key != evolve(planned, inputs={**planned.inputs, "graspsense/knn": "other code"}).tasks()[0].key
     )
     assert task.key == evolve(planned, inputs={**planned.inputs, "another/part": "other code"}).tasks()[0].key
+
+
+def test_the_code_of_a_component_that_a_setting_names_is_an_input(monkeypatch):
+    import graspsense.sources.input_content as module
+
+    foreign = next(part for part in installed().components() if part.distribution != "graspsense")
+    params = {"features": {"type": "graspsense/union", "sets": ["curve", foreign.name]}}
+    contents = contents_of(params)
+    monkeypatch.setattr(module, "_hash_of_code", lambda version, name: f"{version} {name} changed")
+    assert contents[foreign.name] != contents_of(params)[foreign.name]
+
+
+def test_a_table_that_is_replaced_while_the_experiment_runs_is_no_result_of_what_it_was_before(tmp_path):
+    table(tmp_path / "t.csv", 1, 50.0)
+    planned, results = read_experiment(experiment(tmp_path, "t.csv")), Results(tmp_path / "out")
+    table(tmp_path / "t.csv", 2, 0.0)
+    account = run_experiment(planned, results, Serial)
+    assert "t.csv" in account.failed[0].reason
+    table(tmp_path / "t.csv", 1, 50.0)
+    again = run_experiment(planned, results, Serial, resume=True)
+    assert (again.kept, again.done) == (0, 1)
+    assert rate_of(planned, results) == (1.0, 40)
 
 
 def test_what_is_no_file_is_no_input():

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 import wayward
 from cases import every_case
-from commands import graspsense
+from commands import graspsense, printed
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -317,6 +317,13 @@ def test_no_part_of_a_result_is_taken_for_one(end):
         TaskResult.from_text(text[: end % len(text)])
 
 
+def test_a_result_with_a_changed_digit_is_not_read():
+    """A rate that was edited, or damaged on the disk, is valid JSON; only the hash tells."""
+    text = TaskResult(key="k", name="n", state="done", result={"rate": 0.5}).to_text()
+    with pytest.raises(ValueError, match="sha256"):
+        TaskResult.from_text(text.replace("0.5", "0.6"))
+
+
 def test_rates_over_seeds():
     """By hand: s = 0.0645497, and Student's t at 97.5 % with 3 degrees of freedom is 3.182446."""
     rate = OverSeeds((0.8, 0.9, 0.85, 0.95), 10_000)
@@ -381,6 +388,39 @@ def test_train_here_test_there(file, tmp_path):
     assert condition.protocol == "other_trials"
     assert condition.confusion.n == 40
     assert sum(condition.confusion.counts[0]) == 15  # five labels were changed from a to b
+
+
+def test_trials_of_few_objects_to_test_on_have_no_interval_and_those_learned_from_are_said(file, tmp_path):
+    header, *lines = wayward.CSV.splitlines()
+    # Forty trials of four objects tell less than forty objects would; two of the four are learned from.
+    for name, offset in (("mine.csv", 0), ("other.csv", 2)):
+        rows = [f"{line},bottle {offset + k % 4}" for k, line in enumerate(lines)]
+        shifted = [row.replace(".", f".{offset}", 1) for row in rows]
+        (tmp_path / name).write_text("\n".join([f"{header},bottle", *shifted]) + "\n")
+    other = '[test]\nsource = "other.csv"\nlabel = "what"\ninstance = "bottle"\n'
+    file.write_text(
+        EXPERIMENT.replace('[sweep]\n"judge.folds" = [2, 3]\n', other).replace(
+            "[data]\n", '[data]\ninstance = "bottle"\n'
+        )
+    )
+    code, told, _ = graspsense(
+        "experiment", str(file), "--out", str(tmp_path / "out"), "-o", "seeds=1", "--json"
+    )
+    condition = json.loads(told)["conditions"][0]
+
+    assert code == 0
+    assert condition["n"] == 40
+    assert condition["interval"] is None
+    assert any("2 of 4 instances" in note for note in condition["notes"])
+    assert "2 of 4 instances" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_what_casts_doubt_on_a_rate_is_said_on_the_screen(tmp_path):
+    # Noise beside a column that rises with the lines, which come label by label.
+    rows = [f"{'ab'[k // 30]},{k % 7},{k + (k % 5) ** 2 / 100}" for k in range(60)]
+    (tmp_path / "mine.csv").write_text("\n".join(["what,x,hours", *rows]) + "\n")
+    (tmp_path / "e.toml").write_text('title = "t"\n[data]\nsource = "mine.csv"\nlabel = "what"\n')
+    assert "hours" in printed("experiment", tmp_path / "e.toml", "--out", tmp_path / "out")
 
 
 @pytest.mark.slow

@@ -146,10 +146,13 @@ def test_constant_and_empty_columns_are_noted(csv):
     assert trials.table.names == ("p", "same")
 
 
-def test_labels_that_differ_in_case_only_are_noted(csv):
-    trials = read_labelled(csv(GOOD.replace("a,0.05,6", "A,0.05,6", 1)), "what")
+@every_case("other", ["Tin_can 1", "tin-can 01", "tin  can 1", "tin can \uff11"])
+def test_labels_that_differ_in_spelling_only_are_noted(csv, other):
+    text = GOOD.replace("\na,", "\ntin can 1,")
+    trials = read_labelled(csv(text.replace("tin can 1", other, 1)), "what")
 
-    assert any("differ in case only" in note for note in trials.notes)
+    assert any("differ in spelling only" in note for note in trials.notes)
+    assert not any("spelling" in note for note in read_labelled(csv(text), "what").notes)
 
 
 def test_instances_order_and_what_is_known_before_the_contact(csv):

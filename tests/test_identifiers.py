@@ -8,9 +8,10 @@ from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.sources.doubtful_columns import keeps_rising
 from graspsense.sources.features_csv import read_labelled
-from graspsense.sources.identifiers import identifies, keeps_rising, text_identifies
+from graspsense.sources.identifiers import identifies, text_identifies
 
 LABELS = ("can",) * 30 + ("jar",) * 30
 N = len(LABELS)
@@ -193,3 +194,93 @@ def test_hashes_are_texts_although_some_have_digits_alone(tmp_path):
 def test_a_column_that_says_the_label_in_other_words_is_told(tmp_path):
     trials = read_labelled(table(tmp_path / "t.csv", "class", [1] * 30 + [2] * 30), "object")
     assert any("class" in note and "label" in note for note in trials.notes)
+
+
+NAMED = {
+    "session": [
+        (1, 2, 3, 4)[i // 15] for i in range(N)
+    ],  # two for each label: too few to be known by their values
+    "Robot ID": [f"arm {i // 20}" for i in range(N)],
+    "operator": ["anna" if i < 27 else "ben" for i in range(N)],
+    "randomSeed": [1234 + 8765 * (i // 30) for i in range(N)],
+    "day [day]": [i // 20 for i in range(N)],
+}
+
+
+@every_case("heading", NAMED)
+def test_what_tells_of_the_recording_by_its_name_is_no_feature(heading, tmp_path):
+    trials = read_labelled(table(tmp_path / "t.csv", heading, NAMED[heading]), "object")
+    assert trials.table.names == ("s",)
+    assert any("to include them" in note for note in trials.notes)
+
+
+def test_what_is_measured_is_a_feature_whatever_else_its_name_says(tmp_path):
+    noise = np.random.default_rng(4).normal(size=N).round(3).tolist()
+    for heading in ("robot_force", "day_temperature", "number", "rise_time [s]"):
+        trials = read_labelled(table(tmp_path / "t.csv", heading, noise), "object")
+        assert len(trials.table.names) == 2
+        assert not any("used, although" in note for note in trials.notes)
+
+
+@every_case("unit", ["hours", "Minutes", "days", "nr", "ID"])
+def test_a_time_or_a_number_is_known_in_any_spelling_of_its_unit(unit):
+    rises = np.cumsum(np.random.default_rng(0).integers(1, 9, N))
+    assert identifies("x", unit, rises, LABELS)
+
+
+def notes_on(path, column, values, labels=LABELS):
+    order = np.random.default_rng(6).permutation(N)  # so that no order of lines shows anything
+    given = [(labels[i], values[i]) for i in order]
+    lines = [f"{label},{value},{i * 7919 % 101 / 17:.4f}" for i, (label, value) in enumerate(given)]
+    path.write_text("\n".join([f"object,{column},s", *lines]) + "\n")
+    return [note for note in read_labelled(path, "object").notes if column.partition(" ")[0] in note]
+
+
+RNG = np.random.default_rng(7)
+NOISE = RNG.normal(6.0, 1.0, N).round(3).tolist()
+DOUBTFUL = {
+    "values of one label each": ("x", [(1, 2, 3, 4)[i // 15] for i in range(N)]),
+    "a time": ("elapsed_h", np.cumsum(RNG.exponential(0.1, N)).round(4).tolist()),
+    "a noisy counter": ("x", (np.arange(N) + RNG.normal(0.0, 0.3, N)).round(3).tolist()),
+    "seconds since 1970 in thousands": (
+        "x",
+        (1.77e6 + 0.037 * np.arange(N) + RNG.uniform(0, 0.02, N)).tolist(),
+    ),
+    "values of one label only": ("x", [*NOISE[:30], *[""] * 30]),
+    "a number for what is missing": ("x", [value if i % 4 else -999 for i, value in enumerate(NOISE)]),
+    "millimetres and metres": ("x", [*NOISE[:30], *[f"{value / 1000:.6f}" for value in NOISE[30:]]]),
+}
+
+
+@every_case("doubt", DOUBTFUL)
+def test_a_column_that_may_reveal_the_labels_is_told(doubt, tmp_path):
+    assert notes_on(tmp_path / "t.csv", *DOUBTFUL[doubt])
+
+
+@given(seed=st.integers(0, 10_000))
+def test_measured_columns_are_not_doubted(tmp_path_factory, seed):
+    rng = np.random.default_rng(seed)
+    path = tmp_path_factory.mktemp("measured") / "t.csv"
+    for values in (
+        rng.normal([0.0] * 30 + [9.0] * 30, 1.0).round(4),  # classes far apart
+        rng.lognormal(0.0, 1.5, N).round(5),
+        np.maximum(rng.normal(0.0, 1.0, N), 0.0).round(4),  # a force that is zero in half of the trials
+        rng.normal([3.0] * 30 + [40.0] * 30, 1.0).round(),
+    ):
+        assert not notes_on(path, "width [mm]", values.tolist())
+
+
+def test_a_number_too_large_to_learn_from_is_refused_by_its_name(tmp_path):
+    with pytest.raises(DataDamaged, match=r"'x' of trial 1 is 1e\+308"):
+        read_labelled(table(tmp_path / "t.csv", "x", [1e308] * 30 + [-1e308] * 30), "object")
+
+
+def test_the_number_to_predict_in_another_unit_is_told(tmp_path):
+    forces = np.random.default_rng(8).normal(12.0, 3.0, N).round(3)
+    widths = np.random.default_rng(9).normal(60.0, 3.0, N).round(3)
+    lines = [f"{force},{1000 * force:.0f},{width}" for force, width in zip(forces, widths, strict=True)]
+    path = tmp_path / "t.csv"
+    path.write_text("\n".join(["break_n,break_mn,width", *lines]) + "\n")
+    notes = read_labelled(path, None, value="break_n").notes
+    assert any("break_mn" in note and "another unit" in note for note in notes)
+    assert not any("width" in note for note in notes)

@@ -102,6 +102,59 @@ def test_train_then_predict(csv, tmp_path):
     assert "unknown counts as wrong" in out
 
 
+def test_a_rate_of_trials_that_were_learned_from_has_no_interval_and_says_so(csv, tmp_path):
+    model, others = tmp_path / "mine.json", tmp_path / "others.csv"
+    header, *lines = csv.read_text().splitlines()
+    # As a spreadsheet saves them: columns in another order, and a value of 66.0 mm without its zero.
+    turned = [",".join([line.split(",")[k] for k in (3, 2, 1, 0)]) for line in [header, *lines]]
+    others.write_text("\n".join(turned).replace("00,", ",") + "\n")
+    graspsense("train", csv, "--label", "what", "--instance", "thing", "--out", model)
+
+    answer = json.loads(printed("predict", model, others, "--label", "what", "--json"))
+    assert answer["rate"]["rate"] > 0.9
+    assert answer["rate"]["interval"] is None
+    assert any("120 of 120 trials were learned from" in warning for warning in answer["warnings"])
+
+
+def test_a_rate_of_predictions_counts_the_objects_of_the_trials(csv, tmp_path):
+    model, others = tmp_path / "mine.json", tmp_path / "others.csv"
+    header, *lines = csv.read_text().splitlines()
+    others.write_text(
+        "\n".join([header, *(f"{line}1" for line in lines)]) + "\n"
+    )  # one digit more: other trials
+    graspsense("train", csv, "--label", "what", "--instance", "thing", "--out", model)
+
+    arguments = ("predict", model, others, "--label", "what", "--json")
+    alone, of_objects = (
+        json.loads(printed(*arguments, *more))["rate"] for more in ((), ("--instance", "thing"))
+    )
+    assert of_objects["instances"] == 6  # in place of 120 independent trials
+    assert of_objects["interval"][0] < alone["interval"][0]
+
+
+@pytest.mark.slow
+def test_a_certainty_by_trials_is_said_to_be_that_of_the_same_objects(tmp_path):
+    # Every object has a width of its own, which its label does not determine: a new one is recognised by chance.
+    rng = np.random.default_rng(2)
+    widths = rng.normal(60.0, 5.0, 40)
+    rows = [
+        f"{('can', 'jar')[k % 2]},thing {k},{widths[k] + 0.05 * rng.normal():.4f}"
+        for k in range(40)
+        for _ in range(4)
+    ]
+    for name, some in (("known.csv", rows[:80]), ("new.csv", rows[80:])):
+        (tmp_path / name).write_text("\n".join(["what,thing,p_first [mm]", *some]) + "\n")
+    said = {}
+    for more in ((), ("--instance", "thing")):
+        model = tmp_path / "m.json"
+        graspsense("train", tmp_path / "known.csv", "--label", "what", *more, "--out", model, "--overwrite")
+        said[more] = json.loads(printed("predict", model, tmp_path / "new.csv", "--label", "what", "--json"))
+    by_trials, by_objects = said.values()
+    assert by_trials["rate"]["rate"] < 0.75
+    assert any("of other objects it knows less" in warning for warning in by_trials["warnings"])
+    assert not any("of other objects" in warning for warning in by_objects["warnings"])
+
+
 def test_a_model_of_states_or_classes(csv, tmp_path):
     model = tmp_path / "states.json"
     code, _, err = graspsense("train", csv, "--label", "what", "--out", model, "--target", "state")

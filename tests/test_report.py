@@ -395,7 +395,7 @@ def test_the_headline_of_an_evaluation_compares_with_guessing(rate, words):
     evaluation = evaluated(right, Difference(rate - 0.5, (rate - 0.6, rate - 0.4)))
 
     assert headline(evaluation).startswith(
-        f"{right} of 100 grasps tell the object and its state ({right} of 100)"
+        f"{right} of 100 grasps tell the object ({right} of 100)"  # the labels have no state
     )
     assert headline(evaluation).endswith(words)
 

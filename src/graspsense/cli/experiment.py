@@ -279,3 +279,21 @@ def _print_rates(summary: Summary) -> None:
     if rows:
         echo_table(("CASE", "TARGET", "RATE", "95 %", "PROTOCOL"), rows)
         echo()
+    _print_doubts(summary)
+
+
+def _print_doubts(summary: Summary) -> None:
+    """Print what the controls and the trials of the first seed say against the rates, each once."""
+    several = len(summary.conditions) > 1
+    warnings = [
+        f"{condition.name}: {warning}" if several else warning
+        for condition in summary.conditions
+        for warning in condition.of_first_seed.warnings
+    ]
+    notes = [note for condition in summary.conditions for note in condition.of_first_seed.notes]
+    for key, texts, style in (("WARNING", warnings, Style.CAUTION), ("note", notes, None)):
+        different = list(dict.fromkeys(texts))
+        for text in different[:_MOST_NAMED]:
+            echo_entry(key, text, style)
+        if len(different) > _MOST_NAMED:
+            echo_entry(key, f"and {len(different) - _MOST_NAMED} more, which --json tells", style)

@@ -14,8 +14,10 @@ from graspsense.cli.terminal import Style, correct_style, echo, echo_entry, echo
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from graspsense.core.learn.labelled import Labelled
     from graspsense.core.learn.model import Model
     from graspsense.core.values.features import FeatureTable, Prediction
+    from graspsense.evaluation.intervals import RecognitionRate
 
 MOST_WITH_REASONS: Final = 1000
 """Largest number of trials whose predictions are given with reasons, which take about a millisecond each."""
@@ -38,9 +40,8 @@ MOST_WITH_REASONS: Final = 1000
 def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     """Predict and print."""
     from graspsense.core.components.registry import installed
+    from graspsense.core.learn.copies import learned_from
     from graspsense.core.learn.model import load_model
-    from graspsense.core.values.errors import ConfigError
-    from graspsense.evaluation.intervals import RecognitionRate
     from graspsense.evaluation.json_codec import to_json
     from graspsense.regression.model import is_regression
 
@@ -52,23 +53,16 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     if given["target_value"]:
         raise click.UsageError(f"--target-value: model {model} predicts a label, not a number")
     asked = load_model(model, installed())
-    table, labels, notes, provenance = _trials(asked, source, given)
-    mismatch = asked.misfit(table)
-    if mismatch:
-        raise ConfigError(mismatch)
+    table, labelled, notes = _trials(asked, source, given)
+    predictions = _predictions(asked, table, {} if labelled is None else labelled.provenance)
     if len(table) > MOST_WITH_REASONS:
-        notes = (
-            *notes,
-            f"more than {MOST_WITH_REASONS} trials: the predictions have no reasons",
-        )
-        predictions = asked.predictions(table, provenance)
-    else:
-        predictions = [asked.predict(table.row(i), provenance=provenance) for i in range(len(table))]
-    rate = None
-    if labels is not None:
-        pairs = zip(predictions, labels, strict=True)
-        rate = RecognitionRate(sum(prediction.label == label for prediction, label in pairs), len(labels))
+        notes = (*notes, f"more than {MOST_WITH_REASONS} trials: the predictions have no reasons")
+    learned = learned_from(asked.learned_from, table.columns(asked.names))
+    labels = None if labelled is None else labelled.labels
+    rate = None if labelled is None else _rate(predictions, labelled, learned)
     warnings = list(dict.fromkeys(warning for prediction in predictions for warning in prediction.warnings))
+    if learned:
+        warnings.append(f"{learned}: their predictions say nothing of other trials")
     if as_json:
         echo_json(
             {
@@ -110,14 +104,14 @@ def _refuse_swapped(model: str, source: str) -> None:
 
 def _trials(
     model: Model, source: str, given: Mapping[str, Any]
-) -> tuple[FeatureTable, tuple[str, ...] | None, tuple[str, ...], Mapping[str, Any]]:
-    """Return the features of the trials, their labels (None if the source has none), notes, and how they were made."""
+) -> tuple[FeatureTable, Labelled | None, tuple[str, ...]]:
+    """Return the features of the trials, the trials with labels (None if the source has none), and notes."""
     from graspsense.cli.progress import ProgressLine
 
     if is_csv(source) and not given["label"]:
         from graspsense.sources.features_csv import read_table
 
-        return read_table(Path(source), model.names), None, (), {}
+        return read_table(Path(source), model.names), None, ()
     with ProgressLine() as progress:
         labelled = trials_of(
             source,
@@ -125,7 +119,28 @@ def _trials(
             {**given, "features": given["features"] or model.names},
             copies=True,
         )
-    return labelled.table, labelled.aimed(model.target).labels, labelled.notes, labelled.provenance
+    return labelled.table, labelled.aimed(model.target), labelled.notes
+
+
+def _predictions(asked: Model, table: FeatureTable, provenance: Mapping[str, Any]) -> list[Prediction]:
+    """Return the prediction of each trial, with reasons unless there are many. Raises ConfigError, DataDamaged."""
+    from graspsense.core.values.errors import ConfigError
+
+    if mismatch := asked.misfit(table):
+        raise ConfigError(mismatch)
+    if len(table) > MOST_WITH_REASONS:
+        return asked.predictions(table, provenance)
+    return [asked.predict(table.row(i), provenance=provenance) for i in range(len(table))]
+
+
+def _rate(predictions: Sequence[Prediction], labelled: Labelled, learned: str) -> RecognitionRate:
+    """Return the rate of these predictions; `learned` says which trials were learned from, and leaves no interval."""
+    from graspsense.evaluation.intervals import rate_of
+
+    right = [
+        prediction.label == label for prediction, label in zip(predictions, labelled.labels, strict=True)
+    ]
+    return rate_of(right, labelled.instances, learned or labelled.no_interval)
 
 
 def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) -> None:

@@ -105,18 +105,26 @@ def train_value(
 
 def predict_value(model_name: str, source: str, as_json: bool, given: Mapping[str, Any]) -> None:
     """Predict a number for each trial, and compare it with the true one if --target-value names it."""
+    from attrs import evolve
+
+    from graspsense.core.learn.copies import learned_from, row_hashes
     from graspsense.evaluation.json_codec import to_json
     from graspsense.regression.error import error_of
     from graspsense.regression.model import load_regression
 
     model = load_regression(model_name)
-    table, truth, notes = _to_predict(model, source, given)
+    table, labelled, notes = _to_predict(model, source, given)
     predictions = model.predict(table)
-    error = None
-    if truth is not None:
-        error = error_of(
-            [prediction.value - true for prediction, true in zip(predictions, truth, strict=True)], None
-        )
+    warnings, error, truth = list(model.warnings), None, None
+    learned = learned_from(row_hashes(model.table), table.columns(model.table.names))
+    if learned:
+        warnings.append(f"{learned}: their predictions say nothing of other trials")
+    if labelled is not None and labelled.value is not None:
+        truth = labelled.value.values
+        errors = [prediction.value - true for prediction, true in zip(predictions, truth, strict=True)]
+        error = error_of(errors, labelled.instances)
+        if learned:
+            error = evolve(error, interval=None, no_interval=learned)
     if as_json:
         echo_json(
             {
@@ -134,7 +142,7 @@ def predict_value(model_name: str, source: str, as_json: bool, given: Mapping[st
                     for i, prediction in enumerate(predictions)
                 ],
                 "error": None if error is None else to_json(error),
-                "warnings": list(model.warnings),
+                "warnings": warnings,
                 "notes": list(notes),
             }
         )
@@ -144,7 +152,7 @@ def predict_value(model_name: str, source: str, as_json: bool, given: Mapping[st
     if error is not None:
         echo_entry("error", f"{error.words(model.target.unit)} on average, in absolute value")
     echo_entry("model", model.in_a_line)
-    for text in model.warnings:
+    for text in warnings:
         echo_entry("warning", text, Style.CAUTION)
     for text in notes:
         echo_entry("note", text)
@@ -160,8 +168,8 @@ def _trials(source: str, estimator: str | None, progress: ProgressLine, given: M
 
 def _to_predict(
     model: RegressionModel, source: str, given: Mapping[str, Any]
-) -> tuple[FeatureTable, Sequence[float] | None, tuple[str, ...]]:
-    """Return the features of the trials, the true numbers (None if they are not named), and notes."""
+) -> tuple[FeatureTable, Labelled | None, tuple[str, ...]]:
+    """Return the features of the trials, the trials with true numbers (None if they are not named), and notes."""
     from graspsense.cli.progress import ProgressLine
     from graspsense.core.values.errors import ConfigError
 
@@ -179,7 +187,7 @@ def _to_predict(
             f"model {model.name!r} predicts {model.target.name} in {model.target.unit}; {labelled.value.name} of "
             f"{source} is in {labelled.value.unit}"
         )
-    return labelled.table, labelled.value.values, labelled.notes
+    return labelled.table, labelled, labelled.notes
 
 
 def _print_predictions(

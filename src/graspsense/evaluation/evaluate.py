@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import groupby
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -15,7 +16,8 @@ from attrs import frozen
 
 from graspsense.core.components.config import select_component
 from graspsense.core.learn.labelled import TARGETS, ControlFeatures, Labelled, Target, class_of
-from graspsense.core.values.errors import ConfigError, counted
+from graspsense.core.values.errors import ConfigError, counted, listed
+from graspsense.core.values.label_text import spelled_alike
 from graspsense.evaluation.confusion import confusion
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, Groups, Pooled, cross_validate
 from graspsense.evaluation.doubt import reliability, set_coverage
@@ -128,11 +130,15 @@ def _check_arguments(labelled: object, target: str) -> None:
 
 @frozen
 class _Headline:
-    """The predictions that the headline is about, with their protocol and folds."""
+    """The predictions that the headline is about, with their protocol and folds.
+
+    `assign` makes such folds for other labels of the same trials.
+    """
 
     protocol: str
     pooled: Pooled
     folds: list[Folds]
+    assign: Callable[[Sequence[str]], list[Folds]]
 
 
 class _Evaluator:
@@ -160,13 +166,18 @@ class _Evaluator:
         self.predicted_by_control: dict[str, tuple[Pooled, list[int]]] = {}
         """The predictions of the controls with other features, and the trials that these are of."""
         self._note_small_labels()
-        self._note_few_instances()
+        self._note_instances()
+        self._note_blocks()
 
     def measure_protocols(self) -> tuple[_Headline, dict[str, Measurement]]:
         """Measure the rate under each protocol. The headline holds out whole instances if that is possible."""
-        folds = self._folds(lambda labels, rows: stratified(labels, self.k, self.seed))
+
+        def assign(labels: Sequence[str]) -> list[Folds]:
+            return self._folds(lambda of_group, rows: stratified(of_group, self.k, self.seed), labels)
+
+        folds = assign(self.labels)
         plain = self._pooled(self.stratified_name, self.trials.table, folds)
-        headline = _Headline(self.stratified_name, plain, folds)
+        headline = _Headline(self.stratified_name, plain, folds, assign)
         held, measured = self._instance_held_out(plain)
         if held is not None:
             self.pooled_by_protocol[INSTANCE_HELD_OUT] = held.pooled
@@ -307,17 +318,48 @@ class _Evaluator:
         if few:
             self.notes.append(f"labels with fewer trials than folds ({self.k}): {', '.join(few)}")
 
-    def _note_few_instances(self) -> None:
-        if self.trials.instances is not None:
-            count = len(set(self.trials.instances))
-            if count < MIN_INSTANCES:
-                self.notes.append(
-                    f"{counted(count, 'instance')}: with fewer than {MIN_INSTANCES}, rates and differences have "
-                    "no interval, and the controls give no warning"
-                )
+    def _note_instances(self) -> None:
+        """Note what makes the instances of these trials less than other objects."""
+        if self.trials.instances is None:
+            return
+        count = len(set(self.trials.instances))
+        if count < MIN_INSTANCES:
+            self.notes.append(
+                f"{counted(count, 'instance')}: with fewer than {MIN_INSTANCES}, rates and differences have "
+                "no interval, and the controls give no warning"
+            )
+        if count == len(self.labels) and not self.trials.provenance.get("simulated"):
+            self.notes.append(
+                "each trial has an instance of its own: if these are numbers of trials, grasps of the same object are "
+                "in training and test, and the rate is not that of other objects"
+            )
+        if pairs := spelled_alike(self.trials.instances):
+            alike = listed([f"{name!r} and {other!r}" for name, other in pairs])
+            self.notes.append(
+                f"instances that differ in spelling only count as two: {alike}. If they are one object, its grasps are "
+                "in training and test"
+            )
 
-    def _folds(self, assign: Callable[[Sequence[str], Any], Folds]) -> list[Folds]:
-        return [assign([self.labels[i] for i in rows], rows) for rows in self.groups]
+    def _note_blocks(self) -> None:
+        """Note that drift can tell recorded labels, and that no control shows it, where each label is one block."""
+        order = self.trials.order
+        if order is None or self.trials.provenance.get("simulated"):
+            return
+        in_time = [self.labels[i] for i in np.argsort(order, kind="stable").tolist()]
+        blocks = sum(1 for _ in groupby(in_time))
+        if blocks == len(set(in_time)) < len(in_time):
+            self.notes.append(
+                "in the order of recording, the trials of each label are one block: what changes with time, such as a "
+                "temperature or the zero of a sensor, may tell the labels, and recording_order cannot show it. Grasp "
+                "the objects in turn"
+            )
+
+    def _folds(
+        self, assign: Callable[[Sequence[str], Any], Folds], labels: Sequence[str] | None = None
+    ) -> list[Folds]:
+        """Return the folds of each group, for these labels (default: those of the trials)."""
+        labels = self.labels if labels is None else labels
+        return [assign([labels[i] for i in rows], rows) for rows in self.groups]
 
     def _pooled(
         self,
@@ -364,14 +406,21 @@ class _Evaluator:
         if single:
             reason = f"labels with a single instance, which cannot be held out: {', '.join(single)}"
             return None, Measurement(what, reason=reason)
-        folds = self._folds(
-            lambda labels, rows: instance_held_out(labels, [instances[i] for i in rows], self.k, self.seed)
-        )
+
+        def assign(labels: Sequence[str]) -> list[Folds]:
+            return self._folds(
+                lambda of_group, rows: instance_held_out(
+                    of_group, [instances[i] for i in rows], self.k, self.seed
+                ),
+                labels,
+            )
+
+        folds = assign(self.labels)
         try:
             held = self._pooled(INSTANCE_HELD_OUT, self.trials.table, folds)
         except FitRefused as refusal:
             return None, Measurement(what, reason=str(refusal))
-        headline = _Headline(INSTANCE_HELD_OUT, held, folds)
+        headline = _Headline(INSTANCE_HELD_OUT, held, folds, assign)
         return headline, self._against(what, held, plain, self.stratified_name)
 
     def _in_order(self) -> Measurement:
@@ -440,17 +489,20 @@ class _Evaluator:
         """Measure the rate on labels that carry no information, and the permutation p of the headline.
 
         The labels of whole instances are exchanged, so that shuffled trials depend on each other as the real ones do.
+        The folds are stratified by the shuffled labels: in those of the real ones, a label that is frequent in a fold
+        would be rare in its training trials, so that shuffled rates would be too low.
         p is (b + 1) / (m + 1), with b of m permutations at least as good as the headline (B. Phipson and G. K. Smyth,
         Stat. Appl. Genet. Mol. Biol. 9 (2010) 39).
         """
-        what = f"mean of {permutations} permutations of the labels, in the folds of the headline"
+        what = f"mean of {permutations} permutations of the labels, each in folds like those of the headline"
         rng = np.random.default_rng(self.seed)
         counts = []
         for k in range(permutations):
             shuffled = self._permuted(rng)
             name = f"shuffled_labels {k + 1}/{permutations}"
             try:
-                pooled = self._pooled(name, self.trials.table, headline.folds, labels=shuffled)
+                folds = headline.assign(shuffled)
+                pooled = self._pooled(name, self.trials.table, folds, labels=shuffled)
             except FitRefused as refusal:
                 return Measurement(what, reason=str(refusal))
             counts.append(sum(pooled.right(shuffled)))

@@ -191,6 +191,22 @@ def difference(
     return Difference(value, (max(low, -1.0), min(high, 1.0)))
 
 
+def unpaired_difference(
+    minuend: float, subtrahend: float, intervals: tuple[Interval, Interval], comparisons: float = 1.0
+) -> Difference:
+    """Return the difference of two rates whose trials are not paired, from the 95 % intervals of both.
+
+    The method is that of squares (R. G. Newcombe, Statistics in Medicine 17 (1998) 873, method 10), widened for a
+    number of comparisons (Bonferroni).
+    """
+    high, low = intervals
+    wider = _z(comparisons) / Z
+    below = wider * math.hypot(minuend - high[0], low[1] - subtrahend)
+    above = wider * math.hypot(high[1] - minuend, subtrahend - low[0])
+    value = minuend - subtrahend
+    return Difference(value, (max(value - below, -1.0), min(value + above, 1.0)))
+
+
 def mean_interval(
     values: Sequence[float], instances: Sequence[str] | None = None
 ) -> tuple[Interval | None, str]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from attrs import field, frozen
 
-from graspsense.core.learn.labelled import Target
+from graspsense.core.learn.labelled import Target, recognised
 from graspsense.core.values.printable import in_one_line
 from graspsense.core.values.short_html import sentence, table
 from graspsense.evaluation.confusion import Confusion
@@ -80,6 +80,11 @@ class Evaluation:
     """The coverage of the prediction sets, on the trials and folds of the headline."""
     reliability: Reliability | None = None
     """How well the probabilities of the headline agree with the rate."""
+
+    @property
+    def recognised(self) -> Target:
+        """What a correct prediction recognises: the target, or the class if the labels have no state."""
+        return recognised(self.target, self.confusion.labels)
 
     def __repr__(self) -> str:
         return in_one_line(f"<Evaluation: {self._words()}>")

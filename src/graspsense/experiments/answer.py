@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from graspsense.evaluation.equivalence import MARGIN, Verdict, verdict_on
+from graspsense.evaluation.intervals import unpaired_difference
 from graspsense.evaluation.over_seeds import MeanDifference
 from graspsense.experiments.summary import ConditionResult, Summary
 from graspsense.report.verdict import in_hundred
@@ -60,13 +61,25 @@ def _worst(conditions: Sequence[ConditionResult]) -> ConditionResult:
 
 
 def _verdict(conditions: Sequence[ConditionResult], best: ConditionResult) -> Verdict:
-    """Return whether the highest and the lowest rate differ, corrected for the number of cases."""
+    """Return whether the highest and the lowest rate differ, corrected for the number of pairs of cases.
+
+    Two of many rates are the highest and the lowest by chance. Rates that are not paired by seed differ if their
+    intervals do not overlap, and if the interval of the difference says so too.
+    """
     worst = _worst(conditions)
-    gap = best.minus(worst, comparisons=len(conditions) - 1)
+    gap = best.minus(worst, comparisons=_pairs(conditions))
     if gap is not None:
         return verdict_on(gap.interval)
     low, high = best.rate.interval, worst.rate.interval
-    return "differs" if low is not None and high is not None and high[1] < low[0] else "cannot be told"
+    if low is None or high is None or high[1] >= low[0]:
+        return "cannot be told"
+    unpaired = unpaired_difference(best.rate.mean, worst.rate.mean, (low, high), _pairs(conditions))
+    return "differs" if unpaired.is_positive else "cannot be told"
+
+
+def _pairs(conditions: Sequence[ConditionResult]) -> int:
+    """Return the number of pairs of conditions, of which the highest and the lowest rate are one."""
+    return len(conditions) * (len(conditions) - 1) // 2
 
 
 def _comparison(conditions: Sequence[ConditionResult], best: ConditionResult) -> str:
@@ -76,7 +89,7 @@ def _comparison(conditions: Sequence[ConditionResult], best: ConditionResult) ->
     if ends is not None and change is not None:
         return f"From {ends[0].name} to {ends[1].name} the rate changes by {_points(change)}."
     worst = _worst(conditions)
-    gap = best.minus(worst, comparisons=len(conditions) - 1)
+    gap = best.minus(worst, comparisons=_pairs(conditions))
     name = _capitalised(worst.name)
     if gap is not None:
         return f"{name} has the lowest rate, {_rate(worst)}; the difference is {_points(gap)}."
@@ -85,6 +98,10 @@ def _comparison(conditions: Sequence[ConditionResult], best: ConditionResult) ->
         return f"{name} has the lowest rate, {_rate(worst)}; without intervals the difference may be chance."
     if high[1] >= low[0]:
         return f"{name} has the lowest rate, {_rate(worst)}; as the intervals overlap, the difference may be chance."
+    if _verdict(conditions, best) != "differs":
+        return (
+            f"{name} has the lowest rate, {_rate(worst)}; among {len(conditions)} cases this may be chance."
+        )
     return f"{name} has the lowest rate, {_rate(worst)}."
 
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from statistics import NormalDist
 from typing import TYPE_CHECKING, Any, Final
 
 from attrs import frozen
@@ -14,7 +12,7 @@ from attrs import frozen
 from graspsense import __version__
 from graspsense.core.components.strict import plain
 from graspsense.core.values.errors import ConfigError, DataDamaged, counted
-from graspsense.evaluation.intervals import Difference
+from graspsense.evaluation.intervals import Difference, unpaired_difference
 from graspsense.experiments.experiment import PIPELINE_TABLES, shown
 from graspsense.experiments.results import EXPERIMENT, RESULTS, Results
 from graspsense.experiments.summary import ConditionResult, Summary, summarise
@@ -344,13 +342,11 @@ def _difference(result: ConditionResult, other: ConditionResult, comparisons: in
         reason = "the trials differ"
     else:
         reason = f"{counted(len(common), 'common seed')}, two are needed"
-    value = result.rate.mean - other.rate.mean
-    high, low = result.rate.interval, other.rate.interval
-    if high is None or low is None:
+    intervals = result.rate.interval, other.rate.interval
+    if intervals[0] is None or intervals[1] is None:
+        value = result.rate.mean - other.rate.mean
         return Difference(value, None, "a rate has none"), f"unpaired: {reason}"
-    # Newcombe's method of squares (Stat. Med. 17, 1998, 873, method 10), widened for several comparisons.
-    wider = NormalDist().inv_cdf(1 - 0.025 / comparisons) / NormalDist().inv_cdf(0.975)
-    below = wider * math.hypot(result.rate.mean - high[0], low[1] - other.rate.mean)
-    above = wider * math.hypot(high[1] - result.rate.mean, other.rate.mean - low[0])
-    interval = (max(value - below, -1.0), min(value + above, 1.0))
-    return Difference(value, interval), f"unpaired: {reason}{corrected}"
+    unpaired = unpaired_difference(
+        result.rate.mean, other.rate.mean, (intervals[0], intervals[1]), comparisons
+    )
+    return unpaired, f"unpaired: {reason}{corrected}"

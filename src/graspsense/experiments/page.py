@@ -269,7 +269,10 @@ def _made_of(summary: Summary, results: Results) -> Section:
     made = results.provenance()
     experiment = summary.planned.experiment
     result = next(iter(summary.results.values()), None)
-    notes = result.notes if isinstance(result, RecognitionResult) else ()
+    notes: list[str] = []
+    if isinstance(result, RecognitionResult):
+        of_classifiers = (note for classifier in result.classifiers for note in classifier.notes)
+        notes = list(dict.fromkeys((*result.notes, *of_classifiers)))
     pairs = [
         ("experiment", f"{summary.planned.name} ({experiment.kind})"),
         ("command", str(made.get("command", ""))),

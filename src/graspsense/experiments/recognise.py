@@ -14,8 +14,9 @@ from graspsense.core.components.registry import installed
 from graspsense.core.components.strict import structured
 from graspsense.core.learn.copies import apart_from, without_copies
 from graspsense.core.learn.labelled import class_of
-from graspsense.core.values.errors import ConfigError, counted
+from graspsense.core.values.errors import ConfigError, counted, listed
 from graspsense.evaluation.evaluate import evaluate
+from graspsense.evaluation.folds import trials_by_class
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.experiments.task_results import (
     MOST_KEPT_GRASPS,
@@ -193,24 +194,39 @@ def _on_other_trials(
     note = (
         f"trained on {counted(len(data), 'trial')} of {data.source}, tested on {len(true)} of {test.source}"
     )
-    notes = (note, *test.notes, *told)
-    return ClassifierResult.from_answers(name, target, OTHER_TRIALS, true, predicted, notes=notes, tree=tree)
+    notes = (note, *_note_same_objects(data, test), *test.notes, *told)
+    return ClassifierResult.from_answers(
+        name, target, OTHER_TRIALS, true, predicted, test, notes=notes, tree=tree
+    )
+
+
+def _note_same_objects(data: Labelled, test: Labelled) -> list[str]:
+    """Return a note if recorded trials to test on are of objects that are learned from."""
+    if data.instances is None or test.instances is None or data.provenance.get("simulated"):
+        return []
+    tested = set(test.instances)
+    same = sorted(tested & set(data.instances))
+    if not same:
+        return []
+    return [
+        f"{len(same)} of {counted(len(tested), 'instance')} to test on are learned from too, so that the rate is not "
+        f"that of other objects: {listed(same)}"
+    ]
 
 
 def true_and_predicted(
     learner: SelectedComponent, training: Labelled, test: Labelled, target: Target, seed: int
 ) -> tuple[list[str], list[str]]:
     """Return the labels of other trials, true and predicted, with a model for each class if the target is `state`."""
-    classes = {""} if target != "state" else {class_of(label) for label in test.labels}
-    true: list[str] = []
-    predicted: list[str] = []
-    for name in sorted(classes):
-        known, tested = (trials.of_class(name) if name else trials for trials in (training, test))
-        if target == "class":
-            known, tested = known.aimed("class"), tested.aimed("class")
-        true += tested.labels
-        predicted += predictions(learner, known.table, known.labels, tested.table, seed)
-    return true, predicted
+    if target == "class":
+        training, test = training.aimed("class"), test.aimed("class")
+    predicted = [""] * len(test)
+    for rows in trials_by_class(test.labels, target):
+        known = training.of_class(class_of(test.labels[int(rows[0])])) if target == "state" else training
+        answers = predictions(learner, known.table, known.labels, test.table.rows(rows), seed)
+        for i, answer in zip(rows.tolist(), answers, strict=True):
+            predicted[i] = answer
+    return list(test.labels), predicted
 
 
 def predictions(

@@ -9,7 +9,7 @@ from typing import Any
 from attrs import evolve, field, frozen
 
 from graspsense.core.components.caller import option
-from graspsense.core.learn.labelled import Target
+from graspsense.core.learn.labelled import Target, recognised
 from graspsense.core.values.errors import ConfigError, counted
 from graspsense.evaluation.confusion import Confusion
 from graspsense.evaluation.intervals import RecognitionRate
@@ -63,8 +63,7 @@ class ConditionResult:
     @property
     def recognised(self) -> Target:
         """What a correct prediction recognises: the target, or the class if labels have no state."""
-        no_state = not any(":" in label for label in self.of_first_seed.confusion.labels)
-        return "class" if self.target == "both" and no_state else self.target
+        return recognised(self.target, self.of_first_seed.confusion.labels)
 
     @property
     def rates(self) -> dict[int, float]:
@@ -187,6 +186,8 @@ class Summary:
                     "prediction_interval": None
                     if condition.rate.prediction is None
                     else list(condition.rate.prediction),
+                    "warnings": list(condition.of_first_seed.warnings),
+                    "notes": list(condition.of_first_seed.notes),
                 }
                 for condition in self.conditions
             ],

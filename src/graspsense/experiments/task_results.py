@@ -11,7 +11,7 @@ from attrs import field, frozen
 from graspsense.core.learn.labelled import Target
 from graspsense.core.values.tree import TreeNode
 from graspsense.evaluation.confusion import Confusion, confusion
-from graspsense.evaluation.intervals import RecognitionRate
+from graspsense.evaluation.intervals import RecognitionRate, rate_among, rate_of
 from graspsense.evaluation.results import Measurement
 from graspsense.report.grasp_curve import GraspCurve
 
@@ -51,15 +51,20 @@ class ClassifierResult:
         protocol: str,
         true: Sequence[str],
         predicted: Sequence[str],
+        trials: Labelled | None = None,
         **more: Any,
     ) -> ClassifierResult:
-        """Return the result of these predictions; `more` are further fields."""
+        """Return the result of these predictions; `more` are further fields.
+
+        If the answers are those of `trials`, in their order, the interval takes their instances into account.
+        """
         matrix = confusion(true, predicted)
+        right = [answer == label for answer, label in zip(predicted, true, strict=True)]
         return cls(
             classifier=classifier,
             target=target,
             protocol=protocol,
-            rate=RecognitionRate(matrix.correct, matrix.n),
+            rate=rate_of(right) if trials is None else rate_among(trials, right),
             confusion=matrix,
             **more,
         )

@@ -24,7 +24,7 @@ from graspsense.core.learn.novelty import Novelty, novelty_of
 from graspsense.core.learn.stored_values import LARGEST_SEED, StoredValues
 from graspsense.core.learn.target_value import TargetValue
 from graspsense.core.values.errors import ConfigError, DataDamaged, counted
-from graspsense.core.values.features import FeatureTable
+from graspsense.core.values.features import FeatureTable, misfit
 from graspsense.core.values.json_values import json_ready
 from graspsense.regression.estimators import ESTIMATORS, FittedRegression
 from graspsense.regression.evaluate import held_out_folds, held_out_predictions, interval_radius
@@ -83,16 +83,9 @@ class RegressionModel:
 
     def predict(self, table: FeatureTable) -> list[PredictedValue]:
         """Return the prediction of each trial. Raises ConfigError if a feature is missing, or has another unit."""
-        lacking = [name for name in self.table.names if name not in table.names]
-        if lacking:
-            raise ConfigError(
-                f"model {self.name!r} takes the features {', '.join(self.table.names)}; there is no "
-                f"{', '.join(lacking)} here (there are: {', '.join(table.names)})"
-            )
+        if why := misfit(f"model {self.name!r}", self.table.names, self.table.units, table):
+            raise ConfigError(why)
         chosen = table.columns(self.table.names)
-        for name, own, given in zip(self.table.names, self.table.units, chosen.units, strict=True):
-            if own and given and own != given:
-                raise ConfigError(f"model {self.name!r} takes {name} in {own}; here it is in {given}")
         half = self.half_width
         return [
             PredictedValue(

@@ -31,7 +31,7 @@ def evaluation_page(
     return Page(
         kind="Evaluation",
         title=evaluation.source,
-        question=f"Is {TARGETS[evaluation.target]} recognised by touch?",
+        question=f"Is {TARGETS[evaluation.recognised]} recognised by touch?",
         answer=verdict(evaluation),
         headline=headline(evaluation),
         beside=beside(evaluation, labelled),
@@ -51,9 +51,10 @@ def beside(evaluation: Evaluation, labelled: Labelled) -> str:
     )
     text = (
         "A gripper closes two fingers with force sensors on an object that it cannot see into. Each grasp gives a few "
-        f"numbers ({', '.join(labelled.table.names)}), from which a classifier learns {TARGETS[evaluation.target]}. "
-        f"There are {len(evaluation.confusion.labels)} possible answers.{guessing} Every grasp is classified by "
-        f"{protocol_words(evaluation.protocol)}. A 95 % interval contains the true rate in 95 of 100 such collections."
+        f"numbers ({', '.join(labelled.table.names)}), from which a classifier learns "
+        f"{TARGETS[evaluation.recognised]}. There are {len(evaluation.confusion.labels)} possible answers."
+        f"{guessing} Every grasp is classified by {protocol_words(evaluation.protocol)}. "
+        "A 95 % interval contains the true rate in 95 of 100 such collections."
     )
     notes = list(evaluation.notes)
     if labelled.provenance.get("simulated") and not any("simulated" in note for note in notes):

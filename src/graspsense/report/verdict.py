@@ -29,7 +29,7 @@ def verdict(evaluation: Evaluation) -> str:
 def headline(evaluation: Evaluation) -> str:
     """Return the result as a person would say it, for the head of a page."""
     told = (
-        f"{in_hundred(evaluation.headline.rate)} grasps tell {TARGETS[evaluation.target]} "
+        f"{in_hundred(evaluation.headline.rate)} grasps tell {TARGETS[evaluation.recognised]} "
         f"({evaluation.headline.correct} of {evaluation.headline.n})"
     )
     majority = evaluation.controls.get("majority_class")
@@ -58,7 +58,7 @@ def _rate(evaluation: Evaluation) -> str:
         protocol = "objects of which other grasps may have been used for training"
     interval = f"95 %: {percentages(rate.interval)}" if rate.interval else f"no interval: {rate.no_interval}"
     return (
-        f"{name} recognises {TARGETS[evaluation.target]} in {percentage(rate.rate)} of {trials} "
+        f"{name} recognises {TARGETS[evaluation.recognised]} in {percentage(rate.rate)} of {trials} "
         f"({interval}), on {protocol}."
     )
 

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -20,15 +20,19 @@ from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.target_value import TargetValue
 from graspsense.core.values.errors import ConfigError, DataDamaged, counted, listed
 from graspsense.core.values.features import UNKNOWN, FeatureTable
-from graspsense.core.values.label_text import is_missing_label, label_text
+from graspsense.core.values.label_text import is_missing_label, label_text, spelled_alike
 from graspsense.core.values.nominal import splits_of
 from graspsense.core.values.written_numbers import is_missing
 from graspsense.recording.atomic_file import write_or_replace
 from graspsense.recording.controls import Controls, controls
 from graspsense.sources.arff_columns import ArffColumns
 from graspsense.sources.csv_columns import CsvColumns
+from graspsense.sources.doubtful_columns import doubts
 from graspsense.sources.exported_table import ExportedTable, exported
-from graspsense.sources.identifiers import identifies, keeps_rising, says_the_label, text_identifies
+from graspsense.sources.identifiers import identifies, names_a_recording, text_identifies
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 SMALL: Final = 1e-3
 """A column that varies by less than this has few values that differ by J48's 1e-5."""
@@ -74,8 +78,9 @@ def read_labelled(
     ranks, no_order = _order(columns, order, export, notes)
     identified = partial(_identified, columns, labels, ranks) if export is None else _measured
     table = _feature_table(columns, features, reserved, identified, notes)
-    if export is None and target is None:
-        notes += _doubts(columns, labels, [name for name in columns.names if name not in reserved], table)
+    if export is None:
+        others = [name for name in columns.names if name not in reserved]
+        notes += doubts(columns, labels, others, table, None if target is None else target.values)
     _note_similar_labels(labels, notes)
     return Labelled(
         source=str(path),
@@ -182,11 +187,9 @@ def _labels(columns: CsvColumns, label: str | None, notes: list[str]) -> list[st
 
 
 def _note_similar_labels(labels: Sequence[str], notes: list[str]) -> None:
-    folded = {label.casefold(): label for label in labels}
-    for label in sorted(set(labels)):
-        other = folded[label.casefold()]
-        if other != label:
-            notes.append(f"labels {label!r} and {other!r} differ in case only and count as two")
+    if pairs := spelled_alike(labels):
+        alike = listed([f"{label!r} and {other!r}" for label, other in pairs])
+        notes.append(f"labels that differ in spelling only count as two: {alike}")
 
 
 def _ranks(columns: CsvColumns, order: str | None, notes: list[str]) -> tuple[int, ...]:
@@ -203,30 +206,12 @@ def _ranks(columns: CsvColumns, order: str | None, notes: list[str]) -> tuple[in
 def _identified(columns: CsvColumns, labels: Sequence[str], order: Sequence[int] | None, name: str) -> str:
     """Return how a column identifies trials, empty if it can be a feature. Raises DataDamaged."""
     if columns.is_nominal(name):
-        return text_identifies(columns.texts(name), labels)
-    return identifies(name, columns.units[name], columns.numbers(name), labels, order)
-
-
-def _doubts(
-    columns: CsvColumns, labels: Sequence[str], names: Sequence[str], table: FeatureTable
-) -> list[str]:
-    """Return notes on features that may reveal the labels, although no value shows it for certain."""
-    used = [name for name in names if set(columns.columns_of(name)) <= set(table.names)]
-    number = [name for name in used if not columns.is_nominal(name)]
-    rising = [name for name in number if keeps_rising(columns.numbers(name))]
-    same = [name for name in used if says_the_label(columns.cells[name], labels)]
-    notes = []
-    if rising:
-        notes.append(
-            f"used, although every line has more than the one before, or every line less: {listed(rising)}. If it is a "
-            f"time or a counter it reveals the labels: leave it out ({option('features', python='columns')})"
-        )
-    if same:
-        notes.append(
-            f"used, although each label has one value of its own: {listed(same)}. If it is the label in other words, "
-            f"leave it out ({option('features', python='columns')})"
-        )
-    return notes
+        why = text_identifies(columns.texts(name), labels)
+    else:
+        why = identifies(name, columns.units[name], columns.numbers(name), labels, order)
+    if not why and names_a_recording(name):
+        return "tell of the recording and not of the grasp, by their name"
+    return why
 
 
 def _measured(name: str) -> str:
@@ -306,7 +291,7 @@ def _note_uninformative_columns(path: Path, table: FeatureTable, notes: list[str
         notes.append(f"without any value: {listed(blank)}")
     if constant:
         notes.append(f"constant, and so without information: {listed(constant)}")
-    small = [name for name, values in having if len(values) and 0.0 < np.ptp(values) < SMALL]
+    small = [name for name, values in having if len(values) and 0.0 < _span(values) < SMALL]
     if small:
         notes.append(
             f"{listed(small)} varies by less than {SMALL:g} in its unit: the classifiers of graspsense answer as they "
@@ -317,3 +302,8 @@ def _note_uninformative_columns(path: Path, table: FeatureTable, notes: list[str
         notes.append(f"{share:.1%} of all values are missing")
     if len(blank) == len(table.names):
         raise DataDamaged(f"{path}: no feature has any value: {listed(blank)}")
+
+
+def _span(values: NDArray[np.float64]) -> float:
+    """Return the difference of the largest and the smallest value; infinite where it is too large for a number."""
+    return float(values.max()) - float(values.min())

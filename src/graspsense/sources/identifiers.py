@@ -19,18 +19,31 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from graspsense.core.learn.copies import cells_in_range
+from graspsense.core.values.features import LARGEST_VALUE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_COUNTED: Final = frozenset({"", "1", "-", "#", "count", "counts"})
-_TIMES: Final = frozenset({"s", "sec", "ms", "us", "µs", "ns", "min", "h", "d"})
+_COUNTED: Final = frozenset({"", "1", "-", "#", "count", "counts", "nr", "no", "id", "index", "none", "n/a"})
+"""What stands in the place of a unit for numbers without one."""
+TIMES: Final = frozenset({
+    "s", "sec", "secs", "second", "seconds", "ms", "msec", "us", "µs", "ns", "min", "mins", "minute", "minutes",
+    "h", "hr", "hrs", "hour", "hours", "d", "day", "days",
+})  # fmt: skip
 _NAMES: Final = frozenset({
     "id", "uid", "uuid", "index", "idx", "number", "num", "no", "nr", "trial", "run", "row", "line", "record",
     "seq", "sequence", "serial", "counter", "file", "filename", "session", "date", "timestamp", "time",
     "epoch"
 })  # fmt: skip
-_LEAST: Final = 5
+_OF_RECORDINGS: Final = frozenset({
+    "session", "operator", "experimenter", "person", "user", "robot", "host", "seed", "batch", "weekday", "day", "date",
+    "datetime", "trial", "fold", "split", "file", "filename", "uid", "uuid",
+})  # fmt: skip
+"""What a recording is known by; no gripper measures it."""
+_NUMBERED: Final = frozenset(
+    {"id", "no", "nr", "num", "number", "index", "idx", "name", "code", "of", "the", "random"}
+)
+LEAST_LINES: Final = 5
 """Lines from which on the values of a column can show that it is an identifier."""
 _FOLLOWS: Final = 0.95
 """Rank correlation with the lines, within each label, of a counter or a clock."""
@@ -59,6 +72,16 @@ _WEEKDAYS: Final = frozenset(["monday", "tuesday", "wednesday", "thursday", "fri
 _DATES: Final = ("%Y%m%d", "%Y%m%d%H%M", "%Y%m%d%H%M%S")
 
 
+def names_a_recording(name: str) -> bool:
+    """Return whether a heading says who recorded, when, in which session or with which device.
+
+    >>> names_a_recording("session_id"), names_a_recording("trial"), names_a_recording("robot_force")
+    (True, True, False)
+    """
+    words = set(words_in(name))
+    return bool(words & _OF_RECORDINGS) and words <= _OF_RECORDINGS | _NUMBERED
+
+
 def identifies(
     name: str, unit: str, values: Sequence[float], labels: Sequence[str], order: Sequence[int] | None = None
 ) -> str:
@@ -67,12 +90,12 @@ def identifies(
     `values` are NaN where they are missing. `order` is the position of each line in the order of recording, where that
     is not the order of the lines.
     """
-    if unit not in _COUNTED | _TIMES:
+    if not (is_count(unit) or is_time(unit)):
         return ""
     column = np.array(values, dtype=np.float64)
     given = np.flatnonzero(~np.isnan(column))
     column, known = column[given], [labels[i] for i in given.tolist()]
-    if len(column) < _LEAST or column.min() == column.max():
+    if len(column) < LEAST_LINES or column.min() == column.max() or np.abs(column).max() > LARGEST_VALUE:
         return ""
     if _is_calendar(column):
         return "are dates or times"
@@ -80,11 +103,11 @@ def identifies(
     values_of = np.unique(column)
     cells = cells_in_range(values_of) + 1.0
     if len(set(zip(column.tolist(), known, strict=True))) >= (1.0 - _TIES) * len(column):
-        named = bool(_NAMES & set(_words(name)))
+        named = bool(_NAMES & set(words_in(name)))
         for lines in (given, None if order is None else np.array(order)[given]):
             if lines is not None and (
                 (_follows(column, lines, known) and (whole or named or _is_regular(values_of)))
-                or (unit in _TIMES and _follows_in_labels(column, lines, known))
+                or (is_time(unit) and _follows_in_labels(column, lines, known))
             ):
                 return "follow the order of the lines as a counter or a time does"
         if _hardly_repeats(len(column), len(values_of), cells) or (
@@ -97,18 +120,6 @@ def identifies(
     if (hashed or cells <= 2.0 * len(values_of)) and _name_objects(column.tolist(), known):
         return "number the objects (name them by --instance)"
     return ""
-
-
-def keeps_rising(values: Sequence[float]) -> bool:
-    """Return whether each value is larger than the one before, or each is smaller, in lines that are not few."""
-    steps = np.diff(np.array(values, dtype=np.float64))
-    return len(steps) >= 2 * _LEAST and bool((steps > 0.0).all() or (steps < 0.0).all())
-
-
-def says_the_label(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
-    """Return whether each value belongs to one label and each label to one value, as the label in other words does."""
-    pairs = set(zip(values, labels, strict=True))
-    return 1 < len(pairs) == len(set(values)) == len(set(labels)) < len(labels)
 
 
 def text_identifies(texts: Sequence[str], labels: Sequence[str]) -> str:
@@ -138,7 +149,17 @@ def _is_date(text: str) -> bool:
     return any(character.isdigit() for character in text) and _DATE_TEXT.fullmatch(text) is not None
 
 
-def _words(name: str) -> list[str]:
+def is_count(unit: str) -> bool:
+    """Return whether this stands in the place of a unit for numbers without one."""
+    return unit.lower() in _COUNTED
+
+
+def is_time(unit: str) -> bool:
+    """Return whether this is a unit of time. Only words can have capitals: S is not the second."""
+    return unit in TIMES or (len(unit) > len("min") and unit.lower() in TIMES)
+
+
+def words_in(name: str) -> list[str]:
     """Return the words of a name such as `trial_id` or `trialId` in lower case."""
     return [word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|#", name)]
 
@@ -230,4 +251,4 @@ def _name_objects(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
 
 def _enough_objects(objects: int, labels: Sequence[str]) -> bool:
     """Return whether there are more objects than a feature has values that tell the labels apart."""
-    return objects >= max(_LEAST, 2 * len(set(labels)) + 1)
+    return objects >= max(LEAST_LINES, 2 * len(set(labels)) + 1)

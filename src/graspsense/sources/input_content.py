@@ -31,7 +31,7 @@ def contents_of(params: Any) -> dict[str, str]:
     """Return the hash of each input that these parameters name, by the text that names it, and our own version.
 
     Parameters are JSON values. A text names an input if it is a file, if a file or folder follows its colon
-    (`store:DIR`, `identified:cup.toml,mug.toml`), or if it is the qualified name of a component.
+    (`store:DIR`, `identified:cup.toml,mug.toml`), or if it is the name of a component.
     """
     contents = {FRAMEWORK: __version__}
     codes = _codes()
@@ -62,13 +62,12 @@ def _texts(value: Any) -> Iterator[str]:
             yield from _texts(inner)
 
 
-def _content(text: str, codes: Mapping[str, tuple[str, str]]) -> str | None:
+def _content(text: str, codes: Mapping[str, list[tuple[str, str]]]) -> str | None:
     """Return the hash of what a text names; None if it names no input. `codes` are those of `_codes`."""
     if "\n" in text:
         return None  # the text of a scene, which is its own content
-    code = codes.get(text)
-    if code is not None:
-        return _hash_of_code(*code)
+    if text in codes:
+        return _hash(_hash_of_code(*code) for code in codes[text])
     kind, colon, places = text.partition(":")
     if text.startswith(STORE):
         return _hash_of_store(places)
@@ -76,8 +75,8 @@ def _content(text: str, codes: Mapping[str, tuple[str, str]]) -> str | None:
     if not all(os.path.isfile(path) or (colon and os.path.isdir(path)) for path in paths):
         return None
     parts = [_hash_of_files(path, kind) for path in paths]
-    reader = codes.get(f"{kind}:") if colon else None
-    return _hash([*parts, *(() if reader is None else (_hash_of_code(*reader),))])
+    readers = codes.get(f"{kind}:", []) if colon else []
+    return _hash([*parts, *(_hash_of_code(*reader) for reader in readers)])
 
 
 def _path(place: str) -> str:
@@ -101,15 +100,20 @@ def located_text(text: str, base: Path) -> str:
     return f"{kind}:{','.join(located)}"
 
 
-def _codes() -> dict[str, tuple[str, str]]:
-    """Return version and module of every component by its qualified name, and of every data set as `NAME:`."""
-    codes = {
-        part.qualified: (part.version, part.entry.target.partition(":")[0])
-        for part in installed().components()
-    }
-    for part in installed().datasets():
-        target = part.entry.target or part.entry.recordings
-        codes[f"{part.name}:"] = (part.version, target.partition(":")[0])
+def _codes() -> dict[str, list[tuple[str, str]]]:
+    """Return version and module of every component by its qualified name, and of every data set as `NAME:`.
+
+    A setting may also name components of others without their distribution, as those of a union of feature sets.
+    """
+    codes: dict[str, list[tuple[str, str]]] = {}
+    for part in installed().components():
+        code = (part.version, part.entry.target.partition(":")[0])
+        codes.setdefault(part.qualified, []).append(code)
+        if part.distribution != FRAMEWORK:
+            codes.setdefault(part.name, []).append(code)
+    for dataset in installed().datasets():
+        target = dataset.entry.target or dataset.entry.recordings
+        codes[f"{dataset.name}:"] = [(dataset.version, target.partition(":")[0])]
     return codes
 
 

@@ -166,7 +166,8 @@ class PredictionSets:
         text = f"{100 * self.coverage:.0f} % for {len(self.thresholds) - len(shared)} of {len(self.thresholds)} labels"
         if not shared:
             fewest = min(threshold.units for threshold in self.thresholds.values())
-            return f"{text} ({fewest} {self.unit} or more of each)"
+            held_for = "" if self.unit == "instances" else ", for grasps of the same objects only"
+            return f"{text} ({fewest} {self.unit} or more of each{held_for})"
         lacking = ", ".join(f"{name} {needed - self.thresholds[name].units} more" for name in shared)
         return f"{text}; the others are in every set; a label needs {needed} {self.unit}: {lacking}"
 

@@ -8,16 +8,19 @@ another one in a single feature, as an edited copy does.
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from attrs import evolve
 
 from graspsense.core.learn.labelled import Labelled
+from graspsense.core.learn.near_copies import note_on_near_copies
 from graspsense.core.values.errors import ConfigError, counted
+from graspsense.core.values.features import misfit
 from graspsense.core.values.nominal import with_codes
 
 if TYPE_CHECKING:
@@ -33,6 +36,8 @@ _ROUNDING: Final = 1e-9
 """Differences below this share of a range are rounding errors."""
 _COMPARED: Final = 32
 """Features that are compared with each other, those with the most values."""
+_HASH_DIGITS: Final = 12
+"""Two of a million different trials have the same hash with a probability below 1 in 500."""
 _FEW: Final = 5
 """With fewer different values than this, their differences do not show the resolution of a column."""
 
@@ -61,20 +66,27 @@ def without_copies(labelled: Labelled) -> Labelled:
             f"trials that differ from another one in a single feature: {len(edited)} (trial {copy} from trial {row})"
             ". They count: make sure that they are no copies with a value that was changed"
         )
+    remaining = labelled.rows(kept) if len(left_out) else labelled
+    if not by_chance and not edited and not labelled.provenance.get("simulated"):
+        notes += filter(None, [note_on_near_copies(remaining)])
     if len(notes) == len(labelled.notes):
         return labelled
-    return evolve(labelled.rows(kept) if len(left_out) else labelled, notes=tuple(notes))
+    return evolve(remaining, notes=tuple(notes))
 
 
 def apart_from(tested: Labelled, training: Labelled) -> Labelled:
-    """Return the trials of `tested` whose features are not those of a trial of `training`, with a note on the others.
+    """Return the trials of `tested` with the features of `training`, without those that are copies of its trials.
 
-    Raises ConfigError if there are none.
+    A note tells of the copies. Raises ConfigError if there are no other trials, if a feature is missing or in another
+    unit.
     """
-    if tested.table.names != training.table.names:
-        return tested
-    values = np.concatenate([training.table.values, tested.table.values])
-    original, _ = _originals(evolve(tested.table, values=values), None)
+    names, units = training.table.names, training.table.units
+    if why := misfit(f"what learns from {training.source}", names, units, tested.table):
+        raise ConfigError(f"{tested.source} cannot be tested on: {why}")
+    table = tested.table.columns(names)
+    tested = evolve(tested, table=table)
+    values = np.concatenate([training.table.values, table.values])
+    original, _ = _originals(evolve(table, values=values), None)
     n = len(training)
     kept = np.flatnonzero(~np.isin(original[n:], original[:n]))
     if len(kept) == len(tested):
@@ -85,6 +97,20 @@ def apart_from(tested: Labelled, training: Labelled) -> Labelled:
         )
     note = f"{counted(len(tested) - len(kept), 'trial')} to test on left out: copies of trials to learn from"
     return evolve(tested.rows(kept), notes=(*tested.notes, note))
+
+
+def row_hashes(table: FeatureTable) -> tuple[str, ...]:
+    """Return a hash of the features of each trial, by which it is known again in another table."""
+    values = table.values + 0.0  # -0.0 and 0.0 are the same number
+    values[np.isnan(values)] = np.nan
+    return tuple(hashlib.sha256(row.tobytes()).hexdigest()[:_HASH_DIGITS] for row in values)
+
+
+def learned_from(known: Iterable[str], table: FeatureTable) -> str:
+    """Return in words how many of these trials are among those that have the hashes `known`; empty if none is."""
+    hashes, learned = row_hashes(table), frozenset(known)
+    seen = sum(text in learned for text in hashes)
+    return f"{seen} of {counted(len(hashes), 'trial')} were learned from" if seen else ""
 
 
 def _left_out(labelled: Labelled, left_out: NDArray[np.int64], original: NDArray[np.int64]) -> str:
@@ -141,16 +167,19 @@ def _edited_copies(values: NDArray[np.float64]) -> list[tuple[int, int]]:
     cells = np.array([1.0 if len(column) < _FEW else cells_in_range(column) for column in columns])
     copies: dict[int, int] = {}
     for left_out in range(values.shape[1]):
-        combinations = np.delete(cells, left_out)
-        if (combinations > 1.0).sum() < 2:
-            continue
+        others, cells_of = np.delete(values, left_out, axis=1), np.delete(cells, left_out)
+        known = ~np.isnan(others)
+        judged = (known & (cells_of > 1.0)).sum(axis=1) >= 2
+        with np.errstate(over="ignore"):
+            combinations = np.where(known, cells_of, 1.0).prod(axis=1)
+        by_chance = float((len(values) / (2.0 * combinations[judged])).sum())
         seen: dict[bytes, int] = {}
         pairs = {}
-        for i, row in zip(candidates, np.delete(values[candidates], left_out, axis=1), strict=True):
-            earlier = seen.setdefault(row.tobytes(), i)
+        for i in candidates:
+            earlier = seen.setdefault(others[i].tobytes(), i) if judged[i] else i
             if earlier != i:
                 pairs[i] = earlier
-        if len(pairs) > _SURE_OF_ALL * len(values) ** 2 / (2.0 * math.prod(combinations.tolist())):
+        if len(pairs) > _SURE_OF_ALL * by_chance:
             copies |= pairs
     return [(earlier, i) for i, earlier in sorted(copies.items())]
 

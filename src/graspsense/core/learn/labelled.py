@@ -189,6 +189,11 @@ def _refuse_large_target(target: TargetValue, source: str) -> None:
             )
 
 
+def recognised(target: Target, labels: Sequence[str]) -> Target:
+    """Return what a correct prediction of these labels recognises: the class, if they have no state."""
+    return "class" if target == "both" and not any(":" in label for label in labels) else target
+
+
 def class_of(label: str) -> str:
     """Return the class of a label `class:state`."""
     return label.partition(":")[0]

@@ -28,6 +28,7 @@ from graspsense.core.components.setting import CHANGES_NO_RESULT, NAMES_INPUT, U
 from graspsense.core.files.whole_file import write_whole
 from graspsense.core.learn.certainty import Certainty, certainty_from, with_certainty
 from graspsense.core.learn.conformal import COVERAGES, Answers, PredictionSets, scores_of, sets_from
+from graspsense.core.learn.copies import row_hashes
 from graspsense.core.learn.model_content import digest, model_bytes, parsed, sealed_content
 from graspsense.core.learn.novelty import Novelty, novelty_from, novelty_of
 from graspsense.core.learn.stored_values import StoredValueError, StoredValues
@@ -48,6 +49,7 @@ from graspsense.core.values.features import (
     Features,
     FeatureTable,
     Prediction,
+    misfit,
     table_of,
 )
 from graspsense.core.values.json_values import json_ready, settings_from_json
@@ -100,6 +102,8 @@ class Model:
     """How often its answers are right, by their support; None in a model that is not calibrated."""
     temperature: float | None = None
     """The temperature (`learn.temperature`) of the probabilities of the labels that are not predicted."""
+    learned_from: tuple[str, ...] = ()
+    """The hashes (`learn.copies`) of the recorded trials that it was trained on."""
     checkpoints: tuple[tuple[float, Model], ...] = ()
     """The models for grasps that go on: each with the seconds after the contact up to which it knows them."""
 
@@ -269,17 +273,7 @@ class Model:
 
     def misfit(self, given: Features | FeatureTable) -> str:
         """Return why the model cannot be applied to these features; empty if it can."""
-        lacking = [name for name in self.names if name not in given.names]
-        if lacking:
-            return (
-                f"model {self.name!r} takes the features {', '.join(self.names)}; there is no "
-                f"{', '.join(lacking)} here (there are: {', '.join(given.names)})"
-            )
-        units = dict(zip(given.names, given.units, strict=True))
-        for name, unit in zip(self.names, self.units, strict=True):
-            if unit and units[name] and unit != units[name]:
-                return f"model {self.name!r} takes {name} in {unit}; here it is in {units[name]}"
-        return ""
+        return misfit(f"model {self.name!r}", self.names, self.units, given)
 
     def _refuse_improbable(self, shares: NDArray[np.float64]) -> None:
         try:
@@ -328,7 +322,17 @@ class Model:
                     )
 
     def _kind_warnings(self, differences: Sequence[str]) -> Iterator[str]:
-        """Yield what holds for all predictions of a model of simulated grasps, unless a difference says more."""
+        """Yield what holds for all predictions of this model, unless a difference says more."""
+        if (
+            self.certainty is not None
+            and self.sets is not None
+            and self.sets.unit == "trials"
+            and not differences
+        ):
+            yield (
+                "certainty and sets were measured with grasps of the objects that it was trained on: of other objects "
+                "it knows less"
+            )
         if self.sets is not None and self.sets.uncalibrated and not differences:
             names = ", ".join(self.sets.uncalibrated)
             yield f"in every set, because too few {self.sets.unit} calibrate it: {names}"
@@ -352,6 +356,7 @@ class Model:
             "certainty": None if self.certainty is None else self.certainty.to_json(),
             **({} if self.temperature is None else {"temperature": self.temperature}),
             "model": self.classifier.to_json(),
+            **({} if not self.learned_from else {"learned_from": list(self.learned_from)}),
             **(
                 {}
                 if not self.checkpoints
@@ -574,6 +579,7 @@ def train(
         units=labelled.table.units,
         target=target,
         novelty=novelty_of(labelled.table, labelled.labels),
+        learned_from=() if labelled.provenance.get("simulated") else row_hashes(labelled.table),
         provenance={
             "source": labelled.source,
             "trials": len(labelled),
@@ -650,6 +656,7 @@ def _restored(stored: StoredValues, name: str, plugins: Plugins, component: Comp
         sets=_sets_from(stored, classifier),
         certainty=_certainty_from(stored),
         temperature=_temperature_from(stored),
+        learned_from=stored.texts("learned_from") if "learned_from" in stored else (),
     )
     return evolve(model, checkpoints=_checkpoints_from(stored, model, component, config))
 

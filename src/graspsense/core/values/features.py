@@ -115,6 +115,24 @@ class FeatureTable:
         return Features(names=self.names, values=values, units=self.units, reasons=absent)
 
 
+def misfit(taker: str, names: Sequence[str], units: Sequence[str], given: Features | FeatureTable) -> str:
+    """Return why something that takes these features cannot take the given ones; empty if it can.
+
+    `taker` says what takes them. A unit that is not stated on one side fits any.
+    """
+    lacking = [name for name in names if name not in given.names]
+    if lacking:
+        return (
+            f"{taker} takes the features {', '.join(names)}; there is no {', '.join(lacking)} here (there are: "
+            f"{', '.join(given.names)})"
+        )
+    unit_of = dict(zip(given.names, given.units, strict=True))
+    for name, unit in zip(names, units, strict=True):
+        if unit and unit_of[name] and unit != unit_of[name]:
+            return f"{taker} takes {name} in {unit}; here it is in {unit_of[name]}"
+    return ""
+
+
 class FeatureRows:
     """Collects the features of trials for a table, and keeps their numbers only."""
 

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Iterable
 from typing import Final
 
 MISSING_LABELS: Final = frozenset({"", "nan", "?"})
 """What stands for a missing label. `none`, `null` and `NA` are labels."""
 _WHOLE: Final = re.compile(r"(?<![^:#])([-+]?[0-9]+)[.,]0+(?![^:#])")
+
+_JOINTS: Final = re.compile(r"(?<=[^\W\d])[\s_-]+(?=\w)|(?<=\w)[\s_-]+(?=[^\W\d])|(?<=\s)\s+")
+"""Spaces, underscores and hyphens beside a letter."""
+_LEADING: Final = re.compile(r"(?<![\d.,])0+(?=\d)")
 
 
 def label_text(text: str) -> str:
@@ -22,6 +27,22 @@ def label_text(text: str) -> str:
         text = "".join(sign for sign in text if unicodedata.category(sign) not in ("Cf", "Cc"))
         text = "".join(" " if unicodedata.category(sign) == "Zs" else sign for sign in text)
     return _WHOLE.sub(r"\1", text.strip())
+
+
+def spelled_alike(texts: Iterable[str]) -> list[tuple[str, str]]:
+    """Return pairs of different labels or names that differ in case, spaces, hyphens, width or leading zeros only.
+
+    >>> spelled_alike(["can1", "Can 01", "can2", "-2", "2", "1-2", "12"])
+    [('Can 01', 'can1')]
+    """
+    by_form: dict[str, str] = {}
+    pairs = []
+    for text in sorted(set(texts)):
+        form = _LEADING.sub("", _JOINTS.sub("", unicodedata.normalize("NFKC", text).casefold()))
+        other = by_form.setdefault(form, text)
+        if other != text:
+            pairs.append((other, text))
+    return pairs
 
 
 def is_missing_label(text: str) -> bool:

@@ -51,5 +51,7 @@ def compare(params: Mapping[str, Any], seed: int) -> RecognitionResult:
         true = target_labels(data.labels, target)
         for name, (learner, table) in tables.items():
             predicted = predictions(learner, table, data.labels, target, folds, seed)
-            results.append(ClassifierResult.from_answers(name, target, STRATIFIED, true, predicted, cost=0.0))
+            results.append(
+                ClassifierResult.from_answers(name, target, STRATIFIED, true, predicted, data, cost=0.0)
+            )
     return simulated_result(data, results)

@@ -55,7 +55,9 @@ def physics(params: Mapping[str, Any], seed: int) -> RecognitionResult:
     for name, learner in classifiers_of(params).items():
         for target in settings.targets:
             true, predicted = true_and_predicted(learner, training, test, target, seed)
-            results.append(ClassifierResult.from_answers(name, target, PROTOCOL, true, predicted, cost=cost))
+            results.append(
+                ClassifierResult.from_answers(name, target, PROTOCOL, true, predicted, test, cost=cost)
+            )
     return simulated_result(test, results)
 
 

@@ -1,0 +1,247 @@
+"""Columns that are used as features and may reveal the labels, or that hold more than one kind of number.
+
+No value shows it for certain, so that a note asks the reader. `graspsense.sources.identifiers` finds the columns that
+are no features at all.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Hashable, Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from graspsense.core.components.caller import option
+from graspsense.core.values.errors import listed
+from graspsense.core.values.features import LARGEST_VALUE
+from graspsense.sources.identifiers import LEAST_LINES, TIMES, is_count, is_time, words_in
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from graspsense.core.values.features import FeatureTable
+    from graspsense.sources.csv_columns import CsvColumns
+
+    Numbers = NDArray[np.float64]
+
+_TIME_NAMES: Final = frozenset(
+    {"t", "time", "elapsed", "clock", "hour", "hours", "minute", "minutes", "timestamp"}
+)
+_OF_TIMES: Final = TIMES | {
+    "rec",
+    "recorded",
+    "recording",
+    "start",
+    "begin",
+    "end",
+    "at",
+    "of",
+    "day",
+    "since",
+    "total",
+}
+_OFTEN: Final = 3
+"""Lines with the same value from which on it may stand for something else than a measurement."""
+_ENOUGH_LINES: Final = 30
+_USUAL: Final = 2.0
+"""Largest step between two labels over the median step within labels."""
+_THOUSAND: Final = 1000.0
+_GAP: Final = 100.0
+"""Ratio of two neighbouring values between which the unit may change."""
+_PROPORTIONAL: Final = 1.0 - 1e-6
+"""Correlation with the number to predict from which on a column is that number in another unit."""
+
+
+def doubts(
+    columns: CsvColumns,
+    labels: Sequence[str],
+    names: Sequence[str],
+    table: FeatureTable,
+    target: Sequence[float] | None = None,
+) -> list[str]:
+    """Return notes on those of these columns that are features and may reveal the labels, or the number to predict."""
+    if target is not None:
+        return _doubts_of_target(columns, target, table)
+    used = [name for name in names if set(columns.columns_of(name)) <= set(table.names)]
+    numbers = _numbers(columns, [name for name in used if not columns.is_nominal(name)])
+    rising = [name for name, values in numbers.items() if keeps_rising(values)]
+    same = [name for name in used if says_the_label(columns.cells[name], labels)]
+    free = [name for name in used if is_count(columns.units[name]) and name not in same]
+    missing = {name: np.isnan(table.columns(columns.columns_of(name)[:1]).values[:, 0]) for name in used}
+    leave_out = f"leave it out ({option('features', python='columns')})"
+    checks: tuple[tuple[str, list[str], str], ...] = (
+        (
+            "every line has more than the one before, or every line less",
+            rising,
+            f"If it is a time or a counter it reveals the labels: {leave_out}",
+        ),
+        (
+            "each label has one value of its own",
+            same,
+            f"If it is the label in other words, {leave_out}",
+        ),
+        (
+            "each of its values occurs with one label only",
+            [name for name in free if values_have_one_label(columns.cells[name], labels)],
+            f"If it names sessions, devices or objects, it reveals the labels: {leave_out}",
+        ),
+        (
+            "its name is that of a time",
+            [name for name in numbers if name not in rising and _is_named_as_time(name, columns.units[name])],
+            f"If it is the time of recording, it reveals the labels: {leave_out}",
+        ),
+        (
+            "its values pass from label to label without a gap or an overlap, as those of a clock or a counter do",
+            [
+                name
+                for name, values in numbers.items()
+                if name not in rising
+                and (is_count(columns.units[name]) or is_time(columns.units[name]))
+                and passes_without_a_gap(values, labels)
+            ],
+            f"If it is a time or a counter it reveals the labels: {leave_out}",
+        ),
+        (
+            "some labels have all of its values, and others none",
+            [name for name in used if says_of_labels(missing[name].tolist(), labels)],
+            f"If the recording is the reason, and not the object, it reveals the labels: {leave_out}",
+        ),
+    )
+    notes = [
+        f"used, although {what}: {listed(doubted)}. {advice}" for what, doubted, advice in checks if doubted
+    ]
+    return notes + _mixed(numbers)
+
+
+def _doubts_of_target(columns: CsvColumns, target: Sequence[float], table: FeatureTable) -> list[str]:
+    """Return notes on features that may be the number to predict itself, or that hold two kinds of numbers."""
+    numbers = _numbers(columns, [name for name in columns.names if name in table.names])
+    rising = [name for name, values in numbers.items() if keeps_rising(values)]
+    same = [name for name, values in numbers.items() if is_proportional(values, np.array(target))]
+    notes = []
+    if rising:
+        notes.append(
+            f"used, although every line has more than the one before, or every line less: {listed(rising)}. If it is a "
+            f"time or a counter, leave it out ({option('features', python='columns')})"
+        )
+    if same:
+        notes.append(
+            f"used, although it is the number to predict in another unit: {listed(same)}. If it is not measured "
+            f"apart from it, leave it out ({option('features', python='columns')})"
+        )
+    return notes + _mixed(numbers)
+
+
+def keeps_rising(values: Sequence[float] | Numbers) -> bool:
+    """Return whether each value is larger than the one before, or each is smaller, in lines that are not few."""
+    steps = np.diff(np.array(values, dtype=np.float64))
+    return len(steps) >= 2 * LEAST_LINES and bool((steps > 0.0).all() or (steps < 0.0).all())
+
+
+def says_the_label(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
+    """Return whether each value belongs to one label and each label to one value, as the label in other words does."""
+    pairs = set(zip(values, labels, strict=True))
+    return 1 < len(pairs) == len(set(values)) == len(set(labels)) < len(labels)
+
+
+def says_of_labels(values: Sequence[bool], labels: Sequence[str]) -> bool:
+    """Return whether all lines of a label have the same one of two values, and both occur in lines that are not few."""
+    pairs = set(zip(values, labels, strict=True))
+    counts = Counter(values)
+    return len(counts) == 2 and min(counts.values()) >= LEAST_LINES and len(pairs) == len(set(labels))
+
+
+def values_have_one_label(values: Sequence[str], labels: Sequence[str]) -> bool:
+    """Return whether several lines have each value, all with one label, and there are more values than labels."""
+    given = [(value, label) for value, label in zip(values, labels, strict=True) if value]
+    different = len({value for value, _ in given})
+    return len(set(labels)) < different == len(set(given)) and _OFTEN * different <= len(given)
+
+
+def passes_without_a_gap(values: Numbers, labels: Sequence[str]) -> bool:
+    """Return whether each label has a range of its own, and no two ranges are farther apart than values within one.
+
+    Two classes of normally distributed values that do not overlap lie so closely in about 2 of 100 columns.
+    """
+    known = np.flatnonzero(~np.isnan(values))
+    order = known[np.argsort(values[known], kind="stable")]
+    sorted_labels = np.array(labels)[order]
+    ends = np.flatnonzero(sorted_labels[1:] != sorted_labels[:-1])
+    if len(order) < _ENOUGH_LINES or not 0 < len(ends) == len(set(labels)) - 1:
+        return False
+    steps = np.diff(values[order])
+    usual = float(np.median(np.delete(steps, ends)))
+    return bool((steps[ends] > 0.0).all() and (steps[ends] <= _USUAL * usual).all())
+
+
+def is_proportional(values: Numbers, target: Numbers) -> bool:
+    """Return whether these are the numbers of the target with another factor and zero, as rounding allows."""
+    known = ~np.isnan(values)
+    if known.sum() < 2 * LEAST_LINES:
+        return False
+    away, of_target = values[known] - values[known].mean(), target[known] - target[known].mean()
+    scale = float(np.sqrt((away @ away) * (of_target @ of_target)))
+    return scale > 0.0 and abs(float(away @ of_target)) >= _PROPORTIONAL * scale
+
+
+def _numbers(columns: CsvColumns, names: Sequence[str]) -> dict[str, Numbers]:
+    """Return these columns of numbers, without those that are too large to learn from."""
+    numbers = {name: np.array(columns.numbers(name)) for name in names}
+    return {name: values for name, values in numbers.items() if not (np.abs(values) > LARGEST_VALUE).any()}
+
+
+def _is_named_as_time(name: str, unit: str) -> bool:
+    words = words_in(name)
+    return (
+        (is_count(unit) or is_time(unit))
+        and bool(_TIME_NAMES & set(words))
+        and set(words) <= _TIME_NAMES | _OF_TIMES
+    )
+
+
+def _mixed(numbers: dict[str, Numbers]) -> list[str]:
+    """Return notes on columns in which a number stands for something else, or whose unit changes."""
+    notes = []
+    for name, values in numbers.items():
+        known = values[~np.isnan(values)]
+        stand_in = stand_in_of(known)
+        if stand_in is not None:
+            times = int((known == stand_in).sum())
+            notes.append(
+                f"{name} is {stand_in:g} in {times} trials, far from all other values: if it stands for a missing "
+                "value, leave the cell empty"
+            )
+        elif unit_changes(known):
+            notes.append(
+                f"{name} has two groups of values, one a thousand times the other: make sure that all have one unit"
+            )
+    return notes
+
+
+def stand_in_of(known: Numbers) -> float | None:
+    """Return the value that several lines have and that is farther from all others than these are from each other."""
+    if len(known) < 2 * LEAST_LINES:
+        return None
+    value, times = Counter(known.tolist()).most_common(1)[0]
+    others = known[known != value]
+    if times < _OFTEN or len(np.unique(others)) < LEAST_LINES:
+        return None
+    span = float(others.max() - others.min())
+    return float(value) if value < others.min() - span or value > others.max() + span else None
+
+
+def unit_changes(known: Numbers) -> bool:
+    """Return whether positive values have two groups that lie within each other if one is taken a thousand times."""
+    if len(known) < 2 * LEAST_LINES or known.min() <= 0.0:
+        return False
+    rising = np.sort(known)
+    ratios = rising[1:] / rising[:-1]
+    k = int(ratios.argmax()) + 1
+    small, large = rising[:k] * _THOUSAND, rising[k:]
+    return bool(
+        ratios[k - 1] > _GAP
+        and min(len(small), len(large)) >= LEAST_LINES
+        and large[0] <= np.median(small) <= large[-1]
+        and small[0] <= np.median(large) <= small[-1]
+    )
