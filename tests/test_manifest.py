@@ -441,6 +441,9 @@ def test_a_list_names_files_and_rows_with_their_facts(tmp_path):
         ({"gap": 0.1 - squeezing()[0]}, 'the gap rises while the force rises: .*gap = "0.1 - POSITION"'),
         ({"force": np.round(20 * squeezing()[1])}, r'whole numbers, as counts .*force = "COLUMN \[counts\]"'),
         ({"force": squeezing()[1] + 30.0}, 'the force does not begin at zero: .*zero = "10 samples"'),
+        # A load cell that was not tared: by less than what would be a contact, and yet f_steady is 10 % too large.
+        ({"force": squeezing()[1] + 2.0}, 'the force does not begin at zero: .*zero = "10 samples"'),
+        ({"force": 40.5 * squeezing()[1]}, r"the force reaches 810 N, which few grippers have: .*\[gf\]"),
         ({"force": -squeezing()[1]}, "the force is negative where it is largest: .*-FORCE"),
         ({"force": 10.0 + 2.0 * np.cos(T_S)}, "the recording begins in contact: there is no approach"),
         ({"gap": np.full(300, 0.05)}, "the gap does not change"),
@@ -451,6 +454,30 @@ def test_what_looks_wrong_is_noticed_with_its_remedy(columns, says, tmp_path):
     assert [notice for notice in recording.notices if re.search(says, notice)], recording.notices
     (fine,) = plain(tmp_path, "")
     assert fine.notices == ()
+
+
+def test_what_looks_wrong_in_the_force_of_one_pad_is_told_of_that_pad(tmp_path):
+    gap, force = squeezing()
+    sides = "files = 'jar.csv'\nlabel = 'jar'\ntime = 't'\ngap = 'gap [mm]'\nleft = 'L'\nright = 'R'"
+    # Their mean begins at 0.75 N of 20 N, or is 0.
+    for left, says in ((force + 1.5, "left pad does not begin at zero"), (-force, "left pad is negative")):
+        pandas_csv(tmp_path / "jar.csv", {"t": T_S, "gap": gap * 1e3, "L": left, "R": force})
+        (recording,) = recordings(tmp_path, sides)
+        assert [says in notice for notice in recording.notices] == [True]
+
+
+def test_a_recording_that_begins_with_both_pads_in_contact_says_so_however_weak_it_is(tmp_path):
+    gap, force = squeezing()
+    # From 1 N of 20 N on: the contact force is 0.625 N.
+    (recording,) = plain(tmp_path, "", force=force[105::2], gap=gap[105::2], time=T_S[105::2])
+    assert ["begins in contact" in notice for notice in recording.notices] == [True]
+
+
+def test_a_replay_tells_what_looks_wrong_in_its_recording(tmp_path):
+    plain(tmp_path, "", force=squeezing()[1] + 2.0)
+    code, out, err = graspsense("replay", f"manifest:{tmp_path / 'manifest.toml'}#1")
+    assert code == 0, err
+    assert "the force does not begin at zero" in out
 
 
 def test_noise_alone_is_neither_a_pull_nor_a_contact(tmp_path):
