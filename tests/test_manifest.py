@@ -466,6 +466,29 @@ def test_what_looks_wrong_in_the_force_of_one_pad_is_told_of_that_pad(tmp_path):
         assert [says in notice for notice in recording.notices] == [True]
 
 
+@every_case(
+    ("unit", "factor", "says"),
+    [
+        # Three seconds in ms that are called us, in hours, and as the number of the row.
+        (" [us]", 1e3, "lasts 3 ms only"),
+        ("", 1 / 3600, "lasts 0.83 ms only"),
+        ("", RATE_HZ, 'rises by 1 in each sample.*"t \\[s\\]"'),
+    ],
+)
+def test_a_time_in_another_unit_is_noticed(unit, factor, says, tmp_path):
+    gap, force = squeezing()
+    pandas_csv(tmp_path / "jar.csv", {"t": np.round(T_S * factor, 9), "gap": gap * 1e3, "F": force})
+    (recording,) = recordings(tmp_path, PLAIN.replace('"t"', f'"t{unit}"'))
+    assert [bool(re.search(says, notice)) for notice in recording.notices] == [True]
+
+
+def test_a_recording_of_a_sample_a_second_is_not_one_of_counted_samples(tmp_path):
+    gap, force = squeezing()
+    pandas_csv(tmp_path / "jar.csv", {"t": T_S * RATE_HZ, "gap": gap * 1e3, "F": force})
+    (recording,) = recordings(tmp_path, PLAIN.replace('"t"', '"t [s]"'))
+    assert recording.notices == ()
+
+
 def test_a_recording_that_begins_with_both_pads_in_contact_says_so_however_weak_it_is(tmp_path):
     gap, force = squeezing()
     # From 1 N of 20 N on: the contact force is 0.625 N.

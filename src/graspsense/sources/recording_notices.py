@@ -1,8 +1,8 @@
-"""What looks wrong in the forces of a recording, whatever it was read from."""
+"""What looks wrong in the forces and the gap of a recording, whatever it was read from."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
@@ -27,42 +27,140 @@ TURNS: Final = 0.3
 """Share of the changes without a load that go against the one before, where they are noise."""
 LARGE_TURNS: Final = 0.1
 """Share of the changes without a load that turn and exceed the least one, where the steps of a force are fine."""
+FEWEST_IN_COURSE: Final = 50
+"""Fewest samples from which on the course of a force is told from a glitch."""
+GLITCH_SAMPLES: Final = 3
+GLITCH_S: Final = 0.05
+"""Most samples and longest time (s) of one glitch: what lasts longer can be a tap."""
+MOST_GLITCHES: Final = 0.05
+"""Largest share of all samples that are glitches: what is more frequent is the course of the force."""
+FREE_GLITCH: Final = 0.1
+LOADED_GLITCH: Final = 0.5
+"""Share of its range by which a force leaves its course in a glitch: up to this share of the force, and above it."""
+GLITCH_NOISE: Final = 10.0
+"""A glitch is at least so many times the usual distance from the course."""
+ZERO_SAMPLES: Final = 10
+STEADY: Final = 0.1
+"""Share of its range by which a force may change in the samples that its zero is taken from."""
+OPENED: Final = 0.1
+"""Share of its range by which a gap is wider at the end than at the largest force when the fingers are open again."""
+DRIFT: Final = 0.1
+"""Share of its range by which a force may end from where it began."""
+JUMP_SPEED_M_S: Final = 1.0
+"""Speed beyond which no finger moves,"""
+JUMP: Final = 3.0
+"""and how many times farther than the third largest step of the gap a jump goes, since a glitch is two steps."""
 FREE: Final = 0.2
 """Share of its range up to which a force is that of free fingers."""
 
 
 def with_notices(labelled: LabelledRecording) -> LabelledRecording:
-    """Return the recording with all that looks wrong: what its reader noticed, and what its forces show.
+    """Return the recording with all that looks wrong: what its reader noticed, and what its signals show.
 
     The recording itself has it too, so that a replay and a stored trial tell it.
     """
-    notices = (*labelled.notices, *labelled.recording.notices, *force_notices(labelled.recording))
+    notices = (*labelled.notices, *labelled.recording.notices, *signal_notices(labelled.recording))
     notices = tuple(dict.fromkeys(notices))
     return evolve(labelled, notices=notices, recording=evolve(labelled.recording, notices=notices))
 
 
-def force_notices(recording: Recording) -> Iterator[str]:
-    """Return what looks wrong in the forces of the pads: no number, one value all along, or a value that stays."""
-    unit = recording.units.get("t", "s")
+def signal_notices(recording: Recording) -> Iterator[str]:
+    """Return what looks wrong in the forces of the pads and in the gap.
+
+    A force has no number, one value all along, or a value that stays; a glitch; or a zero that drifts. The gap jumps.
+    """
     times = np.array([reading.frame.t_s for reading in recording.readings])
-    for what, force in _pads(recording).items():
-        finite = np.isfinite(force)
-        known, known_times = force[finite], times[finite]
-        if len(force) > 1 and not len(known):
-            yield f"{what} has no number: was the sensor connected?"
-        elif len(known) > 2 and known.min() == known.max():
-            yield f"{what} does not change during the recording: is it another column, or did its sensor stop?"
-        elif (held := _held(known)) is not None:
-            begin, end = known_times[held.start], known_times[held.stop - 1]
-            repeats = (
-                "its last value to the end"
-                if held.stop == len(known)
-                else f"one value from {begin:.4g} to {end:.4g} {unit}"
-            )
-            yield (
-                f"{what} repeats {repeats}, although it varied before: did its sensor stop, or is it "
-                "at the end of its range?"
-            )
+    gap = np.array([reading.frame.gap_m for reading in recording.readings])
+    pads = _pads(recording)
+    for what, force in pads.items():
+        yield from _of_sensor(what, times, force, recording.units)
+    for what, force in pads.items():
+        known = np.isfinite(force)
+        if int(known.sum()) >= FEWEST:
+            if "t" not in recording.units:
+                yield from _glitches(what, times[known], force[known], recording.units)
+            yield from _drift(what, gap[known], force[known], recording.units)
+    if not {"gap", "t"} & recording.units.keys() and len(gap) >= FEWEST:
+        yield from _jump(times, gap)
+
+
+def _of_sensor(what: str, times: Numbers, force: Numbers, units: Mapping[str, str]) -> Iterator[str]:
+    """Yield what tells that a force was not measured, or not all the time."""
+    finite = np.isfinite(force)
+    known, known_times = force[finite], times[finite]
+    if len(force) > 1 and not len(known):
+        yield f"{what} has no number: was the sensor connected?"
+    elif len(known) > 2 and known.min() == known.max():
+        yield f"{what} does not change during the recording: is it another column, or did its sensor stop?"
+    elif (held := _held(known)) is not None:
+        begin, end = known_times[held.start], known_times[held.stop - 1]
+        repeats = (
+            "its last value to the end"
+            if held.stop == len(known)
+            else f"one value from {begin:.4g} to {end:.4g} {units.get('t', 's')}"
+        )
+        yield (
+            f"{what} repeats {repeats}, although it varied before: did its sensor stop, or is it "
+            "at the end of its range?"
+        )
+
+
+def _glitches(what: str, times: Numbers, force: Numbers, units: Mapping[str, str]) -> Iterator[str]:
+    """Yield that a force leaves its course for a few samples: without a load, or by most of its range anywhere."""
+    changes = np.flatnonzero(np.diff(force)) + 1
+    # A sensor that is slower than the rows repeats its values.
+    every = max(1, round(float(np.median(np.diff(changes))))) if len(changes) > 1 else 1
+    sampled, sampled_times = force[::every], times[::every]
+    if len(sampled) < FEWEST_IN_COURSE:
+        return
+    longest = min(GLITCH_SAMPLES, int(GLITCH_S / float(np.median(np.diff(sampled_times)))))
+    around = np.pad(sampled, longest, mode="reflect")
+    course = np.median(np.lib.stride_tricks.sliding_window_view(around, 2 * longest + 1), axis=1)
+    apart, span = np.abs(sampled - course), float(np.ptp(sampled))
+    free = course < course.min() + FREE_GLITCH * np.ptp(course)
+    noise = float(np.median(apart))
+    left = (apart > np.where(free, FREE_GLITCH, LOADED_GLITCH) * span) & (apart > GLITCH_NOISE * noise)
+    count = int(left.sum())
+    if not 0 < count <= MOST_GLITCHES * len(sampled):
+        return
+    k = int(np.argmax(left))
+    others = f", and {count - 1} more" if count > 1 else ""
+    yield (
+        f"{what} leaves its course for a moment ({sampled[k]:.4g} {units.get('force_left', 'N')} at "
+        f"{sampled_times[k]:.4g} s{others}): if that is a glitch, take it out, since it can "
+        "pass for a contact"
+    )
+
+
+def _drift(what: str, gap: Numbers, force: Numbers, units: Mapping[str, str]) -> Iterator[str]:
+    """Yield that a force does not come back when the fingers are open again."""
+    span = float(np.ptp(force))
+    ends = force[:ZERO_SAMPLES], force[-ZERO_SAMPLES:]
+    steady = max(float(np.ptp(part)) for part in ends) <= STEADY * span
+    first_load = int(np.argmax(force > force[0] + FREE * span))
+    peak = int(force.argmax())
+    opened = gap[-1] >= gap[first_load] and gap[-1] > gap[peak] + OPENED * np.ptp(gap)
+    apart = float(ends[1].mean() - ends[0].mean())
+    if steady and opened and abs(apart) > DRIFT * span:
+        yield (
+            f"{what} ends {apart:+.3g} {units.get('force_left', 'N')} from where it began, although the fingers are "
+            "open again: its zero drifts, and all forces have a part of that"
+        )
+
+
+def _jump(times: Numbers, gap: Numbers) -> Iterator[str]:
+    """Yield that a gap (m) jumps faster (s) than fingers move, and farther than it does elsewhere."""
+    known = np.isfinite(gap)
+    steps = np.abs(np.diff(gap[known]))
+    if len(steps) < FEWEST:
+        return
+    k, usual = int(steps.argmax()), float(np.sort(steps)[-3])
+    seconds = max(float(np.diff(times[known])[k]), float(np.median(np.diff(times[known]))))
+    if steps[k] > JUMP_SPEED_M_S * seconds and steps[k] > JUMP * usual:
+        yield (
+            f"the gap jumps by {steps[k] * 1e3:.3g} mm within {seconds * 1e3:.3g} ms (at {times[known][k + 1]:.4g} s), "
+            "as no finger does: is it a glitch, or did its sensor stop before?"
+        )
 
 
 def _pads(recording: Recording) -> dict[str, Numbers]:

@@ -12,6 +12,7 @@ from graspsense.core.control.contact import CONTACT_FORCE_N, both_touch
 from graspsense.core.values.errors import DataDamaged
 from graspsense.sources.grasp_columns import GraspColumns
 from graspsense.sources.manifest.steps import squeezes
+from graspsense.sources.recording_notices import FEWEST, STEADY, ZERO_SAMPLES
 
 if TYPE_CHECKING:
     from graspsense.sources.grasp_columns import Numbers
@@ -20,6 +21,8 @@ BEGINS_LOADED: Final = 0.25
 """Share of its range above which the force of the first sample is that of a contact, or of a wrong zero."""
 JUMP: Final = 20.0
 """A time step of so many usual ones is a jump."""
+SHORTEST_S: Final = 0.1
+"""No grasp is shorter (s)."""
 MILLIMETRES: Final = 0.5
 """A gap beyond this (m) is in another unit."""
 OFFSET: Final = 0.05
@@ -28,11 +31,8 @@ STRONG_N: Final = 300.0
 """A force whose range is beyond that of the usual grippers is in another unit."""
 GLITCHES: Final = 0.01
 """Share of the samples that can be glitches, at each end of the range of a force."""
-ZERO_SAMPLES: Final = 10
 NOISE: Final = 6.0
 """A force whose range is at most so many usual second differences is noise alone."""
-STEADY: Final = 0.1
-"""Share of its range by which the force may change in the samples that a zero is taken from."""
 _OFFSET: Final = ' If the fingers were free, the sensor has an offset: zero = "10 samples"'
 _FOUND: Final = 'split = "force" finds them, '
 
@@ -127,6 +127,12 @@ def _both_touch_at_first(columns: GraspColumns) -> bool:
 def _of_time(columns: GraspColumns) -> Iterator[str]:
     steps = np.diff(columns.t_s)
     usual = float(np.median(steps))
+    lasts_s = float(columns.t_s[-1] - columns.t_s[0])
+    if not columns.units.get("t") and len(columns) >= FEWEST and 0.0 < lasts_s < SHORTEST_S:
+        yield (
+            f"the recording lasts {lasts_s * 1e3:.2g} ms only: if the time is not in s, write its unit behind it, or a "
+            "factor that makes it seconds"
+        )
     if float(steps.max()) > JUMP * usual > 0.0:
         yield (
             f"the time jumps by more than {JUMP:g} usual steps: does the file hold several grasps? "
