@@ -377,6 +377,51 @@ def test_squeezes_are_found_from_the_force(tmp_path):
     assert [squeeze.source for squeeze in squeezes] == [f"jar.csv, squeeze {k}" for k in (1, 2, 3)]
 
 
+def repeated(*factors):
+    """Return gap, force and time of a squeeze for each factor on the force, each with its release."""
+    gap, force = squeezing()
+    forces = np.concatenate([factor * np.concatenate([force, force[::-1]]) for factor in factors])
+    gaps = np.concatenate([gap, gap[::-1]] * len(factors))
+    return gaps, forces, np.arange(len(forces)) / RATE_HZ
+
+
+@every_case(
+    ("factors", "change"),
+    [
+        # One squeeze is a tenth of the others, or twenty times as strong.
+        ((1.0, 0.8, 0.12, 1.0), None),
+        ((1.0, 20.0, 0.9, 1.1), None),
+        # The zero drifts by a seventh of the force of a squeeze in each, 12 N in all.
+        ((1.0, 1.0, 1.0, 1.0), lambda force, time: force + 0.5 * time),
+        ((1.0, 1.0, 1.0, 1.0), lambda force, time: force - 0.5 * time),
+        # Five samples of the hold are lost: no fingers open and close in 50 ms.
+        ((1.0, 1.0, 1.0, 1.0), lambda force, _: np.where((np.arange(2400) // 5) == 180, 0.0, force)),
+        # One sample in a hold is a glitch.
+        ((1.0, 1.0, 1.0, 1.0), lambda force, _: np.where(np.arange(2400) == 900, 900.0, force)),
+    ],
+)
+def test_squeezes_of_any_force_are_found_with_drift_and_faults(factors, change, tmp_path):
+    gaps, forces, time = repeated(*factors)
+    force = forces if change is None else change(forces, time)
+    squeezes = plain(tmp_path, 'split = "force"', force=force, gap=gaps, time=time)
+    begins = [column(squeeze, "t_s")[0] for squeeze in squeezes]
+    assert begins == pytest.approx([0.0, 6.0, 12.0, 18.0], abs=0.6)
+
+
+def test_a_clock_that_begins_anew_between_two_squeezes_costs_neither(tmp_path):
+    gaps, forces, time = repeated(1.0, 1.0)
+    anew = np.where(time < 5.3, time, time - 5.3)
+    squeezes = plain(tmp_path, 'split = "force"', force=forces, gap=gaps, time=anew)
+    assert [len(squeeze.recording.readings) for squeeze in squeezes] == [530, 670]
+
+
+def test_noise_is_not_split_into_squeezes(tmp_path):
+    gaps, _, time = repeated(1.0, 1.0)
+    noise = np.random.default_rng(3).normal(0.0, 0.02, len(time))
+    with pytest.raises(DataDamaged, match="no squeeze was found"):
+        plain(tmp_path, 'split = "force"', force=noise, gap=gaps, time=time)
+
+
 @every_case(
     ("spoilt", "value"), [("force", 1e6), ("force", np.nan), ("force", np.inf), ("gap", 900.0), ("time", 0.0)]
 )

@@ -43,7 +43,7 @@ ZERO_SAMPLES: Final = 10
 STEADY: Final = 0.1
 """Share of its range by which a force may change in the samples that its zero is taken from."""
 OPENED: Final = 0.1
-"""Share of its range by which a gap is wider at the end than at the largest force when the fingers are open again."""
+"""Share of its range by which a gap is wider than at the largest force where the fingers are open."""
 DRIFT: Final = 0.1
 """Share of its range by which a force may end from where it began."""
 JUMP_SPEED_M_S: Final = 1.0
@@ -139,7 +139,7 @@ def _drift(what: str, gap: Numbers, force: Numbers, units: Mapping[str, str]) ->
     steady = max(float(np.ptp(part)) for part in ends) <= STEADY * span
     first_load = int(np.argmax(force > force[0] + FREE * span))
     peak = int(force.argmax())
-    opened = gap[-1] >= gap[first_load] and gap[-1] > gap[peak] + OPENED * np.ptp(gap)
+    opened = gap[-1] >= gap[first_load] and min(gap[0], gap[-1]) > gap[peak] + OPENED * np.ptp(gap)
     apart = float(ends[1].mean() - ends[0].mean())
     if steady and opened and abs(apart) > DRIFT * span:
         yield (

@@ -11,7 +11,7 @@ import numpy as np
 from graspsense.core.control.contact import CONTACT_FORCE_N, both_touch
 from graspsense.core.values.errors import DataDamaged
 from graspsense.sources.grasp_columns import GraspColumns
-from graspsense.sources.manifest.steps import squeezes
+from graspsense.sources.manifest.steps import NOISE, squeezes
 from graspsense.sources.recording_notices import FEWEST, STEADY, ZERO_SAMPLES
 
 if TYPE_CHECKING:
@@ -31,8 +31,6 @@ STRONG_N: Final = 300.0
 """A force whose range is beyond that of the usual grippers is in another unit."""
 GLITCHES: Final = 0.01
 """Share of the samples that can be glitches, at each end of the range of a force."""
-NOISE: Final = 6.0
-"""A force whose range is at most so many usual second differences is noise alone."""
 _OFFSET: Final = ' If the fingers were free, the sensor has an offset: zero = "10 samples"'
 _FOUND: Final = 'split = "force" finds them, '
 
