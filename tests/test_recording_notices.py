@@ -112,3 +112,18 @@ def test_a_gap_that_jumps_is_noticed() -> None:
     coarse = np.round(np.repeat(OPEN_AGAIN_M, 10) * 200) / 200
     forces = np.repeat(RELEASED_N, 10)
     assert noticed(forces, forces, coarse, rate_hz=1000.0) == ()
+
+
+def test_a_gap_that_stops_in_the_squeeze_is_noticed() -> None:
+    squeeze = 0.05 - 0.002 * (1.0 - np.exp(-np.clip(T_S - 1.0, 0.0, None) / 0.3))
+    gap = np.where(T_S < 1.0, OPEN_AGAIN_M, np.where(T_S < 2.6, squeeze, squeeze + 0.1 * (T_S - 2.6)))
+    assert noticed(RELEASED_N, RELEASED_N, gap) == ()
+    for until_s, says in ((1.6, "then jumps by 1.42 mm"), (9.0, "although the force is gone")):
+        stopped = np.where((T_S >= 1.05) & (until_s > T_S), gap[105], gap)
+        (notice,) = noticed(RELEASED_N, RELEASED_N, stopped)
+        assert says in notice
+    # A rigid object, and one whose force is raised in steps while the gap follows at once.
+    assert noticed(RELEASED_N, RELEASED_N, OPEN_AGAIN_M) == ()
+    stairs = np.floor(np.clip(T_S - 1.0, 0.0, 1.0) * 4.0)
+    force = np.where(T_S < 2.7, 1.5 * stairs, 0.0) + NOISE_N[0]
+    assert noticed(force, force, np.where(T_S < 2.6, OPEN_AGAIN_M - 0.0005 * stairs, OPEN_AGAIN_M)) == ()

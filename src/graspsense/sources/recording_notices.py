@@ -50,6 +50,8 @@ JUMP_SPEED_M_S: Final = 1.0
 """Speed beyond which no finger moves,"""
 JUMP: Final = 3.0
 """and how many times farther than the third largest step of the gap a jump goes, since a glitch is two steps."""
+STOPPED_STEPS: Final = 5.0
+"""Least steps of a gap that one goes on by, at least, when its sensor had stopped."""
 FREE: Final = 0.2
 """Share of its range up to which a force is that of free fingers."""
 
@@ -67,7 +69,8 @@ def with_notices(labelled: LabelledRecording) -> LabelledRecording:
 def signal_notices(recording: Recording) -> Iterator[str]:
     """Return what looks wrong in the forces of the pads and in the gap.
 
-    A force has no number, one value all along, or a value that stays; a glitch; or a zero that drifts. The gap jumps.
+    A force has no number, one value all along, or a value that stays; a glitch; or a zero that drifts. The gap jumps,
+    or stays while the force changes.
     """
     times = np.array([reading.frame.t_s for reading in recording.readings])
     gap = np.array([reading.frame.gap_m for reading in recording.readings])
@@ -82,6 +85,7 @@ def signal_notices(recording: Recording) -> Iterator[str]:
             yield from _drift(what, gap[known], force[known], recording.units)
     if not {"gap", "t"} & recording.units.keys() and len(gap) >= FEWEST:
         yield from _jump(times, gap)
+        yield from _stopped_gap(times, gap, np.mean(list(pads.values()), axis=0))
 
 
 def _of_sensor(what: str, times: Numbers, force: Numbers, units: Mapping[str, str]) -> Iterator[str]:
@@ -135,6 +139,8 @@ def _glitches(what: str, times: Numbers, force: Numbers, units: Mapping[str, str
 def _drift(what: str, gap: Numbers, force: Numbers, units: Mapping[str, str]) -> Iterator[str]:
     """Yield that a force does not come back when the fingers are open again."""
     span = float(np.ptp(force))
+    if np.count_nonzero(np.diff(force)) < FEWEST:  # measured too rarely
+        return
     ends = force[:ZERO_SAMPLES], force[-ZERO_SAMPLES:]
     steady = max(float(np.ptp(part)) for part in ends) <= STEADY * span
     first_load = int(np.argmax(force > force[0] + FREE * span))
@@ -161,6 +167,36 @@ def _jump(times: Numbers, gap: Numbers) -> Iterator[str]:
             f"the gap jumps by {steps[k] * 1e3:.3g} mm within {seconds * 1e3:.3g} ms (at {times[known][k + 1]:.4g} s), "
             "as no finger does: is it a glitch, or did its sensor stop before?"
         )
+
+
+def _stopped_gap(times: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
+    """Yield that a gap (m) stays, by time (s), as the gap of a rigid object does, and yet does not end so.
+
+    It jumps to another value at once, and the force does not. Or it does not open, and the force is gone.
+    """
+    begins = np.concatenate(([0], np.flatnonzero(np.diff(gap)) + 1, [len(gap)])).tolist()
+    lasting = [(begin, end) for begin, end in pairwise(begins) if end - begin >= FEWEST]
+    span = float(np.ptp(force))
+    for begin, end in lasting:
+        stays = (
+            f"the gap stays at {gap[begin] * 1e3:.4g} mm from {times[begin]:.4g} to {times[end - 1]:.4g} s"
+        )
+        during = force[begin:end]
+        if begin == 0 or not float(np.ptp(during)) > FREE * span:
+            continue
+        if end == len(gap):
+            if during.max() - force.min() > 0.5 * span and during[-1] - force.min() < FREE_GLITCH * span:
+                yield f"{stays}, although the force is gone: did its sensor stop?"
+        elif end + 1 < len(gap):
+            jump, *around = np.abs(np.diff(gap)[[end - 1, begin - 1, end]]).tolist()
+            calm = abs(float(force[end] - force[end - 1])) < FREE_GLITCH * span
+            if jump > JUMP * max(around) and jump > STOPPED_STEPS * _least_step(gap) and calm:
+                yield f"{stays} while the force changes, and then jumps by {jump * 1e3:.3g} mm: did its sensor stop?"
+
+
+def _least_step(gap: Numbers) -> float:
+    steps = np.abs(np.diff(gap))
+    return float(steps[steps > 0.0].min(initial=np.inf))
 
 
 def _pads(recording: Recording) -> dict[str, Numbers]:
