@@ -280,6 +280,9 @@ def texts(separator, decimal=".", comment=""):
         ("jar.csv", texts(";", ",", "# written by a logger")),
         ("jar.tsv", texts("\t", ",")),
         ("jar.txt", texts("  ")),
+        ("jar.txt", texts("|")),
+        # As numpy.savetxt writes a header of two lines.
+        ("jar.txt", "# t gap F\n# s mm N\n" + texts(" ").partition("\n")[2]),
         ("jar.dat", texts(" ", ",", "% MATLAB")),
         ("jar.csv", "\ufeff" + texts(",").replace("\n", "\r\n")),
     ],
