@@ -2,6 +2,7 @@
 
 import gzip
 import json
+from datetime import UTC, datetime
 
 import numpy as np
 import pytest
@@ -42,6 +43,11 @@ def iso(k):
     return f"2026-03-29T03:00:{seconds - 60.0:09.6f}+02:00"
 
 
+def late(k):
+    """Return a time of the day: midnight is behind half a second."""
+    return datetime.fromtimestamp(86399.5 + k * 0.01, UTC).strftime("%H:%M:%S.%f")
+
+
 def read(path, **columns):
     given = {"time": ["t"], "gap": ["pos [mm]"], "force": ["f1", "f2"], **columns}
     return read_squeeze(named(str(path), given))
@@ -63,6 +69,7 @@ VARIANTS = {
     "separator of Excel": ["sep=;", HEADER.replace(",", ";"), *DECIMAL_COMMAS],
     "repeated header": [HEADER, *ROWS[:90], HEADER, *ROWS[90:]],
     "repeated header and units": [HEADER, "s,mm,N,N", *ROWS[:90], HEADER, "s,mm,N,N", *ROWS[90:]],
+    "times of the day over midnight": stamped(late),
     "numpy": ["# t,pos,f1,f2", *ROWS],
     "numpy with spaces": ["# made by a logger", "# t pos f1 f2", *(row.replace(",", " ") for row in ROWS)],
     "blank end": [HEADER + ",", *(row + "," for row in ROWS)],
