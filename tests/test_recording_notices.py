@@ -47,6 +47,8 @@ LEFT, RIGHT = LOAD_N + NOISE_N
         ),
         # The end of the range of a sensor, at half of the force, until the fingers open.
         (np.where(T_S < 2.8, np.minimum(LEFT, 3.0), NOISE_N[0]), "or is it at the end of its range"),
+        # A converter of ten bits at its end, in the counts of a sensor without noise.
+        (np.where(T_S < 2.8, np.minimum(np.round(400.0 * LOAD_N), 1023.0), 0.0), "at the end of its range"),
     ],
 )
 def test_a_sensor_that_says_nothing_is_noticed(spoilt: Any, says: str, side: str) -> None:

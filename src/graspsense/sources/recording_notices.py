@@ -23,6 +23,8 @@ STOPPED: Final = 0.1
 """Share of a recording for which a force in coarse counts repeats its last value when its sensor has stopped."""
 CHANGES: Final = 20.0
 """Number of changes that a force would have had in the time in which its sensor has stopped."""
+LARGEST_COUNTS: Final = frozenset(float(2**bits - 1) for bits in (8, 10, 12, 14, 15, 16))
+"""The ends of the ranges of converters, in counts."""
 TURNS: Final = 0.3
 """Share of the changes without a load that go against the one before, where they are noise."""
 LARGE_TURNS: Final = 0.1
@@ -211,7 +213,8 @@ def _pads(recording: Recording) -> dict[str, Numbers]:
 def _held(force: Numbers) -> slice | None:
     """Return the samples in which a force that varies also without a load, by its noise, repeats a value; else None.
 
-    A value in coarse counts can stay within its step. It is told only if it stays to the end, and for long.
+    A value in coarse counts can stay within its step. It is told only if it stays to the end, and for long, or if it is
+    the largest of a converter.
     """
     if len(force) < FEWEST:
         return None
@@ -224,6 +227,8 @@ def _held(force: Numbers) -> slice | None:
         others = free.copy()
         others[run.start : run.stop - 1] = False
         repeated = run.stop - run.start - 1
+        if repeated >= FEWEST and force[run.start] == force.max() and force.max() in LARGEST_COUNTS:
+            return run
         if not others.any() or repeated * changed[others].mean() < CHANGES:
             continue
         noise = steps[others & changed]
