@@ -177,6 +177,13 @@ def test_a_large_loss_is_a_warning(tmp_path):
     assert "line 2" in str(most.error)
 
 
+def test_a_sensor_at_a_third_of_the_rate_of_the_rows_gives_its_samples(tmp_path):
+    slow = [row if k % 3 == 0 else row.rpartition(",")[0] + "," for k, row in enumerate(ROWS)]
+    (recording,) = recordings(tmp_path, [HEADER, *slow])
+    assert times(recording.recording) == pytest.approx(T_S[::3])
+    assert [notice for notice in recording.notices if "133 samples" in notice]
+
+
 def test_advice_on_repeated_times_is_tried_first(tmp_path):
     coarse = stamped(lambda k: int(k * 0.05))
     (refused,) = recordings(tmp_path, coarse)
