@@ -280,6 +280,9 @@ def texts(separator, decimal=".", comment=""):
         ("jar.csv", texts(";", ",", "# written by a logger")),
         ("jar.tsv", texts("\t", ",")),
         ("jar.txt", texts("  ")),
+        ("jar.txt", texts("|")),
+        # As numpy.savetxt writes a header of two lines.
+        ("jar.txt", "# t gap F\n# s mm N\n" + texts(" ").partition("\n")[2]),
         ("jar.dat", texts(" ", ",", "% MATLAB")),
         ("jar.csv", "\ufeff" + texts(",").replace("\n", "\r\n")),
     ],
@@ -377,6 +380,51 @@ def test_squeezes_are_found_from_the_force(tmp_path):
     assert [squeeze.source for squeeze in squeezes] == [f"jar.csv, squeeze {k}" for k in (1, 2, 3)]
 
 
+def repeated(*factors):
+    """Return gap, force and time of a squeeze for each factor on the force, each with its release."""
+    gap, force = squeezing()
+    forces = np.concatenate([factor * np.concatenate([force, force[::-1]]) for factor in factors])
+    gaps = np.concatenate([gap, gap[::-1]] * len(factors))
+    return gaps, forces, np.arange(len(forces)) / RATE_HZ
+
+
+@every_case(
+    ("factors", "change"),
+    [
+        # One squeeze is a tenth of the others, or twenty times as strong.
+        ((1.0, 0.8, 0.12, 1.0), None),
+        ((1.0, 20.0, 0.9, 1.1), None),
+        # The zero drifts by a seventh of the force of a squeeze in each, 12 N in all.
+        ((1.0, 1.0, 1.0, 1.0), lambda force, time: force + 0.5 * time),
+        ((1.0, 1.0, 1.0, 1.0), lambda force, time: force - 0.5 * time),
+        # Five samples of the hold are lost: no fingers open and close in 50 ms.
+        ((1.0, 1.0, 1.0, 1.0), lambda force, _: np.where((np.arange(2400) // 5) == 180, 0.0, force)),
+        # One sample in a hold is a glitch.
+        ((1.0, 1.0, 1.0, 1.0), lambda force, _: np.where(np.arange(2400) == 900, 900.0, force)),
+    ],
+)
+def test_squeezes_of_any_force_are_found_with_drift_and_faults(factors, change, tmp_path):
+    gaps, forces, time = repeated(*factors)
+    force = forces if change is None else change(forces, time)
+    squeezes = plain(tmp_path, 'split = "force"', force=force, gap=gaps, time=time)
+    begins = [column(squeeze, "t_s")[0] for squeeze in squeezes]
+    assert begins == pytest.approx([0.0, 6.0, 12.0, 18.0], abs=0.6)
+
+
+def test_a_clock_that_begins_anew_between_two_squeezes_costs_neither(tmp_path):
+    gaps, forces, time = repeated(1.0, 1.0)
+    anew = np.where(time < 5.3, time, time - 5.3)
+    squeezes = plain(tmp_path, 'split = "force"', force=forces, gap=gaps, time=anew)
+    assert [len(squeeze.recording.readings) for squeeze in squeezes] == [530, 670]
+
+
+def test_noise_is_not_split_into_squeezes(tmp_path):
+    gaps, _, time = repeated(1.0, 1.0)
+    noise = np.random.default_rng(3).normal(0.0, 0.02, len(time))
+    with pytest.raises(DataDamaged, match="no squeeze was found"):
+        plain(tmp_path, 'split = "force"', force=noise, gap=gaps, time=time)
+
+
 @every_case(
     ("spoilt", "value"), [("force", 1e6), ("force", np.nan), ("force", np.inf), ("gap", 900.0), ("time", 0.0)]
 )
@@ -441,6 +489,9 @@ def test_a_list_names_files_and_rows_with_their_facts(tmp_path):
         ({"gap": 0.1 - squeezing()[0]}, 'the gap rises while the force rises: .*gap = "0.1 - POSITION"'),
         ({"force": np.round(20 * squeezing()[1])}, r'whole numbers, as counts .*force = "COLUMN \[counts\]"'),
         ({"force": squeezing()[1] + 30.0}, 'the force does not begin at zero: .*zero = "10 samples"'),
+        # A load cell that was not tared: by less than what would be a contact, and yet f_steady is 10 % too large.
+        ({"force": squeezing()[1] + 2.0}, 'the force does not begin at zero: .*zero = "10 samples"'),
+        ({"force": 40.5 * squeezing()[1]}, r"the force reaches 810 N, which few grippers have: .*\[gf\]"),
         ({"force": -squeezing()[1]}, "the force is negative where it is largest: .*-FORCE"),
         ({"force": 10.0 + 2.0 * np.cos(T_S)}, "the recording begins in contact: there is no approach"),
         ({"gap": np.full(300, 0.05)}, "the gap does not change"),
@@ -451,6 +502,53 @@ def test_what_looks_wrong_is_noticed_with_its_remedy(columns, says, tmp_path):
     assert [notice for notice in recording.notices if re.search(says, notice)], recording.notices
     (fine,) = plain(tmp_path, "")
     assert fine.notices == ()
+
+
+def test_what_looks_wrong_in_the_force_of_one_pad_is_told_of_that_pad(tmp_path):
+    gap, force = squeezing()
+    sides = "files = 'jar.csv'\nlabel = 'jar'\ntime = 't'\ngap = 'gap [mm]'\nleft = 'L'\nright = 'R'"
+    # Their mean begins at 0.75 N of 20 N, or is 0.
+    for left, says in ((force + 1.5, "left pad does not begin at zero"), (-force, "left pad is negative")):
+        pandas_csv(tmp_path / "jar.csv", {"t": T_S, "gap": gap * 1e3, "L": left, "R": force})
+        (recording,) = recordings(tmp_path, sides)
+        assert [says in notice for notice in recording.notices] == [True]
+
+
+@every_case(
+    ("unit", "factor", "says"),
+    [
+        # Three seconds in ms that are called us, in hours, and as the number of the row.
+        (" [us]", 1e3, "lasts 3 ms only"),
+        ("", 1 / 3600, "lasts 0.83 ms only"),
+        ("", RATE_HZ, 'rises by 1 in each sample.*"t \\[s\\]"'),
+    ],
+)
+def test_a_time_in_another_unit_is_noticed(unit, factor, says, tmp_path):
+    gap, force = squeezing()
+    pandas_csv(tmp_path / "jar.csv", {"t": np.round(T_S * factor, 9), "gap": gap * 1e3, "F": force})
+    (recording,) = recordings(tmp_path, PLAIN.replace('"t"', f'"t{unit}"'))
+    assert [bool(re.search(says, notice)) for notice in recording.notices] == [True]
+
+
+def test_a_recording_of_a_sample_a_second_is_not_one_of_counted_samples(tmp_path):
+    gap, force = squeezing()
+    pandas_csv(tmp_path / "jar.csv", {"t": T_S * RATE_HZ, "gap": gap * 1e3, "F": force})
+    (recording,) = recordings(tmp_path, PLAIN.replace('"t"', '"t [s]"'))
+    assert recording.notices == ()
+
+
+def test_a_recording_that_begins_with_both_pads_in_contact_says_so_however_weak_it_is(tmp_path):
+    gap, force = squeezing()
+    # From 1 N of 20 N on: the contact force is 0.625 N.
+    (recording,) = plain(tmp_path, "", force=force[105::2], gap=gap[105::2], time=T_S[105::2])
+    assert ["begins in contact" in notice for notice in recording.notices] == [True]
+
+
+def test_a_replay_tells_what_looks_wrong_in_its_recording(tmp_path):
+    plain(tmp_path, "", force=squeezing()[1] + 2.0)
+    code, out, err = graspsense("replay", f"manifest:{tmp_path / 'manifest.toml'}#1")
+    assert code == 0, err
+    assert "the force does not begin at zero" in out
 
 
 def test_noise_alone_is_neither_a_pull_nor_a_contact(tmp_path):

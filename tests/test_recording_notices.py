@@ -18,12 +18,15 @@ LOAD_N = np.clip(T_S - 1.0, 0.0, 1.0) * 6.0
 NOISE_N = np.random.default_rng(0).normal(0.0, 0.01, (2, len(T_S)))
 
 
-def noticed(left: Any, right: Any) -> tuple[str, ...]:
+def noticed(left: Any, right: Any, gap: Any = None, rate_hz: float = 100.0) -> tuple[str, ...]:
+    gaps = np.full(len(left), 0.05) if gap is None else gap
     readings = tuple(
-        Reading(Frame(float(t), 0.01, 0.05, 0.0, nan, float(a), float(b), nan, nan, 0), NO_PADS)
-        for t, a, b in zip(T_S, left, right, strict=True)
+        Reading(
+            Frame(k / rate_hz, 1.0 / rate_hz, float(gap), 0.0, nan, float(a), float(b), nan, nan, 0), NO_PADS
+        )
+        for k, (gap, a, b) in enumerate(zip(gaps, left, right, strict=True))
     )
-    recording = Recording(name="squeeze", readings=readings, rate_hz=100.0)
+    recording = Recording(name="squeeze", readings=readings, rate_hz=rate_hz)
     return with_notices(LabelledRecording(recording=recording, source="squeeze")).notices
 
 
@@ -37,6 +40,15 @@ LEFT, RIGHT = LOAD_N + NOISE_N
         (np.full(300, 4.5), "does not change"),
         (np.full(300, nan), "has no number"),
         (LEFT[np.minimum(np.arange(300), 120)], "repeats its last value"),
+        # Reports that stop while the force grows, and go on a second later: 100 rows of one value.
+        (
+            LEFT[np.where((T_S >= 1.5) & (T_S < 2.5), 150, np.arange(300))],
+            "repeats one value from 1.5 to 2.49 s",
+        ),
+        # The end of the range of a sensor, at half of the force, until the fingers open.
+        (np.where(T_S < 2.8, np.minimum(LEFT, 3.0), NOISE_N[0]), "or is it at the end of its range"),
+        # A converter of ten bits at its end, in the counts of a sensor without noise.
+        (np.where(T_S < 2.8, np.minimum(np.round(400.0 * LOAD_N), 1023.0), 0.0), "at the end of its range"),
     ],
 )
 def test_a_sensor_that_says_nothing_is_noticed(spoilt: Any, says: str, side: str) -> None:
@@ -52,3 +64,68 @@ def test_healthy_forces_give_no_notice() -> None:
     # Without noise, or in coarse counts, a force repeats itself at rest.
     assert noticed(LOAD_N, LOAD_N) == ()
     assert noticed(np.round(LEFT * 4) / 4, np.round(RIGHT * 4) / 4) == ()
+    released = np.where(T_S < 2.5, LOAD_N, 0.0)
+    assert noticed(released, released) == ()
+    # Noise of one count makes steps of one count, and a force at rest can stay within its count.
+    few = np.round(LEFT * 50) / 50
+    few[200:280] = few[200]
+    assert noticed(few, few) == ()
+    # A sensor that is read at every fifth row repeats each value four times.
+    held = np.arange(300) // 5 * 5
+    assert noticed(LEFT[held], RIGHT[held]) == ()
+
+
+OPEN_AGAIN_M = np.where(T_S < 2.6, np.maximum(0.08 - 0.03 * T_S, 0.05), 0.05 + 0.1 * (T_S - 2.6))
+RELEASED_N = np.where(T_S < 2.7, LOAD_N, 0.0) + NOISE_N[0]
+
+
+@every_case("samples", [1, 2, 3])
+def test_a_glitch_that_could_pass_for_a_contact_is_noticed(samples: int) -> None:
+    spoilt = RELEASED_N.copy()
+    spoilt[30 : 30 + samples] += 1.0  # before the contact; a contact is 0.625 N
+    (notice,) = noticed(spoilt, spoilt, OPEN_AGAIN_M)
+    assert "at 0.3 s" in notice
+    # A tap of three samples is a glitch where it takes 30 ms, and none where it takes 300 ms.
+    assert noticed(spoilt, spoilt, OPEN_AGAIN_M, rate_hz=10.0) == ()
+
+
+def test_the_code_of_an_error_in_the_force_is_noticed() -> None:
+    spoilt = RELEASED_N.copy()
+    spoilt[230] = -999.0
+    (notice,) = noticed(spoilt, RELEASED_N, OPEN_AGAIN_M)
+    assert "left pad" in notice
+    assert "-999 N at 2.3 s" in notice
+
+
+def test_a_zero_that_drifts_is_noticed_when_the_fingers_are_open_again() -> None:
+    assert noticed(RELEASED_N, RELEASED_N, OPEN_AGAIN_M) == ()
+    (notice,) = noticed(RELEASED_N, RELEASED_N + 0.5 * T_S, OPEN_AGAIN_M)
+    assert "right pad ends +1.45 N" in notice  # 0.5 N/s between the means of ten samples at both ends
+    # A recording that ends in the hold says nothing about it.
+    held = slice(0, 260)
+    assert noticed(RELEASED_N[held], RELEASED_N[held] + 0.5 * T_S[held], OPEN_AGAIN_M[held]) == ()
+
+
+def test_a_gap_that_jumps_is_noticed() -> None:
+    stopped = np.where((T_S >= 0.4) & (T_S < 0.9), OPEN_AGAIN_M[40], OPEN_AGAIN_M)
+    (notice,) = noticed(RELEASED_N, RELEASED_N, stopped)
+    assert "jumps by 15 mm within 10 ms (at 0.9 s)" in notice  # 30 mm/s for half a second
+    # An encoder with steps of 5 mm goes on by one of them, also at 1 kHz.
+    coarse = np.round(np.repeat(OPEN_AGAIN_M, 10) * 200) / 200
+    forces = np.repeat(RELEASED_N, 10)
+    assert noticed(forces, forces, coarse, rate_hz=1000.0) == ()
+
+
+def test_a_gap_that_stops_in_the_squeeze_is_noticed() -> None:
+    squeeze = 0.05 - 0.002 * (1.0 - np.exp(-np.clip(T_S - 1.0, 0.0, None) / 0.3))
+    gap = np.where(T_S < 1.0, OPEN_AGAIN_M, np.where(T_S < 2.6, squeeze, squeeze + 0.1 * (T_S - 2.6)))
+    assert noticed(RELEASED_N, RELEASED_N, gap) == ()
+    for until_s, says in ((1.6, "then jumps by 1.42 mm"), (9.0, "although the force is gone")):
+        stopped = np.where((T_S >= 1.05) & (until_s > T_S), gap[105], gap)
+        (notice,) = noticed(RELEASED_N, RELEASED_N, stopped)
+        assert says in notice
+    # A rigid object, and one whose force is raised in steps while the gap follows at once.
+    assert noticed(RELEASED_N, RELEASED_N, OPEN_AGAIN_M) == ()
+    stairs = np.floor(np.clip(T_S - 1.0, 0.0, 1.0) * 4.0)
+    force = np.where(T_S < 2.7, 1.5 * stairs, 0.0) + NOISE_N[0]
+    assert noticed(force, force, np.where(T_S < 2.6, OPEN_AGAIN_M - 0.0005 * stairs, OPEN_AGAIN_M)) == ()

@@ -2,6 +2,7 @@
 
 import gzip
 import json
+from datetime import UTC, datetime
 
 import numpy as np
 import pytest
@@ -42,6 +43,11 @@ def iso(k):
     return f"2026-03-29T03:00:{seconds - 60.0:09.6f}+02:00"
 
 
+def late(k):
+    """Return a time of the day: midnight is behind half a second."""
+    return datetime.fromtimestamp(86399.5 + k * 0.01, UTC).strftime("%H:%M:%S.%f")
+
+
 def read(path, **columns):
     given = {"time": ["t"], "gap": ["pos [mm]"], "force": ["f1", "f2"], **columns}
     return read_squeeze(named(str(path), given))
@@ -63,6 +69,7 @@ VARIANTS = {
     "separator of Excel": ["sep=;", HEADER.replace(",", ";"), *DECIMAL_COMMAS],
     "repeated header": [HEADER, *ROWS[:90], HEADER, *ROWS[90:]],
     "repeated header and units": [HEADER, "s,mm,N,N", *ROWS[:90], HEADER, "s,mm,N,N", *ROWS[90:]],
+    "times of the day over midnight": stamped(late),
     "numpy": ["# t,pos,f1,f2", *ROWS],
     "numpy with spaces": ["# made by a logger", "# t pos f1 f2", *(row.replace(",", " ") for row in ROWS)],
     "blank end": [HEADER + ",", *(row + "," for row in ROWS)],
@@ -168,6 +175,13 @@ def test_a_large_loss_is_a_warning(tmp_path):
         tmp_path, [HEADER, *(row.rpartition(",")[0] + ",nan" for row in ROWS[:150]), *ROWS[150:]]
     )
     assert "line 2" in str(most.error)
+
+
+def test_a_sensor_at_a_third_of_the_rate_of_the_rows_gives_its_samples(tmp_path):
+    slow = [row if k % 3 == 0 else row.rpartition(",")[0] + "," for k, row in enumerate(ROWS)]
+    (recording,) = recordings(tmp_path, [HEADER, *slow])
+    assert times(recording.recording) == pytest.approx(T_S[::3])
+    assert [notice for notice in recording.notices if "133 samples" in notice]
 
 
 def test_advice_on_repeated_times_is_tried_first(tmp_path):

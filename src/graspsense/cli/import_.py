@@ -264,7 +264,7 @@ class _Stored:
     refused: list[str]
     """Why a recording was left out, although it can be read."""
     notes: list[tuple[str, ...]]
-    """What the gripper of each trial notes."""
+    """What the gripper of each trial notes, without what looks wrong: that is told for all trials together."""
 
 
 def _import(
@@ -353,7 +353,8 @@ def _store(
                     unreadable.append(UnreadableRecording(source=source, error=error))
                     continue
             stored.kept.append({"source": source, "trial": number, "outcome": trial.outcome.words})
-            stored.notes.append(trial.device.notes)
+            noticed = recording.labelled.notices
+            stored.notes.append(tuple(note for note in trial.device.notes if note not in noticed))
             progress("grasps imported", done + 1, len(recordings))
     return stored
 

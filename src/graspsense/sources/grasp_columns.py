@@ -27,6 +27,9 @@ Spans = tuple[tuple[float, float], ...]
 """Begin and end (s) of each of several events."""
 LARGE_LOSS: Final = 0.05
 """Share of the samples beyond which leaving them out is told as a warning, and not advised."""
+FEWEST_AT_A_RATE: Final = 20
+STEADY_RATE: Final = 2.0
+"""Samples of a slower sensor are at least so many, and at most so many times as far apart as they usually are."""
 PLAUSIBLE: Final = {
     "gap": (-0.05, 0.5, "m", {"mm": 1e-3, "um": 1e-6}),
     "force": (-2000.0, 2000.0, "N", {"mN": 1e-3}),
@@ -131,12 +134,24 @@ def finger_sides(fingers: Sequence[FingerForce], forces: Mapping[str, Numbers]) 
 
 
 def without_missing(columns: GraspColumns) -> GraspColumns:
-    """Return the samples that have a time, a gap and both forces; all of them if most lack one."""
+    """Return the samples that have a time, a gap and both forces.
+
+    If most lack one, all are returned, unless those that have them come at a steady rate, as those of a slower sensor.
+    """
     needed = (columns.t_s, columns.gap_m, columns.left_n, columns.right_n)
     known: NDArray[np.bool_] = np.logical_and.reduce([~np.isnan(values) for values in needed])
-    if known.all() or 2 * int(known.sum()) < len(known):
+    if known.all() or (2 * int(known.sum()) < len(known) and not _at_a_steady_rate(known)):
         return columns
     return only(columns, known, f"without a number ({columns.place(int(np.argmin(known)))})")
+
+
+def _at_a_steady_rate(known: NDArray[np.bool_]) -> bool:
+    """Return whether the rows that are known are spread evenly over all rows."""
+    rows = np.flatnonzero(known)
+    if len(rows) < FEWEST_AT_A_RATE:
+        return False
+    apart = np.diff(np.concatenate(([-1], rows, [len(known)])))
+    return bool(apart.max() <= STEADY_RATE * np.median(apart))
 
 
 def only(columns: GraspColumns, kept: NDArray[np.bool_], what: str) -> GraspColumns:

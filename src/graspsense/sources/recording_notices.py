@@ -1,69 +1,242 @@
-"""What looks wrong in the forces of a recording, whatever it was read from."""
+"""What looks wrong in the forces and the gap of a recording, whatever it was read from."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Final
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from attrs import evolve
-from numpy.typing import NDArray
 
 from graspsense.recording.labelled_recording import LabelledRecording
 from graspsense.recording.replayable import Recording
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Numbers = NDArray[np.float64]
+
 FEWEST: Final = 20
 """Fewest samples from which on a force that has stopped is told from one that is steady."""
 STOPPED: Final = 0.1
-"""Share of a recording for which a force repeats its last value when its sensor has stopped,"""
+"""Share of a recording for which a force in coarse counts repeats its last value when its sensor has stopped."""
 CHANGES: Final = 20.0
-"""and the number of changes that it would have had in this time."""
+"""Number of changes that a force would have had in the time in which its sensor has stopped."""
+LARGEST_COUNTS: Final = frozenset(float(2**bits - 1) for bits in (8, 10, 12, 14, 15, 16))
+"""The ends of the ranges of converters, in counts."""
+TURNS: Final = 0.3
+"""Share of the changes without a load that go against the one before, where they are noise."""
+LARGE_TURNS: Final = 0.1
+"""Share of the changes without a load that turn and exceed the least one, where the steps of a force are fine."""
+FEWEST_IN_COURSE: Final = 50
+"""Fewest samples from which on the course of a force is told from a glitch."""
+GLITCH_SAMPLES: Final = 3
+GLITCH_S: Final = 0.05
+"""Most samples and longest time (s) of one glitch: what lasts longer can be a tap."""
+MOST_GLITCHES: Final = 0.05
+"""Largest share of all samples that are glitches: what is more frequent is the course of the force."""
+FREE_GLITCH: Final = 0.1
+LOADED_GLITCH: Final = 0.5
+"""Share of its range by which a force leaves its course in a glitch: up to this share of the force, and above it."""
+GLITCH_NOISE: Final = 10.0
+"""A glitch is at least so many times the usual distance from the course."""
+ZERO_SAMPLES: Final = 10
+STEADY: Final = 0.1
+"""Share of its range by which a force may change in the samples that its zero is taken from."""
+OPENED: Final = 0.1
+"""Share of its range by which a gap is wider than at the largest force where the fingers are open."""
+DRIFT: Final = 0.1
+"""Share of its range by which a force may end from where it began."""
+JUMP_SPEED_M_S: Final = 1.0
+"""Speed beyond which no finger moves,"""
+JUMP: Final = 3.0
+"""and how many times farther than the third largest step of the gap a jump goes, since a glitch is two steps."""
+STOPPED_STEPS: Final = 5.0
+"""Least steps of a gap that one goes on by, at least, when its sensor had stopped."""
 FREE: Final = 0.2
 """Share of its range up to which a force is that of free fingers."""
 
 
 def with_notices(labelled: LabelledRecording) -> LabelledRecording:
-    """Return the recording with all that looks wrong: what its reader noticed, and what its forces show."""
-    notices = (*labelled.notices, *labelled.recording.notices, *force_notices(labelled.recording))
-    return evolve(labelled, notices=tuple(dict.fromkeys(notices)))
+    """Return the recording with all that looks wrong: what its reader noticed, and what its signals show.
+
+    The recording itself has it too, so that a replay and a stored trial tell it.
+    """
+    notices = (*labelled.notices, *labelled.recording.notices, *signal_notices(labelled.recording))
+    notices = tuple(dict.fromkeys(notices))
+    return evolve(labelled, notices=notices, recording=evolve(labelled.recording, notices=notices))
 
 
-def force_notices(recording: Recording) -> Iterator[str]:
-    """Return what looks wrong in the forces of the pads: no number, one value all along, or a value that stays."""
-    pads = {
-        "left": np.array([reading.frame.force_left_n for reading in recording.readings]),
-        "right": np.array([reading.frame.force_right_n for reading in recording.readings]),
-    }
-    if np.array_equal(pads["left"], pads["right"], equal_nan=True):
-        pads = {"": pads["left"]}
-    for side, force in pads.items():
-        what = f"the force of the {side} pad" if side else "the force"
-        known = force[np.isfinite(force)]
-        if len(force) > 1 and not len(known):
-            yield f"{what} has no number: was the sensor connected?"
-        elif len(known) > 2 and known.min() == known.max():
-            yield f"{what} does not change during the recording: is it another column, or did its sensor stop?"
-        elif _stops(known):
-            yield (
-                f"{what} repeats its last value to the end, although it varied before: did its sensor stop, or is it "
-                "at the end of its range?"
-            )
+def signal_notices(recording: Recording) -> Iterator[str]:
+    """Return what looks wrong in the forces of the pads and in the gap.
+
+    A force has no number, one value all along, or a value that stays; a glitch; or a zero that drifts. The gap jumps,
+    or stays while the force changes.
+    """
+    times = np.array([reading.frame.t_s for reading in recording.readings])
+    gap = np.array([reading.frame.gap_m for reading in recording.readings])
+    pads = _pads(recording)
+    for what, force in pads.items():
+        yield from _of_sensor(what, times, force, recording.units)
+    for what, force in pads.items():
+        known = np.isfinite(force)
+        if int(known.sum()) >= FEWEST:
+            if "t" not in recording.units:
+                yield from _glitches(what, times[known], force[known], recording.units)
+            yield from _drift(what, gap[known], force[known], recording.units)
+    if not {"gap", "t"} & recording.units.keys() and len(gap) >= FEWEST:
+        yield from _jump(times, gap)
+        yield from _stopped_gap(times, gap, np.mean(list(pads.values()), axis=0))
 
 
-def _stops(force: NDArray[np.float64]) -> bool:
-    """Return whether a force that varies also without a load, by its noise, repeats its last value to the end."""
-    if len(force) < FEWEST:
-        return False
-    changed = np.diff(force) != 0.0
-    until = int(np.flatnonzero(changed)[-1]) + 1
-    free = force < force.min() + FREE * np.ptp(force)
-    earlier = changed[:until]
-    usual = float(earlier.mean())
-    noise = earlier[free[:until]]
-    repeated = len(changed) - until
-    return bool(
-        len(noise)
-        and noise.mean() > 0.5 * usual
-        and repeated >= STOPPED * len(force)
-        and repeated * usual >= CHANGES
+def _of_sensor(what: str, times: Numbers, force: Numbers, units: Mapping[str, str]) -> Iterator[str]:
+    """Yield what tells that a force was not measured, or not all the time."""
+    finite = np.isfinite(force)
+    known, known_times = force[finite], times[finite]
+    if len(force) > 1 and not len(known):
+        yield f"{what} has no number: was the sensor connected?"
+    elif len(known) > 2 and known.min() == known.max():
+        yield f"{what} does not change during the recording: is it another column, or did its sensor stop?"
+    elif (held := _held(known)) is not None:
+        begin, end = known_times[held.start], known_times[held.stop - 1]
+        repeats = (
+            "its last value to the end"
+            if held.stop == len(known)
+            else f"one value from {begin:.4g} to {end:.4g} {units.get('t', 's')}"
+        )
+        yield (
+            f"{what} repeats {repeats}, although it varied before: did its sensor stop, or is it "
+            "at the end of its range?"
+        )
+
+
+def _glitches(what: str, times: Numbers, force: Numbers, units: Mapping[str, str]) -> Iterator[str]:
+    """Yield that a force leaves its course for a few samples: without a load, or by most of its range anywhere."""
+    changes = np.flatnonzero(np.diff(force)) + 1
+    # A sensor that is slower than the rows repeats its values.
+    every = max(1, round(float(np.median(np.diff(changes))))) if len(changes) > 1 else 1
+    sampled, sampled_times = force[::every], times[::every]
+    if len(sampled) < FEWEST_IN_COURSE:
+        return
+    longest = min(GLITCH_SAMPLES, int(GLITCH_S / float(np.median(np.diff(sampled_times)))))
+    around = np.pad(sampled, longest, mode="reflect")
+    course = np.median(np.lib.stride_tricks.sliding_window_view(around, 2 * longest + 1), axis=1)
+    apart, span = np.abs(sampled - course), float(np.ptp(sampled))
+    free = course < course.min() + FREE_GLITCH * np.ptp(course)
+    noise = float(np.median(apart))
+    left = (apart > np.where(free, FREE_GLITCH, LOADED_GLITCH) * span) & (apart > GLITCH_NOISE * noise)
+    count = int(left.sum())
+    if not 0 < count <= MOST_GLITCHES * len(sampled):
+        return
+    k = int(np.argmax(left))
+    others = f", and {count - 1} more" if count > 1 else ""
+    yield (
+        f"{what} leaves its course for a moment ({sampled[k]:.4g} {units.get('force_left', 'N')} at "
+        f"{sampled_times[k]:.4g} s{others}): if that is a glitch, take it out, since it can "
+        "pass for a contact"
     )
+
+
+def _drift(what: str, gap: Numbers, force: Numbers, units: Mapping[str, str]) -> Iterator[str]:
+    """Yield that a force does not come back when the fingers are open again."""
+    span = float(np.ptp(force))
+    if np.count_nonzero(np.diff(force)) < FEWEST:  # measured too rarely
+        return
+    ends = force[:ZERO_SAMPLES], force[-ZERO_SAMPLES:]
+    steady = max(float(np.ptp(part)) for part in ends) <= STEADY * span
+    first_load = int(np.argmax(force > force[0] + FREE * span))
+    peak = int(force.argmax())
+    opened = gap[-1] >= gap[first_load] and min(gap[0], gap[-1]) > gap[peak] + OPENED * np.ptp(gap)
+    apart = float(ends[1].mean() - ends[0].mean())
+    if steady and opened and abs(apart) > DRIFT * span:
+        yield (
+            f"{what} ends {apart:+.3g} {units.get('force_left', 'N')} from where it began, although the fingers are "
+            "open again: its zero drifts, and all forces have a part of that"
+        )
+
+
+def _jump(times: Numbers, gap: Numbers) -> Iterator[str]:
+    """Yield that a gap (m) jumps faster (s) than fingers move, and farther than it does elsewhere."""
+    known = np.isfinite(gap)
+    steps = np.abs(np.diff(gap[known]))
+    if len(steps) < FEWEST:
+        return
+    k, usual = int(steps.argmax()), float(np.sort(steps)[-3])
+    seconds = max(float(np.diff(times[known])[k]), float(np.median(np.diff(times[known]))))
+    if steps[k] > JUMP_SPEED_M_S * seconds and steps[k] > JUMP * usual:
+        yield (
+            f"the gap jumps by {steps[k] * 1e3:.3g} mm within {seconds * 1e3:.3g} ms (at {times[known][k + 1]:.4g} s), "
+            "as no finger does: is it a glitch, or did its sensor stop before?"
+        )
+
+
+def _stopped_gap(times: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
+    """Yield that a gap (m) stays, by time (s), as the gap of a rigid object does, and yet does not end so.
+
+    It jumps to another value at once, and the force does not. Or it does not open, and the force is gone.
+    """
+    begins = np.concatenate(([0], np.flatnonzero(np.diff(gap)) + 1, [len(gap)])).tolist()
+    lasting = [(begin, end) for begin, end in pairwise(begins) if end - begin >= FEWEST]
+    span = float(np.ptp(force))
+    for begin, end in lasting:
+        stays = (
+            f"the gap stays at {gap[begin] * 1e3:.4g} mm from {times[begin]:.4g} to {times[end - 1]:.4g} s"
+        )
+        during = force[begin:end]
+        if begin == 0 or not float(np.ptp(during)) > FREE * span:
+            continue
+        if end == len(gap):
+            if during.max() - force.min() > 0.5 * span and during[-1] - force.min() < FREE_GLITCH * span:
+                yield f"{stays}, although the force is gone: did its sensor stop?"
+        elif end + 1 < len(gap):
+            jump, *around = np.abs(np.diff(gap)[[end - 1, begin - 1, end]]).tolist()
+            calm = abs(float(force[end] - force[end - 1])) < FREE_GLITCH * span
+            if jump > JUMP * max(around) and jump > STOPPED_STEPS * _least_step(gap) and calm:
+                yield f"{stays} while the force changes, and then jumps by {jump * 1e3:.3g} mm: did its sensor stop?"
+
+
+def _least_step(gap: Numbers) -> float:
+    steps = np.abs(np.diff(gap))
+    return float(steps[steps > 0.0].min(initial=np.inf))
+
+
+def _pads(recording: Recording) -> dict[str, Numbers]:
+    """Return the force of each pad by its name in a sentence; of both together where one stands for both."""
+    left = np.array([reading.frame.force_left_n for reading in recording.readings])
+    right = np.array([reading.frame.force_right_n for reading in recording.readings])
+    if np.array_equal(left, right, equal_nan=True):
+        return {"the force": left}
+    return {"the force of the left pad": left, "the force of the right pad": right}
+
+
+def _held(force: Numbers) -> slice | None:
+    """Return the samples in which a force that varies also without a load, by its noise, repeats a value; else None.
+
+    A value in coarse counts can stay within its step. It is told only if it stays to the end, and for long, or if it is
+    the largest of a converter.
+    """
+    if len(force) < FEWEST:
+        return None
+    steps = np.diff(force)
+    changed = steps != 0.0
+    free = force[:-1] < force.min() + FREE * np.ptp(force)
+    begins = np.concatenate(([0], np.flatnonzero(changed) + 1, [len(force)])).tolist()
+    runs = [slice(begin, end) for begin, end in pairwise(begins)]
+    for run in (runs[-1], max(runs, key=lambda run: run.stop - run.start)):
+        others = free.copy()
+        others[run.start : run.stop - 1] = False
+        repeated = run.stop - run.start - 1
+        if repeated >= FEWEST and force[run.start] == force.max() and force.max() in LARGEST_COUNTS:
+            return run
+        if not others.any() or repeated * changed[others].mean() < CHANGES:
+            continue
+        noise = steps[others & changed]
+        turns = noise[1:] * noise[:-1] < 0.0  # noise goes up and down, and a force that is built up does not
+        if len(turns) == 0 or turns.mean() < TURNS:
+            continue
+        large = np.abs(noise) > 1.5 * np.abs(steps[changed]).min()
+        fine = (large[1:] & large[:-1] & turns).mean() > LARGE_TURNS
+        if fine or (run is runs[-1] and repeated >= STOPPED * len(force)):
+            return run
+    return None

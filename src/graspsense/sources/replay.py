@@ -27,7 +27,7 @@ from graspsense.sources.dataset_recordings import (
     numbered_recording,
 )
 from graspsense.sources.icub import read_recording
-from graspsense.sources.recording_notices import force_notices
+from graspsense.sources.recording_notices import signal_notices
 from graspsense.store.naming import as_source
 
 
@@ -172,7 +172,7 @@ class ReplayBackend(SensorBackend[ReplayConfig]):
             has_release=recording.has_release,
             units=recording.units,
             mounting=recording.mounting,
-            notes=tuple(dict.fromkeys((*recording.notes, *recording.notices, *force_notices(recording)))),
+            notes=tuple(dict.fromkeys((*recording.notes, *recording.notices, *signal_notices(recording)))),
         )
 
     def read(self, timeout_s: float) -> Reading:

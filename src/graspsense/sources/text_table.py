@@ -171,7 +171,7 @@ class _Layout:
         if data == 0:
             named = self._names_in_comment(width)
             if named is not None:
-                return named[1], None, 0, named[0]
+                return named[1], named[2], 0, named[0]
             if all(is_number(cell) or is_missing(cell) for cell in top):
                 return [f"c{k}" for k in range(1, width + 1)], None, 0, 0
             return top, None, 1, self.rows[0][0]
@@ -212,18 +212,26 @@ class _Layout:
             )
         return self.rows[names][1], units, names + (2 if units else 1), self.rows[names][0]
 
-    def _names_in_comment(self, width: int) -> tuple[int, list[str]] | None:
-        """Return the names that the last comment before the first row has, with its line; None if it has none."""
-        above = [(number, line) for number, line in self.comments if number < self.rows[0][0]]
+    def _names_in_comment(self, width: int) -> tuple[int, list[str], list[str] | None] | None:
+        """Return the line, the names and the units that the last comments before the first row have.
+
+        Units stand in the comment behind the names. None if the last comment, but for units, has no names.
+        """
+        above = [(number, self._cells(line)) for number, line in self.comments if number < self.rows[0][0]]
+        units = None
+        if len(above) > 1 and len(above[-1][1]) == width and _are_units(above[-1][1]):
+            units = [cell.strip("[]()") for cell in above.pop()[1]]
         if not above:
             return None
-        number, line = above[-1]
-        text = line.strip().lstrip("#% ")
-        cells = (
+        number, cells = above[-1]
+        named = len(cells) == width and len(set(cells)) == width and not any(map(is_number, cells))
+        return (number, cells, units) if named and all(cells) else None
+
+    def _cells(self, comment: str) -> list[str]:
+        text = comment.strip().lstrip("#% ")
+        return (
             text.split() if self.separator == " " else [cell.strip() for cell in text.split(self.separator)]
         )
-        named = len(cells) == width and len(set(cells)) == width and not any(map(is_number, cells))
-        return (number, cells) if named and all(cells) else None
 
     def _without_repeats(
         self, rows: list[Row], names: Sequence[str], units: Sequence[str] | None
@@ -326,11 +334,11 @@ def _sample(lines: Sequence[Any]) -> list[Any]:
 
 
 def _separator(lines: Sequence[str]) -> str:
-    """Return what separates the cells of these lines: a semicolon, a tab, a comma, or any number of spaces.
+    """Return what separates the cells of these lines: a semicolon, a tab, a comma, a bar, or any number of spaces.
 
     It gives most lines the same number of cells, and the first line as many if any does.
     """
-    widths = {separator: _width(lines, separator) for separator in (";", "\t", ",", " ")}
+    widths = {separator: _width(lines, separator) for separator in (";", "\t", ",", "|", " ")}
     agreeing = {separator: count for separator, (width, count) in widths.items() if width > 1}
     if agreeing.get(" ", 0) >= agreeing.get(",", 1) and _commas_are_within_numbers(lines):
         agreeing.pop(",", None)

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from graspsense.core.control.contact import CONTACT_FORCE_N, both_touch
 from graspsense.core.values.errors import DataDamaged
 from graspsense.sources.grasp_columns import GraspColumns
-from graspsense.sources.manifest.steps import squeezes
+from graspsense.sources.manifest.steps import NOISE, squeezes
+from graspsense.sources.recording_notices import FEWEST, STEADY, ZERO_SAMPLES
 
 if TYPE_CHECKING:
     from graspsense.sources.grasp_columns import Numbers
@@ -19,13 +21,16 @@ BEGINS_LOADED: Final = 0.25
 """Share of its range above which the force of the first sample is that of a contact, or of a wrong zero."""
 JUMP: Final = 20.0
 """A time step of so many usual ones is a jump."""
+SHORTEST_S: Final = 0.1
+"""No grasp is shorter (s)."""
 MILLIMETRES: Final = 0.5
 """A gap beyond this (m) is in another unit."""
-ZERO_SAMPLES: Final = 10
-NOISE: Final = 6.0
-"""A force whose range is at most so many usual second differences is noise alone."""
-STEADY: Final = 0.1
-"""Share of its range by which the force may change in the samples that a zero is taken from."""
+OFFSET: Final = 0.05
+"""Share of the range of a pad that its force may have without contact."""
+STRONG_N: Final = 300.0
+"""A force whose range is beyond that of the usual grippers is in another unit."""
+GLITCHES: Final = 0.01
+"""Share of the samples that can be glitches, at each end of the range of a force."""
 _OFFSET: Final = ' If the fingers were free, the sensor has an offset: zero = "10 samples"'
 _FOUND: Final = 'split = "force" finds them, '
 
@@ -35,34 +40,59 @@ def notices_of(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
     yield from columns.warnings
     if len(columns) < 2:
         return
-    force, gap = columns.force_n, columns.gap_m
-    low, high, start = float(force.min()), float(force.max()), float(force[0])
-    peak, felt = int(force.argmax()), _is_felt(force)
-    if felt and abs(low) > abs(high) and low < 0.0:
-        yield "the force is negative where it is largest: is it a pull? Turn its sign: -FORCE"
-    moved, span = float(gap[peak] - gap[0]), float(np.ptp(gap))
-    if span == 0.0 and not columns.units.get("gap"):
+    yield from _of_gap(columns)
+    if not columns.units.get("force"):
+        yield from _of_unit(columns)
+    yield from _of_zero(columns, zeroed=zeroed)
+    yield from _of_time(columns)
+
+
+def _of_gap(columns: GraspColumns) -> Iterator[str]:
+    gap, in_m = columns.gap_m, not columns.units.get("gap")
+    moved, span = float(gap[int(columns.force_n.argmax())] - gap[0]), float(np.ptp(gap))
+    if span == 0.0 and in_m:
         yield "the gap does not change during the recording: is it another column?"
     if span > 0.0 and moved > 0.2 * span:
         yield (
             "the gap rises while the force rises: is it a position that grows on closing? Write the gap as a "
             f'difference: gap = "{_opening(gap):g} - POSITION"'
         )
-    if not columns.units.get("gap") and float(np.abs(gap).max()) > MILLIMETRES:
+    if in_m and float(np.abs(gap).max()) > MILLIMETRES:
         yield 'the gap is too large for metres: if it is in millimetres, write gap = "COLUMN [mm]"'
-    if not columns.units.get("force"):
-        pads = np.concatenate((columns.left_n, columns.right_n))
-        if high - low > 20.0 and bool((pads == np.round(pads)).all()):
-            yield (
-                "the forces are whole numbers, as counts of a sensor are: give a factor to newtons, or write "
-                'force = "COLUMN [counts]", or [gf] for the grams of a scale'
-            )
+
+
+def _of_unit(columns: GraspColumns) -> Iterator[str]:
+    """Yield what tells that forces called newtons are in another unit."""
+    pads = np.concatenate((columns.left_n, columns.right_n))
+    low, high = _usual_range(columns.force_n)
+    if high - low > 20.0 and bool((pads == np.round(pads)).all()):
+        yield (
+            "the forces are whole numbers, as counts of a sensor are: give a factor to newtons, or write "
+            'force = "COLUMN [counts]", or [gf] for the grams of a scale'
+        )
+    elif high - low > STRONG_N:
+        yield (
+            f"the force reaches {high:.4g} N, which few grippers have: if it is in another unit, write that behind "
+            "it, as [gf] for the grams of a scale, [mN] or [counts]"
+        )
+
+
+def _of_zero(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
+    """Yield what looks wrong in the sign of the forces and in their zero, and whether a contact was before."""
+    force = columns.force_n
+    low, high = _usual_range(force)
+    felt = _is_felt(force)
+    for name, pad in _pads(columns):
+        least, most = _usual_range(pad)
+        if _is_felt(pad) and least < 0.0 and abs(least) > abs(most):
+            yield f"{name} is negative where it is largest: is it a pull? Turn its sign: -FORCE"
+    steady, touched = _is_steady(force), not columns.units.get("force") and _both_touch_at_first(columns)
     if _falls_on_contact(columns):
         yield (
             "the force falls while the gap closes: does the sensor fall on contact? Turn its sign and write its zero: "
             'force = "-FORCE" and zero = "10 samples", or force = "999 - FORCE" where 999 is its value without contact'
         )
-    elif felt and start - low > BEGINS_LOADED * (high - low):
+    elif felt and (force[0] - low > BEGINS_LOADED * (high - low) or (touched and not steady)):
         if zeroed:
             yield (
                 "the recording begins in contact, so the zero of its first samples removes a part of the force: leave "
@@ -71,18 +101,48 @@ def notices_of(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
         else:
             yield (
                 "the recording begins in contact: there is no approach, so features from before the contact are "
-                "missing." + _OFFSET * _is_steady(force)
+                "missing." + _OFFSET * steady
             )
-    elif not zeroed and high > low and abs(start) > BEGINS_LOADED * (high - low) and _is_steady(force):
-        yield 'the force does not begin at zero: if the fingers were free then, write zero = "10 samples"'
+    elif not zeroed:
+        for name, pad in _pads(columns):
+            least, most = _usual_range(pad)
+            offset = abs(float(pad[:ZERO_SAMPLES].mean()))
+            if _is_felt(pad) and _is_steady(pad) and offset > OFFSET * (most - least):
+                yield f'{name} does not begin at zero: if the fingers were free then, write zero = "10 samples"'
+
+
+def _pads(columns: GraspColumns) -> list[tuple[str, Numbers]]:
+    """Return the force of each pad with its name; of both together where one force stands for both."""
+    if np.array_equal(columns.left_n, columns.right_n):
+        return [("the force", columns.left_n)]
+    return [("the force of the left pad", columns.left_n), ("the force of the right pad", columns.right_n)]
+
+
+def _both_touch_at_first(columns: GraspColumns) -> bool:
+    return both_touch(float(columns.left_n[0]), float(columns.right_n[0]), CONTACT_FORCE_N)
+
+
+def _of_time(columns: GraspColumns) -> Iterator[str]:
     steps = np.diff(columns.t_s)
     usual = float(np.median(steps))
+    lasts_s = float(columns.t_s[-1] - columns.t_s[0])
+    if not columns.units.get("t") and len(columns) >= FEWEST and 0.0 < lasts_s < SHORTEST_S:
+        yield (
+            f"the recording lasts {lasts_s * 1e3:.2g} ms only: if the time is not in s, write its unit behind it, or a "
+            "factor that makes it seconds"
+        )
     if float(steps.max()) > JUMP * usual > 0.0:
         yield (
             f"the time jumps by more than {JUMP:g} usual steps: does the file hold several grasps? "
             + _FOUND * _has_several_squeezes(columns)
             + 'split = "COLUMN" splits it by a column'
         )
+
+
+def _usual_range(force: Numbers) -> tuple[float, float]:
+    """Return the least and the largest force, apart from one sample in a hundred, which may be a glitch."""
+    low, high = np.quantile(force, [GLITCHES, 1.0 - GLITCHES]).tolist()
+    return low, high
 
 
 def _falls_on_contact(columns: GraspColumns) -> bool:

@@ -93,7 +93,7 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
             "t": "" if _has_time(manifest, table, available) else "sample",
         },
         notes=tuple(notes),
-        warnings=(*table.warnings, *_doubtful_units(manifest, available)),
+        warnings=(*table.warnings, *_doubts(manifest, available)),
         lines=table.lines,
         events=events,
     )
@@ -139,6 +139,12 @@ def _fingers(
     return hand_of(manifest.keys, next(iter(units.values()), "N")), forces
 
 
+def _doubts(manifest: ReadManifest, columns: AvailableColumns) -> Iterator[str]:
+    """Yield a sentence for each unit that is most likely another one."""
+    yield from _doubtful_units(manifest, columns)
+    yield from _counted_time(manifest, columns)
+
+
 def _doubtful_units(manifest: ReadManifest, columns: AvailableColumns) -> Iterator[str]:
     """Yield a sentence for each quantity whose unit the file states otherwise than the manifest."""
     for key, parts in manifest.expressions.items():
@@ -154,6 +160,20 @@ def _doubtful_units(manifest: ReadManifest, columns: AvailableColumns) -> Iterat
             )
         elif stated and chosen.unit and stated != chosen.unit and stated in TO_SI[quantity]:
             yield f"{key}: the manifest says [{chosen.unit}], and the file states {stated}"
+
+
+def _counted_time(manifest: ReadManifest, columns: AvailableColumns) -> Iterator[str]:
+    """Yield that a time without a unit is most likely the number of the sample: it is whole, and rises by 1."""
+    parts = manifest.expressions["time"]
+    chosen = columns.chosen(parts) if parts else None
+    if chosen is None or not columns.has(chosen) or columns.unit(chosen, "time"):
+        return
+    steps = np.diff(chosen.numbers(columns, len(columns.table)))
+    if len(steps) and np.median(steps) == 1.0 and (steps == np.round(steps)).all():
+        yield (
+            "the time rises by 1 in each sample, as the number of a sample does: leave time out and write rate_hz, or "
+            f'write time = "{chosen.text} [s]" if these are seconds'
+        )
 
 
 def _gram_force(expression: Expression, stated: str, known: Sequence[str]) -> str:

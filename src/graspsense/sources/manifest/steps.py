@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
@@ -21,7 +23,15 @@ RUPTURE_FALL: Final = 0.3
 RELEASED: Final = 0.1
 """Share of its peak below which the force is when the object is released."""
 LOADED: Final = 0.2
-"""Share of the range of the force above which an object is held, where squeezes are to be found."""
+"""Share of its force below which a squeeze has ended."""
+WEAKEST: Final = 0.1
+"""Share of the usual force by which a squeeze rises at least."""
+UNLOADED: Final = 0.02
+"""Share of the range of the force up to which nothing is held."""
+NOISE: Final = 6.0
+"""A force whose range is at most so many usual second differences is noise alone."""
+SHORTEST_RELEASE_S: Final = 0.1
+"""Fingers need this time (s) at least to open and to close again."""
 FEWEST: Final = 3
 """Fewest samples of a squeeze that is found."""
 
@@ -39,30 +49,72 @@ def without_duplicates(columns: GraspColumns) -> GraspColumns:
 def squeezes(columns: GraspColumns) -> list[GraspColumns]:
     """Return each squeeze of a recording, with the approach before it. Raises DataDamaged if there is none.
 
-    An object is held while the force exceeds its lowest values by a fifth of its range. A squeeze begins halfway
-    after the one before, where both fingers are free. A force that is missing, or that no gripper has, is of its own
-    squeeze: there the last force before it counts.
+    A squeeze rises above the force before it by a tenth of the usual force, and ends where it has lost four fifths of
+    what it rose by, so squeezes of different forces and a zero that drifts are told apart. The next one begins halfway
+    after the end, where both fingers are free. A force that is missing, or that no gripper has, is of its own
+    squeeze: there the last force before it counts. A glitch of two samples does not end a squeeze.
     """
     force = _known_force(columns)
-    low, high = np.percentile(force, [5.0, 99.5])
-    held = force > low + LOADED * (high - low)
-    edges = np.flatnonzero(np.diff(held.astype(np.int8)))
-    begins = [0, *(edges + 1).tolist()]
-    runs = [
-        (begin, end)
-        for begin, end in zip(begins, [*begins[1:], len(held)], strict=True)
-        if held[begin] and end - begin >= FEWEST
-    ]
-    if not runs or not high > low:
+    runs = _held_runs(force, np.diff(columns.t_s))
+    if not runs:
         raise DataDamaged(f"{columns.source}: no squeeze was found, because its force never rises")
-    bounds = [
-        0,
-        *((end + begin) // 2 for (_, end), (begin, _) in pairwise(runs)),
-        len(held),
-    ]
+    between = (_middle(columns.t_s, end, begin) for (_, end), (begin, _) in pairwise(runs))
+    bounds = [0, *between, len(force)]
     return [
         columns.rows(slice(start, end), f"squeeze {k}") for k, (start, end) in enumerate(pairwise(bounds), 1)
     ]
+
+
+def _middle(t_s: NDArray[np.float64], end: int, begin: int) -> int:
+    """Return the sample with which the next squeeze begins: the middle, or where the clock begins anew."""
+    back = np.flatnonzero(np.diff(t_s[end - 1 : begin + 1]) < 0.0)
+    return end + int(back[0]) if len(back) else (end + begin) // 2
+
+
+def _held_runs(force: NDArray[np.float64], steps_s: NDArray[np.float64]) -> list[tuple[int, int]]:
+    """Return the first sample of each squeeze and the one after its last."""
+    noise = NOISE * float(np.median(np.abs(np.diff(force, 2)))) if len(force) > 2 else 0.0
+    around = np.pad(force, FEWEST - 1, mode="edge")
+    force = np.median(np.lib.stride_tricks.sliding_window_view(around, 2 * FEWEST - 1), axis=1)
+    low, high = np.percentile(force, [5.0, 99.5])
+    if not high - low > noise:
+        return []
+    loaded = force[force > low + max(noise, UNLOADED * (high - low))]
+    usual = float(np.median(loaded)) - float(low) if len(loaded) else float(high - low)
+    rise = max(noise, WEAKEST * usual)
+    shortest = SHORTEST_RELEASE_S / float(np.median(steps_s)) if len(steps_s) else 0.0
+    joined: list[tuple[int, int]] = []
+    for begin, end in _rises(force, rise, max(rise, 0.5 * usual)):
+        if end - begin < FEWEST:
+            continue
+        if joined and begin - joined[-1][1] < shortest:
+            begin = joined.pop()[0]
+        joined.append((begin, end))
+    return joined
+
+
+def _rises(force: NDArray[np.float64], rise: float, held_at_first: float) -> Iterator[tuple[int, int]]:
+    """Yield where the force rises by `rise` above the least before it, up to where it has lost most of that.
+
+    A recording that begins in a squeeze falls first, by `held_at_first`.
+    """
+    base = peak = start = float(force[0])
+    begin: int | None = None
+    for k, value in enumerate(force.tolist()):
+        if begin is not None:
+            peak = max(peak, value)
+            if value - base < LOADED * (peak - base):
+                yield begin, k
+                begin, base, start = None, value, -math.inf
+            continue
+        base = min(base, value)
+        if value - base > rise:
+            begin, peak = k, value
+        elif start - value > held_at_first:
+            yield 0, k
+            start = -math.inf
+    if begin is not None:
+        yield begin, len(force)
 
 
 def _known_force(columns: GraspColumns) -> NDArray[np.float64]:
