@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
 from attrs import frozen
@@ -28,10 +27,6 @@ COMMA: Final = 4
 _EVERY: Final = POINT | THOUSANDS | COMMA
 _NOTATIONS: Final = (POINT, THOUSANDS, COMMA)
 
-ALIKE: Final = 3.0
-"""Factor within which two numbers behind each other are alike."""
-SINGLE_DIGITS: Final = 9.0
-"""Numbers up to this are near the zero of a sensor, from which it can go anywhere."""
 MISSING: Final = frozenset(
     (
         *("", "nan", "na", "n/a", "null", "none", "?", "-", "--", "---"),
@@ -193,22 +188,17 @@ def _read(cells: Sequence[str], fit: _Fit, of_file: int) -> Numbers | NotNumbers
     """Return the numbers; `of_file` holds COMMA and THOUSANDS where other columns prove decimal commas or points."""
     common = fit.notations
     if common & POINT:
-        # `1.500` is 1500 where all other columns have decimal commas, and beside 975 and 1.000, or behind 998.
+        # `1.500` is 1500 where all other columns have decimal commas, and beside 975 and 1.000.
         grouped = common & COMMA and any("." in cell for cell in cells)
-        signs, alike = (_signs_of_thousands(cells, "."), _neighbours(cells, ".")) if grouped else (0, 0)
-        thousands = (signs > 0 and alike > 0) or (signs == 2 and alike == 0)
-        if not grouped or not (of_file & COMMA or thousands):
+        if not grouped or not (of_file & COMMA or _signs_of_thousands(cells, ".") == 2):
             return _values(cells, POINT) if fit.values is None else fit.values
         if not of_file & THOUSANDS:
             return _values(cells, COMMA)
     elif common == THOUSANDS | COMMA:
         if of_file == COMMA:
             return _values(cells, COMMA)
-        signs, alike = _signs_of_thousands(cells, ","), _neighbours(cells, ",")
-        if of_file == THOUSANDS or (signs > 0 and alike >= 0):
+        if of_file == THOUSANDS or _signs_of_thousands(cells, ",") > 0:
             return _values(cells, THOUSANDS)
-        if not of_file and alike < 0:
-            return _values(cells, COMMA)
     else:
         return _values(cells, common)
     row = next(k for k, cell in enumerate(cells) if "," in cell or "." in cell)
@@ -231,21 +221,6 @@ def _signs_of_thousands(cells: Sequence[str], mark: str) -> int:
     return any(cell.endswith("0") for cell in cells if mark in cell) + any(
         len(cell.lstrip("+-\u2212")) == 3 for cell in plain
     )
-
-
-def _neighbours(cells: Sequence[str], mark: str) -> int:
-    """Return how much more often neighbours are alike with marks between thousands than with decimal marks.
-
-    Where a cell with a mark stands beside one without, `998, 1.005` goes on with 1005, and `100, 99.875` with 99.875.
-    """
-    alike = 0
-    for cell, following in pairwise(cell for cell in cells if not is_missing(cell)):
-        if (mark in cell) != (mark in following):
-            marked, plain = (cell, following) if mark in cell else (following, cell)
-            decimal, number = abs(_number(marked.replace(",", "."), POINT)), abs(_number(plain, POINT))
-            alike += number < ALIKE * 1000.0 * decimal < ALIKE**2 * number
-            alike -= SINGLE_DIGITS < number < ALIKE * decimal < ALIKE**2 * number
-    return alike
 
 
 def _values(cells: Sequence[str], notation: int) -> Numbers:
