@@ -45,7 +45,7 @@ from graspsense_pr2_gripper.protocol import (
     limit,
     micro,
 )
-from graspsense_pr2_gripper.status import COMMAND_REFUSED, REPORTS_LOST, status_bits
+from graspsense_pr2_gripper.status import REPORTS_LOST, status_bits
 
 _RATE_HZ: Final = 1000.0
 _PADS_RATE_HZ: Final = 24.39
@@ -66,8 +66,7 @@ RELEASE_REPORT: Final = OutputReport(0, RELEASE_KIND, 0, 0, 0)
 UNHEARD_S: Final = 0.1
 """Device time without the echo of a command after which the device counts as lost."""
 UNHEARD_COMMANDS: Final = 5
-"""Commands that must be without an echo by then: a host that stops for a moment has sent only one or two. So many that
-are not echoed, one behind the other, are lost."""
+"""Commands that must be without an echo by then: a host that stops for a moment has sent only one or two."""
 UNCALIBRATED: Final = "none"
 TEST_NUMBER: Final = (0x1209, 0x0001)
 
@@ -120,13 +119,11 @@ class Pr2Backend(BackendWithEmulator[Pr2Config]):
         if behind and self._sent:
             if report.echo != self._echo:
                 self._heard_us = report.time_us
-            elif behind >= UNHEARD_COMMANDS:
-                if report.time_us - self._heard_us > UNHEARD_S * 1e6:
-                    raise DeviceLost(
-                        f"the PR2 gripper reports but takes no commands: {behind} were not echoed in {UNHEARD_S} s; "
-                        "its watchdog lets go. Unplug it and plug it in again"
-                    )
-                report = report._replace(status=report.status | COMMAND_REFUSED)
+            elif behind >= UNHEARD_COMMANDS and report.time_us - self._heard_us > UNHEARD_S * 1e6:
+                raise DeviceLost(
+                    f"the PR2 gripper reports but takes no commands: {behind} were not echoed in {UNHEARD_S} s; its "
+                    "watchdog lets go. Unplug it and plug it in again"
+                )
         else:
             self._heard_us = report.time_us
         self._echo = report.echo

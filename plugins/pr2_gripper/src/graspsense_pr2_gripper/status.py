@@ -101,8 +101,8 @@ _COMMON: Final = (
     StatusBit(
         mask=COMMAND_REFUSED,
         name="command refused",
-        meaning="a command was lost or arrived damaged and the one before still applies; without a good one for "
-        "0.1 s the device counts as lost",
+        meaning="a command arrived damaged and the one before still applies; without a good one for 0.1 s the device "
+        "counts as lost",
     ),
     StatusBit(
         mask=OLD_IMAGE,
