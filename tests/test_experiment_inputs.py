@@ -234,18 +234,6 @@ def test_the_code_of_a_component_that_a_setting_names_is_an_input(monkeypatch):
     assert contents[foreign.name] != contents_of(params)[foreign.name]
 
 
-def test_a_table_that_is_replaced_while_the_experiment_runs_is_no_result_of_what_it_was_before(tmp_path):
-    table(tmp_path / "t.csv", 1, 50.0)
-    planned, results = read_experiment(experiment(tmp_path, "t.csv")), Results(tmp_path / "out")
-    table(tmp_path / "t.csv", 2, 0.0)
-    account = run_experiment(planned, results, Serial)
-    assert "t.csv" in account.failed[0].reason
-    table(tmp_path / "t.csv", 1, 50.0)
-    again = run_experiment(planned, results, Serial, resume=True)
-    assert (again.kept, again.done) == (0, 1)
-    assert rate_of(planned, results) == (1.0, 40)
-
-
 def test_what_is_no_file_is_no_input():
     assert contents_of({"a": "can:full_open", "b": ["", "a\nb = 1\n"], "c": 3, "d": None}).keys() == {
         "graspsense"

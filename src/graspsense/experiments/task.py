@@ -14,14 +14,12 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from attrs import field, frozen
 
-from graspsense.core.components.caller import option
 from graspsense.core.learn.model_content import digest
-from graspsense.core.values.errors import FAILURES, ConfigError, DataDamaged, GraspsenseError, listed, named
+from graspsense.core.values.errors import FAILURES, DataDamaged, GraspsenseError, named
 from graspsense.core.values.json_values import json_ready, json_text
 from graspsense.evaluation.json_codec import from_json, to_json
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.versions import versions
-from graspsense.sources.input_content import contents_of
 
 if TYPE_CHECKING:
     from graspsense.experiments.task_results import AnyTaskResult
@@ -137,7 +135,6 @@ def run_task(text: str) -> str:
         # Plugins may print; standard output carries results only.
         with redirect_stdout(sys.stderr):
             returned = kind_of(task.kind).function()(task.params, task.seed)
-        _refuse_changed_inputs(task.params)
         # Encoded here, so that a value of a plugin that JSON cannot hold fails this task alone.
         result = json.loads(json_text(to_json(returned)))
     except GraspsenseError as error:
@@ -156,18 +153,6 @@ def run_task(text: str) -> str:
     return TaskResult(
         key=task.key, name=task.name, state=state, result=result, reason=reason, made=made
     ).to_text()
-
-
-def _refuse_changed_inputs(params: Mapping[str, Any]) -> None:
-    """Raise ConfigError if an input has another content than when the experiment was read."""
-    planned = params.get("inputs", {})
-    present = contents_of({key: value for key, value in params.items() if key != "inputs"}) if planned else {}
-    changed = [name for name, content in planned.items() if present.get(name) != content]
-    if changed:
-        raise ConfigError(
-            f"changed after the experiment was begun, or different on this machine: {listed(changed)}. Run it again "
-            f"with {option('resume', python='resume=True')}"
-        )
 
 
 def _text(values: Mapping[str, Any]) -> str:
