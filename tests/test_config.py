@@ -211,6 +211,18 @@ def test_lists_replace_and_tables_merge(plugins, write):
     assert asdict(config.filter) == {"cutoff_hz": 5.0, "order": 3}
 
 
+def test_a_table_that_a_value_replaced_leaves_no_origin_behind(plugins, write):
+    write(BASE.replace('port = "a"', 'port = "a"\nfilter = { order = 4 }'), "base.toml")
+    write('extends = "base.toml"\n[gripper]\nfilter = 3', "middle.toml")
+    top = write('extends = "middle.toml"\n[gripper]\nfilter = { cutoff_hz = 5 }', "top.toml")
+
+    settings = resolve(top)
+
+    assert asdict(settings.gripper.config.filter) == {"cutoff_hz": 5.0, "order": 2}
+    assert settings.origins["gripper.filter.cutoff_hz"] == "top.toml:3"
+    assert settings.origins["gripper.filter.order"] == "default"
+
+
 def test_extends_lays_a_file_over_another_with_paths_from_its_own_folder(plugins, write):
     write(BASE, "shared/base.toml")
     write('extends = "base.toml"\n[controller]\nforce_n = 13', "shared/middle.toml")

@@ -129,6 +129,14 @@ def test_a_set_keeps_a_single_label_only_if_the_answer_is_certain_enough():
     assert set_of(sets, {"a": 0.9, "b": 0.1}, "a", certainty=0.85) == {"a", "b"}
 
 
+def test_a_label_whose_score_is_its_threshold_is_a_member_whatever_the_rounding():
+    sets = calibrated_by(np.full(40, 0.5), ["a"] * 20 + ["b"] * 20)
+
+    for score in (0.5, np.nextafter(0.5, 0.0)):
+        assert set_of(sets, {"a": 0.9, "b": score}, "a") == {"a", "b"}
+    assert set_of(sets, {"a": 0.9, "b": 0.499}, "a") == {"a"}
+
+
 def test_many_trials_of_one_instance_count_as_one():
     truth = np.array([0.05] * 100 + [0.5] * 20)
     instances = ["poor"] * 100 + [f"good{i}" for i in range(20)]

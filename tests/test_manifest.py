@@ -560,6 +560,16 @@ def test_noise_alone_is_neither_a_pull_nor_a_contact(tmp_path):
         )
 
 
+def test_an_empty_cell_does_not_hide_the_peak_of_its_column(tmp_path):
+    gap, force = squeezing()
+    cells = ["" if k == 40 else str(value) for k, value in enumerate(force)]
+    pandas_csv(tmp_path / "jar.csv", {"t": T_S, "gap": gap * 1e3, "F": force, "load": cells})
+
+    (jar,) = recordings(tmp_path, PLAIN + 'values = { most = "peak(load) [N]" }')
+
+    assert jar.values == {"most [N]": pytest.approx(20.0)}
+
+
 def test_a_gap_in_millimetres_and_counts_called_newtons_are_refused(tmp_path):
     pandas_csv(tmp_path / "jar.csv", {"t": T_S, "gap": squeezing()[0] * 1e3, "F": squeezing()[1]})
     with pytest.raises(DataDamaged, match=r"the gap reaches 60 m, which no gripper has.*\[mm\]"):
