@@ -123,11 +123,18 @@ def test_a_subpackage_knows_only_the_subpackages_it_may():
         assert subpackages_known(path, package) <= MAY_KNOW[parts[0]], path.relative_to(SOURCE)
 
 
-def modules() -> dict[str, Path]:
-    """Return the path of each module of graspsense."""
+def package_of(distribution: Path) -> Path:
+    (package,) = [
+        path for path in (distribution / "src").iterdir() if path.is_dir() and path.name != "__pycache__"
+    ]
+    return package
+
+
+def modules(package: Path = SOURCE) -> dict[str, Path]:
+    """Return the path of each module of a package."""
     names = {}
-    for path in files(SOURCE):
-        parts = ("graspsense", *path.relative_to(SOURCE).with_suffix("").parts)
+    for path in files(package):
+        parts = (package.name, *path.relative_to(package).with_suffix("").parts)
         names[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
     return names
 
@@ -157,9 +164,10 @@ def test_a_room_of_core_knows_those_before_it_only():
             assert {".".join(name_of.split(".")[:3]) for name_of in within} <= allowed, name
 
 
-def test_no_module_imports_itself_through_others():
-    known = modules()
-    waiting = {name: imports_of(name, known) - {name, "graspsense"} for name in known}
+@every_case("package", [SOURCE, *map(package_of, distributions())])
+def test_no_module_imports_itself_through_others(package):
+    known = modules(package)
+    waiting = {name: imports_of(name, known) - {name, package.name} for name in known}
     while ready := [name for name, needed in waiting.items() if not needed & waiting.keys()]:
         for name in ready:
             del waiting[name]
@@ -212,7 +220,7 @@ def test_core_names_the_other_subpackages_in_one_place_only():
 
 @every_case("folder", distributions())
 def test_a_distribution_knows_the_door_for_authors_only(folder):
-    (package,) = [path for path in (folder / "src").iterdir() if path.is_dir() and path.name != "__pycache__"]
+    package = package_of(folder)
     for path in files(package):
         names = set(imported(parsed(path), package.name))
         known = {name for name in names if name.split(".")[0] == "graspsense"}

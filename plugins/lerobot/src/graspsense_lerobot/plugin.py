@@ -15,7 +15,7 @@ def graspsense_datasets() -> Iterable[DatasetEntry]:
     yield DatasetEntry(
         name="lerobot",
         recordings="graspsense_lerobot.reader:recordings",
-        export="graspsense_lerobot.writer:export",
+        export="graspsense_lerobot.export:export",
         summary="LeRobot data sets v2.1 and v3.0, as lerobot:FOLDER",
     )
 

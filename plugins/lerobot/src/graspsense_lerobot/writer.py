@@ -7,11 +7,7 @@ at their own rates. `meta/graspsense.json` says what each column and each number
 from __future__ import annotations
 
 import json
-import os
-import secrets
-import shutil
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -20,12 +16,11 @@ import pyarrow
 from attrs import frozen
 from pyarrow import parquet
 
-from graspsense.gripper_api import Phase, SaveFailed, StoredGrasp
+from graspsense.gripper_api import Phase, StoredGrasp
 from graspsense.plugin_api import ConfigError, TactileArray
 from graspsense.testing_api import ImageTrace, SampleTrace
 from graspsense_lerobot.columns import Column, parquet_columns, statistics
 from graspsense_lerobot.folder import DATA_PATHS
-from graspsense_lerobot.place import folder_and_options
 
 if TYPE_CHECKING:
     from graspsense.plugin_api import Trace
@@ -65,40 +60,16 @@ class Plan:
     """Whether all trials have commands; else the action is the position one frame later."""
 
 
-def export(grasps: Sequence[StoredGrasp], place: str) -> dict[str, int]:
-    """Write trials to a new folder, or to a copy of their data set, and return how many trials and frames it has.
+def write_data_set(grasps: Sequence[StoredGrasp], fps: float | None, part: Path) -> dict[str, int]:
+    """Write trials as a data set to a folder, and return how many trials and frames it has.
 
-    Raises ConfigError if it exists or a trial cannot be an episode, SaveFailed if it cannot be written.
+    `fps` is the number of frames per second, by default 30. Raises ConfigError if a trial cannot be an episode.
     """
-    folder, options = folder_and_options(place)
-    if options.annotate:
-        from graspsense_lerobot.annotate import annotate
-
-        with new_folder(folder) as part:
-            return annotate(grasps, Path(options.annotate).expanduser(), part)
-    fps = options.fps or FPS
+    fps = fps or FPS
     if fps != int(fps):
         raise ConfigError(f"fps={fps:g}: LeRobot has whole numbers of frames per second")
-    plan = planned(grasps, int(fps))
-    with new_folder(folder) as part:
-        frames = _write(part, grasps, plan)
+    frames = _write(part, grasps, planned(grasps, int(fps)))
     return {"trials": len(grasps), "frames": frames}
-
-
-@contextmanager
-def new_folder(folder: Path) -> Iterator[Path]:
-    """Give a folder to write to, which gets its name when all is written. Raises ConfigError, SaveFailed."""
-    if os.path.lexists(folder):
-        raise ConfigError(f"{folder} already exists: name another folder, or move it away")
-    part = folder.with_name(f"{folder.name}.{secrets.token_hex(8)}.part")
-    try:
-        part.mkdir(parents=True)
-        yield part
-        part.rename(folder)
-    except OSError as error:
-        raise SaveFailed(f"{folder} cannot be written: {error.strerror or error}") from error
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
 
 
 def planned(grasps: Sequence[StoredGrasp], fps: int) -> Plan:

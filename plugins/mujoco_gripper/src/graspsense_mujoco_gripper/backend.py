@@ -177,7 +177,8 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         for name in dict.fromkeys(scenes):
             read_scene(name, self.config.scene)
         makes_signals = any(self.with_object(name).makes_signals() for name in set(scenes))
-        return grasps(GraspingJob(self.config, controller, options, makes_signals), scenes, seeds)
+        job = GraspingJob(gripper_in_batch, self.config, controller, options, makes_signals)
+        return grasps(job, scenes, seeds)
 
     def makes_signals(self) -> bool:
         """Return whether there are channels that each tick has besides the frame and the cells."""
@@ -517,6 +518,13 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
                 "-o controller.sends=velocity"
             )
         return report
+
+
+def gripper_in_batch(config: MujocoConfig, batch: Batch) -> MujocoGripper:
+    """Return a gripper that takes part in a batch."""
+    gripper = MujocoGripper(config)
+    gripper.join(batch)
+    return gripper
 
 
 def kept_steps(steps: int, most: float) -> list[int]:

@@ -1,8 +1,8 @@
 """Many grasps at once: in several processes, as the interpreter runs between the steps of MuJoCo.
 
-A process is a new interpreter that runs `main`, so that the script of the caller is not imported a second time. It
-reads lines of JSON, and answers with a line of JSON and the columns of the trace as numpy writes them. The caller
-extracts the features. A grasp follows from its thing and its seed alone, whoever runs it.
+A process is a new interpreter that runs `batch_process`, so that the script of the caller is not imported a second
+time. It reads lines of JSON, and answers with a line of JSON and the columns of the trace as numpy writes them. The
+caller extracts the features. A grasp follows from its thing and its seed alone, whoever runs it.
 """
 
 from __future__ import annotations
@@ -10,10 +10,9 @@ from __future__ import annotations
 import io
 import json
 import os
-import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from queue import SimpleQueue
@@ -23,16 +22,25 @@ import numpy as np
 from attrs import asdict, evolve, field, fields, frozen
 
 from graspsense.gripper_api import Outcome, Phase
-from graspsense.plugin_api import ConfigError, Controller, GraspEvent, Trace, UnknownName, create
+from graspsense.plugin_api import (
+    ConfigError,
+    Controller,
+    GraspEvent,
+    SensorBackend,
+    Trace,
+    UnknownName,
+    create,
+)
 from graspsense.simulator_api import BatchOptions, Grasped, RunConfig, recipe_of, run_uninterrupted
 from graspsense_mujoco_gripper.config import MujocoConfig
 from graspsense_mujoco_gripper.prepared import Batch
 
 WORTH_A_PROCESS: Final = 4
 """Grasps that take about as long as the start of a process."""
-_COLUMNS: Final = tuple(
+COLUMNS: Final = tuple(
     field.name for field in fields(Trace) if field.name not in ("units", "signals", "events")
 )
+"""The columns of a trace that a process hands over."""
 
 
 class JobStaysHere(Exception):
@@ -43,6 +51,8 @@ class JobStaysHere(Exception):
 class GraspingJob:
     """What all grasps of a batch have in common."""
 
+    gripper: Callable[[MujocoConfig, Batch], SensorBackend[MujocoConfig]]
+    """Makes a gripper that takes part in a batch."""
     config: MujocoConfig
     controller: Controller[Any]
     options: BatchOptions
@@ -53,11 +63,8 @@ class GraspingJob:
 
     def grasp(self, thing: str, seed: int) -> Grasped:
         """Run one grasp here."""
-        from graspsense_mujoco_gripper.backend import MujocoGripper
-
         run = evolve(self.options.get("run") or RunConfig(), seed=int(seed))
-        gripper = MujocoGripper(evolve(self.config, object=thing))
-        gripper.join(self.batch)
+        gripper = self.gripper(evolve(self.config, object=thing), self.batch)
         done = run_uninterrupted(gripper, self.controller, run)
         return self._grasped(done.outcome, done.reason, done.trace, done.report)
 
@@ -81,7 +88,7 @@ class GraspingJob:
             # Compared as text, because NaN is not equal to itself.
             if repr((twin.params(), twin.init())) != repr((self.controller.params(), self.controller.init())):
                 raise JobStaysHere
-            return _line(
+            return line_of(
                 {
                     "path": [folder or os.getcwd() for folder in sys.path],
                     "config": asdict(self.config),
@@ -99,7 +106,7 @@ class GraspingJob:
         assert jobs is not None
         assert answers is not None
         try:
-            jobs.write(_line([thing, int(seed)]))
+            jobs.write(line_of([thing, int(seed)]))
             jobs.flush()
             line = answers.readline()
             if not line.endswith(b"\n"):
@@ -171,7 +178,7 @@ def _processes(job: GraspingJob, workers: int) -> Iterator[SimpleQueue[subproces
                 free.put(None)
                 continue
             process = subprocess.Popen(
-                [sys.executable, "-P", "-c", "from graspsense_mujoco_gripper.batch import main; main()"],
+                [sys.executable, "-P", "-m", "graspsense_mujoco_gripper.batch_process"],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
             )
@@ -186,48 +193,12 @@ def _processes(job: GraspingJob, workers: int) -> Iterator[SimpleQueue[subproces
             process.communicate()
 
 
-def main() -> None:
-    """Answer the requests on the standard input until it ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    answers = os.fdopen(os.dup(1), "wb")
-    # Text that other code prints must not appear between the answers.
-    os.dup2(2, 1)
-    asked = sys.stdin.buffer
-    greeting = json.loads(asked.readline() or b"null")
-    if greeting is None:
-        return
-    sys.path[:] = greeting["path"]
-    name, values = greeting["controller"]
-    job = GraspingJob(
-        MujocoConfig(**greeting["config"]),
-        create("controller", name, **values),
-        {"run": RunConfig(**greeting["run"]), "traces": True},
-        makes_signals=False,
-        batch=Batch(greeting["grasps"], {}),
-    )
-    for line in asked:
-        columns = io.BytesIO()
-        try:
-            done = job.grasp(*json.loads(line))
-            assert done.trace is not None
-            for column in _COLUMNS:
-                np.lib.format.write_array(columns, getattr(done.trace, column), allow_pickle=False)
-            told = [[event.t_s, int(event.phase), event.what, event.source] for event in done.trace.events]
-            outcome = done.outcome.value
-            answer: dict[str, Any] = {"outcome": outcome, "reason": done.reason, "report": dict(done.report)}
-            head = _line({**answer, "events": told, "bytes": columns.tell()})
-        except Exception:
-            columns = io.BytesIO()
-            head = _line({"failed": True, "bytes": 0})
-        answers.write(head + columns.getbuffer())
-        answers.flush()
-
-
 def _trace(answers: IO[bytes], told: Sequence[Sequence[Any]]) -> Trace:
-    parts: dict[str, Any] = {name: np.lib.format.read_array(answers, allow_pickle=False) for name in _COLUMNS}
+    parts: dict[str, Any] = {name: np.lib.format.read_array(answers, allow_pickle=False) for name in COLUMNS}
     events = tuple(GraspEvent(t_s, Phase(phase), what, source) for t_s, phase, what, source in told)
     return Trace(**parts, events=events)
 
 
-def _line(value: Any) -> bytes:
+def line_of(value: Any) -> bytes:
+    """Return a value as a line of JSON."""
     return json.dumps(value).encode() + b"\n"
