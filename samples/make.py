@@ -19,6 +19,8 @@ FOLDER = Path(__file__).parent
 LABELS = ("can:full_open", "can:empty_open", "odwalla:full_closed", "odwalla:empty_open")
 TRIALS = 6
 """Trials of each label in the feature table."""
+TOUCHING_N = 0.5
+"""Force of both fingers from which on the other program says that they touch."""
 STEP = 10
 """Every so many ticks of the simulated 1 kHz are a row of a recording: 100 Hz."""
 
@@ -50,12 +52,12 @@ def main() -> None:
 
 
 def write_recording(path: Path, trial: Trial) -> None:
-    """Write a grasp as another program would have: milliseconds, millimetres, one line a sample."""
+    """Write a grasp as another program would have: milliseconds, millimetres, and whether both fingers touch."""
     path.parent.mkdir(exist_ok=True)
     trace = trial.trace
     with path.open("w", newline="") as file:
         table = csv.writer(file)
-        table.writerow(["stamp", "width", "left finger", "right finger"])
+        table.writerow(["stamp", "width", "left finger", "right finger", "both touch"])
         for k in range(0, len(trace), STEP):
             table.writerow(
                 [
@@ -63,6 +65,7 @@ def write_recording(path: Path, trial: Trial) -> None:
                     f"{trace.gap_m[k] * 1e3:.3f}",
                     f"{trace.force_left_n[k]:.3f}",
                     f"{trace.force_right_n[k]:.3f}",
+                    int(min(trace.force_left_n[k], trace.force_right_n[k]) >= TOUCHING_N),
                 ]
             )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -46,6 +47,29 @@ def test_every_command_that_the_readme_names_exists() -> None:
     named = {line.split()[1] for line in re.findall(r"`(graspsense [^`]+)`", README)}
     assert {"run", "plugins", "config", "devices"} <= named
     assert named - {"--help"} <= set(COMMANDS)
+
+
+SAMPLES = Path(__file__).parents[1] / "samples"
+ENDED_BY_A_FAULT = 4
+MINUTES = ("experiment ", "tradeoff ", "compare simulated", "evaluate simulated", "train simulated", "hold ")
+"""Commands that are tried by their own tests, since they grasp for a while."""
+
+
+@pytest.mark.slow
+def test_each_row_of_the_table_can_be_typed_as_printed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(SAMPLES, "samples")
+    rows = re.findall(r"^\| [^|]+ \| `graspsense ([^`]+)` \|", README, flags=re.MULTILINE)
+    assert len(rows) > 20
+    for row in rows:
+        # A page of a grasp that goes on waits for a viewer.
+        if row.startswith(MINUTES) or "--live" in row:
+            continue
+        done = graspsense(*row.split())
+        expected = ENDED_BY_A_FAULT if "pad_fault" in row else 0
+        assert done.returncode == expected, f"{row}: {done.stderr}"
 
 
 def test_the_page_of_commands_has_every_command_and_no_other() -> None:
