@@ -32,16 +32,20 @@ from graspsense_sim_gripper.run.batch.job import (
     Measure,
     grasp_plain,
 )
-from graspsense_sim_gripper.run.batch.scenes import Scenes, scene_key
+from graspsense_sim_gripper.run.batch.scenes import Scenes, SelectedScene, scene_key
 from graspsense_sim_gripper.run.batch.worker import NotHandedOver, PlainProcess
+from graspsense_sim_gripper.run.build import build
 from graspsense_sim_gripper.run.compiled.extraction import compiled_measure
-from graspsense_sim_gripper.run.compiled.loop_code import CompiledLoops
+from graspsense_sim_gripper.run.compiled.loop_code import CompiledLoops, is_kept
 from graspsense_sim_gripper.run.compiled.padding import compiled_kinds
 from graspsense_sim_gripper.scene.library import kinds_in
 from graspsense_sim_gripper.scene.scaled import ScaledParameter
 
-WORTH_COMPILING: Final = 50
-"""Number of grasps with the same kinds of terms from which compiling saves more time than it takes."""
+WORTH_COMPILING: Final = 350
+"""Number of grasps with the same kinds of terms in this process from which compiling saves more time than it takes:
+half a minute, in which the interpreter runs about so many grasps."""
+WORTH_LOADING: Final = 16
+"""The same where an earlier process has kept the compiled loop on disk."""
 WORTH_A_PROCESS: Final = 16
 """Number of grasps per worker in the interpreter from which a process, which starts in half a second, saves time."""
 WORTH_A_WORKER: Final = 16
@@ -56,6 +60,9 @@ SLICES_AHEAD: Final = 8
 PROGRESS_S: Final = 0.2
 """Time between two calls of the progress callback."""
 
+_interpreted: Final[Counter[tuple[str, ...]]] = Counter()
+"""Number of grasps of this process that were not worth compiling, by the kinds of their terms."""
+
 
 def run_many(
     config: SimConfig,
@@ -69,8 +76,8 @@ def run_many(
     """Simulate a grasp of each scene with its seed, and return the results in that order.
 
     The results are the same for any number of workers. Traces are kept unless the options say otherwise. `compiled`:
-    True compiles every loop, False none; None compiles where at least `WORTH_COMPILING` grasps have the same kinds of
-    terms. If numba is missing, or a controller or term cannot be compiled, the loop runs in the interpreter, and a
+    True compiles every loop, False none; None compiles where so many grasps have the same kinds of terms that it saves
+    time. If numba is missing, or a controller or term cannot be compiled, the loop runs in the interpreter, and a
     warning gives the reason.
 
     Raises TypeError for an unknown option, ValueError if there are not as many seeds as scenes, UnknownName for an
@@ -189,12 +196,30 @@ class _Batch:
         kinds = {key: compiled_kinds(kinds_in(names[key])) for key in grasps}
         for key, n in grasps.items():
             self.counts[kinds[key]] += n
-        for own, n in self.counts.items():
-            self.is_compiled[own] = n >= WORTH_COMPILING if self.compiled is None else self.compiled
+        for key in grasps:
+            own = kinds[key]
+            if own not in self.is_compiled:
+                self.is_compiled[own] = (
+                    self._is_worth_compiling(own, names[key]) if self.compiled is None else self.compiled
+                )
         for key in grasps:
             self.models.add(names[key], compiled=self.is_compiled[kinds[key]])
         if any(self.is_compiled.values()):
             self._compile_around_the_loop()
+
+    def _is_worth_compiling(self, kinds: tuple[str, ...], scene: str) -> bool:
+        """Return whether a compiled loop saves time for the grasps with these kinds of terms, as those of `scene`."""
+        n = self.counts[kinds]
+        if n + _interpreted[kinds] >= WORTH_COMPILING:
+            return True
+        if n >= WORTH_LOADING:
+            job = self.job
+            usual = SelectedScene(job, build(job.config, scene, job.scaled), None).composition
+            composition = usual._replace(kinds=kinds, converges=job.config.fidelity == "reference")
+            if is_kept(composition, type(job.controller).step):
+                return True
+        _interpreted[kinds] += n
+        return False
 
     def _compile_around_the_loop(self) -> None:
         """Compile what each compiled grasp does before and after its loop."""

@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from graspsense.simulator_api import NotCompilable, bind, entry_point
+from graspsense.simulator_api import NotCompilable, bind, entry_point, is_on_disk
 from graspsense_sim_gripper.plant.sensing import PadBuffers
 from graspsense_sim_gripper.run.binding import bind_reachable
 from graspsense_sim_gripper.run.compiled.compose import Composition, grasp_loop
@@ -218,9 +218,23 @@ class CompiledLoops:
         return self._loops[composition]
 
 
+def is_kept(composition: Composition, step: ControllerStep) -> bool:
+    """Return whether an earlier process has kept the compiled loop of a composition on disk."""
+    try:
+        return is_on_disk(_composed(composition, step), OPTIONS)
+    except NotCompilable:
+        return False
+
+
 @lru_cache(maxsize=64)
 def _compiled(composition: Composition, step: ControllerStep) -> Callable[..., Ending]:
     """Return `stored_grasp` of a composition for a controller with this step, compiled. Raises NotCompilable."""
+    return compile_part(_composed(composition, step))
+
+
+@lru_cache(maxsize=64)
+def _composed(composition: Composition, step: ControllerStep) -> Callable[..., Ending]:
+    """Return what `_compiled` compiles. Raises NotCompilable."""
     try:
         from graspsense_sim_gripper.run.compiled.nested_numbers import store_numbers, tuples_of
     except ImportError as error:
@@ -230,4 +244,4 @@ def _compiled(composition: Composition, step: ControllerStep) -> Callable[..., E
         "tuples_of": tuples_of,
         "store_numbers": store_numbers,
     }
-    return compile_part(bind_reachable(bind(stored_grasp, **parts), IN_COMPILED_CODE))
+    return bind_reachable(bind(stored_grasp, **parts), IN_COMPILED_CODE)
