@@ -368,6 +368,25 @@ def test_an_edited_helper_or_constant_of_another_module_is_noticed(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("_numba")
+def test_the_same_code_in_another_folder_or_further_down_in_its_file_is_not_compiled_again(tmp_path):
+    source = "def law(x):\n    return 2.0 * x + 1.0\n"
+    program = textwrap.dedent("""
+        from law import law
+        from graspsense.simulator_api import compile_function
+        compiled = compile_function(law)
+        print(compiled(1.0), sum(compiled.stats.cache_hits.values()))
+    """)
+    told = []
+    for name, text in (("first", source), ("second", source), ("third", f"# A comment.\n\n\n{source}")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "law.py").write_text(text)
+        (tmp_path / name / "program.py").write_text(program)
+        told += run(tmp_path / name / "program.py", NUMBA_CACHE_DIR=str(tmp_path / "kept"))
+    assert told == ["3.0 0", "3.0 1", "3.0 1"]
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("_numba")
 def test_code_of_a_version_with_other_types_is_made_anew(tmp_path):
     """The code of the function stays the same, but the type of its argument has another name."""
     (tmp_path / "law.py").write_text("def law(params):\n    return params.stiffness * 2.0\n")
@@ -385,11 +404,17 @@ def test_code_of_a_version_with_other_types_is_made_anew(tmp_path):
     assert told == ["6.0 0", "6.0 1", "6.0 0", "6.0 1"]
 
 
-@pytest.mark.usefixtures("_numba")
-def test_where_code_is_on_disk_what_a_function_calls_is_not_prepared_for_compiling(tmp_path, monkeypatch):
-    from numba.core import config
+@pytest.fixture
+def kept_in(tmp_path, monkeypatch):
+    """A folder of its own for the code that this process keeps."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    compiled_code_folder.cache_clear()
+    yield tmp_path
+    compiled_code_folder.cache_clear()
 
-    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
+
+@pytest.mark.usefixtures("_numba")
+def test_where_code_is_on_disk_what_a_function_calls_is_not_prepared_for_compiling(kept_in, monkeypatch):
     monkeypatch.setattr(compiling, "_COMPILED", {})
     assert compile_function(bind(_scaled, helper=_thrice))(2.0) == 12.0
     monkeypatch.setattr(compiling, "_COMPILED", {})
@@ -410,11 +435,8 @@ def test_where_code_is_on_disk_what_a_function_calls_is_not_prepared_for_compili
 
 @pytest.mark.usefixtures("_numba")
 def test_a_called_function_that_is_replaced_before_the_first_call_is_not_kept_under_the_old_name(
-    tmp_path, monkeypatch
+    kept_in, monkeypatch
 ):
-    from numba.core import config
-
-    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(compiling, "_COMPILED", {})
     law = bind(_scaled, helper=_twice)
     compiled = compile_function(law)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import hashlib
 import os
 from contextlib import suppress
 from pathlib import Path
@@ -21,36 +20,25 @@ MAX_FILES: Final = 2000
 def compiled_code_folder() -> Path | None:
     """Return the folder for compiled code, made and swept once a process; None where there is none that can be used.
 
-    It is the one that NUMBA_CACHE_DIR names, or else one of the user's, since an installed package may not be writable.
-    Compiled code is run as it is found: a folder that other users can write to is not used.
+    It is in the one that NUMBA_CACHE_DIR names, or else one of the user's, since an installed package may not be
+    writable. Compiled code is run as it is found: a folder in which another user could have put something is not used.
     """
     given = os.environ.get("NUMBA_CACHE_DIR")
     if given and _is_usable(Path(given)):
-        return Path(given).absolute()
+        return _closed(Path(given).absolute() / "graspsense")
     parent = cache_folder()
     if parent is None or not _is_usable(parent / "compiled"):
         return None
     delete_older_half(parent / "compiled", MAX_FILES)
-    return parent / "compiled"
+    return _closed(parent / "compiled")
 
 
-@functools.cache
-def folder_of_source(source: str, given: str = "") -> Path | None:
-    """Return the folder for the compiled code of one folder of sources, by the name of a file in it.
-
-    It is in the folder `given`, or else in `compiled_code_folder`. None where nothing can be kept, or where another
-    user could have put something.
-    """
-    folder = Path(given).absolute() if given and _is_usable(Path(given)) else compiled_code_folder()
-    if folder is None:
-        return None
-    # This is how numba names it.
-    sources = os.path.dirname(os.path.abspath(source))
-    own = folder / f"{Path(sources).name}_{hashlib.sha1(sources.encode()).hexdigest()}"
-    if not _is_usable(own):
+def _closed(folder: Path) -> Path | None:
+    """Return the folder, or None where another user could have put something into it."""
+    if not _is_usable(folder):
         return None
     with suppress(OSError):
-        return own if all(is_closed(path, _CONTENT) for path in own.iterdir()) else None
+        return folder if all(is_closed(path, _CONTENT) for path in folder.iterdir()) else None
     return None
 
 

@@ -7,7 +7,8 @@ cache on disk are avoided here:
 - numba names machine code after file, function and argument types. Two compositions of the same functions share all
   three, and one would silently run the other's code. The fingerprint of the code is therefore part of the name.
 - numba loads machine code from disk while the file of the outermost function is unchanged, although a function that it
-  calls was edited in another file. The fingerprint covers everything that is called.
+  calls was edited in another file; and not if that file lies elsewhere, although nothing was edited. The fingerprint
+  covers everything that is called, and nothing else decides.
 - Options of the compiler are not part of numba's key. They are part of the name as well.
 
 A function that is called has to be a global of its caller; a function of another module (`module.function`) is imported
@@ -40,7 +41,7 @@ from graspsense.core.compiling.call_graph import (
     times_read,
 )
 from graspsense.core.compiling.compile_notice import compiling_begins
-from graspsense.core.compiling.compiled_code_folder import folder_of_source
+from graspsense.core.compiling.compiled_code_folder import compiled_code_folder
 from graspsense.core.control.binding import bind
 from graspsense.core.control.garbage_collection import no_collection
 
@@ -121,15 +122,15 @@ def is_on_disk(function: Callable[..., Any], options: CompileOptions | None = No
     `compile_function` does for the function.
     """
     plain = plain_function(function)
-    kept = folder_of_source(plain.__code__.co_filename)
-    if kept is None:
+    folder = _folder_of(plain)
+    if folder is None:
         return False
     try:
         digest = _Compilation(None, options or CompileOptions()).digest(plain)
     except PackageNotFoundError:
         return False
-    # numba names the index of a function after its qualified name, which ends with the digest.
-    return any(kept.glob(f"*_{digest}-*.nbi"))
+    # The index of a function is named after its qualified name, which ends with the digest.
+    return any(folder.glob(f"*_{digest}.nbi"))
 
 
 @contextmanager
@@ -182,15 +183,16 @@ class _Compilation:
             named = self._named(function, key)
             # Only the outermost function is kept on disk, since the others are inside it, and only it needs the
             # wrapper for calls from the interpreter, which takes longer to compile than most functions.
-            with _cache_folder(self.numba, function) as is_kept:
-                compiled: Any = self.numba.njit(
-                    named, pipeline_class=_linked_code().OutermostCompiler, **self._flags(function)
-                )
-                if is_kept:
-                    compiled._cache = _linked_code().KeptCode(named, partial(self._bind_all, function, named))
-                else:
-                    self._bind_all(function, named)
-                _COMPILED[key] = compiled
+            compiled: Any = self.numba.njit(
+                named, pipeline_class=_linked_code().OutermostCompiler, **self._flags(function)
+            )
+            folder = _folder_of(function)
+            if folder is None:
+                self._bind_all(function, named)
+            else:
+                prepare = partial(self._bind_all, function, named)
+                compiled._cache = _linked_code().KeptCode(named, folder, prepare)
+            _COMPILED[key] = compiled
         return _COMPILED[key]
 
     def _inner(self, function: types.FunctionType, n_places: int) -> Callable[..., Any]:
@@ -282,28 +284,6 @@ def _versions() -> tuple[str, ...]:
     return tuple(version(name) for name in ("numba", "llvmlite", "numpy"))
 
 
-@contextmanager
-def _cache_folder(numba: types.ModuleType, function: types.FunctionType) -> Iterator[bool]:
-    """Let functions that are declared inside this context be kept in the user's folder; yield whether they can be."""
-    config: Any = numba.config
-    source = function.__code__.co_filename
-    folder = folder_of_source(source, _set_by_program(config)) if Path(source).is_file() else None
-    if folder is None:
-        yield False
-        return
-    # Set for this function alone, since other packages in this process keep their own compiled code elsewhere.
-    previous = config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES
-    config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = str(folder.parent), "UserProvidedCacheLocator"
-    try:
-        yield True
-    finally:
-        config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = previous
-
-
-def _set_by_program(config: Any) -> str:
-    """Return the folder that a program has set as `numba.config.CACHE_DIR`, or an empty text.
-
-    One that numba has read from a file in the current folder does not count: it could hold anybody's code.
-    """
-    read = getattr(getattr(config, "_env_reloader", None), "old_environ", {})
-    return "" if read.get("NUMBA_CACHE_DIR", "") == config.CACHE_DIR else str(config.CACHE_DIR)
+def _folder_of(function: types.FunctionType) -> Path | None:
+    """Return the folder for the code of a function; None for one of a notebook, which changes all the time."""
+    return compiled_code_folder() if Path(function.__code__.co_filename).is_file() else None

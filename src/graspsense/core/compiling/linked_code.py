@@ -7,11 +7,15 @@ again there. For a loop that a few hundred functions make up that is half of the
 from __future__ import annotations
 
 import os
+import re
+import types
 from collections.abc import Callable
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 from numba import _dynfunc  # type: ignore[attr-defined]
-from numba.core.caching import FunctionCache
+from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.compiler_machinery import register_pass
@@ -158,11 +162,41 @@ class OutermostCompiler(Compiler):
         return _with_lowering(passes, OutermostLowering)
 
 
+class CodeFolder:
+    """The folder that code is kept in. A file there is named after its content, so it is never out of date."""
+
+    def __init__(self, folder: Path, source: str) -> None:
+        """Take the folder, and the file of the function, which numba names in warnings."""
+        self._folder, self._py_file = folder, source
+
+    def get_cache_path(self) -> str:
+        """Return the folder."""
+        return str(self._folder)
+
+    def get_source_stamp(self) -> None:
+        """Return what numba compares to tell whether the source has changed."""
+
+    def ensure_cache_path(self) -> None:
+        """Make the folder, should somebody have removed it."""
+        self._folder.mkdir(parents=True, exist_ok=True)
+
+
+class CodeByContent(CompileResultCacheImpl):
+    """How numba names and reads the files of a function, whose qualified name ends with the digest of its content."""
+
+    def __init__(self, function: types.FunctionType, folder: Path) -> None:
+        """Take the function and the folder, in place of the search of numba for one beside the source."""
+        self._lineno = function.__code__.co_firstlineno
+        self._locator = CodeFolder(folder, function.__code__.co_filename)
+        self._filename_base = re.sub(r"[^\w.]", "", f"{function.__module__}.{function.__qualname__}")
+
+
 class KeptCode(FunctionCache):
     """The machine code of a function on disk. Code that cannot be loaded any more is made anew."""
 
-    def __init__(self, function: Callable[..., Any], prepare: Callable[[], None]) -> None:
+    def __init__(self, function: Callable[..., Any], folder: Path, prepare: Callable[[], None]) -> None:
         """Take the function, and what makes it ready to be compiled, which takes longer than loading its code."""
+        self._impl_class = partial(CodeByContent, folder=folder)  # type: ignore[assignment]
         super().__init__(function)  # type: ignore[no-untyped-call]
         self._prepare, self._is_prepared = prepare, False
 
