@@ -7,6 +7,8 @@ import signal
 import subprocess
 import sys
 import tracemalloc
+import warnings
+from collections import Counter
 from typing import NamedTuple
 
 import numpy as np
@@ -586,6 +588,27 @@ def test_without_numba_the_plain_loop_runs_and_says_so(monkeypatch):
     with pytest.warns(UserWarning, match=r"plain Python on one core.*numba is not installed"):
         done = run_many(SimConfig(), HYBRID, ["none"] * 2, [1, 2], run=run)
     assert len(done) == 2
+
+
+def test_few_grasps_are_compiled_only_if_their_code_is_on_disk_or_others_came_before(monkeypatch):
+    monkeypatch.setitem(sys.modules, "numba", None)  # a batch that would be compiled warns
+    loop_code._compiled.cache_clear()
+    monkeypatch.setattr(threads, "WORTH_LOADING", 2)
+    monkeypatch.setattr(threads, "WORTH_COMPILING", 6)
+    monkeypatch.setattr(threads, "_interpreted", Counter())
+
+    def is_compiled(n, *, kept):
+        monkeypatch.setattr(threads, "is_kept", lambda composition, step: kept)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            run_many(SimConfig(), HYBRID, ["none"] * n, range(n), run=RunConfig(grasp_timeout_s=0.01))
+        return any("numba is not installed" in str(warning.message) for warning in caught)
+
+    assert not is_compiled(1, kept=True)
+    assert is_compiled(2, kept=True)
+    assert not is_compiled(2, kept=False)
+    assert not is_compiled(2, kept=False)
+    assert is_compiled(2, kept=False)
 
 
 def test_room_is_made_on_the_way_without_beginning_again(monkeypatch):
