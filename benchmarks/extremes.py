@@ -30,7 +30,7 @@ from graspsense.report.simulation import markdown_table
 from graspsense.simulator_api import NotCompilable, RunConfig, bind
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.state import PlantState
-from graspsense_sim_gripper.run.accuracy.model import Reduction
+from graspsense_sim_gripper.run.accuracy.chosen_steps import ChosenSteps
 from graspsense_sim_gripper.run.accuracy.probe import grip_of
 from graspsense_sim_gripper.run.accuracy.propose import propose
 from graspsense_sim_gripper.run.accuracy.select import select
@@ -76,7 +76,7 @@ class Ready:
     """A plant as a user's run of this config has it."""
 
     setup: GraspSetup
-    reduction: Reduction
+    chosen: ChosenSteps
     params: PlantParams
     move: Callable[[PlantParams, PlantState, float, float], PlantState]
 
@@ -84,10 +84,10 @@ class Ready:
 def ready(config: SimConfig, spec: ObjectSpec) -> Ready:
     """Return the plant of this scene, as the backend has it."""
     problem = Problem(config, spec)
-    reduction = propose(problem, grip_of(problem))
-    setup = instantiate(problem, reduction, 0)
+    chosen = propose(problem, grip_of(problem))
+    setup = instantiate(problem, chosen, 0)
     move = plant_move(laws_of(setup.kinds))
-    return Ready(setup=setup, reduction=reduction, params=setup.plant, move=move)
+    return Ready(setup=setup, chosen=chosen, params=setup.plant, move=move)
 
 
 @cache
@@ -156,7 +156,7 @@ def compared(forces: FloatArray, peak_n: float, expected: FloatArray, expected_p
 
 def is_flagged(plant: Ready, state: PlantState) -> bool:
     """Return whether the report of this grasp says that its trace is not verified, or that it is not resolved."""
-    return bool(plant.reduction.unresolved) or state.step.unresolved + state.contact.unbalanced > 0
+    return bool(plant.chosen.unresolved) or state.step.unresolved + state.contact.unbalanced > 0
 
 
 def light_surface(stiffness: float, ratio: float, mass_kg: float = 1.0) -> ObjectSpec:
@@ -320,7 +320,7 @@ def _looped(rate_hz: float) -> Row:
         expected.append(speed_of(same))
     error = max(abs(a - b) for a, b in zip(speeds, expected, strict=True)) / 0.02
     late = speeds[-max(len(speeds) // 5, 5) :]
-    unstable = not controller_is_stable(plant.setup, plant.reduction)
+    unstable = not controller_is_stable(plant.setup, plant.chosen)
     swings = max(late) - min(late) > 0.02
     return {
         "case": "control tick, the sampled controller",
@@ -449,10 +449,10 @@ def whole_grasp(config: SimConfig, spec: ObjectSpec, controller: Any) -> tuple[F
     Raises ConfigError if the scene is refused.
     """
     run, problem = RunConfig(grasp_timeout_s=20.0), Problem(config, spec)
-    reduction = select(problem, GraspController(controller, run))
+    chosen = select(problem, GraspController(controller, run))
     job = Job(config=config, controller=controller, run=run, extract=None, traces=True)
-    done = grasp_plain(job, instantiate(problem, reduction, 0))
-    return done, flags_of(done, reduction, config)
+    done = grasp_plain(job, instantiate(problem, chosen, 0))
+    return done, flags_of(done, chosen, config)
 
 
 def grasped(case: str, value: Any, config: SimConfig, spec: ObjectSpec, **controller: Any) -> Row:

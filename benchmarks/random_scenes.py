@@ -16,8 +16,8 @@ from attrs import evolve, frozen
 from graspsense.plugin_api import HOLD, create
 from graspsense.simulator_api import RunConfig
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.run.accuracy.chosen_steps import ChosenSteps
 from graspsense_sim_gripper.run.accuracy.error import GraspRecord, deviation
-from graspsense_sim_gripper.run.accuracy.model import Reduction
 from graspsense_sim_gripper.run.accuracy.propose import NOT_VERIFIED
 from graspsense_sim_gripper.run.accuracy.select import select
 from graspsense_sim_gripper.run.batch.buffers import Storage
@@ -112,9 +112,9 @@ def scene_of(number: int) -> Scene:
     return Scene(spec=spec, config=config, speed_m_s=speed)
 
 
-def controller_is_stable(setup: GraspSetup, reduction: Reduction) -> bool:
+def controller_is_stable(setup: GraspSetup, chosen: ChosenSteps) -> bool:
     """Return whether the sampled loop of the hybrid controller is stable, see `sampled_loop.growth_per_tick`."""
-    return not instability(setup, GraspController(create("controller", "hybrid"), RunConfig()), reduction)
+    return not instability(setup, GraspController(create("controller", "hybrid"), RunConfig()), chosen)
 
 
 def record_of(grasp: FinishedGrasp, dt_s: float) -> GraspRecord:
@@ -139,12 +139,12 @@ def error_of(grasp: FinishedGrasp, reference: FinishedGrasp) -> tuple[float, str
     return deviation(record_of(grasp, dt), record_of(reference, dt))
 
 
-def flags_of(done: FinishedGrasp, reduction: Reduction, config: SimConfig) -> list[str]:
+def flags_of(done: FinishedGrasp, chosen: ChosenSteps, config: SimConfig) -> list[str]:
     """Return what the report of a grasp says against its trace; nothing if it is verified."""
-    flags = [NOT_VERIFIED] if reduction.unresolved else []
+    flags = [NOT_VERIFIED] if chosen.unresolved else []
     if done.state.step.unresolved + done.state.contact.unbalanced > 0:
         flags.append("not resolved")
-    if reduction.verification is None and not config.has_forced_steps:
+    if chosen.verification is None and not config.has_forced_steps:
         flags.append("not verified")
     return flags
 
@@ -159,18 +159,18 @@ class Bench:
 
     def grasp(
         self, scene: Scene, accuracy: float, fidelity: str
-    ) -> tuple[FinishedGrasp, GraspSetup, Reduction, Job]:
+    ) -> tuple[FinishedGrasp, GraspSetup, ChosenSteps, Job]:
         """Return the grasp, its setup, its reduced model and its job. Raises ConfigError for a refusal."""
         controller = create("controller", "hybrid", closing_speed_m_s=scene.speed_m_s)
         config = evolve(scene.config, accuracy=accuracy, fidelity=fidelity)
         run = RunConfig(grasp_timeout_s=20.0)
         problem = Problem(config, scene.spec)
-        reduction = self.selected(problem, GraspController(controller, run))
-        setup = instantiate(problem, reduction, 0)
+        chosen = self.selected(problem, GraspController(controller, run))
+        setup = instantiate(problem, chosen, 0)
         job = Job(config=config, controller=controller, run=run, extract=None, traces=True)
-        return self.run(job, setup), setup, reduction, job
+        return self.run(job, setup), setup, chosen, job
 
-    def selected(self, problem: Problem, controller: GraspController) -> Reduction:
+    def selected(self, problem: Problem, controller: GraspController) -> ChosenSteps:
         """Return the steps that are chosen for a scene. Raises ConfigError for a refusal."""
         return select(problem, controller, compiled=self.compiled, padding=KINDS)
 

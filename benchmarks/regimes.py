@@ -119,10 +119,10 @@ def measured(bench: Bench, scene: Scene) -> Row:
     row: Row = {"sensor": scene.config.sensor}
     dt = 1.0 / scene.config.rate_hz
     try:
-        reference, setup, reduction, _ = bench.grasp(scene, REFERENCE, "reference")
+        reference, setup, chosen, _ = bench.grasp(scene, REFERENCE, "reference")
     except ConfigError as error:
         return {**row, "failed": f"the reference: {error}"}
-    row |= {"outcome": reference.outcome.name, "stable": controller_is_stable(setup, reduction)}
+    row |= {"outcome": reference.outcome.name, "stable": controller_is_stable(setup, chosen)}
     row["reference_resolved"] = reference.state.step.unresolved + reference.state.contact.unbalanced == 0
     for accuracy in ACCURACIES:
         row[f"{accuracy:g}"] = _case(bench, scene, accuracy, "scene", reference, dt)
@@ -136,7 +136,7 @@ def _case(
     bench: Bench, scene: Scene, accuracy: float, fidelity: str, reference: FinishedGrasp, dt_s: float
 ) -> Row:
     try:
-        done, _, reduction, job = bench.grasp(scene, accuracy, fidelity)
+        done, _, chosen, job = bench.grasp(scene, accuracy, fidelity)
     except ConfigError as error:
         return {"error": math.inf, "refused": str(error)[:200]}
     except ArithmeticError as error:
@@ -145,8 +145,8 @@ def _case(
     return {
         "error": error,
         "of": quantity,
-        "flags": flags_of(done, reduction, job.config),
-        "chosen": reduction.decisions[0].decision,
+        "flags": flags_of(done, chosen, job.config),
+        "chosen": chosen.decisions[0].decision,
     }
 
 

@@ -10,7 +10,7 @@ reference is used. It takes some hundred times as long or more, so it is not use
 the instances only.
 
 The distance of two distributions of a feature is the Wasserstein distance, relative to the root mean square of the
-feature in the reference, or to the scale of the unit if that is larger (`reduction.error.UNIT_SCALES` of the
+feature in the reference, or to the scale of the unit if that is larger (`accuracy.error.UNIT_SCALES` of the
 simulator). It is within the accuracy if it is smaller, and shown to be if the upper end of its one-sided 95 % interval
 is (bootstrap over instances). Where it is larger, a permutation test (the model and the reference swapped at random in
 each instance) says whether the distributions differ at all, or the distance is that of so many instances. A feature is
@@ -71,7 +71,7 @@ class Grasps:
         controller = create("controller", "hybrid", closing_speed_m_s=scene.speed_m_s)
         config, run = evolve(scene.config, **settings), RunConfig(grasp_timeout_s=20.0)
         self.bench, self.problem = bench, Problem(config, scene.spec)
-        self.reduction = bench.selected(self.problem, GraspController(controller, run, features))
+        self.chosen = bench.selected(self.problem, GraspController(controller, run, features))
         self.job = Job(config=config, controller=controller, run=run, extract=features.extract, traces=False)
         self.features: list[Features] = []
         self.outcomes: list[Outcome] = []
@@ -81,12 +81,12 @@ class Grasps:
     def extend(self, instances: int) -> None:
         """Grasp further instances until there are so many."""
         for seed in range(len(self.features), instances):
-            setup = instantiate(self.problem, self.reduction, seed)
+            setup = instantiate(self.problem, self.chosen, seed)
             done = self.bench.run(self.job, setup)
             self.features.append(done.extracted)
             self.outcomes.append(done.outcome)
             report = model_report(done.state, KINDS if self.bench.compiled else setup.kinds)
-            self.doubts.update(accuracy_report(report, self.reduction, "")["not_verified"])
+            self.doubts.update(accuracy_report(report, self.chosen, "")["not_verified"])
 
 
 class Distance(NamedTuple):
@@ -149,7 +149,7 @@ def finest(bench: Bench, scene: Scene) -> Grasps:
     fast, reference = FINEST
     with suppress(ConfigError):
         grasps = Grasps(bench, scene, fast)
-        if not grasps.reduction.not_verified:
+        if not grasps.chosen.not_verified:
             return grasps
     return Grasps(bench, scene, reference)
 
@@ -160,7 +160,7 @@ def measured(bench: Bench, number: int, instances: int) -> Row:
     try:
         best = finest(bench, scene)
         row["by"] = best.job.config.fidelity
-        if not controller_is_stable(instantiate(best.problem, best.reduction, 0), best.reduction):
+        if not controller_is_stable(instantiate(best.problem, best.chosen, 0), best.chosen):
             return {**row, "unstable": True}
         if row["by"] != "reference":
             best.extend(instances)

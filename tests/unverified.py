@@ -14,8 +14,8 @@ from graspsense_sim_gripper.scene.spec import ObjectSpec
 
 def unverified_setup(config: SimConfig, scene: str | ObjectSpec, seed: int) -> GraspSetup:
     problem = build(config, scene) if isinstance(scene, str) else Problem(config, scene)
-    reduction = None if problem.spec is None else propose(problem, grip_of(problem))
-    return instantiate(problem, reduction, seed)
+    chosen = None if problem.spec is None else propose(problem, grip_of(problem))
+    return instantiate(problem, chosen, seed)
 
 
 def sample(spec: ObjectSpec, seed: int | None, number: int | None = None) -> SimpleNamespace:

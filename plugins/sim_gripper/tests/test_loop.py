@@ -56,7 +56,7 @@ def test_with_steps_over_several_ticks_the_plain_loop_and_the_compiled_loop_give
     config = SimConfig(sensor=sensor)
     plain = run_many(config, HYBRID, ["can:empty_open"], [5], compiled=False)[0]
     fast = run_many(config, HYBRID, ["can:empty_open"], [5], compiled=True)[0]
-    assert plain.model.reduction.steps.macro_tolerance > 0.0
+    assert plain.model.chosen.steps.macro_tolerance > 0.0
     assert plain.outcome == fast.outcome
     assert_same(plain.trace, fast.trace)
 
@@ -70,7 +70,7 @@ def test_steps_over_several_ticks_give_the_features_of_single_ticks(controller):
     config = SimConfig(object="odwalla:full_closed", sensor="ideal")
     run = run_grasp(SimBackend(config), law, RunConfig(seed=5))
     many = run_many(config, law, [config.object], [5])[0]
-    assert many.model.reduction.steps.macro_tolerance > 0.0
+    assert many.model.chosen.steps.macro_tolerance > 0.0
     assert run.outcome == many.outcome
     assert many.state.step.n_steps < 0.4 * len(run.trace.t_s)
     alone, among = (features.extract(trace).as_dict() for trace in (run.trace, many.trace))

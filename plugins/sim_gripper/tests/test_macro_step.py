@@ -180,7 +180,7 @@ def test_a_grasp_does_not_depend_on_the_length_of_its_buffers(monkeypatch):
     whole = run_many(SimConfig(), law, ["toy"], [3])[0]
     monkeypatch.setattr(buffers, "TICKS", 700)
     parts = run_many(SimConfig(), law, ["toy"], [3])[0]
-    assert whole.model.reduction.steps.macro_tolerance > 0.0
+    assert whole.model.chosen.steps.macro_tolerance > 0.0
     assert parts.state == whole.state
     np.testing.assert_array_equal(parts.trace.gap_m, whole.trace.gap_m)
 
@@ -208,7 +208,7 @@ def test_images_and_outcome_are_those_of_single_ticks(settings):
         run_many(SimConfig(**settings, **fidelity), law, ["can:empty_open"], [4])[0]
         for fidelity in ({}, {"fidelity": "fixed"})
     )
-    assert many.model.reduction.steps.macro_tolerance > 0.0
+    assert many.model.chosen.steps.macro_tolerance > 0.0
     assert many.outcome == single.outcome
     n = min(len(many.trace.pad_t_s), len(single.trace.pad_t_s)) - 10
     np.testing.assert_allclose(many.trace.pad_t_s[:n], single.trace.pad_t_s[:n], atol=1e-9)
@@ -243,7 +243,7 @@ def test_a_command_within_a_step_takes_effect_in_its_tick(compiled):
         )[0]
         for fidelity in ({"fidelity": "scene"}, {"fidelity": "fixed"})
     )
-    assert many.model.reduction.steps.macro_tolerance > 0.0
+    assert many.model.chosen.steps.macro_tolerance > 0.0
     pressed_from = int(np.argmax(many.trace.force_left_n > 3.0))
     assert pressed_from == int(np.argmax(single.trace.force_left_n > 3.0))
     rows = slice(pressed_from - 20, pressed_from + 20)

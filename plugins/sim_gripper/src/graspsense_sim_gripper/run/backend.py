@@ -124,10 +124,10 @@ class SimBackend(BatchBackend[SimConfig]):
         Raises UnknownName for an unknown object, ConfigError if no model has the accuracy asked for.
         """
         problem = build(self.config, self.config.object)
-        self._reduction = None
+        self._chosen = None
         if problem.spec is not None:
-            self._reduction = select(problem, self._controller or default_controller(self.config))
-        setup = instantiate(problem, self._reduction, seed)
+            self._chosen = select(problem, self._controller or default_controller(self.config))
+        setup = instantiate(problem, self._chosen, seed)
         self._setup = setup = evolve(setup, sensor=with_listed_cells(setup.sensor))
         self._move = composed_move(composition(setup.kinds, setup.plant))
         self._state, self._sensor = setup.state, setup.sensor_state
@@ -206,30 +206,30 @@ class SimBackend(BatchBackend[SimConfig]):
         `selection` describes the steps. With `explain` in the settings, `model` gives the contribution of each term,
         and what each feature would lose without it.
         """
-        setup, reduction = self._setup, self._reduction
+        setup, chosen = self._setup, self._chosen
         report = model_report(self._state, setup.kinds)
-        if reduction is not None:
+        if chosen is not None:
             report["selection"] = {
                 "fidelity": self.config.fidelity,
-                **reduction.as_values(),
+                **chosen.as_values(),
                 "steps": self._state.step.n_steps,
-                "within": reduction.valid_for(self._state.peak_n),
+                "within": chosen.valid_for(self._state.peak_n),
             }
             controller = self._controller or default_controller(self.config)
-            report |= accuracy_report(report, reduction, instability(setup, controller, reduction))
+            report |= accuracy_report(report, chosen, instability(setup, controller, chosen))
         if self.config.explain:
             report["model"] = explain(setup, self._compressions) | {"without": self._without()}
         return report
 
     def _without(self) -> list[dict[str, Any]]:
-        """Return what each feature would lose without each term, see `reduction.without`."""
+        """Return what each feature would lose without each term, see `accuracy.without`."""
         # Imported here, since only `explain` needs it.
         from graspsense_sim_gripper.run.accuracy.without import without_each_term
 
-        if self._reduction is None:
+        if self._chosen is None:
             return []
         controller = self._controller or default_controller(self.config)
-        return without_each_term(build(self.config, self.config.object), controller, self._reduction)
+        return without_each_term(build(self.config, self.config.object), controller, self._chosen)
 
     def _draw_noise(self) -> None:
         """Draw the noise of the next images, and extend the buffer of images by as many."""

@@ -1,6 +1,6 @@
 """Building the parameters and initial states of a grasp from a config, the name of an object, and a seed.
 
-This takes three steps: `build` gives the problem, `reduction.select` its steps, and `instantiate` one grasp.
+This takes three steps: `build` gives the problem, `accuracy.select` its steps, and `instantiate` one grasp.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from graspsense_sim_gripper.plant.sensing import (
     initial_sensor,
 )
 from graspsense_sim_gripper.plant.state import Contact, ContactState, Motion, PlantState
+from graspsense_sim_gripper.run.accuracy.chosen_steps import ChosenSteps
 from graspsense_sim_gripper.run.accuracy.levels import step_tolerance
-from graspsense_sim_gripper.run.accuracy.model import Reduction
 from graspsense_sim_gripper.run.compiled.compose import all_active, uncompressed
 from graspsense_sim_gripper.run.drawing import (
     NO_NUMBER,
@@ -145,21 +145,21 @@ def _model_config(config: SimConfig, spread: bool) -> SimConfig:
     return evolve(config, **_NOT_OF_THE_MODEL, spread=spread)
 
 
-def instantiate(problem: Problem, reduction: Reduction | None, seed: int) -> GraspSetup:
-    """Return the grasp with this seed, of an instance; `reduction` None: in steps that are not chosen for it.
+def instantiate(problem: Problem, chosen: ChosenSteps | None, seed: int) -> GraspSetup:
+    """Return the grasp with this seed, of an instance; `chosen` None: in steps that are not chosen for it.
 
     Raises ConfigError for an object of a scene file that the open fingers would cut into, and ValueError for a seed
     that is negative or has more than 64 bits.
     """
-    return _setup(problem.config, problem.spec, problem.number, seed, reduction)
+    return _setup(problem.config, problem.spec, problem.number, seed, chosen)
 
 
-def example_of(problem: Problem, reduction: Reduction | None) -> GraspSetup:
+def example_of(problem: Problem, chosen: ChosenSteps | None) -> GraspSetup:
     """Return a grasp of the nominal object, for what all grasps of a scene have in common.
 
     It may not fit between the fingers, and its cells measure nothing.
     """
-    return _setup(problem.config, problem.spec, problem.number, None, reduction)
+    return _setup(problem.config, problem.spec, problem.number, None, chosen)
 
 
 def _setup(
@@ -167,9 +167,9 @@ def _setup(
     spec: ObjectSpec | None,
     number: int | None,
     seed: int | None,
-    reduction: Reduction | None = None,
+    chosen: ChosenSteps | None = None,
 ) -> GraspSetup:
-    """Return the grasp with a seed; `reduction` None: in steps that are not chosen for it.
+    """Return the grasp with a seed; `chosen` None: in steps that are not chosen for it.
 
     `seed` None: that of the nominal object, without cells. Otherwise this raises as `check_fit` does.
     """
@@ -186,8 +186,8 @@ def _setup(
         if seed is not None:
             check_fit(config, spec, width_m, drawn.placement.offset_m)
     plant, state = _plant(config, spec, drawn, width_m, terms)
-    if reduction is not None:
-        plant = reduction.applied_to(plant)
+    if chosen is not None:
+        plant = chosen.applied_to(plant)
     return GraspSetup(
         kinds=() if spec is None else spec.kinds,
         terms=terms,

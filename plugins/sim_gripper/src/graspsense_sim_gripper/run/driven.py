@@ -1,7 +1,7 @@
 """Squeezes in which the fingers follow a recorded gap or a recorded force, instead of a drive under a controller.
 
 They give the forces of an object along a path that somebody measured, so a scene can be compared with a recording.
-The contact is that of a grasp (`dynamics.contact`): pads in series with the object, and the object on its table.
+The contact is that of a grasp (`plant.contact`): pads in series with the object, and the object on its table.
 Between two recorded times the gap, or the force, changes linearly. Contacts and events of terms are located within a
 step.
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graspsense_sim_gripper.plant.state import PlantState
-from graspsense_sim_gripper.run.accuracy.model import QUANTITIES, Reduction
+from graspsense_sim_gripper.run.accuracy.chosen_steps import QUANTITIES, ChosenSteps
 from graspsense_sim_gripper.run.compiled.padding import PaddedLayout
 from graspsense_sim_gripper.run.nested import TupleType, first_place, with_places
 from graspsense_sim_gripper.scene.terms.registry import find_term
@@ -111,7 +111,7 @@ class GraspModel(NamedTuple):
 
     kinds: tuple[str, ...]
     """Those of the object's own terms."""
-    reduction: Reduction | None
+    chosen: ChosenSteps | None
     """Its steps; None without an object."""
     unstable_loop: str
     """The text of `sampled_loop.instability` for the scene."""
@@ -120,14 +120,14 @@ class GraspModel(NamedTuple):
 NO_MODEL: Final = GraspModel((), None, "")
 
 
-def accuracy_report(report: Mapping[str, Any], reduction: Reduction, unstable_loop: str) -> dict[str, Any]:
+def accuracy_report(report: Mapping[str, Any], chosen: ChosenSteps, unstable_loop: str) -> dict[str, Any]:
     """Return which quantities are not verified in a grasp with this report and these steps, and the unstable loop.
 
     `unstable_loop` is as in `GraspModel`.
     """
-    valid = reduction.valid_for(report["true_peak_force_n"]) and report["resolved"]
+    valid = chosen.valid_for(report["true_peak_force_n"]) and report["resolved"]
     doubtful = not valid or report["beyond"] != "" or unstable_loop != ""
     return {
         "unstable_loop": unstable_loop,
-        "not_verified": list(QUANTITIES if doubtful else reduction.not_verified),
+        "not_verified": list(QUANTITIES if doubtful else chosen.not_verified),
     }

@@ -19,7 +19,7 @@ from graspsense.gripper_api import no_pads
 from graspsense.plugin_api import Frame, Reading
 from graspsense.simulator_api import NOT_FREE, FreeMotion
 from graspsense_sim_gripper.plant.fingertip import CELLS
-from graspsense_sim_gripper.run.accuracy.model import Reduction
+from graspsense_sim_gripper.run.accuracy.chosen_steps import ChosenSteps
 from graspsense_sim_gripper.run.problem import GraspController, GraspSetup
 
 STABLE: Final = 1.0 + 1e-9
@@ -34,7 +34,7 @@ LARGEST_NORM: Final = 0.125
 Array = NDArray[np.float64]
 
 
-def growth_per_tick(setup: GraspSetup, controller: GraspController, reduction: Reduction) -> float | None:
+def growth_per_tick(setup: GraspSetup, controller: GraspController, chosen: ChosenSteps) -> float | None:
     """Return the factor by which a deviation of the speed grows from tick to tick: at most `STABLE` if it decays.
 
     It is the spectral radius of the map from tick to tick, linearised at open fingers, of the free mass or of the mass
@@ -47,7 +47,7 @@ def growth_per_tick(setup: GraspSetup, controller: GraspController, reduction: R
         return None
     drive, dt = setup.plant.drive, setup.dt_s
     mass = drive.inertia / setup.state.motion.jacobian_m_rev**2
-    stiffest = mass * (reduction.frequency / dt) ** 2
+    stiffest = mass * (chosen.frequency / dt) ** 2
     rows = tuple(map(tuple, law.tolist()))
     return _growth(rows, mass, drive.friction.damping_n_s_m, stiffest, drive.lag_s, dt)
 
@@ -68,9 +68,9 @@ def _growth(
     return _spectral_radius(np.array(law), rates, 1.0 / mass_kg, lag_s, dt_s)
 
 
-def instability(setup: GraspSetup, controller: GraspController, reduction: Reduction) -> str:
+def instability(setup: GraspSetup, controller: GraspController, chosen: ChosenSteps) -> str:
     """Return why the sampled loop is unstable and what to change; empty if it is stable or cannot be examined."""
-    growth = growth_per_tick(setup, controller, reduction)
+    growth = growth_per_tick(setup, controller, chosen)
     if growth is None or growth <= STABLE:
         return ""
     return (

@@ -30,8 +30,8 @@ from graspsense.simulator_api import (
     write_whole,
 )
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.run.accuracy.chosen_steps import ChosenSteps
 from graspsense_sim_gripper.run.accuracy.levels import Level
-from graspsense_sim_gripper.run.accuracy.model import Reduction
 from graspsense_sim_gripper.run.build import Problem
 from graspsense_sim_gripper.run.problem import ControllerStep, GraspController
 from graspsense_sim_gripper.scene.terms.registry import active_laws
@@ -64,11 +64,11 @@ class Key(NamedTuple):
     """The feature set with its settings and its files; empty if there is none."""
 
 
-class ReductionCache:
+class ChosenStepsCache:
     """Reduced models by `Key`. Threads may share a cache."""
 
     def __init__(self) -> None:
-        self._models: OrderedDict[Key, Reduction] = OrderedDict()
+        self._models: OrderedDict[Key, ChosenSteps] = OrderedDict()
         self._lock = threading.Lock()
 
     def key(self, problem: Problem, controller: GraspController) -> Key:
@@ -81,7 +81,7 @@ class ReductionCache:
             problem.model_config, spec.kinds, spec.content, controller.step, controller.content, features
         )
 
-    def get(self, key: Key) -> Reduction | None:
+    def get(self, key: Key) -> ChosenSteps | None:
         """Return the model of this key, from memory or else from disk; None if there is none."""
         with self._lock:
             if key in self._models:
@@ -93,7 +93,7 @@ class ReductionCache:
             self._remember(key, model)
         return model
 
-    def put(self, key: Key, model: Reduction) -> None:
+    def put(self, key: Key, model: ChosenSteps) -> None:
         """Cache a model: in memory, and on disk if it was verified by trial grasps."""
         self._remember(key, model)
         if model.verification is not None:
@@ -109,7 +109,7 @@ class ReductionCache:
     def __len__(self) -> int:
         return len(self._models)
 
-    def _remember(self, key: Key, model: Reduction) -> None:
+    def _remember(self, key: Key, model: ChosenSteps) -> None:
         with self._lock:
             self._models[key] = model
             self._models.move_to_end(key)
@@ -166,7 +166,7 @@ def _stamp(source: Path) -> str:
     return f"{source} {status.st_size} {status.st_mtime_ns}\n"
 
 
-def _read(name: str) -> Reduction | None:
+def _read(name: str) -> ChosenSteps | None:
     folder = _folder()
     if folder is None or not (folder / name).is_file() or not is_closed(folder / name, _CONTENT):
         return None
@@ -178,7 +178,7 @@ def _read(name: str) -> Reduction | None:
     return None
 
 
-def _write(name: str, model: Reduction) -> None:
+def _write(name: str, model: ChosenSteps) -> None:
     """Write a model to disk. If that is not possible, nothing happens."""
     folder = _folder()
     if folder is None:
@@ -199,7 +199,7 @@ def _folder() -> Path | None:
     parent = cache_folder()
     if parent is None:
         return None
-    folder = parent / "reductions"
+    folder = parent / "chosen_steps"
     try:
         make_closed(folder)
     except OSError:
@@ -215,17 +215,17 @@ def _delete_old_files(folder: Path) -> None:
         path.unlink(missing_ok=True)
 
 
-def stored(model: Reduction) -> Json:
+def stored(model: ChosenSteps) -> Json:
     """Return a model as values that JSON can represent."""
     return _CONVERTER.unstructure(model)
 
 
-def restored(values: Json) -> Reduction:
+def restored(values: Json) -> ChosenSteps:
     """Return the model of which `stored` has given these values.
 
     Raises KeyError, TypeError or ValueError for others.
     """
-    return _CONVERTER.structure(values, Reduction)
+    return _CONVERTER.structure(values, ChosenSteps)
 
 
 _CONVERTER: Final = cattrs.Converter(detailed_validation=False)

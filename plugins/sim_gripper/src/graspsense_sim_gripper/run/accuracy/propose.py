@@ -12,6 +12,7 @@ from typing import Final
 
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.contact import ObjectModel
+from graspsense_sim_gripper.run.accuracy.chosen_steps import QUANTITIES, ChosenSteps, StepDecision
 from graspsense_sim_gripper.run.accuracy.levels import (
     CONTROLLED,
     LevelScale,
@@ -19,7 +20,6 @@ from graspsense_sim_gripper.run.accuracy.levels import (
     step_tolerance,
     steps_for,
 )
-from graspsense_sim_gripper.run.accuracy.model import QUANTITIES, Reduction, StepDecision
 from graspsense_sim_gripper.run.accuracy.probe import FORCE_N, SPEED_M_S, Grip
 from graspsense_sim_gripper.run.build import Problem
 from graspsense_sim_gripper.scene.terms.registry import find_term
@@ -50,7 +50,7 @@ PERIOD_RAD: Final = 2.0 * math.pi
 too, and agree."""
 
 
-def propose(problem: Problem, grip: Grip | None, scale: LevelScale = CONTROLLED[0]) -> Reduction:
+def propose(problem: Problem, grip: Grip | None, scale: LevelScale = CONTROLLED[0]) -> ChosenSteps:
     """Return the steps of a level, without a trial grasp; `grip` None: the object is not examined.
 
     Raises TypeError if there is no object.
@@ -87,7 +87,7 @@ def propose(problem: Problem, grip: Grip | None, scale: LevelScale = CONTROLLED[
             for i, per_s in too_fast.items()
         ),
     ]
-    return Reduction(
+    return ChosenSteps(
         accuracy=config.accuracy,
         force_n=FORCE_N if grip is None else grip.force_n,
         speed_m_s=SPEED_M_S if grip is None else grip.speed_m_s,

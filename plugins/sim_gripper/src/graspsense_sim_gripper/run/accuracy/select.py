@@ -20,10 +20,15 @@ from attrs import evolve
 
 from graspsense.plugin_api import ConfigError
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.run.accuracy.cache import ReductionCache
+from graspsense_sim_gripper.run.accuracy.cache import ChosenStepsCache
+from graspsense_sim_gripper.run.accuracy.chosen_steps import (
+    QUANTITIES,
+    ChosenSteps,
+    StepDecision,
+    Verification,
+)
 from graspsense_sim_gripper.run.accuracy.error import GraspRecord, deviation
 from graspsense_sim_gripper.run.accuracy.levels import CONTROLLED, PLAIN, REFERENCE_SCALES, LevelScale
-from graspsense_sim_gripper.run.accuracy.model import QUANTITIES, Reduction, StepDecision, Verification
 from graspsense_sim_gripper.run.accuracy.own_features import NOT_READ
 from graspsense_sim_gripper.run.accuracy.probe import Grip, grip_of
 from graspsense_sim_gripper.run.accuracy.propose import propose
@@ -54,7 +59,7 @@ MOST_FOR_FEATURES: Final = 2
 """Further models that are tried where features of the pipeline are less accurate than those of the paper. A feature
 that shorter steps do not give is one that depends on ticks."""
 
-_SELECTED: Final = ReductionCache()
+_SELECTED: Final = ChosenStepsCache()
 _UNKNOWN: Final = (None, None)
 """What `_felt` returns for a trial grasp that fails; `grip_of` then has the values of the paper."""
 
@@ -65,12 +70,12 @@ def select(
     *,
     compiled: bool = False,
     padding: tuple[str, ...] | None = None,
-) -> Reduction:
+) -> ChosenSteps:
     """Return the steps for a problem's object, verified by trial grasps under the controller.
 
     They are cached in memory and on disk, by everything that they depend on. They are not verified, and their
     `verification` is None, if the settings prescribe the steps or ask for the reference, if the controller raises in
-    the first trial grasp, if something cannot be resolved (`Reduction.unresolved`), or if the trial grasps would take
+    the first trial grasp, if something cannot be resolved (`ChosenSteps.unresolved`), or if the trial grasps would take
     too much work (`MOST_WORK`).
 
     `compiled`: run the trial grasps compiled, if the controller can be compiled. `padding`: the kinds of terms in the
@@ -82,36 +87,36 @@ def select(
     if problem.config.fidelity == "fixed":
         return propose(problem, None)
     key = _SELECTED.key(problem, controller)
-    reduction = _SELECTED.get(key)
-    if reduction is None:
+    chosen = _SELECTED.get(key)
+    if chosen is None:
         trial = trial_grasps(problem, controller, compiled=compiled, padding=padding)
         try:
-            reduction = _select_within_limit(problem, trial)
+            chosen = _select_within_limit(problem, trial)
         except LAW_ERRORS as error:
             reason = raised_in_term(error, trial.setup.kinds)
             if not reason:
                 raise
             raise ConfigError(f"{_scene_in_words(problem)}: {reason}") from error
-        _SELECTED.put(key, reduction)
-    return reduction
+        _SELECTED.put(key, chosen)
+    return chosen
 
 
-def _select_within_limit(problem: Problem, trial: TrialGrasps) -> Reduction:
+def _select_within_limit(problem: Problem, trial: TrialGrasps) -> ChosenSteps:
     """Return the steps as `_select` does, or unverified ones if the trial grasps take too much work."""
     try:
         return _select(problem, trial)
     except TooMuchWork:
-        reduction = propose(problem, grip_of(problem))
+        chosen = propose(problem, grip_of(problem))
     limit = StepDecision(
         subject="trial grasps",
         decision="stopped at the limit: not verified",
         what="ticks and steps",
         number=float(MOST_WORK),
     )
-    return evolve(reduction, decisions=(*reduction.decisions, limit), unresolved=QUANTITIES)
+    return evolve(chosen, decisions=(*chosen.decisions, limit), unresolved=QUANTITIES)
 
 
-def _select(problem: Problem, trial: TrialGrasps) -> Reduction:
+def _select(problem: Problem, trial: TrialGrasps) -> ChosenSteps:
     """Return the model as `select` does, without the cache."""
     config = problem.model_config
     usual = grip_of(problem)
@@ -128,14 +133,14 @@ def _select(problem: Problem, trial: TrialGrasps) -> Reduction:
     return unverified if unverified.unresolved else _best(problem, grip, trial)
 
 
-def _felt(trial: TrialGrasps, reduction: Reduction) -> tuple[float | None, float | None]:
+def _felt(trial: TrialGrasps, chosen: ChosenSteps) -> tuple[float | None, float | None]:
     """Return the peak force and the speed at the contact of a trial grasp in these steps, to two digits.
 
     They suffice: similar grasps then get the same proposals. `_UNKNOWN` if the grasp fails; a controller that raises
     does so in the grasp of the run as well, and is reported there. Raises TooMuchWork, and what a term raises.
     """
     try:
-        grasp = trial.record(reduction)
+        grasp = trial.record(chosen)
     except TooMuchWork:
         raise
     except Exception as error:
@@ -146,7 +151,7 @@ def _felt(trial: TrialGrasps, reduction: Reduction) -> tuple[float | None, float
     return (force_n, speed_m_s) if math.isfinite(force_n + speed_m_s) else _UNKNOWN
 
 
-def _best(problem: Problem, grip: Grip, trial: TrialGrasps) -> Reduction:
+def _best(problem: Problem, grip: Grip, trial: TrialGrasps) -> ChosenSteps:
     """Return the first accepted model in which the features of the pipeline are accurate too, or else the first.
 
     Raises ConfigError if no model is accepted.
@@ -159,24 +164,24 @@ def _best(problem: Problem, grip: Grip, trial: TrialGrasps) -> Reduction:
     return next((model for model in further if not model.not_verified), fastest)
 
 
-def _accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Iterator[Reduction]:
+def _accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Iterator[ChosenSteps]:
     """Yield the models that trial grasps accept, the fastest first. Raises ConfigError if there is none."""
     config = problem.model_config
     share, least, grasps, n_accepted = _accepted_share(config), (math.inf, ""), 1, 0
     for scale in (PLAIN, *CONTROLLED):
-        reduction = propose(problem, grip, scale)
+        chosen = propose(problem, grip, scale)
         full = propose(problem, grip, _reference_scale(config, scale))
-        error, quantity = _off(trial, reduction, trial.record(full))
+        error, quantity = _off(trial, chosen, trial.record(full))
         grasps += 1
         if error <= share * config.accuracy:
-            features = trial.features_beyond(reduction, full)
+            features = trial.features_beyond(chosen, full)
             verification = Verification(error=error, quantity=quantity, grasps=grasps, features=features)
             if scale.plain == 1 and config.spread:
-                accepted = _accepted_for_instances(problem, reduction, full, trial, verification)
+                accepted = _accepted_for_instances(problem, chosen, full, trial, verification)
             else:
-                error, quantity = _confirmed(problem, grip, trial, reduction, scale)
+                error, quantity = _confirmed(problem, grip, trial, chosen, scale)
                 fits = error <= config.accuracy
-                accepted = evolve(reduction, verification=verification) if fits else None
+                accepted = evolve(chosen, verification=verification) if fits else None
             if accepted:
                 n_accepted += 1
                 yield accepted
@@ -186,48 +191,48 @@ def _accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Iterator[Redu
         raise ConfigError(_refusal(problem, *least, _culprit(problem, grip, trial)))
 
 
-def _off(trial: TrialGrasps, reduction: Reduction, expected: GraspRecord) -> tuple[float, str]:
+def _off(trial: TrialGrasps, chosen: ChosenSteps, expected: GraspRecord) -> tuple[float, str]:
     """Return how far a grasp in these steps is from the expected one, as `deviation` does; inf if it fails."""
     try:
-        return deviation(trial.record(reduction), expected)
+        return deviation(trial.record(chosen), expected)
     except (TermFailed, *LAW_ERRORS):
         return math.inf, "outcome"
 
 
 def _confirmed(
-    problem: Problem, grip: Grip, trial: TrialGrasps, reduction: Reduction, scale: LevelScale
+    problem: Problem, grip: Grip, trial: TrialGrasps, chosen: ChosenSteps, scale: LevelScale
 ) -> tuple[float, str]:
     """Return how far the grasp is from one in still smaller steps than those that it was compared with."""
     finer = scale._replace(refinement=min(10.0 * scale.refinement, max(REFERENCE_SCALES)))
     exact = trial.record(propose(problem, grip, _reference_scale(problem.model_config, finer)))
-    return deviation(trial.record(reduction), exact)
+    return deviation(trial.record(chosen), exact)
 
 
 def _accepted_for_instances(
-    problem: Problem, reduction: Reduction, full: Reduction, trial: TrialGrasps, verification: Verification
-) -> Reduction | None:
+    problem: Problem, chosen: ChosenSteps, full: ChosenSteps, trial: TrialGrasps, verification: Verification
+) -> ChosenSteps | None:
     """Return a model, verified by grasps of some instances; None if it is not accurate enough for one of them.
 
     `full` is the model to compare with, and `verification` the result for the nominal object. The expected force of the
     returned model is the largest peak force of all these grasps.
     """
-    force_n = reduction.force_n
+    force_n = chosen.force_n
     for setup in problem.examples():
         trial = trial.with_setup(setup)
         try:
-            grasp, expected = trial.record(reduction), trial.record(full)
+            grasp, expected = trial.record(chosen), trial.record(full)
         except Exception:
             # A single instance that fails, or takes too much work, is no reason to refuse the object.
             return None
         error, quantity = deviation(grasp, expected)
         if error > _accepted_share(problem.model_config) * problem.model_config.accuracy:
             return None
-        features = dict.fromkeys((*verification.features, *trial.features_beyond(reduction, full)))
+        features = dict.fromkeys((*verification.features, *trial.features_beyond(chosen, full)))
         if error > verification.error:
             verification = evolve(verification, error=error, quantity=quantity)
         verification = evolve(verification, grasps=verification.grasps + 1, features=tuple(features))
         force_n = max(force_n, grasp.peak_n)
-    return evolve(reduction, verification=verification, force_n=force_n)
+    return evolve(chosen, verification=verification, force_n=force_n)
 
 
 def _reference_scale(config: SimConfig, scale: LevelScale) -> LevelScale:

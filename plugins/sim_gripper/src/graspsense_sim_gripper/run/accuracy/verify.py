@@ -27,8 +27,8 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.fingertip import CELLS
 from graspsense_sim_gripper.plant.sensing import PadBuffers
 from graspsense_sim_gripper.plant.state import Motion, PlantState
+from graspsense_sim_gripper.run.accuracy.chosen_steps import ChosenSteps
 from graspsense_sim_gripper.run.accuracy.error import SCALES, UNIT_SCALES, GraspRecord
-from graspsense_sim_gripper.run.accuracy.model import Reduction
 from graspsense_sim_gripper.run.accuracy.own_features import OwnFeatures, beyond, own_features
 from graspsense_sim_gripper.run.build import Problem
 from graspsense_sim_gripper.run.compiled.compose import composition, grasp_loop
@@ -111,26 +111,26 @@ class TrialGrasps:
     def _new_loops(self) -> CompiledLoops:
         return CompiledLoops(self.controller.step)
 
-    def record(self, reduction: Reduction) -> GraspRecord:
+    def record(self, chosen: ChosenSteps) -> GraspRecord:
         """Return the grasp in these steps."""
-        return self._grasp(reduction).record
+        return self._grasp(chosen).record
 
-    def features_beyond(self, reduction: Reduction, full: Reduction) -> tuple[str, ...]:
+    def features_beyond(self, chosen: ChosenSteps, full: ChosenSteps) -> tuple[str, ...]:
         """Return the features of the pipeline that differ from those in finer steps by more than the accuracy.
 
         Empty without a feature set, `own_features.NOT_READ` for one that ideal sensors do not suffice for.
         """
         if self.features is None:
             return ()
-        grasp, expected = self._grasp(reduction), self._grasp(full)
+        grasp, expected = self._grasp(chosen), self._grasp(full)
         return beyond(grasp.features, expected.features, self.config.accuracy)
 
-    def values(self, reduction: Reduction) -> dict[str, tuple[float, float]]:
+    def values(self, chosen: ChosenSteps) -> dict[str, tuple[float, float]]:
         """Return the features of the pipeline and the peak force in these steps, each with the scale of its unit.
 
         The features of the paper, if the pipeline has none or ideal sensors do not suffice for them.
         """
-        record, own = self._grasp(reduction)
+        record, own = self._grasp(chosen)
         if own is None:
             return {name: (value, SCALES[name]) for name, value in record.quantities.items()}
         names, values, units = own.features.names, own.features.values, own.features.units
@@ -139,20 +139,20 @@ class TrialGrasps:
             "peak": (record.peak_n, SCALES["peak"])
         }
 
-    def _grasp(self, reduction: Reduction) -> TrialGrasp:
+    def _grasp(self, chosen: ChosenSteps) -> TrialGrasp:
         """Return the grasp in these steps, which is simulated once."""
-        key = (reduction.steps, reduction.left_out)
+        key = (chosen.steps, chosen.left_out)
         if key not in self._grasps:
             try:
-                self._grasps[key] = self._simulated(reduction)
+                self._grasps[key] = self._simulated(chosen)
             except NotCompilable:
                 self.compiled = False
-                self._grasps[key] = self._simulated(reduction)
+                self._grasps[key] = self._simulated(chosen)
         return self._grasps[key]
 
-    def _simulated(self, reduction: Reduction) -> TrialGrasp:
+    def _simulated(self, chosen: ChosenSteps) -> TrialGrasp:
         """Return what `_grasp` returns. Raises NotCompilable."""
-        setup = evolve(self.setup, plant=reduction.applied_to(self.setup.plant))
+        setup = evolve(self.setup, plant=chosen.applied_to(self.setup.plant))
         end, rows = self._run(setup)
         if not self.near and not has_ended(end.controller):
             self.near = True

@@ -11,7 +11,7 @@ from typing import Any
 
 from attrs import evolve
 
-from graspsense_sim_gripper.run.accuracy.model import Reduction
+from graspsense_sim_gripper.run.accuracy.chosen_steps import ChosenSteps
 from graspsense_sim_gripper.run.accuracy.verify import TooMuchWork, TrialGrasps, trial_grasps, without_term
 from graspsense_sim_gripper.run.build import Problem
 from graspsense_sim_gripper.run.problem import GraspController
@@ -20,7 +20,7 @@ from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
 
 
 def without_each_term(
-    problem: Problem, controller: GraspController, reduction: Reduction
+    problem: Problem, controller: GraspController, chosen: ChosenSteps
 ) -> list[dict[str, Any]]:
     """Return for each term of the object what its absence changes, as plain values.
 
@@ -31,14 +31,14 @@ def without_each_term(
     and is empty if there is one. Raises TypeError if there is no object.
     """
     trial = trial_grasps(problem, controller, compiled=False, padding=None)
-    expected = trial.record(reduction)
+    expected = trial.record(chosen)
     rows = []
     for i, kind in enumerate(trial.setup.kinds):
         other = evolve(trial, setup=without_term(trial.setup, i))
         row: dict[str, Any] = {"term": kind, "same_outcome": False, "changes": {}, "failed": ""}
         try:
-            row["same_outcome"] = other.record(reduction).outcome == expected.outcome
-            row["changes"] = _changes(trial, other, reduction)
+            row["same_outcome"] = other.record(chosen).outcome == expected.outcome
+            row["changes"] = _changes(trial, other, chosen)
         except (TermFailed, *LAW_ERRORS) as error:
             row["failed"] = str(error)
         except TooMuchWork:
@@ -48,12 +48,12 @@ def without_each_term(
 
 
 def _changes(
-    trial: TrialGrasps, other: TrialGrasps, reduction: Reduction
+    trial: TrialGrasps, other: TrialGrasps, chosen: ChosenSteps
 ) -> dict[str, dict[str, float | None]]:
     """Return what `without_each_term` has under `changes`."""
-    without = other.values(reduction)
+    without = other.values(chosen)
     changes: dict[str, dict[str, float | None]] = {}
-    for name, (value, scale) in trial.values(reduction).items():
+    for name, (value, scale) in trial.values(chosen).items():
         other_value = without[name][0] if name in without else math.nan
         if math.isnan(value) and math.isnan(other_value):
             continue

@@ -88,13 +88,13 @@ class FinishedGrasp:
 
     def report(self) -> dict[str, Any]:
         """Return the `model_report` of the grasp, with what its model does not verify."""
-        kinds, reduction, unstable_loop = self.model
+        kinds, chosen, unstable_loop = self.model
         if isinstance(self.end, Stored) and self.layout is not None:
             report = stored_report(self.end.type, self.layout, kinds).report(self.end.numbers)
         else:
             report = model_report(self.state, kinds)
-        if reduction is not None:
-            report |= accuracy_report(report, reduction, unstable_loop)
+        if chosen is not None:
+            report |= accuracy_report(report, chosen, unstable_loop)
         return report
 
     @property

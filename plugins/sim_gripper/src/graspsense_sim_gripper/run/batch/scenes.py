@@ -7,7 +7,7 @@ from functools import cached_property, lru_cache
 
 from attrs import define, evolve, field
 
-from graspsense_sim_gripper.run.accuracy.model import Reduction
+from graspsense_sim_gripper.run.accuracy.chosen_steps import ChosenSteps
 from graspsense_sim_gripper.run.accuracy.select import select
 from graspsense_sim_gripper.run.batch.drawn import DrawnScene, drawn_scene
 from graspsense_sim_gripper.run.batch.job import Job, started
@@ -26,7 +26,7 @@ class SelectedScene:
 
     job: Job
     problem: Problem
-    reduction: Reduction | None
+    chosen: ChosenSteps | None
     """None: there is no object."""
 
     def setup(self, seed: int, number: int | None) -> GraspSetup:
@@ -34,12 +34,12 @@ class SelectedScene:
         problem = self.problem
         if problem.number != number:
             problem = evolve(problem, number=number)
-        return instantiate(problem, self.reduction, seed)
+        return instantiate(problem, self.chosen, seed)
 
     @cached_property
     def example(self) -> GraspSetup:
         """Any of its grasps, for what all of them have in common."""
-        return example_of(self.problem, self.reduction)
+        return example_of(self.problem, self.chosen)
 
     @cached_property
     def composition(self) -> Composition:
@@ -54,10 +54,10 @@ class SelectedScene:
     @cached_property
     def model(self) -> GraspModel:
         """The model of its object, for the reports of its grasps."""
-        if self.problem.spec is None or self.reduction is None:
+        if self.problem.spec is None or self.chosen is None:
             return GraspModel((), None, "")
-        unstable = instability(self.example, self.job.grasp_controller, self.reduction)
-        return GraspModel(self.problem.spec.kinds, self.reduction, unstable)
+        unstable = instability(self.example, self.job.grasp_controller, self.chosen)
+        return GraspModel(self.problem.spec.kinds, self.chosen, unstable)
 
 
 @define(eq=False)
@@ -65,7 +65,7 @@ class Scenes:
     """The scenes of a job."""
 
     job: Job
-    selected: Mapping[tuple[str, bool], Reduction | None] = field(factory=dict)
+    selected: Mapping[tuple[str, bool], ChosenSteps | None] = field(factory=dict)
     """Models that were selected elsewhere, by `scene_key`."""
     _scenes: dict[tuple[str, bool], SelectedScene] = field(factory=dict, init=False)
     """By `scene_key`."""
@@ -76,11 +76,11 @@ class Scenes:
         Raises UnknownName and ConfigError as `build` and `select` do.
         """
         job, key = self.job, scene_key(name)
-        reduction = self.selected.get(key)
+        chosen = self.selected.get(key)
         problem = build(job.config, name, job.scaled)
-        if problem.spec is not None and reduction is None:
-            reduction = select(problem, job.grasp_controller, compiled=compiled)
-        self._scenes[key] = SelectedScene(job, problem, reduction)
+        if problem.spec is not None and chosen is None:
+            chosen = select(problem, job.grasp_controller, compiled=compiled)
+        self._scenes[key] = SelectedScene(job, problem, chosen)
         return self._scenes[key]
 
     def find(self, name: str) -> SelectedScene:
@@ -91,9 +91,9 @@ class Scenes:
         """Return the grasp of a scene with this seed. Raises as `add` and `instantiate` do."""
         return self.find(name).setup(seed, number_in(name))
 
-    def models(self) -> dict[tuple[str, bool], Reduction | None]:
+    def models(self) -> dict[tuple[str, bool], ChosenSteps | None]:
         """Return the models of the scenes that were added, by `scene_key`."""
-        return {key: scene.reduction for key, scene in self._scenes.items()}
+        return {key: scene.chosen for key, scene in self._scenes.items()}
 
 
 @lru_cache(maxsize=4096)

@@ -43,7 +43,7 @@ TermsParams = Any
 PlantMove = Callable[[Any, PlantState, float, float], PlantState]
 """`move(model, state, effort_n, dt_s) -> state` over one tick."""
 ContactSolver = Callable[[ObjectModel, ContactState, float, float, float], tuple[ContactState, int]]
-"""`dynamics.contact.solve_contact` with the terms of an object."""
+"""`plant.contact.solve_contact` with the terms of an object."""
 
 INTERPRETED: Final[Constructors] = {
     kind: maker(kind)

@@ -391,10 +391,10 @@ def test_gas_that_is_spent_is_reported(tmp_path):
 def test_trial_grasps_end_at_a_limit_of_work_and_the_grasp_runs(monkeypatch):
     monkeypatch.setattr(verify, "MOST_WORK", 2000)
     problem = Problem(CONFIG, ObjectSpec(name="shell", width_m=0.05, terms=(SHELL,)))
-    reduction = select(problem, hybrid(closing_speed_m_s=0.0117))
-    assert reduction.verification is None
-    assert reduction.not_verified == ("peak", "trace", "features")
-    told = next(d for d in reduction.decisions if d.subject == "trial grasps")
+    chosen = select(problem, hybrid(closing_speed_m_s=0.0117))
+    assert chosen.verification is None
+    assert chosen.not_verified == ("peak", "trace", "features")
+    told = next(d for d in chosen.decisions if d.subject == "trial grasps")
     assert "limit" in told.decision
 
 

@@ -42,7 +42,7 @@ class Verification:
 
 
 @frozen(kw_only=True)
-class Reduction:
+class ChosenSteps:
     """The steps of the grasps of an object for an accuracy. All instances of the object share them."""
 
     accuracy: float
