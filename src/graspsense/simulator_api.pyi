@@ -1,4 +1,4 @@
-"""Generated from the table of graspsense.simulator_api by `core/components/lazy_names.py`: change the table."""
+"""The names of graspsense.simulator_api, for type checkers and for `core/components/lazy_names.py`."""
 
 # Many grasps at once
 from graspsense.core.components.roles import BatchBackend as BatchBackend
