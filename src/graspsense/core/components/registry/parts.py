@@ -247,7 +247,7 @@ class Resource(Declared[EntryT]):
     @property
     def kind(self) -> str:
         """The kind of its entry in words."""
-        return _KIND_OF_ENTRY[type(self.entry)]
+        return KIND_OF_ENTRY[type(self.entry)]
 
     @property
     def targets(self) -> tuple[str, ...]:
@@ -286,7 +286,7 @@ class Resource(Declared[EntryT]):
 
 
 _TARGETS: Final = ("target", "recordings", "export", "run", "keys", "result", "findings")
-_KIND_OF_ENTRY: Final[dict[type, str]] = {
+KIND_OF_ENTRY: Final[dict[type, str]] = {
     PipelineEntry: "pipeline",
     ModelEntry: "model",
     DatasetEntry: "data set",
@@ -294,7 +294,7 @@ _KIND_OF_ENTRY: Final[dict[type, str]] = {
     EmulatorEntry: "emulator",
     ExperimentEntry: "experiment",
     ExperimentKindEntry: "kind of experiment",
-    IdentifierEntry: "identifier of objects",
+    IdentifierEntry: "identifier of objects for gripper",
     LiveObserverEntry: "live observer",
     ConformanceCheckEntry: "conformance check",
 }
