@@ -22,7 +22,7 @@ _MARK: Final = 11
 """Width of a mark with its margins."""
 
 
-@click.command(short_help="Diagnose plugins, permissions and devices.")
+@click.command()
 @pipeline_options
 @click.option(
     "--timeout",

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from graspsense.core.components.identification import Identification, IdentifiedParameter
 
 
-@click.command(short_help="Identify an object from recorded squeezes, as a scene of the simulator.")
+@click.command()
 @click.argument(
     "sources", nargs=-1, required=True, metavar="RECORDING|store:DIR|DIR#N...", callback=named_source
 )

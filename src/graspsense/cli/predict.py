@@ -24,7 +24,6 @@ MOST_WITH_REASONS: Final = 1000
 
 
 @click.command(
-    short_help="Predict the labels of trials.",
     help=f"""Predict the labels of the trials of SOURCE, with probabilities and reasons.
 
     MODEL is a .json file of `graspsense train`, or the name of a model of a plugin (such as default). If the trials

@@ -43,7 +43,7 @@ MANY_GUARDED: Final = 0.1
 """Share of the ticks of a grasp from which on `run` names the settings by which the guard limits the approach."""
 
 
-@click.command(short_help="Perform one grasp.")
+@click.command()
 @pipeline_options
 @click.option(
     "--save",
