@@ -221,9 +221,9 @@ def test_hook_graspsense_diagnose():
 
     failed, diagnoses, told = plugins.diagnose("these settings", 0.25)
 
-    assert (failed.findings, failed.error) == ((), "PermissionError: cannot list the bus")
-    assert (diagnoses.findings[0].state, diagnoses.findings[0].numbers) == ("problem", {"baud": 115200})
-    assert told.findings[0].words == "these settings for 0.25 s"
+    assert (failed.given, failed.error) == ((), "PermissionError: cannot list the bus")
+    assert (diagnoses.given[0].state, diagnoses.given[0].numbers) == ("problem", {"baud": 115200})
+    assert told.given[0].words == "these settings for 0.25 s"
 
 
 def test_a_finding_is_in_one_of_three_states():
@@ -253,10 +253,10 @@ def test_hook_graspsense_probe_devices():
 
     failed, devices, timed = plugins.probe_devices(0.25)
 
-    assert (failed.distribution, failed.devices) == ("lab-a", ())
+    assert (failed.distribution, failed.given) == ("lab-a", ())
     assert failed.error == "PermissionError: cannot list the bus"
-    assert (devices.error, devices.devices[0].advice) == ("", "add yourself to the group dialout")
-    assert timed.devices[0].serial == "0.25"
+    assert (devices.error, devices.given[0].advice) == ("", "add yourself to the group dialout")
+    assert timed.given[0].serial == "0.25"
 
 
 def test_a_probe_that_gives_something_else_is_reported_as_failed():

@@ -25,8 +25,6 @@ from graspsense.core.components.entries import (
     EmulatorEntry,
     ExperimentEntry,
     ExperimentKindEntry,
-    Finding,
-    FoundDevice,
     IdentifierEntry,
     LiveObserverEntry,
     ModelEntry,
@@ -300,19 +298,13 @@ KIND_OF_ENTRY: Final[dict[type, str]] = {
 }
 
 
-@frozen
-class Probe:
-    """The devices that one plugin found; `error` is the reason if it could not search."""
-
-    distribution: str
-    devices: tuple[FoundDevice, ...] = ()
-    error: str = ""
+AnswerT = TypeVar("AnswerT")
 
 
 @frozen
-class Diagnosis:
-    """The findings of one plugin about its devices; `error` is the reason if it could not examine them."""
+class HookAnswer(Generic[AnswerT]):
+    """What the hook of one plugin gave: devices that it found, or findings; `error` is the reason if it failed."""
 
     distribution: str
-    findings: tuple[Finding, ...] = ()
+    given: tuple[AnswerT, ...] = ()
     error: str = ""

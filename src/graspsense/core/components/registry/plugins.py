@@ -62,11 +62,11 @@ from graspsense.core.components.registry.isolation import (
 )
 from graspsense.core.components.registry.parts import (
     KIND_OF_ENTRY,
+    AnswerT,
     Component,
-    Diagnosis,
     EntryT,
+    HookAnswer,
     PluginStatus,
-    Probe,
     Resource,
     canonical,
 )
@@ -205,30 +205,26 @@ class Plugins:
         lines = [status.absence for status in self._statuses]
         return "".join([*lines, *(f"\n  {problem}" for problem in self.unknown_names)])
 
-    def probe_devices(self, timeout_s: float) -> tuple[Probe, ...]:
+    def probe_devices(self, timeout_s: float) -> tuple[HookAnswer[FoundDevice], ...]:
         """Let every plugin search for its devices for at most `timeout_s` each; a failure is reported as its own."""
-        hook, probes = "graspsense_probe_devices", []
-        for status, plugin in self._implementing(hook):
-            try:
-                devices = self._hooks.entries(plugin, hook, FoundDevice, timeout_s=timeout_s)
-                probes.append(Probe(status.distribution, tuple(devices)))
-            except FAILURES as error:
-                probes.append(Probe(status.distribution, error=error_text(error)))
-        return tuple(probes)
+        return self._answers("graspsense_probe_devices", FoundDevice, timeout_s=timeout_s)
 
-    def diagnose(self, config: object, timeout_s: float) -> tuple[Diagnosis, ...]:
+    def diagnose(self, config: object, timeout_s: float) -> tuple[HookAnswer[Finding], ...]:
         """Let every plugin examine its devices, for about `timeout_s` each; a failure is reported as its own.
 
         `config` is that of the gripper that the user named, or None.
         """
-        hook, diagnoses = "graspsense_diagnose", []
+        return self._answers("graspsense_diagnose", Finding, config=config, timeout_s=timeout_s)
+
+    def _answers(self, hook: str, kind: type[AnswerT], **arguments: Any) -> tuple[HookAnswer[AnswerT], ...]:
+        answers: list[HookAnswer[AnswerT]] = []
         for status, plugin in self._implementing(hook):
             try:
-                findings = self._hooks.entries(plugin, hook, Finding, config=config, timeout_s=timeout_s)
-                diagnoses.append(Diagnosis(status.distribution, tuple(findings)))
+                given = self._hooks.entries(plugin, hook, kind, **arguments)
+                answers.append(HookAnswer(status.distribution, tuple(given)))
             except FAILURES as error:
-                diagnoses.append(Diagnosis(status.distribution, error=error_text(error)))
-        return tuple(diagnoses)
+                answers.append(HookAnswer(status.distribution, error=error_text(error)))
+        return tuple(answers)
 
     def run_starting(self, run: RunInfo) -> None:
         """Notify the observers that a grasp is about to start."""
