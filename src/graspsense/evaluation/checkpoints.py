@@ -11,7 +11,7 @@ from attrs import frozen
 from graspsense.core.learn.model import Model, checkpoint_model, train
 from graspsense.evaluation.crossval import columns_of, cross_validate
 from graspsense.evaluation.doubt import HeldOut, calibrated, calibrated_by, exchangeable_instances
-from graspsense.evaluation.folds import held_out
+from graspsense.evaluation.folds import INSTANCE_HELD_OUT, held_out
 from graspsense.evaluation.intervals import RecognitionRate, rate_among
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ def early_recognition(
     if not reason:
         rows.append(_stopped(whole, parts, answers))
     return EarlyRecognition(
-        protocol="stratified" if instances is None else "instance_held_out",
+        protocol="stratified" if instances is None else INSTANCE_HELD_OUT,
         rows=tuple(rows),
         reason=reason,
     )

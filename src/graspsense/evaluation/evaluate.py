@@ -50,7 +50,7 @@ SHARES: Final = (0.1, 0.2, 0.4, 0.7, 1.0)
 """Shares of the training trials at which the learning curve is measured."""
 
 PERMUTATIONS: Final = 19
-"""Number of permutations of the labels: the smallest with which p can be 0.05."""
+"""Number of permutations of the labels, or numbers: the smallest with which p can be 0.05."""
 
 Progress = Callable[[str, int, int], None]
 
@@ -434,11 +434,8 @@ class _Evaluator:
         """
         if control is None:
             return Measurement(default, reason=reason or "these trials have no such features")
-        having: NDArray[np.bool_] = np.array(~np.isnan(control.table.values).all(axis=1))
-        n, total = int(having.sum()), len(having)
-        why = f": {control.missing}" if control.missing else ""
-        having_words = f"{n} of {counted(total, 'trial')} have such features{why}"
-        if n == 0:
+        having, having_words = control.having, control.having_words
+        if not having.any():
             return Measurement(control.what, reason=having_words)
         groups, folds = _among(having, self.groups, headline.folds)
         if not groups:
@@ -449,7 +446,7 @@ class _Evaluator:
             return Measurement(control.what, reason=str(refusal))
         rows = np.sort(np.concatenate(list(groups))).tolist()
         self.predicted_by_control[name] = (pooled, rows)
-        what = control.what if len(rows) == total else f"{control.what}; {having_words}"
+        what = control.what if len(rows) == len(having) else f"{control.what}; {having_words}"
         return self._against(what, pooled, headline.pooled, headline.protocol, rows)
 
     def _majority(self, headline: _Headline) -> tuple[list[bool], Measurement]:
