@@ -230,7 +230,7 @@ def _point(
     if measured is not reference and len(measured.rates) > 1:
         trials = len(labels) // len(measured.rates)
         test = equivalence(measured.rates, reference.rates, trials, comparisons=comparisons)
-    return SensedPoint.of(
+    return SensedPoint.measured(
         variant,
         seconds=measured.seconds,
         distances=tuple(

@@ -77,7 +77,7 @@ def trade_simulation(
                 raise
             why = f"{type(error).__name__}: {error}"
             points.append(
-                VariantPoint.of(variant, seconds=math.nan, setup_s=math.nan, errors={}, failure=why)
+                VariantPoint.measured(variant, seconds=math.nan, setup_s=math.nan, errors={}, failure=why)
             )
             continue
         if reference is None:
@@ -174,4 +174,4 @@ def _point(
         worst[PEAK] = max(worst.get(PEAK, 0.0), abs(reached - float(np.max(true.force, initial=0.0))) / peak)
         worst[TRACE] = max(worst.get(TRACE, 0.0), off / peak)
     failure = missing or ("" if all(map(math.isfinite, worst.values())) else "no number in the force trace")
-    return VariantPoint.of(variant, seconds=seconds, setup_s=setup, errors=worst, failure=failure)
+    return VariantPoint.measured(variant, seconds=seconds, setup_s=setup, errors=worst, failure=failure)

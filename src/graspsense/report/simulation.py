@@ -32,14 +32,14 @@ class MeasuredVariant:
     seconds: float
 
     @classmethod
-    def of(cls, variant: SimulationVariant, **measured: Any) -> Self:
-        """Return what was measured of a variant; `measured` has the other fields."""
+    def measured(cls, variant: SimulationVariant, **figures: Any) -> Self:
+        """Return what was measured of a variant; `figures` has the other fields."""
         return cls(
             method=variant.method,
             fidelity=variant.fidelity,
             step=variant.step,
             role=variant.role,
-            **measured,
+            **figures,
         )
 
     @property
