@@ -394,16 +394,16 @@ def names_page() -> str:
             _text(door).partition("\n\n")[0],
             "",
         ]
-        for title, homes in door.PUBLIC.table.items():
+        for title, names in door.PUBLIC.groups.items():
             lines += [f"### {title}", "", "| name | meaning |", "|---|---|"]
-            lines += [_public_row(home, name) for home, names in homes.items() for name in names]
+            lines += [_public_row(home, name) for name, home in names]
             lines.append("")
     return "\n".join(lines)
 
 
 def _public_row(home: str, name: str) -> str:
     """Return the row of a name: with its signature if it is called, and the first sentence of its meaning."""
-    value = getattr(import_module(f"graspsense.{home}"), name)
+    value = getattr(import_module(home), name)
     if not callable(value):
         return f"| `{name}` | {_cell(_sentence(_text_below(home, name)) or f'the value {value!r}')} |"
     if inspect.isclass(value):
@@ -428,7 +428,7 @@ def _sentence(text: str) -> str:
 
 def _text_below(home: str, name: str) -> str:
     """Return the docstring that follows the definition of a constant in its module, empty if there is none."""
-    body = ast.parse(inspect.getsource(import_module(f"graspsense.{home}"))).body
+    body = ast.parse(inspect.getsource(import_module(home))).body
     for statement, text in pairwise(body):
         if isinstance(statement, ast.Assign | ast.AnnAssign) and isinstance(text, ast.Expr):
             target = statement.targets[0] if isinstance(statement, ast.Assign) else statement.target

@@ -14,7 +14,16 @@ import pytest
 from cases import every_case
 
 from graspsense.core.components import hookspecs
-from graspsense.core.components.entries import Finding, FoundDevice
+from graspsense.core.components.entries import (
+    ConformanceCheckEntry,
+    EmulatorEntry,
+    ExperimentEntry,
+    Finding,
+    FoundDevice,
+    IdentifierEntry,
+    LiveObserverEntry,
+    ModelEntry,
+)
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.values.events import GraspEvent
 from graspsense.core.values.features import Features
@@ -22,7 +31,14 @@ from graspsense.core.values.signals import Outcome, Phase
 from graspsense.core.values.trace import trace_of
 from graspsense.core.values.trial import RunInfo, Trial
 from graspsense.experiment_api import ExperimentKindEntry
-from graspsense.plugin_api import CommandEntry, PluginUnavailable, UnknownName, hookimpl
+from graspsense.plugin_api import (
+    CommandEntry,
+    DatasetEntry,
+    PipelineEntry,
+    PluginUnavailable,
+    UnknownName,
+    hookimpl,
+)
 from graspsense.simulator_api import collect
 
 HOOKS = {name: spec for name, spec in vars(hookspecs).items() if name.startswith("graspsense_")}
@@ -105,20 +121,20 @@ def test_the_documented_hand_has_the_channels_of_its_fingers():
 def test_hook_graspsense_pipelines():
     plugins = IsolatedPlugins(example("graspsense_pipelines"))
 
-    assert [pipeline.name for pipeline in plugins.pipelines()] == ["best", "default", "lab"]
-    assert "[gripper]" in plugins.pipeline("graspsense/default").file().read_text()
+    assert [pipeline.name for pipeline in plugins.resources(PipelineEntry)] == ["best", "default", "lab"]
+    assert "[gripper]" in plugins.resource(PipelineEntry, "graspsense/default").file().read_text()
 
 
 def test_hook_graspsense_models():
     plugins = IsolatedPlugins(example("graspsense_models"))
 
-    assert plugins.model("lab-cans").entry.resource == "lab_hand:models/cans.json"
+    assert plugins.resource(ModelEntry, "lab-cans").entry.resource == "lab_hand:models/cans.json"
 
 
 def test_hook_graspsense_datasets():
     plugins = IsolatedPlugins(example("graspsense_datasets"))
 
-    assert plugins.dataset("lab-csv").entry.recordings == "lab_hand.csv:recordings"
+    assert plugins.resource(DatasetEntry, "lab-csv").entry.recordings == "lab_hand.csv:recordings"
 
 
 def test_hook_graspsense_commands():
@@ -131,36 +147,38 @@ def test_hook_graspsense_commands():
 
     plugins = IsolatedPlugins(example("graspsense_commands"), Plugin())
 
-    assert [command.name for command in plugins.commands()] == ["again", "home-hand"]
-    assert plugins.command("again").load() is click.Command
+    assert [command.name for command in plugins.resources(CommandEntry)] == ["again", "home-hand"]
+    assert plugins.resource(CommandEntry, "again").load() is click.Command
 
 
 def test_hook_graspsense_emulators():
     plugins = IsolatedPlugins(example("graspsense_emulators"))
 
-    entry = plugins.emulator("lab-hand").entry
+    entry = plugins.resource(EmulatorEntry, "lab-hand").entry
     assert (entry.target, entry.wires, entry.options) == ("lab_hand.emulator:emulate", ("pty",), ())
 
 
 def test_hook_graspsense_live_observers():
     plugins = IsolatedPlugins(example("graspsense_live_observers"))
-    assert [observer.entry.target for observer in plugins.live_observers()] == ["lab_hand.wall:observe"]
+    assert [observer.entry.target for observer in plugins.resources(LiveObserverEntry)] == [
+        "lab_hand.wall:observe"
+    ]
 
 
 def test_hook_graspsense_identifiers():
     plugins = IsolatedPlugins(example("graspsense_identifiers"))
 
-    assert plugins.identifier("lab-sim").entry.target == "lab_sim.identification:identify"
+    assert plugins.resource(IdentifierEntry, "lab-sim").entry.target == "lab_sim.identification:identify"
     with pytest.raises(UnknownName, match=r"graspsense-identify:\n.*graspsense\[identify\]"):
-        plugins.identifier("sim")
+        plugins.resource(IdentifierEntry, "sim")
     with pytest.raises(UnknownName, match="Known: lab-sim"):
-        plugins.identifier("replay")
+        plugins.resource(IdentifierEntry, "replay")
 
 
 def test_hook_graspsense_experiment_kinds():
     plugins = IsolatedPlugins(example("graspsense_experiment_kinds"))
 
-    assert plugins.experiment_kind("wear").targets == ("run", "keys", "result", "findings")
+    assert plugins.resource(ExperimentKindEntry, "wear").targets == ("run", "keys", "result", "findings")
     with pytest.raises(ValueError, match="both 'run' and 'keys'"):
         ExperimentKindEntry(name="wear", run="lab_study.wear:run", summary="without keys")
 
@@ -168,7 +186,7 @@ def test_hook_graspsense_experiment_kinds():
 def test_hook_graspsense_experiments():
     plugins = IsolatedPlugins(example("graspsense_experiments"))
 
-    worn = plugins.experiment("graspsense-test/worn-cans")
+    worn = plugins.resource(ExperimentEntry, "graspsense-test/worn-cans")
     assert worn.entry.resource == "lab_study:experiments/worn_cans.toml"
     with pytest.raises(PluginUnavailable, match="lab_study"):
         worn.file()
@@ -177,7 +195,7 @@ def test_hook_graspsense_experiments():
 def test_hook_graspsense_conformance_checks():
     plugins = IsolatedPlugins(example("graspsense_conformance_checks"))
 
-    (check,) = plugins.conformance_checks()
+    (check,) = plugins.resources(ConformanceCheckEntry)
     assert (check.name, check.entry.hook) == ("fingers-have-names", "lab_hand_fingers")
 
 
@@ -203,9 +221,9 @@ def test_hook_graspsense_diagnose():
 
     failed, diagnoses, told = plugins.diagnose("these settings", 0.25)
 
-    assert (failed.findings, failed.error) == ((), "PermissionError: cannot list the bus")
-    assert (diagnoses.findings[0].state, diagnoses.findings[0].numbers) == ("problem", {"baud": 115200})
-    assert told.findings[0].words == "these settings for 0.25 s"
+    assert (failed.given, failed.error) == ((), "PermissionError: cannot list the bus")
+    assert (diagnoses.given[0].state, diagnoses.given[0].numbers) == ("problem", {"baud": 115200})
+    assert told.given[0].words == "these settings for 0.25 s"
 
 
 def test_a_finding_is_in_one_of_three_states():
@@ -235,10 +253,10 @@ def test_hook_graspsense_probe_devices():
 
     failed, devices, timed = plugins.probe_devices(0.25)
 
-    assert (failed.distribution, failed.devices) == ("lab-a", ())
+    assert (failed.distribution, failed.given) == ("lab-a", ())
     assert failed.error == "PermissionError: cannot list the bus"
-    assert (devices.error, devices.devices[0].advice) == ("", "add yourself to the group dialout")
-    assert timed.devices[0].serial == "0.25"
+    assert (devices.error, devices.given[0].advice) == ("", "add yourself to the group dialout")
+    assert timed.given[0].serial == "0.25"
 
 
 def test_a_probe_that_gives_something_else_is_reported_as_failed():

@@ -9,6 +9,7 @@ import pytest
 from cases import every_case
 
 from graspsense.core.components.config import select_component
+from graspsense.core.components.entries import PipelineEntry
 from graspsense.core.components.registry import IsolatedPlugins, canonical, installed
 from graspsense.core.components.roles import SensorBackend
 from graspsense.core.values.errors import PluginUnavailable, UnknownName
@@ -433,7 +434,7 @@ def test_a_pipeline_file_left_out_of_the_wheel_is_named(site):
     with pytest.raises(
         PluginUnavailable, match=r"there is no file 'no/such\.toml' in the package 'graspsense'"
     ):
-        site.discover().pipeline("mine").file()
+        site.discover().resource(PipelineEntry, "mine").file()
 
 
 def test_isolated_plugins_do_not_discover(site):

@@ -12,6 +12,7 @@ import pytest
 from cases import every_case
 
 import graspsense_sim_gripper.plugin
+from graspsense.core.components.entries import PipelineEntry
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.pipeline.pipeline import load_pipeline
 from graspsense.core.values.errors import ConfigError, WiringError
@@ -103,7 +104,9 @@ def test_the_components_of_a_package_fit_together(roles, tmp_path, monkeypatch):
             trial = load_pipeline("lab-thing", plugins=plugins).grasp()
             assert (trial.outcome.words, dict(trial.features.reasons)) == ("steady", {})
         else:
-            assert not any(pipeline.distribution == "lab-thing" for pipeline in plugins.pipelines())
+            assert not any(
+                pipeline.distribution == "lab-thing" for pipeline in plugins.resources(PipelineEntry)
+            )
 
 
 def test_the_first_commands_find_the_scene_from_where_they_are_printed_and_from_the_package(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import mutants
+import numpy as np
 import parts
 import pytest
 from attrs import evolve
@@ -13,6 +14,7 @@ from graspsense.plugin_api import Feature, hookimpl
 from graspsense.testing import CHECKS, MINIMUM_CHECKS, controller, examine, session
 from graspsense.testing.checks import ConformanceReport, Result, outcome_of
 from graspsense.testing.conformance import Examined
+from graspsense.testing.samples import squeeze
 from graspsense.testing.subject import Subject
 
 ROLES = tuple(parts.ENTRIES)
@@ -185,3 +187,7 @@ def test_where_the_class_cannot_be_had_nothing_else_is_reported():
     assert {result.text for result in report.results[1:]} == {
         "no other check can run before classes-can-be-imported passes"
     }
+
+
+def test_the_frames_of_the_sample_squeeze_come_at_the_rate_that_its_docstring_says():
+    assert f"The frames come at {1.0 / np.diff(squeeze().t_s).mean():.0f} Hz." in squeeze.__doc__

@@ -94,6 +94,21 @@ def check(site, name, plugin=SOUND, features="chitta", reader=READER):
     return outcome_of(chosen, package, {})
 
 
+def test_the_code_of_a_live_observer_is_loaded_too(site):
+    watching = """
+    from graspsense.gripper_api import LiveObserverEntry
+
+    @hookimpl
+    def graspsense_live_observers():
+        yield LiveObserverEntry("lab-wall", "lab_wall:observe", "a wall of screens")
+    """
+
+    result = check(site, "everything-declared-loads", SOUND + watching)
+
+    assert result.state == "failed"
+    assert "No module named 'lab_wall'" in result.text
+
+
 @pytest.mark.parametrize("name", [sound.id for sound in CHECKS["distribution"]])
 def test_a_sound_distribution_passes(site, name):
     result = check(site, name)

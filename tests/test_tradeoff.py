@@ -46,7 +46,6 @@ TRADE = SimulationTrade(
         point("even", "0.5 ms", 2e-3, 1e-3),
         point("even", "5 ms", 1e-4, math.inf, failure="no number in the force trace"),
         point("broken", "1 ms", math.nan, math.nan, failure="ZeroDivisionError: x"),
-        point("fine", "0.02 ms", 0.1, 1e-4, role="floor"),
     ),
     made={"date": "2026-11-21", "numpy": "2.4"},
 )
@@ -72,7 +71,7 @@ def test_the_page_has_the_table_with_date_and_versions():
 
 
 @pytest.mark.slow
-def test_the_picture_is_drawn_with_failures_and_floors(tmp_path):
+def test_the_picture_is_drawn_with_failures(tmp_path):
     pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
     file = tmp_path / "trade.png"
     simulation_png(TRADE, file)

@@ -323,7 +323,7 @@ def dataset_of(reader, monkeypatch):
             return reader
 
     class Plugins:
-        def dataset(self, name):
+        def resource(self, kind, name):
             assert name == "lab"
             return Dataset()
 

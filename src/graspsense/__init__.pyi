@@ -1,4 +1,4 @@
-"""Generated from the table of graspsense by `core/components/lazy_names.py`: change the table."""
+"""The names of graspsense, for type checkers and for `core/components/lazy_names.py`."""
 
 __version__: str
 

@@ -1,4 +1,4 @@
-"""Generated from the table of graspsense.classifier_api by `core/components/lazy_names.py`: change the table."""
+"""The names of graspsense.classifier_api, for type checkers and for `core/components/lazy_names.py`."""
 
 # Reasons for an answer
 from graspsense.core.values.reasons import Reason as Reason

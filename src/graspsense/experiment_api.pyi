@@ -1,4 +1,4 @@
-"""Generated from the table of graspsense.experiment_api by `core/components/lazy_names.py`: change the table."""
+"""The names of graspsense.experiment_api, for type checkers and for `core/components/lazy_names.py`."""
 
 # Declaring kinds of experiments
 from graspsense.core.components.entries import ExperimentKindEntry as ExperimentKindEntry

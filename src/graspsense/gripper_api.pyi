@@ -1,4 +1,4 @@
-"""Generated from the table of graspsense.gripper_api by `core/components/lazy_names.py`: change the table."""
+"""The names of graspsense.gripper_api, for type checkers and for `core/components/lazy_names.py`."""
 
 # Finding devices and their faults
 from graspsense.core.components.entries import FoundDevice as FoundDevice

@@ -1,4 +1,4 @@
-"""Generated from the table of graspsense.plugin_api by `core/components/lazy_names.py`: change the table."""
+"""The names of graspsense.plugin_api, for type checkers and for `core/components/lazy_names.py`."""
 
 # Declaring what a plugin brings
 from graspsense.core.components.hookspecs import hookimpl as hookimpl

@@ -1,4 +1,4 @@
-"""Generated from the table of graspsense.simulator_api by `core/components/lazy_names.py`: change the table."""
+"""The names of graspsense.simulator_api, for type checkers and for `core/components/lazy_names.py`."""
 
 # Many grasps at once
 from graspsense.core.components.roles import BatchBackend as BatchBackend
@@ -43,6 +43,7 @@ from graspsense.core.components.identification import repeatability as repeatabi
 from graspsense.core.grasp.transmission import straight_linkage as straight_linkage
 
 # Laws and features that are compiled
+from graspsense.core.components.step_params import params_of as params_of
 from graspsense.core.control.free_motion import NOT_FREE as NOT_FREE
 from graspsense.core.control.free_motion import FreeLimits as FreeLimits
 from graspsense.core.control.free_motion import FreeMotion as FreeMotion

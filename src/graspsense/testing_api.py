@@ -4,21 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from graspsense.core.components.lazy_names import LazyNames, Table
+from graspsense.core.components.lazy_names import LazyNames
 
-_TABLE: Final[Table] = {
-    "Conformance": {
-        "testing.conformance": ("parametrize_checks",),
-    },
-    "Samples": {
-        "testing.samples": ("a_trial", "squeeze", "sample_table", "with_channels"),
-        "core.values.trace": ("ImageTrace", "SampleTrace", "TraceRecorder", "trace_of"),
-    },
-    "A gripper for tests": {
-        "testing.model_gripper": ("model_gripper", "drive"),
-    },
-}
-
-PUBLIC: Final = LazyNames("graspsense.testing_api", _TABLE)
+PUBLIC: Final = LazyNames(__name__)
 
 __all__ = PUBLIC.names

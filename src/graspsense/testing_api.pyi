@@ -1,4 +1,4 @@
-"""Generated from the table of graspsense.testing_api by `core/components/lazy_names.py`: change the table."""
+"""The names of graspsense.testing_api, for type checkers and for `core/components/lazy_names.py`."""
 
 # Conformance
 from graspsense.testing.conformance import parametrize_checks as parametrize_checks

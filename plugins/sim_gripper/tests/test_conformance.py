@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from cases import every_case
 
+from graspsense.core.components.entries import ConformanceCheckEntry
 from graspsense.core.components.registry import installed
 from graspsense.testing.conformance import checks_for
 from graspsense.testing.subject import package_of
@@ -63,5 +64,7 @@ COMPRESSED_M = 0.0001 * 10
 def test_the_conformance_kit_runs_it_for_a_distribution_with_terms():
     sim = package_of("graspsense-sim-gripper", installed())
 
-    assert "simulator-terms-are-laws" in {resource.name for resource in installed().conformance_checks()}
+    assert "simulator-terms-are-laws" in {
+        resource.name for resource in installed().resources(ConformanceCheckEntry)
+    }
     assert all(check.id != "simulator-terms-are-laws" for check in checks_for(sim))

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 _LABEL = 14
 
 
-@click.command(short_help="Collect labelled trials with an operator.")
+@click.command()
 @click.option(
     "--labels",
     required=True,

@@ -33,7 +33,6 @@ DEFAULT_FEATURES: Final = ("chitta", "columns")
 
 
 @click.command(
-    short_help="Compare classifiers and feature sets on the same folds.",
     help=f"""Cross-validate several classifiers with several feature sets on SOURCE, on the same folds.
 
     Names which are equivalent to the best, and the cheapest of them. Differences are paired by trial, with intervals

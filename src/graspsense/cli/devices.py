@@ -28,7 +28,7 @@ def devices(timeout_s: float, as_json: bool) -> None:
             "nan is not a number of seconds; give a number above 0", param_hint="--timeout"
         )
     probes = installed().probe_devices(timeout_s)
-    devices = [(probe.distribution, device) for probe in probes for device in probe.devices]
+    devices = [(probe.distribution, device) for probe in probes for device in probe.given]
     failed = {probe.distribution: probe.error for probe in probes if probe.error}
     for distribution, error in failed.items():
         talk(f"{distribution} could not look for its devices: {error}")

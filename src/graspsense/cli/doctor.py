@@ -14,7 +14,7 @@ from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, stat
 if TYPE_CHECKING:
     from graspsense.core.components.config import Settings
     from graspsense.core.components.entries import Finding
-    from graspsense.core.components.registry import Diagnosis, Plugins
+    from graspsense.core.components.registry import HookAnswer, Plugins
 
 EXIT_PROBLEM: Final = 1
 MARKS: Final = {"ok": "ok", "note": "note", "problem": "PROBLEM"}
@@ -22,7 +22,7 @@ _MARK: Final = 11
 """Width of a mark with its margins."""
 
 
-@click.command(short_help="Diagnose plugins, permissions and devices.")
+@click.command()
 @pipeline_options
 @click.option(
     "--timeout",
@@ -48,7 +48,7 @@ def doctor(timeout_s: float, repetitions: int | None, as_json: bool, **asked: An
     Nothing moves without --latency. With --gripper and -o, it looks for that gripper (-o gripper.vendor_id=...,
     -o gripper.serial=...), and reports a problem if it is missing. Exit code 0: no problem; 1: a problem.
     """
-    from graspsense.core.components.registry import Diagnosis, installed
+    from graspsense.core.components.registry import HookAnswer, installed
     from graspsense.core.control.garbage_collection import no_collection
 
     plugins = installed()
@@ -59,11 +59,11 @@ def doctor(timeout_s: float, repetitions: int | None, as_json: bool, **asked: An
         config = settings.gripper.config
     # A collection within a measurement would be told as a late report of the device.
     with no_collection():
-        diagnoses = [Diagnosis("graspsense", _ourselves(plugins)), *plugins.diagnose(config, timeout_s)]
+        diagnoses = [HookAnswer("graspsense", _ourselves(plugins)), *plugins.diagnose(config, timeout_s)]
         if repetitions is not None:
             diagnoses.append(_latency(settings, repetitions))
     problems = sum(diagnosis.error != "" for diagnosis in diagnoses) + sum(
-        finding.state == "problem" for diagnosis in diagnoses for finding in diagnosis.findings
+        finding.state == "problem" for diagnosis in diagnoses for finding in diagnosis.given
     )
     if as_json:
         echo_json({"problems": problems, "diagnoses": [_as_json(diagnosis) for diagnosis in diagnoses]})
@@ -113,9 +113,9 @@ def _ourselves(plugins: Plugins) -> tuple[Finding, ...]:
     return tuple(findings)
 
 
-def _latency(settings: Settings | None, repetitions: int) -> Diagnosis:
+def _latency(settings: Settings | None, repetitions: int) -> HookAnswer[Finding]:
     """Return the measured latencies of the gripper of these settings. It is left open, whatever happens."""
-    from graspsense.core.components.registry import Diagnosis
+    from graspsense.core.components.registry import HookAnswer
     from graspsense.core.grasp.latency import latency_findings
     from graspsense.core.values.errors import GraspsenseError
 
@@ -126,29 +126,29 @@ def _latency(settings: Settings | None, repetitions: int) -> Diagnosis:
     try:
         info = backend.open(run.seed)
         findings = latency_findings(backend, gripper.declared.accepts, info, run, repetitions)
-        return Diagnosis(gripper.component.qualified, findings)
+        return HookAnswer(gripper.component.qualified, findings)
     except GraspsenseError as error:
-        return Diagnosis(gripper.component.qualified, error=str(error))
+        return HookAnswer(gripper.component.qualified, error=str(error))
     finally:
         backend.close()
 
 
-def _as_json(diagnosis: Diagnosis) -> dict[str, Any]:
+def _as_json(diagnosis: HookAnswer[Finding]) -> dict[str, Any]:
     return {
         "distribution": diagnosis.distribution,
         "error": diagnosis.error,
         "findings": [
             {"found" if name == "words" else name: value for name, value in attrs.asdict(finding).items()}
-            for finding in diagnosis.findings
+            for finding in diagnosis.given
         ],
     }
 
 
-def _print(diagnosis: Diagnosis) -> None:
+def _print(diagnosis: HookAnswer[Finding]) -> None:
     echo(diagnosis.distribution, Style.HEADING)
     if diagnosis.error:
         echo_entry("  PROBLEM", f"could not look: {diagnosis.error}", Style.BAD, width=_MARK)
-    for finding in diagnosis.findings:
+    for finding in diagnosis.given:
         style = None if finding.state == "ok" else state_style(finding.state)
         echo_entry(f"  {MARKS[finding.state]}", f"{finding.subject}: {finding.words}", style, width=_MARK)
         if finding.state != "ok" and finding.advice:

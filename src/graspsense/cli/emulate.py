@@ -51,13 +51,14 @@ def emulate(
     The command reads commands such as unplug and plug from its standard input, one per line; `help` lists them. The
     device disappears with the process.
     """
+    from graspsense.core.components.entries import EmulatorEntry
     from graspsense.core.components.registry import installed
     from graspsense.core.control.garbage_collection import present_objects_kept
     from graspsense.core.values.errors import ConfigError, suggestion
 
     if asked["gripper"] is not None:
         raise click.UsageError("the gripper is the argument: graspsense emulate NAME, without --gripper")
-    emulator = installed().emulator(name)
+    emulator = installed().resource(EmulatorEntry, name)
     if wire and wire not in emulator.entry.wires:
         raise ConfigError(
             f"emulator {name} has no wire {wire!r}. Known: {', '.join(emulator.entry.wires)}."

@@ -36,7 +36,6 @@ if TYPE_CHECKING:
 
 
 @click.command(
-    short_help="Measure the recognition rate by cross-validation.",
     help=f"""Cross-validate a classifier on SOURCE. Print its rate and the controls.
 
     The headline holds out whole instances if instances are labelled. Otherwise it uses the protocol of the paper:

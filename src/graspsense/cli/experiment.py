@@ -46,7 +46,7 @@ class ExperimentCommand(click.Command):
         return super().make_context(info_name, args, parent, **extra)
 
 
-@click.command(cls=ExperimentCommand, short_help="Run or resume an experiment from a file.")
+@click.command(cls=ExperimentCommand)
 @click.argument("experiment", required=False, metavar="NAME|FILE")
 @click.option("--out", metavar="DIR", help="Folder for the results.  [default: NAME]")
 @click.option("--resume", is_flag=True, help="Run only the tasks that have no result in --out yet.")

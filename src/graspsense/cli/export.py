@@ -13,7 +13,7 @@ from graspsense.cli.sources import named_store
 from graspsense.cli.terminal import echo
 
 
-@click.command(short_help="Export trials or a recording.")
+@click.command()
 @click.argument("source", metavar="DIR|DIR#NUMBER|FILE.mcap", callback=named_store)
 @click.option(
     "--to",

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from graspsense.core.learn.labelled import Labelled
 
 
-@click.command(short_help="Extract the features of a store again.")
+@click.command()
 @click.argument("source", metavar="DIR", callback=named_store)
 @keys_option(
     "Change a key of [features], [controller] or [run]: -o controller.contact_force_n=0.1.", required=True

@@ -22,7 +22,7 @@ TO_GRASP_S: Final = 60.0
 """Time that is allowed for the grasp itself."""
 
 
-@click.command(short_help="Hold a thing with the least force that does not slip.")
+@click.command()
 @click.option(
     "--seconds",
     type=click.FloatRange(0.0, LONGEST_S, min_open=True),

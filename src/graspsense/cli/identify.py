@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from graspsense.core.components.identification import Identification, IdentifiedParameter
 
 
-@click.command(short_help="Identify an object from recorded squeezes, as a scene of the simulator.")
+@click.command()
 @click.argument(
     "sources", nargs=-1, required=True, metavar="RECORDING|store:DIR|DIR#N...", callback=named_source
 )
@@ -81,6 +81,7 @@ def identify(
     """
     from graspsense.cli.progress import ProgressLine
     from graspsense.core.components.config import Flag, resolve
+    from graspsense.core.components.entries import IdentifierEntry
     from graspsense.core.components.registry import installed
     from graspsense.core.values.errors import ConfigError
     from graspsense.recording.atomic_file import write_or_replace
@@ -89,7 +90,7 @@ def identify(
     check_outputs(out, page, overwrite=overwrite, sources=sources)
     flags = [Flag("--gripper", "gripper.type", gripper)] if gripper else []
     settings = resolve(pipeline, options=options, flags=flags, force=force)
-    identifier = installed().identifier(settings.gripper.component.name).load()
+    identifier = installed().resource(IdentifierEntry, settings.gripper.component.name).load()
     squeezes = recorded_squeezes(sources, name)
     with ProgressLine() as progress:
         block = recorded_squeezes(blocks) if blocks else ()

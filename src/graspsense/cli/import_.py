@@ -33,7 +33,7 @@ FEW: Final = 3
 """Largest number of recordings that are printed one by one."""
 
 
-@click.command("import", short_help="Import recordings of other programs.")
+@click.command("import")
 @click.argument(
     "sources", nargs=-1, required=True, metavar="FILE.csv|MANIFEST.toml|KIND:NAME...", callback=named_source
 )

@@ -188,12 +188,13 @@ def _rerun_target(target: str) -> str:
 
 def _observers() -> list[LiveFeed]:
     """Start the observers of plugins, and print which cannot be."""
+    from graspsense.core.components.entries import LiveObserverEntry
     from graspsense.core.components.registry import installed
     from graspsense.core.values.errors import ConfigError
     from graspsense.live.feeds import LiveFeed
 
     feeds = []
-    for observer in installed().live_observers():
+    for observer in installed().resources(LiveObserverEntry):
         try:
             feeds.append(LiveFeed("graspsense.live.observer_process", [observer.entry.target]))
         except ConfigError as error:

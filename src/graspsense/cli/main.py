@@ -98,17 +98,18 @@ class Commands(click.Group):
 
 
 def _plugin_command(name: str) -> click.Command:
+    from graspsense.core.components.entries import CommandEntry
     from graspsense.core.components.registry import installed
 
     plugins = installed()
-    added = plugins.commands()
+    added = plugins.resources(CommandEntry)
     if all(name not in (resource.name, resource.qualified) for resource in added):
         known = [*COMMANDS, *(resource.name for resource in added)]
         raise UnknownName(
             f"no command named {name!r}. Known: {', '.join(known)}.{suggestion(name, known)}"
             + plugins.absences()
         )
-    resource = plugins.command(name)
+    resource = plugins.resource(CommandEntry, name)
     command = resource.load()
     if not isinstance(command, click.Command):
         raise PluginUnavailable(

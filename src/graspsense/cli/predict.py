@@ -24,7 +24,6 @@ MOST_WITH_REASONS: Final = 1000
 
 
 @click.command(
-    short_help="Predict the labels of trials.",
     help=f"""Predict the labels of the trials of SOURCE, with probabilities and reasons.
 
     MODEL is a .json file of `graspsense train`, or the name of a model of a plugin (such as default). If the trials
@@ -93,9 +92,10 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
 
 def _refuse_swapped(model: str, source: str) -> None:
     """Raise UsageError if the source was named first and the model second."""
+    from graspsense.core.components.entries import ModelEntry
     from graspsense.core.components.registry import installed
 
-    models = {entry.name for entry in installed().models()}
+    models = {entry.name for entry in installed().resources(ModelEntry)}
     if not model.endswith(".json") and model not in models and (source.endswith(".json") or source in models):
         raise click.UsageError(
             f"{model} is not a model, and {source} is one. The model comes first: graspsense predict {source} {model}"

@@ -13,7 +13,7 @@ from graspsense.cli.terminal import echo, talk
 EXIT_DAMAGED = 5
 
 
-@click.command(short_help="Complete recordings of a killed program.")
+@click.command()
 @click.argument("source", metavar="DIR|FILE", callback=named_store)
 @click.option("--out", metavar="FILE", help="With a FILE: file for the recovered recording.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result for each file as JSON.")

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from graspsense.core.components.config import Settings
 
 
-@click.command(short_help="Process a recording with a pipeline.")
+@click.command()
 @click.argument("recording", metavar="FILE.mcap|DIR#NUMBER|KIND:NAME")
 @click.option(
     "--pipeline", metavar="NAME|FILE", help="Another pipeline.  [default: the one it was recorded with]"

@@ -12,7 +12,7 @@ from graspsense.cli.sources import folds_option, named_store
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, warn
 
 
-@click.command(short_help="Write the report page of a store or an experiment.")
+@click.command()
 @click.argument("folder", metavar="DIR", callback=named_store)
 @click.option("--out", metavar="DIR", help="Folder for report.html.  [default: DIR]")
 @click.option(

@@ -43,7 +43,7 @@ MANY_GUARDED: Final = 0.1
 """Share of the ticks of a grasp from which on `run` names the settings by which the guard limits the approach."""
 
 
-@click.command(short_help="Perform one grasp.")
+@click.command()
 @pipeline_options
 @click.option(
     "--save",
@@ -242,9 +242,10 @@ def _condition(settings: Settings) -> Conditions | None:
 
 def _print_better(settings: Settings, trial: Trial) -> None:
     """Name the pipeline that recognises more, if the plugin of this one declares it."""
+    from graspsense.core.components.entries import PipelineEntry
     from graspsense.core.components.registry import installed
 
-    shipped = {pipeline.entry.name: pipeline.entry for pipeline in installed().pipelines()}
+    shipped = {pipeline.entry.name: pipeline.entry for pipeline in installed().resources(PipelineEntry)}
     entry = shipped.get(settings.pipeline)
     if entry is not None and entry.better and trial.prediction is not None and trial.device.simulated:
         echo_entry(

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from graspsense.report.simulation import SimulationTrade
 
 
-@click.group(short_help="Measure recognition or accuracy against cost.")
+@click.group()
 def tradeoff() -> None:
     """Measure recognition, or the accuracy of the simulator, against its cost."""
 

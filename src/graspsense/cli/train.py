@@ -40,7 +40,6 @@ _NOT_EVALUATED: Final = ("out", "keep", "overwrite", "as_json", "calibration_ins
 
 
 @click.command(
-    short_help="Train a model on labelled trials.",
     help=f"""Train a classifier on all trials of SOURCE and write the model.
 
     The model is a JSON file without code. Use it with -o classifier.model=FILE. To measure its recognition rate, run

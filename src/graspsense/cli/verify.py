@@ -15,7 +15,7 @@ EXIT_DAMAGED = 5
 EXIT_UNREAD = 2
 
 
-@click.command(short_help="Check a store or a recording for damage.")
+@click.command()
 @click.argument("source", metavar="DIR|FILE", callback=named_store)
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def verify(source: str, as_json: bool) -> None:

@@ -60,8 +60,13 @@ def _option_for(word: str) -> str:
         return "--pipeline"
     if "=" in word:
         return "-o"
+    from graspsense.core.components.entries import PipelineEntry
     from graspsense.core.components.registry import installed
 
     if word in {component.name for component in installed().components("sensor-backend")}:
         return "--gripper"
-    return "--pipeline" if word in {pipeline.name for pipeline in installed().pipelines()} else "--object"
+    return (
+        "--pipeline"
+        if word in {pipeline.name for pipeline in installed().resources(PipelineEntry)}
+        else "--object"
+    )

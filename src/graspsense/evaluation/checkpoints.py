@@ -10,8 +10,8 @@ from attrs import frozen
 
 from graspsense.core.learn.model import Model, checkpoint_model, train
 from graspsense.evaluation.crossval import columns_of, cross_validate
-from graspsense.evaluation.doubt import calibrated, calibrated_by, exchangeable_instances, held_out_members
-from graspsense.evaluation.folds import held_out
+from graspsense.evaluation.doubt import HeldOut, calibrated, calibrated_by, exchangeable_instances
+from graspsense.evaluation.folds import INSTANCE_HELD_OUT, held_out
 from graspsense.evaluation.intervals import RecognitionRate, rate_among
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ def early_recognition(
     if not reason:
         rows.append(_stopped(whole, parts, answers))
     return EarlyRecognition(
-        protocol="stratified" if instances is None else "instance_held_out",
+        protocol="stratified" if instances is None else INSTANCE_HELD_OUT,
         rows=tuple(rows),
         reason=reason,
     )
@@ -142,7 +142,7 @@ def _answers(
     for i, label in zip(numbers, pooled.predicted, strict=True):
         predicted[i] = label
     sizes, covered, reason = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.bool_), ""
-    inside = held_out_members(pooled, labels, own, groups, folds)
+    inside = HeldOut(pooled=pooled, labels=labels, instances=own, groups=groups, folds=folds).members()
     if isinstance(inside, str):
         reason = inside
     else:

@@ -216,106 +216,81 @@ def exchangeable_instances(labelled: Labelled) -> tuple[str, ...] | None:
     return labelled.instances if several else None
 
 
-def _calibrations(
-    pooled: Pooled,
-    labels: Sequence[str],
-    instances: Sequence[str] | None,
-    groups: Groups,
-    folds: Sequence[Folds],
-) -> Iterator[tuple[NDArray[np.int64], _Calibration | str]]:
-    """Yield the trials of each fold, and the calibration with the predictions of the other folds."""
-    for rows, fold_of in zip(groups, folds, strict=True):
-        for fold in np.unique(fold_of).tolist():
-            yield rows[fold_of == fold], _calibration(pooled, labels, instances, rows[fold_of != fold])
+@frozen(kw_only=True, eq=False)
+class HeldOut:
+    """Predictions of held-out trials, their true labels, the instances held out if any, and the folds of each group.
 
-
-def held_out_members(
-    pooled: Pooled,
-    labels: Sequence[str],
-    instances: Sequence[str] | None,
-    groups: Groups,
-    folds: Sequence[Folds],
-) -> NDArray[np.bool_] | str:
-    """Return which labels belong to the set of each held-out trial, shape (trials, classes), or why there are no sets.
-
-    The sets of a fold are calibrated with the predictions of the other folds.
+    What is said of the trials of a fold is calibrated with the predictions of the other folds.
     """
-    inside = np.zeros(pooled.scores.shape, dtype=np.bool_)
-    for test, calibration in _calibrations(pooled, labels, instances, groups, folds):
-        if isinstance(calibration, str) or not calibration.sets.thresholds:
-            return calibration if isinstance(calibration, str) else calibration.sets.reason
-        inside[test] = calibration.sets.members(calibration.answers(pooled, test), pooled.classes)
-    return inside
 
+    pooled: Pooled
+    labels: Sequence[str]
+    instances: Sequence[str] | None
+    groups: Groups
+    folds: Sequence[Folds]
 
-def set_coverage(
-    pooled: Pooled,
-    labels: Sequence[str],
-    instances: Sequence[str] | None,
-    groups: Groups,
-    folds: Sequence[Folds],
-    rate_of: RateOf,
-) -> SetCoverage:
-    """Return how often the sets of held-out trials contain the true label.
+    def members(self) -> NDArray[np.bool_] | str:
+        """Return which labels belong to the set of each trial, shape (trials, classes), or why there are no sets."""
+        inside = np.zeros(self.pooled.scores.shape, dtype=np.bool_)
+        for test, calibration in self._calibrations():
+            if isinstance(calibration, str) or not calibration.sets.thresholds:
+                return calibration if isinstance(calibration, str) else calibration.sets.reason
+            inside[test] = calibration.sets.members(
+                calibration.answers(self.pooled, test), self.pooled.classes
+            )
+        return inside
 
-    The sets of a fold are calibrated with the predictions of the other folds. The model of the fold does not know the
-    instances that it is tested on. The thresholds do indirectly: the models of the other folds were trained on them.
-    """
-    unit = _unit(instances)
-    inside = held_out_members(pooled, labels, instances, groups, folds)
-    if isinstance(inside, str):
-        return SetCoverage(asked=COVERAGE, unit=unit, reason=inside)
-    covered = inside[np.arange(len(labels)), columns_of(labels, pooled.classes)].tolist()
-    sizes = inside.sum(axis=1)
-    rows_of = {name: [i for i, label in enumerate(labels) if label == name] for name in pooled.classes}
-    right = np.array(pooled.right(labels))
-    below = [i for row in rows_of.values() if right[row].mean() < COVERAGE for i in row]
-    return SetCoverage(
-        asked=COVERAGE,
-        unit=unit,
-        covered=rate_of(covered, None),
-        covered_below=rate_of(covered, sorted(below)) if below else None,
-        by_label={name: rate_of(covered, row) for name, row in rows_of.items()},
-        mean_size=float(sizes.mean()),
-        single=rate_of((sizes == 1).tolist(), None),
-    )
+    def set_coverage(self, rate_of: RateOf) -> SetCoverage:
+        """Return how often the sets contain the true label.
 
+        The model of a fold does not know the instances that it is tested on. The thresholds do indirectly: the models
+        of the other folds were trained on them.
+        """
+        labels, classes, unit = self.labels, self.pooled.classes, _unit(self.instances)
+        inside = self.members()
+        if isinstance(inside, str):
+            return SetCoverage(asked=COVERAGE, unit=unit, reason=inside)
+        covered = inside[np.arange(len(labels)), columns_of(labels, classes)].tolist()
+        sizes = inside.sum(axis=1)
+        rows_of = {name: [i for i, label in enumerate(labels) if label == name] for name in classes}
+        right = np.array(self.pooled.right(labels))
+        below = [i for row in rows_of.values() if right[row].mean() < COVERAGE for i in row]
+        return SetCoverage(
+            asked=COVERAGE,
+            unit=unit,
+            covered=rate_of(covered, None),
+            covered_below=rate_of(covered, sorted(below)) if below else None,
+            by_label={name: rate_of(covered, row) for name, row in rows_of.items()},
+            mean_size=float(sizes.mean()),
+            single=rate_of((sizes == 1).tolist(), None),
+        )
 
-def held_out_probabilities(
-    pooled: Pooled,
-    labels: Sequence[str],
-    instances: Sequence[str] | None,
-    groups: Groups,
-    folds: Sequence[Folds],
-) -> NDArray[np.float64]:
-    """Return the probabilities of held-out trials as a model gives them: calibrated with the trials of other folds."""
-    probabilities = pooled.probabilities.copy()
-    for test, calibration in _calibrations(pooled, labels, instances, groups, folds):
-        if not isinstance(calibration, str):
-            probabilities[test] = calibration.probabilities(pooled, test)
-    return probabilities
+    def reliability(self, rate_of: RateOf) -> Reliability:
+        """Return how well the probabilities, calibrated as a model gives them, agree with the rate."""
+        pooled = self.pooled
+        probabilities = pooled.probabilities.copy()
+        for test, calibration in self._calibrations():
+            if not isinstance(calibration, str):
+                probabilities[test] = calibration.probabilities(pooled, test)
+        given = np.nan_to_num(probabilities, nan=0.0)
+        truth = np.array(self.labels)[:, np.newaxis] == np.array(pooled.classes)
+        right = pooled.right(self.labels)
+        curve = _bins(given, right, rate_of)
+        return Reliability(
+            brier=float(((given - truth) ** 2).sum(axis=1).mean()),
+            calibration_error=_calibration_error(curve),
+            curve=curve,
+            uncalibrated_error=_calibration_error(
+                _bins(np.nan_to_num(pooled.probabilities, nan=0.0), right, rate_of)
+            ),
+        )
 
-
-def reliability(
-    pooled: Pooled,
-    labels: Sequence[str],
-    instances: Sequence[str] | None,
-    groups: Groups,
-    folds: Sequence[Folds],
-    rate_of: RateOf,
-) -> Reliability:
-    """Return how well the calibrated probabilities of held-out trials agree with the rate."""
-    truth = np.array(labels)[:, np.newaxis] == np.array(pooled.classes)
-    right = pooled.right(labels)
-    given = np.nan_to_num(held_out_probabilities(pooled, labels, instances, groups, folds), nan=0.0)
-    uncalibrated = _bins(np.nan_to_num(pooled.probabilities, nan=0.0), right, rate_of)
-    curve = _bins(given, right, rate_of)
-    return Reliability(
-        brier=float(((given - truth) ** 2).sum(axis=1).mean()),
-        calibration_error=_calibration_error(curve),
-        curve=curve,
-        uncalibrated_error=_calibration_error(uncalibrated),
-    )
+    def _calibrations(self) -> Iterator[tuple[NDArray[np.int64], _Calibration | str]]:
+        """Yield the trials of each fold, and the calibration with the predictions of the other folds."""
+        for rows, fold_of in zip(self.groups, self.folds, strict=True):
+            for fold in np.unique(fold_of).tolist():
+                others = rows[fold_of != fold]
+                yield rows[fold_of == fold], _calibration(self.pooled, self.labels, self.instances, others)
 
 
 def _bins(

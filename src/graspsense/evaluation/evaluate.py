@@ -20,7 +20,7 @@ from graspsense.core.values.errors import ConfigError, counted, listed
 from graspsense.core.values.label_text import spelled_alike
 from graspsense.evaluation.confusion import confusion
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, Groups, Pooled, cross_validate
-from graspsense.evaluation.doubt import reliability, set_coverage
+from graspsense.evaluation.doubt import HeldOut
 from graspsense.evaluation.folds import (
     INSTANCE_HELD_OUT,
     commonest,
@@ -44,14 +44,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from graspsense.core.values.features import FeatureTable
-    from graspsense.evaluation.doubt import Reliability, SetCoverage
     from graspsense.evaluation.folds import Folds
 
 SHARES: Final = (0.1, 0.2, 0.4, 0.7, 1.0)
 """Shares of the training trials at which the learning curve is measured."""
 
 PERMUTATIONS: Final = 19
-"""Number of permutations of the labels: the smallest with which p can be 0.05."""
+"""Number of permutations of the labels, or numbers: the smallest with which p can be 0.05."""
 
 Progress = Callable[[str, int, int], None]
 
@@ -90,7 +89,7 @@ def evaluate(
         headline, protocols = evaluator.measure_protocols()
         measured = evaluator.measure_controls(headline, protocols, permutations) if controls else {}
         curve = evaluator.learning_curve(headline) if learning_curve else ()
-    labels, table = trials.labels, trials.table
+    labels, table, held_out = trials.labels, trials.table, evaluator.held_out(headline)
     return Evaluation(
         source=labelled.source,
         classifier=classifier,
@@ -113,8 +112,8 @@ def evaluate(
         confusions={
             name: confusion(labels, pooled.predicted) for name, pooled in evaluator.pooled_by_protocol.items()
         },
-        sets=evaluator.sets(headline),
-        reliability=evaluator.reliability(headline),
+        sets=held_out.set_coverage(evaluator.rate_among),
+        reliability=held_out.reliability(evaluator.rate_among),
     )
 
 
@@ -259,31 +258,15 @@ class _Evaluator:
         """Return the share of trials that the model of their fold calls unknown, or that have no feature at all."""
         return self.rate_among((pooled.unlike | self._featureless).tolist())
 
-    def sets(self, headline: _Headline) -> SetCoverage:
-        """Return the coverage of the prediction sets, with the unit of exchangeability that the folds hold out."""
-        return set_coverage(
-            headline.pooled,
-            self.labels,
-            self._units(headline),
-            self.groups,
-            headline.folds,
-            self.rate_among,
+    def held_out(self, headline: _Headline) -> HeldOut:
+        """Return the predictions of the headline, with the instances that its folds hold out, if they hold out any."""
+        return HeldOut(
+            pooled=headline.pooled,
+            labels=self.labels,
+            instances=self.trials.instances if headline.protocol == INSTANCE_HELD_OUT else None,
+            groups=self.groups,
+            folds=headline.folds,
         )
-
-    def reliability(self, headline: _Headline) -> Reliability:
-        """Return how well the probabilities of the headline's held-out trials agree with the rate."""
-        return reliability(
-            headline.pooled,
-            self.labels,
-            self._units(headline),
-            self.groups,
-            headline.folds,
-            self.rate_among,
-        )
-
-    def _units(self, headline: _Headline) -> Sequence[str] | None:
-        """Return the instances that the folds of the headline hold out, None if they hold out trials."""
-        return self.trials.instances if headline.protocol == INSTANCE_HELD_OUT else None
 
     def by_features(self, pooled: Pooled) -> dict[str, RecognitionRate]:
         """Return the rates among trials with features and without any; nothing if all trials have features."""
@@ -451,11 +434,8 @@ class _Evaluator:
         """
         if control is None:
             return Measurement(default, reason=reason or "these trials have no such features")
-        having: NDArray[np.bool_] = np.array(~np.isnan(control.table.values).all(axis=1))
-        n, total = int(having.sum()), len(having)
-        why = f": {control.missing}" if control.missing else ""
-        having_words = f"{n} of {counted(total, 'trial')} have such features{why}"
-        if n == 0:
+        having, having_words = control.having, control.having_words
+        if not having.any():
             return Measurement(control.what, reason=having_words)
         groups, folds = _among(having, self.groups, headline.folds)
         if not groups:
@@ -466,7 +446,7 @@ class _Evaluator:
             return Measurement(control.what, reason=str(refusal))
         rows = np.sort(np.concatenate(list(groups))).tolist()
         self.predicted_by_control[name] = (pooled, rows)
-        what = control.what if len(rows) == total else f"{control.what}; {having_words}"
+        what = control.what if len(rows) == len(having) else f"{control.what}; {having_words}"
         return self._against(what, pooled, headline.pooled, headline.protocol, rows)
 
     def _majority(self, headline: _Headline) -> tuple[list[bool], Measurement]:

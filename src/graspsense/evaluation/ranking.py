@@ -18,7 +18,7 @@ from attrs import evolve, frozen
 from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.chosen import ChosenRate, comparisons_of, rate_of_chosen
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, cross_validate
-from graspsense.evaluation.doubt import SetCoverage, exchangeable_instances, set_coverage
+from graspsense.evaluation.doubt import HeldOut, SetCoverage, exchangeable_instances
 from graspsense.evaluation.folds import INSTANCE_HELD_OUT, in_order, instance_held_out, stratified
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.evaluation.intervals import Difference, RecognitionRate, difference, rate_among, rate_of
@@ -236,9 +236,14 @@ def _measured(
         seconds.append((time.perf_counter() - began) / (int(folds.max()) + 1))
         right[protocol] = pooled.right(labels)
         if sets is None:
-            sets = set_coverage(
-                pooled, labels, exchangeable_instances(trials), groups, [folds], partial(rate_among, trials)
+            held_out = HeldOut(
+                pooled=pooled,
+                labels=labels,
+                instances=exchangeable_instances(trials),
+                groups=groups,
+                folds=[folds],
             )
+            sets = held_out.set_coverage(partial(rate_among, trials))
     return CandidateResult(right=right, training_s=seconds[0], sets=sets)
 
 

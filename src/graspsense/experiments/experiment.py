@@ -186,7 +186,7 @@ class Planned:
 
 def shipped() -> dict[str, Resource[ExperimentEntry]]:
     """Return the experiments that graspsense and plugins ship by their names, qualified where two share a name."""
-    known = installed().experiments()
+    known = installed().resources(ExperimentEntry)
     times = Counter(resource.name for resource in known)
     return {
         resource.name if times[resource.name] == 1 else resource.qualified: resource for resource in known
@@ -598,7 +598,7 @@ def _found(asked: str) -> tuple[Layer, Path | None, str]:
         path = Path(asked).expanduser()
         return read_toml(path, asked, "experiment"), path.parent, path.stem
     try:
-        resource = installed().experiment(asked)
+        resource = installed().resource(ExperimentEntry, asked)
     except UnknownName as error:
         hint = (
             f"; there is a file {asked}.toml: write the name with .toml"

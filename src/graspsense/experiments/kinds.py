@@ -49,4 +49,4 @@ class TaskKind:
 
 def kind_of(name: str) -> TaskKind:
     """Return a kind by its name. Raises UnknownName."""
-    return TaskKind(installed().experiment_kind(name))
+    return TaskKind(installed().resource(ExperimentKindEntry, name))

@@ -30,6 +30,7 @@ from graspsense.core.values.features import FeatureTable, table_of
 from graspsense.evaluation.distribution import DistributionDistance, distribution_distance
 from graspsense.evaluation.equivalence import Equivalence, equivalence
 from graspsense.experiments.recognise import TEST_SEED_OFFSET, predictions
+from graspsense.report.simulation import MeasuredVariant
 from graspsense.sources.simulated import Group, SimulationPlan, plan_trials
 
 TIME_MARGIN: Final = 1.25
@@ -38,27 +39,16 @@ LIMIT: Final = 0.1
 """Distance of distributions, in standard deviations, below which a variant of no stated accuracy is equivalent."""
 
 
-@frozen(kw_only=True)
-class SensedPoint:
+@frozen(kw_only=True, slots=False)
+class SensedPoint(MeasuredVariant):
     """What a variant costs and how near it is to the reference."""
 
-    method: str
-    fidelity: str
-    step: str
-    role: str
-    seconds: float
-    """Processor time of a grasp, without set-up and compilation."""
     distances: tuple[DistributionDistance, ...]
     """One for each feature."""
     rates: tuple[float, ...]
     """The recognition rate of each seed."""
     equivalence: Equivalence | None
     """None for the reference, and with fewer than two seeds."""
-
-    @property
-    def name(self) -> str:
-        """Method, fidelity and step in words."""
-        return f"{self.method}, {self.fidelity}, {self.step}"
 
     @property
     def largest(self) -> DistributionDistance:
@@ -240,11 +230,8 @@ def _point(
     if measured is not reference and len(measured.rates) > 1:
         trials = len(labels) // len(measured.rates)
         test = equivalence(measured.rates, reference.rates, trials, comparisons=comparisons)
-    return SensedPoint(
-        method=variant.method,
-        fidelity=variant.fidelity,
-        step=variant.step,
-        role=variant.role,
+    return SensedPoint.measured(
+        variant,
         seconds=measured.seconds,
         distances=tuple(
             distribution_distance(name, values[:, k], expected[:, k], labels, limit)

@@ -75,7 +75,10 @@ def trade_simulation(
             # The reference comes first, so an unknown scene is already reported there.
             if reference is None:
                 raise
-            points.append(_failed(variant, f"{type(error).__name__}: {error}"))
+            why = f"{type(error).__name__}: {error}"
+            points.append(
+                VariantPoint.measured(variant, seconds=math.nan, setup_s=math.nan, errors={}, failure=why)
+            )
             continue
         if reference is None:
             reference = felt
@@ -171,26 +174,4 @@ def _point(
         worst[PEAK] = max(worst.get(PEAK, 0.0), abs(reached - float(np.max(true.force, initial=0.0))) / peak)
         worst[TRACE] = max(worst.get(TRACE, 0.0), off / peak)
     failure = missing or ("" if all(map(math.isfinite, worst.values())) else "no number in the force trace")
-    return VariantPoint(
-        method=variant.method,
-        fidelity=variant.fidelity,
-        step=variant.step,
-        role=variant.role,
-        seconds=seconds,
-        setup_s=setup,
-        errors=worst,
-        failure=failure,
-    )
-
-
-def _failed(variant: SimulationVariant, why: str) -> VariantPoint:
-    return VariantPoint(
-        method=variant.method,
-        fidelity=variant.fidelity,
-        step=variant.step,
-        role=variant.role,
-        seconds=math.nan,
-        setup_s=math.nan,
-        errors={},
-        failure=why,
-    )
+    return VariantPoint.measured(variant, seconds=seconds, setup_s=setup, errors=worst, failure=failure)

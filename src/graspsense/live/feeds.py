@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
-import select
 import subprocess
-import time
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
@@ -45,7 +42,7 @@ class LiveFeed(Feed):
             super().__init__(module, arguments, QUEUE_BYTES)
         except SaveFailed as error:
             raise ConfigError(str(error)) from error
-        self.answer = self._first_line()
+        self.answer = self._first_answer()
         """What the process found."""
         if "error" in self.answer:
             self.close()
@@ -56,16 +53,10 @@ class LiveFeed(Feed):
         """Messages that the process did not take."""
         return self._dropped
 
-    def _first_line(self) -> Mapping[str, Any]:
-        assert self._process.stdout is not None
-        out, said = self._process.stdout.fileno(), b""
-        until = time.monotonic() + START_TIMEOUT_S
-        while not said.endswith(b"\n"):
-            left = max(0.0, until - time.monotonic())
-            data = os.read(out, 4096) if select.select([out], [], [], left)[0] else b""
-            if not data:
-                return {"error": f"the process {self.name} does not start"}
-            said += data
+    def _first_answer(self) -> Mapping[str, Any]:
+        said = self._first_line(START_TIMEOUT_S)
+        if not said:
+            return {"error": f"the process {self.name} does not start"}
         answer: Mapping[str, Any] = json.loads(said)
         return answer
 

@@ -46,6 +46,12 @@ _MOST_BEFORE_A_TICK: Final = select.PIPE_BUF - TICK_WIRE.size
 """Bytes of other messages beside a tick up to which a write is atomic."""
 
 
+def metadata_message(name: str, values: Any) -> bytes:
+    """Return the message that passes JSON values under a name."""
+    body = json.dumps([name, values]).encode()
+    return LENGTH_WIRE.pack(IS_METADATA, len(body)) + body
+
+
 class _Channel:
     """A topic that was announced to the writer process under a number: what packs a message with all its numbers.
 
@@ -101,6 +107,19 @@ class Feed:
         self._broken = False
         self._deferred = self._most_waiting = self._dropped = 0
 
+    def _first_line(self, timeout_s: float) -> bytes | None:
+        """Return the first line that the process prints: empty if it ends without one, None if none comes in time."""
+        assert self._process.stdout is not None
+        out, said, until = self._process.stdout.fileno(), b"", time.monotonic() + timeout_s
+        while not said.endswith(b"\n"):
+            if not select.select([out], [], [], max(0.0, until - time.monotonic()))[0]:
+                return None
+            data = os.read(out, 4096)
+            if not data:
+                return b""
+            said += data
+        return said
+
     def take(self, reading: Reading, phase: int, command: Command) -> None:
         """Pass on one tick, with its images and samples if those are new."""
         frame, pads, signals = reading
@@ -147,8 +166,7 @@ class Feed:
 
     def _told(self, name: str, values: Any) -> None:
         """Pass on JSON values under a name."""
-        body = json.dumps([name, values]).encode()
-        self._send(LENGTH_WIRE.pack(IS_METADATA, len(body)) + body)
+        self._send(metadata_message(name, values))
 
     def _send(self, data: Data) -> None:
         waiting = self._waiting

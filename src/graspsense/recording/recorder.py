@@ -7,8 +7,6 @@ the next ticks. `RecordingInfo` counts them.
 from __future__ import annotations
 
 import json
-import os
-import select
 import subprocess
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,12 +15,10 @@ from typing import Any, Final
 from graspsense.core.values.events import GraspEvent, event_as_json
 from graspsense.core.values.json_values import json_text
 from graspsense.recording.atomic_file import SaveFailed
-from graspsense.recording.feed import Feed
+from graspsense.recording.feed import Feed, metadata_message
 from graspsense.recording.layout import (
     EVENT,
     IS_END,
-    IS_METADATA,
-    LENGTH_WIRE,
     PART,
     READY,
 )
@@ -58,23 +54,16 @@ class Recorder(Feed):
 
         Raises SaveFailed with the reason if it could not.
         """
-        assert self._process.stdout is not None
-        out = self._process.stdout.fileno()
-        said = b""
-        while not said.endswith(b"\n"):
-            if not select.select([out], [], [], ANSWER_TIMEOUT_S)[0]:
-                raise SaveFailed(f"the writer process of {self.path} does not start")
-            data = os.read(out, 4096)
-            if not data:
-                raise SaveFailed(f"the writer process of {self.path} died when it started")
-            said += data
+        said = self._first_line(ANSWER_TIMEOUT_S)
+        if not said:
+            what = "does not start" if said is None else "died when it started"
+            raise SaveFailed(f"the writer process of {self.path} {what}")
         if said.decode() != READY:
             raise self._failure(json.loads(said))
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Pass on a metadata record and wait until the pipe has taken it. Do not call this during control."""
-        body = json.dumps([name, dict(values)]).encode()
-        self._drain(LENGTH_WIRE.pack(IS_METADATA, len(body)) + body, ANSWER_TIMEOUT_S)
+        self._drain(metadata_message(name, dict(values)), ANSWER_TIMEOUT_S)
 
     def finish(self) -> RecordingInfo:
         """Wait until the recording is complete on the disk. Raises SaveFailed with the reason if it is not."""

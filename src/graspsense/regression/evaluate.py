@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 from attrs import frozen
@@ -14,7 +14,8 @@ from attrs import frozen
 from graspsense.core.components.caller import option
 from graspsense.core.learn.conformal import COVERAGE, calibrated_threshold, units_needed
 from graspsense.core.values.errors import ConfigError, counted
-from graspsense.evaluation.folds import in_order, instance_held_out, stratified
+from graspsense.evaluation.evaluate import PERMUTATIONS, Progress
+from graspsense.evaluation.folds import INSTANCE_HELD_OUT, in_order, instance_held_out, stratified
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.evaluation.intervals import MIN_INSTANCES, rate_of
 from graspsense.regression.error import RegressionError, difference_of_errors, error_of
@@ -26,12 +27,6 @@ if TYPE_CHECKING:
 
     from graspsense.core.learn.labelled import ControlFeatures, Labelled
     from graspsense.evaluation.folds import Folds
-
-INSTANCE_HELD_OUT: Final = "instance_held_out"
-PERMUTATIONS: Final = 19
-"""Number of permutations of the numbers: the smallest with which p can be 0.05."""
-
-Progress = Callable[[str, int, int], None]
 
 
 def evaluate_regression(
@@ -326,10 +321,8 @@ class _Evaluator:
                 what=default, reason=reason or "these trials have no such features"
             )
             return
-        having = np.array(~np.isnan(control.table.values).all(axis=1))
-        n, total = int(having.sum()), len(having)
-        why = f": {control.missing}" if control.missing else ""
-        words = f"{n} of {counted(total, 'trial')} have such features{why}"
+        having = control.having
+        n, total, words = int(having.sum()), len(having), control.having_words
         folds = self.headline.folds[having]
         if n == 0 or len(np.unique(folds)) < 2:
             too_few = "; these are too few to learn from" if n else ""

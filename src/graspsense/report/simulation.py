@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final, Self
 
 from attrs import asdict, frozen
 
 from graspsense.report.write import new_figure, write_picture
+
+if TYPE_CHECKING:
+    from graspsense.core.components.roles import SimulationVariant
 
 HEADER: Final = ("METHOD", "FIDELITY", "STEP OR ACCURACY", "MS A GRASP", "SET-UP, S")
 PEAK: Final = "peak force"
@@ -18,28 +21,50 @@ LEAST_ERROR: Final = 1e-9
 """Smaller errors are drawn at this value, because a logarithmic axis cannot show 0."""
 
 
-@frozen(kw_only=True)
-class VariantPoint:
-    """The errors of one variant and its processor time for one grasp, both measured on the same grasps.
-
-    `errors` are the largest errors over all grasps, by quantity, and infinite if a feature is missing that the
-    reference has. `setup_s` is the additional time of the first grasps, for compiling or for loading compiled code.
-    `failure` is the reason why there are no errors, or why grasps ended otherwise than in the reference.
-    """
+@frozen(kw_only=True, slots=False)
+class MeasuredVariant:
+    """A variant of a simulated gripper, and its processor time (s) for one grasp, without set-up and compilation."""
 
     method: str
     fidelity: str
     step: str
     role: str
     seconds: float
-    setup_s: float
-    errors: Mapping[str, float]
-    failure: str = ""
+
+    @classmethod
+    def measured(cls, variant: SimulationVariant, **figures: Any) -> Self:
+        """Return what was measured of a variant; `figures` has the other fields."""
+        return cls(
+            method=variant.method,
+            fidelity=variant.fidelity,
+            step=variant.step,
+            role=variant.role,
+            **figures,
+        )
 
     @property
     def curve(self) -> str:
         """Name of the curve that the point belongs to."""
         return f"{self.method}, {self.fidelity}"
+
+    @property
+    def name(self) -> str:
+        """Method, fidelity and step in words."""
+        return f"{self.curve}, {self.step}"
+
+
+@frozen(kw_only=True, slots=False)
+class VariantPoint(MeasuredVariant):
+    """The errors of one variant and its processor time, both measured on the same grasps.
+
+    `errors` are the largest errors over all grasps, by quantity, and infinite if a feature is missing that the
+    reference has. `setup_s` is the additional time of the first grasps, for compiling or for loading compiled code.
+    `failure` is the reason why there are no errors, or why grasps ended otherwise than in the reference.
+    """
+
+    setup_s: float
+    errors: Mapping[str, float]
+    failure: str = ""
 
 
 @frozen(kw_only=True)
@@ -64,10 +89,7 @@ def simulation_rows(trade: SimulationTrade) -> tuple[tuple[str, ...], list[tuple
     rows = []
     for point in trade.points:
         errors = [_short(point.errors.get(name, math.nan)) for name in trade.quantities]
-        note = point.failure or {
-            "reference": "the reference",
-            "floor": "the remaining error is that of the model",
-        }.get(point.role, "")
+        note = point.failure or ("the reference" if point.role == "reference" else "")
         seconds, setup = (
             f"{v:.3g}" if math.isfinite(v) else "-" for v in (1e3 * point.seconds, point.setup_s)
         )
@@ -114,7 +136,6 @@ def simulation_png(trade: SimulationTrade, path: Path) -> None:
     handles: dict[str, Any] = {}
     for ax, name in zip(axes, names, strict=False):
         handles.update(_draw_curves(ax, trade, name))
-        handles.update(_draw_floors(ax, trade, name))
         axes_of(ax, name, "error, relative")
     for ax in axes[panels:]:
         ax.set_axis_off()
@@ -155,18 +176,6 @@ def _draw_curves(ax: Any, trade: SimulationTrade, quantity: str) -> dict[str, An
                     ms=9,
                     transform=ax.get_xaxis_transform(),
                 )
-    return handles
-
-
-def _draw_floors(ax: Any, trade: SimulationTrade, quantity: str) -> dict[str, Any]:
-    """Draw a line at the error of each model that remains with exact integration; return the lines for the legend."""
-    handles = {}
-    for k, floor in enumerate(p for p in trade.points if p.role == "floor"):
-        level = floor.errors.get(quantity, math.nan)
-        if math.isfinite(level):
-            style = ("--", ":", "-.")[k % 3]
-            line = ax.axhline(max(level, LEAST_ERROR), color="0.45", lw=1.0, ls=style)
-            handles[f"error of the model itself, {floor.fidelity}"] = line
     return handles
 
 

@@ -30,17 +30,17 @@ _handed: dict[str, Recording] = {}
 
 def datasets_with_recordings() -> tuple[str, ...]:
     """Return the names of the installed data sets that have recordings."""
-    return tuple(dataset.name for dataset in installed().datasets() if dataset.entry.recordings)
+    return tuple(dataset.name for dataset in installed().resources(DatasetEntry) if dataset.entry.recordings)
 
 
 def datasets_to_write() -> tuple[str, ...]:
     """Return the names of the installed data sets that trials can be written as."""
-    return tuple(dataset.name for dataset in installed().datasets() if dataset.entry.export)
+    return tuple(dataset.name for dataset in installed().resources(DatasetEntry) if dataset.entry.export)
 
 
 def write_dataset(kind: str, place: str, store: str) -> dict[str, int]:
     """Write the trials of a store as a data set, and return what was counted. Raises ConfigError, DataDamaged."""
-    dataset = installed().dataset(kind)
+    dataset = installed().resource(DatasetEntry, kind)
     with _failing_as(dataset.qualified):
         return dict(dataset.load("export")(stored_grasps(store), place))
 
@@ -56,7 +56,7 @@ def readable_or_not(kind: str, place: str) -> Iterator[LabelledRecording | Unrea
     A reader that fails ends its data set: what it failed with comes last. Raises UnknownName, PluginUnavailable, and
     ConfigError or DataDamaged if it fails before the first recording.
     """
-    yield from recordings_of(installed().dataset(kind), kind, place)
+    yield from recordings_of(installed().resource(DatasetEntry, kind), kind, place)
 
 
 def recordings_of(

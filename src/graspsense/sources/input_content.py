@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from graspsense import __version__
+from graspsense.core.components.entries import DatasetEntry
 from graspsense.core.components.registry import installed
 from graspsense.core.grasp.calibration_files import calibration_folder
 from graspsense.core.values.errors import GraspsenseError
@@ -111,7 +112,7 @@ def _codes() -> dict[str, list[tuple[str, str]]]:
         codes.setdefault(part.qualified, []).append(code)
         if part.distribution != FRAMEWORK:
             codes.setdefault(part.name, []).append(code)
-    for dataset in installed().datasets():
+    for dataset in installed().resources(DatasetEntry):
         target = dataset.entry.target or dataset.entry.recordings
         codes[f"{dataset.name}:"] = [(dataset.version, target.partition(":")[0])]
     return codes

@@ -234,12 +234,13 @@ def _csv(source: TrialSource) -> Labelled:
 
 
 def _data_set(source: TrialSource, features: FeatureSet[Any]) -> Labelled:
+    from graspsense.core.components.entries import DatasetEntry
     from graspsense.core.components.registry import installed
 
     name, _, folder = source.source.partition(":")
     if not folder:
         raise ConfigError(f"{source.source!r} names no folder: write it after the colon")
-    dataset = installed().dataset(name)
+    dataset = installed().resource(DatasetEntry, name)
     if not dataset.entry.target:
         from graspsense.sources.labelled_recordings import labelled_recordings
 

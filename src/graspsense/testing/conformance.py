@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Final
 
 from attrs import define, field
 
+from graspsense.core.components.entries import ConformanceCheckEntry
 from graspsense.core.components.registry import Component, Plugins, installed
 from graspsense.core.components.strict import keys_of
 from graspsense.core.values.errors import PluginUnavailable, UnknownName
@@ -157,7 +158,7 @@ def examine(
         raise plugins.unknown(name)
     expected = dict(expected_failures or {})
     known = {check.id for checks in CHECKS.values() for check in checks}
-    known |= {contributed.name for contributed in plugins.conformance_checks()}
+    known |= {contributed.name for contributed in plugins.resources(ConformanceCheckEntry)}
     strangers = set(expected) - known
     if strangers:
         raise UnknownName(f"there is no check named {', '.join(sorted(strangers))}")

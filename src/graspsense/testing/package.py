@@ -107,15 +107,7 @@ def everything_declared_loads(package: Package) -> None:
 
 def names_are_unique(package: Package) -> None:
     """No other installed distribution uses the name of one of its components or resources."""
-    others: list[Any] = [
-        *package.plugins.components(),
-        *package.plugins.pipelines(),
-        *package.plugins.models(),
-        *package.plugins.datasets(),
-        *package.plugins.commands(),
-        *package.plugins.experiment_kinds(),
-        *package.plugins.experiments(),
-    ]
+    others: list[Any] = [*package.plugins.components(), *package.plugins.all_resources()]
     parts: list[Any] = [*package.components, *package.resources]
     for mine in parts:
         for other in others:
@@ -329,7 +321,7 @@ def contributed_checks(package: Package) -> tuple[Check, ...]:
     implemented = {hook for status in package.statuses for hook in status.hooks}
     return tuple(
         Check(contributed.name, contributed.entry.summary, _check_of(contributed))
-        for contributed in package.plugins.conformance_checks()
+        for contributed in package.plugins.resources(ConformanceCheckEntry)
         if contributed.entry.hook in implemented
     )
 

@@ -41,7 +41,7 @@ COLUMNS_OF_CHANNEL: Final = {
 def squeeze(stiffness_n_m: float = 4000.0, contacts: tuple[float, float] = (0.06, 0.0598)) -> Trace:
     """Return a whole grasp: approach at 10 mm/s, squeeze by 4 mm, hold with relaxation, release.
 
-    The pads touch at the gaps `contacts` (m); a gap below 0 is never reached. The frames come at 1 kHz.
+    The pads touch at the gaps `contacts` (m); a gap below 0 is never reached. The frames come at 500 Hz.
 
     >>> round(float(squeeze(stiffness_n_m=1000.0).force_left_n.max()), 1)
     4.0

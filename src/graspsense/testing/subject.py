@@ -89,23 +89,12 @@ def package_of(
     statuses = tuple(status for status in plugins.statuses if status.distribution == name)
     if not statuses:
         return None
-    resources: list[Resource[Any]] = [
-        *plugins.pipelines(),
-        *plugins.models(),
-        *plugins.datasets(),
-        *plugins.commands(),
-        *plugins.emulators(),
-        *plugins.identifiers(),
-        *plugins.experiment_kinds(),
-        *plugins.experiments(),
-        *plugins.conformance_checks(),
-    ]
     return Package(
         distribution=name,
         version=statuses[0].version,
         statuses=statuses,
         components=tuple(component for component in plugins.components() if component.distribution == name),
-        resources=tuple(resource for resource in resources if resource.distribution == name),
+        resources=tuple(resource for resource in plugins.all_resources() if resource.distribution == name),
         plugins=plugins,
         builds=builds,
         data=dict(data or {}),

@@ -12,6 +12,7 @@ from typing import Any
 from attrs import define, field, frozen
 
 from graspsense.core.components.caller import set_option
+from graspsense.core.components.entries import PipelineEntry
 from graspsense.core.components.registry import Plugins
 from graspsense.core.components.strict import InvalidValue, shown
 from graspsense.core.components.toml_kinds import KINDS, refuse_other_kind
@@ -147,7 +148,7 @@ def _located(asked: str, base: Path, asker: str, plugins: Plugins) -> tuple[Trav
         path = base / asked
         return path, str(path), path.parent
     try:
-        shipped = plugins.pipeline(asked)
+        shipped = plugins.resource(PipelineEntry, asked)
     except UnknownName as error:
         hint = "\n  A file is given with its ending .toml"
         if os.path.isfile(base / asked):  # of pathlib, it raises for a name that is too long

@@ -1,37 +1,26 @@
 """The names of a public module, imported when they are first used.
 
-Listing plugins and printing help therefore load neither numpy nor a driver. Type checkers read a stub beside the
-module, which is generated from the same table:
-
-    python -c "import graspsense as m; print(m.PUBLIC.stub())" > src/graspsense/__init__.pyi
-    for door in plugin gripper classifier testing experiment simulator; do
-        python -c "import graspsense.${door}_api as m; print(m.PUBLIC.stub())" > src/graspsense/${door}_api.pyi; done
-
-A test compares the stubs with the tables.
+Listing plugins and printing help therefore load neither numpy nor a driver. The names stand in the type stub beside the
+module, which type checkers read too: an import of each name, below a comment that says what the names are for.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
 from importlib import import_module
 from typing import Any, Final
 
-Table = Mapping[str, Mapping[str, tuple[str, ...]]]
-"""What names are for, the module that defines them, and the names.
-
-A module is one of graspsense: `core.values.trace`.
-"""
-
 
 class LazyNames:
-    """The names that the module `module` offers. The module gets the functions by which Python finds and lists them."""
+    """The names in the stub of the module `module`. The module gets the functions by which Python finds and lists them.
 
-    def __init__(self, module: str, table: Table) -> None:
-        self.module, self.table = module, table
-        self._home_of: Final = {
-            name: home for homes in table.values() for home, names in homes.items() for name in names
-        }
+    `groups` has, for each purpose, the names in their order, with the modules that define them.
+    """
+
+    def __init__(self, module: str) -> None:
+        self.module = module
+        self.groups: Final = _groups(_stub_of(module))
+        self._home_of: Final = {name: home for names in self.groups.values() for name, home in names}
         self.names: Final = sorted(self._home_of)
         attributes = vars(sys.modules[module])
         attributes |= {"__getattr__": self.load, "__dir__": lambda: sorted(attributes["__all__"])}
@@ -40,19 +29,25 @@ class LazyNames:
         """Import a name, and keep it in the module. Raises AttributeError if the module does not offer it."""
         if name not in self._home_of:
             raise AttributeError(f"module {self.module!r} has no attribute {name!r}")
-        value = getattr(import_module(f"graspsense.{self._home_of[name]}"), name)
+        value = getattr(import_module(self._home_of[name]), name)
         setattr(sys.modules[self.module], name, value)
         return value
 
-    def stub(self) -> str:
-        """Return the text of the type stub: an import of each name, in the groups of the table."""
-        lines = [
-            f'"""Generated from the table of {self.module} by `core/components/lazy_names.py`: change the table."""'
-        ]
-        if hasattr(sys.modules[self.module], "__version__"):
-            lines += ["", "__version__: str"]
-        for purpose, homes in self.table.items():
-            lines += ["", f"# {purpose}"]
-            for home, names in homes.items():
-                lines += [f"from graspsense.{home} import {name} as {name}" for name in names]
-        return "\n".join(lines)
+
+def _stub_of(module: str) -> str:
+    """Return the text of the type stub beside a module, which may be inside an archive."""
+    spec: Any = sys.modules[module].__spec__
+    text: bytes = spec.loader.get_data(spec.origin.removesuffix(".py") + ".pyi")
+    return text.decode()
+
+
+def _groups(stub: str) -> dict[str, list[tuple[str, str]]]:
+    """Return the names that a stub imports, each with its module, by the comment above them."""
+    groups: dict[str, list[tuple[str, str]]] = {}
+    for line in stub.splitlines():
+        if line.startswith("# "):
+            names = groups[line.removeprefix("# ")] = []
+        elif line.startswith("from "):
+            _, home, _, name, *_ = line.split()
+            names.append((name, home))
+    return groups

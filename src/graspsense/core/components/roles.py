@@ -255,16 +255,15 @@ class SimulationVariant:
     """Settings of a simulated gripper with a certain trade-off between accuracy and time.
 
     `settings` are keys of the gripper's own table. Variants of one `method` and `fidelity` form a curve, on which
-    `step` names the point. The `role` is `reference` for the variant that errors are measured against, and `floor`
-    for one whose steps are so short that only the error of the model remains. With those that are `for_recognition`,
-    recognition is measured as well.
+    `step` names the point. The `role` is `reference` for the variant that errors are measured against. With those that
+    are `for_recognition`, recognition is measured as well.
     """
 
     method: str
     fidelity: str
     step: str
     settings: Mapping[str, Any]
-    role: Literal["curve", "floor", "reference"] = "curve"
+    role: Literal["curve", "reference"] = "curve"
     for_recognition: bool = False
 
 

@@ -16,11 +16,12 @@ import attrs
 from graspsense.core.components.entries import KINDS
 
 
-def params_of(config: Any) -> Any:
+def params_of(config: Any, **further: float) -> Any:
     """Return the numbers of a config as a named tuple: each setting that is a float, an int or a bool.
 
     A bool becomes 0 or 1. The key `sends` of a law with several kinds of command becomes the number of the kind, such
-    as `VELOCITY`. Settings of other types are left out. Raises TypeError if `config` is not an attrs object.
+    as `VELOCITY`. Settings of other types are left out. The `further` numbers, which a law computes from its settings,
+    follow. Raises TypeError if `config` is not an attrs object.
     """
     cls = type(config)
     attrs.resolve_types(cls)
@@ -33,6 +34,7 @@ def params_of(config: Any) -> Any:
     }
     if "sends" in attrs.fields_dict(cls):
         values["sends"] = KINDS.index(config.sends)
+    values |= further
     return _type_of(f"{cls.__name__}({','.join(values)})")(*values.values())
 
 

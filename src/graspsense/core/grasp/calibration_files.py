@@ -32,9 +32,9 @@ KINDS: Final = ("tare", "gain", "load-cell", "friction", "delivered-force")
 DIRECTIONS: Final = ("closing", "opening")
 """In which a motor pushes."""
 UNCALIBRATED: Final = "none"
+"""The value of the setting for the use without calibration."""
 CALIBRATION_BYTES: Final = 2**20
 """Of a longer file, only so many are read, which are then no JSON."""
-"""The value of the setting for the use without calibration."""
 
 
 @frozen(kw_only=True)

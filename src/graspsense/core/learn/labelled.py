@@ -10,7 +10,7 @@ from attrs.converters import optional
 
 from graspsense.core.components.caller import option
 from graspsense.core.learn.target_value import TargetValue
-from graspsense.core.values.errors import ConfigError, DataDamaged, suggestion
+from graspsense.core.values.errors import ConfigError, DataDamaged, counted, suggestion
 from graspsense.core.values.features import LARGEST_VALUE, FeatureTable
 from graspsense.core.values.label_text import label_text
 from graspsense.core.values.limits import CLASSES, FEATURES
@@ -34,6 +34,20 @@ class ControlFeatures:
     table: FeatureTable
     what: str
     missing: str = ""
+
+    @property
+    def having(self) -> NDArray[np.bool_]:
+        """Which trials have any of the features."""
+        import numpy as np
+
+        return np.asarray(~np.isnan(self.table.values).all(axis=1))
+
+    @property
+    def having_words(self) -> str:
+        """How many trials have any of the features, in words, with the most frequent reason why others have none."""
+        having = self.having
+        why = f": {self.missing}" if self.missing else ""
+        return f"{int(having.sum())} of {counted(len(having), 'trial')} have such features{why}"
 
 
 def _label_texts(labels: Sequence[str]) -> tuple[str, ...]:

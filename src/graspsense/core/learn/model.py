@@ -22,7 +22,7 @@ from attrs import evolve, frozen
 
 from graspsense import __version__
 from graspsense.core.components.caller import set_option
-from graspsense.core.components.entries import TABLE_OF_ROLE
+from graspsense.core.components.entries import TABLE_OF_ROLE, ModelEntry
 from graspsense.core.components.firstparty import MODELS
 from graspsense.core.components.setting import CHANGES_NO_RESULT, NAMES_INPUT, UNIT_OF_ENDING, settings_marked
 from graspsense.core.files.whole_file import write_whole
@@ -744,7 +744,7 @@ def _how_to_train(settings: Settings, out: str) -> str:
 def _text(name: str, plugins: Plugins) -> bytes:
     if not name.endswith(".json"):
         try:
-            return plugins.model(name).file().read_bytes()
+            return plugins.resource(ModelEntry, name).file().read_bytes()
         except UnknownName as error:
             shipped = MODELS.get(name)
             hint = f"\n  It comes with {shipped.distribution}:\n  {shipped.hint}" if shipped else ""

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from functools import cache
 from typing import TYPE_CHECKING, Any, Final, Self
 
 from attrs import frozen
 
-from graspsense.classifier_api import FeatureValue, Reason
 from graspsense.plugin_api import ClassifierConfig, setting
-from graspsense.plugins.classifiers.scikit import FittedEstimator, ScikitClassifier, most_likely
+from graspsense.plugins.classifiers.scikit import ScikitClassifier
 from graspsense.simulator_api import NotCompilable, compile_function, first_call
 
 if TYPE_CHECKING:
@@ -55,6 +54,8 @@ class Backprop(ScikitClassifier[BackpropConfig]):
     epochs are run. The probabilities are the outputs divided by their sum.
     """
 
+    shares_are = "outputs of the network"
+
     def estimator(self, seed: int, trials: int) -> Any:
         """Return the untrained network."""
         return SigmoidNetwork(self.config, seed)
@@ -63,19 +64,6 @@ class Backprop(ScikitClassifier[BackpropConfig]):
         """Return about how many steps of 10 ns the compiled training takes."""
         units = hidden_units(self.config, features, labels)
         return float(self.config.epochs) * trials * (200.0 + units * (features + labels) / 4.0)
-
-    def reasons(
-        self,
-        fitted: FittedEstimator,
-        row: NDArray[np.float64],
-        given: Sequence[FeatureValue],
-        shares: Mapping[str, float],
-    ) -> Sequence[Reason]:
-        """Return the contributions of the features to the probability, and the most probable labels."""
-        return (
-            *self.shapley_reasons(fitted, row, given, shares),
-            most_likely(shares, "outputs of the network"),
-        )
 
 
 class SigmoidNetwork:

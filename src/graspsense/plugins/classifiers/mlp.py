@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import frozen
 
-from graspsense.classifier_api import FeatureValue, Reason
 from graspsense.plugin_api import StoredValues, setting
 from graspsense.plugins.classifiers.scikit import (
     FittedEstimator,
     KeptConfig,
     ScikitClassifier,
-    most_likely,
     restored,
 )
 
@@ -47,6 +45,8 @@ class MlpConfig(KeptConfig):
 class Mlp(ScikitClassifier[MlpConfig]):
     """A network with one hidden layer, trained by L-BFGS, which suits hundreds of trials."""
 
+    shares_are = "outputs of the network"
+
     def estimator(self, seed: int, trials: int) -> Any:
         """Return the network."""
         from sklearn.neural_network import MLPClassifier
@@ -62,19 +62,6 @@ class Mlp(ScikitClassifier[MlpConfig]):
     def training_steps(self, trials: int, features: int, labels: int) -> float:
         """Return about how many steps of 10 ns the training takes; of products of matrices, ten are one."""
         return MOST_ROUNDS * (1e4 + trials * self.config.hidden * (features + labels) / 10.0)
-
-    def reasons(
-        self,
-        fitted: FittedEstimator,
-        row: NDArray[np.float64],
-        given: Sequence[FeatureValue],
-        shares: Mapping[str, float],
-    ) -> Sequence[Reason]:
-        """Return the contributions of the features to the probability, and the most probable labels."""
-        return (
-            *self.shapley_reasons(fitted, row, given, shares),
-            most_likely(shares, "outputs of the network"),
-        )
 
     def shares(self, fitted: FittedEstimator, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the probabilities of preprocessed trials; they are not finite if the weights are too large."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, TypeVar
 
 from attrs import frozen
 
@@ -84,6 +84,8 @@ class FittedEstimator:
 class ScikitClassifier(Classifier[ScikitConfigT]):
     """A classifier of scikit-learn, which subclasses specify."""
 
+    shares_are: ClassVar[str] = ""
+    """What the probabilities are, for the reasons of an answer."""
     _fitted: FittedEstimator | None = None
     _made_with = ""
 
@@ -95,7 +97,6 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         """Return about how many elementary steps of 10 ns a training takes; 0 where settings cannot make it long."""
         return 0.0
 
-    @abstractmethod
     def reasons(
         self,
         fitted: FittedEstimator,
@@ -103,11 +104,12 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         given: Sequence[FeatureValue],
         shares: Mapping[str, float],
     ) -> Sequence[Reason]:
-        """Return the reasons for the most probable label of one trial.
+        """Return the reasons for the most probable label of one trial: contributions of the features, largest labels.
 
         `row` is the preprocessed trial, of shape (1, features), `given` its features before that; `shares` are its
         probabilities, the most probable label first.
         """
+        return (*self.shapley_reasons(fitted, row, given, shares), most_likely(shares, self.shares_are))
 
     def shapley_reasons(
         self,

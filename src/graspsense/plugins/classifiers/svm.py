@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import frozen
 
-from graspsense.classifier_api import FeatureValue, Reason
 from graspsense.plugin_api import setting
-from graspsense.plugins.classifiers.scikit import FittedEstimator, KeptConfig, ScikitClassifier, most_likely
+from graspsense.plugins.classifiers.scikit import FittedEstimator, KeptConfig, ScikitClassifier
 
 if TYPE_CHECKING:
     import numpy as np
@@ -39,6 +37,8 @@ class SvmConfig(KeptConfig):
 
 class Svm(ScikitClassifier[SvmConfig]):
     """The probabilities are the softmax of the one-against-rest decision values, and are not calibrated."""
+
+    shares_are = "softmax of the decision values"
 
     def estimator(self, seed: int, trials: int) -> Any:
         """Return the machine."""
@@ -70,16 +70,3 @@ class Svm(ScikitClassifier[SvmConfig]):
             values = np.column_stack((-values, values)) / 2.0
         powers = np.exp(values - values.max(axis=1, keepdims=True))
         return np.asarray(powers / powers.sum(axis=1, keepdims=True))
-
-    def reasons(
-        self,
-        fitted: FittedEstimator,
-        row: NDArray[np.float64],
-        given: Sequence[FeatureValue],
-        shares: Mapping[str, float],
-    ) -> Sequence[Reason]:
-        """Return the contributions of the features to the softmax, and the labels with the largest values."""
-        return (
-            *self.shapley_reasons(fitted, row, given, shares),
-            most_likely(shares, "softmax of the decision values"),
-        )

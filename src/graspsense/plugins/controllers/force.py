@@ -7,14 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import inf
-from typing import ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 from attrs import frozen
 
 from graspsense.plugin_api import (
     APPROACH,
     EFFORT,
-    FORCE,
     POSITION,
     Command,
     Controller,
@@ -26,15 +25,14 @@ from graspsense.plugins.controllers.supervision import (
     EVENTS,
     LAW_CHANNELS,
     GraspProgress,
-    Supervision,
     SupervisionConfig,
     events_of,
     free_limits,
+    law_numbers,
     not_begun,
     supervise,
-    supervision,
 )
-from graspsense.simulator_api import NOT_FREE, FreeLimits, FreeMotion
+from graspsense.simulator_api import NOT_FREE, FreeLimits, FreeMotion, params_of
 
 
 @frozen(kw_only=True, slots=False)
@@ -86,47 +84,29 @@ class ForceConfig(SupervisionConfig, ForceLoopConfig):
     )
 
 
-class ForceLoop(NamedTuple):
-    """The parameters of `ForceLoopConfig`; `closed` is 0 or 1."""
+def squeezing_effort(params: Any, effort_n: float, frame: Frame) -> float:
+    """Return the effort (N) of this tick, given that of the tick before.
 
-    probing_force_n: float
-    closed: int
-    force_gain_1_s: float
-    effort_limit_n: float
-
-
-def force_loop(config: ForceLoopConfig) -> ForceLoop:
-    """Return the parameters of this config."""
-    return ForceLoop(
-        probing_force_n=float(config.probing_force_n),
-        closed=1 if config.loop == "closed" else 0,
-        force_gain_1_s=float(config.force_gain_1_s),
-        effort_limit_n=float(config.effort_limit_n),
-    )
+    `params` has the numbers of `ForceLoopConfig`, and those of `force_numbers`.
+    """
+    asked_n: float = params.probing_force_n
+    if params.closed == 0:
+        return asked_n
+    most_n: float = params.effort_limit_n
+    error = asked_n - 0.5 * (frame.force_left_n + frame.force_right_n)
+    effort_n += params.force_gain_1_s * error * frame.dt_s
+    return min(max(effort_n, 0.0), most_n)
 
 
-def squeezing_effort(loop: ForceLoop, effort_n: float, frame: Frame) -> float:
-    """Return the effort (N) of this tick, given that of the tick before."""
-    if loop.closed == 0:
-        return loop.probing_force_n
-    error = loop.probing_force_n - 0.5 * (frame.force_left_n + frame.force_right_n)
-    effort_n += loop.force_gain_1_s * error * frame.dt_s
-    return min(max(effort_n, 0.0), loop.effort_limit_n)
+def force_numbers(config: ForceLoopConfig, slowest_m_s: float = 0.0) -> dict[str, float]:
+    """Return what a law of the force adds to the numbers of its config: `law_numbers`, and whether the loop is closed.
 
-
-def settling(config: ForceLoopConfig) -> dict[str, float]:
-    """Return the target of `supervision` for the force; empty for an open loop."""
+    With a closed loop the force has a target. `closed` is 1 or 0.
+    """
     if config.loop == "open":
-        return {}
-    return {"target_force_n": config.probing_force_n, "force_tolerance_n": config.force_tolerance_n}
-
-
-class ForceParams(NamedTuple):
-    """Parameters of the law; `kind` is the command kind that it sends."""
-
-    loop: ForceLoop
-    kind: int
-    supervision: Supervision
+        return {**law_numbers(slowest_m_s), "closed": 0}
+    numbers = law_numbers(slowest_m_s, float(config.probing_force_n), float(config.force_tolerance_n))
+    return {**numbers, "closed": 1}
 
 
 class ForceState(NamedTuple):
@@ -140,36 +120,34 @@ class ForceState(NamedTuple):
     """The bits of `EVENTS` in this tick."""
 
 
-def step(params: ForceParams, state: ForceState, reading: Reading) -> tuple[Command, ForceState]:
+def step(params: Any, state: ForceState, reading: Reading) -> tuple[Command, ForceState]:
     """Close with the probing effort; from contact on, control the force if the loop is closed."""
     frame = reading.frame
-    progress = supervise(params.supervision, state.progress, frame)
-    effort = params.loop.probing_force_n
+    progress = supervise(params, state.progress, frame)
+    effort = params.probing_force_n
     if progress.phase != APPROACH:
-        effort = squeezing_effort(params.loop, state.effort_n, frame)
+        effort = squeezing_effort(params, state.effort_n, frame)
     value, limit = effort, inf
-    if params.kind == POSITION:
+    if params.sends == POSITION:
         value, limit = 0.0, effort
-    return Command(params.kind, value, limit, inf), ForceState(
+    return Command(params.sends, value, limit, inf), ForceState(
         progress.phase, progress.outcome, progress, effort, events_of(state.progress, progress)
     )
 
 
-def free_begin(params: ForceParams, state: ForceState, frame: Frame) -> tuple[float, FreeLimits]:
+def free_begin(params: Any, state: ForceState, frame: Frame) -> tuple[float, FreeLimits]:
     """Begin free motion, whose effort is constant: its memory is unused."""
-    return 0.0, free_limits(params.supervision, state.progress) if params.kind == EFFORT else NOT_FREE
+    return 0.0, free_limits(params, state.progress) if params.sends == EFFORT else NOT_FREE
 
 
 def free_command(
-    params: ForceParams, memory: float, gap_m: float, velocity_m_s: float, dt_s: float
+    params: Any, memory: float, gap_m: float, velocity_m_s: float, dt_s: float
 ) -> tuple[float, float]:
     """Return the effort of a tick of free motion."""
-    return params.loop.probing_force_n, memory
+    return params.probing_force_n, memory
 
 
-def free_end(
-    params: ForceParams, state: ForceState, memory: float, effort_n: float, t_s: float
-) -> ForceState:
+def free_end(params: Any, state: ForceState, memory: float, effort_n: float, t_s: float) -> ForceState:
     """Return the state after free motion."""
     return ForceState(state.phase, state.outcome, state.progress, effort_n, 0)
 
@@ -196,13 +174,9 @@ class ForceController(Controller[ForceConfig]):
         """Return the contact force (N) of the supervision."""
         return float(self.config.contact_force_n)
 
-    def params(self) -> ForceParams:
-        """Return the parameters of the law."""
-        return ForceParams(
-            loop=force_loop(self.config),
-            kind={"effort": EFFORT, "position": POSITION, "force": FORCE}[self.config.sends],
-            supervision=supervision(self.config, **settling(self.config)),
-        )
+    def params(self) -> Any:
+        """Return the numbers of the config, and those of `force_numbers`."""
+        return params_of(self.config, **force_numbers(self.config))
 
     def init(self) -> ForceState:
         """Return the state before the first tick."""

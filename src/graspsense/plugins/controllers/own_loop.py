@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import nan
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from attrs import frozen
 
@@ -40,14 +40,6 @@ class OwnLoopConfig:
     )
 
 
-class OwnLoop(NamedTuple):
-    """The numbers of `OwnLoopConfig`."""
-
-    approach_force_n: float
-    force_step_n: float
-    step_time_s: float
-
-
 class Raised(NamedTuple):
     """The force that is sent, since when, and the gap at which the fingers stop; NaN where they close on."""
 
@@ -56,14 +48,9 @@ class Raised(NamedTuple):
     stop_gap_m: float
 
 
-def own_loop(config: OwnLoopConfig) -> OwnLoop:
-    """Return the parameters of this config."""
-    return OwnLoop(float(config.approach_force_n), float(config.force_step_n), float(config.step_time_s))
-
-
-def approaching(loop: OwnLoop) -> Raised:
+def approaching(params: Any) -> Raised:
     """Return what is sent until the contact."""
-    return Raised(loop.approach_force_n, 0.0, nan)
+    return Raised(params.approach_force_n, 0.0, nan)
 
 
 def rises(now: Raised, most_n: float) -> bool:
@@ -71,8 +58,8 @@ def rises(now: Raised, most_n: float) -> bool:
     return now.force_n < most_n or now.stop_gap_m == now.stop_gap_m
 
 
-def raised(loop: OwnLoop, now: Raised, t_s: float, most_n: float) -> Raised:
+def raised(params: Any, now: Raised, t_s: float, most_n: float) -> Raised:
     """Return what is sent in this tick of the squeeze: the same, or one step more, up to `most_n`."""
-    if t_s - now.since_t_s >= loop.step_time_s and rises(now, most_n):
-        return Raised(max(now.force_n, min(now.force_n + loop.force_step_n, most_n)), t_s, nan)
+    if t_s - now.since_t_s >= params.step_time_s and rises(now, most_n):
+        return Raised(max(now.force_n, min(now.force_n + params.force_step_n, most_n)), t_s, nan)
     return now

@@ -8,7 +8,7 @@ result codes of `GraspClosedLoop.srv`.
 from __future__ import annotations
 
 from math import inf
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from attrs import frozen
 
@@ -129,29 +129,6 @@ class SupervisionConfig:
     )
 
 
-class Supervision(NamedTuple):
-    """The numbers of `SupervisionConfig`, and what the law itself adds to them.
-
-    `slowest_m_s` is the closing speed that the time-out must allow for (0: none). A law that controls the force
-    is steady only when the mean force is within `force_tolerance_n` of `target_force_n`; for others that is inf.
-    """
-
-    contact_force_n: float
-    rest_speed_m_s: float
-    rest_window_s: float
-    edge_force_n: float
-    move_timeout_s: float
-    steady_timeout_s: float
-    closed_gap_m: float
-    too_wide_m: float
-    crush_share: float
-    crush_travel_m: float
-    slip_time_s: float
-    slowest_m_s: float
-    target_force_n: float
-    force_tolerance_n: float
-
-
 class GraspProgress(NamedTuple):
     """The progress of the grasp. The start is unknown until the first tick (`begun` is 0)."""
 
@@ -168,30 +145,19 @@ class GraspProgress(NamedTuple):
     """Time of the last force on a pad after contact."""
 
 
-def supervision(
-    config: SupervisionConfig,
-    *,
-    slowest_m_s: float = 0.0,
-    target_force_n: float = 0.0,
-    force_tolerance_n: float = inf,
-) -> Supervision:
-    """Return the parameters of this config, with those that the law adds."""
-    return Supervision(
-        contact_force_n=float(config.contact_force_n),
-        rest_speed_m_s=float(config.rest_speed_m_s),
-        rest_window_s=float(config.rest_window_s),
-        edge_force_n=float(config.edge_force_n),
-        move_timeout_s=float(config.move_timeout_s),
-        steady_timeout_s=float(config.steady_timeout_s),
-        closed_gap_m=float(config.closed_gap_m),
-        too_wide_m=float(config.too_wide_m),
-        crush_share=float(config.crush_share),
-        crush_travel_m=float(config.crush_travel_m),
-        slip_time_s=float(config.slip_time_s),
-        slowest_m_s=float(slowest_m_s),
-        target_force_n=float(target_force_n),
-        force_tolerance_n=float(force_tolerance_n),
-    )
+def law_numbers(
+    slowest_m_s: float = 0.0, target_force_n: float = 0.0, force_tolerance_n: float = inf
+) -> dict[str, float]:
+    """Return what a law adds to the numbers of its config, for `supervise`.
+
+    `slowest_m_s` is the closing speed that the time-out must allow for (0: none). A law that controls the force is
+    steady only when the mean force is within `force_tolerance_n` of `target_force_n`; for others that is inf.
+    """
+    return {
+        "slowest_m_s": slowest_m_s,
+        "target_force_n": target_force_n,
+        "force_tolerance_n": force_tolerance_n,
+    }
 
 
 EVENTS: Final = ("contact", "slip")
@@ -219,8 +185,11 @@ def not_resting(now: GraspProgress, frame: Frame) -> GraspProgress:
     return GraspProgress(phase, outcome, begun, start_gap, deadline, still, peak_force, peak_gap, felt_t)
 
 
-def supervise(params: Supervision, now: GraspProgress, frame: Frame) -> GraspProgress:
-    """Return the progress after this frame; the same object if nothing has changed."""
+def supervise(params: Any, now: GraspProgress, frame: Frame) -> GraspProgress:
+    """Return the progress after this frame; the same object if nothing has changed.
+
+    `params` has the numbers of `SupervisionConfig`, and those of `law_numbers`.
+    """
     if now.outcome != RUNNING:
         return now
     if now.phase == APPROACH:
@@ -228,14 +197,14 @@ def supervise(params: Supervision, now: GraspProgress, frame: Frame) -> GraspPro
     return _squeezing(params, now, frame)
 
 
-def free_limits(params: Supervision, now: GraspProgress) -> FreeLimits:
+def free_limits(params: Any, now: GraspProgress) -> FreeLimits:
     """Return until when `supervise` returns the same progress, if no force changes (see `FreeMotion`)."""
     if now.phase == APPROACH and now.outcome == RUNNING and now.begun == 1:
         return FreeLimits(params.closed_gap_m, now.deadline_s)
     return NOT_FREE
 
 
-def _approaching(params: Supervision, now: GraspProgress, frame: Frame) -> GraspProgress:
+def _approaching(params: Any, now: GraspProgress, frame: Frame) -> GraspProgress:
     t, _, gap, _, _, left, right, edge_left, edge_right, _ = frame
     contact, edge = params.contact_force_n, params.edge_force_n
     begun, start_gap, deadline = now.begun, now.start_gap_m, now.deadline_s
@@ -263,7 +232,7 @@ def _approaching(params: Supervision, now: GraspProgress, frame: Frame) -> Grasp
     return GraspProgress(APPROACH, outcome, 1, start_gap, deadline, RestState(t, gap), 0.0, gap, t)
 
 
-def _squeezing(params: Supervision, now: GraspProgress, frame: Frame) -> GraspProgress:
+def _squeezing(params: Any, now: GraspProgress, frame: Frame) -> GraspProgress:
     t, gap, left, right = frame.t_s, frame.gap_m, frame.force_left_n, frame.force_right_n
     force = 0.5 * (left + right)
     still = update_rest(now.still, t, gap, params.rest_speed_m_s, params.rest_window_s)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import inf
-from typing import ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 from attrs import frozen
 
@@ -26,15 +26,14 @@ from graspsense.plugins.controllers.supervision import (
     EVENTS,
     LAW_CHANNELS,
     GraspProgress,
-    Supervision,
     SupervisionConfig,
     events_of,
     free_limits,
+    law_numbers,
     not_begun,
     supervise,
-    supervision,
 )
-from graspsense.simulator_api import NOT_FREE, FreeLimits, FreeMotion
+from graspsense.simulator_api import NOT_FREE, FreeLimits, FreeMotion, params_of
 
 
 @frozen(kw_only=True, slots=False)
@@ -77,52 +76,19 @@ class VelocityConfig(SupervisionConfig, VelocityLoopConfig):
     """Settings of the velocity controller."""
 
 
-class VelocityLoop(NamedTuple):
-    """The parameters of `VelocityLoopConfig`."""
+def closing_effort(params: Any, integral_n: float, velocity_m_s: float, dt_s: float) -> tuple[float, float]:
+    """Return the effort (N) of the velocity loop, and its integral (N) after this tick.
 
-    closing_speed_m_s: float
-    velocity_gain_n_s_m: float
-    integral_gain_n_m: float
-    integral_limit_n: float
-    preload_n: float
-
-
-def velocity_loop(config: VelocityLoopConfig) -> VelocityLoop:
-    """Return the parameters of this config."""
-    return VelocityLoop(
-        closing_speed_m_s=float(config.closing_speed_m_s),
-        velocity_gain_n_s_m=float(config.velocity_gain_n_s_m),
-        integral_gain_n_m=float(config.integral_gain_n_m),
-        integral_limit_n=float(config.integral_limit_n),
-        preload_n=float(config.preload_n),
-    )
-
-
-def kind_sent(config: VelocityLoopConfig) -> int:
-    """Return the command kind of the key `sends`."""
-    return {"effort": EFFORT, "velocity": VELOCITY, "position": POSITION}[config.sends]
-
-
-def closing_effort(
-    loop: VelocityLoop, integral_n: float, velocity_m_s: float, dt_s: float
-) -> tuple[float, float]:
-    """Return the effort (N) of the velocity loop, and its integral (N) after this tick."""
-    speed, gain, integral_gain, limit, _ = loop
-    error = speed + velocity_m_s
-    integral_n += (integral_gain * dt_s) * error
+    `params` has the numbers of `VelocityLoopConfig`.
+    """
+    limit = params.integral_limit_n
+    error = params.closing_speed_m_s + velocity_m_s
+    integral_n += (params.integral_gain_n_m * dt_s) * error
     if integral_n > limit:
         integral_n = limit
     elif integral_n < -limit:
         integral_n = -limit
-    return gain * error + integral_n, integral_n
-
-
-class VelocityParams(NamedTuple):
-    """Numbers of the law; `kind` is the command kind that it sends."""
-
-    loop: VelocityLoop
-    kind: int
-    supervision: Supervision
+    return params.velocity_gain_n_s_m * error + integral_n, integral_n
 
 
 class VelocityState(NamedTuple):
@@ -136,36 +102,36 @@ class VelocityState(NamedTuple):
     """The bits of `EVENTS` in this tick."""
 
 
-def step(params: VelocityParams, state: VelocityState, reading: Reading) -> tuple[Command, VelocityState]:
+def step(params: Any, state: VelocityState, reading: Reading) -> tuple[Command, VelocityState]:
     """Close at the given speed against any resistance."""
     frame = reading.frame
-    progress = supervise(params.supervision, state.progress, frame)
-    value, integral = closing_effort(params.loop, state.integral_n, frame.velocity_m_s, frame.dt_s)
+    progress = supervise(params, state.progress, frame)
+    value, integral = closing_effort(params, state.integral_n, frame.velocity_m_s, frame.dt_s)
     speed = inf
-    if params.kind == VELOCITY:
-        value = -params.loop.closing_speed_m_s
-    elif params.kind == POSITION:
-        value, speed = 0.0, params.loop.closing_speed_m_s
-    return Command(params.kind, value, inf, speed), VelocityState(
+    if params.sends == VELOCITY:
+        value = -params.closing_speed_m_s
+    elif params.sends == POSITION:
+        value, speed = 0.0, params.closing_speed_m_s
+    return Command(params.sends, value, inf, speed), VelocityState(
         progress.phase, progress.outcome, progress, integral, events_of(state.progress, progress)
     )
 
 
-def free_begin(params: VelocityParams, state: VelocityState, frame: Frame) -> tuple[float, FreeLimits]:
-    """Begin free motion: its memory is the integral."""
-    limits = free_limits(params.supervision, state.progress) if params.kind == EFFORT else NOT_FREE
+def free_begin(params: Any, state: Any, frame: Frame) -> tuple[float, FreeLimits]:
+    """Begin free motion: its memory is the integral of the velocity loop."""
+    limits = free_limits(params, state.progress) if params.sends == EFFORT else NOT_FREE
     return state.integral_n, limits
 
 
 def free_command(
-    params: VelocityParams, integral_n: float, gap_m: float, velocity_m_s: float, dt_s: float
+    params: Any, integral_n: float, gap_m: float, velocity_m_s: float, dt_s: float
 ) -> tuple[float, float]:
     """Return the effort and the integral of a tick of free motion."""
-    return closing_effort(params.loop, integral_n, velocity_m_s, dt_s)
+    return closing_effort(params, integral_n, velocity_m_s, dt_s)
 
 
 def free_end(
-    params: VelocityParams, state: VelocityState, integral_n: float, effort_n: float, t_s: float
+    params: Any, state: VelocityState, integral_n: float, effort_n: float, t_s: float
 ) -> VelocityState:
     """Return the state after free motion."""
     return VelocityState(state.phase, state.outcome, state.progress, integral_n, 0)
@@ -193,13 +159,9 @@ class VelocityController(Controller[VelocityConfig]):
         """Return the contact force (N) of the supervision."""
         return float(self.config.contact_force_n)
 
-    def params(self) -> VelocityParams:
-        """Return the parameters of the law."""
-        return VelocityParams(
-            loop=velocity_loop(self.config),
-            kind=kind_sent(self.config),
-            supervision=supervision(self.config, slowest_m_s=self.config.closing_speed_m_s),
-        )
+    def params(self) -> Any:
+        """Return the numbers of the config, and those of `law_numbers`."""
+        return params_of(self.config, **law_numbers(float(self.config.closing_speed_m_s)))
 
     def init(self) -> VelocityState:
         """Return the state before the first tick."""

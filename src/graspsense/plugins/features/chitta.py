@@ -27,10 +27,7 @@ from graspsense.gripper_api import (
 )
 from graspsense.plugin_api import (
     APPROACH,
-    CONTACT_FORCE_N,
     HOLD,
-    REST_SPEED_M_S,
-    REST_WINDOW_S,
     Channel,
     Feature,
     Features,
@@ -42,6 +39,7 @@ from graspsense.plugin_api import (
     setting,
     update_rest,
 )
+from graspsense.plugins.features.contact_threshold import RestThresholds
 from graspsense.simulator_api import CompiledFeatures, TickColumns
 
 if TYPE_CHECKING:
@@ -58,39 +56,12 @@ RATES: Final = NAMES[4:]
 
 
 @frozen(kw_only=True)
-class ChittaConfig:
+class ChittaConfig(RestThresholds):
     """The force to use, and the thresholds of contact and rest."""
 
     force: Literal["mean", "left", "right", "min", "sum"] = setting(
         default="mean",
         meaning="The force f from those of the two pads: their mean, one of them, the smaller, or their sum.",
-    )
-    contact_force_n: float = setting(
-        default=CONTACT_FORCE_N,
-        unit="N",
-        above=0.0,
-        plausible=(0.01, 20.0),
-        meaning="tau_1 of the paper: the force on each pad from which on it touches the object; that of the controller "
-        "unless it is given here.",
-        follows="controller.contact_force_n",
-    )
-    rest_speed_m_s: float = setting(
-        default=REST_SPEED_M_S,
-        unit="m/s",
-        above=0.0,
-        plausible=(1e-7, 0.05),
-        meaning="tau_2 of the paper, below which the speed must stay throughout the window; that of the controller "
-        "unless it is given here.",
-        follows="controller.rest_speed_m_s",
-    )
-    rest_window_s: float = setting(
-        default=REST_WINDOW_S,
-        unit="s",
-        above=0.0,
-        plausible=(0.001, 5.0),
-        meaning="Time for which the speed must stay below rest_speed_m_s; that of the controller unless it is given "
-        "here. Longer where the gap is coarse: a step at this speed must fit into it.",
-        follows="controller.rest_window_s",
     )
 
 

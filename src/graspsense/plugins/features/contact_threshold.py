@@ -1,10 +1,10 @@
-"""The setting that feature sets of the contact have in common."""
+"""The settings that feature sets of the contact, or of the contact and the rest, have in common."""
 
 from __future__ import annotations
 
 from attrs import frozen
 
-from graspsense.plugin_api import CONTACT_FORCE_N, setting
+from graspsense.plugin_api import CONTACT_FORCE_N, REST_SPEED_M_S, REST_WINDOW_S, setting
 
 
 @frozen(kw_only=True)
@@ -16,6 +16,31 @@ class ContactThreshold:
         unit="N",
         above=0.0,
         plausible=(0.01, 20.0),
-        meaning="Force on each pad from which on it touches; that of the controller unless it is given here.",
+        meaning="Force on each pad from which on it touches, tau_1 of the paper; that of the controller unless it is "
+        "given here.",
         follows="controller.contact_force_n",
+    )
+
+
+@frozen(kw_only=True)
+class RestThresholds(ContactThreshold):
+    """The thresholds of contact and rest."""
+
+    rest_speed_m_s: float = setting(
+        default=REST_SPEED_M_S,
+        unit="m/s",
+        above=0.0,
+        plausible=(1e-7, 0.05),
+        meaning="tau_2 of the paper, below which the speed must stay throughout the window; that of the controller "
+        "unless it is given here.",
+        follows="controller.rest_speed_m_s",
+    )
+    rest_window_s: float = setting(
+        default=REST_WINDOW_S,
+        unit="s",
+        above=0.0,
+        plausible=(0.001, 5.0),
+        meaning="Time for which the speed must stay below rest_speed_m_s; that of the controller unless it is given "
+        "here. Longer where the gap is coarse: a step at this speed must fit into it.",
+        follows="controller.rest_window_s",
     )

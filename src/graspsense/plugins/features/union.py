@@ -13,8 +13,6 @@ from typing import Any, Final
 from attrs import evolve, fields_dict, frozen
 
 from graspsense.plugin_api import (
-    REST_SPEED_M_S,
-    REST_WINDOW_S,
     Channel,
     ConfigError,
     Feature,
@@ -24,32 +22,16 @@ from graspsense.plugin_api import (
     create,
     setting,
 )
-from graspsense.plugins.features.contact_threshold import ContactThreshold
+from graspsense.plugins.features.contact_threshold import RestThresholds
 
 
 @frozen(kw_only=True)
-class UnionConfig(ContactThreshold):
+class UnionConfig(RestThresholds):
     """The sets, and the thresholds that those of them get which have such a setting."""
 
     sets: tuple[str, ...] = setting(
         default=("chitta", "curve", "quantiles"),
         meaning="Names of the feature sets; their other settings are the defaults.",
-    )
-    rest_speed_m_s: float = setting(
-        default=REST_SPEED_M_S,
-        unit="m/s",
-        above=0.0,
-        plausible=(1e-7, 0.05),
-        meaning="Speed of the gap below which the fingers rest; that of the controller unless it is given here.",
-        follows="controller.rest_speed_m_s",
-    )
-    rest_window_s: float = setting(
-        default=REST_WINDOW_S,
-        unit="s",
-        above=0.0,
-        plausible=(0.001, 5.0),
-        meaning="Time of rest; that of the controller unless it is given here.",
-        follows="controller.rest_window_s",
     )
 
 

@@ -10,9 +10,8 @@ from graspsense.core.components.registry.discovery import PluginSource, builtin_
 from graspsense.core.components.registry.isolation import HEAVY, SLOW_IMPORT_S
 from graspsense.core.components.registry.parts import (
     Component,
-    Diagnosis,
+    HookAnswer,
     PluginStatus,
-    Probe,
     Resource,
     canonical,
 )
@@ -22,12 +21,11 @@ __all__ = [
     "HEAVY",
     "SLOW_IMPORT_S",
     "Component",
-    "Diagnosis",
+    "HookAnswer",
     "IsolatedPlugins",
     "PluginSource",
     "PluginStatus",
     "Plugins",
-    "Probe",
     "Resource",
     "builtin_source",
     "canonical",

@@ -25,8 +25,6 @@ from graspsense.core.components.entries import (
     EmulatorEntry,
     ExperimentEntry,
     ExperimentKindEntry,
-    Finding,
-    FoundDevice,
     IdentifierEntry,
     LiveObserverEntry,
     ModelEntry,
@@ -247,7 +245,7 @@ class Resource(Declared[EntryT]):
     @property
     def kind(self) -> str:
         """The kind of its entry in words."""
-        return _KIND_OF_ENTRY[type(self.entry)]
+        return KIND_OF_ENTRY[type(self.entry)]
 
     @property
     def targets(self) -> tuple[str, ...]:
@@ -286,7 +284,7 @@ class Resource(Declared[EntryT]):
 
 
 _TARGETS: Final = ("target", "recordings", "export", "run", "keys", "result", "findings")
-_KIND_OF_ENTRY: Final[dict[type, str]] = {
+KIND_OF_ENTRY: Final[dict[type, str]] = {
     PipelineEntry: "pipeline",
     ModelEntry: "model",
     DatasetEntry: "data set",
@@ -294,25 +292,19 @@ _KIND_OF_ENTRY: Final[dict[type, str]] = {
     EmulatorEntry: "emulator",
     ExperimentEntry: "experiment",
     ExperimentKindEntry: "kind of experiment",
-    IdentifierEntry: "identifier of objects",
+    IdentifierEntry: "identifier of objects for gripper",
     LiveObserverEntry: "live observer",
     ConformanceCheckEntry: "conformance check",
 }
 
 
-@frozen
-class Probe:
-    """The devices that one plugin found; `error` is the reason if it could not search."""
-
-    distribution: str
-    devices: tuple[FoundDevice, ...] = ()
-    error: str = ""
+AnswerT = TypeVar("AnswerT")
 
 
 @frozen
-class Diagnosis:
-    """The findings of one plugin about its devices; `error` is the reason if it could not examine them."""
+class HookAnswer(Generic[AnswerT]):
+    """What the hook of one plugin gave: devices that it found, or findings; `error` is the reason if it failed."""
 
     distribution: str
-    findings: tuple[Finding, ...] = ()
+    given: tuple[AnswerT, ...] = ()
     error: str = ""

@@ -61,11 +61,12 @@ from graspsense.core.components.registry.isolation import (
     imported,
 )
 from graspsense.core.components.registry.parts import (
+    KIND_OF_ENTRY,
+    AnswerT,
     Component,
-    Diagnosis,
     EntryT,
+    HookAnswer,
     PluginStatus,
-    Probe,
     Resource,
     canonical,
 )
@@ -84,6 +85,12 @@ COMPONENT_HOOKS: Final[dict[str, Role]] = {
     "graspsense_feature_sets": "feature-set",
     "graspsense_classifiers": "classifier",
 }
+_SHIPPED: Final[Mapping[type, Mapping[str, Shipped]]] = {
+    ExperimentEntry: EXPERIMENTS,
+    ExperimentKindEntry: EXPERIMENT_KINDS,
+    IdentifierEntry: IDENTIFIERS,
+}
+"""Resources of other distributions of this project, for the hint if one is not installed."""
 RESOURCE_HOOKS: Final[dict[str, type]] = {
     "graspsense_pipelines": PipelineEntry,
     "graspsense_models": ModelEntry,
@@ -166,79 +173,20 @@ class Plugins:
         shipped = {short: by for (of_role, short), by in provided.items() if of_role == role}
         return self._only(role.replace("-", " "), self.components(role), name, key, shipped)
 
-    def pipelines(self) -> tuple[Resource[PipelineEntry], ...]:
-        """Return the pipeline files that plugins ship."""
-        return self._resources_of(PipelineEntry)
+    def resources(self, kind: type[EntryT]) -> tuple[Resource[EntryT], ...]:
+        """Return what plugins declare by entries of this type, in the order of the names."""
+        return tuple(resource for resource in self.all_resources() if type(resource.entry) is kind)
 
-    def models(self) -> tuple[Resource[ModelEntry], ...]:
-        """Return the trained models that plugins ship."""
-        return self._resources_of(ModelEntry)
+    def all_resources(self) -> tuple[Resource[Any], ...]:
+        """Return the resources of every kind, in the order of the names."""
+        return tuple(sorted(self._resources, key=lambda resource: (resource.name, resource.distribution)))
 
-    def datasets(self) -> tuple[Resource[DatasetEntry], ...]:
-        """Return the readers of recorded data."""
-        return self._resources_of(DatasetEntry)
-
-    def commands(self) -> tuple[Resource[CommandEntry], ...]:
-        """Return the subcommands that plugins add."""
-        return self._resources_of(CommandEntry)
-
-    def emulators(self) -> tuple[Resource[EmulatorEntry], ...]:
-        """Return the devices that can be emulated."""
-        return self._resources_of(EmulatorEntry)
-
-    def identifiers(self) -> tuple[Resource[IdentifierEntry], ...]:
-        """Return the functions that identify objects."""
-        return self._resources_of(IdentifierEntry)
-
-    def live_observers(self) -> tuple[Resource[LiveObserverEntry], ...]:
-        """Return what receives grasps while they go on."""
-        return self._resources_of(LiveObserverEntry)
-
-    def experiment_kinds(self) -> tuple[Resource[ExperimentKindEntry], ...]:
-        """Return the kinds of experiments that plugins add."""
-        return self._resources_of(ExperimentKindEntry)
-
-    def experiments(self) -> tuple[Resource[ExperimentEntry], ...]:
-        """Return the experiment files that plugins ship."""
-        return self._resources_of(ExperimentEntry)
-
-    def conformance_checks(self) -> tuple[Resource[ConformanceCheckEntry], ...]:
-        """Return the checks that plugins contribute to the conformance kit."""
-        return self._resources_of(ConformanceCheckEntry)
-
-    def pipeline(self, name: str) -> Resource[PipelineEntry]:
-        """Return the pipeline of this short or qualified name. Raises UnknownName."""
-        return self._only("pipeline", self.pipelines(), name)
-
-    def model(self, name: str) -> Resource[ModelEntry]:
-        """Return the model of this short or qualified name. Raises UnknownName."""
-        return self._only("model", self.models(), name)
-
-    def dataset(self, name: str) -> Resource[DatasetEntry]:
-        """Return the reader of this short or qualified name. Raises UnknownName."""
-        return self._only("data set", self.datasets(), name)
-
-    def command(self, name: str) -> Resource[CommandEntry]:
-        """Return the subcommand of this short or qualified name. Raises UnknownName."""
-        return self._only("command", self.commands(), name)
-
-    def experiment(self, name: str) -> Resource[ExperimentEntry]:
-        """Return the experiment of this short or qualified name. Raises UnknownName."""
-        return self._only("experiment", self.experiments(), name, shipped=EXPERIMENTS)
-
-    def experiment_kind(self, name: str) -> Resource[ExperimentKindEntry]:
-        """Return the kind of experiment of this short or qualified name. Raises UnknownName."""
-        return self._only("kind of experiment", self.experiment_kinds(), name, "kind", EXPERIMENT_KINDS)
-
-    def identifier(self, gripper: str) -> Resource[IdentifierEntry]:
-        """Return what identifies objects as scenes of this sensor backend. Raises UnknownName."""
+    def resource(self, kind: type[EntryT], name: str) -> Resource[EntryT]:
+        """Return the resource of this kind with this short or qualified name. Raises UnknownName."""
+        key = "kind" if kind is ExperimentKindEntry else ""
         return self._only(
-            "identifier of objects for gripper", self.identifiers(), gripper, shipped=IDENTIFIERS
+            KIND_OF_ENTRY[kind], self.resources(kind), name, key, _SHIPPED.get(kind, MappingProxyType({}))
         )
-
-    def emulator(self, name: str) -> Resource[EmulatorEntry]:
-        """Return the emulator of this short or qualified name. Raises UnknownName."""
-        return self._only("emulator", self.emulators(), name)
 
     def unknown(self, name: str) -> UnknownName:
         """Return the error for a name that no distribution with plugins and no component has."""
@@ -257,30 +205,26 @@ class Plugins:
         lines = [status.absence for status in self._statuses]
         return "".join([*lines, *(f"\n  {problem}" for problem in self.unknown_names)])
 
-    def probe_devices(self, timeout_s: float) -> tuple[Probe, ...]:
+    def probe_devices(self, timeout_s: float) -> tuple[HookAnswer[FoundDevice], ...]:
         """Let every plugin search for its devices for at most `timeout_s` each; a failure is reported as its own."""
-        hook, probes = "graspsense_probe_devices", []
-        for status, plugin in self._implementing(hook):
-            try:
-                devices = self._hooks.entries(plugin, hook, FoundDevice, timeout_s=timeout_s)
-                probes.append(Probe(status.distribution, tuple(devices)))
-            except FAILURES as error:
-                probes.append(Probe(status.distribution, error=error_text(error)))
-        return tuple(probes)
+        return self._answers("graspsense_probe_devices", FoundDevice, timeout_s=timeout_s)
 
-    def diagnose(self, config: object, timeout_s: float) -> tuple[Diagnosis, ...]:
+    def diagnose(self, config: object, timeout_s: float) -> tuple[HookAnswer[Finding], ...]:
         """Let every plugin examine its devices, for about `timeout_s` each; a failure is reported as its own.
 
         `config` is that of the gripper that the user named, or None.
         """
-        hook, diagnoses = "graspsense_diagnose", []
+        return self._answers("graspsense_diagnose", Finding, config=config, timeout_s=timeout_s)
+
+    def _answers(self, hook: str, kind: type[AnswerT], **arguments: Any) -> tuple[HookAnswer[AnswerT], ...]:
+        answers: list[HookAnswer[AnswerT]] = []
         for status, plugin in self._implementing(hook):
             try:
-                findings = self._hooks.entries(plugin, hook, Finding, config=config, timeout_s=timeout_s)
-                diagnoses.append(Diagnosis(status.distribution, tuple(findings)))
+                given = self._hooks.entries(plugin, hook, kind, **arguments)
+                answers.append(HookAnswer(status.distribution, tuple(given)))
             except FAILURES as error:
-                diagnoses.append(Diagnosis(status.distribution, error=error_text(error)))
-        return tuple(diagnoses)
+                answers.append(HookAnswer(status.distribution, error=error_text(error)))
+        return tuple(answers)
 
     def run_starting(self, run: RunInfo) -> None:
         """Notify the observers that a grasp is about to start."""
@@ -374,17 +318,13 @@ class Plugins:
             with self._hooks.isolated(status, hook):
                 self._hooks.call(plugin, hook, **arguments)
 
-    def _resources_of(self, kind: type[EntryT]) -> tuple[Resource[EntryT], ...]:
-        of_kind = (resource for resource in self._resources if type(resource.entry) is kind)
-        return tuple(sorted(of_kind, key=lambda resource: (resource.name, resource.distribution)))
-
     def _only(
         self,
         kind: str,
         known: Sequence[PartT],
         name: str,
-        key: str = "",
-        shipped: Mapping[str, Shipped | Example] = MappingProxyType({}),
+        key: str,
+        shipped: Mapping[str, Shipped | Example] | Mapping[str, Shipped],
     ) -> PartT:
         """Return the part among `known` with this name, or raise UnknownName.
 
