@@ -24,7 +24,7 @@ CONFIG = SimConfig(sensor="ideal", spread=False, accuracy=0.1, rate_hz=250.0, op
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    return tmp_path / "graspsense" / "chosen steps"
+    return tmp_path / "graspsense" / "chosen_steps"
 
 
 @pytest.fixture
