@@ -491,7 +491,8 @@ def text_of(path: Path) -> str:
     text = _decoded(path, data)
     if "\0" in text:
         raise DataDamaged(
-            f"{path} contains zero bytes: it is not a text file. If a program wrote it as Unicode text, save it as UTF-8"
+            f"{path} contains zero bytes: it is not a text file. If a program wrote it as Unicode text, save it as "
+            "UTF-8"
         )
     return text
 
@@ -505,7 +506,9 @@ def _decoded(path: Path, data: bytes) -> str:
         try:
             return data.decode("utf-16")
         except UnicodeDecodeError as error:
-            raise DataDamaged(f"{path} begins as UTF-16, and is none: {error.reason}. Save it as UTF-8") from None
+            raise DataDamaged(
+                f"{path} begins as UTF-16, and is none: {error.reason}. Save it as UTF-8"
+            ) from None
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -46,6 +46,7 @@ _OTHER_GROUPS: Final = re.compile(
     rf"{_SIGN}[1-9][0-9]{{0,2}}(?:[ '\u2019\u00a0\u2009\u202f][0-9]{{3}})+(?:[.,][0-9]*)?{_EXPONENT}"
 )
 _GROUP_SIGNS: Final = re.compile("[ '\u2019\u00a0\u2009\u202f]")
+_HEXADECIMAL: Final = re.compile("0[xX][0-9a-fA-F]{1,16}")
 _INFINITE: Final = re.compile("[-+]?inf(?:inity)?", re.IGNORECASE)
 _PLAIN: Final = re.compile(r"[0-9+\-.eE]*")
 _TO_PYTHON: Final = str.maketrans("dD\u2212", "ee-")
@@ -243,6 +244,8 @@ def _floats(cells: Sequence[str]) -> Numbers | None:
 def _number(cell: str, notation: int) -> float:
     if _INFINITE.fullmatch(cell):
         return float(cell)
+    if _HEXADECIMAL.fullmatch(cell):
+        return float(int(cell, 16))
     if _OTHER_GROUPS.fullmatch(cell):
         cell = _GROUP_SIGNS.sub("", cell)
     if notation == THOUSANDS:
@@ -268,4 +271,4 @@ def _notations(cell: str) -> int:
         forms |= COMMA
     if _COMMA_GROUPS.fullmatch(cell):
         forms |= THOUSANDS
-    return forms or (_EVERY if _INFINITE.fullmatch(cell) else 0)
+    return forms or (_EVERY if _INFINITE.fullmatch(cell) or _HEXADECIMAL.fullmatch(cell) else 0)
