@@ -31,8 +31,8 @@ def label_text(text: str) -> str:
 
 
 def spelled_alike(texts: Iterable[str]) -> list[tuple[str, str]]:
-    """Return pairs of different labels or names that differ in case, spaces, hyphens, width, leading zeros or the last zeros of a
-    decimal number only.
+    """Return pairs of different labels or names that differ in case, spaces, hyphens, width or leading zeros only,
+    or in zeros at the end of a decimal number.
 
     >>> spelled_alike(["can1", "Can 01", "can2", "-2", "2", "1-2", "12", "0.5", "0.50", "1.20.30"])
     [('0.5', '0.50'), ('Can 01', 'can1')]
