@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 POINT: Final = 1
 THOUSANDS: Final = 2
 COMMA: Final = 4
+HEXADECIMAL: Final = 8
+"""`0x7D0`, beside `0` at most: any other number can be a hexadecimal one without its sign."""
 _EVERY: Final = POINT | THOUSANDS | COMMA
 _NOTATIONS: Final = (POINT, THOUSANDS, COMMA)
 
@@ -133,7 +135,7 @@ def columns_of_numbers(columns: Mapping[str, Sequence[str]]) -> dict[str, Number
     """
     fits = {name: _common(cells) for name, cells in columns.items()}
     certain = [fit.notations for fit in fits.values() if isinstance(fit, _Fit)]
-    points = any(not notations & COMMA for notations in certain)
+    points = any(not notations & COMMA for notations in certain if notations != HEXADECIMAL)
     commas = any(notations == COMMA for notations in certain)
     of_file = (COMMA if commas else 0) | (THOUSANDS if points else 0)
     return {
@@ -161,7 +163,7 @@ def _common(cells: Sequence[str]) -> _Fit | NotNumbers:
             else True
         )
         return _Fit(POINT | COMMA if grouped else POINT, values)
-    common = _EVERY
+    common = _EVERY | HEXADECIMAL
     for row, cell in enumerate(cells):
         if is_missing(cell):
             continue
@@ -265,10 +267,12 @@ def _notations(cell: str) -> int:
             forms |= THOUSANDS
         if "." not in cell or _POINT_GROUPS.fullmatch(cell):
             forms |= COMMA
-        return forms
+        return forms | (HEXADECIMAL if cell == "0" else 0)
+    if _HEXADECIMAL.fullmatch(cell):
+        return HEXADECIMAL
     forms = 0
     if _WITH_COMMA.fullmatch(cell) or _POINT_GROUPS.fullmatch(cell):
         forms |= COMMA
     if _COMMA_GROUPS.fullmatch(cell):
         forms |= THOUSANDS
-    return forms or (_EVERY if _INFINITE.fullmatch(cell) or _HEXADECIMAL.fullmatch(cell) else 0)
+    return forms or (_EVERY if _INFINITE.fullmatch(cell) else 0)
