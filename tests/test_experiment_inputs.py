@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 import wayward
@@ -11,6 +13,8 @@ from kept import keep
 
 from graspsense.core.components.registry import installed
 from graspsense.core.values.errors import ConfigError
+from graspsense.experiments.executors.dask import DaskCluster
+from graspsense.experiments.executors.processes import Processes
 from graspsense.experiments.executors.serial import Serial
 from graspsense.experiments.experiment import _located, read_experiment
 from graspsense.experiments.results import Results
@@ -232,6 +236,29 @@ def test_the_code_of_a_component_that_a_setting_names_is_an_input(monkeypatch):
     contents = contents_of(params)
     monkeypatch.setattr(module, "_hash_of_code", lambda version, name: f"{version} {name} changed")
     assert contents[foreign.name] != contents_of(params)[foreign.name]
+
+
+def dask_cluster():
+    pytest.importorskip("distributed", reason="Dask is not installed")
+    return DaskCluster(None, 2)
+
+
+@pytest.mark.parametrize(
+    "executor", [Serial, partial(Processes, 2), dask_cluster], ids=["serial", "processes", "dask"]
+)
+def test_a_table_that_is_replaced_while_the_experiment_runs_is_no_result_of_what_it_was_before(
+    tmp_path, executor
+):
+    table(tmp_path / "t.csv", 1, 50.0)
+    planned = read_experiment(experiment(tmp_path, "t.csv"), ["seeds=2"])
+    results = Results(tmp_path / "out")
+    table(tmp_path / "t.csv", 2, 0.0)
+    account = run_experiment(planned, results, executor)
+    assert ["t.csv" in failed.reason for failed in account.failed] == [True, True]
+    table(tmp_path / "t.csv", 1, 50.0)
+    again = run_experiment(planned, results, executor, resume=True)
+    assert (again.kept, again.done, again.failed) == (0, 2, ())
+    assert rate_of(planned, results) == (1.0, 40)
 
 
 def test_what_is_no_file_is_no_input():

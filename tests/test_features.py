@@ -262,6 +262,29 @@ def test_a_rest_that_a_coarse_gap_cannot_show_is_said_to_be_unresolved(step_m, h
     assert "rest not resolved" in f.reasons["f_steady"]
 
 
+@pytest.mark.parametrize(("jump_s", "ends"), [(0.0, True), (0.15, True), (0.5, True), (0.15, False)])
+def test_a_clock_that_was_set_within_a_squeeze_shows_no_rest(jump_s, ends):
+    """The gap closes by 1.6 mm/s and rests at 0.0460 m; where the recording ends before, there is no rest."""
+    times = np.arange(0.0, 5.0 if ends else 3.0, 0.01)
+    gap = np.interp(times, [0.0, 1.0, 3.5], [0.08, 0.05, 0.046])
+    force = np.interp(times, [1.0, 3.5], [0.0, 6.0])
+    trace = made_trace(zip(gap.tolist(), force.tolist(), force.tolist(), strict=True), dt=0.01)
+    f = FEATURES.extract(evolve(trace, t_s=times + np.where(times > 1.8, jump_s, 0.0)))
+    assert f["f_steady"] == pytest.approx(6.0 if ends else math.nan, abs=0.05, nan_ok=True)
+    assert ("clock" in f.reasons.get("f_steady", "")) == (not ends)
+
+
+def test_a_hole_in_a_rest_is_a_part_of_it():
+    times = np.arange(0.0, 5.0, 0.01)
+    times = times[(times < 3.6) | (times > 4.0)]
+    gap = np.interp(times, [0.0, 1.0, 3.5], [0.08, 0.05, 0.046])
+    force = np.interp(times, [1.0, 3.5], [0.0, 6.0])
+    trace = made_trace(zip(gap.tolist(), force.tolist(), force.tolist(), strict=True), dt=0.01)
+    f = FEATURES.extract(evolve(trace, t_s=times))
+    assert f["f_steady"] == pytest.approx(6.0)
+    assert f["delta_t"] == pytest.approx(2.2, abs=0.1)
+
+
 @given(
     st.lists(
         st.tuples(

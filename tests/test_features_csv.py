@@ -96,11 +96,11 @@ def test_what_counts_as_missing(csv, gap):
         (GOOD.replace("f_steady", "p_first"), DataDamaged, "two columns are named 'p_first'"),
         (GOOD.replace("f_steady", ""), DataDamaged, "column 3 has no name"),
         (GOOD.replace("a,", "unknown,"), ConfigError, "'unknown' cannot be a label"),
-        (GOOD.encode("utf-16"), DataDamaged, "is UTF-16: save it as UTF-8"),
+        (GOOD.encode("utf-16")[:-1], DataDamaged, "begins as UTF-16, and is none"),
         (
-            GOOD.replace("b,", "flaschenöffner,").encode("latin-1"),
+            GOOD.replace("b,", "бутылка,").encode("cp1251"),
             DataDamaged,
-            "line 3: byte 0xf6 is not UTF-8",
+            "line 3: byte 0xe1 is not UTF-8",
         ),
         (b"PK\x03\x04\x00\x00what,p", DataDamaged, "contains zero bytes: it is not a text file"),
         ("what,p\na,\nb,\n" * 1, DataDamaged, "no feature has any value: p"),
@@ -112,6 +112,33 @@ def test_what_cannot_be_read_says_where_and_why(csv, content, error, said):
         read_labelled(csv(content), "what")
 
     assert said in str(raised.value)
+
+
+@every_case("encoding", ["utf-16", "utf-16-be", "latin-1", "cp1252"])
+def test_a_table_in_another_encoding_is_the_same_table(csv, encoding):
+    text = GOOD.replace("b,", "öffner,").replace("f_steady", "f_steady [µm]")
+    mark = b"\xfe\xff" if encoding == "utf-16-be" else b""
+    read = read_labelled(csv(mark + text.encode(encoding)), "what")
+    expected = read_labelled(csv(text.encode()), "what")
+    assert (read.labels, read.table.units) == (expected.labels, expected.table.units)
+    assert read.table.values.tolist() == expected.table.values.tolist()
+
+
+def test_a_unit_in_every_cell_is_that_of_the_column_and_labels_keep_theirs(csv):
+    rows = [
+        (f"{500 * (1 + i % 2)} g", f"{6 + i % 2},{i} N", f"{i % 3}.5 mm" if i else "nan") for i in range(8)
+    ]
+    read = read_labelled(csv("size;force;gap\n" + "".join(f"{';'.join(row)}\n" for row in rows)), "size")
+    assert set(read.labels) == {"500 g", "1000 g"}
+    assert (read.table.names, read.table.units) == (("force", "gap"), ("N", "mm"))
+    assert read.table.values[:2, 0].tolist() == [6.0, 7.1]
+
+
+def test_units_that_differ_within_a_column_are_no_numbers(csv):
+    rows = "".join(f"{'ab'[i % 2]},{i * 7 % 5},{i % 4} {'m' if i == 3 else 'mm'}\n" for i in range(8))
+    read = read_labelled(csv("what,force,gap\n" + rows), "what")
+    assert read.table.names == ("force",)
+    assert any("gap" in note for note in read.notes)
 
 
 def test_a_column_of_numbers_is_no_label(csv):

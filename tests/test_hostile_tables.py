@@ -166,8 +166,9 @@ def test_every_limit_is_documented():
     "data",
     [
         b"label,x\na,\x001\n",
-        "label,x\na,1\n".encode("utf-16"),
-        "label,x\nä,1\n".encode("latin-1"),
+        "label,x\na,1\n".encode("utf-16")[:-1],
+        "label,x\na,1\n".encode("utf-32"),
+        "label,x\nж,1\n".encode("cp1251"),
         b'label,x\na,"1\nb,2\n' * 3,
         b'label,x\na,"' + b"1" * 200_000 + b'"\n',
         b"",

@@ -43,9 +43,20 @@ CLOCKS = {
     "ahead": T_S + 20.0,
     "half a second": T_S + 0.5,
     "since boot": T_S - 1.69e9,
+    "2 % fast": T_S * 1.02,
+    "2 % slow": T_S * 0.98,
     "set back": np.where(T_S > 1.3, T_S - 0.5, T_S),
     "set forward": np.where(T_S > 1.3, T_S + 3600.0, T_S),
 }
+
+
+def test_delays_of_a_busy_computer_are_no_clock_of_their_own() -> None:
+    for seed in range(300):
+        rng = np.random.default_rng(seed)
+        busy = (rng.uniform(1.0, 3.0) < T_S) & (rng.random(len(T_S)) > 0.1)
+        late_s = rng.exponential(0.03, len(T_S)) + 0.2 * busy
+        topics = {"/hand": HEALTHY, "/tip": messages(T_S + late_s, T_S)}
+        assert not any("clock" in notice for notice in common_clock("bag", topics).notices)
 
 
 @every_case("clock", CLOCKS)

@@ -33,6 +33,7 @@ def numbers(*cells, **others):
         (["1.5D-03", "\u22122", "+3e2"], [0.0015, -2, 300]),
         (["1", "", "NA", "--", "#N/A", "#DIV/0!", "NaN"], [1] + [math.nan] * 6),
         (["inf", "-Infinity"], [math.inf, -math.inf]),
+        (["0x7D0", "0", "", "0Xff"], [2000, 0, math.nan, 255]),
     ],
 )
 def test_a_column_has_one_notation(cells, values):

@@ -475,6 +475,8 @@ class _Evaluator:
         Stat. Appl. Genet. Mol. Biol. 9 (2010) 39).
         """
         what = f"mean of {permutations} permutations of the labels, each in folds like those of the headline"
+        if permutations < 1:
+            return Measurement(what, reason="no permutation was asked for")
         rng = np.random.default_rng(self.seed)
         counts = []
         for k in range(permutations):

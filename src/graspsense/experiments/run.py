@@ -17,6 +17,7 @@ from graspsense.experiments.task import Task, TaskResult
 from graspsense.experiments.timing import TimeLeft
 from graspsense.experiments.versions import differences, versions
 from graspsense.recording.atomic_file import SaveFailed
+from graspsense.sources.input_content import contents_of
 
 STORE_FILE = "store.sqlite"
 """A folder with this file is a store of trials. This package may not import the store itself."""
@@ -134,7 +135,9 @@ def _run_tasks(
         with Interrupts():
             running = executor()
             left.workers = running.workers
-            for result in running.run(todo):
+            of_key = {task.key: task for task in todo}
+            for returned in running.run(todo):
+                result = _without_changed_inputs(of_key[returned.key], returned)
                 keys.append(result.key)
                 results.add(result)
                 left.add(result.seconds)
@@ -153,6 +156,22 @@ def _run_tasks(
         if running is not None:
             running.close()
     return keys, ""
+
+
+def _without_changed_inputs(task: Task, result: TaskResult) -> TaskResult:
+    """Return the result, or a failure if an input of its task has another content than when the experiment was read."""
+    planned = task.params.get("inputs", {})
+    present = (
+        contents_of({key: value for key, value in task.params.items() if key != "inputs"}) if planned else {}
+    )
+    changed = [name for name, content in planned.items() if present.get(name) != content]
+    if result.state == "failed" or not changed:
+        return result
+    return TaskResult.failed(
+        task,
+        f"changed while the experiment ran: {listed(changed)}. Run it again with "
+        f"{option('resume', python='resume=True')}",
+    )
 
 
 def _changed_inputs(results: Results, planned: Planned) -> list[str]:

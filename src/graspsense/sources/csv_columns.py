@@ -20,7 +20,7 @@ from graspsense.core.values.label_text import is_missing_label
 from graspsense.core.values.nominal import splits_of, value_name
 from graspsense.core.values.written_numbers import NotNumbers, columns_of_numbers, is_missing, is_number
 from graspsense.core.values.written_times import seconds_since_first
-from graspsense.sources.text_table import read_lines, table_of
+from graspsense.sources.text_table import numbers_with_unit, read_lines, table_of
 
 if TYPE_CHECKING:
     from graspsense.core.values.written_numbers import Numbers
@@ -67,6 +67,8 @@ class CsvColumns:
             name: [text_of_cell(cell) for cell in cells]
             for name, cells in zip(self.names, table.columns, strict=True)
         }
+        for name, cells in self.cells.items():
+            self.units[name] = self.units[name] or numbers_with_unit(cells)[1]
         self._numbers: dict[str, Numbers | NotNumbers] | None = None
         self.levels: dict[str, tuple[str, ...]] = {}
 
@@ -100,7 +102,7 @@ class CsvColumns:
         """Return a column as numbers, NaN where missing. Raises DataDamaged with the line that has another text."""
         self.column(name, "a feature")
         if self._numbers is None:
-            self._numbers = columns_of_numbers(self.cells)
+            self._numbers = columns_of_numbers({name: self._without_unit(name) for name in self.cells})
         number = self._numbers[name]
         if isinstance(number, NotNumbers):
             times = seconds_since_first(self.cells[name])
@@ -118,8 +120,13 @@ class CsvColumns:
 
     def has_numbers(self, name: str) -> bool:
         """Return whether half of the cells of a column are numbers: a few may be so by chance, as those of hashes."""
-        given = [cell for cell in self.cells[name] if not is_missing(cell)]
+        given = [cell for cell in self._without_unit(name) if not is_missing(cell)]
         return 2 * sum(map(is_number, given)) >= len(given) > 0
+
+    def _without_unit(self, name: str) -> Sequence[str]:
+        """Return the cells of a column, without a unit that stands in each of them and is that of the column."""
+        cells, unit = numbers_with_unit(self.cells[name])
+        return cells if unit == self.units.get(name, "") else self.cells[name]
 
     def is_blank(self, name: str) -> bool:
         """Return whether every cell of a column is missing."""

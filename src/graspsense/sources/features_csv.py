@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 SMALL: Final = 1e-3
 """A column that varies by less than this has few values that differ by J48's 1e-5."""
+LARGEST_WHOLE: Final = 2.0**53
+"""From here on, not every whole number is a number of the computer."""
 
 
 def read_labelled(
@@ -208,10 +210,18 @@ def _identified(columns: CsvColumns, labels: Sequence[str], order: Sequence[int]
     if columns.is_nominal(name):
         why = text_identifies(columns.texts(name), labels)
     else:
-        why = identifies(name, columns.units[name], columns.numbers(name), labels, order)
+        values = columns.numbers(name)
+        why = identifies(name, columns.units[name], values, labels, order)
+        if not why and _loses_digits(columns.cells[name], values):
+            why = "differ in digits that a number does not keep (subtract an offset)"
     if not why and names_a_recording(name):
         return "tell of the recording and not of the grasp, by their name"
     return why
+
+
+def _loses_digits(cells: Sequence[str], values: Sequence[float]) -> bool:
+    """Return whether different whole numbers of so many digits are the same number."""
+    return len(set(values)) < len(set(cells)) and any(abs(value) >= LARGEST_WHOLE for value in values)
 
 
 def _measured(name: str) -> str:

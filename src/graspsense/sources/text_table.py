@@ -40,6 +40,9 @@ _LINE_ENDS: Final = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
 """The characters at which `str.splitlines` divides a text."""
 _COMMENTS: Final = ("#", "%")
 _SEPARATOR_LINE: Final = re.compile(r'"?sep=([;,\t|])"?\s*')
+_CODE_PAGES: Final = ("cp1252", "cp1250", "iso8859-1", "iso8859-15")
+"""They agree on degrees, micro and the letters of several languages."""
+_WITH_UNIT: Final = re.compile(r"(.*[0-9.])\s*([^\s0-9]+)")
 _SAMPLED: Final = 400
 """Lines from which the separator and the kinds of the columns are found."""
 _SAMPLED_CELLS: Final = 100_000
@@ -274,6 +277,25 @@ class _Layout:
         return rows[:-1]
 
 
+def numbers_with_unit(cells: Sequence[str]) -> tuple[Sequence[str], str]:
+    """Return the numbers and the unit of cells such as `12.3 N`; the cells, and no unit, if they have not all the same.
+
+    >>> numbers_with_unit(["12.3 N", "", "4N"]), numbers_with_unit(["12 mm", "1 m"])
+    ((['12.3', '', '4'], 'N'), (['12 mm', '1 m'], ''))
+    """
+    numbers, unit = [], ""
+    for cell in cells:
+        if is_missing(cell):
+            numbers.append(cell)
+            continue
+        match = _WITH_UNIT.fullmatch(cell)
+        if match is None or match[2] != (unit or match[2]) or not is_number(match[1]):
+            return cells, ""
+        numbers.append(match[1])
+        unit = match[2]
+    return (numbers, unit) if unit.lower() in UNITS else (cells, "")
+
+
 def _json_table(path: Path, lines: Sequence[Line], ended: bool) -> TextTable:
     """Return the table of a file with one JSON object a line. Raises DataDamaged."""
     written = [(number, line) for number, line in lines if line.strip()]
@@ -446,7 +468,7 @@ def check_columns(path: Path, names: Sequence[str]) -> None:
 
 
 def text_of(path: Path) -> str:
-    """Return the text of a file in UTF-8, unpacked if it is compressed by gzip.
+    """Return the text of a file, unpacked if it is compressed by gzip.
 
     Raises ConfigError if it cannot be read, TooLarge, and DataDamaged if it is not text.
     """
@@ -466,14 +488,35 @@ def text_of(path: Path) -> str:
             size = max(size, len(data))
     if too_large := TEXT_BYTES.exceeded(size):
         raise DataDamaged(f"{path}: {too_large}")
+    text = _decoded(path, data)
+    if "\0" in text:
+        raise DataDamaged(
+            f"{path} contains zero bytes: it is not a text file. If a program wrote it as Unicode text, save it as "
+            "UTF-8"
+        )
+    return text
+
+
+def _decoded(path: Path, data: bytes) -> str:
+    """Return the text of bytes in UTF-8, in UTF-16 with its mark, or in a code page if those of Europe agree on it.
+
+    Raises DataDamaged.
+    """
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise DataDamaged(f"{path} is UTF-16: save it as UTF-8")
-    if b"\0" in data:
-        raise DataDamaged(f"{path} contains zero bytes: it is not a text file")
+        try:
+            return data.decode("utf-16")
+        except UnicodeDecodeError as error:
+            raise DataDamaged(
+                f"{path} begins as UTF-16, and is none: {error.reason}. Save it as UTF-8"
+            ) from None
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
+        texts = {data.decode(code_page, "replace") for code_page in _CODE_PAGES}
+        if len(texts) == 1:
+            return texts.pop()
         line = data.count(b"\n", 0, error.start) + 1
         raise DataDamaged(
-            f"{path}, line {line}: byte 0x{data[error.start]:02x} is not UTF-8: save the file as UTF-8"
+            f"{path}, line {line}: byte 0x{data[error.start]:02x} is not UTF-8, and other encodings read the file in "
+            "different ways: save it as UTF-8"
         ) from None

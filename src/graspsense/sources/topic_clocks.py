@@ -25,6 +25,11 @@ CLOCKS_APART_NS: Final = 300_000_000
 """Delays of two topics, or of two parts of a topic, that differ by more are from different clocks."""
 PARTS: Final = 5
 """Parts of a recording whose delays are compared."""
+RATES_APART: Final = 0.01
+RATES_APART_NS: Final = 20_000_000
+"""Share of the recording, and time, by which one clock gets ahead of another that runs at another rate."""
+EVEN: Final = 0.5
+"""Least share of the mean by which it gets ahead in each part of the recording."""
 PERIODS: Final = 5.0
 """A value holds for so many usual periods of its topic at most,"""
 LEAST_HOLD_NS: Final = 100_000_000
@@ -195,6 +200,8 @@ def _apart(stamped: Mapping[str, Nanoseconds], recorded: Mapping[str, Nanosecond
     used = "the times at which the messages were recorded are used"
     if changed:
         yield f"the clock in the headers of {', '.join(changed)} was set during the recording: {used}"
+    elif drifting := _drifting(recorded, least):
+        yield f"the clock in the headers of {drifting} runs at another rate than that of another topic: {used}"
     elif apart > CLOCKS_APART_NS:
         yield (
             f"the times in the headers of {behind} are behind those of another topic, from another clock: {used}"
@@ -206,6 +213,21 @@ def _least_delays(recorded: Nanoseconds, stamped: Nanoseconds) -> list[int]:
     order = np.argsort(recorded, kind="stable")
     delays = np.array_split((recorded - stamped)[order], min(PARTS, len(order)))
     return [int(part.min()) for part in delays]
+
+
+def _drifting(recorded: Mapping[str, Nanoseconds], least: Mapping[str, list[int]]) -> str:
+    """Return the topic whose delays grow, or shrink, evenly against those of another topic; empty if none does."""
+    parts = {topic: np.array(delays) for topic, delays in least.items() if len(delays) == PARTS}
+    if not parts:
+        return ""
+    steady = min(parts.values(), key=lambda delays: abs(int(delays[-1] - delays[0])))
+    for topic, delays in parts.items():
+        steps = np.diff(delays - steady)
+        much = max(RATES_APART * int(np.ptp(recorded[topic])), RATES_APART_NS)
+        even = steps * np.sign(steps.sum()) > EVEN * np.abs(steps).mean()
+        if abs(int(steps.sum())) > much and even.all():
+            return topic
+    return ""
 
 
 def _jumps(delays: Nanoseconds) -> bool:

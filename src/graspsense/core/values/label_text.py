@@ -14,6 +14,7 @@ _WHOLE: Final = re.compile(r"(?<![^:#])([-+]?[0-9]+)[.,]0+(?![^:#])")
 _JOINTS: Final = re.compile(r"(?<=[^\W\d])[\s_-]+(?=\w)|(?<=\w)[\s_-]+(?=[^\W\d])|(?<=\s)\s+")
 """Spaces, underscores and hyphens beside a letter."""
 _LEADING: Final = re.compile(r"(?<![\d.,])0+(?=\d)")
+_LAST_ZEROS: Final = re.compile(r"(?<!\d)(\d+[.,]\d*[1-9])0+(?![\d.,])")
 
 
 def label_text(text: str) -> str:
@@ -30,15 +31,17 @@ def label_text(text: str) -> str:
 
 
 def spelled_alike(texts: Iterable[str]) -> list[tuple[str, str]]:
-    """Return pairs of different labels or names that differ in case, spaces, hyphens, width or leading zeros only.
+    """Return pairs of different labels or names that differ in case, spaces, hyphens, width or leading zeros only,
+    or in zeros at the end of a decimal number.
 
-    >>> spelled_alike(["can1", "Can 01", "can2", "-2", "2", "1-2", "12"])
-    [('Can 01', 'can1')]
+    >>> spelled_alike(["can1", "Can 01", "can2", "-2", "2", "1-2", "12", "0.5", "0.50", "1.20.30"])
+    [('0.5', '0.50'), ('Can 01', 'can1')]
     """
     by_form: dict[str, str] = {}
     pairs = []
     for text in sorted(set(texts)):
         form = _LEADING.sub("", _JOINTS.sub("", unicodedata.normalize("NFKC", text).casefold()))
+        form = _LAST_ZEROS.sub(r"\1", form)
         other = by_form.setdefault(form, text)
         if other != text:
             pairs.append((other, text))

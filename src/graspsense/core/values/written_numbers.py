@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 POINT: Final = 1
 THOUSANDS: Final = 2
 COMMA: Final = 4
+HEXADECIMAL: Final = 8
+"""`0x7D0`, beside `0` at most: any other number can be a hexadecimal one without its sign."""
 _EVERY: Final = POINT | THOUSANDS | COMMA
 _NOTATIONS: Final = (POINT, THOUSANDS, COMMA)
 
@@ -46,6 +48,7 @@ _OTHER_GROUPS: Final = re.compile(
     rf"{_SIGN}[1-9][0-9]{{0,2}}(?:[ '\u2019\u00a0\u2009\u202f][0-9]{{3}})+(?:[.,][0-9]*)?{_EXPONENT}"
 )
 _GROUP_SIGNS: Final = re.compile("[ '\u2019\u00a0\u2009\u202f]")
+_HEXADECIMAL: Final = re.compile("0[xX][0-9a-fA-F]{1,16}")
 _INFINITE: Final = re.compile("[-+]?inf(?:inity)?", re.IGNORECASE)
 _PLAIN: Final = re.compile(r"[0-9+\-.eE]*")
 _TO_PYTHON: Final = str.maketrans("dD\u2212", "ee-")
@@ -132,7 +135,7 @@ def columns_of_numbers(columns: Mapping[str, Sequence[str]]) -> dict[str, Number
     """
     fits = {name: _common(cells) for name, cells in columns.items()}
     certain = [fit.notations for fit in fits.values() if isinstance(fit, _Fit)]
-    points = any(not notations & COMMA for notations in certain)
+    points = any(not notations & COMMA for notations in certain if notations != HEXADECIMAL)
     commas = any(notations == COMMA for notations in certain)
     of_file = (COMMA if commas else 0) | (THOUSANDS if points else 0)
     return {
@@ -160,7 +163,7 @@ def _common(cells: Sequence[str]) -> _Fit | NotNumbers:
             else True
         )
         return _Fit(POINT | COMMA if grouped else POINT, values)
-    common = _EVERY
+    common = _EVERY | HEXADECIMAL
     for row, cell in enumerate(cells):
         if is_missing(cell):
             continue
@@ -243,6 +246,8 @@ def _floats(cells: Sequence[str]) -> Numbers | None:
 def _number(cell: str, notation: int) -> float:
     if _INFINITE.fullmatch(cell):
         return float(cell)
+    if _HEXADECIMAL.fullmatch(cell):
+        return float(int(cell, 16))
     if _OTHER_GROUPS.fullmatch(cell):
         cell = _GROUP_SIGNS.sub("", cell)
     if notation == THOUSANDS:
@@ -262,7 +267,9 @@ def _notations(cell: str) -> int:
             forms |= THOUSANDS
         if "." not in cell or _POINT_GROUPS.fullmatch(cell):
             forms |= COMMA
-        return forms
+        return forms | (HEXADECIMAL if cell == "0" else 0)
+    if _HEXADECIMAL.fullmatch(cell):
+        return HEXADECIMAL
     forms = 0
     if _WITH_COMMA.fullmatch(cell) or _POINT_GROUPS.fullmatch(cell):
         forms |= COMMA

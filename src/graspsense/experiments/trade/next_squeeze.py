@@ -167,8 +167,9 @@ def next_squeeze(params: Mapping[str, Any], seed: int) -> RecognitionResult:
                 name,
                 target,
                 INSTANCE_HELD_OUT,
-                [true for true, _ in rows],
+                [str(learning.true[trial]) for trial, _ in rows],
                 [str(learning.labels[decision.answer]) for _, decision in rows],
+                data.rows(np.array([trial for trial, _ in rows])),
                 cost=math.fsum(decision.seconds for _, decision in rows) / len(rows),
                 squeezes=sum(decision.squeezes for _, decision in rows) / len(rows),
             )
@@ -201,14 +202,14 @@ def _decisions(
     settings: NextSqueezeSettings,
     learning: _Learning,
     tables: Mapping[float, FeatureTable],
-) -> dict[str, list[tuple[str, Decision]]]:
-    """Return the true label and the decision of each trial, for each single squeeze and each threshold."""
+) -> dict[str, list[tuple[int, Decision]]]:
+    """Return each trial with its decision, for each single squeeze and each threshold."""
     controller = params["settings"]["controller"]
     again_s = OPENED_M / float(controller["closing_speed_m_s"])
     seconds = {force: _squeeze_seconds(table, controller) for force, table in tables.items()}
     shortest = next(iter(tables.values()))
     width = shortest.columns([width_feature(shortest.names) or shortest.names[0]])
-    decisions: dict[str, list[tuple[str, Decision]]] = {}
+    decisions: dict[str, list[tuple[int, Decision]]] = {}
     folds = instance_held_out(learning.true.tolist(), learning.instances, settings.folds, learning.seed)
     for fold in range(int(folds.max()) + 1):
         test, training = np.flatnonzero(folds == fold), np.flatnonzero(folds != fold)
@@ -221,15 +222,14 @@ def _decisions(
             statistics={force: statistics for force, (_, statistics) in learned.items()},
         )
         for k, i in enumerate(test.tolist()):
-            true = str(learning.true[i])
             for force, answers in choices.answers.items():
                 single = Decision(
                     answer=int(answers.answer[k]), seconds=float(answers.seconds[k]), squeezes=1
                 )
-                decisions.setdefault(fixed_name(force), []).append((true, single))
+                decisions.setdefault(fixed_name(force), []).append((i, single))
             for sure in settings.sure:
                 decision = decide(k, contact, choices, sure=sure, most=settings.most, again_s=again_s)
-                decisions.setdefault(f"sequential, sure at {sure:g}", []).append((true, decision))
+                decisions.setdefault(f"sequential, sure at {sure:g}", []).append((i, decision))
     return decisions
 
 

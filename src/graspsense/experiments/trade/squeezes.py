@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from attrs import field, frozen
@@ -25,6 +25,9 @@ from graspsense.experiments.trade.trade_task import (
     trial_groups,
 )
 from graspsense.sources.simulated import simulated
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 MIN_PROBABILITY: Final = 1e-3
 """Lower bound on a probability: a label that a tree gives no trial may still be correct."""
@@ -59,12 +62,14 @@ def squeezes(params: Mapping[str, Any], seed: int) -> RecognitionResult:
     for name, learner in classifiers_of(params).items():
         suffix = f", {name}" if len(params["learners"]) > 1 else ""
         for target in settings.targets:
-            true, predicted = _combined_predictions(learner, data, target, settings.most, seed)
+            squeezed, predicted = _combined_predictions(learner, data, target, settings.most, seed)
+            objects = data.rows(squeezed)
+            true = target_labels(objects.labels, target)
             for k, labels in predicted.items():
                 title = f"{counted(k, 'squeeze')}{suffix}"
                 results.append(
                     ClassifierResult.from_answers(
-                        title, target, INSTANCE_HELD_OUT, true, labels, cost=k * one_s
+                        title, target, INSTANCE_HELD_OUT, true, labels, objects, cost=k * one_s
                     )
                 )
     return simulated_result(data, results)
@@ -72,12 +77,12 @@ def squeezes(params: Mapping[str, Any], seed: int) -> RecognitionResult:
 
 def _combined_predictions(
     learner: SelectedComponent, data: Labelled, target: Target, n: int, seed: int
-) -> tuple[list[str], dict[int, list[str]]]:
-    """Return the true label of each object, and for 1 to `n` squeezes the predicted ones."""
+) -> tuple[NDArray[np.int64], dict[int, list[str]]]:
+    """Return the first trial of each object in a state, and for 1 to `n` squeezes the predicted labels."""
     instances = data.instances or ()
     all_labels = np.array(target_labels(data.labels, target))
     predicted: dict[int, list[str]] = {k: [] for k in range(1, n + 1)}
-    true: list[str] = []
+    squeezed: list[NDArray[np.int64]] = []
     for rows in trials_by_class(data.labels, target):
         labels = [str(label) for label in all_labels[rows]]
         folds = instance_held_out(labels, [instances[i] for i in rows], FOLDS, seed)
@@ -90,7 +95,7 @@ def _combined_predictions(
             logs = np.log(np.maximum(probabilities, MIN_PROBABILITY)).reshape(len(test) // n, n, -1)
             sums = logs.cumsum(axis=1)
             classes = classifier.classes()
-            true += [str(label) for label in all_labels[test[::n]]]
+            squeezed.append(test[::n])
             for k in predicted:
                 predicted[k] += [classes[best] for best in sums[:, k - 1].argmax(axis=1)]
-    return true, predicted
+    return np.concatenate(squeezed), predicted

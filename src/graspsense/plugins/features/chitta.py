@@ -73,6 +73,9 @@ FAR_APART_S: Final = 0.02
 MISSED: Final = 0.5
 """Share of the force at rest from which on the first force of a contact does not tell when it began."""
 
+HOLE: Final = 5.0
+"""A time between samples of so many usual ones is a hole, in which no rest is seen, or a clock that was set."""
+
 NO_TICKS: Final = 0.0
 NO_PAD: Final = 1.0
 LEFT_ONLY: Final = 2.0
@@ -107,7 +110,7 @@ class Measured(NamedTuple):
     window_s: float = 0.0
     """The window in which a rest shows, given the resolution of the gap."""
     blind_s: float = 0.0
-    """The time between samples in which the contact was missed; 0 if it was seen."""
+    """The time between samples in which the contact was missed, or a rest was not seen; 0 if both were."""
 
 
 def pad_force(choice: int, left_n: float, right_n: float) -> float:
@@ -128,6 +131,15 @@ def blind_time(before_s: float, contact_s: float, f_first: float, f_steady: floa
     """
     step_s = contact_s - before_s
     return step_s if step_s > FAR_APART_S and f_first >= MISSED * f_steady else 0.0
+
+
+def hole_within(t_s: NDArray[np.float64], since: int, shown: int) -> float:
+    """Return the longest time between the samples from `since` to `shown`, 0 if it is no hole among all until then."""
+    longest = 0.0
+    for i in range(since + 1, shown + 1):
+        longest = max(longest, t_s[i] - t_s[i - 1])
+    usual = (t_s[shown] - t_s[0] - longest) / max(shown - 1, 1)
+    return longest if longest > HOLE * usual else 0.0
 
 
 def reached_without_contact(params: ChittaParams, ticks: TickColumns) -> float:
@@ -172,7 +184,7 @@ def measure(params: ChittaParams, ticks: TickColumns) -> Measured:
     p_first, after_contact = gap[contact], t[end - 1] - t[contact]
     resolution = gap_resolution_by_sample(t, gap, contact, end)
     window_s = window_of_rest(resolution, params.rest_speed_m_s, params.rest_window_s)
-    still, since = RestState(t[contact], gap[contact]), contact
+    still, since, unseen_s = RestState(t[contact], gap[contact]), contact, 0.0
     for i in range(contact, end):
         if i > contact:
             state = update_rest(still, t[i], gap[i], params.rest_speed_m_s, window_s)
@@ -182,6 +194,10 @@ def measure(params: ChittaParams, ticks: TickColumns) -> Measured:
         # A controller can wait for more than rest, such as a force. The rest in its hold phase is then the one meant.
         shows = phase[i] == HOLD or not holds
         if shows and gap[since] == gap[since] and at_rest(still, t[i], window_s):
+            hole_s = hole_within(t, since, i)
+            if hole_s > 0.0 and not at_rest(still, t[i] - hole_s, window_s):
+                unseen_s = hole_s
+                continue
             f_first = pad_force(params.force, left[contact], right[contact])
             f_steady = pad_force(params.force, left[i], right[i])
             delta_t = t[since] - t[contact]
@@ -189,7 +205,9 @@ def measure(params: ChittaParams, ticks: TickColumns) -> Measured:
             return Measured(
                 REST, p_first, after_contact, gap[since], delta_t, f_first, f_steady, window_s, blind_s
             )
-    return Measured(CONTACT, p_first, after_contact, math.nan, math.nan, math.nan, math.nan, window_s, 0.0)
+    return Measured(
+        CONTACT, p_first, after_contact, math.nan, math.nan, math.nan, math.nan, window_s, unseen_s
+    )
 
 
 @lru_cache(maxsize=16)
@@ -232,7 +250,12 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
             return Features(names=NAMES, values=(math.nan,) * 6, units=units, reasons=reasons)
         if reached == CONTACT:
             why = f"not at rest within the {after_contact:.3g} {t} after contact"
-            if window_s > self.config.rest_window_s:
+            if blind_s > 0.0:
+                why = (
+                    f"rest not resolved: the gap stays for the {blind_s:.2g} {t} between two samples, and moves before "
+                    "and after it: is a part of the recording missing, or was the clock set?"
+                )
+            elif window_s > self.config.rest_window_s:
                 why = (
                     f"rest not resolved: the gap is so coarse, or measured so rarely, that a rest shows after "
                     f"{window_s:.3g} {t}, and there is none within the {after_contact:.3g} {t} after contact"
@@ -280,6 +303,10 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
         if rest_ticks is None:
             return Measured(CONTACT, p_first, after_contact, window_s=window_s)
         steady, shown = rest_ticks
+        if trace.units["t"] == "s" and hole_within(trace.t_s, steady, shown) > 0.0:
+            return measure(
+                self._params(), TickColumns(*(getattr(trace, name) for name in TickColumns._fields))
+            )
         p_steady, delta_t = float(trace.gap_m[steady]), float(trace.t_s[steady] - trace.t_s[contact])
         forces = self._force(trace, contact), self._force(trace, shown)
         blind_s = blind_time(float(trace.t_s[max(contact - 1, 0)]), float(trace.t_s[contact]), *forces)

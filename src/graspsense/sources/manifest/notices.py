@@ -21,6 +21,10 @@ BEGINS_LOADED: Final = 0.25
 """Share of its range above which the force of the first sample is that of a contact, or of a wrong zero."""
 JUMP: Final = 20.0
 """A time step of so many usual ones is a jump."""
+HOLE: Final = 5.0
+HOLE_S: Final = 0.05
+HOLE_FORCE: Final = 0.2
+"""A time step of so many usual ones, and so long, is a hole if the force changes in it by this share of its range."""
 SHORTEST_S: Final = 0.1
 """No grasp is shorter (s)."""
 MILLIMETRES: Final = 0.5
@@ -45,6 +49,8 @@ def notices_of(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
         yield from _of_unit(columns)
     yield from _of_zero(columns, zeroed=zeroed)
     yield from _of_time(columns)
+    if _is_felt(columns.force_n):
+        yield from _of_holes(columns)
 
 
 def _of_gap(columns: GraspColumns) -> Iterator[str]:
@@ -133,9 +139,22 @@ def _of_time(columns: GraspColumns) -> Iterator[str]:
         )
     if float(steps.max()) > JUMP * usual > 0.0:
         yield (
-            f"the time jumps by more than {JUMP:g} usual steps: does the file hold several grasps? "
+            f"the time jumps by more than {JUMP:g} usual steps: was the clock set, or are there several grasps? "
             + _FOUND * _has_several_squeezes(columns)
             + 'split = "COLUMN" splits it by a column'
+        )
+
+
+def _of_holes(columns: GraspColumns) -> Iterator[str]:
+    """Yield that there are no samples while the force changes by much."""
+    steps, force, t = np.diff(columns.t_s), columns.force_n, columns.units.get("t") or "s"
+    changes = np.abs(np.diff(force)) > HOLE_FORCE * np.ptp(force)
+    missed = np.flatnonzero(changes & (steps > HOLE * np.median(steps)) & ((steps > HOLE_S) | (t != "s")))
+    for k in missed[:1].tolist():
+        begin, end = columns.t_s[k : k + 2].tolist()
+        yield (
+            f"there are no samples from {begin:.4g} to {end:.4g} {t}, and the force changes from {force[k]:.3g} to "
+            f"{force[k + 1]:.3g} {columns.units.get('force') or 'N'}: a contact or a rest in this time is seen too late"
         )
 
 

@@ -27,7 +27,7 @@ from graspsense.core.values.written_times import seconds_since_first
 from graspsense.sources.csv_columns import INDEX
 from graspsense.sources.manifest.patterns import regular_expression
 from graspsense.sources.manifest.table import ColumnTable, Numbers
-from graspsense.sources.text_table import UNITS, Line, TextTable, read_lines, table_of
+from graspsense.sources.text_table import UNITS, Line, TextTable, numbers_with_unit, read_lines, table_of
 
 
 @define
@@ -98,6 +98,12 @@ def _columns(path: Path, part: _Part, table: TextTable, *, several: bool) -> Col
     texts: dict[str, Sequence[str]] = {}
     not_numbers: dict[str, str] = {}
     seconds: dict[str, str] = {}
+    units = {name: _unit_in(name) or unit for name, unit in zip(cells, table.units, strict=True)}
+    for name in cells:
+        numbers_in_cells, unit = numbers_with_unit(cells[name])
+        if unit and units[name] in ("", unit):
+            texts[name] = cells[name]
+            cells[name], units[name] = numbers_in_cells, unit
     for name, column in columns_of_numbers(cells).items():
         if not isinstance(column, NotNumbers):
             numbers[name] = column
@@ -119,7 +125,10 @@ def _columns(path: Path, part: _Part, table: TextTable, *, several: bool) -> Col
             numbers[name] = logical
         elif column.row or is_number(column.cell):
             not_numbers[name] = f"line {table.lines[column.row]} has {column.words}"
-    units = {name: _unit_in(name) or unit for name, unit in zip(cells, table.units, strict=True)}
+        elif numbers_with_unit([column.cell])[1]:
+            not_numbers[name] = (
+                f"line {table.lines[column.row]} has {column.cell!r}, and other cells have another unit or none"
+            )
     return ColumnTable(
         source=f"{path.name}, line {table.named_in or table.lines[0]}" if several else path.name,
         numbers=numbers,
