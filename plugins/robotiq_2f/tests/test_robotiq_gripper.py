@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 import threading
 from contextlib import suppress
 from types import SimpleNamespace
@@ -183,6 +184,61 @@ def test_whatever_becomes_of_replies_the_fingers_are_told_to_stop(emulated, wire
         assert mood in ("late", "repeated")
     driver.close()
     assert not gripper.state()["going"]
+
+
+def closing(gripper):
+    """Return an open driver that closes this gripper."""
+    driver = create("sensor-backend", "robotiq", port=gripper.where, reply_timeout_s=PATIENT_S)
+    driver.open(1)
+    driver.read(0.1)
+    driver.apply(Command(VELOCITY, -0.03, 25.0, 0.15))
+    driver.read(0.1)
+    assert gripper.state()["going"]
+    return driver
+
+
+@pytest.mark.usefixtures("own_time")
+@pytest.mark.parametrize("wire", ["pty", "socket", "ur"])
+def test_a_gripper_that_lost_its_power_is_not_activated_around_the_object(emulated, wire):
+    """Each request asks it to be active, and an activation runs over the whole stroke."""
+    gripper = emulated(wire)
+    driver = closing(gripper)
+    gripper.tell("restart")
+    with pytest.raises(DeviceLost, match="switched off and on"):
+        driver.read(0.1)
+    driver.apply(Command(VELOCITY, 0.0, 25.0, 0.15))
+    driver.close()
+    assert not gripper.state()["going"]
+    assert gripper._hand.active_since_s == np.inf
+
+    driver.open(1)
+    assert driver.read(0.1) is not None
+    driver.close()
+
+
+@pytest.mark.usefixtures("own_time")
+@pytest.mark.parametrize("wire", ["socket", "ur"])
+def test_a_gripper_whose_connection_broke_is_told_to_stop_over_a_new_one(emulated, wire):
+    gripper = emulated(wire)
+    driver = closing(gripper)
+    # A converter drops the first of two connections.
+    other = socket.create_connection(("127.0.0.1", int(gripper.where.rpartition(":")[2])))
+    other.sendall(b"\n")
+    with pytest.raises(DeviceLost, match="cable and power"):
+        driver.read(0.1)
+    assert gripper.state()["going"]
+    driver.close()
+    assert not gripper.state()["going"]
+    other.close()
+
+
+def test_fingers_that_do_not_move_end_the_grasp():
+    """A drive that more friction holds than it has force stands for an emergency stop, or for what blocks it."""
+    options = ["gripper.port=emulated", "gripper.body_config={coulomb_n=500.0, breakaway_n=500.0}"]
+    trial = load_pipeline("robotiq", options=options, force=True).grasp()
+    assert trial.outcome.words == "aborted"
+    assert "fingers stand still: they are told to close, and have been at 85.0 mm" in trial.reason
+    assert trial.trace.t_s[-1] < 5.0
 
 
 def test_a_late_reply_is_not_taken_for_that_of_the_next_request(emulated):

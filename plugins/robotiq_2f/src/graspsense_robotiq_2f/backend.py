@@ -153,8 +153,7 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
             self._move_target(goal, speed)
         else:
             self._target_m = goal
-        self._asked = Request(
-            active=True,
+        self._asked = self._asked._replace(
             go=True,
             position=self._model.position(self._target_m),
             speed=byte_of(speed, self._model.speeds_m_s),
@@ -167,14 +166,15 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
             self._zero = tare(images, self.config.pad_counts_per_newton, 0)
 
     def close(self) -> None:
-        """Stop the fingers if the gripper still responds, and close the connection."""
+        """Stop the fingers if the gripper still responds, if need be over a new connection, and close it."""
         link, self._link = self._link, None
         if link is not None:
-            stop = self._asked._replace(go=False).registers()
-            with suppress(NoReply, OSError):
-                self._polling.tried(lambda: link.exchange(stop), NoReply, OSError)
-            with suppress(OSError):
-                link.close()
+            try:
+                self._stop(link)
+            except OSError:
+                config = self.config
+                with suppress(OSError, ValueError):
+                    self._stop(opened_link(config.port, config.address, config.reply_timeout_s))
         fingertips, self._fingertips = self._fingertips, None
         if fingertips is not None:
             fingertips.close()
@@ -287,6 +287,16 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
         if goal_m < self._gap_m:
             self._target_m = max(self._target_m, self._gap_m - AHEAD_M)
 
+    def _stop(self, link: ModbusLink | UrCapLink | LockStepGripper) -> None:
+        """Tell the gripper to stop, and close the connection. Raises OSError if the connection was lost."""
+        stop = self._asked._replace(go=False).registers()
+        try:
+            with suppress(NoReply):
+                self._polling.tried(lambda: link.exchange(stop), NoReply)
+        finally:
+            with suppress(OSError):
+                link.close()
+
     def _exchange(self, request: Request) -> Status:
         assert self._link is not None
         return status_of(self._link.exchange(request.registers()))
@@ -300,6 +310,8 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
             raise DeviceLost(
                 f"the {self._model.name} at {self.config.port} does not answer ({error}): look at its cable and power"
             ) from error
-        if not status.active:
+        if status.state != ACTIVE:
+            # The request to be active has begun an activation, which runs over the whole stroke: it is taken back.
+            self._asked = self._asked._replace(active=False)
             raise DeviceLost(f"the {self._model.name} was switched off and on again: open it anew")
         return status
