@@ -36,6 +36,7 @@ _TABLE: Final[Table] = {
         "core.grasp.polling": ("Polling",),
         "core.grasp.reading_thread": ("ReadingThread",),
         "core.grasp.device_clock": ("DeviceClock", "clock_report"),
+        "core.grasp.dead_man_switch": ("DeadManSwitch",),
     },
     "Fingers, and where the gripper is mounted": {
         "core.values.fingers": ("FingerForce", "opposed_forces"),

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-import socket
+import subprocess
+import sys
 import threading
+import time
 from contextlib import suppress
 from types import SimpleNamespace
 
@@ -222,8 +224,8 @@ def test_a_gripper_whose_connection_broke_is_told_to_stop_over_a_new_one(emulate
     gripper = emulated(wire)
     driver = closing(gripper)
     # A converter drops the first of two connections.
-    other = socket.create_connection(("127.0.0.1", int(gripper.where.rpartition(":")[2])))
-    other.sendall(b"\n")
+    other = opened_link(gripper.where, driver.config.address, PATIENT_S)
+    other.status()
     with pytest.raises(DeviceLost, match="cable and power"):
         driver.read(0.1)
     assert gripper.state()["going"]
@@ -239,6 +241,33 @@ def test_fingers_that_do_not_move_end_the_grasp():
     assert trial.outcome.words == "aborted"
     assert "fingers stand still: they are told to close, and have been at 85.0 mm" in trial.reason
     assert trial.trace.t_s[-1] < 5.0
+
+
+HOLDS_ON = """
+import sys, time
+from graspsense.plugin_api import POSITION, Command, create
+driver = create("sensor-backend", "robotiq", port=sys.argv[1], reply_timeout_s=10.0)
+driver.open(0)
+for number in range(10**9):
+    driver.read(10.0)
+    driver.apply(Command(POSITION, 0.0, 25.0, 0.05))
+    if number == 10:
+        print("closes", flush=True)
+"""
+
+
+def test_a_program_that_is_killed_leaves_no_gripper_that_presses(emulated):
+    gripper = emulated()
+    with subprocess.Popen(
+        [sys.executable, "-c", HOLDS_ON, gripper.where], stdout=subprocess.PIPE, text=True
+    ) as program:
+        assert program.stdout.readline() == "closes\n"
+        assert gripper.state()["going"]
+        program.kill()
+    until_s = time.monotonic() + PATIENT_S
+    while gripper.state()["going"] and time.monotonic() < until_s:
+        time.sleep(0.01)
+    assert not gripper.state()["going"]
 
 
 def test_a_late_reply_is_not_taken_for_that_of_the_next_request(emulated):

@@ -11,7 +11,7 @@ from typing import Any, Final, final
 
 from attrs import evolve
 
-from graspsense.gripper_api import BackendWithEmulator, Polling, no_pads, pad_force, tare
+from graspsense.gripper_api import BackendWithEmulator, DeadManSwitch, Polling, no_pads, pad_force, tare
 from graspsense.plugin_api import (
     FORCE,
     NO_PADS,
@@ -48,6 +48,8 @@ RATE_HZ: Final = 100.0
 ACTIVATION_S: Final = 5.0
 COMMAND_DELAY_S: Final = 0.02
 """A command waits for the next exchange (10 ms), which takes 5 ms on the line, and the gripper's next period (5 ms)."""
+STOP: Final = "graspsense_robotiq_2f.stopping:stop"
+"""What is called if the program is killed."""
 AHEAD_M: Final = 0.004
 """How far a target that moves can be ahead of the fingers."""
 
@@ -89,6 +91,7 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
         self.least_step_m = self._model.step_m
         self._link: ModbusLink | UrCapLink | LockStepGripper | None = None
         self._emulated: LockStepGripper | None = None
+        self._switch: DeadManSwitch | None = None
         self._fingertips: TactileFingertips | None = None
         self._polling = Polling(RATE_HZ)
         self._gap_m = self._target_m = 0.0
@@ -110,7 +113,9 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
         self._asked = Request(active=True, go=False, position=0, speed=0, force=0)
         try:
             self._emulated = LockStepGripper(config, seed) if config.emulated else None
-            self._link = self._emulated or opened_link(config.port, config.address, config.reply_timeout_s)
+            self._link = self._emulated or self._opened_link()
+            if self._emulated is None:
+                self._switch = DeadManSwitch(STOP, config.port, config.address, config.reply_timeout_s)
             self._polling = Polling(RATE_HZ, self._emulated or time)
             status = self._activated()
             self._open_fingertips()
@@ -172,9 +177,11 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
             try:
                 self._stop(link)
             except OSError:
-                config = self.config
                 with suppress(OSError, ValueError):
-                    self._stop(opened_link(config.port, config.address, config.reply_timeout_s))
+                    self._stop(self._opened_link())
+        switch, self._switch = self._switch, None
+        if switch is not None:
+            switch.release()
         fingertips, self._fingertips = self._fingertips, None
         if fingertips is not None:
             fingertips.close()
@@ -286,6 +293,9 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
         self._target_m += min(max(goal_m - self._target_m, -step), step)
         if goal_m < self._gap_m:
             self._target_m = max(self._target_m, self._gap_m - AHEAD_M)
+
+    def _opened_link(self) -> ModbusLink | UrCapLink:
+        return opened_link(self.config.port, self.config.address, self.config.reply_timeout_s)
 
     def _stop(self, link: ModbusLink | UrCapLink | LockStepGripper) -> None:
         """Tell the gripper to stop, and close the connection. Raises OSError if the connection was lost."""
