@@ -27,7 +27,7 @@ from graspsense_robotiq_2f.config import RobotiqConfig
 from graspsense_robotiq_2f.discovery import diagnose
 from graspsense_robotiq_2f.emulator import ur_cap
 from graspsense_robotiq_2f.emulator.device import EmulatedGripper
-from graspsense_robotiq_2f.emulator.modbus import checksum
+from graspsense_robotiq_2f.emulator.modbus import answered, checksum
 from graspsense_robotiq_2f.link import ModbusLink
 from graspsense_robotiq_2f.registers import INPUT, MODELS, OUTPUT, byte_of
 from graspsense_robotiq_2f.ur_cap import opened_link
@@ -92,6 +92,7 @@ def test_a_grasp_over_every_wire(emulated, wire):
     assert not trial.features.reasons
     # The fingers are 85 mm apart, and the block of the simulator is narrower.
     assert 0.05 < trial.features["p_steady"] <= trial.features["p_first"] < 0.08
+    assert gripper.state()["gap_m"] > 0.08
     assert not gripper.state()["going"]
 
 
@@ -184,6 +185,57 @@ def test_whatever_becomes_of_replies_the_fingers_are_told_to_stop(emulated, wire
         assert mood in ("damaged", "silent")
     else:
         assert mood in ("late", "repeated")
+    driver.close()
+    assert not gripper.state()["going"]
+
+
+@pytest.mark.usefixtures("own_time")
+def test_fingers_that_open_slowly_begin_at_once(emulated):
+    """The target of a slow closing is up to 4 mm ahead, within the object."""
+    gripper = emulated()
+    driver = create("sensor-backend", "robotiq", port=gripper.where, reply_timeout_s=PATIENT_S)
+    driver.open(1)
+    for _ in range(400):
+        frame = driver.read(0.1).frame
+        driver.apply(Command(VELOCITY, -0.01, 25.0, 0.15))
+    driver.read(0.1)
+    driver.apply(Command(POSITION, 0.085, 25.0, 0.01))
+    driver.read(0.1)
+    assert MODELS["2f-85"].gap_m(gripper._hand.registers[1]) > frame.gap_m
+    driver.close()
+
+
+def test_requests_that_come_together_are_all_answered(emulated):
+    hand = emulated()._hand
+    asks = [
+        bytes([9, 23, *INPUT.to_bytes(2, "big"), 0, 3, *OUTPUT.to_bytes(2, "big"), 0, 1, 2, 9, go])
+        for go in (0, 8)
+    ]
+    together = b"".join(ask + checksum(ask) for ask in asks)
+    replies, left = answered(hand, 9, together + asks[0][:5], 1.0)
+    assert len(replies) == 2 * 11
+    assert left == asks[0][:5]
+
+
+class OneBehind:
+    """A line on which a reply is that to the request before, which the gripper has lost."""
+
+    def __init__(self, link):
+        self._link, self._late = link, link.status()
+        self.close = link.close
+
+    def exchange(self, values):
+        if self._late is None:
+            return self._link.exchange(values)
+        late, self._late = self._late, None
+        return late
+
+
+@pytest.mark.usefixtures("own_time")
+def test_a_late_reply_is_not_taken_for_that_to_the_stop(emulated):
+    gripper = emulated()
+    driver = closing(gripper)
+    driver._link = OneBehind(driver._link)
     driver.close()
     assert not gripper.state()["going"]
 

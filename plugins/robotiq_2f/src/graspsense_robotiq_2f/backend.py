@@ -273,7 +273,7 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
     def _activated(self) -> Status:
         """Return the status of the gripper once it is active. One that is already active does not move."""
         assert self._link is not None
-        status = status_of(self._link.status())
+        status = status_of(self._polling.tried(self._link.status, NoReply))
         if status.state == ACTIVE and not status.fault:
             return self._exchange(self._asked)
         self._exchange(self._asked._replace(active=False))
@@ -293,6 +293,9 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
         self._target_m += min(max(goal_m - self._target_m, -step), step)
         if goal_m < self._gap_m:
             self._target_m = max(self._target_m, self._gap_m - AHEAD_M)
+        elif goal_m > self._gap_m:
+            # A target that is left from closing is still within the object.
+            self._target_m = max(self._target_m, min(self._gap_m + self._model.step_m, goal_m))
 
     def _opened_link(self) -> ModbusLink | UrCapLink:
         return opened_link(self.config.port, self.config.address, self.config.reply_timeout_s)
@@ -300,22 +303,29 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
     def _stop(self, link: ModbusLink | UrCapLink | LockStepGripper) -> None:
         """Tell the gripper to stop, and close the connection. Raises OSError if the connection was lost."""
         stop = self._asked._replace(go=False).registers()
+
+        def told() -> None:
+            # A late reply to the request before says that it still goes.
+            if status_of(link.exchange(stop)).go:
+                raise NoReply("it does not say that it stops")
+
         try:
             with suppress(NoReply):
-                self._polling.tried(lambda: link.exchange(stop), NoReply)
+                self._polling.tried(told, NoReply)
         finally:
             with suppress(OSError):
                 link.close()
 
     def _exchange(self, request: Request) -> Status:
-        assert self._link is not None
-        return status_of(self._link.exchange(request.registers()))
+        link = self._link
+        assert link is not None
+        return status_of(self._polling.tried(lambda: link.exchange(request.registers()), NoReply))
 
     def _status(self) -> Status:
         if self._link is None:
             raise DeviceLost(f"the {self._model.name} is not open")
         try:
-            status = self._polling.tried(lambda: self._exchange(self._asked), NoReply)
+            status = self._exchange(self._asked)
         except (NoReply, OSError) as error:
             raise DeviceLost(
                 f"the {self._model.name} at {self.config.port} does not answer ({error}): look at its cable and power"
