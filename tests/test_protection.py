@@ -15,7 +15,7 @@ from graspsense.core.grasp.protection.effort_ceiling import effort_ceiling_n, li
 from graspsense.core.grasp.protection.motor import FeltForce, FreeEffort, Motor
 from graspsense.core.grasp.protection.pad_forces import StuckForce
 from graspsense.core.grasp.protection.reports import Reports
-from graspsense.core.grasp.protection.speed import GapSpeed
+from graspsense.core.grasp.protection.speed import GapSpeed, Standstill
 from graspsense.core.grasp.protection.status import StatusWatch
 from graspsense.core.grasp.protection.touch import Touch
 from graspsense.core.values.device import DeviceInfo
@@ -639,3 +639,44 @@ def test_a_late_velocity_and_a_gap_in_steps_agree(speed, dt, step, late_s):
 
 def test_a_gripper_without_velocity_agrees():
     assert travelled(lambda t: nan, lambda t: 0.09 - 0.01 * t) is None
+
+
+def standing(command, seconds, gap=0.05, jitter=0.0):
+    """Return how long (s) the fingers stand still under this command until a fault, or None."""
+    watch = Standstill()
+    for k in range(round(seconds * 100)):
+        fault = watch.see(frame(k / 100, gap + jitter * (k % 2), velocity=0.0), command)
+        if fault is not None:
+            assert fault.ends
+            return k / 100
+    return None
+
+
+@every_case(
+    ("command", "after_s"),
+    [
+        (Command(POSITION, 0.0, 20.0, 0.01), 3.0),
+        (Command(VELOCITY, -0.01, 20.0, inf), 3.0),
+        (Command(FORCE, 20.0, inf, inf), 3.0),
+        # 3 mm at 0.2 mm/s.
+        (Command(VELOCITY, -0.0002, 20.0, 0.01), 15.0),
+        (Command(POSITION, 0.06, 20.0, 0.01), None),
+        (Command(VELOCITY, 0.0, 20.0, 0.01), None),
+        (Command(FORCE, 0.0, inf, 0.01), None),
+        # What an effort should do is not known.
+        (Command(EFFORT, 20.0, inf, inf), None),
+        (Command(VELOCITY, nan, 20.0, 0.01), None),
+    ],
+)
+def test_fingers_that_do_not_close_when_told_are_found(command, after_s):
+    assert standing(command, 20.0, jitter=0.0007) == (
+        None if after_s is None else pytest.approx(after_s, abs=0.02)
+    )
+
+
+def test_fingers_that_are_closed_or_move_do_not_stand_still():
+    command = Command(VELOCITY, -0.01, 20.0, inf)
+    assert standing(command, 20.0, gap=0.002) is None
+    assert standing(command, 20.0, gap=nan) is None
+    watch = Standstill()
+    assert not any(watch.see(frame(k / 100, 0.05 - 0.005 * k / 1000), command) for k in range(2000))

@@ -74,6 +74,32 @@ def test_a_grasp_from_opening_to_release(ordinary):
     assert 20.0 in {c.value for c in gripper.commands}
 
 
+class ActsLate(Scripted):
+    """A gripper that opens 0.2 s after it is told to."""
+
+    command_delay_s = 0.25
+
+    def __init__(self):
+        super().__init__(self.gap, lambda t: bottle(t - self.command_delay_s))
+        self.told_s = inf
+
+    def apply(self, command):
+        super().apply(command)
+        t = self.k * 0.001
+        if command.value == -20.0 and t > REST_S + self.command_delay_s:
+            self.told_s = min(self.told_s, t)
+
+    def gap(self, t):
+        return min(squeezing(t - self.command_delay_s) + 0.1 * max(t - self.told_s - 0.2, 0.0), 0.074)
+
+
+def test_a_gripper_that_acts_late_is_not_taken_for_open_before_it_moves():
+    grasp = run_grasp(ActsLate(), HYBRID, RUN)
+    assert grasp.outcome is Outcome.STEADY
+    assert phases_of(grasp)[-1] is Phase.RELEASE
+    assert grasp.trace.gap_m[-1] == pytest.approx(0.074)
+
+
 def test_the_hold_lasts_as_long_as_asked():
     grasp = run_grasp(Scripted(squeezing, bottle), HYBRID, RunConfig(hold_s=0.5))
     held = grasp.trace.t_s[grasp.trace.phase == Phase.HOLD]

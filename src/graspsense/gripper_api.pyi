@@ -31,6 +31,7 @@ from graspsense.core.grasp.polling import Polling as Polling
 from graspsense.core.grasp.reading_thread import ReadingThread as ReadingThread
 from graspsense.core.grasp.device_clock import DeviceClock as DeviceClock
 from graspsense.core.grasp.device_clock import clock_report as clock_report
+from graspsense.core.grasp.dead_man_switch import DeadManSwitch as DeadManSwitch
 
 # Fingers, and where the gripper is mounted
 from graspsense.core.values.fingers import FingerForce as FingerForce

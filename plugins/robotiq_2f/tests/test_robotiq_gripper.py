@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import subprocess
+import sys
 import threading
+import time
 from contextlib import suppress
 from types import SimpleNamespace
 
@@ -24,7 +27,7 @@ from graspsense_robotiq_2f.config import RobotiqConfig
 from graspsense_robotiq_2f.discovery import diagnose
 from graspsense_robotiq_2f.emulator import ur_cap
 from graspsense_robotiq_2f.emulator.device import EmulatedGripper
-from graspsense_robotiq_2f.emulator.modbus import checksum
+from graspsense_robotiq_2f.emulator.modbus import answered, checksum
 from graspsense_robotiq_2f.link import ModbusLink
 from graspsense_robotiq_2f.registers import INPUT, MODELS, OUTPUT, byte_of
 from graspsense_robotiq_2f.ur_cap import opened_link
@@ -89,6 +92,7 @@ def test_a_grasp_over_every_wire(emulated, wire):
     assert not trial.features.reasons
     # The fingers are 85 mm apart, and the block of the simulator is narrower.
     assert 0.05 < trial.features["p_steady"] <= trial.features["p_first"] < 0.08
+    assert gripper.state()["gap_m"] > 0.08
     assert not gripper.state()["going"]
 
 
@@ -182,6 +186,139 @@ def test_whatever_becomes_of_replies_the_fingers_are_told_to_stop(emulated, wire
     else:
         assert mood in ("late", "repeated")
     driver.close()
+    assert not gripper.state()["going"]
+
+
+@pytest.mark.usefixtures("own_time")
+def test_fingers_that_open_slowly_begin_at_once(emulated):
+    """The target of a slow closing is up to 4 mm ahead, within the object."""
+    gripper = emulated()
+    driver = create("sensor-backend", "robotiq", port=gripper.where, reply_timeout_s=PATIENT_S)
+    driver.open(1)
+    for _ in range(400):
+        frame = driver.read(0.1).frame
+        driver.apply(Command(VELOCITY, -0.01, 25.0, 0.15))
+    driver.read(0.1)
+    driver.apply(Command(POSITION, 0.085, 25.0, 0.01))
+    driver.read(0.1)
+    assert MODELS["2f-85"].gap_m(gripper._hand.registers[1]) > frame.gap_m
+    driver.close()
+
+
+def test_requests_that_come_together_are_all_answered(emulated):
+    hand = emulated()._hand
+    asks = [
+        bytes([9, 23, *INPUT.to_bytes(2, "big"), 0, 3, *OUTPUT.to_bytes(2, "big"), 0, 1, 2, 9, go])
+        for go in (0, 8)
+    ]
+    together = b"".join(ask + checksum(ask) for ask in asks)
+    replies, left = answered(hand, 9, together + asks[0][:5], 1.0)
+    assert len(replies) == 2 * 11
+    assert left == asks[0][:5]
+
+
+class OneBehind:
+    """A line on which a reply is that to the request before, which the gripper has lost."""
+
+    def __init__(self, link):
+        self._link, self._late = link, link.status()
+        self.close = link.close
+
+    def exchange(self, values):
+        if self._late is None:
+            return self._link.exchange(values)
+        late, self._late = self._late, None
+        return late
+
+
+@pytest.mark.usefixtures("own_time")
+def test_a_late_reply_is_not_taken_for_that_to_the_stop(emulated):
+    gripper = emulated()
+    driver = closing(gripper)
+    driver._link = OneBehind(driver._link)
+    driver.close()
+    assert not gripper.state()["going"]
+
+
+def closing(gripper):
+    """Return an open driver that closes this gripper."""
+    driver = create("sensor-backend", "robotiq", port=gripper.where, reply_timeout_s=PATIENT_S)
+    driver.open(1)
+    driver.read(0.1)
+    driver.apply(Command(VELOCITY, -0.03, 25.0, 0.15))
+    driver.read(0.1)
+    assert gripper.state()["going"]
+    return driver
+
+
+@pytest.mark.usefixtures("own_time")
+@pytest.mark.parametrize("wire", ["pty", "socket", "ur"])
+def test_a_gripper_that_lost_its_power_is_not_activated_around_the_object(emulated, wire):
+    """Each request asks it to be active, and an activation runs over the whole stroke."""
+    gripper = emulated(wire)
+    driver = closing(gripper)
+    gripper.tell("restart")
+    with pytest.raises(DeviceLost, match="switched off and on"):
+        driver.read(0.1)
+    driver.apply(Command(VELOCITY, 0.0, 25.0, 0.15))
+    driver.close()
+    assert not gripper.state()["going"]
+    assert gripper._hand.active_since_s == np.inf
+
+    driver.open(1)
+    assert driver.read(0.1) is not None
+    driver.close()
+
+
+@pytest.mark.usefixtures("own_time")
+@pytest.mark.parametrize("wire", ["socket", "ur"])
+def test_a_gripper_whose_connection_broke_is_told_to_stop_over_a_new_one(emulated, wire):
+    gripper = emulated(wire)
+    driver = closing(gripper)
+    # A converter drops the first of two connections.
+    other = opened_link(gripper.where, driver.config.address, PATIENT_S)
+    other.status()
+    with pytest.raises(DeviceLost, match="cable and power"):
+        driver.read(0.1)
+    assert gripper.state()["going"]
+    driver.close()
+    assert not gripper.state()["going"]
+    other.close()
+
+
+def test_fingers_that_do_not_move_end_the_grasp():
+    """A drive that more friction holds than it has force stands for an emergency stop, or for what blocks it."""
+    options = ["gripper.port=emulated", "gripper.body_config={coulomb_n=500.0, breakaway_n=500.0}"]
+    trial = load_pipeline("robotiq", options=options, force=True).grasp()
+    assert trial.outcome.words == "aborted"
+    assert "fingers stand still: they are told to close, and have been at 85.0 mm" in trial.reason
+    assert trial.trace.t_s[-1] < 5.0
+
+
+HOLDS_ON = """
+import sys, time
+from graspsense.plugin_api import POSITION, Command, create
+driver = create("sensor-backend", "robotiq", port=sys.argv[1], reply_timeout_s=10.0)
+driver.open(0)
+for number in range(10**9):
+    driver.read(10.0)
+    driver.apply(Command(POSITION, 0.0, 25.0, 0.05))
+    if number == 10:
+        print("closes", flush=True)
+"""
+
+
+def test_a_program_that_is_killed_leaves_no_gripper_that_presses(emulated):
+    gripper = emulated()
+    with subprocess.Popen(
+        [sys.executable, "-c", HOLDS_ON, gripper.where], stdout=subprocess.PIPE, text=True
+    ) as program:
+        assert program.stdout.readline() == "closes\n"
+        assert gripper.state()["going"]
+        program.kill()
+    until_s = time.monotonic() + PATIENT_S
+    while gripper.state()["going"] and time.monotonic() < until_s:
+        time.sleep(0.01)
     assert not gripper.state()["going"]
 
 

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
+import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -228,6 +231,33 @@ def test_a_motor_that_is_not_asked_what_was_written_ends_the_grasp(emulated, wor
     with pytest.raises(DeviceLost, match=why):
         driver.read(0.1)
     driver.close()
+    assert not arm.state()["torque"]
+
+
+HOLDS_ON = """
+import sys, time
+from graspsense.plugin_api import POSITION, Command, create
+driver = create("sensor-backend", "so101", port=sys.argv[1], reply_timeout_s=10.0, calibration="none")
+driver.open(0)
+for number in range(10**9):
+    driver.read(10.0)
+    driver.apply(Command(POSITION, 0.0, 8.0, 0.05))
+    if number == 10:
+        print("closes", flush=True)
+"""
+
+
+def test_a_program_that_is_killed_leaves_no_gripper_that_presses(emulated):
+    arm = emulated()
+    with subprocess.Popen(
+        [sys.executable, "-c", HOLDS_ON, arm.where], stdout=subprocess.PIPE, text=True
+    ) as program:
+        assert program.stdout.readline() == "closes\n"
+        assert arm.state()["torque"]
+        program.kill()
+    until_s = time.monotonic() + PATIENT_S
+    while arm.state()["torque"] and time.monotonic() < until_s:
+        time.sleep(0.01)
     assert not arm.state()["torque"]
 
 

@@ -11,7 +11,7 @@ from typing import Any, Final, final
 
 from attrs import evolve
 
-from graspsense.gripper_api import BackendWithEmulator, Polling, no_pads, pad_force, tare
+from graspsense.gripper_api import BackendWithEmulator, DeadManSwitch, Polling, no_pads, pad_force, tare
 from graspsense.plugin_api import (
     FORCE,
     NO_PADS,
@@ -48,6 +48,8 @@ RATE_HZ: Final = 100.0
 ACTIVATION_S: Final = 5.0
 COMMAND_DELAY_S: Final = 0.02
 """A command waits for the next exchange (10 ms), which takes 5 ms on the line, and the gripper's next period (5 ms)."""
+STOP: Final = "graspsense_robotiq_2f.stopping:stop"
+"""What is called if the program is killed."""
 AHEAD_M: Final = 0.004
 """How far a target that moves can be ahead of the fingers."""
 
@@ -89,6 +91,7 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
         self.least_step_m = self._model.step_m
         self._link: ModbusLink | UrCapLink | LockStepGripper | None = None
         self._emulated: LockStepGripper | None = None
+        self._switch: DeadManSwitch | None = None
         self._fingertips: TactileFingertips | None = None
         self._polling = Polling(RATE_HZ)
         self._gap_m = self._target_m = 0.0
@@ -110,7 +113,9 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
         self._asked = Request(active=True, go=False, position=0, speed=0, force=0)
         try:
             self._emulated = LockStepGripper(config, seed) if config.emulated else None
-            self._link = self._emulated or opened_link(config.port, config.address, config.reply_timeout_s)
+            self._link = self._emulated or self._opened_link()
+            if self._emulated is None:
+                self._switch = DeadManSwitch(STOP, config.port, config.address, config.reply_timeout_s)
             self._polling = Polling(RATE_HZ, self._emulated or time)
             status = self._activated()
             self._open_fingertips()
@@ -153,8 +158,7 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
             self._move_target(goal, speed)
         else:
             self._target_m = goal
-        self._asked = Request(
-            active=True,
+        self._asked = self._asked._replace(
             go=True,
             position=self._model.position(self._target_m),
             speed=byte_of(speed, self._model.speeds_m_s),
@@ -167,14 +171,17 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
             self._zero = tare(images, self.config.pad_counts_per_newton, 0)
 
     def close(self) -> None:
-        """Stop the fingers if the gripper still responds, and close the connection."""
+        """Stop the fingers if the gripper still responds, if need be over a new connection, and close it."""
         link, self._link = self._link, None
         if link is not None:
-            stop = self._asked._replace(go=False).registers()
-            with suppress(NoReply, OSError):
-                self._polling.tried(lambda: link.exchange(stop), NoReply, OSError)
-            with suppress(OSError):
-                link.close()
+            try:
+                self._stop(link)
+            except OSError:
+                with suppress(OSError, ValueError):
+                    self._stop(self._opened_link())
+        switch, self._switch = self._switch, None
+        if switch is not None:
+            switch.release()
         fingertips, self._fingertips = self._fingertips, None
         if fingertips is not None:
             fingertips.close()
@@ -266,7 +273,7 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
     def _activated(self) -> Status:
         """Return the status of the gripper once it is active. One that is already active does not move."""
         assert self._link is not None
-        status = status_of(self._link.status())
+        status = status_of(self._polling.tried(self._link.status, NoReply))
         if status.state == ACTIVE and not status.fault:
             return self._exchange(self._asked)
         self._exchange(self._asked._replace(active=False))
@@ -286,20 +293,45 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
         self._target_m += min(max(goal_m - self._target_m, -step), step)
         if goal_m < self._gap_m:
             self._target_m = max(self._target_m, self._gap_m - AHEAD_M)
+        elif goal_m > self._gap_m:
+            # A target that is left from closing is still within the object.
+            self._target_m = max(self._target_m, min(self._gap_m + self._model.step_m, goal_m))
+
+    def _opened_link(self) -> ModbusLink | UrCapLink:
+        return opened_link(self.config.port, self.config.address, self.config.reply_timeout_s)
+
+    def _stop(self, link: ModbusLink | UrCapLink | LockStepGripper) -> None:
+        """Tell the gripper to stop, and close the connection. Raises OSError if the connection was lost."""
+        stop = self._asked._replace(go=False).registers()
+
+        def told() -> None:
+            # A late reply to the request before says that it still goes.
+            if status_of(link.exchange(stop)).go:
+                raise NoReply("it does not say that it stops")
+
+        try:
+            with suppress(NoReply):
+                self._polling.tried(told, NoReply)
+        finally:
+            with suppress(OSError):
+                link.close()
 
     def _exchange(self, request: Request) -> Status:
-        assert self._link is not None
-        return status_of(self._link.exchange(request.registers()))
+        link = self._link
+        assert link is not None
+        return status_of(self._polling.tried(lambda: link.exchange(request.registers()), NoReply))
 
     def _status(self) -> Status:
         if self._link is None:
             raise DeviceLost(f"the {self._model.name} is not open")
         try:
-            status = self._polling.tried(lambda: self._exchange(self._asked), NoReply)
+            status = self._exchange(self._asked)
         except (NoReply, OSError) as error:
             raise DeviceLost(
                 f"the {self._model.name} at {self.config.port} does not answer ({error}): look at its cable and power"
             ) from error
-        if not status.active:
+        if status.state != ACTIVE:
+            # The request to be active has begun an activation, which runs over the whole stroke: it is taken back.
+            self._asked = self._asked._replace(active=False)
             raise DeviceLost(f"the {self._model.name} was switched off and on again: open it anew")
         return status

@@ -12,7 +12,7 @@ from typing import Any, Final, TypeVar, final
 
 from attrs import evolve
 
-from graspsense.gripper_api import BackendWithEmulator, Polling, calibrations_of
+from graspsense.gripper_api import BackendWithEmulator, DeadManSwitch, Polling, calibrations_of
 from graspsense.plugin_api import (
     FORCE,
     NO_PADS,
@@ -52,6 +52,8 @@ from graspsense_so101_gripper.registers import (
 RATE_HZ: Final = 100.0
 SPEED_LIMIT_M_S: Final = 0.3
 FORCE_SPEED_M_S: Final = 0.02
+STOP: Final = "graspsense_so101_gripper.stopping:stop"
+"""What is called if the program is killed."""
 """Speed of a closing that only a force was asked for."""
 COMMAND_DELAY_S: Final = 0.02
 """A command is written at once (1 ms), and seen in the next frame (10 ms); the rest is for the motor to start."""
@@ -94,6 +96,7 @@ class So101Backend(BackendWithEmulator[So101Config]):
         self._bus: ServoBus | None = None
         self._emulated: LockStepBus | None = None
         self._polling = Polling(RATE_HZ)
+        self._switch: DeadManSwitch | None = None
         self._found: MotorRequest | None = None
         self._asked: MotorRequest | None = None
 
@@ -114,6 +117,10 @@ class So101Backend(BackendWithEmulator[So101Config]):
             self._jaw = jaw_of(memory, config, arm)
             state = self._state()
             self._found, self._position, self._stopped = state.asked, state.position, True
+            if self._emulated is None:
+                self._switch = DeadManSwitch(
+                    STOP, config.port, config.motor, config.reply_timeout_s, *state.asked
+                )
             self._ask(self._asked_of(state.position, SPEED_LIMIT_M_S, config.moving_force_n))
         except (OSError, NoStatusPacket, Unfit) as error:
             self.close()
@@ -173,6 +180,9 @@ class So101Backend(BackendWithEmulator[So101Config]):
             if self._found is not None:
                 self._give_back(bus, self._found)
             bus.close()
+        switch, self._switch = self._switch, None
+        if switch is not None:
+            switch.release()
         self._found = self._asked = None
 
     def report(self) -> dict[str, float | int | str | bool]:
@@ -203,7 +213,7 @@ class So101Backend(BackendWithEmulator[So101Config]):
         motor, position = self.config.motor, self._position
         with suppress(NoStatusPacket, OSError):
             position = motor_state(bus.read(motor, *STATE)).position
-        stop = request._replace(goal_position=position, goal_time=0).written()
+        stop = request.staying_at(position).written()
         with suppress(NoStatusPacket, OSError):
             self._polling.tried(lambda: bus.write(motor, STATE[0], stop), NoStatusPacket, OSError)
 

@@ -84,6 +84,10 @@ class MotorRequest(NamedTuple):
     goal_velocity: int
     torque_limit: int
 
+    def staying_at(self, position: int) -> MotorRequest:
+        """Return the request for a motor that stays at this position."""
+        return self._replace(goal_position=position, goal_time=0)
+
     def written(self) -> bytes:
         """Return the bytes from the first of these registers on."""
         return b"".join(REGISTERS[name].written(value) for name, value in self._asdict().items())

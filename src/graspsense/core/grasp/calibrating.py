@@ -79,7 +79,7 @@ class Rig:
     def _until_rest(self, command: Command) -> Reading:
         reading = self.tick(command)
         began_s = reading.frame.t_s
-        still = RestState(began_s, reading.frame.gap_m)
+        still = RestState(began_s + self._backend.command_delay_s, reading.frame.gap_m)
         while not at_rest(still, reading.frame.t_s, OPEN_WINDOW_S):
             if reading.frame.t_s - began_s > self._run.opening_timeout_s:
                 raise CalibrationFailed(

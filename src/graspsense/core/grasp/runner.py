@@ -507,6 +507,7 @@ class _Grasp:
             if not same_phase:
                 if phase == TARING and not self._tared(images, frame):
                     return
+                self.state = state = self._not_yet_at_rest(state, frame)
                 phase, newest = state.phase, pads.counter
                 self._event(frame.t_s, Phase(phase), Phase(phase).name.lower())
             if state.guard is not watcher:
@@ -545,6 +546,16 @@ class _Grasp:
         if problem := self.delivered.problem(reading):
             raise _NotDelivered(f"{self.info.name} delivered what it does not declare: {problem}")
         return reading
+
+    def _not_yet_at_rest(self, state: TickState, frame: Frame) -> TickState:
+        """Return the state of a phase that begins: fingers that open rest at the earliest when the gripper has acted.
+
+        Those that stand still until then would otherwise count as open, and be stopped before they move.
+        """
+        delay_s = self.backend.command_delay_s
+        if not delay_s or state.phase not in (Phase.OPENING, RELEASE):
+            return state
+        return state._replace(still=RestState(frame.t_s + delay_s, frame.gap_m))
 
     def _most_ticks(self) -> float:
         """Return the number of ticks that a grasp may take; a recording ends by itself.
@@ -705,7 +716,7 @@ class _Grasp:
     def _opened(self, opening: Command, last: Frame) -> str:
         """Open the fingers, and return in words whether they came to rest."""
         info, run = self.info, self.run
-        still, began_s = RestState(last.t_s, last.gap_m), last.t_s
+        still, began_s = RestState(last.t_s + self.backend.command_delay_s, last.gap_m), last.t_s
         give_up = time.perf_counter() + run.opening_timeout_s
         fresh = GuardState(1, 0, 0)
         # After a second Ctrl-C, only relax.

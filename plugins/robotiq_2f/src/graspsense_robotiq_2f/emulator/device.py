@@ -15,6 +15,7 @@ from graspsense_robotiq_2f.ur_cap import PREFIX
 
 RATE_HZ: Final = 100.0
 TACTILE_TICK_S: Final = 0.001
+RESTART: Final = "restart"
 
 
 def emulate(config: object, wire: str, seed: int) -> EmulatedGripper:
@@ -53,8 +54,17 @@ class EmulatedGripper(EmulatedSerial):
         """What the body knows."""
         return self._hand.fingers.body.report()
 
+    @property
+    def words(self) -> Mapping[str, str]:
+        """The words that `tell` understands, with their effects."""
+        return {**super().words, RESTART: "cut the power of the gripper for a moment"}
+
     def tell(self, word: str) -> None:
         """Execute one of `words`. Raises KeyError for any other."""
+        if word == RESTART:
+            with self._lock:
+                self._hand.power_up()
+            return
         super().tell(word)
         if word == "plug" and not self._tactile_ports:
             self._tactile_ports = [

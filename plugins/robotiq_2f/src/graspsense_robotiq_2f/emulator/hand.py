@@ -72,6 +72,11 @@ class Hand:
         if not request.active:
             self.active_since_s = inf
 
+    def power_up(self) -> None:
+        """Have what a gripper has after its power came: it is not active, and was asked for nothing."""
+        self._registers = [0] * COUNT
+        self.active_since_s = inf
+
     def read(self, address: int, count: int, now_s: float) -> list[int]:
         """Return input registers at this time. Raises IndexError for others."""
         start = address - INPUT

@@ -23,7 +23,17 @@ def checksum(data: bytes) -> bytes:
 
 
 def answered(hand: Hand, address: int, data: bytes, now_s: float) -> tuple[bytes, bytes]:
-    """Return the reply to the data, and the remaining data: an incomplete request waits for its end."""
+    """Return the replies to the data, and the remaining data: an incomplete request waits for its end."""
+    replies = b""
+    while True:
+        reply, remaining = _answered_first(hand, address, data, now_s)
+        replies += reply
+        if len(remaining) == len(data):
+            return replies, remaining
+        data = remaining
+
+
+def _answered_first(hand: Hand, address: int, data: bytes, now_s: float) -> tuple[bytes, bytes]:
     if len(data) < 8:
         return b"", data
     lengths = {WRITE: 9 + data[6], READ_AND_WRITE: 13 + (data[10] if len(data) > 10 else 255)}

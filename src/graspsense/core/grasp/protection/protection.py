@@ -20,7 +20,7 @@ from graspsense.core.grasp.protection.effort_ceiling import asked_effort_n, effo
 from graspsense.core.grasp.protection.motor import FeltForce, FreeEffort, Motor
 from graspsense.core.grasp.protection.pad_forces import PadBalance, StuckForce
 from graspsense.core.grasp.protection.reports import Reports
-from graspsense.core.grasp.protection.speed import GapSpeed, Rush
+from graspsense.core.grasp.protection.speed import GapSpeed, Rush, Standstill
 from graspsense.core.grasp.protection.status import StatusWatch
 from graspsense.core.grasp.protection.touch import Touch
 from graspsense.core.values.device import DeviceInfo
@@ -83,6 +83,7 @@ class Protection:
         self._motor = Motor("effort" in rates, info.rate_hz)
         self._status = StatusWatch(info.status_bits)
         first_m_s = run.first_speed_m_s if info.clock == "device" else inf
+        self._standstill = Standstill()
         self._rush = Rush(min(first_m_s, info.speed_limit_m_s), info.rate_hz)
         self._reports = Reports(info.rate_hz, rates.get("pads", 0.0))
 
@@ -116,6 +117,8 @@ class Protection:
             self._felt.apply(allowed)
         if phase == APPROACH and self._touch.free():
             self._see(self._free_effort.see(frame, allowed))
+        if phase == APPROACH and self.ending is None:
+            self._see(self._standstill.see(frame, allowed))
         self.acted += allowed.value != command.value or self._gives(command) > asked_effort_n(allowed)
         self._motor.apply(frame, allowed)
         return allowed

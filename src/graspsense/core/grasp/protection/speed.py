@@ -1,4 +1,4 @@
-"""Whether the gap moves as the velocity says, and whether the fingers approach faster than they may.
+"""Whether the gap moves as the velocity says, and whether the fingers approach too fast or not at all.
 
 An encoder can stand still, and a gripper that closes by itself may take no limit of the speed.
 """
@@ -8,8 +8,9 @@ from __future__ import annotations
 from math import exp, nan
 from typing import Final
 
+from graspsense.core.grasp.protection.touch import CLOSED_M
 from graspsense.core.values.faults import Fault
-from graspsense.core.values.signals import Frame
+from graspsense.core.values.signals import EFFORT, FORCE, POSITION, Command, Frame
 
 MEMORY_S: Final = 0.5
 """Time constant over which travels are summed."""
@@ -22,6 +23,12 @@ RUSH: Final = 3.0
 """Speed over the limit of a first use from which on the fingers rush: a loop overshoots when it starts."""
 RUSH_S: Final = 0.1
 """Time for which they must do so; at least three frames."""
+STILL_M: Final = 0.001
+"""Travel of the gap below which the fingers stand still: more than a step of a coarse encoder."""
+STILL_S: Final = 3.0
+"""Time for which fingers that are told to close may stand still."""
+TOLD_M: Final = 0.003
+"""Travel that they must have been told in this time."""
 
 
 class GapSpeed:
@@ -82,3 +89,38 @@ class Rush:
             "a position or a velocity instead of an effort",
             ends=True,
         )
+
+
+class Standstill:
+    """Watches whether the fingers move in the approach, where the command says at which speed they should."""
+
+    def __init__(self) -> None:
+        self._gap_m = self._since_s = nan
+
+    def see(self, frame: Frame, command: Command) -> Fault | None:
+        """Take a frame of the approach with its command, and return the fault if the fingers stand still."""
+        closing_m_s = closing_speed_m_s(frame, command)
+        if not closing_m_s > 0.0 or frame.gap_m <= CLOSED_M or not abs(frame.gap_m - self._gap_m) < STILL_M:
+            self._gap_m, self._since_s = frame.gap_m, frame.t_s
+            return None
+        still_s = frame.t_s - self._since_s
+        if still_s <= max(STILL_S, TOLD_M / closing_m_s):
+            return None
+        return Fault(
+            "fingers stand still",
+            f"they are told to close, and have been at {frame.gap_m * 1e3:.1f} mm for {still_s:.0f} s: look for an "
+            "emergency stop, a thing that blocks them, or one that is too wide for the opening",
+            ends=True,
+        )
+
+
+def closing_speed_m_s(frame: Frame, command: Command) -> float:
+    """Return the speed at which this command tells the fingers to close; 0 where it does not say."""
+    kind, value, _, speed_limit_m_s = command
+    if kind == EFFORT:
+        return 0.0
+    if kind == POSITION:
+        return speed_limit_m_s if value < frame.gap_m else 0.0
+    if kind == FORCE:
+        return speed_limit_m_s if value > 0.0 else 0.0
+    return min(-value, speed_limit_m_s)
