@@ -52,9 +52,9 @@ from graspsense_so101_gripper.registers import (
 RATE_HZ: Final = 100.0
 SPEED_LIMIT_M_S: Final = 0.3
 FORCE_SPEED_M_S: Final = 0.02
+"""Speed of a closing that only a force was asked for."""
 STOP: Final = "graspsense_so101_gripper.stopping:stop"
 """What is called if the program is killed."""
-"""Speed of a closing that only a force was asked for."""
 COMMAND_DELAY_S: Final = 0.02
 """A command is written at once (1 ms), and seen in the next frame (10 ms); the rest is for the motor to start."""
 
