@@ -30,7 +30,7 @@ from graspsense.plugins.controllers.force import ForceConfig, ForceController
 from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
 from graspsense.plugins.controllers.send_and_watch import SendAndWatchConfig, SendAndWatchController
 from graspsense.plugins.controllers.velocity import VelocityConfig, closing_effort
-from graspsense.simulator_api import CHANNELS
+from graspsense.simulator_api import CHANNELS, params_of
 from graspsense.testing.model_gripper import OBJECTS, ModelGripper
 
 HERE = sys.modules[__name__]
@@ -150,7 +150,7 @@ class OwnLoop(SensorBackend):
     def __init__(self, body, rate_hz):
         super().__init__(body.config)
         self._body, self._rate_hz, self._ticks = body, rate_hz, round(self.body_hz / rate_hz)
-        self._loop = VelocityConfig()
+        self._loop = params_of(VelocityConfig())
 
     @property
     def channels(self):
@@ -184,7 +184,7 @@ class OwnLoop(SensorBackend):
         if kind != POSITION:
             return self._command
         speed = min(max((frame.gap_m - target_m) / self.near_s, -speed_m_s), speed_m_s)
-        loop = evolve(self._loop, closing_speed_m_s=speed)
+        loop = self._loop._replace(closing_speed_m_s=speed)
         effort, integral = closing_effort(loop, self._integral_n, frame.velocity_m_s, 1.0 / self.body_hz)
         most_n = force_n + self.friction_n
         if abs(effort) < most_n:
