@@ -294,7 +294,7 @@ def test_no_such_file_or_name(tmp_path):
         load_model("nosuch", installed())
     with (
         IsolatedPlugins() as plugins,
-        pytest.raises(UnknownName, match="It comes with graspsense-sim-gripper"),
+        pytest.raises(UnknownName, match="provided by graspsense-sim-gripper"),
     ):
         load_model("default", plugins)
 

@@ -10,6 +10,7 @@ from cases import every_case
 
 from graspsense.core.components.config import select_component
 from graspsense.core.components.entries import PipelineEntry
+from graspsense.core.components.firstparty import provider
 from graspsense.core.components.registry import IsolatedPlugins, canonical, installed
 from graspsense.core.components.roles import SensorBackend
 from graspsense.core.values.errors import PluginUnavailable, UnknownName
@@ -151,9 +152,22 @@ def test_text_for_a_part_of_ours_that_is_not_installed(site, name):
 
     assert str(caught.value) == (
         f"no sensor backend named '{name}'. It is provided by graspsense-pr2-gripper:\n"
-        "  in a clone: pip install -e . -e ./plugins/pr2_gripper"
+        "  in a clone: pip install -r requirements-all.txt"
         '     published: pip install "graspsense[pr2]"'
     )
+
+
+def test_what_each_distribution_of_ours_has_is_known_where_it_is_not_installed():
+    """But for conformance checks, which nobody names, and parts of graspsense itself."""
+    parts = [(part.role, part.name, part.distribution) for part in installed().components()]
+    parts += [(part.kind, part.name, part.distribution) for part in installed().all_resources()]
+    of_others = [part for part in parts if part[2] != "graspsense" and part[0] != "conformance check"]
+
+    assert len(of_others) > 40
+    for kind, name, distribution in of_others:
+        provided = provider(kind, name)
+        assert provided, f"{kind} {name} of {distribution}"
+        assert provided.distribution == distribution
 
 
 def test_a_part_of_ours_that_is_installed_and_broken_is_not_to_be_installed_again(site):

@@ -46,14 +46,18 @@ def test_requirements_install_every_distribution_in_editable_form() -> None:
 
 
 def test_an_installation_for_use_has_every_distribution_with_the_same_versions() -> None:
-    lines = [line for line in (ROOT / "requirements.txt").read_text().splitlines() if line[:1] != "#"]
-    assert lines[0] == "-c constraints.txt"
+    default, added = (
+        [line for line in (ROOT / name).read_text().splitlines() if line[:1] != "#"]
+        for name in ("requirements.txt", "requirements-all.txt")
+    )
+    assert (default[0], added[0]) == ("-c constraints.txt", "-r requirements.txt")
+    lines = sorted([*default[1:], *added[1:]])
     assert [line for line in lines if line.startswith(".")] == [
         ".",
         *(f"./plugins/{folder.name}" for folder in FOLDERS),
     ]
     tools = PROJECT["dependency-groups"]["dev"]
-    assert [line for line in lines if not line.startswith((".", "-"))] == [
+    assert [line for line in lines if not line.startswith(".")] == [
         line for line in tools if line.startswith(("matplotlib", "numba", "websockets"))
     ]
 

@@ -109,10 +109,11 @@ def test_a_kind_of_file_is_recognised_by_keys_that_it_has():
 
 
 def test_every_component_of_an_example_is_known_by_its_folder():
-    for (_, name), example in EXAMPLES.items():
-        plugin = Path(__file__).parents[1] / "examples" / example.folder
-        assert f'name="{name}"' in next(plugin.glob("src/*/plugin.py")).read_text()
-        assert f'name = "{example.distribution}"' in (plugin / "pyproject.toml").read_text()
+    for example in EXAMPLES:
+        folder = Path(__file__).parents[1] / example.hint.rpartition("-e ")[2]
+        declared = next(folder.glob("src/*/plugin.py")).read_text()
+        assert all(f'name="{name}"' in declared for names in example.names.values() for name in names)
+        assert f'name = "{example.distribution}"' in (folder / "pyproject.toml").read_text()
 
 
 def test_a_scene_without_terms_is_refused(run, tmp_path):

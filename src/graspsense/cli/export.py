@@ -34,6 +34,7 @@ def export(source: str, target: str, pictures: bool, as_json: bool) -> None:
     .mcap (a copy of the recording) and .toml (its settings). NAME:FOLDER is a data set that a plugin writes, as
     lerobot:FOLDER. Existing files are never overwritten.
     """
+    from graspsense.core.components.firstparty import provider
     from graspsense.core.values.errors import ConfigError
     from graspsense.recording import export_trace
     from graspsense.recording.reader import read_recorded
@@ -44,7 +45,7 @@ def export(source: str, target: str, pictures: bool, as_json: bool) -> None:
     path = Path(target)
     table = Path(source).is_dir()
     kind, _, place = target.partition(":")
-    if place and kind in datasets_to_write():
+    if place and (kind in datasets_to_write() or provider("data set", kind)):
         if not table or pictures:
             raise ConfigError(
                 f"{target!r}: a data set is written from the folder of a store, without --pictures"

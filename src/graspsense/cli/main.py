@@ -21,7 +21,7 @@ from graspsense.cli.terminal import Style, echo, echo_as_it_is, has_colour, talk
 from graspsense.core.compiling.compile_notice import tell_compiling
 from graspsense.core.components.caller import command_line
 from graspsense.core.grasp.interrupts import ended_like_ctrl_c
-from graspsense.core.values.errors import GraspsenseError, PluginUnavailable, UnknownName, suggestion
+from graspsense.core.values.errors import GraspsenseError, PluginUnavailable
 
 PROGRAM: Final = "graspsense"
 COMPLETION_VARIABLE: Final = "_GRASPSENSE_COMPLETE"
@@ -101,15 +101,7 @@ def _plugin_command(name: str) -> click.Command:
     from graspsense.core.components.entries import CommandEntry
     from graspsense.core.components.registry import installed
 
-    plugins = installed()
-    added = plugins.resources(CommandEntry)
-    if all(name not in (resource.name, resource.qualified) for resource in added):
-        known = [*COMMANDS, *(resource.name for resource in added)]
-        raise UnknownName(
-            f"no command named {name!r}. Known: {', '.join(known)}.{suggestion(name, known)}"
-            + plugins.absences()
-        )
-    resource = plugins.resource(CommandEntry, name)
+    resource = installed().resource(CommandEntry, name, COMMANDS)
     command = resource.load()
     if not isinstance(command, click.Command):
         raise PluginUnavailable(

@@ -280,6 +280,7 @@ def _settings(options: Sequence[str]) -> dict[str, Any]:
 
 def _rows(loaded: Plugins) -> list[dict[str, Any]]:
     """Return one row a component; one for a plugin without any; one for a component that is not installed."""
+    from graspsense.core.components.entries import TABLE_OF_ROLE
     from graspsense.core.components.firstparty import SHIPPED
 
     advice: dict[str, tuple[str, ...]] = {}
@@ -315,8 +316,10 @@ def _rows(loaded: Plugins) -> list[dict[str, Any]]:
     distributions = {status.distribution for status in loaded.statuses}
     rows += [
         _row(role, name, shipped.distribution, None, "not installed", "", shipped.hint)
-        for (role, name), shipped in SHIPPED.items()
+        for shipped in SHIPPED
         if shipped.distribution not in distributions
+        for role in TABLE_OF_ROLE
+        for name in shipped.names.get(role, ())
     ]
     return rows
 

@@ -23,7 +23,6 @@ from attrs import evolve, frozen
 from graspsense import __version__
 from graspsense.core.components.caller import set_option
 from graspsense.core.components.entries import TABLE_OF_ROLE, ModelEntry
-from graspsense.core.components.firstparty import MODELS
 from graspsense.core.components.setting import CHANGES_NO_RESULT, NAMES_INPUT, UNIT_OF_ENDING, settings_marked
 from graspsense.core.files.whole_file import write_whole
 from graspsense.core.learn.certainty import Certainty, certainty_from, with_certainty
@@ -746,10 +745,8 @@ def _text(name: str, plugins: Plugins) -> bytes:
         try:
             return plugins.resource(ModelEntry, name).file().read_bytes()
         except UnknownName as error:
-            shipped = MODELS.get(name)
-            hint = f"\n  It comes with {shipped.distribution}:\n  {shipped.hint}" if shipped else ""
             raise UnknownName(
-                f"{error}{hint}\n  A model of your own is a file: write its name with .json"
+                f"{error}\n  A model of your own is a file: write its name with .json"
             ) from error
     return model_bytes(name)
 

@@ -11,7 +11,7 @@ import os
 import sys
 import traceback
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from types import MappingProxyType, TracebackType
+from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
 
 from attrs import evolve
@@ -34,15 +34,7 @@ from graspsense.core.components.entries import (
     PipelineEntry,
     Role,
 )
-from graspsense.core.components.firstparty import (
-    EXAMPLES,
-    EXPERIMENT_KINDS,
-    EXPERIMENTS,
-    IDENTIFIERS,
-    SHIPPED,
-    Example,
-    Shipped,
-)
+from graspsense.core.components.firstparty import provider
 from graspsense.core.components.registry.discovery import (
     PluginSource,
     builtin_source,
@@ -85,12 +77,6 @@ COMPONENT_HOOKS: Final[dict[str, Role]] = {
     "graspsense_feature_sets": "feature-set",
     "graspsense_classifiers": "classifier",
 }
-_SHIPPED: Final[Mapping[type, Mapping[str, Shipped]]] = {
-    ExperimentEntry: EXPERIMENTS,
-    ExperimentKindEntry: EXPERIMENT_KINDS,
-    IdentifierEntry: IDENTIFIERS,
-}
-"""Resources of other distributions of this project, for the hint if one is not installed."""
 RESOURCE_HOOKS: Final[dict[str, type]] = {
     "graspsense_pipelines": PipelineEntry,
     "graspsense_models": ModelEntry,
@@ -169,9 +155,7 @@ class Plugins:
         if role not in TABLE_OF_ROLE:
             raise UnknownName(f"no role {str(role)[:40]!r}: name one of {', '.join(TABLE_OF_ROLE)}")
         key = f"{TABLE_OF_ROLE[role]}.type"
-        provided: dict[tuple[Role, str], Shipped | Example] = {**EXAMPLES, **SHIPPED}
-        shipped = {short: by for (of_role, short), by in provided.items() if of_role == role}
-        return self._only(role.replace("-", " "), self.components(role), name, key, shipped)
+        return self._only(role, self.components(role), name, key)
 
     def resources(self, kind: type[EntryT]) -> tuple[Resource[EntryT], ...]:
         """Return what plugins declare by entries of this type, in the order of the names."""
@@ -181,12 +165,13 @@ class Plugins:
         """Return the resources of every kind, in the order of the names."""
         return tuple(sorted(self._resources, key=lambda resource: (resource.name, resource.distribution)))
 
-    def resource(self, kind: type[EntryT], name: str) -> Resource[EntryT]:
-        """Return the resource of this kind with this short or qualified name. Raises UnknownName."""
+    def resource(self, kind: type[EntryT], name: str, others: Iterable[str] = ()) -> Resource[EntryT]:
+        """Return the resource of this kind with this short or qualified name.
+
+        Raises UnknownName, which also lists `others`: names of this kind that no plugin declares.
+        """
         key = "kind" if kind is ExperimentKindEntry else ""
-        return self._only(
-            KIND_OF_ENTRY[kind], self.resources(kind), name, key, _SHIPPED.get(kind, MappingProxyType({}))
-        )
+        return self._only(KIND_OF_ENTRY[kind], self.resources(kind), name, key, others)
 
     def unknown(self, name: str) -> UnknownName:
         """Return the error for a name that no distribution with plugins and no component has."""
@@ -324,13 +309,14 @@ class Plugins:
         known: Sequence[PartT],
         name: str,
         key: str,
-        shipped: Mapping[str, Shipped | Example] | Mapping[str, Shipped],
+        others: Iterable[str] = (),
     ) -> PartT:
-        """Return the part among `known` with this name, or raise UnknownName.
+        """Return the part among `known` with this name, or raise UnknownName, which also lists `others`.
 
-        `key` is the setting in which the qualified name belongs. `shipped` names distributions of this project that
-        provide a part: where one is not installed, the error says how to install it.
+        `key` is the setting in which the qualified name belongs. Where a distribution of this project provides the
+        part and is not installed, the error says how to install it.
         """
+        title = kind.replace("-", " ")
         wanted, _, short = name.rpartition("/")
         matching = [
             part
@@ -343,15 +329,15 @@ class Plugins:
             providers = " and ".join(part.distribution for part in matching)
             how = f"{key} = " if key else ""
             raise UnknownName(
-                f'{kind} {name!r} is provided by {providers}; write {how}"{matching[0].qualified}"'
+                f'{title} {name!r} is provided by {providers}; write {how}"{matching[0].qualified}"'
             )
-        by = shipped.get(short)
+        by = provider(kind, short)
         present = {status.distribution for status in self._statuses}
         if by and canonical(wanted) in ("", by.distribution) and by.distribution not in present:
-            raise UnknownName(f"no {kind} named {name!r}. It is provided by {by.distribution}:\n  {by.hint}")
-        names = sorted({part.qualified if wanted else part.name for part in known})
+            raise UnknownName(f"no {title} named {name!r}. It is provided by {by.distribution}:\n  {by.hint}")
+        names = sorted({*(part.qualified if wanted else part.name for part in known), *others})
         raise UnknownName(
-            f"no {kind} named {name!r}. Known: {', '.join(names) or 'none'}.{suggestion(name, names)}"
+            f"no {title} named {name!r}. Known: {', '.join(names) or 'none'}.{suggestion(name, names)}"
             + self.absences()
         )
 
