@@ -45,11 +45,13 @@ def require_picture(path: Path) -> None:
 
 
 def grasp_png(trial: Trial, path: Path) -> None:
-    """Draw a trial as a PNG file. Raises as `require_picture`, and ConfigError where `path` cannot be written."""
+    """Draw a trial as a PNG file, with its text as the `Description` of the file.
+
+    Raises as `require_picture`, and ConfigError where `path` cannot be written.
+    """
     require_picture(path)
-    lines = [
-        part for line in _words(trial) for part in wrap(line, COLUMNS, subsequent_indent="      ") or [""]
-    ]
+    text = _words(trial)
+    lines = [part for line in text for part in wrap(line, COLUMNS, subsequent_indent="      ") or [""]]
     height = max(HEIGHT_IN, LINE_IN * len(lines))
     figure = new_figure(8.5, height, DPI)
     grid = figure.add_gridspec(2, 2, width_ratios=(2.1, 1.0))
@@ -59,7 +61,7 @@ def grasp_png(trial: Trial, path: Path) -> None:
     draw_trace(trial.trace, force, gap, fingers_of(trial.device.channels))
     words.set_axis_off()
     words.text(0.0, 1.0, "\n".join(lines), va="top", fontsize=8.5, linespacing=1.45)
-    write_picture(path, figure)
+    write_picture(path, figure, metadata={"Description": "\n".join(text)})
 
 
 def _words(trial: Trial) -> list[str]:

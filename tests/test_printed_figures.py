@@ -1,0 +1,127 @@
+"""The figures that the pages print are those of the stored results, and those that their commands print today."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from cases import every_case
+from commands import printed
+from PIL import Image
+
+from graspsense.core.components.config import resolve, select_component
+from graspsense.core.components.registry import installed
+from graspsense.core.learn.checkpoints import split_checkpoints
+from graspsense.core.learn.model import model_for
+from graspsense.evaluation.checkpoints import SURE, early_recognition
+from graspsense.sources.trial_source import load_trials
+
+ROOT = Path(__file__).parents[1]
+RESULTS = ROOT / "benchmarks" / "results"
+PERCENTAGE = re.compile(r"\b\d+\.\d %")
+SAME_ON_ANY_PROCESSOR = 0.006
+"""Kernels of the linear algebra round differently, which can change the answer to a few of 900 trials."""
+
+
+def page(name: str) -> str:
+    return (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
+
+
+def results(name: str) -> str:
+    return (RESULTS / f"{name}.md").read_text(encoding="utf-8")
+
+
+def rates(text: str) -> list[float]:
+    """Return the percentages of a text as shares."""
+    return [float(found.removesuffix(" %")) / 100.0 for found in PERCENTAGE.findall(text)]
+
+
+def row(text: str, *begin: str) -> str:
+    """Return the first row of a table, of a page or printed, whose first cells are these."""
+    cells = r"[ |`]+".join(map(re.escape, begin))
+    return re.search(rf"^[ |`]*{cells}[ |`].*$", text, flags=re.MULTILINE)[0]
+
+
+@every_case("name", ["recognition", "trade"])
+def test_the_percentages_of_a_page_are_those_of_its_results(name):
+    measured = set(PERCENTAGE.findall(results(name) + results("other_data")))
+    told = set(PERCENTAGE.findall(page(name)))
+    assert len(told) > 5
+    assert told <= measured, f"docs/{name}.md"
+
+
+def test_the_picture_of_the_readme_shows_the_grasp_of_today(tmp_path):
+    printed("run", "--plot", tmp_path / "grasp.png")
+    with Image.open(tmp_path / "grasp.png") as today, Image.open(ROOT / "docs" / "grasp.png") as shown:
+        assert today.info["Description"] == shown.info["Description"]
+        assert "Prediction" in shown.info["Description"]
+
+
+@pytest.mark.slow
+def test_the_comparison_of_classifiers_is_the_one_of_today():
+    command = "compare simulated --classifiers c45,knn --feature-sets chitta,curve --instances 20 --trials 3 --folds 5"
+    today = printed(*command.split(), "--seed", "10")
+    for names in (("c45", "curve"), ("c45", "chitta"), ("knn", "curve"), ("knn", "chitta")):
+        stored = rates(row(results("recognition"), *names))[:2]
+        assert rates(row(today, *names))[:2] == pytest.approx(stored, abs=SAME_ON_ANY_PROCESSOR)
+
+
+@pytest.mark.slow
+def test_a_trade_off_is_the_one_of_today(tmp_path):
+    today = printed("tradeoff", "speed", "-o", "seeds=4", "--out", tmp_path / "speed")
+    for speed in (5, 10, 20, 40):
+        name = f"closing speed {speed} mm/s"
+        stored, shown = (rates(row(text, name))[0] for text in (results("trade"), today))
+        assert shown == pytest.approx(stored, abs=SAME_ON_ANY_PROCESSOR)
+
+
+@pytest.mark.slow
+def test_recognition_before_the_end_is_the_one_of_today():
+    text = page("early_recognition")
+    times = (0.05, 0.1, 0.15, 0.2, 0.3)
+    assert f"--classifier forest --checkpoints {','.join(map(str, times))}" in text
+    trials = load_trials(options=("features.type=curve",), checkpoints_s=times)
+    parts = split_checkpoints(trials, times)
+    early = {
+        rate.name: rate for rate in early_recognition(select_component("classifier", "forest"), parts).rows
+    }
+    for name in ("0.05 s", "0.2 s", "0.3 s", "whole grasp", SURE):
+        told = rates(row(text, name))
+        today = early[name]
+        shares = [today.rate.rate, today.covered.rate, today.single.rate]
+        assert [told[0], *told[-2:]] == pytest.approx(shares, abs=SAME_ON_ANY_PROCESSOR), name
+
+
+@pytest.mark.slow
+@every_case("pipeline", ["default", "best"])
+def test_the_rate_of_a_shipped_model_is_the_one_of_today(pipeline):
+    told = dict(
+        zip(("default", "best"), re.findall(r"(\d+\.\d) %(?: of 1005| and)", page("simulator")), strict=True)
+    )
+    trials = load_trials(pipeline=pipeline, seed=7001, instances=67, trials=1)
+    predictions = model_for(resolve(pipeline), installed()).predictions(trials.table, trials.provenance)
+    right = [prediction.label == label for prediction, label in zip(predictions, trials.labels, strict=True)]
+    assert len(right) == 1005
+    assert sum(right) / 1005 == pytest.approx(float(told[pipeline]) / 100.0, abs=SAME_ON_ANY_PROCESSOR)
+
+
+@pytest.mark.slow
+def test_the_printed_prediction_is_the_one_of_today():
+    block = re.search(r"^    \$ graspsense (run .*)\n((?:    \S.*\n)+)", page("evaluation"), re.MULTILINE)
+    today = printed(*block[1].split())
+    for line in block[2].splitlines():
+        assert line.strip() in today
+
+
+@pytest.mark.slow
+def test_the_printed_evaluation_is_the_one_of_today():
+    text = page("evaluation")
+    command = re.search(r"`graspsense (evaluate simulated .*--json)`", text)[1]
+    evaluation = json.loads(printed(*command.split()))
+    headline = evaluation["headline"]
+    assert f'"correct": {headline["correct"]}, "n": {headline["n"]}' in text
+    assert f'"interval": {headline["interval"]}' in text
+    assert f'"counts": [{evaluation["confusion"]["counts"][0]}, ...]' in text
+    assert f'"difference": {{"value": {evaluation["controls"]["width_only"]["difference"]["value"]},' in text
