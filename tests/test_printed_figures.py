@@ -125,3 +125,24 @@ def test_the_printed_evaluation_is_the_one_of_today():
     assert f'"interval": {headline["interval"]}' in text
     assert f'"counts": [{evaluation["confusion"]["counts"][0]}, ...]' in text
     assert f'"difference": {{"value": {evaluation["controls"]["width_only"]["difference"]["value"]},' in text
+
+
+@pytest.mark.slow
+def test_the_printed_identification_is_the_one_of_today(tmp_path, monkeypatch):
+    text = page("identify")
+    monkeypatch.chdir(tmp_path)
+    for seed in (1, 2, 3):
+        printed("run", "--object", "toy", "--seed", seed, "--save", "trials")
+    today = printed("identify", "store:trials", "--out", "my_toy.toml")
+    shown = re.search(r"^The report begins like this .*\n\n((?:    \S.*\n|\n)+)", text, re.MULTILINE)[1]
+    lines = [line.strip() for line in shown.splitlines() if line.strip()]
+    rows = [line for line in lines if not line.startswith(("squeezes", "PARAMETER"))]
+    assert len(rows) == 7
+    number = re.compile(r"\d+(?:\.\d+)?(?:e[+-]\d+)?")
+    for line in rows:
+        name = line.split()[0]
+        measured = next(other for other in today.splitlines() if other.startswith(f"{name} "))
+        told, found = (
+            [float(n) for n in number.findall(words.removeprefix(name))] for words in (line, measured)
+        )
+        assert found == pytest.approx(told, rel=0.02), name
