@@ -144,7 +144,7 @@ def _rate(predictions: Sequence[Prediction], labelled: Labelled, learned: str) -
 
 
 def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) -> None:
-    from graspsense.core.values.features import percent
+    from graspsense.core.values.features import certainty_words
 
     coverage = next(
         (prediction.coverage for prediction in predictions if prediction.coverage is not None), None
@@ -153,7 +153,7 @@ def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) ->
     header = ("TRIAL", "PREDICTION", "CERTAINTY", *sets, *(("LABEL", "CORRECT") if labels else ()), "BECAUSE")
     rows = []
     for i, prediction in enumerate(predictions):
-        certainty = percent(prediction.certainty) if prediction.certainty is not None else ""
+        certainty = certainty_words(prediction.certainty) if prediction.certainty is not None else ""
         of_set = () if coverage is None else (" or ".join(prediction.prediction_set),)
         label = (labels[i], "yes" if prediction.label == labels[i] else "no") if labels else ()
         because = "; ".join(reason.words for reason in prediction.because)

@@ -35,7 +35,7 @@ from graspsense.evaluation.intervals import (
     Difference,
     RecognitionRate,
     difference,
-    percentage,
+    percent,
     rate_among,
 )
 from graspsense.evaluation.results import CurvePoint, Evaluation, Measurement
@@ -525,9 +525,9 @@ class _Evaluator:
             if self._difference(pooled.right(self.labels), majority_correct, rows).is_positive:
                 majority = float(np.mean([majority_correct[i] for i in rows]))
                 self.warnings.append(
-                    f"{percentage(control.rate.rate)} of {counted(control.rate.n, 'trial is', 'trials are')} "
+                    f"{percent(control.rate.rate)} of {counted(control.rate.n, 'trial is', 'trials are')} "
                     f"recognised from {when} ({control.what}); the most frequent label alone gives "
-                    f"{percentage(majority)}. The recording itself reveals the labels"
+                    f"{percent(majority)}. The recording itself reveals the labels"
                 )
 
     def _warn_of_width(self, control: Measurement, headline: _Headline) -> None:
@@ -535,7 +535,7 @@ class _Evaluator:
         by = control.difference
         if control.rate is not None and by is not None and by.interval is not None and not by.is_positive:
             self.warnings.append(
-                f"the width alone reaches {percentage(control.rate.rate)} of {counted(control.rate.n, 'trial')}, and "
+                f"the width alone reaches {percent(control.rate.rate)} of {counted(control.rate.n, 'trial')}, and "
                 f"the rate of {headline.protocol} is not shown to be higher (by {by.words}): the squeeze is not "
                 "shown to add anything"
             )

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 from attrs import frozen
 
-from graspsense.gripper_api import first_rest
+from graspsense.gripper_api import MOVED_M, first_rest
 from graspsense.plugin_api import APPROACH, HOLD, Channel, Feature, Features, FeatureSet, setting
 
 if TYPE_CHECKING:
     from graspsense.plugin_api import Trace
-
-MOVED_M: Final = 1e-3
-"""Travel after which fingers at rest have met something: they have begun to move before."""
 
 
 @frozen(kw_only=True)

@@ -20,6 +20,7 @@ from attrs import frozen
 
 from graspsense.gripper_api import (
     NO_GAP,
+    both_touch_samples,
     first_rest,
     gap_resolution,
     gap_resolution_by_sample,
@@ -325,7 +326,7 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
 
     def _first(self, trace: Trace) -> int | None:
         tau_1 = self.config.contact_force_n
-        touch = (trace.force_left_n >= tau_1) & (trace.force_right_n >= tau_1)
+        touch = both_touch_samples(trace.force_left_n, trace.force_right_n, tau_1)
         touch &= _closing(trace) & (trace.gap_m == trace.gap_m)
         return int(touch.argmax()) if touch.any() else None
 
