@@ -232,11 +232,10 @@ def _condition(settings: Settings) -> Conditions | None:
     from graspsense.cli.progress import ProgressLine
     from graspsense.experiments.condition import conditions
 
-    scene = str(getattr(settings.gripper.config, "object", "none"))
-    if scene == "none":
+    if settings.held in ("", "none"):
         return None
     with ProgressLine() as progress:
-        return conditions(settings, [scene], [settings.run.seed], progress=progress)
+        return conditions(settings, [settings.held], [settings.run.seed], progress=progress)
 
 
 def _print_better(settings: Settings, trial: Trial) -> None:
