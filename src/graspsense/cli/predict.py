@@ -40,7 +40,7 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     """Predict and print."""
     from graspsense.core.components.registry import installed
     from graspsense.core.learn.copies import learned_from
-    from graspsense.core.learn.model import load_model
+    from graspsense.core.learn.model_file import load_model
     from graspsense.evaluation.json_codec import to_json
     from graspsense.regression.model import is_regression
 

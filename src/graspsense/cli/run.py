@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from graspsense.core.components.config import Settings
-    from graspsense.core.grasp.runner import Sink
+    from graspsense.core.grasp.sinks import Sink
     from graspsense.core.values.device import DeviceInfo
     from graspsense.core.values.features import Prediction
     from graspsense.core.values.trial import Trial

@@ -17,9 +17,9 @@ from graspsense.core.components.entries import TABLE_OF_ROLE, ExperimentEntry
 from graspsense.core.components.layers import Layer, Merged, dotted, option_layers, read_toml, typed_path
 from graspsense.core.components.nearest_key import key_paths
 from graspsense.core.components.registry import Resource, installed
+from graspsense.core.components.setting import worded
 from graspsense.core.components.strict import InvalidValue, ValidationFailed, keys_of, plain, structured
 from graspsense.core.learn.copies import without_copies
-from graspsense.core.learn.model import worded
 from graspsense.core.values.errors import ConfigError, GraspsenseError, UnknownName, counted, suggestion
 from graspsense.core.values.limits import CASES
 from graspsense.experiments.kinds import kind_of
