@@ -21,7 +21,7 @@ from test_imports import DOORS, MAY_KNOW, ROOMS
 
 from graspsense import plugin_api, simulator_api
 from graspsense.cli.main import cli
-from graspsense.experiments.experiment import read_experiment
+from graspsense.experiments.experiment_file import read_experiment
 
 ROOT = Path(__file__).parents[1]
 

@@ -79,7 +79,7 @@ def experiment(
 
     `graspsense experiment compare A B ...` compares the results of several experiments.
     """
-    from graspsense.experiments.experiment import read_experiment, shipped
+    from graspsense.experiments.experiment_file import read_experiment, shipped
 
     if experiment is None:
         _list(shipped(), as_json)
@@ -161,7 +161,7 @@ def _counts(account: Account, problem: str) -> dict[str, object]:
 
 def _list(known: Iterable[str], as_json: bool) -> None:
     from graspsense.experiments.duration import effort_of, measured_on
-    from graspsense.experiments.experiment import read_experiment
+    from graspsense.experiments.experiment_file import read_experiment
 
     cores = os.cpu_count() or 1
     planned = {name: read_experiment(name) for name in known}
