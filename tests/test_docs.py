@@ -129,6 +129,17 @@ def test_the_table_of_the_simulator_has_every_folder():
     assert named == folders - {"models"}, "the table of docs/architecture.md has one row for each folder"
 
 
+def test_every_place_to_change_something_exists():
+    page = (ROOT / "docs" / "architecture.md").read_text()
+    table = page.partition("\n## Where to change what\n")[2].partition("\n## ")[0]
+    places = re.findall(r"`([\w/]+(?:\.py|/))`", table)
+    assert len(places) > 25
+    folders = (ROOT / "src" / "graspsense", *ROOT.glob("plugins/*/src/*"))
+    files = {f"/{path.relative_to(ROOT)}" for folder in folders for path in folder.rglob("*.*")}
+    missing = [place for place in places if not any(f"/{place}" in file for file in files)]
+    assert not missing
+
+
 def test_an_arrow_that_follows_from_others_is_left_out_and_a_circle_shows():
     chain = {"a": {"b", "c"}, "b": {"c"}, "c": set()}
     assert DRAWING.reduced(chain) == {"a": {"b"}, "b": {"c"}, "c": set()}
