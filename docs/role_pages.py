@@ -488,6 +488,7 @@ def _many() -> list[str]:
         f"`graspsense.simulator_api.BatchBackend`: {_text(roles.BatchBackend)} Experiments and simulated trials use "
         "this class. A sensor backend does not have to be a batch backend.",
         "",
+        *_documented_fields(roles.BatchBackend),
         *_methods(roles.BatchBackend),
         f"`BatchOptions`: {_text(roles.BatchOptions)}",
         "",
