@@ -86,8 +86,7 @@ def samples_of(trace: Trace, contact_force_n: float) -> CurveSamples | str:
     ]
     if not pads:
         return "the trace is empty" if len(trace) == 0 else "no pad gave a number"
-    closing = usable & (trace.phase <= HOLD)
-    pads = [force for force in pads if bool(((force >= contact_force_n) & closing).any())] or pads
+    pads = [force for force in pads if bool(((force >= contact_force_n) & trace.closing).any())] or pads
     known = usable & np.isfinite(trace.gap_m) & np.isfinite(trace.t_s)
     for force in pads:
         known &= np.isfinite(force)
