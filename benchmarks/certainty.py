@@ -21,9 +21,9 @@ from scipy.special import ndtri
 
 from graspsense.core.components.config import resolve
 from graspsense.core.components.registry import installed
-from graspsense.core.learn.model import model_for
+from graspsense.core.pipeline.pipeline_model import model_for
 from graspsense.core.values.features import UNKNOWN
-from graspsense.evaluation.intervals import percentage, percentages, wilson
+from graspsense.evaluation.intervals import percent, percentages, wilson
 from graspsense.sources.trial_source import load_trials
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def main() -> int:
         ]
     )
     sizes = np.array([len(prediction.prediction_set) for prediction in predictions])
-    print(f"{model.in_a_line}\n{len(trials)} new grasps, seed {asked.seed}: {percentage(right.mean())} right")
+    print(f"{model.in_a_line}\n{len(trials)} new grasps, seed {asked.seed}: {percent(right.mean())} right")
     classes = {"all": known} if support is None else dict(_classes(rests_on, known))
     rows = [
         (f"{name}, {10 * tenth} to {10 * tenth + 10} %", right[in_tenth], float(certainty[in_tenth].mean()))
@@ -76,7 +76,7 @@ def main() -> int:
     asked_for = model.sets.coverage if model.sets is not None else 0.0
     wrong = _certainties(rows, len(rows) + len(covered))
     print(
-        f"\nlabels in a set: {sizes[known].mean():.2f}; sets of one label: {percentage((sizes[known] == 1).mean())}"
+        f"\nlabels in a set: {sizes[known].mean():.2f}; sets of one label: {percent((sizes[known] == 1).mean())}"
     )
     wrong += _coverages(covered, asked_for, len(rows) + len(covered))
     return 1 if wrong else 0
@@ -100,21 +100,21 @@ def _certainties(rows: list[tuple[str, Any, float]], comparisons: int) -> int:
         wrong += bool(verdict)
         interval = percentages(wilson(float(right.sum()), len(right)))
         print(
-            f"{name:<34} {len(right):>5} {percentage(said):>7} {percentage(right.mean()):>7}  {interval}{verdict}"
+            f"{name:<34} {len(right):>5} {percent(said):>7} {percent(right.mean()):>7}  {interval}{verdict}"
         )
     return wrong
 
 
 def _coverages(rows: list[tuple[str, Any]], asked: float, comparisons: int) -> int:
     """Print the rows, and return how many lie below what is asked for by more than chance allows."""
-    print(f"\n{'sets of ' + percentage(asked):<34} {'n':>5} {'covered':>7}  95 %")
+    print(f"\n{'sets of ' + percent(asked):<34} {'n':>5} {'covered':>7}  95 %")
     wrong = 0
     for name, inside in rows:
         _, high = wilson(float(inside.sum()), len(inside), float(ndtri(1.0 - 0.05 / comparisons)))
         verdict = "" if high >= asked else "  too few"
         wrong += bool(verdict)
         interval = percentages(wilson(float(inside.sum()), len(inside)))
-        print(f"{name:<34} {len(inside):>5} {percentage(inside.mean()):>7}  {interval}{verdict}")
+        print(f"{name:<34} {len(inside):>5} {percent(inside.mean()):>7}  {interval}{verdict}")
     return wrong
 
 

@@ -8,6 +8,7 @@ is that of `graspsense_sim_gripper.run.accuracy.error` against another one; a di
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
@@ -47,14 +48,10 @@ class Scene:
     speed_m_s: float
 
 
-def scene_of(number: int) -> Scene:
-    """Return the scene of this number."""
-    rng = np.random.default_rng([20261121, number])
-
-    def log(least: float, most: float) -> float:
-        return float(math.exp(rng.uniform(math.log(least), math.log(most))))
-
-    stiffness, speed = log(1e2, 1e6), log(1e-3, 0.2)
+def drawn_terms(
+    rng: np.random.Generator, log: Callable[[float, float], float], stiffness: float
+) -> dict[str, dict[str, float]]:
+    """Return the terms of an object about this stiff (N/m); `log` draws a number whose logarithm is uniform."""
     terms: dict[str, dict[str, float]] = {}
     body = rng.choice(["elastic", "rigid", "foam"], p=[0.6, 0.25, 0.15])
     if body == "elastic":
@@ -89,6 +86,18 @@ def scene_of(number: int) -> Scene:
     if rng.random() < 0.3:
         terms["slosh"] = {"mass_kg": log(1e-3, 3.0), "frequency_hz": log(1.0, 100.0)}
         terms["slosh"] |= {"damping_ratio": log(1e-3, 0.3)}
+    return terms
+
+
+def scene_of(number: int) -> Scene:
+    """Return the scene of this number."""
+    rng = np.random.default_rng([20261121, number])
+
+    def log(least: float, most: float) -> float:
+        return float(math.exp(rng.uniform(math.log(least), math.log(most))))
+
+    stiffness, speed = log(1e2, 1e6), log(1e-3, 0.2)
+    terms = drawn_terms(rng, log, stiffness)
     order = list(terms)
     spec = ObjectSpec(
         name=f"scene {number}",

@@ -41,7 +41,7 @@ from graspsense.core.components.config import resolve
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.trace import Trace
 from graspsense.evaluation.choosing import FOLDS
-from graspsense.evaluation.intervals import percentage, percentages
+from graspsense.evaluation.intervals import percent, percentages
 from graspsense.evaluation.ranking import OutsideAnswers, Ranking, protocols_of, rank
 from graspsense.recording.reader import read_recorded
 from graspsense.report.simulation import markdown_table
@@ -191,10 +191,10 @@ def markdown(ranking: Ranking) -> str:
         rows.append(
             (
                 *(names if sets is None else (f"`{name}`" for name in names)),
-                percentage(rate.rate) + interval,
+                percent(rate.rate) + interval,
                 "" if candidate.loss is None else candidate.loss.points,
                 candidate.standing,
-                "" if covered is None else percentage(covered.rate),
+                "" if covered is None else percent(covered.rate),
                 f"{candidate.training_s:.2g} s",
             )
         )

@@ -43,16 +43,10 @@ REFERENCE: Final = 1e-4
 ATMOSPHERE_PA: Final = 101325.0
 
 
-def scene_of(number: int) -> Scene:
-    """Return the scene with this number."""
-    rng = np.random.default_rng([77_003, number])
-
-    def log(least: float, most: float) -> float:
-        return float(10.0 ** rng.uniform(math.log10(least), math.log10(most)))
-
-    stiffness, speed, rate = log(1e2, 1e7), log(1e-3, 0.1), log(200.0, 5000.0)
-    # A light plastic jaw to a large geared hand, as seen at the gap.
-    mass = log(0.5, 300.0)
+def drawn_terms(
+    rng: np.random.Generator, log: Callable[[float, float], float], stiffness: float, mass: float
+) -> dict[str, dict[str, float]]:
+    """Return the terms of an object about this stiff (N/m), for a jaw of this mass (kg), drawn by `log`."""
     terms: dict[str, dict[str, float]] = {"elastic": {"k1_n_m": stiffness}}
     if rng.random() < 0.2:
         terms = {"rigid": {"hertz_n_m15": (stiffness / 1.5) ** 1.5 / math.sqrt(20.0)}}
@@ -83,6 +77,20 @@ def scene_of(number: int) -> Scene:
             "frequency_hz": slosh_hz,
             "damping_ratio": log(1e-3, 2.0),
         }
+    return terms
+
+
+def scene_of(number: int) -> Scene:
+    """Return the scene with this number."""
+    rng = np.random.default_rng([77_003, number])
+
+    def log(least: float, most: float) -> float:
+        return float(10.0 ** rng.uniform(math.log10(least), math.log10(most)))
+
+    stiffness, speed, rate = log(1e2, 1e7), log(1e-3, 0.1), log(200.0, 5000.0)
+    # A light plastic jaw to a large geared hand, as seen at the gap.
+    mass = log(0.5, 300.0)
+    terms = drawn_terms(rng, log, stiffness, mass)
     order = list(terms)
     spec = ObjectSpec(
         name=f"regime {number}",

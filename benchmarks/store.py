@@ -19,7 +19,7 @@ import numpy as np
 from arguments import parser_of
 
 from graspsense.core.components.registry import installed
-from graspsense.core.learn.model import train
+from graspsense.core.learn.training import train
 from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import create
 from graspsense.recording.recording_info import RecordingInfo

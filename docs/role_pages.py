@@ -142,6 +142,11 @@ EXAMPLE = "\n\nExample::\n\n"
 HEAD = "<!-- Written by docs/role_pages.py from the code: change that. -->\n"
 
 
+def _fields_section(cls: type) -> list[str]:
+    """Return the section on a class of values: its fields and its meaning."""
+    return [f"## {cls.__name__}", "", f"    {_fields_signature(cls)}", "", _text(cls), ""]
+
+
 def dataset_page() -> str:
     """Return the page of a reader of a data set, which is a function and no component."""
     return "\n".join(
@@ -172,32 +177,12 @@ def dataset_page() -> str:
             "data={NAME: FOLDER})`) reads the sound examples in this folder twice, which must give the same, and then "
             "with an empty file and with a word in each column: the error must name the file and the column.",
             "",
-            "## LabelledRecording",
-            "",
-            f"    {_fields_signature(LabelledRecording)}",
-            "",
-            _text(LabelledRecording),
-            "",
-            "## Recording",
-            "",
-            f"    {_fields_signature(Recording)}",
-            "",
-            _text(Recording),
-            "",
-            "## GraspColumns",
-            "",
-            f"    {_fields_signature(GraspColumns)}",
-            "",
-            _text(GraspColumns),
-            "",
+            *_fields_section(LabelledRecording),
+            *_fields_section(Recording),
+            *_fields_section(GraspColumns),
             f"`checked_recording(columns)`: {_text(checked_recording)}",
             "",
-            "## StoredGrasp",
-            "",
-            f"    {_fields_signature(StoredGrasp)}",
-            "",
-            _text(StoredGrasp),
-            "",
+            *_fields_section(StoredGrasp),
             "## Fields of the entry",
             "",
             *_entry(entries.DatasetEntry),
@@ -267,7 +252,7 @@ def signals_page() -> str:
     """Return the page of the values that pass between the parts."""
     lines = [HEAD + "# Values and units", "", _text(signals), ""]
     for cls in FLOWING:
-        lines += [f"## {cls.__name__}", "", f"    {_fields_signature(cls)}", "", _text(cls), ""]
+        lines += _fields_section(cls)
         lines += _documented_fields(cls)
     lines += ["## Channels", "", "| channel | unit |", "|---|---|"]
     lines += [f"| `{name}` | {unit} |" for name, unit in signals.CHANNELS.items()]
@@ -503,6 +488,7 @@ def _many() -> list[str]:
         f"`graspsense.simulator_api.BatchBackend`: {_text(roles.BatchBackend)} Experiments and simulated trials use "
         "this class. A sensor backend does not have to be a batch backend.",
         "",
+        *_documented_fields(roles.BatchBackend),
         *_methods(roles.BatchBackend),
         f"`BatchOptions`: {_text(roles.BatchOptions)}",
         "",

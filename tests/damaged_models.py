@@ -20,8 +20,8 @@ from pathlib import Path
 import numpy as np
 
 from graspsense.core.components.registry import installed
-from graspsense.core.learn.model import load_model
 from graspsense.core.learn.model_content import digest
+from graspsense.core.learn.model_file import load_model
 from graspsense.core.values.errors import ConfigError, DataDamaged, UnknownName
 from graspsense.core.values.features import FeatureTable
 from graspsense.testing.damage import damaged_at, paths

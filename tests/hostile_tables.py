@@ -19,7 +19,7 @@ from pathlib import Path
 
 from graspsense.core.components.config import resolve
 from graspsense.core.values.errors import GraspsenseError
-from graspsense.experiments.experiment import read_experiment
+from graspsense.experiments.experiment_file import read_experiment
 from graspsense.recording.export_trace import declared_beside
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.recording.layout import TICK_FIELDS

@@ -22,7 +22,8 @@ from graspsense.core.learn.checkpoints import (
     used,
 )
 from graspsense.core.learn.labelled import Labelled
-from graspsense.core.learn.model import load_model, train, write_model
+from graspsense.core.learn.model_file import load_model, write_model
+from graspsense.core.learn.training import train
 from graspsense.core.pipeline.anytime import Anytime, anytime_of
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.features import CheckpointPrediction, Features, Prediction, table_of

@@ -13,7 +13,8 @@ from test_evaluate import judged, labelled, learner
 
 from graspsense.core.components.registry import installed
 from graspsense.core.learn.conformal import Answers, sets_of, units_lacking, units_needed
-from graspsense.core.learn.model import load_model, train, write_model
+from graspsense.core.learn.model_file import load_model, write_model
+from graspsense.core.learn.training import train
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.features import UNKNOWN
 from graspsense.evaluation.doubt import calibrated

@@ -25,9 +25,11 @@ from graspsense.core.components.registry import Component, installed
 from graspsense.core.learn.certainty import Certainty, SupportClass
 from graspsense.core.learn.conformal import LabelThreshold, PredictionSets
 from graspsense.core.learn.labelled import Labelled
-from graspsense.core.learn.model import checkpoint_model, classifier_from, load_model, train, write_model
+from graspsense.core.learn.model import checkpoint_model
 from graspsense.core.learn.model_content import digest
+from graspsense.core.learn.model_file import as_json, classifier_from, load_model, write_model
 from graspsense.core.learn.stored_values import StoredValues
+from graspsense.core.learn.training import train
 from graspsense.core.values.errors import DataDamaged
 from graspsense.plugin_api import create
 from graspsense.regression.model import is_regression
@@ -235,7 +237,7 @@ def test_whatever_a_classifier_raises_on_a_file_is_damage_of_the_file(mean):
     entry = evolve(parts.ENTRIES["classifier"], target="test_damaged_models:Wayward")
     component = Component(entry, "graspsense-test", "0.1", "classifier")
     model = train(component, component.config_class()(), labelled(), name="m")
-    kept = model.as_json()
+    kept = as_json(model)
     kept["model"] = {**kept["model"], "mean": mean}
     with pytest.raises(DataDamaged):
         classifier_from(StoredValues(kept), component, component.config_class()(), model.names, model.units)

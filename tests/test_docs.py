@@ -21,7 +21,7 @@ from test_imports import DOORS, MAY_KNOW, ROOMS
 
 from graspsense import plugin_api, simulator_api
 from graspsense.cli.main import cli
-from graspsense.experiments.experiment import read_experiment
+from graspsense.experiments.experiment_file import read_experiment
 
 ROOT = Path(__file__).parents[1]
 
@@ -127,6 +127,17 @@ def test_the_table_of_the_simulator_has_every_folder():
     folders = {path.parent.name for path in package.glob("*/__init__.py")}
     named = {row[0].strip("`") for row in architecture_rows("The simulator")}
     assert named == folders - {"models"}, "the table of docs/architecture.md has one row for each folder"
+
+
+def test_every_place_to_change_something_exists():
+    page = (ROOT / "docs" / "architecture.md").read_text()
+    table = page.partition("\n## Where to change what\n")[2].partition("\n## ")[0]
+    places = re.findall(r"`([\w/]+(?:\.py|/))`", table)
+    assert len(places) > 25
+    folders = (ROOT / "src" / "graspsense", *ROOT.glob("plugins/*/src/*"))
+    files = {f"/{path.relative_to(ROOT)}" for folder in folders for path in folder.rglob("*.*")}
+    missing = [place for place in places if not any(f"/{place}" in file for file in files)]
+    assert not missing
 
 
 def test_an_arrow_that_follows_from_others_is_left_out_and_a_circle_shows():

@@ -16,7 +16,7 @@ from graspsense.core.values.errors import ConfigError
 from graspsense.experiments.executors.dask import DaskCluster
 from graspsense.experiments.executors.processes import Processes
 from graspsense.experiments.executors.serial import Serial
-from graspsense.experiments.experiment import _located, read_experiment
+from graspsense.experiments.experiment_file import _located, read_experiment
 from graspsense.experiments.results import Results
 from graspsense.experiments.run import run_experiment
 from graspsense.experiments.summary import summarise

@@ -21,7 +21,7 @@ from graspsense.core.values.errors import ConfigError, UnknownName
 from graspsense.evaluation.over_seeds import OverSeeds, mean_difference
 from graspsense.experiment_api import ExperimentEntry
 from graspsense.experiments.executors.serial import Serial
-from graspsense.experiments.experiment import read_experiment, shipped
+from graspsense.experiments.experiment_file import read_experiment, shipped
 from graspsense.experiments.results import Results
 from graspsense.experiments.run import run_experiment
 from graspsense.experiments.summary import summarise

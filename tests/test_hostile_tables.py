@@ -20,7 +20,7 @@ from graspsense.core.learn.target_value import name_and_unit
 from graspsense.core.values import limits
 from graspsense.core.values.errors import ConfigError, DataDamaged, suggestion
 from graspsense.core.values.features import FeatureTable
-from graspsense.experiments.experiment import read_experiment
+from graspsense.experiments.experiment_file import read_experiment
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.sources.csv_columns import CsvColumns
 from graspsense.sources.features_csv import read_labelled

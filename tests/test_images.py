@@ -58,13 +58,13 @@ from graspsense.recording.replayable import content_sha256
 from graspsense.sources.replay import read_named
 from graspsense.store.record_grasp import record_grasp
 from graspsense.store.store import Store
-from graspsense.testing.backend import images_stay_as_they_were_delivered
 from graspsense.testing.checks import CheckFailed
 from graspsense.testing.conformance import examine
 from graspsense.testing.controller import state_holds_everything, state_is_numbers
 from graspsense.testing.gentle import GentleController, GentleParams, GentleState
 from graspsense.testing.gentle import step as gentle_step
 from graspsense.testing.model_gripper import ModelGripper
+from graspsense.testing.readings import images_stay_as_they_were_delivered
 from graspsense.testing.subject import Subject
 
 HERE = sys.modules[__name__]

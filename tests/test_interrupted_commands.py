@@ -23,7 +23,7 @@ from kept import BENCH, begun, keep, write_recording
 from test_kills import recovered
 
 from graspsense.core.components.registry import installed
-from graspsense.core.learn.model import load_model
+from graspsense.core.learn.model_file import load_model
 from graspsense.store.recover import recover_store
 from graspsense.store.store import Store
 from graspsense.store.verify import verify_store

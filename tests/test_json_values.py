@@ -12,7 +12,8 @@ from kept import BENCH, keep
 
 from graspsense.core.components.config import Flag, resolve, to_toml
 from graspsense.core.components.registry import installed
-from graspsense.core.learn.model import load_model, train, write_model
+from graspsense.core.learn.model_file import load_model, write_model
+from graspsense.core.learn.training import train
 from graspsense.core.values.json_values import json_ready, json_text, settings_from_json
 from graspsense.store.dataset import labelled_store
 from graspsense.store.store import Store

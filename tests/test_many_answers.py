@@ -8,7 +8,7 @@ from commands import printed
 
 from graspsense.core.components.registry import installed
 from graspsense.core.learn.labelled import Labelled
-from graspsense.core.learn.model import train
+from graspsense.core.learn.training import train
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import UNKNOWN, FeatureTable
 from graspsense.plugin_api import create

@@ -15,9 +15,12 @@ from test_conformal import bottles
 
 from graspsense.core.components.config import Flag, SelectedComponent, resolve
 from graspsense.core.components.registry import IsolatedPlugins, installed
+from graspsense.core.components.setting import worded
 from graspsense.core.learn.labelled import Labelled
-from graspsense.core.learn.model import load_model, model_for, train, worded, write_model
 from graspsense.core.learn.model_content import digest
+from graspsense.core.learn.model_file import as_json, load_model, write_model
+from graspsense.core.learn.training import train
+from graspsense.core.pipeline.pipeline_model import model_for
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError, DataDamaged, UnknownName
 from graspsense.core.values.features import UNKNOWN, Features
@@ -72,7 +75,7 @@ def test_a_file_gives_back_the_model(tmp_path, name):
 
     table, _ = trials(seed=9)
     assert (again.classifier.probabilities(table) == made.classifier.probabilities(table)).all()
-    assert again.as_json() == made.as_json()
+    assert as_json(again) == as_json(made)
     assert again.predict(CAN).label == "can:full"
 
 

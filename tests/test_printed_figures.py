@@ -14,7 +14,7 @@ from PIL import Image
 from graspsense.core.components.config import resolve, select_component
 from graspsense.core.components.registry import installed
 from graspsense.core.learn.checkpoints import split_checkpoints
-from graspsense.core.learn.model import model_for
+from graspsense.core.pipeline.pipeline_model import model_for
 from graspsense.evaluation.checkpoints import SURE, early_recognition
 from graspsense.sources.trial_source import load_trials
 

@@ -25,7 +25,7 @@ from graspsense.evaluation.confusion import confusion
 from graspsense.evaluation.intervals import Difference, RecognitionRate
 from graspsense.evaluation.results import Evaluation, Measurement
 from graspsense.experiments.executors.serial import Serial
-from graspsense.experiments.experiment import read_experiment
+from graspsense.experiments.experiment_file import read_experiment
 from graspsense.experiments.page import write_page
 from graspsense.experiments.results import Results
 from graspsense.experiments.run import run_experiment

@@ -12,7 +12,7 @@ from test_report_signals import CHANNELS, grasp
 
 from graspsense.evaluation.confusion import confusion
 from graspsense.experiments.executors.serial import Serial
-from graspsense.experiments.experiment import read_experiment
+from graspsense.experiments.experiment_file import read_experiment
 from graspsense.experiments.findings import FoundTable
 from graspsense.experiments.page import write_page
 from graspsense.experiments.results import Results

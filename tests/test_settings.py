@@ -26,7 +26,7 @@ from graspsense.core.grasp.runner import tick_params
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.signals import EFFORT, Command
-from graspsense.experiments.experiment import read_experiment
+from graspsense.experiments.experiment_file import read_experiment
 from graspsense.plugin_api import setting
 
 INFO = DeviceInfo(

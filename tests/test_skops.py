@@ -11,7 +11,8 @@ from cases import every_case
 
 from graspsense.core.components.registry import installed
 from graspsense.core.learn.labelled import Labelled
-from graspsense.core.learn.model import load_model, train, write_model
+from graspsense.core.learn.model_file import load_model, write_model
+from graspsense.core.learn.training import train
 from graspsense.core.values.errors import DataDamaged, PluginUnavailable
 from graspsense.core.values.features import FeatureTable
 from graspsense.plugin_api import create
@@ -53,7 +54,7 @@ def test_it_comes_back_the_same_without_its_training_trials(name, tmp_path):
 
 def resigned(path, change):
     """Change a model's content and give it the hash of the changed one, as somebody with bad intent would."""
-    from graspsense.core.learn.model import digest
+    from graspsense.core.learn.model_content import digest
 
     content = json.loads(path.read_text())
     change(content["model"])

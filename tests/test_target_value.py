@@ -15,7 +15,7 @@ from kept import keep
 
 from graspsense.core.components.registry import installed
 from graspsense.core.learn.labelled import ControlFeatures, Labelled
-from graspsense.core.learn.model import load_model
+from graspsense.core.learn.model_file import load_model
 from graspsense.core.learn.target_value import TargetValue, value_label
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.features import FeatureTable

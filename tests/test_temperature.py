@@ -13,7 +13,7 @@ from test_conformal import bottles, model_of
 from test_evaluate import judged
 
 from graspsense.core.components.registry import installed
-from graspsense.core.learn.model import load_model, write_model
+from graspsense.core.learn.model_file import as_json, load_model, write_model
 from graspsense.core.learn.temperature import MIN_TRIALS, RANGE, at_temperature, temperature_of
 from graspsense.core.values.errors import DataDamaged
 
@@ -88,7 +88,7 @@ def test_a_model_keeps_its_temperature_and_gives_calibrated_probabilities(tmp_pa
 
 @pytest.mark.parametrize("temperature", [0.0, -1.0, "hot"])
 def test_a_damaged_temperature_is_refused(tmp_path, temperature):
-    content = model_of(bottles(), "tree").as_json()
+    content = as_json(model_of(bottles(), "tree"))
     del content["sha256"]
     (tmp_path / "m.json").write_text(json.dumps({**content, "temperature": temperature}))
 

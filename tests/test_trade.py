@@ -10,7 +10,7 @@ from cases import every_case
 
 from graspsense.evaluation.equivalence import verdict_on
 from graspsense.experiments.executors.serial import Serial
-from graspsense.experiments.experiment import read_experiment
+from graspsense.experiments.experiment_file import read_experiment
 from graspsense.experiments.page import findings_of
 from graspsense.experiments.results import Results
 from graspsense.experiments.run import run_experiment

@@ -23,7 +23,7 @@ from graspsense.evaluation.evaluate import evaluate as evaluate
 from graspsense.evaluation.results import Evaluation as Evaluation
 
 # Experiments
-from graspsense.experiments.experiment import read_experiment as read_experiment
+from graspsense.experiments.experiment_file import read_experiment as read_experiment
 from graspsense.experiments.executors.serial import Serial as Serial
 from graspsense.experiments.results import Results as Results
 from graspsense.experiments.run import run_experiment as run_experiment

@@ -37,8 +37,8 @@ from graspsense.experiments.findings import Findings as Findings
 from graspsense.experiments.findings import FoundTable as FoundTable
 from graspsense.experiments.findings import code as code
 from graspsense.experiments.findings import control_cells as control_cells
-from graspsense.experiments.findings import percent as percent
-from graspsense.experiments.findings import span as span
+from graspsense.evaluation.intervals import percent as percent
+from graspsense.evaluation.intervals import span as span
 from graspsense.core.values.errors import counted as counted
 
 # Pictures and sections of a report

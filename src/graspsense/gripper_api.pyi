@@ -70,11 +70,14 @@ from graspsense.core.grasp.transmission import gap_and_rate as gap_and_rate
 from graspsense.core.grasp.transmission import revolutions_at as revolutions_at
 from graspsense.core.grasp.transmission import screw_linkage as screw_linkage
 
-# Rest where the gap is coarse
+# Contact, and rest where the gap is coarse
+from graspsense.core.control.contact import both_touch_samples as both_touch_samples
+from graspsense.core.control.contact import either_touches as either_touches
 from graspsense.core.grasp.gap_resolution import GapResolution as GapResolution
 from graspsense.core.grasp.gap_resolution import gap_resolution as gap_resolution
 from graspsense.core.grasp.gap_resolution import gap_resolution_by_sample as gap_resolution_by_sample
 from graspsense.core.grasp.gap_resolution import window_of_rest as window_of_rest
+from graspsense.core.control.contact import MOVED_M as MOVED_M
 from graspsense.core.control.contact import first_rest as first_rest
 
 # Observers of a grasp while it goes on, and commands that grasp
@@ -98,7 +101,7 @@ from graspsense.sources.manifest.message_numbers import message_columns as messa
 
 # A grasp that another program makes
 from graspsense.core.pipeline.anytime import anytime_of as anytime_of
-from graspsense.core.learn.model import model_for as model_for
+from graspsense.core.pipeline.pipeline_model import model_for as model_for
 
 # Recordings as they are replayed
 from graspsense.recording.replayable import Recording as Recording

@@ -70,8 +70,8 @@ from graspsense.core.control.tick import free_parts as free_parts
 from graspsense.core.control.tick import free_tick as free_tick
 from graspsense.core.grasp.runner import tick_params as tick_params
 from graspsense.core.grasp.runner import ended_by_itself as ended_by_itself
-from graspsense.core.grasp.runner import overdue as overdue
-from graspsense.core.grasp.runner import seconds_at_most as seconds_at_most
+from graspsense.core.grasp.time_limits import overdue as overdue
+from graspsense.core.grasp.time_limits import seconds_at_most as seconds_at_most
 from graspsense.core.values.events import event_name as event_name
 from graspsense.core.values.trace import FrameTable as FrameTable
 

@@ -68,7 +68,7 @@ from paper_model import (
 )
 from scipy.stats import norm, sem, t
 
-from graspsense.evaluation.intervals import Z, percentage, percentages, wilson
+from graspsense.evaluation.intervals import Z, percent, percentages, wilson
 from graspsense.experiments.versions import where_measured
 from graspsense.report.simulation import markdown_table
 from graspsense_paper.inference import (
@@ -478,8 +478,8 @@ def _data(near: Sample) -> Iterator[tuple[str, ...]]:
     for name, printed in observed().items():
         simulated = [statistics[name] for statistics in near.statistics]
         low, middle, high = weighted_quantiles(simulated, near.weights, LEVELS)
-        accepted = f"{percentage(middle)} ({percentages((low, high))})"
-        yield TITLES[name], percentage(printed.value), percentage(printed.deviation), accepted
+        accepted = f"{percent(middle)} ({percentages((low, high))})"
+        yield TITLES[name], percent(printed.value), percent(printed.deviation), accepted
 
 
 def _predictions(predicted: list[dict[str, float]], w: Any) -> Iterator[tuple[str, ...]]:
@@ -499,7 +499,7 @@ def _predictions(predicted: list[dict[str, float]], w: Any) -> Iterator[tuple[st
 def _shown(name: str, value: float) -> str:
     if name == "gain":
         return f"{100 * value:+.1f} points"
-    return f"{value:.4g}" if name.startswith("fig_") else percentage(value)
+    return f"{value:.4g}" if name.startswith("fig_") else percent(value)
 
 
 def _explanations(
@@ -564,9 +564,9 @@ def _calibration(simulations: list[dict[str, Any]], history: pyabc.History) -> I
     yield from _section(
         "Is the inference calibrated?",
         f"Each of {len(every) // len(ranks)} simulations that were drawn from the prior was taken as the data in turn. "
-        f"Its posterior are the {percentage(NEAREST)} of the others that are nearest to it, weighted and adjusted to "
+        f"Its posterior are the {percent(NEAREST)} of the others that are nearest to it, weighted and adjusted to "
         "it in the same way. A rank histogram counts where the true figure lies within this posterior; it should be "
-        f"flat. Of all true figures, {percentage(covered)} lie within the 90 % interval.",
+        f"flat. Of all true figures, {percent(covered)} lie within the 90 % interval.",
         (
             "figure",
             f"ranks in {BINS} equal parts",

@@ -14,7 +14,7 @@ from attrs import NOTHING, fields
 from cases import every_case
 
 from graspsense.core.values.trace import Trace
-from graspsense.evaluation.intervals import percentage
+from graspsense.evaluation.intervals import percent
 
 pytest.importorskip("graspsense_sim_gripper", reason="the paper is done again in simulation")
 pytest.importorskip("graspsense_c45", reason="the paper's classifier")
@@ -45,7 +45,7 @@ def test_the_page_has_every_figure_of_the_model_and_of_the_data():
     page = (ROOT / "benchmarks" / "results" / "posterior.md").read_text(encoding="utf-8")
     assert all(page.count(f"| `{name}` |") == 2 for name in paper_model.NAMES)
     for figure in paper_model.observed().values():
-        assert f"| {percentage(figure.value)} | {percentage(figure.deviation)} |" in page
+        assert f"| {percent(figure.value)} | {percent(figure.deviation)} |" in page
 
 
 def test_no_bayes_factor_is_given_where_too_few_particles_have_an_explanation_or_lack_it():

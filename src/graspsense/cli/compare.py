@@ -114,7 +114,7 @@ def compared_trials(
 
 
 def _print(ranking: Ranking) -> None:
-    from graspsense.evaluation.intervals import percentage
+    from graspsense.evaluation.intervals import percent
 
     echo(ranking.verdict, Style.HEADING)
     echo_entry("trials", f"{ranking.trials} of {ranking.source}; compared by {ranking.protocol}")
@@ -124,10 +124,7 @@ def _print(ranking: Ranking) -> None:
         (
             candidate.classifier,
             candidate.features,
-            *(
-                percentage(candidate.rates[name].rate) if name in candidate.rates else ""
-                for name in protocols
-            ),
+            *(percent(candidate.rates[name].rate) if name in candidate.rates else "" for name in protocols),
             "" if candidate.loss is None else candidate.loss.points,
             candidate.standing,
             _coverage(candidate),
@@ -158,10 +155,10 @@ def _print(ranking: Ranking) -> None:
 
 def _coverage(candidate: Candidate) -> str:
     """Return how many of the prediction sets contain the true label; empty if that was not measured."""
-    from graspsense.evaluation.intervals import percentage
+    from graspsense.evaluation.intervals import percent
 
     sets = candidate.sets
-    return "" if sets is None or sets.covered is None else percentage(sets.covered.rate)
+    return "" if sets is None or sets.covered is None else percent(sets.covered.rate)
 
 
 def _names(text: str, option: str, role: Role) -> tuple[str, ...]:

@@ -10,13 +10,13 @@ import click
 from graspsense.cli.options import GRIPPER_ALONE, pipeline_options, settings_of
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, state_style
+from graspsense.core.values.exit_code import ExitCode
 
 if TYPE_CHECKING:
     from graspsense.core.components.config import Settings
     from graspsense.core.components.entries import Finding
     from graspsense.core.components.registry import HookAnswer, Plugins
 
-EXIT_PROBLEM: Final = 1
 MARKS: Final = {"ok": "ok", "note": "note", "problem": "PROBLEM"}
 _MARK: Final = 11
 """Width of a mark with its margins."""
@@ -72,7 +72,7 @@ def doctor(timeout_s: float, repetitions: int | None, as_json: bool, **asked: An
             _print(diagnosis)
         echo(f"{problems} problem(s)", Style.BAD) if problems else echo("no problem found", Style.GOOD)
     if problems:
-        raise click.exceptions.Exit(EXIT_PROBLEM)
+        raise click.exceptions.Exit(ExitCode.CHECK_FAILED)
 
 
 def _ourselves(plugins: Plugins) -> tuple[Finding, ...]:

@@ -17,13 +17,13 @@ import click
 from graspsense.cli.options import GRIPPER_ALONE, pipeline_options, settings_of
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import talk
+from graspsense.core.values.exit_code import ExitCode
 
 if TYPE_CHECKING:
     from graspsense.core.components.emulated import EmulatedDevice
 
 LOOK_S: Final = 0.5
 """How often it is looked whether the device still runs."""
-EXIT_FAILED: Final = 4
 
 
 @click.command()
@@ -82,7 +82,7 @@ def emulate(
     failed = str(device.state().get("failed", ""))
     if failed:
         talk(f"graspsense: the emulated {name} failed: {failed}")
-        raise click.exceptions.Exit(EXIT_FAILED)
+        raise click.exceptions.Exit(ExitCode.NOT_FINISHED)
 
 
 class _Ended(Exception):

@@ -185,7 +185,7 @@ def _parts(
 
 def _print_early(recognition: EarlyRecognition) -> None:
     from graspsense.evaluation.checkpoints import SURE
-    from graspsense.evaluation.intervals import percentage, percentages
+    from graspsense.evaluation.intervals import percent, percentages
 
     echo(f"\nanswers while the grasp goes on, by {recognition.protocol}")
     if recognition.reason:
@@ -193,12 +193,12 @@ def _print_early(recognition: EarlyRecognition) -> None:
     rows = []
     for row in recognition.rows:
         told = [
-            "-" if share is None else percentage(share.rate) if share.n else "-"
+            "-" if share is None else percent(share.rate) if share.n else "-"
             for share in (row.covered, row.single)
         ]
         newtons = "-" if row.newtons is None else f"{row.newtons:.2f} N"
         costs = (f"{row.seconds:.3f} s", newtons)
-        rows.append((row.name, percentage(row.rate.rate), percentages(row.rate.interval), *costs, *told))
+        rows.append((row.name, percent(row.rate.rate), percentages(row.rate.interval), *costs, *told))
     heads = ("ANSWER AFTER", "RATE", "95 %", "TIME", "FORCE", "TRUE LABEL IN SET", "SETS OF ONE")
     echo_table(heads, rows)
     if recognition.rows[-1].name == SURE:
@@ -209,7 +209,7 @@ def _print_early(recognition: EarlyRecognition) -> None:
 
 
 def _print(evaluation: Evaluation) -> None:
-    from graspsense.evaluation.intervals import percentage, percentages
+    from graspsense.evaluation.intervals import percent, percentages
     from graspsense.report.confusion import confusion_text
     from graspsense.report.verdict import verdict
 
@@ -219,7 +219,7 @@ def _print(evaluation: Evaluation) -> None:
     echo()
     echo_entry("rate", f"{evaluation.headline.words}, by {evaluation.protocol}")
     for name, part in evaluation.by_features.items():
-        echo_entry("", f"{percentage(part.rate)} ({part.correct} of {part.n}) {name}")
+        echo_entry("", f"{percent(part.rate)} ({part.correct} of {part.n}) {name}")
     echo_entry("classifier", evaluation.classifier)
     echo_entry("features", ", ".join(name for name, _ in evaluation.features))
     echo_entry(
@@ -250,23 +250,23 @@ def _print(evaluation: Evaluation) -> None:
         echo(f"  {line}")
     if len(evaluation.by_class) > 1 and evaluation.target != "class":
         echo()
-        rows = [(name, percentage(rate.rate), percentages(rate.interval), f"{rate.correct} of {rate.n}")
+        rows = [(name, percent(rate.rate), percentages(rate.interval), f"{rate.correct} of {rate.n}")
                 for name, rate in evaluation.by_class.items()]  # fmt: skip
         echo_table(("CLASS", "RATE", "95 %", "TRIALS"), rows)
     if evaluation.reliability is not None:
         echo("\nreliability of the probabilities")
-        bins = [(percentage(bin_.probability), percentage(bin_.rate.rate), percentages(bin_.rate.interval),
+        bins = [(percent(bin_.probability), percent(bin_.rate.rate), percentages(bin_.rate.interval),
                  str(bin_.rate.n)) for bin_ in evaluation.reliability.curve]  # fmt: skip
         echo_table(("MEAN PROBABILITY", "RATE", "95 %", "TRIALS"), bins)
     if evaluation.learning_curve:
         echo("\nlearning curve")
-        points = [(f"{point.trained_on:.0f}", percentage(point.rate.rate), percentages(point.rate.interval))
+        points = [(f"{point.trained_on:.0f}", percent(point.rate.rate), percentages(point.rate.interval))
                   for point in evaluation.learning_curve]  # fmt: skip
         echo_table(("TRAINING TRIALS", "RATE", "95 %"), points)
 
 
 def _print_doubt(evaluation: Evaluation) -> None:
-    from graspsense.evaluation.intervals import percentage
+    from graspsense.evaluation.intervals import percent
 
     sets = evaluation.sets
     if sets is not None and (sets.covered is None or sets.single is None):
@@ -281,12 +281,12 @@ def _print_doubt(evaluation: Evaluation) -> None:
                 "", f"{sets.covered_below.words} of the labels that are recognised less often than that"
             )
         least = min(sets.by_label, key=lambda name: sets.by_label[name].rate)
-        echo_entry("", f"{sets.mean_size:.2f} labels on average, {percentage(sets.single.rate)} of the sets have one; "
-                       f"lowest coverage: {percentage(sets.by_label[least].rate)} of {least}")  # fmt: skip
+        echo_entry("", f"{sets.mean_size:.2f} labels on average, {percent(sets.single.rate)} of the sets have one; "
+                       f"lowest coverage: {percent(sets.by_label[least].rate)} of {least}")  # fmt: skip
     if evaluation.reliability is not None:
-        error = percentage(evaluation.reliability.calibration_error)
+        error = percent(evaluation.reliability.calibration_error)
         raw = evaluation.reliability.uncalibrated_error
-        raw_words = "" if raw is None else f" ({percentage(raw)} before calibration)"
+        raw_words = "" if raw is None else f" ({percent(raw)} before calibration)"
         echo_entry(
             "probability",
             f"Brier score {evaluation.reliability.brier:.3f}, expected calibration error {error}{raw_words}",
@@ -294,13 +294,13 @@ def _print_doubt(evaluation: Evaluation) -> None:
 
 
 def _row(name: str, measured: Measurement, trials: int) -> tuple[str, ...]:
-    from graspsense.evaluation.intervals import percentage, percentages
+    from graspsense.evaluation.intervals import percent, percentages
 
     assert measured.rate is not None
     rate = measured.rate
     return (
         name,
-        percentage(rate.rate),
+        percent(rate.rate),
         percentages(rate.interval),
         f"{rate.n} of {trials}",
         "" if measured.difference is None else measured.difference.points,

@@ -214,17 +214,17 @@ def _row(score: EventScore) -> tuple[str, ...]:
 
 
 def _cells(rate: RecognitionRate | None) -> tuple[str, str]:
-    from graspsense.evaluation.intervals import percentage, percentages
+    from graspsense.evaluation.intervals import percent, percentages
 
     if rate is None:
         return "-", "-"
-    return percentage(rate.rate), "none" if rate.interval is None else percentages(rate.interval)
+    return percent(rate.rate), "none" if rate.interval is None else percentages(rate.interval)
 
 
 def _in_words(score: EventScore) -> str:
-    from graspsense.evaluation.intervals import percentage
+    from graspsense.evaluation.intervals import percent
 
     recall, precision = (
-        "unknown" if rate is None else percentage(rate.rate) for rate in (score.recall, score.precision)
+        "unknown" if rate is None else percent(rate.rate) for rate in (score.recall, score.precision)
     )
     return f"recall {recall}, precision {precision}"

@@ -15,6 +15,7 @@ from graspsense.cli.options import force_option, keys_option
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
 from graspsense.core.values.errors import counted
+from graspsense.core.values.exit_code import ExitCode
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
     from graspsense.experiments.summary import Summary
 
 _MOST_NAMED = 8
-EXIT_INCOMPLETE = 1
-EXIT_INTERRUPTED = 130
 
 
 class ExperimentCommand(click.Command):
@@ -80,7 +79,7 @@ def experiment(
 
     `graspsense experiment compare A B ...` compares the results of several experiments.
     """
-    from graspsense.experiments.experiment import read_experiment, shipped
+    from graspsense.experiments.experiment_file import read_experiment, shipped
 
     if experiment is None:
         _list(shipped(), as_json)
@@ -110,9 +109,9 @@ def experiment(
     else:
         _print(summary, more, account, f"none: {problem}" if problem else str(page))
     if account.stopped == "interrupted":
-        raise click.exceptions.Exit(EXIT_INTERRUPTED)
+        raise click.exceptions.Exit(ExitCode.INTERRUPTED)
     if problem or not account.complete:
-        raise click.exceptions.Exit(EXIT_INCOMPLETE)
+        raise click.exceptions.Exit(ExitCode.CHECK_FAILED)
 
 
 def _run(
@@ -162,7 +161,7 @@ def _counts(account: Account, problem: str) -> dict[str, object]:
 
 def _list(known: Iterable[str], as_json: bool) -> None:
     from graspsense.experiments.duration import effort_of, measured_on
-    from graspsense.experiments.experiment import read_experiment
+    from graspsense.experiments.experiment_file import read_experiment
 
     cores = os.cpu_count() or 1
     planned = {name: read_experiment(name) for name in known}
@@ -264,13 +263,13 @@ def _print(summary: Summary, more: Findings | None, account: Account, page: str)
 
 
 def _print_rates(summary: Summary) -> None:
-    from graspsense.evaluation.intervals import percentage, percentages
+    from graspsense.evaluation.intervals import percent, percentages
 
     rows = [
         (
             condition.name or "-",
             condition.target,
-            percentage(condition.rate.mean),
+            percent(condition.rate.mean),
             percentages(condition.rate.interval),
             condition.protocol,
         )

@@ -22,6 +22,7 @@ from graspsense.core.compiling.compile_notice import tell_compiling
 from graspsense.core.components.caller import command_line
 from graspsense.core.grasp.interrupts import ended_like_ctrl_c
 from graspsense.core.values.errors import GraspsenseError, PluginUnavailable
+from graspsense.core.values.exit_code import ExitCode
 
 PROGRAM: Final = "graspsense"
 COMPLETION_VARIABLE: Final = "_GRASPSENSE_COMPLETE"
@@ -58,11 +59,6 @@ COMMANDS: Final[dict[str, tuple[str, str]]] = {
     "completion": ("graspsense.cli.completion:completion", "Print the completion script for a shell."),
 }
 """Name to import string and summary of each command of our own."""
-
-EXIT_USAGE: Final = 2
-EXIT_BUG: Final = 70
-EXIT_INTERRUPTED: Final = 130
-EXIT_BROKEN_PIPE: Final = 141
 
 
 class Commands(click.Group):
@@ -149,7 +145,7 @@ def _exit_code(arguments: list[str]) -> int:
             echo_as_it_is(
                 f"{PROGRAM}: standard output is closed, so nothing that was to be printed came out", err=True
             )
-            return EXIT_USAGE
+            return ExitCode.WRONG_USE
         sys.stdout.flush()
         return 0
     except click.exceptions.Exit as ended:
@@ -158,15 +154,15 @@ def _exit_code(arguments: list[str]) -> int:
         click.exceptions.NoArgsIsHelpError
     ) as error:  # a group without a subcommand: the message is its help
         echo_as_it_is(error.format_message(), err=True)
-        return EXIT_USAGE
+        return ExitCode.WRONG_USE
     except (click.Abort, KeyboardInterrupt):
         with suppress(OSError):  # the terminal may have gone
             echo_as_it_is("interrupted", err=True)
         _flush_stdout()
-        return EXIT_INTERRUPTED
+        return ExitCode.INTERRUPTED
     except BrokenPipeError:
         _give_up_stdout()  # the reader of the pipe has gone
-        return EXIT_BROKEN_PIPE
+        return ExitCode.BROKEN_PIPE
     except SystemExit as error:
         if next((argument for argument in arguments if not argument.startswith("-")), "") not in COMMANDS:
             raise  # the command of a plugin may choose its exit code
@@ -209,21 +205,21 @@ def _report(error: Exception, arguments: Sequence[str]) -> int:
     if isinstance(error, GraspsenseError):
         message, code = str(error), error.exit_code
     elif isinstance(error, click.ClickException):
-        message, code = error.format_message(), EXIT_USAGE
+        message, code = error.format_message(), ExitCode.WRONG_USE
         if isinstance(error, click.UsageError) and error.ctx is not None:
             message += f"\n  {error.ctx.command_path} --help shows what there is"
     elif isinstance(error, OSError):
         place = f": {error.filename}" if error.filename else ""
-        message, code = f"{error.strerror or error}{place}", EXIT_USAGE
+        message, code = f"{error.strerror or error}{place}", ExitCode.WRONG_USE
     else:
-        message, code = f"{type(error).__name__}: {error}", EXIT_BUG
+        message, code = f"{type(error).__name__}: {error}", ExitCode.BUG
     notes = list(getattr(error, "__notes__", ()))
-    if code == EXIT_USAGE:
+    if code == ExitCode.WRONG_USE:
         from graspsense.cli.wrong_use import advice
 
         notes = [*advice(error, arguments), *notes]
     told = "\n  ".join([message, *notes])
-    if code == EXIT_BUG and not isinstance(error, GraspsenseError):
+    if code == ExitCode.BUG and not isinstance(error, GraspsenseError):
         told = f"internal error: {told}\n  This is a bug, {_whose(error)}."
         if os.environ.get(TRACEBACK_VARIABLE) != "1":
             told += f" Run it again with {TRACEBACK_VARIABLE}=1 to see where it happened."

@@ -77,7 +77,7 @@ def names_object(object_name: str | None, options: Sequence[str]) -> bool:
 def contradiction(settings: Settings, label: str) -> click.UsageError:
     """Return the error for a label that contradicts the object of a simulated gripper."""
     return click.UsageError(
-        f"the label {label} is not what the gripper holds, which is {settings.values['gripper']['object']}: a "
+        f"the label {label} is not what the gripper holds, which is {settings.held}: a "
         "simulated gripper grasps what it is told, so label and object must agree. Leave --object out to grasp what "
         "the label says"
     )

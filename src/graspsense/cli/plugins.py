@@ -11,6 +11,7 @@ import click
 
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, state_style
+from graspsense.core.values.exit_code import ExitCode
 
 if TYPE_CHECKING:
     from graspsense.core.components.registry import Component, Plugins, PluginStatus
@@ -152,7 +153,7 @@ def check(
         echo("does not conform:", Style.BAD) if report.failures else echo("conforms", Style.GOOD)
         for failure in report.failures:
             echo(f"  {failure}", indent=2)
-    ctx.exit(1 if report.failures else 0)
+    ctx.exit(ExitCode.CHECK_FAILED if report.failures else 0)
 
 
 @plugins.command()

@@ -40,7 +40,7 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     """Predict and print."""
     from graspsense.core.components.registry import installed
     from graspsense.core.learn.copies import learned_from
-    from graspsense.core.learn.model import load_model
+    from graspsense.core.learn.model_file import load_model
     from graspsense.evaluation.json_codec import to_json
     from graspsense.regression.model import is_regression
 
@@ -144,7 +144,7 @@ def _rate(predictions: Sequence[Prediction], labelled: Labelled, learned: str) -
 
 
 def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) -> None:
-    from graspsense.core.values.features import percent
+    from graspsense.core.values.features import certainty_words
 
     coverage = next(
         (prediction.coverage for prediction in predictions if prediction.coverage is not None), None
@@ -153,7 +153,7 @@ def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) ->
     header = ("TRIAL", "PREDICTION", "CERTAINTY", *sets, *(("LABEL", "CORRECT") if labels else ()), "BECAUSE")
     rows = []
     for i, prediction in enumerate(predictions):
-        certainty = percent(prediction.certainty) if prediction.certainty is not None else ""
+        certainty = certainty_words(prediction.certainty) if prediction.certainty is not None else ""
         of_set = () if coverage is None else (" or ".join(prediction.prediction_set),)
         label = (labels[i], "yes" if prediction.label == labels[i] else "no") if labels else ()
         because = "; ".join(reason.words for reason in prediction.because)

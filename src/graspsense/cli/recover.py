@@ -9,8 +9,7 @@ import click
 from graspsense.cli.output import echo_json
 from graspsense.cli.sources import named_store
 from graspsense.cli.terminal import echo, talk
-
-EXIT_DAMAGED = 5
+from graspsense.core.values.exit_code import ExitCode
 
 
 @click.command()
@@ -52,4 +51,4 @@ def recover(source: str, out: str | None, as_json: bool) -> None:
         if not recovered:
             echo("nothing to recover")
     if any(trial.what == "failed" for trial in recovered):
-        raise click.exceptions.Exit(EXIT_DAMAGED)
+        raise click.exceptions.Exit(ExitCode.DAMAGED)

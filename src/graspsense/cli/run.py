@@ -24,20 +24,19 @@ from graspsense.cli.terminal import (
     talk,
     warn,
 )
+from graspsense.core.values.exit_code import ExitCode
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from graspsense.core.components.config import Settings
-    from graspsense.core.grasp.runner import Sink
+    from graspsense.core.grasp.sinks import Sink
     from graspsense.core.values.device import DeviceInfo
     from graspsense.core.values.features import Prediction
     from graspsense.core.values.trial import Trial
     from graspsense.experiments.condition import Conditions
     from graspsense.report.film import Film
 
-EXIT_ABORTED: Final = 4
-EXIT_NOT_KEPT: Final = 2
 LARGEST_DRAWN_SEED: Final = 999_999
 MANY_GUARDED: Final = 0.1
 """Share of the ticks of a grasp from which on `run` names the settings by which the guard limits the approach."""
@@ -221,9 +220,9 @@ def finish(trial: Trial, interrupted: bool, problem: str = "") -> None:
 
     if problem:
         talk(f"graspsense: {problem}")
-        raise click.exceptions.Exit(EXIT_NOT_KEPT)
+        raise click.exceptions.Exit(ExitCode.WRONG_USE)
     if trial.outcome in (Outcome.ABORTED, Outcome.DEVICE_LOST):
-        raise click.exceptions.Exit(EXIT_ABORTED)
+        raise click.exceptions.Exit(ExitCode.NOT_FINISHED)
     if interrupted:  # during the release, when the grasp had its outcome
         raise KeyboardInterrupt
 
@@ -233,11 +232,10 @@ def _condition(settings: Settings) -> Conditions | None:
     from graspsense.cli.progress import ProgressLine
     from graspsense.experiments.condition import conditions
 
-    scene = str(getattr(settings.gripper.config, "object", "none"))
-    if scene == "none":
+    if settings.held in ("", "none"):
         return None
     with ProgressLine() as progress:
-        return conditions(settings, [scene], [settings.run.seed], progress=progress)
+        return conditions(settings, [settings.held], [settings.run.seed], progress=progress)
 
 
 def _print_better(settings: Settings, trial: Trial) -> None:

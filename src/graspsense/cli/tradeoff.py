@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from attrs import asdict
+from attrs import asdict, evolve
 
 from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json, file_to_write_as
@@ -77,15 +77,18 @@ def condition(
     from graspsense.cli.condition_table import conditions_markdown, print_conditions
     from graspsense.cli.progress import ProgressLine
     from graspsense.experiments.condition import conditions
+    from graspsense.experiments.sensors import with_ideal_sensors
 
     settings = settings_of(**asked)
     wanted = _scenes(scenes, asked)
     names = [scene for scene in wanted for _ in range(seeds)]
     numbers = [settings.run.seed + k for _ in wanted for k in range(seeds)]
-    sensors = dict.fromkeys(("ideal", str(getattr(settings.gripper.config, "sensor", "ideal"))))
+    ideal = with_ideal_sensors(settings.gripper)
+    grippers = [ideal] if ideal.config == settings.gripper.config else [ideal, settings.gripper]
     with ProgressLine() as progress:
         measured = [
-            conditions(settings, names, numbers, sensor=sensor, progress=progress) for sensor in sensors
+            conditions(evolve(settings, gripper=gripper), names, numbers, progress=progress)
+            for gripper in grippers
         ]
     if markdown:
         write_text(markdown, conditions_markdown(measured))

@@ -90,7 +90,7 @@ def train(
 
     from graspsense.core.files.whole_file import write_whole
     from graspsense.core.learn.checkpoints import checkpoints_of
-    from graspsense.core.learn.model import write_model
+    from graspsense.core.learn.model_file import write_model
     from graspsense.evaluation.gathered_warnings import gathered_warnings
 
     pipeline = pipeline_beside(out) if choose and not is_csv(source) else None
@@ -138,7 +138,7 @@ def _maker(learner: SelectedComponent, name: str, target: str, seed: int) -> Cal
     """Return a function that trains a model of this name, without calibration."""
     from functools import partial
 
-    from graspsense.core.learn.model import train as trained
+    from graspsense.core.learn.training import train as trained
 
     return partial(
         trained,

@@ -10,9 +10,7 @@ from graspsense.cli.output import echo_json
 from graspsense.cli.sources import named_store
 from graspsense.cli.terminal import Style, echo, echo_entry
 from graspsense.core.values.errors import counted
-
-EXIT_DAMAGED = 5
-EXIT_UNREAD = 2
+from graspsense.core.values.exit_code import ExitCode
 
 
 @click.command()
@@ -53,6 +51,6 @@ def verify(source: str, as_json: bool) -> None:
         if verified.unfinished:
             echo("graspsense recover saves what is unfinished")
     if verified.problems:
-        raise click.exceptions.Exit(EXIT_DAMAGED)
+        raise click.exceptions.Exit(ExitCode.DAMAGED)
     if verified.unread:
-        raise click.exceptions.Exit(EXIT_UNREAD)
+        raise click.exceptions.Exit(ExitCode.WRONG_USE)

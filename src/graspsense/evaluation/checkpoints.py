@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import frozen
 
-from graspsense.core.learn.model import Model, checkpoint_model, train
+from graspsense.core.learn.model import Model, checkpoint_model
+from graspsense.core.learn.training import train
 from graspsense.evaluation.crossval import columns_of, cross_validate
 from graspsense.evaluation.doubt import HeldOut, calibrated, calibrated_by, exchangeable_instances
 from graspsense.evaluation.folds import INSTANCE_HELD_OUT, held_out

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import field, frozen
 
-from graspsense.evaluation.intervals import Interval, percentage, percentages, rate_of
+from graspsense.evaluation.intervals import Interval, percent, percentages, rate_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -45,7 +45,7 @@ class ChosenRate:
     @property
     def words(self) -> str:
         """The rate with its interval."""
-        return f"{percentage(self.rate)} (95 %: {percentages(self.interval)})"
+        return f"{percent(self.rate)} (95 %: {percentages(self.interval)})"
 
 
 def comparisons_of(right: NDArray[np.bool_], instances: Sequence[str] | None) -> float:

@@ -31,14 +31,21 @@ MIN_INSTANCES: Final = 6
 Interval = tuple[float, float]
 
 
-def percentage(share: float) -> str:
+def percent(share: float) -> str:
     """Return a share in per cent."""
     return f"{100 * share:.1f} %"
 
 
+def span(interval: Sequence[float] | None) -> str:
+    """Return an interval of shares in per cent, without the sign; for a column, or beside a rate that has it."""
+    if interval is None:
+        return "no interval"
+    return f"{100 * interval[0]:.1f} to {100 * interval[1]:.1f}"
+
+
 def percentages(interval: Interval | None) -> str:
-    """Return an interval of shares in per cent."""
-    return "no interval" if interval is None else f"{100 * interval[0]:.1f} to {100 * interval[1]:.1f} %"
+    """Return an interval of shares in per cent, with the sign."""
+    return span(interval) if interval is None else f"{span(interval)} %"
 
 
 @frozen
@@ -71,7 +78,7 @@ class RecognitionRate:
     @property
     def words(self) -> str:
         """The rate as text: percentage, counts and interval."""
-        counts = f"{percentage(self.rate)} ({self.correct} of {self.n}; "
+        counts = f"{percent(self.rate)} ({self.correct} of {self.n}; "
         if self.interval is None:
             return f"{counts}no interval: {self.no_interval})"
         instances = "" if self.instances is None else f" over {counted(self.instances, 'instance')}"

@@ -11,7 +11,7 @@ from attrs import frozen
 from graspsense.evaluation.intervals import (
     Interval,
     RecognitionRate,
-    percentage,
+    percent,
     percentages,
     t_quantile,
     wilson,
@@ -67,8 +67,10 @@ class OverSeeds:
     def words(self) -> str:
         """The mean as text, with its interval."""
         if self.interval is None:
-            return f"{percentage(self.mean)} (no interval{f': {self.single.no_interval}' if self.single else ''})"
-        return f"{percentage(self.mean)} (95 %: {percentages(self.interval)})"
+            return (
+                f"{percent(self.mean)} (no interval{f': {self.single.no_interval}' if self.single else ''})"
+            )
+        return f"{percent(self.mean)} (95 %: {percentages(self.interval)})"
 
 
 @frozen

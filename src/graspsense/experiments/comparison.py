@@ -13,7 +13,8 @@ from graspsense import __version__
 from graspsense.core.components.strict import plain
 from graspsense.core.values.errors import ConfigError, DataDamaged, counted
 from graspsense.evaluation.intervals import Difference, unpaired_difference
-from graspsense.experiments.experiment import PIPELINE_TABLES, shown
+from graspsense.experiments.cases import shown
+from graspsense.experiments.experiment import PIPELINE_TABLES
 from graspsense.experiments.results import EXPERIMENT, RESULTS, Results
 from graspsense.experiments.summary import ConditionResult, Summary, summarise
 from graspsense.report.verdict import in_hundred

@@ -14,13 +14,14 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
-from attrs import asdict, evolve, fields_dict, frozen
+from attrs import asdict, frozen
 from numpy.typing import NDArray
 
 from graspsense.core.components.config import Settings
 from graspsense.core.components.roles import BatchBackend
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import Features
+from graspsense.experiments.sensors import sensors_of
 
 PPM: Final = 1e-6
 SCALES: Final[Mapping[str, float]] = {"m": 1e-3, "N": 1.0, "s": 0.05, "m/s": 1e-3, "N/s": 1.0}
@@ -70,18 +71,13 @@ def conditions(
     scenes: Sequence[str],
     seeds: Sequence[int],
     *,
-    sensor: str | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Conditions:
     """Measure the condition of every feature, of one grasp of each scene with the seed in the same place.
 
-    `sensor`: the setting of this name, if not that of `settings`. Raises ConfigError if the gripper has no parameters
-    to change, UnknownName for an unknown scene.
+    Raises ConfigError if the gripper has no parameters to change, UnknownName for an unknown scene.
     """
-    config = settings.gripper.config
-    if sensor is not None and "sensor" in fields_dict(type(config)):
-        config = evolve(config, sensor=sensor)
-    backend = settings.gripper.component.create(config)
+    backend = settings.gripper.create()
     grippers = backend.perturbed(scenes, PPM) if isinstance(backend, BatchBackend) else {}
     if not grippers:
         raise ConfigError(
@@ -97,7 +93,7 @@ def conditions(
     names = tuple(rows)
     movement = np.array([[_movements(a, b) for a, b in zip(base, rows[name], strict=True)] for name in names])
     return Conditions(
-        sensor=str(getattr(config, "sensor", "")),
+        sensor=sensors_of(settings.gripper),
         scenes=tuple(dict.fromkeys(scenes)),
         grasps=len(scenes),
         parameters=len(names),

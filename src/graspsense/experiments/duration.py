@@ -11,7 +11,9 @@ from typing import Final
 
 from attrs import frozen
 
-from graspsense.experiments.experiment import Planned, number_of_trials, shipped
+from graspsense.experiments.cases import number_of_trials
+from graspsense.experiments.experiment import Planned
+from graspsense.experiments.experiment_file import shipped
 from graspsense.experiments.kinds import kind_of
 
 MEASURED_ON: Final = "times measured on Intel(R) Xeon(R) Processor at 2.0 GHz on 2026-11-22"

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from html import escape
 from typing import Any, Final
 
 from attrs import field, frozen
 
+from graspsense.evaluation.intervals import percent
 from graspsense.experiments.summary import ConditionResult
 from graspsense.recording.provenance import commit_text
 from graspsense.report.html import Section, bullets, paragraph, table
@@ -103,18 +104,6 @@ class Findings:
         if self.notes:
             lines += ["## Notes", "", *(f"- {_cell(note)}" for note in self.notes), ""]
         return "\n".join(lines)
-
-
-def percent(rate: float) -> str:
-    """Return a rate in per cent."""
-    return f"{100 * rate:.1f} %"
-
-
-def span(interval: Sequence[float] | None) -> str:
-    """Return an interval of rates in per cent."""
-    if interval is None:
-        return "no interval"
-    return f"{100 * interval[0]:.1f} to {100 * interval[1]:.1f}"
 
 
 def code(text: str) -> str:

@@ -8,7 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import Final
 
-from graspsense.core.learn.model import worded
+from graspsense.core.components.setting import worded
 from graspsense.core.values.errors import counted
 from graspsense.experiments.answer import answer, headline
 from graspsense.experiments.findings import MARKDOWN, Findings

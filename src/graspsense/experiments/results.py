@@ -25,7 +25,8 @@ from graspsense.core.components.caller import option
 from graspsense.core.components.config import to_toml, toml_key, toml_value, without_followers
 from graspsense.core.components.strict import plain
 from graspsense.core.values.errors import ConfigError, named
-from graspsense.experiments.experiment import PipelineOf, Planned, read_experiment
+from graspsense.experiments.experiment import PipelineOf, Planned
+from graspsense.experiments.experiment_file import read_experiment
 from graspsense.experiments.task import TaskResult
 from graspsense.experiments.versions import versions
 from graspsense.recording.atomic_file import SaveFailed, write_or_replace

@@ -30,6 +30,7 @@ from graspsense.core.values.features import FeatureTable, table_of
 from graspsense.evaluation.distribution import DistributionDistance, distribution_distance
 from graspsense.evaluation.equivalence import Equivalence, equivalence
 from graspsense.experiments.recognise import TEST_SEED_OFFSET, predictions
+from graspsense.experiments.sensors import sensors_of
 from graspsense.report.simulation import MeasuredVariant
 from graspsense.sources.simulated import Group, SimulationPlan, plan_trials
 
@@ -142,7 +143,7 @@ def sensed_trade(
     ]
     return SensedTrade(
         objects=training.plans[0].groups[0].objects,
-        sensor=str(getattr(settings.gripper.config, "sensor", "")),
+        sensor=sensors_of(settings.gripper),
         classifier=settings.classifier.component.qualified,
         grasps=len(training.plans[0].labels),
         seeds=tuple(seeds),

@@ -10,11 +10,12 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from attrs import evolve, fields_dict, frozen
+from attrs import evolve, frozen
 
 from graspsense.core.components.roles import BatchBackend, Grasped, SimulationVariant
 from graspsense.core.values.errors import ConfigError
 from graspsense.experiments.condition import SCALES
+from graspsense.experiments.sensors import with_ideal_sensors
 from graspsense.experiments.versions import measured_on
 from graspsense.report.simulation import PEAK, TRACE, SimulationTrade, VariantPoint
 
@@ -117,8 +118,7 @@ def _measured(
     tick: Callable[[], None] | None,
 ) -> tuple[list[_Measured], float, float]:
     """Return features and force of every grasp, the processor time of one, and the additional time of the first run."""
-    ideal = {"sensor": "ideal"} if "sensor" in fields_dict(type(settings.gripper.config)) else {}
-    config = evolve(settings.gripper.config, **{**ideal, **variant.settings})
+    config = evolve(with_ideal_sensors(settings.gripper).config, **variant.settings)
     backend = settings.gripper.component.create(config)
     controller, feature_set = settings.controller.create(), settings.features.create()
     backend.expect_features(feature_set)

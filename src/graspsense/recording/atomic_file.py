@@ -6,12 +6,13 @@ from pathlib import Path
 
 from graspsense.core.files.whole_file import write_whole
 from graspsense.core.values.errors import ConfigError, GraspsenseError
+from graspsense.core.values.exit_code import ExitCode
 
 
 class SaveFailed(GraspsenseError):
     """Data could not be written to the disk."""
 
-    exit_code = 2
+    exit_code = ExitCode.WRONG_USE
 
 
 def write_new(path: Path, data: bytes) -> None:

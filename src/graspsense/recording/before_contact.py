@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from graspsense.core.components.compiled_features import CompiledExtraction, TickColumns
-from graspsense.core.control.contact import CONTACT_FORCE_N
+from graspsense.core.control.contact import CONTACT_FORCE_N, either_touches
 from graspsense.core.values.features import Features, missing
 from graspsense.core.values.signals import APPROACH
 from graspsense.core.values.trace import Trace
@@ -83,7 +83,7 @@ def measure(params: tuple[float], ticks: TickColumns) -> Before:
     for i in range(n):
         if ticks.t_s[i] > start_s + SPAN_S + GUARD_S:
             break
-        if ticks.force_left_n[i] >= params[0] or ticks.force_right_n[i] >= params[0]:
+        if either_touches(ticks.force_left_n[i], ticks.force_right_n[i], params[0]):
             return Before(TOUCHED, math.nan, math.nan, math.nan, math.nan, math.nan)
         if ticks.phase[i] == APPROACH and ticks.t_s[i] <= start_s + SPAN_S:
             count += 1

@@ -14,7 +14,8 @@ from attrs import frozen
 from graspsense.core.components.caller import option
 from graspsense.core.learn.conformal import COVERAGE, calibrated_threshold, units_needed
 from graspsense.core.values.errors import ConfigError, counted
-from graspsense.evaluation.evaluate import PERMUTATIONS, Progress
+from graspsense.evaluation.controls import PERMUTATIONS
+from graspsense.evaluation.evaluator import Progress
 from graspsense.evaluation.folds import INSTANCE_HELD_OUT, in_order, instance_held_out, stratified
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.evaluation.intervals import MIN_INSTANCES, rate_of

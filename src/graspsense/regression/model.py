@@ -18,8 +18,14 @@ from attrs import frozen
 
 from graspsense import __version__
 from graspsense.core.learn.conformal import COVERAGE
-from graspsense.core.learn.model import REGRESSION_FORMAT, write_json_lines
-from graspsense.core.learn.model_content import digest, model_bytes, parsed, sealed_content
+from graspsense.core.learn.model_content import (
+    REGRESSION_FORMAT,
+    digest,
+    model_bytes,
+    parsed,
+    sealed_content,
+    write_json_lines,
+)
 from graspsense.core.learn.novelty import Novelty, novelty_of
 from graspsense.core.learn.stored_values import LARGEST_SEED, StoredValues
 from graspsense.core.learn.target_value import TargetValue

@@ -8,7 +8,7 @@ from html import escape
 from graspsense.core.values.tree import TreeNode
 from graspsense.evaluation.confusion import Confusion
 from graspsense.evaluation.doubt import Reliability, SetCoverage
-from graspsense.evaluation.intervals import percentage
+from graspsense.evaluation.intervals import percent
 from graspsense.report.html import Section, bullets, figure, folded, pair, paragraph
 from graspsense.report.matrix import confusion_table
 from graspsense.report.rates import RateRow, rates_list, rates_picture, rates_table
@@ -60,15 +60,15 @@ def doubt_section(sets: SetCoverage, reliability: Reliability) -> Section:
         ]
         text += (
             f" In held-out grasps the sets contain it in {sets.covered.words}. They have {sets.mean_size:.2f} "
-            f"labels on average; {percentage(sets.single.rate)} have a single one. The prediction is always a "
+            f"labels on average; {percent(sets.single.rate)} have a single one. The prediction is always a "
             "member, so a label is covered at least as often as it is recognised."
         )
     raw = reliability.uncalibrated_error
-    raw_words = "" if raw is None else f", and {percentage(raw)} before calibration"
+    raw_words = "" if raw is None else f", and {percent(raw)} before calibration"
     probabilities = (
         f"Where the probabilities are right, predictions of 80 % are correct in 80 of 100 grasps. The Brier score is "
         f"{reliability.brier:.3f} (0 is perfect, 2 the worst); the expected calibration error is "
-        f"{percentage(reliability.calibration_error)}{raw_words}."
+        f"{percent(reliability.calibration_error)}{raw_words}."
     )
     covered = rates_table("Sets that contain the true label", rows, "contain it") if rows else ""
     return Section(
@@ -91,7 +91,7 @@ def _reliability_curve(reliability: Reliability) -> str:
             if point.rate.interval is not None:
                 low, high = point.rate.interval
                 picture.line([(place, y(100 * low)), (place, y(100 * high))], INKS[0])
-            words = f"{percentage(point.probability)}: {point.rate.words}"
+            words = f"{percent(point.probability)}: {point.rate.words}"
             picture.mark(place, y(100 * point.rate.rate), INKS[0], words=words)
     caption = "Recognition rate over probability, in ten bins. Bars are 95 % intervals; the line is perfect agreement."
     return figure(picture.svg(caption), caption)

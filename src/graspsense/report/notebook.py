@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from graspsense.core.values.features import Features, Prediction, percent
+from graspsense.core.values.features import Features, Prediction, certainty_words
 from graspsense.core.values.short_html import sentence, table
 from graspsense.core.values.trace import SampleTrace, Trace
 from graspsense.core.values.trial import Trial
@@ -67,7 +67,9 @@ def prediction_html(prediction: Prediction) -> str:
     if prediction.set_in_words:
         parts.append(sentence(f"set: {prediction.set_in_words}"))
     if likely and prediction.calibrated:
-        parts.append(table(("class", "probability"), [(label, percent(share)) for label, share in likely]))
+        parts.append(
+            table(("class", "probability"), [(label, certainty_words(share)) for label, share in likely])
+        )
     parts += [sentence(reason.words) for reason in prediction.because]
     parts += [sentence(f"warning: {warning}") for warning in prediction.warnings]
     if prediction.model:

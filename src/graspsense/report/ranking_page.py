@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from graspsense.evaluation.intervals import percentage
+from graspsense.evaluation.intervals import percent
 from graspsense.evaluation.ranking import MARGIN, Candidate, Ranking
 from graspsense.report.html import Page, Section, bullets, facts, pair, paragraph, table
 from graspsense.report.rates import RateRow, rates_picture
@@ -48,10 +48,7 @@ def _rates(ranking: Ranking) -> Section:
         (
             candidate.classifier,
             _features(candidate),
-            *(
-                percentage(candidate.rates[name].rate) if name in candidate.rates else ""
-                for name in protocols
-            ),
+            *(percent(candidate.rates[name].rate) if name in candidate.rates else "" for name in protocols),
             f"{candidate.training_s:.2g}",
         )
         for candidate in ranking.candidates
@@ -106,11 +103,11 @@ def _sets(ranking: Ranking) -> Section:
             (
                 candidate.classifier,
                 _features(candidate),
-                percentage(sets.covered.rate),
-                "" if sets.covered_below is None else percentage(sets.covered_below.rate),
-                f"{percentage(lowest[1].rate)} ({lowest[0]})",
+                percent(sets.covered.rate),
+                "" if sets.covered_below is None else percent(sets.covered_below.rate),
+                f"{percent(lowest[1].rate)} ({lowest[0]})",
                 f"{sets.mean_size:.2f}",
-                percentage(sets.single.rate),
+                percent(sets.single.rate),
             )
         )
     header = (

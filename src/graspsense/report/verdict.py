@@ -6,7 +6,7 @@ from typing import Final
 
 from graspsense.core.values.errors import counted
 from graspsense.evaluation.equivalence import MARGIN, verdict_on
-from graspsense.evaluation.intervals import percentage, percentages
+from graspsense.evaluation.intervals import percent, percentages
 from graspsense.evaluation.results import Evaluation, Measurement
 from graspsense.report.wording import TARGETS
 
@@ -58,7 +58,7 @@ def _rate(evaluation: Evaluation) -> str:
         protocol = "objects of which other grasps may have been used for training"
     interval = f"95 %: {percentages(rate.interval)}" if rate.interval else f"no interval: {rate.no_interval}"
     return (
-        f"{name} recognises {TARGETS[evaluation.recognised]} in {percentage(rate.rate)} of {trials} "
+        f"{name} recognises {TARGETS[evaluation.recognised]} in {percent(rate.rate)} of {trials} "
         f"({interval}), on {protocol}."
     )
 
@@ -66,7 +66,7 @@ def _rate(evaluation: Evaluation) -> str:
 def _against_guessing(majority: Measurement | None) -> str:
     if majority is None or majority.rate is None or majority.difference is None:
         return ""
-    guessing = f"always giving the most frequent label ({percentage(majority.rate.rate)})"
+    guessing = f"always giving the most frequent label ({percent(majority.rate.rate)})"
     interval = majority.difference.interval
     if interval is None:
         return f"Whether this is better than {guessing} cannot be told: {majority.difference.no_interval}."
@@ -85,7 +85,7 @@ def _before_contact(evaluation: Evaluation) -> str:
     if control.rate is None or majority is None or majority.rate is None:
         why = "" if control.rate is not None else f": {control.reason}"
         return f"Whether the recording reveals the labels before contact was not measured{why}."
-    known = f"{percentage(control.rate.rate)}{_among(control, evaluation.headline.n)}"
+    known = f"{percent(control.rate.rate)}{_among(control, evaluation.headline.n)}"
     if any("from before contact" in warning for warning in evaluation.warnings):
         return f"But {known} are recognised before any contact: the recording reveals the labels, so do not trust it."
     if control.rate.n < LEAST_TRIALS <= evaluation.headline.n:
@@ -104,7 +104,7 @@ def _first_line(evaluation: Evaluation) -> str:
     if control is None or control.rate is None:
         return ""
     if any("from the first line" in warning for warning in evaluation.warnings):
-        share = percentage(control.rate.rate)
+        share = percent(control.rate.rate)
         return f"The first line of the recording alone gives {share}: the recording reveals the labels."
     return ""
 
@@ -121,7 +121,7 @@ def _width(control: Measurement | None, trials: int) -> str:
         return ""
     if control.rate is None or control.difference is None:
         return "How much of it the width alone explains was not measured."
-    width = f"The width alone gives {percentage(control.rate.rate)}{_among(control, trials)}"
+    width = f"The width alone gives {percent(control.rate.rate)}{_among(control, trials)}"
     if control.rate.n < LEAST_TRIALS <= trials:
         return f"{width}, too few to say what the squeeze adds."
     if control.difference.interval is None:

@@ -49,7 +49,7 @@ def agrees(settings: Settings, label: str) -> bool:
     A label contradicts the gripper only if the gripper holds a known object: an object from a file can have any label,
     and nobody but the user knows what a real gripper holds.
     """
-    held = str(settings.values["gripper"].get("object") or "").partition("#")[0]
+    held = settings.held.partition("#")[0]
     known = {name for kind in settings.gripper.create().objects() for name in kind.full_names}
     named = label.partition("#")[0]
     return held == named or not known & {held, named}

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from graspsense.core.components.config import Settings
     from graspsense.core.components.registry import Plugins
     from graspsense.core.grasp.pair import Member
-    from graspsense.core.grasp.runner import Sink
+    from graspsense.core.grasp.sinks import Sink
     from graspsense.core.values.device import DeviceInfo
     from graspsense.core.values.trial import Trial
 

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 from attrs import frozen
 
-from graspsense.gripper_api import first_rest
-from graspsense.plugin_api import APPROACH, HOLD, Channel, Feature, Features, FeatureSet, setting
+from graspsense.gripper_api import MOVED_M, first_rest
+from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, setting
 
 if TYPE_CHECKING:
     from graspsense.plugin_api import Trace
-
-MOVED_M: Final = 1e-3
-"""Travel after which fingers at rest have met something: they have begun to move before."""
 
 
 @frozen(kw_only=True)
@@ -55,8 +52,7 @@ class WidthAndTime(FeatureSet[WidthAndTimeConfig]):
     def extract(self, trace: Trace) -> Features:
         """Return the five features; those of the last rest are missing where the fingers did not come to it."""
         config = self.config
-        closing = (trace.phase >= APPROACH) & (trace.phase <= HOLD)
-        times, gaps = trace.t_s[closing], trace.gap_m[closing]
+        times, gaps = trace.t_s[trace.closing], trace.gap_m[trace.closing]
         known = ~np.isnan(gaps)
         times, gaps = times[known], gaps[known]
         if len(gaps) == 0:

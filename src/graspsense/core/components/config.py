@@ -125,6 +125,11 @@ class Settings:
             if part is not None
         )
 
+    @property
+    def held(self) -> str:
+        """What `gripper.object` says that a simulated gripper holds; empty if the gripper has no such key."""
+        return str(self.values["gripper"].get("object") or "")
+
     def keys(self, table: str) -> dict[str, dict[str, Any]]:
         """Return what each key of a table declares, as `keys_of` does."""
         selected = next((part for part in self.chosen if part.component.table == table), None)

@@ -285,6 +285,9 @@ class BatchOptions(TypedDict, total=False):
 class BatchBackend(SensorBackend[ConfigT]):
     """A backend that can run many grasps at once."""
 
+    ideal_sensors: Mapping[str, Any] = {}
+    """The settings that make its sensors ideal, as `{"sensor": "ideal"}`; empty if there are none."""
+
     def variants(self) -> Sequence[SimulationVariant]:
         """Return the variants that trade accuracy for time; empty if there are none."""
         return ()

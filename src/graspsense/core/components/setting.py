@@ -21,6 +21,8 @@ from typing import Any, Final, Literal, cast, get_args, get_origin
 import attrs
 from attrs import frozen, validators
 
+from graspsense.core.values.units import display_unit, without_underscores
+
 _DECLARATION: Final = "graspsense.setting"
 _EFFECT: Final = "graspsense.effect"
 _FOLLOWS: Final = "graspsense.follows"
@@ -328,3 +330,12 @@ def _allowed_words(
     if below is not None:
         words.append(f"below {below:g}")
     return ", ".join(words)
+
+
+def worded(key: str, value: Any) -> tuple[str, str]:
+    """Return a key and its value in words: `probing_force_n`, 20 as `probing force`, `20 N`."""
+    ending = next((ending for ending in UNIT_OF_ENDING if key.endswith(ending)), "")
+    if not ending or isinstance(value, bool) or not isinstance(value, int | float):
+        return without_underscores(key), str(value)
+    unit, factor = display_unit(UNIT_OF_ENDING[ending])
+    return without_underscores(key.removesuffix(ending)), f"{value * factor:g} {unit}"

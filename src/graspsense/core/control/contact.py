@@ -21,6 +21,8 @@ REST_SPEED_M_S: Final = 1e-4
 """Rest threshold tau_2: 0.1 mm/s, as in the authors' code."""
 REST_WINDOW_S: Final = 0.05
 """Time for which the speed must stay below tau_2. One encoder tick in 1 ms is already 0.33 mm/s on the PR2."""
+MOVED_M: Final = 1e-3
+"""Travel after which the fingers have overcome static friction: fingers that stand still later have met something."""
 
 FEW: Final = 8
 """Number of samples that are examined one by one before all others at once."""
@@ -43,6 +45,26 @@ def both_touch(force_left_n: float, force_right_n: float, contact_force_n: float
     (True, False)
     """
     return force_left_n >= contact_force_n and force_right_n >= contact_force_n
+
+
+def both_touch_samples(
+    force_left_n: NDArray[np.float64], force_right_n: NDArray[np.float64], contact_force_n: float
+) -> NDArray[np.bool_]:
+    """Return a mask of the samples in which both pads touch; arrays of shape (n,). The result is that of `both_touch`.
+
+    >>> both_touch_samples(np.array([0.1, 0.8]), np.array([0.7, 0.7]), CONTACT_FORCE_N).tolist()
+    [False, True]
+    """
+    return (force_left_n >= contact_force_n) & (force_right_n >= contact_force_n)
+
+
+def either_touches(force_left_n: float, force_right_n: float, contact_force_n: float) -> bool:
+    """Return whether at least one pad is at or above the contact force (N). NaN counts as no contact.
+
+    >>> either_touches(0.8, 0.1, CONTACT_FORCE_N), either_touches(0.1, 0.1, CONTACT_FORCE_N)
+    (True, False)
+    """
+    return force_left_n >= contact_force_n or force_right_n >= contact_force_n
 
 
 def update_rest(

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from math import inf
 from typing import Any, NamedTuple
 
+from graspsense.core.control.contact import either_touches
 from graspsense.core.values.signals import EFFORT, FORCE, POSITION, VELOCITY, Command, Frame, Reading
 
 
@@ -57,7 +58,7 @@ def guard(
     if params.speed_limit_m_s < speed_limit:
         speed_limit = params.speed_limit_m_s
     if contact_seen == 0:
-        if frame.force_left_n >= params.contact_force_n or frame.force_right_n >= params.contact_force_n:
+        if either_touches(frame.force_left_n, frame.force_right_n, params.contact_force_n):
             contact_seen = 1
         else:
             if params.first_effort_n < effort_limit:

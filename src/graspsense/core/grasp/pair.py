@@ -19,6 +19,7 @@ from graspsense.core.components.run_config import RunConfig
 from graspsense.core.values.channel import Channel
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError, DeviceLost, GraspsenseError, named
+from graspsense.core.values.exit_code import ExitCode
 from graspsense.core.values.signals import Command, Image, Pads, Reading, Samples
 
 T = TypeVar("T")
@@ -27,7 +28,7 @@ T = TypeVar("T")
 class OtherGripperFailed(GraspsenseError):
     """The other gripper of a pair was lost or could not go on, so that this one lets go."""
 
-    exit_code = 4
+    exit_code = ExitCode.NOT_FINISHED
 
 
 @define(eq=False)

@@ -12,12 +12,12 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from math import ceil, inf
-from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Final
 
-from attrs import evolve, frozen
+from attrs import frozen
 
 from graspsense.core.components.delivered import Delivered
-from graspsense.core.components.roles import Controller, SensorBackend, Viewer
+from graspsense.core.components.roles import Controller, SensorBackend
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.control.binding import bind, maker
 from graspsense.core.control.contact import RestState, at_rest, update_rest
@@ -38,20 +38,14 @@ from graspsense.core.control.tick import (
 )
 from graspsense.core.grasp.interrupts import Interrupts
 from graspsense.core.grasp.losses import Losses, lost_in_words
-from graspsense.core.values.channel import Channel
+from graspsense.core.grasp.opened_gripper import described, opened_gripper
+from graspsense.core.grasp.sinks import DeviceSink, EventSink, PictureSink, Sink, Watcher
+from graspsense.core.grasp.time_limits import frame_timeout_s, no_frame, overdue, seconds_at_most
 from graspsense.core.values.device import DeviceInfo
-from graspsense.core.values.errors import (
-    FAILURES,
-    DeviceLost,
-    GraspsenseError,
-    RecordingEnded,
-    TareRefused,
-    named,
-)
+from graspsense.core.values.errors import FAILURES, DeviceLost, RecordingEnded, TareRefused, named
 from graspsense.core.values.events import EventSource, GraspEvent, event_name
 from graspsense.core.values.faults import LIMITED, Fault
 from graspsense.core.values.features import Prediction
-from graspsense.core.values.fingers import fingers_in_words, fingers_of
 from graspsense.core.values.signals import (
     APPROACH,
     EFFORT,
@@ -70,50 +64,6 @@ from graspsense.core.values.trace import SI_UNITS, Trace, TraceRecorder
 
 if TYPE_CHECKING:
     from graspsense.core.grasp.protection.protection import Protection
-
-Tell = Callable[[float, int, str, Prediction | None], None]
-"""Called with the time, the phase, a sentence and the prediction; None where there is none, for the reason told."""
-
-
-class Watcher(Protocol):
-    """What the runner shows each tick of a squeeze to, and asks whether to stop it."""
-
-    def begin(self, recorder: TraceRecorder, info: DeviceInfo, tell: Tell) -> None:
-        """Receive the recorder of the grasp, the opened gripper, and where to report predictions."""
-
-    def watch(self, frame: Frame, phase: int) -> str:
-        """Return the reason to stop the squeeze after this tick; empty if it goes on."""
-
-
-class Sink(Protocol):
-    """A receiver of every tick, such as a terminal or a recorder. It must not block.
-
-    One that raises receives nothing more, and the reason of the outcome names it.
-    """
-
-    def take(self, reading: Reading, phase: int, command: Command) -> None:
-        """Receive one tick."""
-
-
-@runtime_checkable
-class EventSink(Protocol):
-    """A sink that also receives the events of a grasp. It must not block."""
-
-    def event(self, event: GraspEvent) -> None:
-        """Receive one event."""
-
-
-@runtime_checkable
-class DeviceSink(Protocol):
-    """A sink that is told of the gripper before the fingers move."""
-
-    def opened(self, device: DeviceInfo) -> None:
-        """Receive the description of the opened gripper."""
-
-
-@runtime_checkable
-class PictureSink(Viewer, Protocol):
-    """A sink that also receives pictures of the gripper, see `SensorBackend.see`."""
 
 
 @frozen(kw_only=True, eq=False)
@@ -158,37 +108,6 @@ def tick_params(info: DeviceInfo, controller: Controller[Any], run: RunConfig) -
     )
 
 
-def seconds_at_most(run: RunConfig) -> float:
-    """Return the longest time (s) of a grasp with opening, taring and release."""
-    return run.grasp_timeout_s + 3.0 * run.opening_timeout_s
-
-
-FRAME_PERIODS: Final = 3.0
-"""How many of its own periods a gripper may take for a frame, if that is longer than `run.frame_timeout_s`."""
-
-
-def frame_timeout_s(run: RunConfig, info: DeviceInfo) -> float:
-    """Return how long to wait for a frame: `run.frame_timeout_s`, or three periods of a gripper that is slower."""
-    return max(run.frame_timeout_s, FRAME_PERIODS / info.rate_hz)
-
-
-def no_frame(run: RunConfig, info: DeviceInfo) -> str:
-    """Return the message for a gripper that gave no frame for that long."""
-    return (
-        f"no frame from {info.name} for {frame_timeout_s(run, info) * 1e3:.0f} ms, although it declares "
-        f"{info.rate_hz:g} Hz: check its cable and power, then `graspsense devices`. run.frame_timeout_s sets how long "
-        "to wait"
-    )
-
-
-def overdue(run: RunConfig) -> str:
-    """Return the reason given for a grasp that took longer."""
-    return (
-        f"no end after {seconds_at_most(run):g} s of ticks: the controller did not end the grasp "
-        "(run.grasp_timeout_s)"
-    )
-
-
 def ended_by_itself(stopped: int, outcome: int) -> tuple[Outcome, str]:
     """Return the outcome of a grasp that its controller or the guard ended, and the reason if it needs one.
 
@@ -226,8 +145,8 @@ def run_grasp(
         try:
             sinks = tuple(sinks)
             _announce(backend, controller, run, sinks)
-            info = _opened(backend, run.seed)
-            info = _described(info, backend, controller, run)
+            info = opened_gripper(backend, run.seed)
+            info = described(info, backend, controller, run)
             if on_open is not None:
                 on_open(info)
             grasp = _Grasp(backend, controller, run, info, sinks, on_event, interrupts)
@@ -300,67 +219,6 @@ def _announce(
     for sink in sinks:
         if isinstance(sink, PictureSink):
             backend.see(sink)
-
-
-def _opened(backend: SensorBackend[Any], seed: int) -> DeviceInfo:
-    """Open the gripper. An exception that is not ours names its class."""
-    name = f"{type(backend).__module__}.{type(backend).__qualname__}"
-    try:
-        info = backend.open(seed)
-    except GraspsenseError:
-        raise
-    except SystemExit as error:
-        raise DeviceLost(f"`open` of the gripper {name} raised {named(error)}") from error
-    except Exception as error:
-        error.add_note(f"`open` of the gripper {name} raised it")
-        raise
-    if not isinstance(info, DeviceInfo):
-        raise TypeError(
-            f"`open` of the gripper {name} returned {info!r}: return graspsense.plugin_api.DeviceInfo"
-        )
-    return info
-
-
-def _described(
-    info: DeviceInfo, backend: SensorBackend[Any], controller: Controller[Any], run: RunConfig
-) -> DeviceInfo:
-    """Return the open gripper with its channels, its mounting, and notes on its commands and its fingers."""
-    channels = info.channels or _declared(backend)
-    fingers = fingers_in_words(fingers_of(channels))
-    further = (*_becoming(backend, controller), *([fingers] if fingers else []))
-    return evolve(
-        info,
-        channels=channels,
-        notes=(*info.notes, *(note for note in further if note not in info.notes)),
-        mounting={**info.mounting, **run.mountings()},
-    )
-
-
-def _becoming(backend: SensorBackend[Any], controller: Controller[Any]) -> tuple[str, ...]:
-    """Return sentences on what the controller becomes with a gripper that closes by itself."""
-    sends = getattr(controller.config, "sends", None)
-    sent = (
-        (sends,) if sends is not None else getattr(type(controller), "commands", tuple(backend.closes_itself))
-    )
-    becomes = type(controller).becomes
-    notes = []
-    for kind in filter(backend.closes_itself.__contains__, sent):
-        notes.append(f"the gripper closes by itself: a {kind} becomes {backend.closes_itself[kind]}")
-        if kind in becomes:
-            notes.append(f"as a {kind}, the controller sends {becomes[kind]}")
-    if notes and backend.command_delay_s:
-        notes.append(
-            f"the gripper acts on a command up to {backend.command_delay_s * 1e3:g} ms after it is sent"
-        )
-    return tuple(notes)
-
-
-def _declared(backend: SensorBackend[Any]) -> tuple[Channel, ...]:
-    """Return the channels of an open gripper; none where the class does not declare them."""
-    try:
-        return tuple(backend.channels)
-    except NotImplementedError:
-        return ()
 
 
 MOSTLY: Final = 0.1

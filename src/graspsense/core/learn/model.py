@@ -1,47 +1,21 @@
-"""A trained model: a fitted classifier and a description of its training data, in one JSON file without code.
-
-The file names its classifier, which must be an installed component. Nothing in the file is imported, evaluated or
-unpickled. Its `sha256` is the hash of the other content, which detects a damaged file.
-"""
+"""A trained model: a fitted classifier, its predictions, and a description of its training data."""
 
 from __future__ import annotations
 
-import json
 import math
-import platform
-import shlex
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from functools import lru_cache
-from itertools import pairwise
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from attrs import evolve, frozen
 
-from graspsense import __version__
-from graspsense.core.components.caller import set_option
-from graspsense.core.components.entries import TABLE_OF_ROLE, ModelEntry
-from graspsense.core.components.setting import CHANGES_NO_RESULT, NAMES_INPUT, UNIT_OF_ENDING, settings_marked
-from graspsense.core.files.whole_file import write_whole
-from graspsense.core.learn.certainty import Certainty, certainty_from, with_certainty
-from graspsense.core.learn.conformal import COVERAGES, Answers, PredictionSets, scores_of, sets_from
-from graspsense.core.learn.copies import row_hashes
-from graspsense.core.learn.model_content import digest, model_bytes, parsed, sealed_content
-from graspsense.core.learn.novelty import Novelty, novelty_from, novelty_of
-from graspsense.core.learn.stored_values import StoredValueError, StoredValues
-from graspsense.core.learn.temperature import RANGE as TEMPERATURES
+from graspsense.core.components.entries import TABLE_OF_ROLE
+from graspsense.core.components.setting import CHANGES_NO_RESULT, NAMES_INPUT, settings_marked, worded
+from graspsense.core.learn.certainty import Certainty, with_certainty
+from graspsense.core.learn.conformal import Answers, PredictionSets, scores_of
+from graspsense.core.learn.novelty import Novelty
 from graspsense.core.learn.temperature import at_temperature
-from graspsense.core.values.errors import (
-    ConfigError,
-    DataDamaged,
-    PluginUnavailable,
-    UnknownName,
-    WiringError,
-    listed,
-    named,
-)
+from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.features import (
     LARGEST_VALUE,
     UNKNOWN,
@@ -51,31 +25,22 @@ from graspsense.core.values.features import (
     misfit,
     table_of,
 )
-from graspsense.core.values.json_values import json_ready, settings_from_json
+from graspsense.core.values.json_values import json_ready
 from graspsense.core.values.reasons import Reason
-from graspsense.core.values.units import display_unit, without_underscores
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from graspsense.core.components.config import Settings
-    from graspsense.core.components.registry import Component, Plugins
     from graspsense.core.components.roles import Classifier
-    from graspsense.core.learn.labelled import Labelled
     from graspsense.core.values.device import DeviceInfo
 
-FORMAT: Final = "graspsense model"
-REGRESSION_FORMAT: Final = "graspsense regression model"
-"""The `format` of a model that predicts a number (`graspsense.regression`)."""
-VERSION: Final = 2
-_READ: Final = (1, VERSION)
-"""The versions that are read. Sets of the first one do not hold for answers from few trials, and are left out."""
-MODELS_KEPT: Final = 4
-"""How many models of pipelines stay in memory."""
 
-_EQUAL: Final = 1e-6
+EQUAL: Final = 1e-6
+"""Probabilities that differ by less differ by rounding."""
 
-_COMPARED_TABLES: Final = ("gripper", "controller", "features", "classifier")
+COMPARED_TABLES: Final = ("gripper", "controller", "features", "classifier")
+"""The tables of settings in which a trial must agree with the training for the certainty to hold."""
 
 
 @frozen(kw_only=True, eq=False)
@@ -258,7 +223,7 @@ class Model:
         unlike = self.novelty.unlike_rows(chosen).tolist()
         classes = self.classifier.classes()
         # Probabilities that differ by rounding count as equal: the first of them is the answer.
-        best = np.argmax(shares >= shares.max(axis=1, keepdims=True) - _EQUAL, axis=1).tolist()
+        best = np.argmax(shares >= shares.max(axis=1, keepdims=True) - EQUAL, axis=1).tolist()
         labels = [UNKNOWN if strange else classes[k] for strange, k in zip(unlike, best, strict=True)]
         return labels, shares
 
@@ -340,44 +305,6 @@ class Model:
         ):
             yield "trained on simulated grasps: valid for the simulator, untested on real objects"
 
-    def as_json(self) -> dict[str, Any]:
-        """Return the content of the file of the model."""
-        content = {
-            "format": FORMAT,
-            "version": VERSION,
-            "classifier": self.component,
-            "settings": json_ready(self.settings),
-            "target": self.target,
-            "features": [[name, unit] for name, unit in zip(self.names, self.units, strict=True)],
-            "provenance": json_ready(self.provenance),
-            "unknown": self.novelty.to_json(),
-            **({} if self.sets is None else {"sets": self.sets.to_json()}),
-            "certainty": None if self.certainty is None else self.certainty.to_json(),
-            **({} if self.temperature is None else {"temperature": self.temperature}),
-            "model": self.classifier.to_json(),
-            **({} if not self.learned_from else {"learned_from": list(self.learned_from)}),
-            **(
-                {}
-                if not self.checkpoints
-                else {"checkpoints": [_part_as_json(*checkpoint) for checkpoint in self.checkpoints]}
-            ),
-        }
-        return {**content, "sha256": digest(content)}
-
-
-def _part_as_json(after_s: float, part: Model) -> dict[str, Any]:
-    """Return what the model of a checkpoint has of its own; the rest is that of the model of whole grasps."""
-    return {
-        "after_contact_s": after_s,
-        "trials": part.provenance["trials"],
-        "by_label": json_ready(part.provenance["by_label"]),
-        "unknown": part.novelty.to_json(),
-        "sets": None if part.sets is None else part.sets.to_json(),
-        "certainty": None if part.certainty is None else part.certainty.to_json(),
-        "temperature": part.temperature,
-        "model": part.classifier.to_json(),
-    }
-
 
 def checkpoint_model(whole: Model, after_s: float, part: Model) -> Model:
     """Return the model of the checkpoint `after_s` (s), as a part of that of whole grasps."""
@@ -390,131 +317,11 @@ def checkpoint_model(whole: Model, after_s: float, part: Model) -> Model:
     )
 
 
-def _part_from_json(whole: Model, component: Component, config: Any, kept: StoredValues) -> Model:
-    """Return the model of a checkpoint. Raises DataDamaged."""
-    classifier = classifier_from(kept, component, config, whole.names, whole.units)
-    if others := sorted({*classifier.classes()} - {*whole.classifier.classes()}):
-        raise kept.refusal(
-            "model", f"it knows labels that the model of whole grasps does not: {listed(others)}"
-        )
-    by_label = kept.table("by_label")
-    part = evolve(
-        whole,
-        classifier=classifier,
-        novelty=_novelty_from(kept, classifier, whole.names, whole.units),
-        sets=_sets_from(kept, classifier),
-        certainty=_certainty_from(kept),
-        temperature=_temperature_from(kept),
-        provenance={
-            "trials": kept.whole("trials"),
-            "by_label": {label: by_label.whole(label) for label in by_label},
-        },
-    )
-    return checkpoint_model(whole, kept.number("after_contact_s", least=0.0), part)
-
-
-def _checkpoints_from(
-    stored: StoredValues, whole: Model, component: Component, config: Any
-) -> tuple[tuple[float, Model], ...]:
-    """Return the models of the checkpoints, with their times. Raises DataDamaged."""
-    if "checkpoints" not in stored:
-        return ()
-    parts = [_part_from_json(whole, component, config, kept) for kept in stored.tables("checkpoints")]
-    times = [float(part.after_s or 0.0) for part in parts]
-    if any(later <= earlier for earlier, later in pairwise([0.0, *times])):
-        raise stored.refusal("checkpoints", "their times do not increase from above 0 s")
-    return tuple(zip(times, parts, strict=True))
-
-
-def classifier_from(
-    stored: StoredValues, component: Component, config: Any, names: tuple[str, ...], units: tuple[str, ...]
-) -> Classifier[Any]:
-    """Return the classifier in `model`, which answers a trial with these features. Raises DataDamaged.
-
-    Whatever a classifier raises on values that it cannot read is an error of the file.
-    """
-    classifier: Classifier[Any] = component.create(config)
-    try:
-        classifier.from_json(stored.table("model").as_dict())
-        classes = classifier.classes()
-        if (
-            len(classes) < 1
-            or len(set(classes)) < len(classes)
-            or not all(type(name) is str for name in classes)
-        ):
-            raise ValueError("its labels are not different texts")
-        empty = FeatureTable(names=names, units=units, values=np.full((1, len(names)), np.nan))
-        refuse_improbable(classifier.probabilities(empty), 1, len(classes))
-    except PluginUnavailable:
-        raise
-    except DataDamaged as error:
-        raise StoredValueError(f"{stored.field('model')}.{error}") from error
-    except Exception as error:
-        raise stored.refusal("model", named(error)) from error
-    return classifier
-
-
-def _novelty_from(
-    stored: StoredValues, classifier: Classifier[Any], names: tuple[str, ...], units: tuple[str, ...]
-) -> Novelty:
-    """Return the ranges of the training trials, which have the labels of the classifier. Raises DataDamaged."""
-    novelty = novelty_from(names, units, stored.value("unknown"), stored.field("unknown"))
-    if sorted(novelty.classes) != sorted(classifier.classes()):
-        raise stored.refusal("unknown.ranges", "they are not those of the labels of the classifier")
-    return novelty
-
-
-def _certainty_from(stored: StoredValues) -> Certainty | None:
-    """Return the certainty; None in a model without calibration, or of an earlier version. Raises DataDamaged."""
-    if "certainty" not in stored or stored.value("certainty") is None:
-        return None
-    return certainty_from(stored.tables("certainty"))
-
-
-def _sets_from(stored: StoredValues, classifier: Classifier[Any]) -> PredictionSets | None:
-    """Return the prediction sets, if there are any. Raises DataDamaged."""
-    if "sets" not in stored or stored.value("sets") is None:
-        return None
-    if "certainty" not in stored:
-        old = stored.table("sets")
-        reason = "its file was written by an earlier version of graspsense: train it again"
-        return PredictionSets(
-            coverage=old.number("coverage", *COVERAGES), unit=old.text("unit"), thresholds={}, reason=reason
-        )
-    certainty = _certainty_from(stored)
-    return sets_from(
-        stored.table("sets"), classifier.classes(), 0 if certainty is None else len(certainty.classes)
-    )
-
-
-def _temperature_from(stored: StoredValues) -> float | None:
-    """Return the stored temperature; None in a model of an earlier version. Raises DataDamaged."""
-    if "temperature" not in stored or stored.value("temperature") is None:
-        return None
-    least, most = TEMPERATURES
-    return stored.number("temperature", least * (1.0 - _EQUAL), most * (1.0 + _EQUAL))
-
-
-def _provenance_from(stored: StoredValues) -> dict[str, Any]:
-    """Return what is known of the training, of which predictions use a part. Raises DataDamaged."""
-    kept = stored.table("provenance")
-    if "simulated" in kept:
-        kept.flag("simulated")
-    if "settings" in kept:
-        tables = kept.table("settings")
-        for name in set(_COMPARED_TABLES) & set(tables):
-            if tables.value(name) is not None:
-                tables.table(name)
-    if "after_contact_s" in kept:
-        raise kept.refusal("after_contact_s", "only the model of a checkpoint has one")
-    return kept.as_dict()
-
-
 def refuse_improbable(shares: Any, trials: int, classes: int) -> None:
     """Raise ValueError unless these are probabilities: shape (trials, classes), and each row sums to 1."""
     if not isinstance(shares, np.ndarray) or shares.shape != (trials, classes) or shares.dtype != np.float64:
         raise ValueError(f"its probabilities do not have the shape {(trials, classes)}")
-    if not ((shares >= 0.0).all() and (np.abs(shares.sum(axis=1) - 1.0) <= _EQUAL).all()):
+    if not ((shares >= 0.0).all() and (np.abs(shares.sum(axis=1) - 1.0) <= EQUAL).all()):
         raise ValueError("it gives no probabilities: they are not finite, are below 0, or do not sum to 1")
 
 
@@ -523,7 +330,7 @@ def _compared(
 ) -> Iterator[tuple[str, Mapping[str, Any], frozenset[str]]]:
     """Yield the tables of settings of a trial, with the keys that may differ between training and use."""
     stated = (provenance or {}).get("settings") or {}
-    for table in _COMPARED_TABLES:
+    for table in COMPARED_TABLES:
         if settings is not None and settings.values.get(table) is not None:
             yield table, settings.values[table], _not_compared(type(getattr(settings, table).config))
         elif settings is None and stated.get(table) is not None:
@@ -547,223 +354,6 @@ def _not_compared(config_class: type) -> frozenset[str]:
     return unchanging | settings_marked(config_class, NAMES_INPUT) | {"type"}
 
 
-def train(
-    component: Component,
-    config: Any,
-    labelled: Labelled,
-    *,
-    name: str,
-    seed: int = 0,
-    target: str = "both",
-    provenance: Mapping[str, Any] | None = None,
-) -> Model:
-    """Return the model of a classifier with this config, fitted to these trials.
-
-    Raises ConfigError if nothing can be learned from them.
-    """
-    from graspsense.core.components.strict import plain
-
-    classifier = component.create(config)
-    try:
-        classifier.fit(labelled.table, labelled.labels, seed)
-    except ValueError as error:
-        raise ConfigError(f"{component.qualified} cannot learn from {labelled.source}: {error}") from error
-    settings = {key: value for key, value in plain(config).items() if key != "model"}
-    return Model(
-        name=name,
-        component=component.qualified,
-        settings=settings,
-        classifier=classifier,
-        names=labelled.table.names,
-        units=labelled.table.units,
-        target=target,
-        novelty=novelty_of(labelled.table, labelled.labels),
-        learned_from=() if labelled.provenance.get("simulated") else row_hashes(labelled.table),
-        provenance={
-            "source": labelled.source,
-            "trials": len(labelled),
-            "by_label": dict(sorted(Counter(labelled.labels).items())),
-            "seed": seed,
-            "versions": {
-                "graspsense": __version__,
-                component.distribution: component.version,
-                "numpy": np.__version__,
-                "python": platform.python_version(),
-            },
-            **labelled.provenance,
-            **(provenance or {}),
-        },
-    )
-
-
-def write_model(path: Path, model: Model) -> None:
-    """Write the file of a model atomically. Raises OSError."""
-    write_json_lines(path, model.as_json())
-
-
-def write_json_lines(path: Path, content: Mapping[str, Any]) -> None:
-    """Write the content of a model atomically, one line for each key. Raises OSError."""
-    # Readable, and much shorter than one line for each number.
-    lines = (f"{json.dumps(key)}: {_json(value)}" for key, value in content.items())
-    write_whole(path, ("{\n" + ",\n".join(lines) + "\n}\n").encode())
-
-
-def load_model(name: str, plugins: Plugins) -> Model:
-    """Return a model from a `.json` file, or by the name of a model that a plugin ships.
-
-    Raises ConfigError if the file is missing, DataDamaged if its content is not a model.
-    """
-    return _model_from(_text(name, plugins), name, plugins, None)
-
-
-@lru_cache(maxsize=MODELS_KEPT)
-def _kept_model(text: bytes, name: str, plugins: Plugins, component: Component) -> Model:
-    """Return the model in this text; one that a pipeline used before is not read again."""
-    return _model_from(text, name, plugins, component)
-
-
-def _model_from(text: bytes, name: str, plugins: Plugins, component: Component | None) -> Model:
-    try:
-        return _restored(StoredValues(_content(name, text)), name, plugins, component)
-    except StoredValueError as error:
-        raise DataDamaged(f"model {name!r} is damaged: {error}") from error
-
-
-def _restored(stored: StoredValues, name: str, plugins: Plugins, component: Component | None) -> Model:
-    """Return the model with these values. Raises DataDamaged, and ConfigError for another classifier."""
-    made_by = stored.text("classifier")
-    if component is None:
-        component = plugins.find("classifier", made_by)
-    elif component.qualified != made_by:
-        raise ConfigError(
-            f"model {name!r} was made by {made_by}, but the classifier here is {component.qualified}. "
-            f'Write classifier.type = "{made_by}", or train a model: graspsense train --help'
-        )
-    settings, config = _settings_from(stored, component)
-    names, units = stored.features("features")
-    classifier = classifier_from(stored, component, config, names, units)
-    model = Model(
-        name=name,
-        component=made_by,
-        settings=settings,
-        classifier=classifier,
-        names=names,
-        units=units,
-        target=stored.text("target"),
-        novelty=_novelty_from(stored, classifier, names, units),
-        provenance=_provenance_from(stored),
-        sets=_sets_from(stored, classifier),
-        certainty=_certainty_from(stored),
-        temperature=_temperature_from(stored),
-        learned_from=stored.texts("learned_from") if "learned_from" in stored else (),
-    )
-    return evolve(model, checkpoints=_checkpoints_from(stored, model, component, config))
-
-
-def _settings_from(stored: StoredValues, component: Component) -> tuple[dict[str, Any], Any]:
-    """Return the settings that the classifier was fitted with, and its config. Raises DataDamaged."""
-    from graspsense.core.components.strict import ValidationFailed, structured
-
-    kept = stored.table("settings")
-    if "model" in kept:
-        raise kept.refusal("model", "the settings of a model do not name a model")
-    config_class = component.config_class()
-    settings = settings_from_json(kept.as_dict(), config_class)
-    try:
-        return settings, structured(settings, config_class, component.qualified)
-    except ValidationFailed as misfit:
-        problem = misfit.problems[0]
-        raise stored.refusal(".".join(map(str, ("settings", *problem.path))), problem.text) from None
-
-
-def model_for(settings: Settings, plugins: Plugins) -> Model | None:
-    """Return the model of the classifier of a pipeline; None if the pipeline has no classifier.
-
-    The same content gives the same model, which must not be changed. Raises ConfigError if the pipeline names no model,
-    WiringError if the model takes other features than those of the pipeline, and what `load_model` raises.
-    """
-    chosen = settings.classifier
-    if chosen is None:
-        return None
-    name = getattr(chosen.config, "model", None)
-    if name is None:
-        raise ConfigError(
-            f"classifier {chosen.component.qualified} has no model (classifier.model is not given).\n"
-            + _how_to_train(settings, "model.json")
-            + f"\n  then use it: {set_option('classifier.model=model.json')}     or do without: "
-            f"{set_option('classifier.type=none')}"
-        )
-    if name.endswith(".json") and not Path(name).expanduser().exists():
-        raise ConfigError(
-            f"there is no model {name} yet (classifier.model).\n"
-            + _how_to_train(settings, name)
-            + f"\n  or do without: {set_option('classifier.type=none')}"
-        )
-    model = _kept_model(_text(name, plugins), name, plugins, chosen.component)
-    given = settings.features.declared.features
-    misfit = model.misfit(
-        FeatureTable(
-            names=tuple(feature.name for feature in given),
-            units=tuple(feature.unit for feature in given),
-            values=np.empty((0, len(given))),
-        )
-    )
-    if misfit:
-        raise WiringError(
-            f"{misfit}. It could not answer: choose its features, features.type = "
-            f"{_features_of(model)}; train a model of these features:\n{_how_to_train(settings, 'model.json')}\n"
-            f"  or do without: {set_option('classifier.type=none')}"
-        )
-    return model
-
-
-def _features_of(model: Model) -> str:
-    """Return the feature set that a model was trained with, as far as it is known."""
-    table = dict(model.provenance.get("settings", {})).get("features") or {}
-    return str(table.get("type", "those of its training"))
-
-
-def _how_to_train(settings: Settings, out: str) -> str:
-    """Return the commands that make a model for these settings: of simulated trials where the gripper is simulated."""
-    assert settings.classifier is not None
-    name = settings.classifier.component.name
-    selection = f"--gripper {settings.gripper.component.name}"
-    if settings.pipeline.endswith(".toml"):
-        selection = f"--pipeline {shlex.quote(settings.pipeline)}"
-    if settings.origins.get("features.type", "").startswith("-o"):
-        selection += f" -o features.type={settings.features.component.name}"
-    if settings.gripper.create().objects():
-        return f"  train one: graspsense train simulated {selection} --classifier {name} --out {out}"
-    return (
-        f"  collect trials of this gripper: graspsense collect {selection} --labels can:full,can:empty --save trials\n"
-        f"  then train: graspsense train store:trials --classifier {name} --out {out}"
-    )
-
-
-def _text(name: str, plugins: Plugins) -> bytes:
-    if not name.endswith(".json"):
-        try:
-            return plugins.resource(ModelEntry, name).file().read_bytes()
-        except UnknownName as error:
-            raise UnknownName(
-                f"{error}\n  A model of your own is a file: write its name with .json"
-            ) from error
-    return model_bytes(name)
-
-
-def _content(name: str, text: bytes) -> dict[str, Any]:
-    content = parsed(name, text)
-    if isinstance(content, dict) and content.get("format") == REGRESSION_FORMAT:
-        raise ConfigError(
-            f"model {name!r} predicts a number, not a label: use it with graspsense predict {name} SOURCE"
-        )
-    return sealed_content(name, content, FORMAT, _READ, "model of graspsense")
-
-
-def _json(value: Any) -> str:
-    return json.dumps(value, ensure_ascii=False, allow_nan=False)
-
-
 def _chosen(features: Features, names: Sequence[str]) -> Features:
     if features.names == tuple(names):
         return features
@@ -782,12 +372,3 @@ def _bounded(features: Features) -> Features:
         return features
     values = tuple(min(max(value, -LARGEST_VALUE), LARGEST_VALUE) for value in features.values)
     return evolve(features, values=values)
-
-
-def worded(key: str, value: Any) -> tuple[str, str]:
-    """Return a key and its value in words: `probing_force_n`, 20 as `probing force`, `20 N`."""
-    ending = next((ending for ending in UNIT_OF_ENDING if key.endswith(ending)), "")
-    if not ending or isinstance(value, bool) or not isinstance(value, int | float):
-        return without_underscores(key), str(value)
-    unit, factor = display_unit(UNIT_OF_ENDING[ending])
-    return without_underscores(key.removesuffix(ending)), f"{value * factor:g} {unit}"

@@ -15,9 +15,12 @@ from typing import Any, Final
 
 from graspsense import __version__
 from graspsense.core.files.regular_file import first_bytes
+from graspsense.core.files.whole_file import write_whole
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.limits import MODEL_BYTES
 
+REGRESSION_FORMAT: Final = "graspsense regression model"
+"""The `format` of a model that predicts a number (`graspsense.regression`)."""
 MOST_DIGITS: Final = 100
 """Largest number of digits of a whole number in a model."""
 MOST_NESTED: Final = 100
@@ -120,3 +123,14 @@ def _refuse_depth(values: Any) -> None:
         if not level:
             return
     raise RecursionError
+
+
+def write_json_lines(path: Path, content: Mapping[str, Any]) -> None:
+    """Write the content of a model atomically, one line for each key. Raises OSError."""
+    # Readable, and much shorter than one line for each number.
+    lines = (f"{json.dumps(key)}: {_json(value)}" for key, value in content.items())
+    write_whole(path, ("{\n" + ",\n".join(lines) + "\n}\n").encode())
+
+
+def _json(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)

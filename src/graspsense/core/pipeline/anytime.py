@@ -15,7 +15,7 @@ from math import inf
 from typing import TYPE_CHECKING, Any, Final
 
 from graspsense.core.components.caller import set_option
-from graspsense.core.grasp.runner import Tell
+from graspsense.core.grasp.sinks import Tell
 from graspsense.core.values.errors import FAILURES, ConfigError, named
 from graspsense.core.values.features import CheckpointPrediction
 from graspsense.core.values.signals import HOLD, SQUEEZE

@@ -13,9 +13,11 @@ from graspsense.core.components.config import Flag, Settings, resolve
 from graspsense.core.components.registry import Plugins, installed
 from graspsense.core.components.roles import Controller, FeatureSet, SensorBackend
 from graspsense.core.control.garbage_collection import no_collection
-from graspsense.core.grasp.runner import Grasp, Sink, run_grasp
-from graspsense.core.learn.model import Model, model_for
+from graspsense.core.grasp.runner import Grasp, run_grasp
+from graspsense.core.grasp.sinks import Sink
+from graspsense.core.learn.model import Model
 from graspsense.core.pipeline.anytime import Anytime, anytime_of
+from graspsense.core.pipeline.pipeline_model import model_for
 from graspsense.core.pipeline.wiring import check
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import FAILURES, named

@@ -11,6 +11,8 @@ from difflib import get_close_matches
 from itertools import islice
 from typing import Final
 
+from graspsense.core.values.exit_code import ExitCode
+
 MOST_NAMED: Final = 24
 """Limit on the names that an error lists."""
 _LONGEST_NAME: Final = 100
@@ -20,13 +22,13 @@ _MOST_COMPARED: Final = 1000
 class GraspsenseError(Exception):
     """Base class of all errors for the user; `exit_code` is that of the command line."""
 
-    exit_code = 70
+    exit_code: int = ExitCode.BUG
 
 
 class ConfigError(GraspsenseError):
     """A pipeline, experiment or option that cannot be used as written."""
 
-    exit_code = 2
+    exit_code = ExitCode.WRONG_USE
 
 
 class UnknownName(ConfigError):
@@ -48,25 +50,25 @@ class ComponentFailed(GraspsenseError):
 class NoDevice(GraspsenseError):
     """The gripper is not connected."""
 
-    exit_code = 3
+    exit_code = ExitCode.NO_DEVICE
 
 
 class DeviceLost(GraspsenseError):
     """The gripper was open and no longer responds."""
 
-    exit_code = 4
+    exit_code = ExitCode.NOT_FINISHED
 
 
 class TareRefused(GraspsenseError):
     """The pads cannot be zeroed now: loaded, silent or unsteady."""
 
-    exit_code = 4
+    exit_code = ExitCode.NOT_FINISHED
 
 
 class DataDamaged(GraspsenseError):
     """A file whose content is not what its format requires."""
 
-    exit_code = 5
+    exit_code = ExitCode.DAMAGED
 
 
 FAILURES: Final = (Exception, SystemExit)

@@ -213,7 +213,7 @@ class Prediction:
         """The set with its coverage, such as `full_open or empty_open, 90 %`; empty without a set."""
         if self.coverage is None:
             return ""
-        return f"{' or '.join(self.prediction_set)}, {percent(self.coverage)}"
+        return f"{' or '.join(self.prediction_set)}, {certainty_words(self.coverage)}"
 
     @property
     def certainty(self) -> float | None:
@@ -226,7 +226,7 @@ class Prediction:
         with_label, trials = self.support or (0.0, 0.0)
         rests = f"{with_label:.4g} of {trials:.4g} training trials" if self.support is not None else ""
         if self.certainty is not None:
-            about = percent(self.certainty)
+            about = certainty_words(self.certainty)
             return (about if about.startswith("over") else f"about {about}") + (f": {rests}" if rests else "")
         why = f"no certainty: {self.no_certainty}" if self.no_certainty else ""
         return "; ".join(part for part in (rests, why) if part)
@@ -278,13 +278,13 @@ class CheckpointPrediction:
         """
         likeliest, *others = self.prediction.prediction_set or (self.prediction.label,)
         if len(others) > 2 and self.prediction.coverage is not None:
-            said = f"{likeliest} or one of {len(others)} others, {percent(self.prediction.coverage)}"
+            said = f"{likeliest} or one of {len(others)} others, {certainty_words(self.prediction.coverage)}"
         else:
             said = self.prediction.set_in_words or self.prediction.label
         return f"{self.after_s:g} s after the contact: {said}"
 
 
-def percent(probability: float) -> str:
+def certainty_words(probability: float) -> str:
     """Return a probability in per cent. No model is certain, so that 1 is `over 99 %`."""
     return "over 99 %" if probability > 0.995 else f"{100 * probability:.0f} %"
 

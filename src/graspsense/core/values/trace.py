@@ -11,7 +11,18 @@ from attrs import define, evolve, field, frozen
 
 from graspsense.core.values.display import html, plot
 from graspsense.core.values.kept_images import KeptImages
-from graspsense.core.values.signals import CHANNELS, NO_PADS, Command, Frame, Image, Pads, Reading, Samples
+from graspsense.core.values.signals import (
+    APPROACH,
+    CHANNELS,
+    HOLD,
+    NO_PADS,
+    Command,
+    Frame,
+    Image,
+    Pads,
+    Reading,
+    Samples,
+)
 from graspsense.core.values.units import quantity
 
 if TYPE_CHECKING:
@@ -120,6 +131,11 @@ class Trace:
             low, high = float(np.nanmin(self.gap_m)), float(np.nanmax(self.gap_m))
             words.append(f"gap {quantity(low, self.units['gap'])} to {quantity(high, self.units['gap'])}")
         return ", ".join(words)
+
+    @property
+    def closing(self) -> NDArray[np.bool_]:
+        """A mask of the ticks from the approach to the end of the hold."""
+        return (self.phase >= APPROACH) & (self.phase <= HOLD)
 
     def _repr_html_(self) -> str:
         return html(self)

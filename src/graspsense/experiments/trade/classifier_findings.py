@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 from attrs import frozen
 
+from graspsense.evaluation.intervals import percent, span
 from graspsense.evaluation.over_seeds import MeanDifference
-from graspsense.experiments.findings import FoundTable, percent, span
+from graspsense.experiments.findings import FoundTable
 from graspsense.experiments.summary import ConditionResult
 from graspsense.experiments.trade.compare import WITHOUT
 from graspsense.experiments.trade.cost_findings import Report

@@ -9,7 +9,8 @@ from typing import Any, Final
 
 from attrs import frozen
 
-from graspsense.experiments.findings import FoundTable, percent, span
+from graspsense.evaluation.intervals import percent, span
+from graspsense.experiments.findings import FoundTable
 from graspsense.experiments.summary import ConditionResult
 from graspsense.experiments.trade.trade_point import Advice, TradePoint, advise, trade_points
 from graspsense.report.html import figure

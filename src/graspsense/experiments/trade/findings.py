@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from graspsense.experiments.findings import CONTROLS, Findings, FoundTable, control_cells, percent
+from graspsense.evaluation.intervals import percent
+from graspsense.experiments.findings import CONTROLS, Findings, FoundTable, control_cells
 from graspsense.experiments.summary import Summary
 from graspsense.experiments.trade.classifier_findings import compare_classifiers
 from graspsense.experiments.trade.cost_findings import Report, cost_report, damage_table

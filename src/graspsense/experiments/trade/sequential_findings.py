@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 from statistics import stdev
 
-from graspsense.evaluation.intervals import t_quantile
+from graspsense.evaluation.intervals import percent, span, t_quantile
 from graspsense.evaluation.over_seeds import MeanDifference
-from graspsense.experiments.findings import FoundTable, percent, span
+from graspsense.experiments.findings import FoundTable
 from graspsense.experiments.summary import ConditionResult
 from graspsense.experiments.trade.cost_findings import Report
 from graspsense.experiments.trade.next_squeeze import fixed_name

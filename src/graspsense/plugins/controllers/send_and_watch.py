@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 from attrs import frozen
 
+from graspsense.gripper_api import MOVED_M
 from graspsense.plugin_api import (
     APPROACH,
     FORCE,
@@ -42,9 +43,6 @@ from graspsense.plugins.controllers.own_loop import (
     raised,
     rises,
 )
-
-MOVED_M = 1e-3
-"""Travel after which fingers that stand still have met something: they have begun to move before."""
 
 
 @frozen(kw_only=True)

@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple
 
 from attrs import frozen
 
-from graspsense.gripper_api import CRUSHED, SIDE_IMPACT, SLIPPED, TOO_WIDE
+from graspsense.gripper_api import CRUSHED, SIDE_IMPACT, SLIPPED, TOO_WIDE, either_touches
 from graspsense.plugin_api import (
     APPROACH,
     CONTACT_FORCE_N,
@@ -226,7 +226,7 @@ def _approaching(params: Any, now: GraspProgress, frame: Frame) -> GraspProgress
     elif gap <= params.closed_gap_m:
         outcome = NOTHING_THERE
     elif t > deadline:
-        outcome = ONE_FINGER if left >= contact or right >= contact else NOTHING_THERE
+        outcome = ONE_FINGER if either_touches(left, right, contact) else NOTHING_THERE
     if outcome == RUNNING and begun == 1:
         return now
     return GraspProgress(APPROACH, outcome, 1, start_gap, deadline, RestState(t, gap), 0.0, gap, t)
@@ -239,8 +239,7 @@ def _squeezing(params: Any, now: GraspProgress, frame: Frame) -> GraspProgress:
     peak_force, peak_gap, felt_t = now.peak_force_n, now.peak_gap_m, now.felt_t_s
     if force > peak_force:
         peak_force, peak_gap = force, gap
-    half = 0.5 * params.contact_force_n
-    if left >= half or right >= half:
+    if either_touches(left, right, 0.5 * params.contact_force_n):
         felt_t = t
 
     phase, outcome = SQUEEZE, RUNNING

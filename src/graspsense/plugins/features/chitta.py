@@ -20,6 +20,7 @@ from attrs import frozen
 
 from graspsense.gripper_api import (
     NO_GAP,
+    both_touch_samples,
     first_rest,
     gap_resolution,
     gap_resolution_by_sample,
@@ -325,8 +326,8 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
 
     def _first(self, trace: Trace) -> int | None:
         tau_1 = self.config.contact_force_n
-        touch = (trace.force_left_n >= tau_1) & (trace.force_right_n >= tau_1)
-        touch &= _closing(trace) & (trace.gap_m == trace.gap_m)
+        touch = both_touch_samples(trace.force_left_n, trace.force_right_n, tau_1)
+        touch &= trace.closing & (trace.gap_m == trace.gap_m)
         return int(touch.argmax()) if touch.any() else None
 
     def _rest(self, trace: Trace, contact: int, end: int, window_s: float) -> tuple[int, int] | None:
@@ -348,7 +349,7 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
             return NO_TICKS
         tau_1 = self.config.contact_force_n
         left, right = trace.force_left_n >= tau_1, trace.force_right_n >= tau_1
-        closing = _closing(trace)
+        closing = trace.closing
         if bool((left & right & ~closing).any()) and not bool((trace.phase == HOLD).any()):
             return BOTH_TOO_LATE
         felt_left, felt_right = bool((left & closing).any()), bool((right & closing).any())
@@ -376,8 +377,3 @@ def _released(trace: Trace, contact: int) -> int:
     """Return the first tick of the release after that of the contact, or the number of ticks."""
     released = trace.phase[contact:] > HOLD
     return contact + (int(released.argmax()) if released.any() else len(released))
-
-
-def _closing(trace: Trace) -> NDArray[np.bool_]:
-    """Return a mask of the ticks from the approach to the end of the hold."""
-    return (trace.phase >= APPROACH) & (trace.phase <= HOLD)

@@ -86,24 +86,27 @@ def samples_of(trace: Trace, contact_force_n: float) -> CurveSamples | str:
     ]
     if not pads:
         return "the trace is empty" if len(trace) == 0 else "no pad gave a number"
-    closing = usable & (trace.phase <= HOLD)
-    pads = [force for force in pads if bool(((force >= contact_force_n) & closing).any())] or pads
+    pads = [force for force in pads if bool(((force >= contact_force_n) & trace.closing).any())] or pads
     known = usable & np.isfinite(trace.gap_m) & np.isfinite(trace.t_s)
     for force in pads:
         known &= np.isfinite(force)
     ticks = np.flatnonzero(known)
     if not len(ticks):
         return "no sample has both a gap and a force"
-    t_s = trace.t_s[ticks]
-    later = np.ones(len(ticks), dtype=np.bool_)
-    later[1:] = t_s[1:] > np.maximum.accumulate(t_s[:-1])
-    ticks = ticks[later]
+    ticks = ticks[increasing(trace.t_s[ticks])]
     forces = np.array([force[ticks] for force in pads])
     new = _new_forces(trace.t_s[ticks], forces)
     ticks = ticks[new]
     return CurveSamples(
         t_s=trace.t_s[ticks], gap_m=trace.gap_m[ticks], pads=forces[:, new], phase=trace.phase[ticks]
     )
+
+
+def increasing(t_s: Floats) -> NDArray[np.bool_]:
+    """Return a mask of the times that are later than every one before them."""
+    later = np.ones(len(t_s), dtype=np.bool_)
+    later[1:] = t_s[1:] > np.maximum.accumulate(t_s[:-1])
+    return later
 
 
 def _new_forces(t_s: Floats, pads: Floats) -> NDArray[np.int64] | slice:

@@ -22,7 +22,7 @@ from attrs import frozen
 
 from graspsense.gripper_api import NO_GAP
 from graspsense.plugin_api import APPROACH, Channel, Feature, Features, FeatureSet
-from graspsense.plugins.features.contact_curve import units_in
+from graspsense.plugins.features.contact_curve import increasing, units_in
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -183,9 +183,6 @@ def _of_intervals(values: Floats) -> Floats:
 def _samples(trace: Trace) -> tuple[Floats, tuple[Floats, Floats, Floats]]:
     """Return the times from the approach on, increasing, and gap, larger and smaller force at them."""
     ticks = np.flatnonzero((trace.phase >= APPROACH) & np.isfinite(trace.t_s))
-    t_s = trace.t_s[ticks]
-    later = np.ones(len(ticks), dtype=np.bool_)
-    later[1:] = t_s[1:] > np.maximum.accumulate(t_s[:-1])
-    ticks = ticks[later]
+    ticks = ticks[increasing(trace.t_s[ticks])]
     left, right = trace.force_left_n[ticks], trace.force_right_n[ticks]
     return trace.t_s[ticks], (trace.gap_m[ticks], np.fmax(left, right), np.fmin(left, right))

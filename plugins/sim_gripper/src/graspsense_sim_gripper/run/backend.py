@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, Final, Unpack
 
 from attrs import evolve
@@ -73,6 +74,8 @@ def default_controller(config: SimConfig) -> GraspController:
 
 class SimBackend(BatchBackend[SimConfig]):
     """A model of a PR2 gripper, its fingertips and an object."""
+
+    ideal_sensors = MappingProxyType({"sensor": "ideal"})
 
     def __init__(self, config: SimConfig) -> None:
         super().__init__(config)

@@ -14,6 +14,7 @@ from __future__ import annotations
 from math import inf, nan
 from typing import Final
 
+from graspsense.core.control.contact import MOVED_M
 from graspsense.core.grasp.protection.recent_mean import RecentMean
 from graspsense.core.values.faults import Fault
 from graspsense.core.values.signals import (
@@ -44,8 +45,6 @@ ABSENT_S: Final = 0.1
 """Time for which the force of a pad may be no number while the fingers close; at least three periods of the pads."""
 USUAL_M_S: Final = 0.010
 """The speed that is assumed for an approach that has not begun to move: that of the paper."""
-MOVED_M: Final = 0.001
-"""Travel after which the fingers have overcome static friction: a later stop is not the start of the motion."""
 STALL_M: Final = 0.0005
 """Travel within which a stalled motor is searched for."""
 CLOSED_M: Final = 0.003

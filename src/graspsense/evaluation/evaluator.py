@@ -1,0 +1,221 @@
+"""The measurements of an evaluation: rates by cross-validation under each protocol, and the learning curve."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from attrs import frozen
+
+from graspsense.core.learn.labelled import Labelled, Target, class_of
+from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, Groups, Pooled, cross_validate
+from graspsense.evaluation.doubt import HeldOut
+from graspsense.evaluation.folds import INSTANCE_HELD_OUT, instance_held_out, stratified, trials_by_class
+from graspsense.evaluation.intervals import Difference, RecognitionRate, difference, rate_among
+from graspsense.evaluation.results import CurvePoint, Measurement
+
+if TYPE_CHECKING:
+    from graspsense.core.values.features import FeatureTable
+    from graspsense.evaluation.folds import Folds
+
+
+SHARES: Final = (0.1, 0.2, 0.4, 0.7, 1.0)
+"""Shares of the training trials at which the learning curve is measured."""
+
+Progress = Callable[[str, int, int], None]
+
+
+@frozen
+class Headline:
+    """The predictions that the headline is about, with their protocol and folds.
+
+    `assign` makes such folds for other labels of the same trials.
+    """
+
+    protocol: str
+    pooled: Pooled
+    folds: list[Folds]
+    assign: Callable[[Sequence[str]], list[Folds]]
+
+
+class Evaluator:
+    """The measurements of one evaluation. `notes` collects what a reader must know."""
+
+    def __init__(
+        self,
+        learner: ClassifierFactory,
+        trials: Labelled,
+        target: Target,
+        k: int,
+        seed: int,
+        progress: Progress | None,
+        notes: list[str],
+    ) -> None:
+        self.learner, self.trials, self.k, self.seed = learner, trials, k, seed
+        self.progress, self.notes = progress, notes
+        self.labels = trials.labels
+        self.rate_among = partial(rate_among, trials)
+        self.groups = trials_by_class(self.labels, target)
+        self._featureless = np.isnan(trials.table.values).all(axis=1)
+        self.stratified_name = f"stratified_{k}_fold"
+        self.pooled_by_protocol: dict[str, Pooled] = {}
+
+    def measure_protocols(self) -> tuple[Headline, dict[str, Measurement]]:
+        """Measure the rate under each protocol. The headline holds out whole instances if that is possible."""
+
+        def assign(labels: Sequence[str]) -> list[Folds]:
+            return self.assigned_folds(lambda of_group, rows: stratified(of_group, self.k, self.seed), labels)
+
+        folds = assign(self.labels)
+        plain = self.pooled(self.stratified_name, self.trials.table, folds)
+        headline = Headline(self.stratified_name, plain, folds, assign)
+        held, measured = self._instance_held_out(plain)
+        if held is not None:
+            self.pooled_by_protocol[INSTANCE_HELD_OUT] = held.pooled
+        self.pooled_by_protocol[self.stratified_name] = plain
+        what = f"{self.k} folds, stratified by label; predictions of all folds pooled"
+        protocols = {
+            INSTANCE_HELD_OUT: measured,
+            self.stratified_name: Measurement(what, self.rate(plain)),
+        }
+        return held or headline, protocols
+
+    def learning_curve(self, headline: Headline) -> tuple[CurvePoint, ...]:
+        """Measure the rate for growing shares of the training trials."""
+        points: list[CurvePoint] = []
+        for share in SHARES:
+            pooled = headline.pooled
+            if share < 1.0:
+                name = f"learning curve {share:.0%}"
+                try:
+                    pooled = self.pooled(name, self.trials.table, headline.folds, share)
+                except FitRefused as refusal:
+                    self.notes.append(
+                        f"the learning curve has no point at {share:.0%} of the trials: {refusal}"
+                    )
+                    continue
+            # At least one trial per label is used, so small shares of few trials may be the same trials.
+            if not points or pooled.trained_on > points[-1].trained_on:
+                points.append(CurvePoint(pooled.trained_on, self.rate(pooled)))
+        return tuple(points)
+
+    def rate(self, pooled: Pooled) -> RecognitionRate:
+        """Return the rate of these predictions."""
+        return self.rate_among(pooled.right(self.labels))
+
+    def by_class(self, pooled: Pooled) -> dict[str, RecognitionRate]:
+        """Return the rate among the trials of each class."""
+        right = pooled.right(self.labels)
+        rows: dict[str, list[int]] = {}
+        for i, label in enumerate(self.labels):
+            rows.setdefault(class_of(label), []).append(i)
+        return {name: self.rate_among(right, of_class) for name, of_class in sorted(rows.items())}
+
+    def unknown(self, pooled: Pooled) -> RecognitionRate:
+        """Return the share of trials that the model of their fold calls unknown, or that have no feature at all."""
+        return self.rate_among((pooled.unlike | self._featureless).tolist())
+
+    def held_out(self, headline: Headline) -> HeldOut:
+        """Return the predictions of the headline, with the instances that its folds hold out, if they hold out any."""
+        return HeldOut(
+            pooled=headline.pooled,
+            labels=self.labels,
+            instances=self.trials.instances if headline.protocol == INSTANCE_HELD_OUT else None,
+            groups=self.groups,
+            folds=headline.folds,
+        )
+
+    def by_features(self, pooled: Pooled) -> dict[str, RecognitionRate]:
+        """Return the rates among trials with features and without any; nothing if all trials have features."""
+        if not self._featureless.any():
+            return {}
+        right = pooled.right(self.labels)
+        chosen = {"with features": ~self._featureless, "without any feature": self._featureless}
+        return {
+            name: self.rate_among(right, np.flatnonzero(chosen_trials).tolist())
+            for name, chosen_trials in chosen.items()
+            if chosen_trials.any()
+        }
+
+    def difference(
+        self, minuend: Sequence[bool], subtrahend: Sequence[bool], rows: Sequence[int] | None = None
+    ) -> Difference:
+        """Return the difference of two rates on these trials (default: all)."""
+        instances = self.trials.instances
+        rows = range(len(minuend)) if rows is None else rows
+        return difference(
+            [minuend[i] for i in rows],
+            [subtrahend[i] for i in rows],
+            None if instances is None else [instances[i] for i in rows],
+        )
+
+    def assigned_folds(
+        self, assign: Callable[[Sequence[str], Any], Folds], labels: Sequence[str] | None = None
+    ) -> list[Folds]:
+        """Return the folds of each group, for these labels (default: those of the trials)."""
+        labels = self.labels if labels is None else labels
+        return [assign([labels[i] for i in rows], rows) for rows in self.groups]
+
+    def pooled(
+        self,
+        name: str,
+        table: FeatureTable,
+        folds: Sequence[Folds],
+        share: float = 1.0,
+        labels: Sequence[str] | None = None,
+        groups: Groups | None = None,
+    ) -> Pooled:
+        """Cross-validate and report progress under this name. Raises FitRefused."""
+        labels = self.labels if labels is None else labels
+        groups = self.groups if groups is None else groups
+        total = sum(int(fold.max()) + 1 for fold in folds)
+        done = 0
+
+        def step() -> None:
+            nonlocal done
+            done += 1
+            if self.progress is not None:
+                self.progress(name, done, total)
+
+        return cross_validate(
+            self.learner, table, labels, groups, folds, seed=self.seed, share=share, progress=step
+        )
+
+    def against(
+        self, what: str, pooled: Pooled, other: Pooled, other_name: str, rows: Sequence[int] | None = None
+    ) -> Measurement:
+        """Return the rate of `pooled` with its difference to another protocol, both on these trials (default: all)."""
+        right = pooled.right(self.labels)
+        by = self.difference(other.right(self.labels), right, rows)
+        return Measurement(what, self.rate_among(right, rows), difference=by, difference_of=other_name)
+
+    def _instance_held_out(self, plain: Pooled) -> tuple[Headline | None, Measurement]:
+        what = f"at most {self.k} folds of whole instances: no model was trained on the object that it is tested on"
+        instances = self.trials.instances
+        if instances is None:
+            return None, Measurement(what, reason=self.trials.no_instances or "no instances are named")
+        of_label: dict[str, set[str]] = {}
+        for instance, label in zip(instances, self.labels, strict=True):
+            of_label.setdefault(label, set()).add(instance)
+        single = sorted(label for label, objects in of_label.items() if len(objects) == 1)
+        if single:
+            reason = f"labels with a single instance, which cannot be held out: {', '.join(single)}"
+            return None, Measurement(what, reason=reason)
+
+        def assign(labels: Sequence[str]) -> list[Folds]:
+            return self.assigned_folds(
+                lambda of_group, rows: instance_held_out(
+                    of_group, [instances[i] for i in rows], self.k, self.seed
+                ),
+                labels,
+            )
+
+        folds = assign(self.labels)
+        try:
+            held = self.pooled(INSTANCE_HELD_OUT, self.trials.table, folds)
+        except FitRefused as refusal:
+            return None, Measurement(what, reason=str(refusal))
+        headline = Headline(INSTANCE_HELD_OUT, held, folds, assign)
+        return headline, self.against(what, held, plain, self.stratified_name)

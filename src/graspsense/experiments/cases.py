@@ -1,0 +1,350 @@
+"""The cases that the keys of an experiment describe: pipelines, variants and swept keys, with all errors in them."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from graspsense.core.components.config import Settings, build_plausible, resolve
+from graspsense.core.components.layers import Layer, Merged, dotted
+from graspsense.core.components.registry import installed
+from graspsense.core.components.setting import worded
+from graspsense.core.components.strict import InvalidValue, ValidationFailed, plain, structured
+from graspsense.core.learn.copies import without_copies
+from graspsense.core.values.errors import ConfigError, GraspsenseError, counted, suggestion
+from graspsense.core.values.limits import CASES
+from graspsense.experiments.experiment import (
+    PIPELINE_TABLES,
+    Experiment,
+    ExperimentCase,
+    LearnerSpec,
+    PipelineOf,
+    Planned,
+    Variant,
+)
+from graspsense.experiments.kinds import kind_of
+from graspsense.sources.identified import IDENTIFIED, identified_scenes
+from graspsense.sources.simulated import number_of_trials as number_of_simulated_trials
+from graspsense.sources.simulated import simulated_objects
+from graspsense.sources.trial_source import (
+    SIMULATED,
+    TrialSource,
+    groups_of,
+    keys_without_effect,
+    labelled_trials,
+    tables_without_effect,
+)
+
+SWEPT_TABLES: Final = (*PIPELINE_TABLES, "classifier", "data", "test", "judge")
+DEFAULT_CLASSIFIER: Final = "c45"
+
+
+class CasePlan:
+    """Expands an experiment to its cases, and collects all errors."""
+
+    def __init__(self, name: str, experiment: Experiment, layer: Layer, *, force: bool) -> None:
+        self.name, self.experiment, self.layer, self.force = name, experiment, layer, force
+        self.complaints: list[str] = []
+
+    def planned(self) -> Planned:
+        """Return the experiment with its cases. Raises ConfigError that lists all errors."""
+        experiment = self.experiment
+        kind_of(experiment.kind)
+        seeds = experiment.listed_seeds
+        pipelines = {}
+        for asked in experiment.pipelines:
+            pipeline_of = (
+                asked if isinstance(asked, PipelineOf) else PipelineOf(name=Path(asked).stem, pipeline=asked)
+            )
+            if pipeline_of.name in pipelines:
+                raise ConfigError(
+                    f"{self.layer.where(('pipelines',))}: two pipelines are called {pipeline_of.name!r}: name one of "
+                    'them, { name = "...", pipeline = "..." }'
+                )
+            pipelines[pipeline_of.name] = resolve(pipeline_of.pipeline, force=self.force)
+        if not pipelines:
+            raise ConfigError(f"{self.layer.where(('pipelines',))}: pipelines: name at least one")
+        sweep = self._sweep()
+        self._check_cases(sweep, len(pipelines))
+        cases = []
+        for pipeline, settings in pipelines.items():
+            for variant in experiment.variants or (Variant(name=""),):
+                for point in _points(sweep, "classifier", within=False):
+                    levels: dict[str, Any] = {}
+                    if len(pipelines) > 1:
+                        levels["pipeline"] = pipeline
+                    if experiment.variants:
+                        levels["variant"] = variant.name
+                    levels.update((dotted(path), value) for path, value in point)
+                    cases.append(self._case(settings, variant, point, sweep, levels))
+        self._check_effect(cases, sweep)
+        if self.complaints:
+            raise ConfigError("\n".join(dict.fromkeys(self.complaints)))
+        return Planned(
+            name=self.name, experiment=experiment, cases=tuple(cases), seeds=seeds, pipelines=pipelines
+        )
+
+    def _check_effect(
+        self, cases: Sequence[ExperimentCase], sweep: Mapping[tuple[str, ...], Sequence[Any]]
+    ) -> None:
+        """Add an error for each swept key that the trials cannot depend on, and for cases that are therefore equal."""
+        seen: dict[str, ExperimentCase] = {}
+        for case in cases:
+            sources = [source for source in (case.data, case.test) if source is not None]
+            if self.complaints or not sources:
+                return
+            inert = set.intersection(*(set(_without_effect(source)) for source in sources))
+            named = " and ".join(source.source for source in sources)
+            keys = [dotted(path) for path in sweep if {path[0], dotted(path[:2])} & inert]
+            twin = seen.setdefault(_what_matters(case, inert), case)
+            if not keys and twin is not case:
+                keys = [key for key in case.levels if case.levels[key] != twin.levels[key]]
+            for key in keys:
+                self.complaints.append(
+                    f"{self.layer.where(('sweep', key))}: {key} makes no difference: the trials of {named} do not "
+                    "depend on what differs. Vary a key of [classifier], [judge] or [data] that they depend on, or "
+                    f'simulate the trials (data.source = "{SIMULATED}")'
+                )
+
+    def _check_cases(self, sweep: Mapping[tuple[str, ...], Sequence[Any]], pipelines: int) -> None:
+        """Raise ConfigError if there are too many cases, before any of them is made."""
+        experiment = self.experiment
+        cases = pipelines * max(len(experiment.variants), 1) * max(len(experiment.classifiers), 1)
+        cases *= math.prod(len(values) for values in sweep.values())
+        if too_many := CASES.exceeded(cases):
+            raise ConfigError(f"{self.layer.label}: {too_many}")
+
+    def _sweep(self) -> dict[tuple[str, ...], Sequence[Any]]:
+        """Return the values of each swept key, by its path."""
+        sweep: dict[tuple[str, ...], Sequence[Any]] = {}
+
+        def take(path: tuple[str, ...], value: Any, where: tuple[str, ...]) -> None:
+            if isinstance(value, Mapping):
+                for key, inner in value.items():
+                    take((*path, *key.split(".")), inner, (*where, key))
+                return
+            place = f"{self.layer.where(('sweep', *where))}: sweep.{dotted(path)}"
+            if path[0] not in SWEPT_TABLES or len(path) < 2:
+                near = suggestion(path[0], SWEPT_TABLES)
+                self.complaints.append(
+                    f"{place}: no such table.{near} A sweep can have keys of {', '.join(SWEPT_TABLES)}"
+                )
+            elif not isinstance(value, list) or not value:
+                self.complaints.append(f"{place}: give a list of values, such as [17.0, 20.0, 23.0]")
+            else:
+                sweep[path] = value
+
+        for key, value in self.experiment.sweep.items():
+            take(tuple(key.split(".")), value, (key,))
+        return sweep
+
+    def _case(
+        self,
+        pipeline: Settings,
+        variant: Variant,
+        point: Sequence[tuple[tuple[str, ...], Any]],
+        sweep: Mapping[tuple[str, ...], Sequence[Any]],
+        levels: dict[str, Any],
+    ) -> ExperimentCase:
+        experiment = self.experiment
+        merged = Merged()
+        merged.add((), _tables(experiment), self.layer)
+        merged.add((), _tables(variant), self.layer)
+        values = merged.values
+        for path, value in point:
+            _put(values, path, value)
+        data = self._keys(values.get("data", {}), TrialSource, "data")
+        test = self._keys(values["test"], TrialSource, "test") if values.get("test") else None
+        over = {table: values[table] for table in PIPELINE_TABLES if values.get(table)}
+        fingertips = self._fingertips(data, test)
+        if fingertips:
+            # What the file says of the gripper stays: it may be what the experiment varies.
+            over["gripper"] = {**fingertips, **over.get("gripper", {})}
+        settings = resolve(
+            pipeline.pipeline,
+            experiment=Layer(label=self.layer.label, values=over, lines=self.layer.lines),
+            force=self.force,
+        )
+        name = ", ".join(
+            str(value) if key in ("pipeline", "variant") else in_a_name(key, value)
+            for key, value in levels.items()
+        )
+        if any(source is not None and source.kind == SIMULATED for source in (data, test)):
+            simulated_objects(settings)
+        judge = self._keys(values.get("judge", {}), kind_of(experiment.kind).keys_class(), "judge")
+        if test is None and data is not None and judge is not None:
+            self._check_folds(settings, data, judge)
+        return ExperimentCase(
+            name=name,
+            levels=levels,
+            settings=settings,
+            data=data,
+            test=test,
+            learners=tuple(self._learners(pipeline, values.get("classifier", {}), sweep)),
+            judge=judge,
+            kind=experiment.kind,
+        )
+
+    def _fingertips(self, data: TrialSource | None, test: TrialSource | None) -> dict[str, float]:
+        """Return the settings of the fingertips that the scenes of `identified:` were recorded with."""
+        variants: dict[str, dict[str, float]] = {}
+        for table, source in (("data", data), ("test", test)):
+            if source is None or not source.source.startswith(IDENTIFIED):
+                continue
+            try:
+                variants[table] = dict(identified_scenes(source.source)[0].gripper)
+            except GraspsenseError as error:
+                self.complaints.append(f"{self.layer.where((table,))}: {error}")
+        if len(variants) > 1 and variants["data"] != variants["test"]:
+            self.complaints.append(
+                f"{self.layer.where(('test',))}: the scenes of [data] and [test] were identified with different "
+                "fingertips ([identified.gripper]): their squeezes cannot be compared"
+            )
+        return next(iter(variants.values()), {})
+
+    def _check_folds(self, settings: Settings, data: TrialSource, judge: Any) -> None:
+        """Add an error if there are more folds than trials, because every task of the case would fail."""
+        folds = getattr(judge, "folds", None)
+        if folds is None:
+            return
+        try:
+            trials = number_of_trials(settings, data)
+        except GraspsenseError as error:
+            self.complaints.append(f"{self.layer.where(('data',))}: {error}")
+            return
+        if trials is not None and folds > trials:
+            text = (
+                f"{folds} folds of {counted(trials, 'trial')}: give at most as many folds as there are trials"
+            )
+            self.complaints.append(self.layer.complain(InvalidValue(("judge", "folds"), text)))
+
+    def _keys(self, values: Mapping[str, Any], cls: type, table: str) -> Any:
+        try:
+            return structured(values, cls, f"[{table}]")
+        except ValidationFailed as misfit:
+            self.complaints += [self.layer.complain(problem) for problem in misfit.under(table)]
+            return None
+
+    def _learners(
+        self,
+        pipeline: Settings,
+        variant: Mapping[str, Any],
+        sweep: Mapping[tuple[str, ...], Sequence[Any]],
+    ) -> Iterator[LearnerSpec]:
+        """Yield every classifier with every combination of its swept keys."""
+        given = self.experiment.classifiers
+        if not given:
+            chosen = pipeline.classifier
+            given = (
+                (DEFAULT_CLASSIFIER,)
+                if chosen is None
+                else (
+                    {
+                        "name": chosen.component.name,
+                        "type": chosen.component.qualified,
+                        **_fresh(chosen.config),
+                    },
+                )
+            )
+        seen: set[str] = set()
+        for index, spec in enumerate(given):
+            table = {"type": spec} if isinstance(spec, str) else dict(spec)
+            called = str(table.pop("name", table.get("type", "")).rpartition("/")[2])
+            for point in _points(sweep, "classifier", within=True):
+                keys = {**table, **variant}
+                for path, value in point:
+                    _put(keys, path[1:], value)
+                try:
+                    component = installed().find("classifier", str(keys.pop("type")))
+                    config = _fresh(build_plausible(component, keys, force=self.force))
+                except KeyError:
+                    self.complaints.append(
+                        self.layer.complain(
+                            InvalidValue(("classifiers", index), "a classifier needs a `type`")
+                        )
+                    )
+                    return
+                except GraspsenseError as error:
+                    self.complaints.append(
+                        self.layer.complain(InvalidValue(("classifiers", index), str(error)))
+                    )
+                    return
+                name = ", ".join([called, *(in_a_name(path[-1], value) for path, value in point)])
+                if name in seen:
+                    text = f"two classifiers are called {name!r}: give one a `name`"
+                    self.complaints.append(self.layer.complain(InvalidValue(("classifiers", index), text)))
+                seen.add(name)
+                yield LearnerSpec(name=name, type=component.qualified, config=config)
+
+
+def _without_effect(source: TrialSource) -> list[str]:
+    """Return the tables, and the keys of [data], that the trials of a source do not depend on."""
+    return [*tables_without_effect(source), *(f"data.{key}" for key in keys_without_effect(source))]
+
+
+def _what_matters(case: ExperimentCase, inert: set[str]) -> str:
+    """Return everything that the result of a case depends on, as text."""
+    tables = {table: case.settings.values[table] for table in PIPELINE_TABLES if table not in inert}
+    sources = [
+        {key: value for key, value in plain(source).items() if f"data.{key}" not in inert}
+        for source in (case.data, case.test)
+        if source is not None
+    ]
+    learners = [(learner.name, learner.type, dict(learner.config)) for learner in case.learners]
+    return repr((tables, sources, learners, plain(case.judge)))
+
+
+def number_of_trials(settings: Settings, data: TrialSource) -> int | None:
+    """Return the number of trials of a source, None for a data set, which would have to be read."""
+    if data.kind == SIMULATED:
+        return number_of_simulated_trials(settings, groups_of(data))
+    if data.kind == "CSV":
+        trials = labelled_trials(data, settings=lambda: settings, features=settings.features.create)
+        return len(without_copies(trials))
+    return None
+
+
+def in_a_name(key: str, value: Any) -> str:
+    """Return a key with its value in words: `probing force 20 N`."""
+    return " ".join(
+        worded(key.rpartition(".")[2], shown(value) if isinstance(value, list | tuple) else value)
+    )
+
+
+def shown(value: Any) -> str:
+    """Return a value as text for the name of a case."""
+    if isinstance(value, float):
+        return f"{value:g}"
+    if isinstance(value, list | tuple):
+        return "+".join(map(shown, value))
+    return str(value)
+
+
+def _fresh(config: Any) -> dict[str, Any]:
+    """Return the keys of a classifier that are set, without a trained model."""
+    return {key: value for key, value in plain(config).items() if value is not None and key != "model"}
+
+
+def _tables(experiment: Experiment | Variant) -> dict[str, Mapping[str, Any]]:
+    return {
+        table: dict(getattr(experiment, table)) for table in SWEPT_TABLES if getattr(experiment, table, None)
+    }
+
+
+def _points(
+    sweep: Mapping[tuple[str, ...], Sequence[Any]], table: str, *, within: bool
+) -> list[tuple[tuple[tuple[str, ...], Any], ...]]:
+    """Return every combination of the swept keys of this table, or, if not `within`, of all other tables."""
+    chosen = {path: values for path, values in sweep.items() if (path[0] == table) is within}
+    return [tuple(zip(chosen, values, strict=True)) for values in itertools.product(*chosen.values())]
+
+
+def _put(values: dict[str, Any], path: Sequence[str], value: Any) -> None:
+    for part in path[:-1]:
+        inner = values.get(part)
+        values[part] = dict(inner) if isinstance(inner, Mapping) else {}
+        values = values[part]
+    values[path[-1]] = value

@@ -1,0 +1,164 @@
+"""Checks of what a gripper does on a command: how it moves, within which limits, and which kinds it accepts."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from math import inf, isnan
+
+from graspsense.core.components.entries import KINDS
+from graspsense.core.control.guard import GuardState, guard
+from graspsense.core.values.signals import (
+    EFFORT,
+    FORCE,
+    POSITION,
+    VELOCITY,
+    Command,
+)
+from graspsense.testing.checks import CheckSkipped, demand, raises_nothing
+from graspsense.testing.gentle import EFFORT_N, FORCE_N, kind_of
+from graspsense.testing.session import TIMEOUT_S, limits_of
+from graspsense.testing.subject import Subject
+
+
+def opening_and_relaxing_are_accepted(subject: Subject) -> None:
+    """The opening and the relaxing command are of kinds that it accepts."""
+    info = subject.session.info
+    for name, command in (("opening", info.opening), ("relaxed", info.relaxed)):
+        if command is not None:
+            kind = KINDS[command.kind]
+            demand(
+                kind in subject.entry.accepts,
+                f"its {name} command is of kind {kind}; it accepts {', '.join(subject.entry.accepts) or 'none'}: use "
+                "one of those, or add it to `accepts`",
+            )
+
+
+def velocity_is_the_rate_of_the_gap(subject: Subject) -> None:
+    """The sum of `velocity_m_s` over time is the change of the gap; closing is negative."""
+    frames = [reading.frame for reading in subject.session.stages.get("closing", [])]
+    if not frames or isnan(frames[0].velocity_m_s) or isnan(frames[0].gap_m):
+        raise CheckSkipped("this gripper has no velocity and gap of its own, or is a recording")
+    moved = frames[-1].gap_m - frames[0].gap_m
+    summed = sum(frame.velocity_m_s * frame.dt_s for frame in frames[1:])
+    if max(abs(moved), abs(summed)) < 2e-3:
+        raise CheckSkipped(f"the gap moved by {abs(moved) * 1e3:.2g} mm only")
+    demand(
+        abs(summed - moved) <= 0.3 * abs(moved),
+        f"velocity_m_s adds up to {summed * 1e3:.3g} mm where the gap moved by {moved * 1e3:.3g} mm: give the rate of "
+        "the gap in m/s, negative while it closes (both fingers together)",
+    )
+
+
+def closing_closes(subject: Subject) -> None:
+    """A gentle closing command reduces the gap; the opening command increases it again."""
+    stages = subject.session.stages
+    if "closing" not in stages:
+        raise CheckSkipped("a recording cannot be commanded")
+    gaps = [reading.frame.gap_m for reading in stages["closing"]]
+    if all(map(isnan, gaps)):
+        raise CheckSkipped("this gripper has no gap")
+    kind = KINDS[kind_of(subject.entry.accepts)]
+    demand(
+        gaps[0] - gaps[-1] > 1e-3,
+        f"under a closing {kind} command the gap goes from {gaps[0]:.4g} to {gaps[-1]:.4g} m: an "
+        "effort or force above 0, a velocity below 0 and a smaller position close the fingers",
+    )
+    opened = [reading.frame.gap_m for reading in stages["open again"]]
+    demand(
+        max(opened) - opened[0] > 1e-3,
+        f"under the opening command {subject.session.info.opening} the gap goes from {opened[0] * 1e3:.4g} to "
+        f"{opened[-1] * 1e3:.4g} mm: it must rise",
+    )
+
+
+def stays_within_its_limits(subject: Subject) -> None:
+    """Under the largest commands of each kind, the reported effort and speed stay within their limits."""
+    if subject.session.info.opening is None:
+        raise CheckSkipped("a recording cannot be commanded")
+    for name in subject.entry.accepts:
+        kind = KINDS.index(name)
+        too_fast = _speed_beyond_limit(subject, kind)
+        if too_fast:
+            # Fingers that other work on the computer holds up catch up faster, but hardly in a second session.
+            too_fast = _speed_beyond_limit(subject, kind)
+        demand(not too_fast, too_fast)
+
+
+def _speed_beyond_limit(subject: Subject, kind: int) -> str:
+    """Return in words what speed exceeds its limit under the largest commands of this kind; empty if none does.
+
+    An effort beyond its limit fails the check at once.
+    """
+    with closing(subject.create()) as backend:
+        least_force_n, least_speed_m_s = backend.least_force_n, backend.least_speed_m_s
+        info = backend.open(0)
+        first_limits = limits_of(info)
+        # The limits of a first use apply after a contact too.
+        limits = first_limits._replace(
+            effort_limit_n=first_limits.first_effort_n, speed_limit_m_s=first_limits.first_speed_m_s
+        )
+        watcher = GuardState(0, 0, 0)
+        greatest = {VELOCITY: -1e6, POSITION: 0.0, FORCE: 1e6, EFFORT: 1e6}[kind]
+        command = Command(kind, greatest, inf, inf)
+        for _ in range(max(int(0.5 * info.rate_hz), 20)):
+            reading = backend.read(TIMEOUT_S)
+            if reading is None:
+                continue
+            frame = reading.frame
+            effort, speed = (
+                f"{name} reaches {abs(value):.3g} under {KINDS[kind]} commands limited to {limit:g}: apply "
+                "`effort_limit_n` and `speed_limit_m_s` of each command"
+                if abs(value) > grace * max(limit, least)
+                else ""
+                for name, value, limit, least, grace in (
+                    ("effort_n", frame.effort_n, limits.first_effort_n, least_force_n, 1.1),
+                    ("velocity_m_s", frame.velocity_m_s, limits.first_speed_m_s, least_speed_m_s, 3.0),
+                )
+            )
+            demand(not effort, effort)
+            if speed:
+                return speed
+            allowed, watcher = guard(limits, watcher, frame, command)
+            backend.apply(allowed)
+    return ""
+
+
+def says_what_commands_become(subject: Subject) -> None:
+    """A gripper that closes by itself says for each kind of command what it becomes, and accepts no effort."""
+    backend = subject.create()
+    if not backend.closes_itself:
+        return
+    demand(
+        "effort" not in subject.entry.accepts,
+        "it closes by itself and accepts an effort, which has no speed, so that it would rush: take 'effort' out of "
+        "`accepts`",
+    )
+    lacking = [kind for kind in subject.entry.accepts if not backend.closes_itself.get(kind)]
+    demand(
+        not lacking,
+        f"`closes_itself` does not say what a command of {', '.join(lacking)} becomes: write it in a few words",
+    )
+
+
+def accepts_every_declared_kind(subject: Subject) -> None:
+    """Each kind in `accepts` can be applied, and frames continue to come."""
+    demand(bool(subject.entry.accepts), "`accepts` is empty: a gripper takes at least one kind of command")
+    with closing(subject.create()) as backend:
+        info = backend.open(0)
+        for name in subject.entry.accepts:
+            kind = KINDS.index(name)
+            value = {
+                EFFORT: min(EFFORT_N, info.effort_limit_n) / 4.0,
+                VELOCITY: 0.001,
+                POSITION: 0.05,
+                FORCE: FORCE_N,
+            }[kind]
+            backend.read(TIMEOUT_S)
+            advice = f" on a {name} command, which `accepts` says it takes: take it, or take {name!r} out of `accepts`"
+            with raises_nothing("apply", advice):
+                backend.apply(Command(kind, value, min(EFFORT_N, info.effort_limit_n), 0.01))
+            demand(
+                any(backend.read(TIMEOUT_S) is not None for _ in range(10)),
+                f"after a {name} command no frame came",
+            )
+        backend.apply(info.relaxed)

@@ -1,0 +1,348 @@
+"""Checks of what a gripper delivers: frames, channels, signals, images, rates and units."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import closing
+from itertools import pairwise
+from math import inf, isfinite, isnan, nan
+from statistics import median
+from typing import Any, Final
+
+import numpy as np
+
+from graspsense.core.components.channels import declared_dtype, dtype_of, further, no_signals, shape_of
+from graspsense.core.components.delivered import Delivered
+from graspsense.core.values.channel import FLOATS, Channel, FastChannel, TactileArray
+from graspsense.core.values.signals import (
+    CHANNELS,
+    Frame,
+    Image,
+    Pads,
+    Reading,
+    Samples,
+)
+from graspsense.testing.checks import CheckFailed, CheckSkipped, demand
+from graspsense.testing.model_gripper import CHANNELS_OF_FIELD
+from graspsense.testing.session import sums_of
+from graspsense.testing.subject import Subject
+
+WIDEST_M: Final = 0.5
+FORGIVEN: Final = 0.25
+"""Relative difference allowed between the measured and the declared rate."""
+
+
+def frames_are_numbers(subject: Subject) -> None:
+    """Every field of a frame is a Python float, `status` an int; cells are floats, as many as are declared."""
+    cells = _cells(subject)
+    # The words of a failure are made where it fails: those of every reading took most of the time of the checks.
+    for reading in subject.session.readings:
+        if not (
+            isinstance(reading, Reading)
+            and isinstance(reading.frame, Frame)
+            and isinstance(reading.pads, Pads)
+        ):
+            raise CheckFailed(
+                f"read returned {reading!r:.80}: return Reading(Frame(...), Pads(...), signals), with NO_PADS where "
+                "there are no cells and () where there are no further channels"
+            )
+        frame, pads, _ = reading
+        for name, value in zip(Frame._fields, frame, strict=True):
+            kind = int if name == "status" else float
+            if type(value) is not kind:
+                raise CheckFailed(
+                    f"{name} of a frame is {value!r} of type {type(value).__name__}: write {kind.__name__}(...)"
+                )
+        demand(
+            type(pads.counter) is int and type(pads.t_s) is float,
+            f"an image has counter {pads.counter!r} and t_s {pads.t_s!r}: an int and a float",
+        )
+        for side in (pads.left, pads.right):
+            if not (
+                isinstance(side, tuple) and len(side) == cells and all(type(cell) is float for cell in side)
+            ):
+                raise CheckFailed(
+                    f"an image of a fingertip has the cells {side!r:.80}: give a tuple of {cells} floats, as many as "
+                    "the channel 'pads' declares (NaN for a cell without a value)"
+                )
+
+
+def _cells(subject: Subject) -> int:
+    """Return the declared number of cells of a fingertip; of a recording, which declares none, that of its images."""
+    for channel in subject.entry.channels:
+        if channel.name == "pads":
+            if isinstance(channel, TactileArray):
+                return channel.cells
+            demand(
+                subject.session.info.opening is None,
+                "the channel 'pads' does not say which cells there are: declare TactileArray('pads', "
+                f"{channel.unit!r}, rate, rows=..., columns=...)",
+            )
+            return len(subject.session.readings[0].pads.left)
+    return 0
+
+
+def channels_are_those_declared(subject: Subject) -> None:
+    """A declared channel has numbers; a channel that is not declared is always NaN."""
+    session = subject.session
+    declared = {channel.name for channel in subject.entry.channels}
+    recording = session.info.opening is None
+    for name, channel in CHANNELS_OF_FIELD.items():
+        values = [getattr(frame, name) for frame in session.frames]
+        if channel not in declared:
+            demand(
+                all(map(isnan, values)),
+                f"{name} has numbers ({next((value for value in values if not isnan(value)), nan):g}), and no channel "
+                f"{channel!r} is declared: declare Channel({channel!r}, {CHANNELS[channel]!r}, rate), or give NaN",
+            )
+        elif not recording:
+            demand(
+                not all(map(isnan, values)),
+                f"{name} is NaN in all {len(values)} frames, and the channel {channel!r} is declared: fill it, or "
+                "take it out of `channels`",
+            )
+        demand(
+            not any(map(_infinite, values)), f"{name} is infinite in a frame: give NaN for what is not known"
+        )
+    if "pads" not in declared:
+        demand(not session.images, "cell images come, and no channel 'pads' is declared: declare it")
+    elif not recording:
+        demand(
+            bool(session.images),
+            "no cell image came, and the channel 'pads' is declared: count images from 1 on, or take it out",
+        )
+
+
+def signals_are_those_declared(subject: Subject) -> None:
+    """Each further channel is delivered in `Reading.signals`, in the declared shape, and has numbers."""
+    channels, session = further(subject.entry.channels), subject.session
+    nothing = no_signals(channels)
+    names = ", ".join(getattr(nothing, "_fields", ())) or "none"
+    for reading in session.readings:
+        fields = getattr(reading.signals, "_fields", ())
+        demand(
+            fields == getattr(nothing, "_fields", ()),
+            f"the further channels declared are {names}, and read delivers {', '.join(fields) or 'none'}: fill "
+            "signal_type(self.channels) with a value for each, in this order",
+        )
+        for channel, empty, value in zip(channels, nothing, reading.signals, strict=True):
+            if type(value) is not type(empty) or (shape_of(value), dtype_of(value)) != (
+                shape_of(empty),
+                dtype_of(empty),
+            ):
+                raise CheckFailed(
+                    f"{channel.name!r} is {value!r:.80}: give {type(empty).__name__}"
+                    + (f" of the declared shape {shape_of(empty)}" if shape_of(empty) else "")
+                    + (f" and the declared dtype {dtype_of(empty)}" if dtype_of(empty) != FLOATS else "")
+                )
+    for channel in channels:
+        values = [getattr(reading.signals, channel.name) for reading in session.readings]
+        if isinstance(channel, TactileArray) and channel.dtype != FLOATS:
+            _demand_images(channel.name, [value.cells for value in values if value.counter])
+            continue
+        if isinstance(channel, TactileArray) and channel.components > 1:
+            numbers = [number for value in values if value.counter for cell in value.cells for number in cell]
+        elif isinstance(channel, TactileArray):
+            numbers = [cell for value in values if value.counter for cell in value.cells]
+        elif isinstance(channel, FastChannel):
+            numbers = [number for value in values for row in value.values[: value.new] for number in row]
+        else:
+            numbers = values
+        wrong = next((number for number in numbers if type(number) is not float or _infinite(number)), None)
+        demand(wrong is None, f"{channel.name!r} has the value {wrong!r}: give finite floats, or NaN")
+        demand(
+            not all(map(isnan, numbers)),
+            f"no number of the declared channel {channel.name!r} came in {len(values)} readings: fill it in "
+            "`Reading.signals`, or take it out of `channels`",
+        )
+
+
+def _demand_images(name: str, images: Sequence[Any]) -> None:
+    """Raise CheckFailed if no image of numpy arrays came, or none has a number; infinite numbers are none, either."""
+    demand(
+        any(not np.isnan(cells).all() for cells in images),
+        f"no image of the declared channel {name!r} came: fill it in `Reading.signals`, or take it out of `channels`",
+    )
+    demand(
+        not any(np.isinf(cells).any() for cells in images),
+        f"{name!r} has an infinite number: give finite ones, or NaN",
+    )
+
+
+def images_stay_as_they_were_delivered(subject: Subject) -> None:
+    """An image that is a numpy array is contiguous and read-only, and nobody changes it after it was delivered."""
+    if all(declared_dtype(channel) == FLOATS for channel in further(subject.entry.channels)):
+        raise CheckSkipped("this gripper has no images that are numpy arrays")
+    problem, session = Delivered(subject.entry.channels).problem, subject.session
+    for reading, sums in zip(session.readings, session.sums, strict=True):
+        fault = problem(reading)
+        demand(not fault, f"a reading is not as declared: {fault}")
+        demand(
+            sums_of(reading) == sums,
+            "an image was changed after it was delivered, and laws and recordings refer to it: fill a new array for "
+            "each image",
+        )
+
+
+def signals_have_no_gaps_or_repeats(subject: Subject) -> None:
+    """Images and samples of further channels are counted: each once, and what is lost shows in the counter."""
+    channels = further(subject.entry.channels)
+    counted = [channel for channel in channels if isinstance(channel, TactileArray | FastChannel)]
+    if not counted:
+        raise CheckSkipped("this gripper has no further arrays or fast channels")
+    for channel in counted:
+        values = [getattr(reading.signals, channel.name) for reading in subject.session.readings]
+        taken = last_s = 0.0
+        for earlier, now in pairwise(values):
+            came = now.counter - earlier.counter
+            taken += came
+            if isinstance(now, Samples):
+                demand(
+                    0 <= now.new <= channel.samples and came >= now.new,  # type: ignore[union-attr]
+                    f"{channel.name!r} has {now.new} new samples while its counter goes from {earlier.counter} to "
+                    f"{now.counter}: count every sample that the sensor has taken, also those that were lost",
+                )
+                demand(
+                    all(isnan(number) for row in now.values[now.new :] for number in row),
+                    f"{channel.name!r} has numbers behind its {now.new} new samples: they repeat old ones; give NaN",
+                )
+            else:
+                demand(
+                    came >= 0 and (came > 0 or _is_same(now, earlier)),
+                    f"an image of {channel.name!r} changes while its counter stays at {now.counter}: count up",
+                )
+            if came:
+                demand(
+                    now.t_s > earlier.t_s or earlier.counter == 0,
+                    f"{channel.name!r} goes from {earlier.t_s} to {now.t_s} s: what is new is later",
+                )
+                last_s = now.t_s
+        first_s = next((value.t_s for value in values if value.counter), 0.0)
+        if channel.rate_hz and last_s > first_s and taken > 10:
+            rate = taken / (last_s - first_s)
+            demand(
+                abs(rate - channel.rate_hz) <= FORGIVEN * channel.rate_hz,
+                f"{channel.name!r} comes at {rate:.3g} Hz and is declared at {channel.rate_hz:g} Hz: declare its rate",
+            )
+
+
+def _is_same(now: Image, earlier: Image) -> bool:
+    if dtype_of(now) == FLOATS:
+        return repr(now) == repr(earlier)
+    return now[:2] == earlier[:2] and np.array_equal(now.cells, earlier.cells, equal_nan=True)
+
+
+def channels_follow_from_the_settings(subject: Subject) -> None:
+    """The declared channels follow from the settings alone, and opening the gripper does not change them."""
+    if not subject.component.channels_vary():
+        return
+    again = subject.create()
+    with closing(subject.create()) as backend:
+        declared = backend.channels
+        demand(
+            isinstance(declared, tuple) and all(isinstance(channel, Channel) for channel in declared),
+            f"`channels` returns {declared!r:.80}: return a tuple of Channel",
+        )
+        backend.open(0)
+        for other, when in (
+            (again.channels, "with the same settings"),
+            (backend.channels, "once it is open"),
+        ):
+            demand(
+                other == declared,
+                f"`channels` are {_named(declared)}, and {_named(other)} {when}: make them depend on self.config only",
+            )
+
+
+def _named(channels: Sequence[Channel]) -> str:
+    return ", ".join(f"{channel.name} at {channel.rate_hz:g} Hz" for channel in channels) or "none"
+
+
+def _infinite(value: float) -> bool:
+    return value in (inf, -inf)
+
+
+def time_runs_forward(subject: Subject) -> None:
+    """`t_s` increases from frame to frame, and `dt_s` is the difference."""
+    session = subject.session
+    demand(all(isfinite(frame.t_s) for frame in session.frames), "t_s of a frame is not a number")
+    for earlier, now in pairwise(session.frames):
+        passed = now.t_s - earlier.t_s
+        demand(
+            passed > 0.0,
+            f"t_s goes from {earlier.t_s} to {now.t_s} s: a frame is given once, and each is later than the last",
+        )
+        demand(
+            abs(now.dt_s - passed) <= 0.5 * passed + 1e-9,
+            f"dt_s is {now.dt_s:g} s where {passed:g} s passed since the last frame: give the seconds between the two",
+        )
+
+
+def rate_is_as_declared(subject: Subject) -> None:
+    """Frames come at `rate_hz`, and no channel is declared with a higher rate."""
+    info, frames = subject.session.info, subject.session.frames
+    passed = [now.t_s - earlier.t_s for earlier, now in pairwise(frames)]
+    demand(bool(passed), "only one frame came")
+    rate = 1.0 / median(passed)
+    if info.units.get("t", "s") == "s":
+        demand(
+            abs(rate - info.rate_hz) <= FORGIVEN * info.rate_hz,
+            f"frames come at {rate:.3g} Hz, rate_hz says {info.rate_hz:g}: declare that rate (is t_s in seconds?)",
+        )
+    for channel in subject.entry.channels:
+        most = channel.samples if isinstance(channel, FastChannel) else 1
+        demand(
+            channel.rate_hz <= most * info.rate_hz * (1.0 + FORGIVEN),
+            f"channel {channel.name!r} is declared at {channel.rate_hz:g} Hz, the gripper gives "
+            f"{info.rate_hz:g} frames a second: declare the rate at which its value is new",
+        )
+
+
+def images_count_up(subject: Subject) -> None:
+    """The counter increases with each new image, by more where some were lost; no image is later than its frame."""
+    if not subject.session.images:
+        raise CheckSkipped("this gripper has no cells")
+    for earlier, now in pairwise(subject.session.images):
+        demand(
+            now.counter > earlier.counter and now.t_s > earlier.t_s,
+            f"after image {earlier.counter} of {earlier.t_s} s comes image {now.counter} of {now.t_s} s: "
+            "count up by one",
+        )
+    shown: dict[int, Pads] = {}
+    for frame, pads, _ in subject.session.readings:
+        demand(
+            pads.counter == 0 or pads.t_s <= frame.t_s + 1e-9,
+            f"the image of {pads.t_s} s comes with the frame of {frame.t_s} s: give the last image",
+        )
+        demand(
+            repr(shown.setdefault(pads.counter, pads)) == repr(pads),
+            f"image {pads.counter} changes while its counter stays: count up with each new image",
+        )
+
+
+def gap_is_in_metres(subject: Subject) -> None:
+    """The gap lies between 0 and half a metre."""
+    gaps = [frame.gap_m for frame in subject.session.frames if not isnan(frame.gap_m)]
+    if not gaps:
+        raise CheckSkipped("this gripper has no gap")
+    if subject.session.info.units.get("gap", "m") != "m":
+        raise CheckSkipped(f"a recording in {subject.session.info.units['gap']}")
+    demand(
+        min(gaps) >= -0.01 and max(gaps) <= WIDEST_M,
+        f"gap_m goes from {min(gaps):g} to {max(gaps):g}: give the distance between the fingertip faces in metres"
+        + (" (this looks like millimetres: divide by 1000)" if max(gaps) > WIDEST_M else ""),
+    )
+
+
+def forces_are_in_newtons(subject: Subject) -> None:
+    """No force of a pad, an edge or the drive exceeds what the limit of the gripper allows."""
+    info = subject.session.info
+    most = max(3.0 * info.effort_limit_n, 50.0)
+    for name in ("force_left_n", "force_right_n", "edge_left_n", "edge_right_n", "effort_n"):
+        values = [abs(getattr(frame, name)) for frame in subject.session.frames]
+        worst = max((value for value in values if not isnan(value)), default=0.0)
+        demand(
+            worst <= most,
+            f"{name} reaches {worst:g} while the fingers are closed gently on a gripper of {info.effort_limit_n:g} N: "
+            "give newtons, tared (raw counts go into Pads)",
+        )
