@@ -101,6 +101,12 @@ class PlantState(NamedTuple):
     """Largest force on a pad so far."""
 
 
+def with_step(state: PlantState, step: StepState) -> PlantState:
+    """Return the same plant, with this state of the step control."""
+    motion, contact, _, effort_n, peak_n = state
+    return PlantState(motion=motion, contact=contact, step=step, effort_n=effort_n, peak_n=peak_n)
+
+
 class PlantReadings(NamedTuple):
     """What sensors measure of the plant at a tick."""
 

@@ -151,17 +151,17 @@ class SimBackend(BatchBackend[SimConfig]):
         else:
             self._move_on(effort)
         buffers = self._buffers
-        if self._sensor.images >= len(buffers.images):
+        if self._sensor.cells.images >= len(buffers.images):
             self._draw_noise()
         contact = self._state.contact
         measured = PlantReadings(self._state.motion, contact.left_n, contact.right_n)
         frame, self._sensor = _sense(
             setup.sensor, self._sensor, measured, self._ticks * dt, dt, effort, buffers
         )
-        count = self._sensor.images
+        count = self._sensor.cells.images
         if count != self._pads.counter:
             image = buffers.images[count - 1]
-            self._pads = Pads(self._sensor.image_t_s, count, tuple(image[0]), tuple(image[1]))
+            self._pads = Pads(self._sensor.cells.image_t_s, count, tuple(image[0]), tuple(image[1]))
         return _reading(frame, self._pads, ())
 
     def _move_on(self, effort_n: float) -> None:

@@ -234,7 +234,12 @@ def _plant(
     )
     at_rest = _uncompressed(() if spec is None else spec.kinds)
     right = (at_rest,) if model.held == 1 else ()
-    state = PlantState(gripper.motion, Contact(0.0, 0.0, drawn.placement.offset_m, 0, at_rest, right))
+    state = PlantState(
+        gripper.motion,
+        Contact(
+            left_n=0.0, right_n=0.0, offset_m=drawn.placement.offset_m, touched=0, left=at_rest, right=right
+        ),
+    )
     return PlantParams(drive, model, gripper.steps), state
 
 
@@ -283,7 +288,13 @@ def _gripper(config: SimConfig) -> _Gripper:
         exponent=float(config.pad_exponent),
     )
     motion = Motion(drive.open_rev, 0.0, *gap_and_rate(link, drive.open_rev))
-    return _Gripper(drive, pads, Steps(step_tolerance(config.accuracy)), motion, initial_sensor(link, motion))
+    return _Gripper(
+        drive=drive,
+        pads=pads,
+        steps=Steps(step_tolerance(config.accuracy)),
+        motion=motion,
+        sensor_state=initial_sensor(link, motion),
+    )
 
 
 def drive_and_pads(config: SimConfig) -> tuple[Drive, PadCompliance]:
@@ -304,7 +315,15 @@ def _sensor(config: SimConfig, drawn: Drawn, cells: CellArrays) -> SensorParams:
     period = float(config.pad_period_s)
     if config.sensor == "ideal":
         clock = ImageClock(0.0, period, 0.0)
-        return SensorParams(1, LINKAGES[config.transmission], clock, 1.0, 0.0, IDEAL_CELLS, IDEAL_CELLS)
+        return SensorParams(
+            ideal=1,
+            link=LINKAGES[config.transmission],
+            clock=clock,
+            share=1.0,
+            noise_counts=0.0,
+            left=IDEAL_CELLS,
+            right=IDEAL_CELLS,
+        )
     return SensorParams(
         ideal=0,
         link=LINKAGES[config.transmission],

@@ -24,9 +24,9 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.contact import (
     ObjectModel,
     has_event,
-    is_touched,
     pad_forces,
     restarted,
+    with_touch,
 )
 from graspsense_sim_gripper.plant.roots import MAX_ITERATIONS, bracketed_secant
 from graspsense_sim_gripper.plant.state import Contact
@@ -176,10 +176,8 @@ def to_gap(model: ObjectModel, state: Driven, gap_m: float, h: float) -> Driven:
                 ahead = _until_event(model, contact, gap, speed, ahead)
                 target = gap - speed * ahead
                 after = restarted(_at(model, contact, target, speed, ahead))
-            left_n, right_n, offset, _, left, right, pending, unbalanced = after
-            touched = is_touched(after, target, reach)
-            contact = Contact(left_n, right_n, offset, touched, left, right, pending, unbalanced)
-            peak = max(peak, left_n, right_n)
+            contact = with_touch(after, target, reach)
+            peak = max(peak, contact.left_n, contact.right_n)
         gap, left_s = target, left_s - ahead
     return Driven(contact, gap_m, peak, missed)
 

@@ -42,7 +42,9 @@ def begin_macro_step(
     if params.macro_steps == 0 or most < FIRST_TICKS:
         return no_step(plant, now)
     n, event = min(now.length, most), False
-    step = MacroStep(math.inf, 0.0, plant, constant_values(plant), UNKNOWN)
+    step = MacroStep(
+        error=math.inf, event_share=0.0, after=plant, values=constant_values(plant), trend=UNKNOWN
+    )
     # In any other tick the plant has moved since the last macro-step ended.
     trend = now.trend if ticks == now.from_tick + 1 else UNKNOWN
     accepted = False

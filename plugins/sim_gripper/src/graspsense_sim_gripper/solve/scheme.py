@@ -93,7 +93,14 @@ def start_of(params: PlantParams, state: PlantState, effort_n: float) -> Start:
     offset = 2.0 * abs(contact.offset_m)
     reach = model.width_m + offset
     meeting = reach if gap > reach else model.width_m - (offset if model.held == 1 else 0.0)
-    return Start(motion, contact, direction, rate, reach, meeting)
+    return Start(
+        motion=motion,
+        contact=contact,
+        direction=direction,
+        acceleration=rate,
+        reach_m=reach,
+        meeting_m=meeting,
+    )
 
 
 def comes_to_rest(start: Start) -> bool:

@@ -40,14 +40,23 @@ def stick(params: PlantParams, state: PlantState, effort_n: float, h: float) -> 
     if after.left.force_n == 0.0 and right_of(after.left, after.right).force_n == 0.0:
         after = _against_table(after, 2.0 * max(effort_n, 0.0))
     peak = max(peak, after.left_n, after.right_n)
-    return PlantState(Motion(revolutions, 0.0, gap, jacobian), after, step, given, peak), t
+    return PlantState(
+        motion=Motion(revolutions, 0.0, gap, jacobian), contact=after, step=step, effort_n=given, peak_n=peak
+    ), t
 
 
 def _against_table(contact: Contact, most_n: float) -> Contact:
     """Return the contact of an object that a finger presses against the table with at most this force."""
     left_n, right_n, offset, touched, left, right, pending, unbalanced = contact
     return Contact(
-        min(left_n, most_n), min(right_n, most_n), offset, touched, left, right, pending, unbalanced
+        left_n=min(left_n, most_n),
+        right_n=min(right_n, most_n),
+        offset_m=offset,
+        touched=touched,
+        left=left,
+        right=right,
+        pending_s=pending,
+        unbalanced=unbalanced,
     )
 
 

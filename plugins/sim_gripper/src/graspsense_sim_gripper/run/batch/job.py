@@ -191,7 +191,7 @@ def _interpreted(job: Job, setup: GraspSetup, loop: GraspLoop, model: GraspModel
     outcome, reason = ended_as(job, end)
     if end.failed == 1:
         plant = before_failure(loop, params, begun, buffers, end.ticks)
-        reason = not_finite_in_tick(setup.kinds, setup.plant, plant, state.loop.effort_n, setup.dt_s)
+        reason = not_finite_in_tick(setup.kinds, setup.plant, plant, state.loop.tick.effort_n, setup.dt_s)
     extracted, kept = extracted_from(job, buffers, end)
     return FinishedGrasp(
         outcome=outcome,
