@@ -17,7 +17,7 @@ from graspsense.simulator_api import CLOSES, FreeLimits, after_free, free_from, 
 from graspsense_sim_gripper.plant.contact import offset_of_pushed, with_forces_of
 from graspsense_sim_gripper.plant.drive import STRIBECK_SPEEDS, stribeck_excess
 from graspsense_sim_gripper.plant.sensing import SensorState, next_image_s, sense_motion
-from graspsense_sim_gripper.plant.state import Contact, Motion, PlantState, StepState
+from graspsense_sim_gripper.plant.state import Contact, Motion
 from graspsense_sim_gripper.run.loop import (
     NOT_NEGATIVE,
     ROWS_AT_ONCE,
@@ -29,6 +29,7 @@ from graspsense_sim_gripper.run.loop import (
 from graspsense_sim_gripper.scene.terms.phi import phi_1_2
 from graspsense_sim_gripper.solve.polynomial import Cubic, derivative, hermite, value
 from graspsense_sim_gripper.solve.scheme import SPEED_SCALE_M_S
+from graspsense_sim_gripper.solve.state import PlantState, StepState
 
 MIN_TICKS: Final = 4
 MAX_TICKS: Final = ROWS_AT_ONCE

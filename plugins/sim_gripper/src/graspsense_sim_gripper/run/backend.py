@@ -36,7 +36,7 @@ from graspsense_sim_gripper.plant.sensing import (
     sense,
     with_listed_cells,
 )
-from graspsense_sim_gripper.plant.state import PlantReadings, PlantState, is_finite, right_of
+from graspsense_sim_gripper.plant.state import PlantReadings, right_of
 from graspsense_sim_gripper.run.accuracy.probe import FORCE_N, SPEED_M_S
 from graspsense_sim_gripper.run.accuracy.select import select
 from graspsense_sim_gripper.run.binding import bind_reachable
@@ -51,6 +51,7 @@ from graspsense_sim_gripper.run.term_failure import TermFailed, not_finite_in_ti
 from graspsense_sim_gripper.scene.library import kinds_in, object_kinds
 from graspsense_sim_gripper.scene.scaled import ScaledParameter
 from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
+from graspsense_sim_gripper.solve.state import PlantState, is_finite
 
 SIDES: Final = ("left", "right")
 

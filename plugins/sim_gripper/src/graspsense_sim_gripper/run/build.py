@@ -28,7 +28,7 @@ from graspsense_sim_gripper.plant.sensing import (
     SensorState,
     initial_sensor,
 )
-from graspsense_sim_gripper.plant.state import Contact, ContactState, Motion, PlantState
+from graspsense_sim_gripper.plant.state import Contact, ContactState, Motion
 from graspsense_sim_gripper.run.accuracy.chosen_steps import ChosenSteps
 from graspsense_sim_gripper.run.accuracy.levels import step_tolerance
 from graspsense_sim_gripper.run.compiled.compose import all_active, uncompressed
@@ -47,6 +47,7 @@ from graspsense_sim_gripper.scene.random_numbers import key_of
 from graspsense_sim_gripper.scene.scaled import ScaledParameter
 from graspsense_sim_gripper.scene.spec import ObjectSpec, TermParams
 from graspsense_sim_gripper.solve.scheme import PlantParams, Steps
+from graspsense_sim_gripper.solve.state import PlantState
 
 EFFORT_LIMIT_N: Final = 100.0
 SPEED_LIMIT_M_S: Final = 0.2

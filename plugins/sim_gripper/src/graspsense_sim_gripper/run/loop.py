@@ -18,7 +18,7 @@ from graspsense_sim_gripper.plant.sensing import (
     apply_tare,
     sense,
 )
-from graspsense_sim_gripper.plant.state import PlantReadings, PlantState, is_finite
+from graspsense_sim_gripper.plant.state import PlantReadings
 from graspsense_sim_gripper.solve.macro_step import (
     FIRST_TICKS,
     DenseOutput,
@@ -28,6 +28,7 @@ from graspsense_sim_gripper.solve.macro_step import (
     with_peak,
 )
 from graspsense_sim_gripper.solve.scheme import PlantParams, Steps
+from graspsense_sim_gripper.solve.state import PlantState, is_finite
 from graspsense_sim_gripper.solve.trend import UNKNOWN, Trend
 
 COLUMNS: Final = (

@@ -6,7 +6,6 @@ import math
 from typing import Final
 
 from graspsense_sim_gripper.plant.sensing import SensorState, next_image_s
-from graspsense_sim_gripper.plant.state import PlantState
 from graspsense_sim_gripper.run.loop import Ahead, GraspParams, MacroControl, no_step
 from graspsense_sim_gripper.solve.macro_step import (
     FIRST_TICKS,
@@ -17,6 +16,7 @@ from graspsense_sim_gripper.solve.macro_step import (
     macro_step,
     next_ticks,
 )
+from graspsense_sim_gripper.solve.state import PlantState
 from graspsense_sim_gripper.solve.trend import UNKNOWN
 
 SHORTEST_ERROR: Final = 8.0

@@ -8,7 +8,7 @@ from typing import Final
 from graspsense.gripper_api import gap_and_rate
 from graspsense_sim_gripper.plant.contact import has_event, is_pressed, restarted, with_touch
 from graspsense_sim_gripper.plant.drive import Drive, is_held
-from graspsense_sim_gripper.plant.state import Contact, Motion, PlantState, StepState, with_step
+from graspsense_sim_gripper.plant.state import Contact, Motion
 from graspsense_sim_gripper.scene.terms.phi import phi1
 from graspsense_sim_gripper.solve.coast import coast
 from graspsense_sim_gripper.solve.control import (
@@ -28,6 +28,7 @@ from graspsense_sim_gripper.solve.scheme import (
     comes_to_rest,
     start_of,
 )
+from graspsense_sim_gripper.solve.state import PlantState, StepState, with_step
 from graspsense_sim_gripper.solve.stick import stick
 from graspsense_sim_gripper.solve.verlet import verlet
 

@@ -14,14 +14,7 @@ from typing import Final, NamedTuple
 from graspsense.gripper_api import gap_and_rate
 from graspsense_sim_gripper.plant.contact import ObjectModel, has_event, pad_forces
 from graspsense_sim_gripper.plant.drive import Drive, acceleration, is_held, sliding_friction
-from graspsense_sim_gripper.plant.state import (
-    Contact,
-    Motion,
-    PlantReadings,
-    PlantState,
-    StepState,
-    right_of,
-)
+from graspsense_sim_gripper.plant.state import Contact, Motion, PlantReadings, right_of
 from graspsense_sim_gripper.solve.advance import completed, rests
 from graspsense_sim_gripper.solve.coast import coast
 from graspsense_sim_gripper.solve.control import (
@@ -42,6 +35,7 @@ from graspsense_sim_gripper.solve.scheme import (
     comes_to_rest,
     start_of,
 )
+from graspsense_sim_gripper.solve.state import PlantState, StepState
 from graspsense_sim_gripper.solve.stick import stick
 from graspsense_sim_gripper.solve.trend import (
     UNKNOWN,

@@ -14,7 +14,8 @@ from graspsense_sim_gripper.plant.drive import (
     load_at_rest,
     sliding_friction,
 )
-from graspsense_sim_gripper.plant.state import Contact, Motion, PlantState
+from graspsense_sim_gripper.plant.state import Contact, Motion
+from graspsense_sim_gripper.solve.state import PlantState
 
 SPEED_SCALE_M_S: Final = 1e-3
 FORCE_SCALE_N: Final = 1.0

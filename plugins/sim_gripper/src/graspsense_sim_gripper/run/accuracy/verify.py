@@ -26,7 +26,7 @@ from graspsense.simulator_api import (
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.fingertip import CELLS
 from graspsense_sim_gripper.plant.sensing import PadBuffers
-from graspsense_sim_gripper.plant.state import Motion, PlantState
+from graspsense_sim_gripper.plant.state import Motion
 from graspsense_sim_gripper.run.accuracy.chosen_steps import ChosenSteps
 from graspsense_sim_gripper.run.accuracy.error import SCALES, UNIT_SCALES, GraspRecord
 from graspsense_sim_gripper.run.accuracy.own_features import OwnFeatures, beyond, own_features
@@ -49,6 +49,7 @@ from graspsense_sim_gripper.run.loop import (
 from graspsense_sim_gripper.run.problem import GraspController, GraspSetup
 from graspsense_sim_gripper.run.term_failure import TermFailed, not_finite_in_tick
 from graspsense_sim_gripper.scene.terms.switchable import switched_off
+from graspsense_sim_gripper.solve.state import PlantState
 
 _LOG: Final = logging.getLogger(__name__)
 MAX_SECONDS: Final = 40.0

@@ -23,7 +23,7 @@ from graspsense_sim_gripper.plant.contact import (
     solve_contact,
 )
 from graspsense_sim_gripper.plant.sensing import CellReading, EncoderReading, SensorState
-from graspsense_sim_gripper.plant.state import Contact, ContactState, Motion, Past, PlantState, StepState
+from graspsense_sim_gripper.plant.state import Contact, ContactState, Motion, Past
 from graspsense_sim_gripper.run.approach import approach_ticks
 from graspsense_sim_gripper.run.binding import Constructors, bind_reachable
 from graspsense_sim_gripper.run.loop import SimulationState, grasp
@@ -35,6 +35,7 @@ from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS, Law, Moves, OnSu
 from graspsense_sim_gripper.solve.advance import advance, move
 from graspsense_sim_gripper.solve.converge import refine_until_converged
 from graspsense_sim_gripper.solve.scheme import Attempt, PlantParams, Start
+from graspsense_sim_gripper.solve.state import PlantState, StepState
 
 TermsStates = Any
 """A tuple with a state of its own type for each term."""

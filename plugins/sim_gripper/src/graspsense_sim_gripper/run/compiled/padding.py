@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 from attrs import frozen
 
 from graspsense_sim_gripper.plant.contact import ObjectModel
-from graspsense_sim_gripper.plant.state import Contact, ContactState, PlantState
+from graspsense_sim_gripper.plant.state import Contact, ContactState
 from graspsense_sim_gripper.run.compiled.compose import Composition, composition
 from graspsense_sim_gripper.run.problem import GraspSetup
 from graspsense_sim_gripper.scene.library import catalogue
@@ -23,6 +23,7 @@ from graspsense_sim_gripper.scene.terms.registry import find_term, in_order
 from graspsense_sim_gripper.scene.terms.switchable import Switchable
 from graspsense_sim_gripper.scene.terms.term import TermState
 from graspsense_sim_gripper.solve.scheme import PlantParams
+from graspsense_sim_gripper.solve.state import PlantState
 
 
 class Filler(NamedTuple):
