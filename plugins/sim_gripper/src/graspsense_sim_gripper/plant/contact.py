@@ -199,6 +199,16 @@ def no_event(earlier: Contact, later: Contact) -> bool:
     return False
 
 
+def next_contacts(model: ObjectModel, contact: Contact, gap_m: float) -> tuple[float, float]:
+    """Return the gap at which the nearer finger touches the object, and that of the next contact of closing fingers.
+
+    The second is that of the other finger if one touches already.
+    """
+    offset = 2.0 * abs(contact.offset_m)
+    reach = model.width_m + offset
+    return reach, reach if gap_m > reach else model.width_m - (offset if model.held == 1 else 0.0)
+
+
 def with_touch(contact: Contact, gap_m: float, reach_m: float) -> Contact:
     """Return the contact at this gap with `touched` brought up to date.
 

@@ -7,9 +7,9 @@ from typing import Final
 
 from graspsense_sim_gripper.plant.sensing import SensorState, next_image_s
 from graspsense_sim_gripper.run.loop import Ahead, GraspParams, MacroControl, no_step
+from graspsense_sim_gripper.solve.events import HALF
 from graspsense_sim_gripper.solve.macro_step import (
     FIRST_TICKS,
-    HALF,
     MAX_TICKS,
     MacroStep,
     constant_values,

@@ -22,7 +22,7 @@ from graspsense_sim_gripper.solve.control import (
     next_length,
     relative_error,
 )
-from graspsense_sim_gripper.solve.events import parting, pressing
+from graspsense_sim_gripper.solve.events import HALF, event_share
 from graspsense_sim_gripper.solve.scheme import (
     PlantParams,
     comes_to_rest,
@@ -37,8 +37,6 @@ LAG_SHARE: Final = 0.25
 MAX_LAG_PIECES: Final = 1000
 """Pieces per time constant in which the force of a drive that lags is constant: at least the first number, or the
 second over the cube root of the tolerance, since their error is of second order. The third is the most in a tick."""
-BISECTION: Final = 0.5
-"""A step that contains an event of a term is repeated with this share of its length, until it is `MIN_STEP_S` long."""
 REST_SHARE: Final = 1e-12
 """Fraction of the tick below which what is left of it is rounding."""
 
@@ -116,12 +114,7 @@ def take_step(
         motion1, contact1, duration = attempt.motion, attempt.contact, attempt.duration_s
         changes = contact.touched == 1 and has_event(contact, contact1)
         if duration > MIN_STEP_S and not forced:
-            fraction = BISECTION
-            if not changes:
-                # The step ends at the other events by itself.
-                fraction = parting(params, start, attempt)
-                if fraction == 0.0:
-                    fraction = pressing(params, start, attempt)
+            fraction = HALF if changes else event_share(params, start, attempt)
             if fraction > 0.0:
                 return with_step(state, StepState(duration * fraction, step.n_steps, step.unresolved)), 0.0
         # A step across an event of a term has an error only where the force jumps, and none that shorter steps reduce.

@@ -23,7 +23,7 @@ from graspsense_sim_gripper.solve.control import (
     SMALL_ERROR,
     relative_error,
 )
-from graspsense_sim_gripper.solve.events import event_share, parting
+from graspsense_sim_gripper.solve.events import HALF, event_share
 from graspsense_sim_gripper.solve.polynomial import Cubic, derivative, hermite, parabola, value
 from graspsense_sim_gripper.solve.scheme import (
     FORCE_SCALE_N,
@@ -56,8 +56,6 @@ GROWTH: Final = 4.0
 """Largest ratio of successive macro-steps."""
 EXPONENT: Final = -0.25
 """The error of a macro-step with a trend is proportional to the fourth power of its length."""
-HALF: Final = 0.5
-"""The share of a step after which an event is assumed that is only known to be in it."""
 
 
 class DenseOutput(NamedTuple):
@@ -222,9 +220,7 @@ def _event_share(params: PlantParams, start: Start, middle: Contact, attempt: At
     contact0, contact1 = start.contact, attempt.contact
     if _has_event(contact0, middle) or _has_event(contact0, contact1):
         return HALF
-    share = parting(params, start, attempt)
-    if share == 0.0:
-        share = event_share(params, start, attempt)
+    share = event_share(params, start, attempt)
     if share == 0.0 and (
         attempt.motion.speed_rev_s * start.direction <= 0.0
         or start.motion.gap_m > start.meeting_m >= attempt.motion.gap_m

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from graspsense_sim_gripper.plant.contact import ObjectModel
+from graspsense_sim_gripper.plant.contact import ObjectModel, next_contacts
 from graspsense_sim_gripper.plant.drive import (
     ARREST_M_S,
     Drive,
@@ -91,9 +91,7 @@ def start_of(params: PlantParams, state: PlantState, effort_n: float) -> Start:
         direction = 1.0 if speed > 0.0 else -1.0
         friction_n = sliding_friction(drive.friction, speed * jacobian, load)
     rate = acceleration(drive, jacobian, speed, net, friction_n, direction)
-    offset = 2.0 * abs(contact.offset_m)
-    reach = model.width_m + offset
-    meeting = reach if gap > reach else model.width_m - (offset if model.held == 1 else 0.0)
+    reach, meeting = next_contacts(model, contact, gap)
     return Start(
         motion=motion,
         contact=contact,

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Final
 
-from graspsense_sim_gripper.plant.contact import has_event, pad_forces, restarted
+from graspsense_sim_gripper.plant.contact import has_event, pad_forces
 from graspsense_sim_gripper.plant.drive import breakaway_friction, load_at_rest
 from graspsense_sim_gripper.plant.state import Contact, Motion, right_of
 from graspsense_sim_gripper.solve.control import MIN_STEP_S
+from graspsense_sim_gripper.solve.events import until_event
 from graspsense_sim_gripper.solve.scheme import PlantParams
 from graspsense_sim_gripper.solve.state import PlantState
 
@@ -37,7 +38,7 @@ def stick(params: PlantParams, state: PlantState, effort_n: float, h: float) -> 
             break
         t = max(t * (margin + SLIP_AIM_N) / (margin - margin1), min(t, MIN_STEP_S))
     if has_event(contact, after):
-        t, after = _until_event(params, contact, gap, t)
+        t, after = until_event(params.object, contact, gap, 0.0, t, True)
     if after.left.force_n == 0.0 and right_of(after.left, after.right).force_n == 0.0:
         after = _against_table(after, 2.0 * max(effort_n, 0.0))
     peak = max(peak, after.left_n, after.right_n)
@@ -59,15 +60,3 @@ def _against_table(contact: Contact, most_n: float) -> Contact:
         pending_s=pending,
         unbalanced=unbalanced,
     )
-
-
-def _until_event(params: PlantParams, contact: Contact, gap_m: float, h: float) -> tuple[float, Contact]:
-    """Return the time within `h` at which a term has an event while the fingers stand still, and the contact then."""
-    lower, upper = 0.0, h
-    while upper - lower > MIN_STEP_S:
-        middle = 0.5 * (lower + upper)
-        if has_event(contact, pad_forces(params.object, contact, gap_m, 0.0, middle, True)):
-            upper = middle
-        else:
-            lower = middle
-    return upper, restarted(pad_forces(params.object, contact, gap_m, 0.0, upper, True))
