@@ -29,7 +29,6 @@ from graspsense.plugin_api import ConfigError, create
 from graspsense.report.simulation import markdown_table
 from graspsense.simulator_api import NotCompilable, RunConfig, bind
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.plant.state import PlantState
 from graspsense_sim_gripper.run.accuracy.chosen_steps import ChosenSteps
 from graspsense_sim_gripper.run.accuracy.probe import grip_of
 from graspsense_sim_gripper.run.accuracy.propose import propose
@@ -43,6 +42,7 @@ from graspsense_sim_gripper.scene.library import find
 from graspsense_sim_gripper.scene.spec import ObjectSpec
 from graspsense_sim_gripper.scene.terms.registry import laws_of
 from graspsense_sim_gripper.solve.scheme import PlantParams
+from graspsense_sim_gripper.solve.state import PlantState
 
 Row = dict[str, Any]
 FloatArray = NDArray[np.float64]

@@ -1,8 +1,8 @@
-"""Limits of the length of functions, the number of parameters, and the fields of tuples; each exception has a reason.
+"""Limits of functions, their parameters, and the fields of tuples; each exception has a reason.
 
 The length of a function counts every line from `def` to the end of its body, with the docstring. Parameters count
-without `self` and `cls`. The limits of parameters hold everywhere; that of the fields of a NamedTuple in the simulator,
-whose tuples are passed through compiled code.
+without `self` and `cls`. The limits hold everywhere; only that of the fields of a NamedTuple in the simulator, whose
+tuples are passed through compiled code.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ SIMULATOR = "graspsense_sim_gripper"
 MAX_LINES: Final = 60
 MAX_PARAMETERS: Final = 7
 MAX_FIELDS: Final = 8
+MAX_BY_POSITION: Final = 4
 
 OPTIONS: Final = "a click command: one parameter for each option"
 
@@ -83,6 +84,18 @@ def fields(node: ast.ClassDef) -> int:
     return sum(isinstance(statement, ast.AnnAssign) for statement in node.body)
 
 
+@cache
+def named_tuples() -> dict[str, int]:
+    """Return the number of fields of each NamedTuple, by `path:name`."""
+    return {
+        f"{name}:{node.name}": fields(node)
+        for name, tree in modules()
+        for node in statements(tree)
+        if isinstance(node, ast.ClassDef)
+        and any(isinstance(base, ast.Name) and base.id == "NamedTuple" for base in node.bases)
+    }
+
+
 def compare(over: dict[str, int], exceptions: dict[str, str], limit: str) -> None:
     new = {name: count for name, count in over.items() if name not in exceptions}
     assert not new, f"more than {limit}: divide them, or add an exception with its reason"
@@ -103,12 +116,27 @@ def test_no_function_has_too_many_parameters():
 
 def test_no_tuple_of_the_simulator_has_too_many_fields():
     over = {
-        f"{name}:{node.name}": fields(node)
-        for name, tree in modules()
-        if name.startswith(SIMULATOR)
-        for node in statements(tree)
-        if isinstance(node, ast.ClassDef)
-        and any(isinstance(base, ast.Name) and base.id == "NamedTuple" for base in node.bases)
-        and fields(node) > MAX_FIELDS
+        name: count
+        for name, count in named_tuples().items()
+        if name.startswith(SIMULATOR) and count > MAX_FIELDS
     }
     compare(over, LARGE_TUPLES, f"{MAX_FIELDS} fields")
+
+
+def test_no_large_tuple_is_built_by_position():
+    # Two numbers in each other's place have the right type.
+    large = {name.split(":")[1] for name, count in named_tuples().items() if count > MAX_BY_POSITION}
+    by_position = [
+        f"{name}:{call.lineno}"
+        for name, tree in modules()
+        for call in ast.walk(tree)
+        if isinstance(call, ast.Call)
+        and isinstance(call.func, ast.Name)
+        and call.func.id in large
+        and (
+            len(call.args) > MAX_BY_POSITION
+            # A row whose order somebody else has set is given as a whole.
+            or any(isinstance(argument, ast.Starred) for argument in call.args[1:])
+        )
+    ]
+    assert not by_position, f"more than {MAX_BY_POSITION} fields by position: name them"

@@ -12,7 +12,7 @@ from graspsense.core.components.run_config import RunConfig
 from graspsense.gripper_api import gap_and_rate, revolutions_at
 from graspsense.plugin_api import EFFORT, RELEASE, Command, create
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.plant.state import Contact, Motion, PlantState
+from graspsense_sim_gripper.plant.state import Contact, Motion
 from graspsense_sim_gripper.run.batch import buffers, run_many
 from graspsense_sim_gripper.run.binding import bind_reachable
 from graspsense_sim_gripper.run.compiled.compose import plant_move, step_parts, uncompressed
@@ -20,6 +20,7 @@ from graspsense_sim_gripper.run.compiled.padding import composition_of
 from graspsense_sim_gripper.scene.terms.registry import laws_of
 from graspsense_sim_gripper.solve.macro_step import macro_step, next_ticks, values_at
 from graspsense_sim_gripper.solve.scheme import Steps
+from graspsense_sim_gripper.solve.state import PlantState
 from graspsense_sim_gripper.solve.trend import UNKNOWN
 
 CONFIG = SimConfig(sensor="ideal", spread=False)

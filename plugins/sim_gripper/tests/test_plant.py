@@ -14,7 +14,7 @@ from graspsense.gripper_api import gap_and_rate, revolutions_at
 from graspsense_sim_gripper.plant.contact import ObjectModel, PadCompliance, solve_contact
 from graspsense_sim_gripper.plant.drive import Drive, Friction, sliding_friction, stribeck_excess
 from graspsense_sim_gripper.plant.drive_models import LINKAGES, STRAIGHT
-from graspsense_sim_gripper.plant.state import Contact, ContactState, Motion, PlantState
+from graspsense_sim_gripper.plant.state import Contact, ContactState, Motion
 from graspsense_sim_gripper.run.accuracy.levels import PLAIN, steps_for
 from graspsense_sim_gripper.run.binding import bind_reachable
 from graspsense_sim_gripper.run.compiled.compose import all_active, plant_move, sum_of, uncompressed
@@ -32,6 +32,7 @@ from graspsense_sim_gripper.scene.terms.surface import Surface, surface
 from graspsense_sim_gripper.scene.terms.term import NoState
 from graspsense_sim_gripper.scene.terms.worn import Worn
 from graspsense_sim_gripper.solve.scheme import PlantParams, Steps
+from graspsense_sim_gripper.solve.state import PlantState
 
 LINK = LINKAGES["pr2"]
 TICK = 1e-3

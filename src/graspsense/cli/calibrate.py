@@ -194,7 +194,14 @@ def _set_up(asked: Mapping[str, Any], replace: bool) -> Iterator[_Setup]:
         rig = Rig(backend, info, settings.run)
         compares = place.is_dir() and not replace
         stored = calibrations_of(folder, info.serial, info.numbers) if compares else {}
-        yield _Setup(backend, info, rig, folder, stored, settings.run.first_effort_n)
+        yield _Setup(
+            backend=backend,
+            info=info,
+            rig=rig,
+            folder=folder,
+            stored=stored,
+            first_effort_n=settings.run.first_effort_n,
+        )
     finally:
         backend.close()
 

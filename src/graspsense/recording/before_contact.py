@@ -72,45 +72,61 @@ def measure(params: tuple[float], ticks: TickColumns) -> Before:
     while start < n and ticks.phase[start] != APPROACH:
         start += 1
     if start == n:
-        return Before(NO_APPROACH, math.nan, math.nan, math.nan, math.nan, math.nan)
+        return _unmeasured(NO_APPROACH)
     last = n - 1
     while ticks.phase[last] != APPROACH:
         last -= 1
     start_s = ticks.t_s[start]
     if ticks.t_s[last] < start_s + SPAN_S:
-        return Before(SHORT, math.nan, math.nan, math.nan, math.nan, math.nan)
+        return _unmeasured(SHORT)
     count, velocity, effort, left, right = 0, 0.0, 0.0, 0.0, 0.0
     for i in range(n):
         if ticks.t_s[i] > start_s + SPAN_S + GUARD_S:
             break
         if either_touches(ticks.force_left_n[i], ticks.force_right_n[i], params[0]):
-            return Before(TOUCHED, math.nan, math.nan, math.nan, math.nan, math.nan)
+            return _unmeasured(TOUCHED)
         if ticks.phase[i] == APPROACH and ticks.t_s[i] <= start_s + SPAN_S:
             count += 1
             velocity += ticks.velocity_m_s[i]
             effort += ticks.effort_n[i]
             left += ticks.force_left_n[i]
             right += ticks.force_right_n[i]
-    return Before(FREE, ticks.gap_m[start], velocity / count, effort / count, left / count, right / count)
+    return Before(
+        seen=FREE,
+        gap_m=ticks.gap_m[start],
+        velocity_m_s=velocity / count,
+        effort_n=effort / count,
+        force_left_n=left / count,
+        force_right_n=right / count,
+    )
+
+
+def _unmeasured(seen: float) -> Before:
+    """Return that there are no values, with the reason."""
+    nan = math.nan
+    return Before(seen=seen, gap_m=nan, velocity_m_s=nan, effort_n=nan, force_left_n=nan, force_right_n=nan)
 
 
 def _seen(trace: Trace, contact_force_n: float) -> Before:
     """Return what `measure` does, in less time in the interpreter."""
     approach = np.flatnonzero(trace.phase == APPROACH)
     if not len(approach):
-        return Before(NO_APPROACH)
+        return _unmeasured(NO_APPROACH)
     start = trace.t_s[approach[0]]
     if trace.t_s[approach[-1]] < start + SPAN_S:
-        return Before(SHORT)
+        return _unmeasured(SHORT)
     felt = (trace.force_left_n >= contact_force_n) | (trace.force_right_n >= contact_force_n)
     if bool((felt & (trace.t_s <= start + SPAN_S + GUARD_S)).any()):
-        return Before(TOUCHED)
+        return _unmeasured(TOUCHED)
     span = approach[trace.t_s[approach] <= start + SPAN_S]
-    means = [
-        float(column[span].mean())
-        for column in (trace.velocity_m_s, trace.effort_n, trace.force_left_n, trace.force_right_n)
-    ]
-    return Before(FREE, float(trace.gap_m[span[0]]), *means)
+    return Before(
+        seen=FREE,
+        gap_m=float(trace.gap_m[span[0]]),
+        velocity_m_s=float(trace.velocity_m_s[span].mean()),
+        effort_n=float(trace.effort_n[span].mean()),
+        force_left_n=float(trace.force_left_n[span].mean()),
+        force_right_n=float(trace.force_right_n[span].mean()),
+    )
 
 
 def _features(measured: Any) -> Features:

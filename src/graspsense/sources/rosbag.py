@@ -276,11 +276,19 @@ def _readings(
         (left, edge_left), (right, edge_right) = forces
         yield Reading(
             Frame(
-                (motion.t_ns - began_ns) * 1e-9, dt_s, motion.gap_m, velocity, motion.effort_n, left, right,
-                edge_left, edge_right, 0,
+                t_s=(motion.t_ns - began_ns) * 1e-9,
+                dt_s=dt_s,
+                gap_m=motion.gap_m,
+                velocity_m_s=velocity,
+                effort_n=motion.effort_n,
+                force_left_n=left,
+                force_right_n=right,
+                edge_left_n=edge_left,
+                edge_right_n=edge_right,
+                status=0,
             ),
             seen,
-        )  # fmt: skip
+        )
         previous = motion
 
 

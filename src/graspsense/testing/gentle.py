@@ -84,7 +84,7 @@ def step(params: GentleParams, state: GentleState, reading: Reading) -> tuple[Co
     elif outcome == RUNNING and frame.t_s - begun > LONGEST_S:
         outcome = NOTHING_THERE
     return closing(params.kind, frame.t_s - begun, state.before_m, frame), GentleState(
-        phase, outcome, begun, gap, frame.gap_m, still
+        phase=phase, outcome=outcome, begun_t_s=begun, gap_m=gap, before_m=frame.gap_m, still=still
     )
 
 
@@ -99,7 +99,14 @@ class GentleController(Controller[int]):
 
     def init(self) -> GentleState:
         """Return the state before the first tick."""
-        return GentleState(APPROACH, RUNNING, float("nan"), float("nan"), float("nan"), RestState(0.0, 0.0))
+        return GentleState(
+            phase=APPROACH,
+            outcome=RUNNING,
+            begun_t_s=float("nan"),
+            gap_m=float("nan"),
+            before_m=float("nan"),
+            still=RestState(0.0, 0.0),
+        )
 
 
 def kind_of(accepts: tuple[str, ...]) -> int:

@@ -96,7 +96,16 @@ class ModelGripper(SensorBackend[None]):
         del timeout_s
         force = self._force()
         frame = Frame(
-            self._ticks * DT_S, DT_S, self._gap, self._speed, self._effort, force, force, 0.0, 0.0, 0
+            t_s=self._ticks * DT_S,
+            dt_s=DT_S,
+            gap_m=self._gap,
+            velocity_m_s=self._speed,
+            effort_n=self._effort,
+            force_left_n=force,
+            force_right_n=force,
+            edge_left_n=0.0,
+            edge_right_n=0.0,
+            status=0,
         )
         if self._has_pads and self._ticks % TICKS_OF_AN_IMAGE == 0:
             cells = (3000.0 + 100.0 * force,) * self._cells

@@ -108,7 +108,13 @@ def sums_of(reading: Reading) -> tuple[int, ...]:
 
 def limits_of(info: DeviceInfo) -> GuardParams:
     """Return the limits for the first use of a gripper."""
-    return GuardParams(info.effort_limit_n, info.speed_limit_m_s, EFFORT_N, FIRST_SPEED_M_S, CONTACT_FORCE_N)
+    return GuardParams(
+        effort_limit_n=info.effort_limit_n,
+        speed_limit_m_s=info.speed_limit_m_s,
+        first_effort_n=EFFORT_N,
+        first_speed_m_s=FIRST_SPEED_M_S,
+        contact_force_n=CONTACT_FORCE_N,
+    )
 
 
 def _ticks(info: DeviceInfo, seconds: float) -> int:

@@ -132,7 +132,18 @@ class FrankaBackend(BackendWithEmulator[FrankaConfig]):
         start_s, start_m = self._recent[0]
         self._velocity_m_s = (state.width_m - start_m) / (t_s - start_s) if t_s > start_s else 0.0
         self._frames += 1
-        frame = Frame(t_s, dt_s, state.width_m, self._velocity_m_s, nan, nan, nan, nan, nan, 0)
+        frame = Frame(
+            t_s=t_s,
+            dt_s=dt_s,
+            gap_m=state.width_m,
+            velocity_m_s=self._velocity_m_s,
+            effort_n=nan,
+            force_left_n=nan,
+            force_right_n=nan,
+            edge_left_n=nan,
+            edge_right_n=nan,
+            status=0,
+        )
         made: Any = signal_type(self.channels)
         signals = made(float(state.grasped), state.temperature_c + KELVIN)
         return Reading(frame, NO_PADS, signals)

@@ -84,7 +84,15 @@ def _at_rest() -> ContactState:
 
 
 def _pressed(pads: PadCompliance, width_m: float, terms: tuple[Switchable, ...]) -> ObjectModel:
-    return ObjectModel(width_m, 0.0, pads, terms, 0, 1, BALANCE_RTOL)
+    return ObjectModel(
+        width_m=width_m,
+        table_friction_n=0.0,
+        pads=pads,
+        terms=terms,
+        held=0,
+        overshoots=1,
+        balance_rtol=BALANCE_RTOL,
+    )
 
 
 @frozen(kw_only=True, eq=False)

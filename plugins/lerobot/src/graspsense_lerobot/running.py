@@ -80,7 +80,9 @@ class FollowedGrasp:
         self._meaning: Meaning | None = None
         self._frames = 0
         self._last: Frame | None = None
-        self._now = Running(int(self._law.init().phase), 0, RUNNING, 0, nan)
+        self._now = Running(
+            phase=int(self._law.init().phase), event=0, outcome=RUNNING, prediction=0, probability=nan
+        )
         self._begin()
 
     def add(self, numbers: Mapping[str, float]) -> Running:
@@ -135,7 +137,10 @@ class FollowedGrasp:
                 self.prediction = self._model.predict(
                     self._features.extract(self._recorder.trace()), None, None
                 )
-        self._now = Running(phase, event, outcome, *self._predicted())
+        prediction, probability = self._predicted()
+        self._now = Running(
+            phase=phase, event=event, outcome=outcome, prediction=prediction, probability=probability
+        )
 
     def _predicted(self) -> tuple[int, float]:
         made = self.prediction
@@ -169,7 +174,18 @@ class FollowedGrasp:
         right = scale * sum(forces[1:]) / (len(forces) - 1) if len(forces) > 1 else left
         dt_s = 0.0 if self._last is None else t_s - self._last.t_s
         velocity = (gap_m - self._last.gap_m) / dt_s if self._last is not None and dt_s > 0.0 else 0.0
-        return Frame(t_s, dt_s, gap_m, velocity, nan, left, right, nan, nan, 0)
+        return Frame(
+            t_s=t_s,
+            dt_s=dt_s,
+            gap_m=gap_m,
+            velocity_m_s=velocity,
+            effort_n=nan,
+            force_left_n=left,
+            force_right_n=right,
+            edge_left_n=nan,
+            edge_right_n=nan,
+            status=0,
+        )
 
     def _understood(self, numbers: Mapping[str, float]) -> Meaning:
         """Return the names of gap and forces, as the reader of data sets finds them. Raises ConfigError."""

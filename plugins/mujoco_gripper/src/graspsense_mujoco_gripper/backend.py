@@ -398,8 +398,20 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             self._draw(2 * most)
             errors = self._errors
         buffers = TickBuffers(errors, np.empty((most, len(Frame._fields))), np.empty((4, most)))
-        moved = Moved(self._gap_m, self._rate_m_s, drive.target_m, drive.effort_n, self._broken)
-        ticked = Ticked(self._ticks, self._measured_m, self._greatest_n, self._swings, self._command)
+        moved = Moved(
+            gap_m=self._gap_m,
+            rate_m_s=self._rate_m_s,
+            target_m=drive.target_m,
+            effort_n=drive.effort_n,
+            broken=self._broken,
+        )
+        ticked = Ticked(
+            ticks=self._ticks,
+            measured_m=self._measured_m,
+            greatest_n=self._greatest_n,
+            swings=self._swings,
+            command=self._command,
+        )
         try:
             with first_call():
                 run = self._run_ticks(rig, params, state, moved, ticked, buffers, most)
@@ -416,7 +428,9 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             return FreeRun(n, [], [], state)
         kinds, values, *limits = buffers.sent[:, :n].tolist()
         sent = map(Command, map(int, kinds), values, *limits)
-        return FreeRun(n, FrameTable(buffers.rows[:n]), values, state, sent)
+        return FreeRun(
+            n_ticks=n, frames=FrameTable(buffers.rows[:n]), commands=values, state=state, sent=sent
+        )
 
     def _show(self, viewer: Viewer, data: mujoco.MjData, t_s: float) -> None:
         if self._camera is not None and t_s >= self._next_picture_s:
@@ -441,7 +455,18 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             if self._edges:
                 edge_left, edge_right = edge_left + self._noise(), edge_right + self._noise()
         effort_n = self._drive.effort_n
-        frame = Frame(t_s, tick_s, measured_m, velocity, effort_n, left, right, edge_left, edge_right, 0)
+        frame = Frame(
+            t_s=t_s,
+            dt_s=tick_s,
+            gap_m=measured_m,
+            velocity_m_s=velocity,
+            effort_n=effort_n,
+            force_left_n=left,
+            force_right_n=right,
+            edge_left_n=edge_left,
+            edge_right_n=edge_right,
+            status=0,
+        )
         pads = NO_PADS
         if self._cells is not None:
             pads = Pads(t_s, self._ticks, *self._cells.images(data))

@@ -40,8 +40,13 @@ class GapTerms(NamedTuple):
 
     def in_arrays(self) -> GapTerms:
         """Return the same for compiled code; `values` remain those of the model."""
-        places = np.array(self.geoms, np.int64), np.asarray(self.values), np.array(self.places, np.int64)
-        return GapTerms(*places, np.array(self.weights, np.float64), float(self.offset_m))
+        return GapTerms(
+            geoms=np.array(self.geoms, np.int64),
+            values=np.asarray(self.values),
+            places=np.array(self.places, np.int64),
+            weights=np.array(self.weights, np.float64),
+            offset_m=float(self.offset_m),
+        )
 
 
 class GapGauge:
@@ -92,10 +97,18 @@ class GapGauge:
                 if axis[k] != 0.0
             ]
             places, weights = map(list, zip(*terms, strict=True))
-            return GapTerms([], plain(data.site_xpos), places, weights, 0.0)
+            return GapTerms(
+                geoms=[], values=plain(data.site_xpos), places=places, weights=weights, offset_m=0.0
+            )
         if self._gap.geoms:
-            return GapTerms(self._ids, plain(data.qpos), [], [], 0.0)
-        return GapTerms([], plain(data.qpos), self._ids, [self._gap.scale], self._gap.offset_m)
+            return GapTerms(geoms=self._ids, values=plain(data.qpos), places=[], weights=[], offset_m=0.0)
+        return GapTerms(
+            geoms=[],
+            values=plain(data.qpos),
+            places=self._ids,
+            weights=[self._gap.scale],
+            offset_m=self._gap.offset_m,
+        )
 
 
 class ForceGauge:

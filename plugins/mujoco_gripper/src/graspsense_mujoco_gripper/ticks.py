@@ -137,7 +137,13 @@ def ticks_at_once(
         state, swings, previous = after, ticked.swings, ticked.command
         if command.kind == EFFORT and command.value * previous.value < 0.0:
             swings += 1 if min(abs(command.value), abs(previous.value)) > rig.swing_n else 0
-        ticked = Ticked(ticked.ticks + 1, frame.gap_m, greatest_n, swings, command)
+        ticked = Ticked(
+            ticks=ticked.ticks + 1,
+            measured_m=frame.gap_m,
+            greatest_n=greatest_n,
+            swings=swings,
+            command=command,
+        )
         _record(buffers.rows, buffers.sent, n, frame, command)
         n += 1
     return n, False, state, moved, ticked
@@ -159,7 +165,7 @@ def _move(rig: SteppedModel, moved: Moved, command: Command) -> Moved:
                 broken = True
                 for equality in rig.shell:
                     rig.equalities[equality] = 0
-    return Moved(gap_m, rate_m_s, target_m, effort_n, broken)
+    return Moved(gap_m=gap_m, rate_m_s=rate_m_s, target_m=target_m, effort_n=effort_n, broken=broken)
 
 
 def _gap_m(rig: SteppedModel) -> float:
@@ -200,7 +206,18 @@ def _measure(rig: SteppedModel, moved: Moved, ticked: Ticked, errors: Any, n: in
         gap_m = round(gap_m / step) * step
     velocity = (gap_m - ticked.measured_m) / rig.tick_s
     t_s = (ticked.ticks + 1) * rig.tick_s
-    return Frame(t_s, rig.tick_s, gap_m, velocity, moved.effort_n, left, right, nan, nan, 0), greatest_n
+    return Frame(
+        t_s=t_s,
+        dt_s=rig.tick_s,
+        gap_m=gap_m,
+        velocity_m_s=velocity,
+        effort_n=moved.effort_n,
+        force_left_n=left,
+        force_right_n=right,
+        edge_left_n=nan,
+        edge_right_n=nan,
+        status=0,
+    ), greatest_n
 
 
 def _record(rows: Any, sent: Any, n: int, frame: Frame, command: Command) -> None:

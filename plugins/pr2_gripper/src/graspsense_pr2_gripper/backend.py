@@ -62,7 +62,9 @@ _CHANNELS: Final = (
 OPENING_N: Final = -20.0
 """Effort that opens the fingers. The authors' recordings show 17 and 20 N, opening, between squeezes."""
 TARE_IMAGES: Final = 6
-RELEASE_REPORT: Final = OutputReport(0, RELEASE_KIND, 0, 0, 0)
+RELEASE_REPORT: Final = OutputReport(
+    counter=0, kind=RELEASE_KIND, effort_un=0, effort_limit_un=0, speed_limit_um_s=0
+)
 UNHEARD_S: Final = 0.1
 """Device time without the echo of a command after which the device counts as lost."""
 UNHEARD_COMMANDS: Final = 5
@@ -143,12 +145,12 @@ class Pr2Backend(BackendWithEmulator[Pr2Config]):
                 most_un = limit(min(command.effort_limit_n, self._effort_limit_n))
                 effort_un = micro(min(max(command.value, -self._effort_limit_n), self._effort_limit_n))
                 numbers = OutputReport(
-                    0,
-                    EFFORT_KIND,
+                    counter=0,
+                    kind=EFFORT_KIND,
                     # In whole numbers, since the board reports an effort that it must clamp.
-                    min(max(effort_un, -most_un), most_un),
-                    most_un,
-                    limit(min(command.speed_limit_m_s, self._speed_limit_m_s)),
+                    effort_un=min(max(effort_un, -most_un), most_un),
+                    effort_limit_un=most_un,
+                    speed_limit_um_s=limit(min(command.speed_limit_m_s, self._speed_limit_m_s)),
                 )
         self._send(self._open(), numbers)
 

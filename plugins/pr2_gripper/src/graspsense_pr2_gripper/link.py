@@ -66,7 +66,13 @@ class Link(ABC):
         return 0
 
     def _arrival(self, report: InputReport, host_s: float) -> Arrival:
-        return Arrival(report, self.stream.image, host_s, report.samples, self.stream.sampled)
+        return Arrival(
+            report=report,
+            image=self.stream.image,
+            host_s=host_s,
+            words=report.samples,
+            sampled=self.stream.sampled,
+        )
 
     def _passes(self, report: InputReport) -> bool:
         """Return whether a report of the stream has a later time than those before. Raises ClockFault."""

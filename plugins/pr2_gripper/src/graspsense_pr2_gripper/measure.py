@@ -67,7 +67,9 @@ class _PadForces(NamedTuple):
     status: int
 
 
-_NO_FORCES: Final = _PadForces(math.nan, math.nan, math.nan, math.nan, 0)
+_NO_FORCES: Final = _PadForces(
+    left_n=math.nan, right_n=math.nan, left_edge_n=math.nan, right_edge_n=math.nan, status=0
+)
 
 
 class Measure:
@@ -134,16 +136,16 @@ class Measure:
             left = math.nan if status & (RIGHT_ABSENT if swap else LEFT_ABSENT) else left
             right = math.nan if status & (LEFT_ABSENT if swap else RIGHT_ABSENT) else right
         frame = Frame(
-            (report.time_us - self._first_us) / 1e6,
-            (report.time_us - self._last_us) / 1e6,
-            gap,
-            report.velocity_mtick_s / 1e3 / self._ticks_rev * rate,
-            report.effort_un / 1e6,
-            left,
-            right,
-            forces.left_edge_n,
-            forces.right_edge_n,
-            status | forces.status,
+            t_s=(report.time_us - self._first_us) / 1e6,
+            dt_s=(report.time_us - self._last_us) / 1e6,
+            gap_m=gap,
+            velocity_m_s=report.velocity_mtick_s / 1e3 / self._ticks_rev * rate,
+            effort_n=report.effort_un / 1e6,
+            force_left_n=left,
+            force_right_n=right,
+            edge_left_n=forces.left_edge_n,
+            edge_right_n=forces.right_edge_n,
+            status=status | forces.status,
         )
         self._last_us = report.time_us
         if self._accelerometer is None:
@@ -203,7 +205,9 @@ class Measure:
             status = BAD_CELL | _dead(LEFT_DEAD, pads.left, zero[0]) | _dead(RIGHT_DEAD, pads.right, zero[1])
         if self._zero is None:
             # Without a tare there is no force: the offsets alone are some thousand counts for each cell.
-            self._forces = _PadForces(0.0, 0.0, 0.0, 0.0, status)
+            self._forces = _PadForces(
+                left_n=0.0, right_n=0.0, left_edge_n=0.0, right_edge_n=0.0, status=status
+            )
             return
         if self._gains is None:
             left_n = pad_force(left, zero[0], self._pad_per_n, FIRST_PAD_CELL)
@@ -217,11 +221,11 @@ class Measure:
             if not (left_inside and right_inside):
                 status |= BEYOND_TABLE
         self._forces = _PadForces(
-            math.nan if left_bad == CELLS else left_n,
-            math.nan if right_bad == CELLS else right_n,
-            edge_force(left, zero[0], self._edge_per_n),
-            edge_force(right, zero[1], self._edge_per_n),
-            status,
+            left_n=math.nan if left_bad == CELLS else left_n,
+            right_n=math.nan if right_bad == CELLS else right_n,
+            left_edge_n=edge_force(left, zero[0], self._edge_per_n),
+            right_edge_n=edge_force(right, zero[1], self._edge_per_n),
+            status=status,
         )
 
 

@@ -145,19 +145,19 @@ def decode_input(data: bytes) -> InputReport:
         )
     samples = (s0, s1, s2, s3)[:count]
     return InputReport(
-        sequence,
-        time_us,
-        ticks,
-        velocity,
-        effort,
-        status,
-        echo,
-        samples,
-        image,
-        slice_,
-        (c0, c1, c2, c3),
-        result,
-        age,
+        sequence=sequence,
+        time_us=time_us,
+        encoder_ticks=ticks,
+        velocity_mtick_s=velocity,
+        effort_un=effort,
+        status=status,
+        echo=echo,
+        samples=samples,
+        image=image,
+        slice=slice_,
+        cells=(c0, c1, c2, c3),
+        command_result=result,
+        image_age_us=age,
     )
 
 
@@ -177,7 +177,13 @@ def decode_output(data: bytes) -> OutputReport:
     _, counter, kind, effort, effort_limit, speed_limit, _ = OUTPUT_LAYOUT.unpack_from(data)
     if kind not in (RELEASE_KIND, EFFORT_KIND):
         raise ProtocolError(f"there is no command kind {kind}")
-    return OutputReport(counter, kind, effort, effort_limit, speed_limit)
+    return OutputReport(
+        counter=counter,
+        kind=kind,
+        effort_un=effort,
+        effort_limit_un=effort_limit,
+        speed_limit_um_s=speed_limit,
+    )
 
 
 def encode_identity(identity: Identity) -> bytes:
@@ -216,7 +222,13 @@ def decode_identity(data: bytes) -> Identity:
         text = serial.rstrip(b"\0").decode("ascii")
     except UnicodeDecodeError:
         raise ProtocolError(f"serial number {serial!r} is not ASCII") from None
-    identity = Identity((major, minor, patch), text, TRANSMISSIONS[transmission], *numbers)
+    names = Identity._fields[Identity._fields.index("pad_counts_per_n") :]
+    identity = Identity(
+        firmware=(major, minor, patch),
+        serial=text,
+        transmission=TRANSMISSIONS[transmission],
+        **dict(zip(names, numbers, strict=True)),
+    )
     _check_identity(identity)
     return identity
 

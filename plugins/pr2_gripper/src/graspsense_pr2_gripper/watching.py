@@ -73,7 +73,13 @@ def _trips(link: Link) -> list[float]:
     for trip in range(TRIPS):
         counter = FIRST_COUNTER + trip
         sent = time.monotonic()
-        link.send(encode_output(OutputReport(counter, RELEASE_KIND, 0, 0, 0)))
+        link.send(
+            encode_output(
+                OutputReport(
+                    counter=counter, kind=RELEASE_KIND, effort_un=0, effort_limit_un=0, speed_limit_um_s=0
+                )
+            )
+        )
         while time.monotonic() - sent < TRIP_S:
             arrival = link.next(TRIP_S)
             if arrival is not None and arrival.report.echo == counter:

@@ -46,9 +46,30 @@ class GripperModel(NamedTuple):
 
 
 MODELS: Final = {
-    "2f-85": GripperModel("Robotiq 2F-85", 0.085, 3, 230, (0.020, 0.150), (20.0, 235.0)),
-    "2f-140": GripperModel("Robotiq 2F-140", 0.140, 3, 230, (0.030, 0.250), (10.0, 125.0)),
-    "hand-e": GripperModel("Robotiq Hand-E", 0.050, 0, 255, (0.020, 0.150), (20.0, 185.0)),
+    "2f-85": GripperModel(
+        name="Robotiq 2F-85",
+        stroke_m=0.085,
+        open_byte=3,
+        closed_byte=230,
+        speeds_m_s=(0.020, 0.150),
+        forces_n=(20.0, 235.0),
+    ),
+    "2f-140": GripperModel(
+        name="Robotiq 2F-140",
+        stroke_m=0.140,
+        open_byte=3,
+        closed_byte=230,
+        speeds_m_s=(0.030, 0.250),
+        forces_n=(10.0, 125.0),
+    ),
+    "hand-e": GripperModel(
+        name="Robotiq Hand-E",
+        stroke_m=0.050,
+        open_byte=0,
+        closed_byte=255,
+        speeds_m_s=(0.020, 0.150),
+        forces_n=(20.0, 185.0),
+    ),
 }
 
 
@@ -81,7 +102,13 @@ class Status(NamedTuple):
 def request_of(registers: Sequence[int]) -> Request:
     """Return the request in these output registers."""
     action, position, both = registers
-    return Request(bool(action >> 8 & 1), bool(action >> 11 & 1), position & 0xFF, both >> 8, both & 0xFF)
+    return Request(
+        active=bool(action >> 8 & 1),
+        go=bool(action >> 11 & 1),
+        position=position & 0xFF,
+        speed=both >> 8,
+        force=both & 0xFF,
+    )
 
 
 def status_of(registers: Sequence[int]) -> Status:
@@ -89,13 +116,13 @@ def status_of(registers: Sequence[int]) -> Status:
     state, echo, measured = registers
     status = state >> 8
     return Status(
-        bool(status & 1),
-        bool(status >> 3 & 1),
-        status >> 4 & 3,
-        status >> 6 & 3,
-        echo >> 8 & 15,
-        measured >> 8,
-        measured & 0xFF,
+        active=bool(status & 1),
+        go=bool(status >> 3 & 1),
+        state=status >> 4 & 3,
+        objects=status >> 6 & 3,
+        fault=echo >> 8 & 15,
+        position=measured >> 8,
+        current=measured & 0xFF,
     )
 
 

@@ -133,7 +133,16 @@ def step(params: Params, state: State, reading: Reading) -> tuple[Command, State
     """Close until both pads touch, then load, hold and let go as planned."""
     frame, earlier, wanted = reading.frame, state.progress, state.wanted_m
     if earlier.stage == NOT_BEGUN:
-        earlier = Progress(APPROACH, RUNNING, CLOSE, frame.t_s, frame.t_s, frame.gap_m, 0.0, 0.0)
+        earlier = Progress(
+            phase=APPROACH,
+            outcome=RUNNING,
+            stage=CLOSE,
+            since_s=frame.t_s,
+            settling_s=frame.t_s,
+            contact_m=frame.gap_m,
+            contact_n=0.0,
+            target_n=0.0,
+        )
         wanted = frame.gap_m
     signals = updated(params.filters, state.signals, reading)
     now = conditions(params.thresholds, signals)
@@ -158,7 +167,15 @@ def step(params: Params, state: State, reading: Reading) -> tuple[Command, State
         if progress.outcome == STEADY and earlier.outcome == RUNNING:
             events |= PLACE_BIT
     command, wanted = commanded(params, progress, wanted, frame)
-    return command, State(progress.phase, progress.outcome, events, progress, wanted, signals, now)
+    return command, State(
+        phase=progress.phase,
+        outcome=progress.outcome,
+        events=events,
+        progress=progress,
+        wanted_m=wanted,
+        signals=signals,
+        conditions=now,
+    )
 
 
 def detect(params: Params, state: State, reading: Reading) -> tuple[Command, State]:
@@ -180,14 +197,40 @@ def detect(params: Params, state: State, reading: Reading) -> tuple[Command, Sta
         if present == 0:
             events |= UNFELT_BIT
     outcome = NEVER_STEADY if t_s - since_s > params.plan.place_timeout_s else RUNNING
-    progress = Progress(APPROACH, outcome, stage, since_s, since_s, 0.0, 0.0, 0.0)
-    return Command(EFFORT, 0.0, inf, inf), State(APPROACH, outcome, events, progress, 0.0, signals, now)
+    progress = Progress(
+        phase=APPROACH,
+        outcome=outcome,
+        stage=stage,
+        since_s=since_s,
+        settling_s=since_s,
+        contact_m=0.0,
+        contact_n=0.0,
+        target_n=0.0,
+    )
+    return Command(EFFORT, 0.0, inf, inf), State(
+        phase=APPROACH,
+        outcome=outcome,
+        events=events,
+        progress=progress,
+        wanted_m=0.0,
+        signals=signals,
+        conditions=now,
+    )
 
 
 def ended(now: Progress, outcome: int) -> Progress:
     """Return this progress with an outcome."""
     phase, _, stage, since, settling, contact_m, contact_n, target = now
-    return Progress(phase, outcome, stage, since, settling, contact_m, contact_n, target)
+    return Progress(
+        phase=phase,
+        outcome=outcome,
+        stage=stage,
+        since_s=since,
+        settling_s=settling,
+        contact_m=contact_m,
+        contact_n=contact_n,
+        target_n=target,
+    )
 
 
 def closing(plan: HoldingPlan, now: Progress, seen: TouchConditions, frame: Frame) -> Progress:
@@ -195,7 +238,16 @@ def closing(plan: HoldingPlan, now: Progress, seen: TouchConditions, frame: Fram
     elapsed = frame.t_s - now.since_s
     if elapsed >= IGNORED_S and seen.left == 1 and seen.right == 1:
         force_n = 0.5 * (frame.force_left_n + frame.force_right_n)
-        return Progress(SQUEEZE, RUNNING, TOUCH, frame.t_s, frame.t_s, frame.gap_m, force_n, 0.0)
+        return Progress(
+            phase=SQUEEZE,
+            outcome=RUNNING,
+            stage=TOUCH,
+            since_s=frame.t_s,
+            settling_s=frame.t_s,
+            contact_m=frame.gap_m,
+            contact_n=force_n,
+            target_n=0.0,
+        )
     if frame.gap_m <= plan.closed_gap_m:
         return ended(now, NOTHING_THERE)
     if elapsed > max(plan.find_timeout_s, 1.5 * now.contact_m / plan.close_speed_m_s):
@@ -217,7 +269,16 @@ def touching(plan: HoldingPlan, now: Progress, frame: Frame) -> Progress:
                 target_n = grab_force(
                     contact_n, plan.close_speed_m_s, plan.hardness, plan.lightest_n, plan.limit_n
                 )
-    return Progress(phase, outcome, stage, since, settling, contact_m, contact_n, target_n)
+    return Progress(
+        phase=phase,
+        outcome=outcome,
+        stage=stage,
+        since_s=since,
+        settling_s=settling,
+        contact_m=contact_m,
+        contact_n=contact_n,
+        target_n=target_n,
+    )
 
 
 def loading(plan: HoldingPlan, now: Progress, signals: Signals, frame: Frame) -> Progress:
@@ -234,7 +295,16 @@ def loading(plan: HoldingPlan, now: Progress, signals: Signals, frame: Frame) ->
         outcome = RUNNING if plan.places == 1 else STEADY
     elif frame.t_s - since > plan.force_timeout_s:
         outcome = NEVER_STEADY
-    return Progress(phase, outcome, stage, since, settling, contact_m, contact_n, target_n)
+    return Progress(
+        phase=phase,
+        outcome=outcome,
+        stage=stage,
+        since_s=since,
+        settling_s=settling,
+        contact_m=contact_m,
+        contact_n=contact_n,
+        target_n=target_n,
+    )
 
 
 def keeping(params: Params, now: Progress, signals: Signals, seen: TouchConditions, frame: Frame) -> Progress:
@@ -251,7 +321,16 @@ def keeping(params: Params, now: Progress, signals: Signals, seen: TouchConditio
             outcome = STEADY
         elif held_s > plan.place_timeout_s:
             outcome = NEVER_STEADY
-    return Progress(phase, outcome, stage, since, settling, contact_m, contact_n, target_n)
+    return Progress(
+        phase=phase,
+        outcome=outcome,
+        stage=stage,
+        since_s=since,
+        settling_s=settling,
+        contact_m=contact_m,
+        contact_n=contact_n,
+        target_n=target_n,
+    )
 
 
 def commanded(params: Params, now: Progress, wanted_m: float, frame: Frame) -> tuple[Command, float]:
@@ -353,18 +432,42 @@ class _Romano(Controller[ConfigT]):
             float(force.opening_gain_m_s_per_newton), float(force.closing_gain_m_s_per_newton), FASTEST_M_S
         )
         position = PositionServo(
-            float(config.stiffness_n_m),
-            float(config.damping_n_s_m),
-            float(config.friction_n),
-            BOUND_M,
-            EFFORT_SHARE * float(config.force_limit_n) + float(config.friction_n),
+            stiffness_n_m=float(config.stiffness_n_m),
+            damping_n_s_m=float(config.damping_n_s_m),
+            friction_n=float(config.friction_n),
+            bound_m=BOUND_M,
+            effort_limit_n=EFFORT_SHARE * float(config.force_limit_n) + float(config.friction_n),
         )
-        return Params(KINDS[config.sends], plan, filters(), thresholds, servo, position)
+        return Params(
+            kind=KINDS[config.sends],
+            plan=plan,
+            filters=filters(),
+            thresholds=thresholds,
+            servo=servo,
+            position=position,
+        )
 
     def init(self) -> State:
         """Return the state before the first tick."""
-        progress = Progress(APPROACH, RUNNING, NOT_BEGUN, 0.0, 0.0, 0.0, 0.0, 0.0)
-        return State(APPROACH, RUNNING, 0, progress, 0.0, no_signals(), NOTHING)
+        progress = Progress(
+            phase=APPROACH,
+            outcome=RUNNING,
+            stage=NOT_BEGUN,
+            since_s=0.0,
+            settling_s=0.0,
+            contact_m=0.0,
+            contact_n=0.0,
+            target_n=0.0,
+        )
+        return State(
+            phase=APPROACH,
+            outcome=RUNNING,
+            events=0,
+            progress=progress,
+            wanted_m=0.0,
+            signals=no_signals(),
+            conditions=NOTHING,
+        )
 
     def reason(self, state: Any) -> str:
         """Return with which force a thing was lost, and whether the force limit cannot hold it."""

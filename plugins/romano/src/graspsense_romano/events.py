@@ -52,7 +52,7 @@ class TouchConditions(NamedTuple):
     shock: int
 
 
-NOTHING: Final = TouchConditions(0, 0, 0, 0, 0, 0)
+NOTHING: Final = TouchConditions(left=0, right=0, slip=0, place_slip=0, side=0, shock=0)
 
 
 def touches(params: EventThresholds, pad: PadSignal) -> bool:
@@ -77,12 +77,12 @@ def conditions(params: EventThresholds, signals: Signals) -> TouchConditions:
     place = slips(left, share, least_n, PLACE_LOW_BAND_N) or slips(right, share, least_n, PLACE_LOW_BAND_N)
     side = signals.edge_left.high_n > params.side_n or signals.edge_right.high_n > params.side_n
     return TouchConditions(
-        int(touches(params, left)),
-        int(touches(params, right)),
-        int(slip),
-        int(place),
-        int(side),
-        int(signals.acceleration.norm_m_s2 > params.shock_m_s2),
+        left=int(touches(params, left)),
+        right=int(touches(params, right)),
+        slip=int(slip),
+        place_slip=int(place),
+        side=int(side),
+        shock=int(signals.acceleration.norm_m_s2 > params.shock_m_s2),
     )
 
 

@@ -31,7 +31,7 @@ class BandPassState(NamedTuple):
     y2: float
 
 
-NOT_BEGUN = BandPassState(0, 0.0, 0.0, 0.0, 0.0)
+NOT_BEGUN = BandPassState(begun=0, x1=0.0, x2=0.0, y1=0.0, y2=0.0)
 
 
 def high_pass(cutoff_hz: float, sample_s: float) -> float:
@@ -75,6 +75,6 @@ def low_pass(cutoff_hz: float, sample_s: float) -> tuple[float, float]:
 def band_passed(band: BandPass, state: BandPassState, x: float) -> BandPassState:
     """Return the state after a sample; `y1` is the result."""
     if state.begun == 0:
-        return BandPassState(1, x, x, 0.0, 0.0)
+        return BandPassState(begun=1, x1=x, x2=x, y1=0.0, y2=0.0)
     y = band.b * (x - state.x2) - band.a1 * state.y1 - band.a2 * state.y2
-    return BandPassState(1, x, state.x1, y, state.y1)
+    return BandPassState(begun=1, x1=x, x2=state.x1, y1=y, y2=state.y1)

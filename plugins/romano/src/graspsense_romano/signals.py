@@ -82,19 +82,29 @@ def filters() -> Filters:
     That of the acceleration is for the 3 kHz of the PR2's sensor. Other rates move its band in proportion.
     """
     return Filters(
-        PAD_SAMPLE_S,
-        high_pass(PAD_HIGH_HZ, PAD_SAMPLE_S),
-        band_pass(*PAD_LOW_HZ, PAD_SAMPLE_S),
-        band_pass(*ACCELERATION_HZ, ACCELERATION_SAMPLE_S),
-        SPEED_HZ,
+        sample_s=PAD_SAMPLE_S,
+        high=high_pass(PAD_HIGH_HZ, PAD_SAMPLE_S),
+        low=band_pass(*PAD_LOW_HZ, PAD_SAMPLE_S),
+        acceleration=band_pass(*ACCELERATION_HZ, ACCELERATION_SAMPLE_S),
+        speed_hz=SPEED_HZ,
     )
 
 
 def no_signals() -> Signals:
     """Return the signals before the first tick."""
     pad = PadSignal(0, 0.0, 0.0, NOT_BEGUN)
-    acceleration = Acceleration(0, NOT_BEGUN, NOT_BEGUN, NOT_BEGUN, 0.0)
-    return Signals(0, 0.0, pad, pad, pad, pad, acceleration, 0.0, 0.0)
+    acceleration = Acceleration(present=0, x=NOT_BEGUN, y=NOT_BEGUN, z=NOT_BEGUN, norm_m_s2=0.0)
+    return Signals(
+        fresh=0,
+        sampled_s=0.0,
+        left=pad,
+        right=pad,
+        edge_left=pad,
+        edge_right=pad,
+        acceleration=acceleration,
+        speed_m_s=0.0,
+        rate_m_s=0.0,
+    )
 
 
 def sampled(coefficients: Filters, pad: PadSignal, force_n: float) -> PadSignal:
@@ -115,7 +125,7 @@ def felt(coefficients: Filters, earlier: Acceleration, samples: Samples) -> Acce
             band = coefficients.acceleration
             x, y, z = band_passed(band, x, row[0]), band_passed(band, y, row[1]), band_passed(band, z, row[2])
             present, norm = 1, max(norm, sqrt(x.y1 * x.y1 + y.y1 * y.y1 + z.y1 * z.y1))
-    return Acceleration(present, x, y, z, norm)
+    return Acceleration(present=present, x=x, y=y, z=z, norm_m_s2=norm)
 
 
 def felt_if_measured(coefficients: Filters, earlier: Acceleration, signals: Any) -> Acceleration:
@@ -149,4 +159,14 @@ def updated(coefficients: Filters, earlier: Signals, reading: Reading) -> Signal
         speed = b * (frame.velocity_m_s + rate) - a * speed
         rate = frame.velocity_m_s
     acceleration = felt_if_measured(coefficients, earlier.acceleration, reading.signals)
-    return Signals(fresh, sampled_s, left, right, edge_left, edge_right, acceleration, speed, rate)
+    return Signals(
+        fresh=fresh,
+        sampled_s=sampled_s,
+        left=left,
+        right=right,
+        edge_left=edge_left,
+        edge_right=edge_right,
+        acceleration=acceleration,
+        speed_m_s=speed,
+        rate_m_s=rate,
+    )

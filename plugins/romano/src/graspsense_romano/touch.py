@@ -231,10 +231,17 @@ def followed(trace: Trace) -> list[Signals]:
             begun = counts[k]
             signals = _Fast(Samples(float(trace.t_s[k]), int(begun), len(rows), rows))
         frame = Frame(
-            float(trace.t_s[k]), float(dt_s[k]), float(trace.gap_m[k]), float(trace.velocity_m_s[k]), nan,
-            float(trace.force_left_n[k]), float(trace.force_right_n[k]),
-            float(trace.edge_left_n[k]), float(trace.edge_right_n[k]), 0,
-        )  # fmt: skip
+            t_s=float(trace.t_s[k]),
+            dt_s=float(dt_s[k]),
+            gap_m=float(trace.gap_m[k]),
+            velocity_m_s=float(trace.velocity_m_s[k]),
+            effort_n=nan,
+            force_left_n=float(trace.force_left_n[k]),
+            force_right_n=float(trace.force_right_n[k]),
+            edge_left_n=float(trace.edge_left_n[k]),
+            edge_right_n=float(trace.edge_right_n[k]),
+            status=0,
+        )
         now = updated(coefficients, now, Reading(frame, NO_PADS, signals))
         signals_by_frame.append(now)
     return signals_by_frame

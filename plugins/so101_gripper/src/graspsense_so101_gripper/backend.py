@@ -200,7 +200,14 @@ class So101Backend(BackendWithEmulator[So101Config]):
     def _asked_of(self, goal: int, speed_m_s: float, force_n: float) -> MotorRequest:
         # A speed of 0 is the highest one to this motor.
         speed = max(int(self._jaw.speed(self._jaw.gap_m(self._position), min(speed_m_s, SPEED_LIMIT_M_S))), 1)
-        return MotorRequest(1, self.config.acceleration, goal, 0, speed, self._force.torque_limit(force_n))
+        return MotorRequest(
+            torque_enable=1,
+            acceleration=self.config.acceleration,
+            goal_position=goal,
+            goal_time=0,
+            goal_velocity=speed,
+            torque_limit=self._force.torque_limit(force_n),
+        )
 
     def _ask(self, asked: MotorRequest) -> None:
         if asked != self._asked:

@@ -26,29 +26,37 @@ class TomlKind(NamedTuple):
 _PIPELINE: Final = frozenset({"extends", "run", *TABLE_OF_ROLE.values()})
 KINDS: Final[Mapping[str, TomlKind]] = {
     "pipeline": TomlKind(
-        "a pipeline", "a pipeline", _PIPELINE, _PIPELINE, "graspsense run --pipeline {file}"
+        called="a pipeline",
+        place="a pipeline",
+        marks=_PIPELINE,
+        needed=_PIPELINE,
+        use="graspsense run --pipeline {file}",
     ),
     "scene": TomlKind(
-        "a scene",
-        "a scene",
-        frozenset({"width_m", "terms", "mass_kg", "patch", "share", "friction", "offset_m", "identified"}),
-        frozenset({"width_m"}),
-        "graspsense run --object {file}",
+        called="a scene",
+        place="a scene",
+        marks=frozenset(
+            {"width_m", "terms", "mass_kg", "patch", "share", "friction", "offset_m", "identified"}
+        ),
+        needed=frozenset({"width_m"}),
+        use="graspsense run --object {file}",
     ),
     "experiment": TomlKind(
-        "an experiment",
-        "an experiment",
-        frozenset({"title", "question", "kind", "parts", "seeds", "sweep", "data", "judge", "variants"})
+        called="an experiment",
+        place="an experiment",
+        marks=frozenset({"title", "question", "kind", "parts", "seeds", "sweep", "data", "judge", "variants"})
         | (_PIPELINE - {"extends", "classifier"}),
-        frozenset({"title"}),
-        "graspsense experiment {file}",
+        needed=frozenset({"title"}),
+        use="graspsense experiment {file}",
     ),
     "manifest": TomlKind(
-        "a manifest",
-        "a recording, nor a manifest of recordings",
-        frozenset({"files", "list", "time", "gap", "force", "left", "right", "label", "rate_hz", "zero"}),
-        frozenset({"files", "list"}),
-        "graspsense import {file} --check",
+        called="a manifest",
+        place="a recording, nor a manifest of recordings",
+        marks=frozenset(
+            {"files", "list", "time", "gap", "force", "left", "right", "label", "rate_hz", "zero"}
+        ),
+        needed=frozenset({"files", "list"}),
+        use="graspsense import {file} --check",
     ),
 }
 

@@ -84,7 +84,16 @@ class TickState(NamedTuple):
 
 def first_state(law: Any) -> TickState:
     """Return the state before the first tick, given that of the controller."""
-    return TickState(-1, 0.0, RestState(0.0, 0.0), 0, law, GuardState(0, 0, 0), 0, 0)
+    return TickState(
+        phase=-1,
+        since_t_s=0.0,
+        still=RestState(0.0, 0.0),
+        first_image=0,
+        law=law,
+        guard=GuardState(0, 0, 0),
+        done=0,
+        events=0,
+    )
 
 
 def stopped(schedule: Schedule, state: TickState, frame: Frame) -> TickState:
@@ -166,7 +175,16 @@ def tick(params: TickParams, state: TickState, reading: Reading) -> tuple[Comman
     if state.phase < APPROACH:
         # Before the approach nothing is touched: these forces may be relative to an old zero.
         watcher = GuardState(0, watcher.acted, watcher.stopped)
-    return command, TickState(phase, since, still, first_image, law, watcher, done, events)
+    return command, TickState(
+        phase=phase,
+        since_t_s=since,
+        still=still,
+        first_image=first_image,
+        law=law,
+        guard=watcher,
+        done=done,
+        events=events,
+    )
 
 
 # ------------------------------------------------------------------------------------------------- free motion
@@ -267,7 +285,13 @@ def free_from(params: TickParams, state: TickState, frame: Frame) -> tuple[FreeT
         speed_limit = min(speed_limit, command.speed_limit_m_s)
     if state.done == 1 or state.guard.stopped == 1:
         kind = CALLED
-    free = FreeTicks(kind, command.value, limits, effort_limit, speed_limit)
+    free = FreeTicks(
+        kind=kind,
+        effort_n=command.value,
+        limits=limits,
+        effort_limit_n=effort_limit,
+        speed_limit_m_s=speed_limit,
+    )
     return free, (memory, state.still)
 
 
@@ -307,4 +331,13 @@ def after_free(
     memory, still = now
     if phase == APPROACH:
         law, since = free_end(params.law, law, memory, effort_n, t_s), t_s
-    return TickState(phase, since, still, first_image, law, watcher, done, 0)
+    return TickState(
+        phase=phase,
+        since_t_s=since,
+        still=still,
+        first_image=first_image,
+        law=law,
+        guard=watcher,
+        done=done,
+        events=0,
+    )

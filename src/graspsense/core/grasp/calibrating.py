@@ -47,11 +47,11 @@ class Rig:
     def __init__(self, backend: SensorBackend[Any], info: DeviceInfo, run: RunConfig) -> None:
         self._backend, self._info, self._run = backend, info, run
         self._guard = GuardParams(
-            info.effort_limit_n,
-            info.speed_limit_m_s,
-            run.first_effort_n,
-            run.first_speed_m_s,
-            float("inf"),
+            effort_limit_n=info.effort_limit_n,
+            speed_limit_m_s=info.speed_limit_m_s,
+            first_effort_n=run.first_effort_n,
+            first_speed_m_s=run.first_speed_m_s,
+            contact_force_n=float("inf"),
         )
         self._last: Reading | None = None
 

@@ -91,13 +91,13 @@ class _CommandRecorder(SensorBackend[None]):
             efforts = [tick.effort_n for tick in ticks] or [0.0]
             phases.append(
                 PhaseCommands(
-                    phase,
-                    tuple(dict.fromkeys(KINDS[tick.kind] for tick in ticks)),
-                    len(ticks) / self._rate_hz,
-                    min(efforts),
-                    max(efforts),
-                    max((tick.speed_m_s for tick in ticks), default=0.0),
-                    sum(tick.limited for tick in ticks),
+                    phase=phase,
+                    kinds=tuple(dict.fromkeys(KINDS[tick.kind] for tick in ticks)),
+                    seconds=len(ticks) / self._rate_hz,
+                    least_n=min(efforts),
+                    most_n=max(efforts),
+                    fastest_m_s=max((tick.speed_m_s for tick in ticks), default=0.0),
+                    limited=sum(tick.limited for tick in ticks),
                 )
             )
         return phases

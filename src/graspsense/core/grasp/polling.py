@@ -73,7 +73,18 @@ class Polling:
         start_s, start_m = self._gaps[0]
         velocity = (gap_m - start_m) / (t_s - start_s) if len(self._gaps) > 1 else 0.0
         self.frames += 1
-        return Frame(t_s, dt_s, gap_m, velocity, effort_n, nan, nan, nan, nan, status)
+        return Frame(
+            t_s=t_s,
+            dt_s=dt_s,
+            gap_m=gap_m,
+            velocity_m_s=velocity,
+            effort_n=effort_n,
+            force_left_n=nan,
+            force_right_n=nan,
+            edge_left_n=nan,
+            edge_right_n=nan,
+            status=status,
+        )
 
     def report(self) -> dict[str, float]:
         """Return the number of frames and of repeated exchanges, and how long the longest took until it succeeded."""

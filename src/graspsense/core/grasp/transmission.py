@@ -59,7 +59,16 @@ def screw_linkage(
 
 def straight_linkage(pitch_m: float) -> ScrewLinkage:
     """Return a screw that moves both jaws along a line: the gap changes by `pitch_m` in each motor revolution."""
-    return ScrewLinkage(pitch_m, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return ScrewLinkage(
+        pitch_m=pitch_m,
+        length0_m=0.0,
+        cosine0=0.0,
+        cosine_m2=0.0,
+        base_sine=0.0,
+        base_cosine=0.0,
+        finger_m=0.0,
+        half_gap0_m=0.0,
+    )
 
 
 def gap_and_rate(link: ScrewLinkage, revolutions: float) -> tuple[float, float]:

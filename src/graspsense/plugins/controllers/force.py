@@ -131,7 +131,11 @@ def step(params: Any, state: ForceState, reading: Reading) -> tuple[Command, For
     if params.sends == POSITION:
         value, limit = 0.0, effort
     return Command(params.sends, value, limit, inf), ForceState(
-        progress.phase, progress.outcome, progress, effort, events_of(state.progress, progress)
+        phase=progress.phase,
+        outcome=progress.outcome,
+        progress=progress,
+        effort_n=effort,
+        events=events_of(state.progress, progress),
     )
 
 
@@ -149,7 +153,9 @@ def free_command(
 
 def free_end(params: Any, state: ForceState, memory: float, effort_n: float, t_s: float) -> ForceState:
     """Return the state after free motion."""
-    return ForceState(state.phase, state.outcome, state.progress, effort_n, 0)
+    return ForceState(
+        phase=state.phase, outcome=state.outcome, progress=state.progress, effort_n=effort_n, events=0
+    )
 
 
 class ForceController(Controller[ForceConfig]):
@@ -181,4 +187,10 @@ class ForceController(Controller[ForceConfig]):
     def init(self) -> ForceState:
         """Return the state before the first tick."""
         progress = not_begun()
-        return ForceState(progress.phase, progress.outcome, progress, float(self.config.probing_force_n), 0)
+        return ForceState(
+            phase=progress.phase,
+            outcome=progress.outcome,
+            progress=progress,
+            effort_n=float(self.config.probing_force_n),
+            events=0,
+        )

@@ -120,15 +120,15 @@ def step(params: Any, state: HybridState, reading: Reading) -> tuple[Command, Hy
     elif params.sends == POSITION:
         command = own_command(params, progress.phase, sent, effort)
     return command, HybridState(
-        progress.phase,
-        progress.outcome,
-        progress,
-        integral,
-        force_effort,
-        approach_effort,
-        contact_t,
-        sent,
-        events_of(state.progress, progress),
+        phase=progress.phase,
+        outcome=progress.outcome,
+        progress=progress,
+        integral_n=integral,
+        force_effort_n=force_effort,
+        approach_effort_n=approach_effort,
+        approached_t_s=contact_t,
+        sent=sent,
+        events=events_of(state.progress, progress),
     )
 
 
@@ -143,7 +143,17 @@ def own_command(params: Any, phase: int, sent: Raised, effort_n: float) -> Comma
 def free_end(params: Any, state: HybridState, integral_n: float, effort_n: float, t_s: float) -> HybridState:
     """Return the state after free motion."""
     phase, outcome, progress, _, force_effort, _, _, sent, _ = state
-    return HybridState(phase, outcome, progress, integral_n, force_effort, effort_n, t_s, sent, 0)
+    return HybridState(
+        phase=phase,
+        outcome=outcome,
+        progress=progress,
+        integral_n=integral_n,
+        force_effort_n=force_effort,
+        approach_effort_n=effort_n,
+        approached_t_s=t_s,
+        sent=sent,
+        events=0,
+    )
 
 
 class HybridController(Controller[HybridConfig]):
@@ -193,13 +203,13 @@ class HybridController(Controller[HybridConfig]):
         """Return the state before the first tick."""
         progress = not_begun()
         return HybridState(
-            progress.phase,
-            progress.outcome,
-            progress,
-            float(self.config.preload_n),
-            float(self.config.probing_force_n),
-            0.0,
-            0.0,
-            approaching(self.params()),
-            0,
+            phase=progress.phase,
+            outcome=progress.outcome,
+            progress=progress,
+            integral_n=float(self.config.preload_n),
+            force_effort_n=float(self.config.probing_force_n),
+            approach_effort_n=0.0,
+            approached_t_s=0.0,
+            sent=approaching(self.params()),
+            events=0,
         )

@@ -153,7 +153,9 @@ def step(params: Any, state: SendAndWatchState, reading: Reading) -> tuple[Comma
             phase, outcome = HOLD, STEADY
     if outcome == RUNNING and frame.t_s - began > params.timeout_s:
         outcome = NOTHING_THERE if phase == APPROACH else NEVER_STEADY
-    return command_of(params, sent), SendAndWatchState(phase, outcome, began, began_gap, sent, still)
+    return command_of(params, sent), SendAndWatchState(
+        phase=phase, outcome=outcome, began_t_s=began, began_gap_m=began_gap, sent=sent, still=still
+    )
 
 
 class SendAndWatchController(Controller[SendAndWatchConfig]):
@@ -196,4 +198,11 @@ class SendAndWatchController(Controller[SendAndWatchConfig]):
 
     def init(self) -> SendAndWatchState:
         """Return the state before the first tick."""
-        return SendAndWatchState(APPROACH, RUNNING, nan, nan, approaching(self.params()), RestState(0.0, 0.0))
+        return SendAndWatchState(
+            phase=APPROACH,
+            outcome=RUNNING,
+            began_t_s=nan,
+            began_gap_m=nan,
+            sent=approaching(self.params()),
+            still=RestState(0.0, 0.0),
+        )

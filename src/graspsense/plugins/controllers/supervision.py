@@ -175,14 +175,34 @@ def events_of(earlier: GraspProgress, later: GraspProgress) -> int:
 
 def not_begun() -> GraspProgress:
     """Return the progress before the first tick."""
-    return GraspProgress(APPROACH, RUNNING, 0, 0.0, 0.0, RestState(0.0, 0.0), 0.0, 0.0, 0.0)
+    return GraspProgress(
+        phase=APPROACH,
+        outcome=RUNNING,
+        begun=0,
+        start_gap_m=0.0,
+        deadline_s=0.0,
+        still=RestState(0.0, 0.0),
+        peak_force_n=0.0,
+        peak_gap_m=0.0,
+        felt_t_s=0.0,
+    )
 
 
 def not_resting(now: GraspProgress, frame: Frame) -> GraspProgress:
     """Return the progress with the rest begun anew in this frame."""
     phase, outcome, begun, start_gap, deadline, _, peak_force, peak_gap, felt_t = now
     still = RestState(frame.t_s, frame.gap_m)
-    return GraspProgress(phase, outcome, begun, start_gap, deadline, still, peak_force, peak_gap, felt_t)
+    return GraspProgress(
+        phase=phase,
+        outcome=outcome,
+        begun=begun,
+        start_gap_m=start_gap,
+        deadline_s=deadline,
+        still=still,
+        peak_force_n=peak_force,
+        peak_gap_m=peak_gap,
+        felt_t_s=felt_t,
+    )
 
 
 def supervise(params: Any, now: GraspProgress, frame: Frame) -> GraspProgress:
@@ -214,22 +234,31 @@ def _approaching(params: Any, now: GraspProgress, frame: Frame) -> GraspProgress
         if params.slowest_m_s > 0.0:
             allowed = max(allowed, 1.5 * gap / params.slowest_m_s)
         deadline = t + allowed
-    outcome = RUNNING
+    phase, outcome, force = APPROACH, RUNNING, 0.0
     if edge_left > edge or edge_right > edge:
         outcome = SIDE_IMPACT
     elif both_touch(left, right, contact):
         if start_gap - gap >= params.too_wide_m or begun == 0:
-            force = 0.5 * (left + right)
-            deadline = t + params.steady_timeout_s
-            return GraspProgress(SQUEEZE, RUNNING, 1, start_gap, deadline, RestState(t, gap), force, gap, t)
-        outcome = TOO_WIDE
+            phase, force, deadline = SQUEEZE, 0.5 * (left + right), t + params.steady_timeout_s
+        else:
+            outcome = TOO_WIDE
     elif gap <= params.closed_gap_m:
         outcome = NOTHING_THERE
     elif t > deadline:
         outcome = ONE_FINGER if either_touches(left, right, contact) else NOTHING_THERE
-    if outcome == RUNNING and begun == 1:
+    if phase == APPROACH and outcome == RUNNING and begun == 1:
         return now
-    return GraspProgress(APPROACH, outcome, 1, start_gap, deadline, RestState(t, gap), 0.0, gap, t)
+    return GraspProgress(
+        phase=phase,
+        outcome=outcome,
+        begun=1,
+        start_gap_m=start_gap,
+        deadline_s=deadline,
+        still=RestState(t, gap),
+        peak_force_n=force,
+        peak_gap_m=gap,
+        felt_t_s=t,
+    )
 
 
 def _squeezing(params: Any, now: GraspProgress, frame: Frame) -> GraspProgress:
@@ -256,5 +285,13 @@ def _squeezing(params: Any, now: GraspProgress, frame: Frame) -> GraspProgress:
     elif t > now.deadline_s:
         outcome = NEVER_STEADY
     return GraspProgress(
-        phase, outcome, 1, now.start_gap_m, now.deadline_s, still, peak_force, peak_gap, felt_t
+        phase=phase,
+        outcome=outcome,
+        begun=1,
+        start_gap_m=now.start_gap_m,
+        deadline_s=now.deadline_s,
+        still=still,
+        peak_force_n=peak_force,
+        peak_gap_m=peak_gap,
+        felt_t_s=felt_t,
     )

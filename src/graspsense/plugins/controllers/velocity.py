@@ -113,7 +113,11 @@ def step(params: Any, state: VelocityState, reading: Reading) -> tuple[Command, 
     elif params.sends == POSITION:
         value, speed = 0.0, params.closing_speed_m_s
     return Command(params.sends, value, inf, speed), VelocityState(
-        progress.phase, progress.outcome, progress, integral, events_of(state.progress, progress)
+        phase=progress.phase,
+        outcome=progress.outcome,
+        progress=progress,
+        integral_n=integral,
+        events=events_of(state.progress, progress),
     )
 
 
@@ -134,7 +138,9 @@ def free_end(
     params: Any, state: VelocityState, integral_n: float, effort_n: float, t_s: float
 ) -> VelocityState:
     """Return the state after free motion."""
-    return VelocityState(state.phase, state.outcome, state.progress, integral_n, 0)
+    return VelocityState(
+        phase=state.phase, outcome=state.outcome, progress=state.progress, integral_n=integral_n, events=0
+    )
 
 
 class VelocityController(Controller[VelocityConfig]):
@@ -166,4 +172,10 @@ class VelocityController(Controller[VelocityConfig]):
     def init(self) -> VelocityState:
         """Return the state before the first tick."""
         progress = not_begun()
-        return VelocityState(progress.phase, progress.outcome, progress, float(self.config.preload_n), 0)
+        return VelocityState(
+            phase=progress.phase,
+            outcome=progress.outcome,
+            progress=progress,
+            integral_n=float(self.config.preload_n),
+            events=0,
+        )

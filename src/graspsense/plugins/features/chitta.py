@@ -165,6 +165,23 @@ def reached_without_contact(params: ChittaParams, ticks: TickColumns) -> float:
     return RIGHT_ONLY if felt_right else NO_PAD
 
 
+def without_rest(
+    reached: float, p_first: float, after_contact: float, window_s: float, blind_s: float
+) -> Measured:
+    """Return what is measured of a grasp in which no rest shows."""
+    return Measured(
+        reached=reached,
+        p_first=p_first,
+        after_contact=after_contact,
+        p_steady=math.nan,
+        delta_t=math.nan,
+        f_first=math.nan,
+        f_steady=math.nan,
+        window_s=window_s,
+        blind_s=blind_s,
+    )
+
+
 def measure(params: ChittaParams, ticks: TickColumns) -> Measured:
     """Return what `ChittaFeatures` measures, from the columns of a grasp; it can be compiled."""
     phase, left, right, gap, t = ticks.phase, ticks.force_left_n, ticks.force_right_n, ticks.gap_m, ticks.t_s
@@ -176,8 +193,7 @@ def measure(params: ChittaParams, ticks: TickColumns) -> Measured:
     ):
         contact += 1
     if contact == n:
-        reached = reached_without_contact(params, ticks)
-        return Measured(reached, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, 0.0, 0.0)
+        return without_rest(reached_without_contact(params, ticks), math.nan, math.nan, 0.0, 0.0)
     end, holds = contact, False
     while end < n and phase[end] <= HOLD:
         holds = holds or phase[end] == HOLD
@@ -204,11 +220,17 @@ def measure(params: ChittaParams, ticks: TickColumns) -> Measured:
             delta_t = t[since] - t[contact]
             blind_s = blind_time(t[contact - 1] if contact else t[contact], t[contact], f_first, f_steady)
             return Measured(
-                REST, p_first, after_contact, gap[since], delta_t, f_first, f_steady, window_s, blind_s
+                reached=REST,
+                p_first=p_first,
+                after_contact=after_contact,
+                p_steady=gap[since],
+                delta_t=delta_t,
+                f_first=f_first,
+                f_steady=f_steady,
+                window_s=window_s,
+                blind_s=blind_s,
             )
-    return Measured(
-        CONTACT, p_first, after_contact, math.nan, math.nan, math.nan, math.nan, window_s, unseen_s
-    )
+    return without_rest(CONTACT, p_first, after_contact, window_s, unseen_s)
 
 
 @lru_cache(maxsize=16)
@@ -311,7 +333,17 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
         p_steady, delta_t = float(trace.gap_m[steady]), float(trace.t_s[steady] - trace.t_s[contact])
         forces = self._force(trace, contact), self._force(trace, shown)
         blind_s = blind_time(float(trace.t_s[max(contact - 1, 0)]), float(trace.t_s[contact]), *forces)
-        return Measured(REST, p_first, after_contact, p_steady, delta_t, *forces, window_s, blind_s)
+        return Measured(
+            reached=REST,
+            p_first=p_first,
+            after_contact=after_contact,
+            p_steady=p_steady,
+            delta_t=delta_t,
+            f_first=forces[0],
+            f_steady=forces[1],
+            window_s=window_s,
+            blind_s=blind_s,
+        )
 
     def _window_s(self, trace: Trace, contact: int, end: int) -> float:
         """Return the window in which a rest shows; where time is counted in frames, that of the settings."""

@@ -50,11 +50,11 @@ class DepthFirstTreeBuilder:
             np.zeros((n_nodes, training.n_classes + 1), dtype=np.int64),
         )
         workspace = pruning.PruningSpace(
-            np.empty(n_nodes, dtype=np.int64),
-            np.empty(n_nodes, dtype=np.int64),
-            np.empty(n_nodes, dtype=np.int64),
-            np.empty(n_rows, dtype=np.uint32),
-            np.empty(n_rows, dtype=np.int64),
+            listed=np.empty(n_nodes, dtype=np.int64),
+            waiting=np.empty(n_nodes, dtype=np.int64),
+            joined=np.empty(n_nodes, dtype=np.int64),
+            rows=np.empty(n_rows, dtype=np.uint32),
+            leaves=np.empty(n_rows, dtype=np.int64),
         )
         compiled.prune(self._nodes, rows, constants, errors, workspace)
         self._mark_leaves()
@@ -68,18 +68,18 @@ def _grown(columns: Columns, training: TrainingSet) -> Nodes:
     n_attributes, n_rows = columns.rows.shape
     nodes = empty_nodes(2 * n_rows, training.n_classes)
     candidates = Candidates(
-        np.zeros(n_attributes, dtype=np.bool_),
-        np.zeros(n_attributes),
-        np.zeros(n_attributes),
-        np.zeros(n_attributes, dtype=np.int64),
-        training.averaged,
+        usable=np.zeros(n_attributes, dtype=np.bool_),
+        gain=np.zeros(n_attributes),
+        ratio=np.zeros(n_attributes),
+        place=np.zeros(n_attributes, dtype=np.int64),
+        averaged=training.averaged,
     )
     workspace = growing.GrowingSpace(
-        np.zeros(n_rows, dtype=np.bool_),
-        np.empty(n_rows, dtype=np.uint32),
-        np.empty(n_rows),
-        np.zeros(training.n_classes, dtype=np.int64),
-        np.empty(2 * n_rows, dtype=np.int64),
+        goes_left=np.zeros(n_rows, dtype=np.bool_),
+        rows=np.empty(n_rows, dtype=np.uint32),
+        values=np.empty(n_rows),
+        passed=np.zeros(training.n_classes, dtype=np.int64),
+        waiting=np.empty(2 * n_rows, dtype=np.int64),
     )
     n_nodes = compiled.grow(nodes, columns, _rules(training), candidates, workspace)
     return Nodes._make(column[:n_nodes].copy() for column in nodes)
@@ -94,7 +94,14 @@ def _columns(training: TrainingSet) -> Columns:
         rows[a] = np.argsort(column)
         values[a] = column[rows[a]]
     terms = training.terms(np.arange(n_rows + 1)) if training.unit else np.zeros(1, dtype=np.int64)
-    return Columns(rows, values, training.small_labels(), training.weights, terms, np.diff(terms))
+    return Columns(
+        rows=rows,
+        values=values,
+        labels=training.small_labels(),
+        weights=training.weights,
+        terms=terms,
+        steps=np.diff(terms),
+    )
 
 
 def _rules(training: TrainingSet) -> Rules:

@@ -133,7 +133,9 @@ def best_split(
         np.int64(least_numerator(weight, weight, rules.scale.term_bits)),
     )
     for a in range(len(candidates.gain)):
-        run = Run(columns.rows[a], columns.values[a], columns.labels, begin, stop)
+        run = Run(
+            rows=columns.rows[a], values=columns.values[a], labels=columns.labels, begin=begin, stop=stop
+        )
         cut = best_cut(run, counts, columns, rules, limits, workspace.passed)
         candidates.usable[a] = False
         if cut.place < 0:

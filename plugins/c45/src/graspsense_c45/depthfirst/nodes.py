@@ -41,12 +41,12 @@ class Rows(NamedTuple):
 def empty_nodes(capacity: int, n_classes: int) -> Nodes:
     """Return this many leaves without rows."""
     return Nodes(
-        np.full(capacity, LEAF, dtype=np.int32),
-        np.full(capacity, np.nan),
-        np.zeros(capacity, dtype=np.int32),
-        np.zeros((capacity, n_classes), dtype=np.int64),
-        np.zeros(capacity, dtype=np.int64),
-        np.zeros(capacity, dtype=np.int64),
+        feature=np.full(capacity, LEAF, dtype=np.int32),
+        threshold=np.full(capacity, np.nan),
+        first_child=np.zeros(capacity, dtype=np.int32),
+        counts=np.zeros((capacity, n_classes), dtype=np.int64),
+        start=np.zeros(capacity, dtype=np.int64),
+        end=np.zeros(capacity, dtype=np.int64),
     )
 
 

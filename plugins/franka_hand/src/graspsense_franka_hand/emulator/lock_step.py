@@ -52,13 +52,13 @@ class LockStepHand:
             return None
         self._count()
         return HandState(
-            self._now_s,
-            self.hand.width_m,
-            self.hand.widest_m,
-            self.hand.grasped,
-            float(TEMPERATURE_C),
-            self._done,
-            self._refused,
+            host_s=self._now_s,
+            width_m=self.hand.width_m,
+            widest_m=self.hand.widest_m,
+            grasped=self.hand.grasped,
+            temperature_c=float(TEMPERATURE_C),
+            done=self._done,
+            refused=self._refused,
         )
 
     def send(self, order: Order) -> None:

@@ -70,7 +70,16 @@ class UsbipServer:
                     is_in = direction == IN
                     data = b"" if is_in else stream.read(length)
                     with self._lock:
-                        self._waiting.append(_Waiting(number, endpoint, length, is_in, setup, data))
+                        self._waiting.append(
+                            _Waiting(
+                                number=number,
+                                endpoint=endpoint,
+                                length=length,
+                                is_in=is_in,
+                                setup=setup,
+                                data=data,
+                            )
+                        )
                         self._complete()
                 elif command == UNLINK:
                     self._unlink(number, *_VICTIM.unpack_from(asked))

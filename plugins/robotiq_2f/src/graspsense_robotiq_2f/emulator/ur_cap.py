@@ -28,6 +28,12 @@ def _reply(hand: Hand, line: str, now_s: float) -> str:
     if not all(value.isdecimal() and int(value) <= 255 for value in given.values()):
         return REFUSED
     wanted = asked | {name: int(value) for name, value in given.items()}
-    request = Request(bool(wanted["ACT"]), bool(wanted["GTO"]), wanted["POS"], wanted["SPE"], wanted["FOR"])
+    request = Request(
+        active=bool(wanted["ACT"]),
+        go=bool(wanted["GTO"]),
+        position=wanted["POS"],
+        speed=wanted["SPE"],
+        force=wanted["FOR"],
+    )
     hand.write(OUTPUT, request.registers(), now_s)
     return ACKNOWLEDGED

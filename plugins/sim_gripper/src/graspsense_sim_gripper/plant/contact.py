@@ -126,7 +126,7 @@ class _Creep(NamedTuple):
     """Compression of the pads at the end if nothing pressed them."""
 
 
-_NO_CREEP: Final = _Creep(1.0, 0.0, 0.0, 0.0, 0.0)
+_NO_CREEP: Final = _Creep(decay=1.0, mean_n_m=0.0, ramp_n_m=0.0, damper_n_s_m=0.0, free_pad_m=0.0)
 
 
 def _linear(pads: PadCompliance, pad_m: float) -> tuple[float, float]:
@@ -199,11 +199,39 @@ def no_event(earlier: Contact, later: Contact) -> bool:
     return False
 
 
-def is_touched(contact: Contact, gap_m: float, reach_m: float) -> int:
-    """Return 1, or 0 for a released object that has recovered its shape and in which nothing moves any more.
+def next_contacts(model: ObjectModel, contact: Contact, gap_m: float) -> tuple[float, float]:
+    """Return the gap at which the nearer finger touches the object, and that of the next contact of closing fingers.
+
+    The second is that of the other finger if one touches already.
+    """
+    offset = 2.0 * abs(contact.offset_m)
+    reach = model.width_m + offset
+    return reach, reach if gap_m > reach else model.width_m - (offset if model.held == 1 else 0.0)
+
+
+def with_touch(contact: Contact, gap_m: float, reach_m: float) -> Contact:
+    """Return the contact at this gap with `touched` brought up to date.
 
     `reach_m`: the gap at which the nearer finger touches the object.
     """
+    touched = _is_touched(contact, gap_m, reach_m)
+    if touched == contact.touched:
+        return contact
+    left_n, right_n, offset, _, left, right, pending, unbalanced = contact
+    return Contact(
+        left_n=left_n,
+        right_n=right_n,
+        offset_m=offset,
+        touched=touched,
+        left=left,
+        right=right,
+        pending_s=pending,
+        unbalanced=unbalanced,
+    )
+
+
+def _is_touched(contact: Contact, gap_m: float, reach_m: float) -> int:
+    """Return 1, or 0 for a released object that has recovered its shape and in which nothing moves any more."""
     left = contact.left
     shape = abs(left.compression_m) + abs(left.pad_m) + _deformation(contact.right)
     separated = gap_m > reach_m and contact.left_n + contact.right_n == 0.0
@@ -224,7 +252,16 @@ def restarted(contact: Contact) -> Contact:
     """Return the contact after an event of a term: the rate of compression before it says nothing any more."""
     left_n, right_n, offset, touched, left, right, pending, unbalanced = contact
     left, right = _restarted(left), _right_restarted(right)
-    return Contact(left_n, right_n, offset, touched, left, right, pending, unbalanced)
+    return Contact(
+        left_n=left_n,
+        right_n=right_n,
+        offset_m=offset,
+        touched=touched,
+        left=left,
+        right=right,
+        pending_s=pending,
+        unbalanced=unbalanced,
+    )
 
 
 def _right_restarted(right: Halves) -> Halves:
@@ -235,7 +272,20 @@ def _right_restarted(right: Halves) -> Halves:
 
 def _restarted(half: ContactState) -> ContactState:
     d, force, slope, states, pad, branch, past = half
-    return ContactState(d, force, slope, states, pad, branch, Past(past.rate_m_s, 0.0, math.inf, math.inf))
+    return ContactState(
+        compression_m=d,
+        force_n=force,
+        slope_n_m=slope,
+        states=states,
+        pad_m=pad,
+        branch_n=branch,
+        past=_without_past(past.rate_m_s),
+    )
+
+
+def _without_past(rate_m_s: float) -> Past:
+    """Return the last step of a compression that says nothing about the next one but its rate."""
+    return Past(rate_m_s, 0.0, math.inf, math.inf)
 
 
 def solve_contact(
@@ -248,14 +298,27 @@ def solve_contact(
     """
     if model.pads.stiffness_n_m < math.inf:
         return _press_through_pads(model, now, closure_m, speed_m_s, h) if h > 0.0 else (now, 0)
-    d0, force0, slope, states0, pad0, branch0, past = now
+    d0, force0, slope, states0, _, _, _ = now
     force, states = object_force(model.terms, states0, d0, closure_m, h, speed_m_s)
     # A finger that is still behind where the object stood presses it only if the object has not recovered so far.
     if force >= 0.0 and (force <= 0.0 or force0 > 0.0 or closure_m >= d0):
-        return ContactState(
-            closure_m, force, slope, states, pad0, branch0, Past(past.rate_m_s, 0.0, math.inf, math.inf)
-        ), 0
+        return _on_rigid_pads(now, closure_m, force, slope, states), 0
     return _release_from_rigid_pads(model, now, force, closure_m, speed_m_s, h) if h > 0.0 else (now, 0)
+
+
+def _on_rigid_pads(
+    now: ContactState, compression_m: float, force_n: float, slope_n_m: float, states: Any
+) -> ContactState:
+    """Return the object that rigid pads press to this compression."""
+    return ContactState(
+        compression_m=compression_m,
+        force_n=force_n,
+        slope_n_m=slope_n_m,
+        states=states,
+        pad_m=now.pad_m,
+        branch_n=now.branch_n,
+        past=_without_past(now.past.rate_m_s),
+    )
 
 
 def _release_from_rigid_pads(
@@ -263,26 +326,39 @@ def _release_from_rigid_pads(
 ) -> tuple[ContactState, int]:
     """Return the object that rigid pads at `closure_m` would pull with `force_n`: separated, or pressed after all."""
     d0, force0, slope, states0, _, branch0, _ = now
-    load = PadLoad(0.0, 0.0, d0, h, -math.inf)
+    load = PadLoad(stiffness_n_m=0.0, push_n=0.0, base_m=d0, span_s=h, closure_m=-math.inf)
     total = _release_slope(slope, force_n, force0, d0, closure_m)
-    search = BalanceSearch(d0 + (0.0 - force0) / total, d0, 0.0, slope, total, -math.inf, math.inf, 0)
+    search = _search_from(d0 + (0.0 - force0) / total, d0, slope, total)
     search, force, states = _balance(model, now, load, search, h)
     if closure_m > search.compression_m:
         # Free, it would have ended behind the pads: they press it where they are.
-        d1 = closure_m
-        force, states = object_force(model.terms, states0, d0, d1, h, speed_m_s)
+        force, states = object_force(model.terms, states0, d0, closure_m, h, speed_m_s)
         if force >= 0.0:
-            past = Past(now.past.rate_m_s, 0.0, math.inf, math.inf)
-            return ContactState(d1, force, search.slope_n_m, states, now.pad_m, branch0, past), 0
+            return _on_rigid_pads(now, closure_m, force, search.slope_n_m, states), 0
         total = _release_slope(search.slope_n_m, force, force0, d0, closure_m)
         _, last, last_n, slope, _, lower, upper, n = search
-        search = BalanceSearch(d0 - force0 / total, last, last_n, slope, total, lower, upper, n)
+        search = BalanceSearch(
+            compression_m=d0 - force0 / total,
+            last_m=last,
+            last_n=last_n,
+            slope_n_m=slope,
+            total_n_m=total,
+            lower_m=lower,
+            upper_m=upper,
+            n=n,
+        )
         search, force, states = _balance(model, now, load, search, h)
     d1 = search.compression_m
-    # No force, but NaN where a law gave no finite one, so that it is noticed.
-    none = force - force
-    past = Past((d1 - d0) / h, 0.0, math.inf, math.inf)
-    free = ContactState(d1, none, search.slope_n_m, states, 0.0, branch0, past)
+    free = ContactState(
+        compression_m=d1,
+        # No force, but NaN where a law gave no finite one, so that it is noticed.
+        force_n=force - force,
+        slope_n_m=search.slope_n_m,
+        states=states,
+        pad_m=0.0,
+        branch_n=branch0,
+        past=_without_past((d1 - d0) / h),
+    )
     return free, _unbalanced(force, 0.0, 0.0)
 
 
@@ -310,17 +386,9 @@ def _press_through_pads(
 ) -> tuple[ContactState, int]:
     """Return the object behind compliant pads: pressed or separated, whichever of the two is consistent."""
     pads = model.pads
-    d0, force0, slope, _, pad0, branch0, (rate0, change0, span, previous_span) = now
+    d0, force0, slope, _, pad0, branch0, (rate0, change0, span, _) = now
     pressed = force0 > 0.0
-    over, base = h, d0
-    if pressed:
-        ahead = h / (h + span)
-        over = h / (1.0 + ahead)
-        base += over * ahead * rate0
-        if h <= MAX_GROWTH * span and previous_span < math.inf:
-            two_back = h / (h + span + previous_span)
-            over = h / (1.0 + ahead + two_back)
-            base = d0 + over * ((ahead + two_back) * rate0 + 0.5 * two_back * (h + span) * change0)
+    over, base = _backward_difference(now, h) if pressed else (h, d0)
     stiffness, push, creep = pads.stiffness_n_m, pads.stiffness_n_m * closure_m, _NO_CREEP
     creeps = pads.damping_n_s_m > 0.0 or pads.branch_n_m > 0.0
     if creeps:
@@ -340,8 +408,8 @@ def _press_through_pads(
             further = d0 + h * (rate0 + 0.5 * (h + span) * change0)
             if total * abs(further - d1) > EQUAL_GUESSES * balance_tolerance(model, force0):
                 d1 = further
-        search = BalanceSearch(d1, d0, 0.0, slope, total, -math.inf, math.inf, 0)
-        load = PadLoad(k, c, base, over, closed)
+        search = _search_from(d1, d0, slope, total)
+        load = PadLoad(stiffness_n_m=k, push_n=c, base_m=base, span_s=over, closure_m=closed)
         search, force, states = _balance(model, now, load, search, h)
         d1, slope = search.compression_m, search.slope_n_m
         # NaN ends the search too.
@@ -351,20 +419,41 @@ def _press_through_pads(
         over, base = h, d0
     excess, _ = pad_excess(pads, closed - d1)
     rate, unbalanced = (d1 - d0) / h, _unbalanced(force, c - k * d1 + excess, c)
+    pad, branch, past = pad0, branch0, _without_past(rate)
     if not pressed:
+        force = force - force
         pad = creep.free_pad_m
         branch = branch0 * creep.decay + (creep.mean_n_m + creep.ramp_n_m) * (pad - pad0)
-        past = Past(rate, 0.0, math.inf, math.inf)
-        return ContactState(d1, force - force, slope, states, pad, branch, past), unbalanced
-    past = Past(rate, 0.0 if span == math.inf else 2.0 * (rate - rate0) / (h + span), h, span)
-    if force0 <= 0.0:
-        past = Past(rate, 0.0, math.inf, math.inf)
-    if not creeps:
-        return ContactState(d1, force, slope, states, pad0, branch0, past), unbalanced
-    pad = closure_m - d1
-    branch = branch0 * creep.decay + creep.mean_n_m * (pad - pad0)
-    branch += creep.ramp_n_m * h * (speed_m_s - (d1 - base) / over)
-    return ContactState(d1, force, slope, states, pad, branch, past), unbalanced
+    else:
+        if not force0 <= 0.0:
+            past = Past(rate, 0.0 if span == math.inf else 2.0 * (rate - rate0) / (h + span), h, span)
+        if creeps:
+            pad = closure_m - d1
+            branch = branch0 * creep.decay + creep.mean_n_m * (pad - pad0)
+            branch += creep.ramp_n_m * h * (speed_m_s - (d1 - base) / over)
+    pressed_or_free = ContactState(
+        compression_m=d1,
+        force_n=force,
+        slope_n_m=slope,
+        states=states,
+        pad_m=pad,
+        branch_n=branch,
+        past=past,
+    )
+    return pressed_or_free, unbalanced
+
+
+def _backward_difference(now: ContactState, h: float) -> tuple[float, float]:
+    """Return `span_s` and `base_m` of `PadLoad` after a step of `h`, for an object that was pressed before it."""
+    d0, (rate0, change0, span, previous_span) = now.compression_m, now.past
+    ahead = h / (h + span)
+    over = h / (1.0 + ahead)
+    base = d0 + over * ahead * rate0
+    if h <= MAX_GROWTH * span and previous_span < math.inf:
+        two_back = h / (h + span + previous_span)
+        over = h / (1.0 + ahead + two_back)
+        base = d0 + over * ((ahead + two_back) * rate0 + 0.5 * two_back * (h + span) * change0)
+    return over, base
 
 
 def balance_tolerance(model: ObjectModel, force_n: float) -> float:
@@ -381,7 +470,21 @@ def _creep(pads: PadCompliance, now: ContactState, h: float) -> _Creep:
     damper = pads.damping_n_s_m + ramp * h
     # Backward Euler, which is enough for pads that touch nothing.
     free = ((mean + damper / h) * now.pad_m - now.branch_n * decay) / (pads.stiffness_n_m + mean + damper / h)
-    return _Creep(decay, mean, ramp, damper, free)
+    return _Creep(decay=decay, mean_n_m=mean, ramp_n_m=ramp, damper_n_s_m=damper, free_pad_m=free)
+
+
+def _search_from(compression_m: float, earlier_m: float, slope_n_m: float, total_n_m: float) -> BalanceSearch:
+    """Return the beginning of a search at a compression, of an object that was compressed by `earlier_m` before."""
+    return BalanceSearch(
+        compression_m=compression_m,
+        last_m=earlier_m,
+        last_n=0.0,
+        slope_n_m=slope_n_m,
+        total_n_m=total_n_m,
+        lower_m=-math.inf,
+        upper_m=math.inf,
+        n=0,
+    )
 
 
 def _balance(
@@ -420,7 +523,17 @@ def _balance(
         if d2 == d1 or not upper - lower > ARGUMENT_RTOL * abs(d1):
             break
         last, last_n, d1 = d1, force, d2
-    return BalanceSearch(d1, last, last_n, slope, total, lower, upper, n), force, states
+    search = BalanceSearch(
+        compression_m=d1,
+        last_m=last,
+        last_n=last_n,
+        slope_n_m=slope,
+        total_n_m=total,
+        lower_m=lower,
+        upper_m=upper,
+        n=n,
+    )
+    return search, force, states
 
 
 def pad_forces(
@@ -457,7 +570,31 @@ def pad_forces(
         left1_n, right1_n = left.force_n, right_of(left, right).force_n
     else:
         left1_n, right1_n = max(left.force_n, left1_n), max(left.force_n, right1_n)
-    return Contact(left1_n, right1_n, offset, touched, left, right, 0.0, unbalanced)
+    return Contact(
+        left_n=left1_n,
+        right_n=right1_n,
+        offset_m=offset,
+        touched=touched,
+        left=left,
+        right=right,
+        pending_s=0.0,
+        unbalanced=unbalanced,
+    )
+
+
+def with_forces_of(contact: Contact, offset_m: float, pending_s: float) -> Contact:
+    """Return the contact with the same forces at another offset; the shapes are computed up to `pending_s` ago."""
+    left_n, right_n, _, touched, left, right, _, unbalanced = contact
+    return Contact(
+        left_n=left_n,
+        right_n=right_n,
+        offset_m=offset_m,
+        touched=touched,
+        left=left,
+        right=right,
+        pending_s=pending_s,
+        unbalanced=unbalanced,
+    )
 
 
 def offset_of_pushed(offset_m: float, pushed_m: float) -> float:

@@ -103,12 +103,17 @@ class Pending(NamedTuple):
     """The forces on the pads when it was taken."""
 
 
-class SensorState(NamedTuple):
-    """The last readings: the encoder, the gap and the filtered rate computed from it, and the cells."""
+class EncoderReading(NamedTuple):
+    """What the encoder shows: its ticks, and the gap and the filtered rate that are computed from them."""
 
-    encoder_ticks: float
+    ticks: float
     gap_m: float
     velocity_m_s: float
+
+
+class CellReading(NamedTuple):
+    """What the cells show."""
+
     images: int
     """Number of cell images so far."""
     image_t_s: float
@@ -116,6 +121,13 @@ class SensorState(NamedTuple):
     forces: PadForces
     """The forces of the last image."""
     pending: Pending
+
+
+class SensorState(NamedTuple):
+    """The last readings."""
+
+    encoder: EncoderReading
+    cells: CellReading
 
 
 def with_listed_cells(params: SensorParams) -> SensorParams:
@@ -132,7 +144,8 @@ def initial_sensor(link: ScrewLinkage, motion: Motion) -> SensorState:
     """Return the sensor's state before the first tick; the velocity filter starts at rest."""
     ticks = float(math.floor(motion.revolutions * ENCODER_TICKS))
     gap, _ = gap_and_rate(link, ticks / ENCODER_TICKS)
-    return SensorState(ticks, gap, 0.0, 0, 0.0, PadForces(0.0, 0.0, 0.0, 0.0), Pending(0, 0.0, 0.0))
+    cells = CellReading(0, 0.0, PadForces(0.0, 0.0, 0.0, 0.0), Pending(0, 0.0, 0.0))
+    return SensorState(EncoderReading(ticks, gap, 0.0), cells)
 
 
 def sense(
@@ -157,7 +170,7 @@ def _with_image(
     params: SensorParams, state: SensorState, measured: PlantReadings, t_s: float, pads: PadBuffers
 ) -> SensorState:
     """Return the state of the sensors with the image that is taken, or that arrives, at `t_s`, if there is one."""
-    encoder_ticks, gap, velocity, count, image_t, forces, pending = state
+    count, image_t, forces, pending = state.cells
     due_s = image_due_s(params, state)
     if pending.waiting == 0 and t_s >= due_s:
         pending = Pending(1, measured.left_n, measured.right_n)
@@ -168,7 +181,7 @@ def _with_image(
         forces = image_forces(image[0], image[1], pads)
         count, image_t = count + 1, t_s - params.clock.delay_s
         pending = Pending(0, pending.left_n, pending.right_n)
-    return SensorState(encoder_ticks, gap, velocity, count, image_t, forces, pending)
+    return SensorState(state.encoder, CellReading(count, image_t, forces, pending))
 
 
 def read_frame(
@@ -180,55 +193,57 @@ def read_frame(
     effort_n: float,
 ) -> tuple[Frame, SensorState]:
     """Return the frame at `t_s` (s) and the new state of the sensors, if no cell image is taken or arrives."""
-    motion, left_n, right_n = measured
-    encoder_ticks, gap, velocity, count, image_t, forces, pending = state
-    encoder_ticks, gap, velocity = sense_motion(params, (encoder_ticks, gap, velocity), motion, dt_s)
+    encoder = sense_motion(params, state.encoder, measured.motion, dt_s)
+    left_n, right_n, left_edge_n, right_edge_n = state.cells.forces
     if params.ideal == 1:
-        return Frame(t_s, dt_s, gap, velocity, effort_n, left_n, right_n, 0.0, 0.0, 0), state
-    left_n, right_n, left_edge_n, right_edge_n = forces
-    frame = Frame(t_s, dt_s, gap, velocity, effort_n, left_n, right_n, left_edge_n, right_edge_n, 0)
-    return frame, SensorState(encoder_ticks, gap, velocity, count, image_t, forces, pending)
+        left_n, right_n, left_edge_n, right_edge_n = measured.left_n, measured.right_n, 0.0, 0.0
+    else:
+        state = SensorState(encoder, state.cells)
+    frame = Frame(
+        t_s=t_s,
+        dt_s=dt_s,
+        gap_m=encoder.gap_m,
+        velocity_m_s=encoder.velocity_m_s,
+        effort_n=effort_n,
+        force_left_n=left_n,
+        force_right_n=right_n,
+        edge_left_n=left_edge_n,
+        edge_right_n=right_edge_n,
+        status=0,
+    )
+    return frame, state
 
 
-def sense_motion(
-    params: SensorParams, last: tuple[float, float, float], motion: Motion, dt_s: float
-) -> tuple[float, float, float]:
-    """Return the ticks of the encoder, the gap (m) and its rate (m/s) that the sensors show, given the last ones."""
-    encoder_ticks, gap, velocity = last
+def sense_motion(params: SensorParams, last: EncoderReading, motion: Motion, dt_s: float) -> EncoderReading:
+    """Return what the encoder shows of this motion, given what it has shown last."""
+    last_ticks, gap, velocity = last
     if params.ideal == 1:
-        return encoder_ticks, motion.gap_m, motion.speed_rev_s * motion.jacobian_m_rev
+        return EncoderReading(last_ticks, motion.gap_m, motion.speed_rev_s * motion.jacobian_m_rev)
     # A division for all ticks, which a compiler takes out of the loop. Few operations wait for the motion, which is
     # known last; `math.floor` would convert to an integer and back.
     share = 1.0 / (VELOCITY_FILTER_S + dt_s)
     velocity -= (dt_s * share) * velocity
     angle = motion.revolutions * ENCODER_TICKS
     ticks = float(np.floor(angle))
-    if ticks != encoder_ticks:
+    if ticks != last_ticks:
         # Over one encoder tick the linkage is linear to a tenth of a picometre.
         gap_before = gap
         gap = motion.gap_m - (motion.jacobian_m_rev * (1.0 / ENCODER_TICKS)) * (angle - ticks)
         velocity += share * (gap - gap_before)
-    return ticks, gap, velocity
-
-
-def moved_sensor(state: SensorState, shown: tuple[float, float, float]) -> SensorState:
-    """Return the state of the sensors after `sense_motion` has given these values, and no cell image was taken."""
-    encoder_ticks, gap, velocity = shown
-    _, _, _, count, image_t, forces, pending = state
-    return SensorState(encoder_ticks, gap, velocity, count, image_t, forces, pending)
+    return EncoderReading(ticks, gap, velocity)
 
 
 def image_due_s(params: SensorParams, state: SensorState) -> float:
     """Return the time from which on the next image is taken; that of an ideal sensor, which takes none, is inf."""
     if params.ideal == 1:
         return math.inf
-    return params.clock.phase_s + state.images * params.clock.period_s - CLOCK_TOLERANCE_S
+    return params.clock.phase_s + state.cells.images * params.clock.period_s - CLOCK_TOLERANCE_S
 
 
 def next_image_s(params: SensorParams, state: SensorState) -> float:
     """Return the time at which an image is taken next, or at which the one that was taken arrives."""
     due_s = image_due_s(params, state)
-    return due_s + params.clock.delay_s if state.pending.waiting == 1 else due_s
+    return due_s + params.clock.delay_s if state.cells.pending.waiting == 1 else due_s
 
 
 def image_forces(left: CellColumn, right: CellColumn, pads: PadBuffers) -> PadForces:
@@ -243,9 +258,10 @@ def image_forces(left: CellColumn, right: CellColumn, pads: PadBuffers) -> PadFo
 
 def apply_tare(state: SensorState, pads: PadBuffers) -> SensorState:
     """Return the state of the sensors, with the forces of the last image computed again from the present zeros."""
-    last = pads.images[state.images - 1]
-    ticks, gap, velocity, count, image_t, _, pending = state
-    return SensorState(ticks, gap, velocity, count, image_t, image_forces(last[0], last[1], pads), pending)
+    count, image_t, _, pending = state.cells
+    last = pads.images[count - 1]
+    forces = image_forces(last[0], last[1], pads)
+    return SensorState(state.encoder, CellReading(count, image_t, forces, pending))
 
 
 def _write_image(

@@ -1,4 +1,4 @@
-"""The state of the simulated plant, which is everything that changes in the course of a grasp.
+"""The state of the simulated plant: the motion of the drive, the contact, and the object between the pads.
 
 It is nested, because compiled code has no `_replace`: a function that changes one part builds that part anew and passes
 the others on.
@@ -78,29 +78,6 @@ def right_of(left: ContactState, right: Halves) -> ContactState:
     return half
 
 
-class StepState(NamedTuple):
-    """The state of the step control between steps."""
-
-    next_s: float = math.inf
-    """Length of the next step that the error of the last one allows."""
-    n_steps: int = 0
-    """Steps so far."""
-    unresolved: int = 0
-    """Steps that were accepted although their error was too large."""
-
-
-class PlantState(NamedTuple):
-    """The state of the plant between two ticks."""
-
-    motion: Motion
-    contact: Contact
-    step: StepState = StepState()
-    effort_n: float = 0.0
-    """Current force of the drive, if it lags behind the command."""
-    peak_n: float = 0.0
-    """Largest force on a pad so far."""
-
-
 class PlantReadings(NamedTuple):
     """What sensors measure of the plant at a tick."""
 
@@ -108,11 +85,3 @@ class PlantReadings(NamedTuple):
     left_n: float
     right_n: float
     """The forces on the pads."""
-
-
-def is_finite(state: PlantState) -> bool:
-    """Return whether the forces on the object and the motion are finite numbers."""
-    contact = state.contact
-    return math.isfinite(
-        contact.left.force_n + right_of(contact.left, contact.right).force_n + state.motion.speed_rev_s
-    )

@@ -14,20 +14,22 @@ from typing import Any, Final, NamedTuple
 from graspsense.gripper_api import gap_and_rate
 from graspsense.plugin_api import Frame
 from graspsense.simulator_api import CLOSES, FreeLimits, after_free, free_from, free_tick
-from graspsense_sim_gripper.plant.contact import offset_of_pushed
+from graspsense_sim_gripper.plant.contact import offset_of_pushed, with_forces_of
 from graspsense_sim_gripper.plant.drive import STRIBECK_SPEEDS, stribeck_excess
-from graspsense_sim_gripper.plant.sensing import moved_sensor, next_image_s, sense_motion
-from graspsense_sim_gripper.plant.state import Contact, Motion, PlantState, StepState
+from graspsense_sim_gripper.plant.sensing import SensorState, next_image_s, sense_motion
+from graspsense_sim_gripper.plant.state import Contact, Motion
 from graspsense_sim_gripper.run.loop import (
     NOT_NEGATIVE,
     ROWS_AT_ONCE,
     GraspParams,
+    LastTick,
     LoopProgress,
     Table,
 )
 from graspsense_sim_gripper.scene.terms.phi import phi_1_2
 from graspsense_sim_gripper.solve.polynomial import Cubic, derivative, hermite, value
 from graspsense_sim_gripper.solve.scheme import SPEED_SCALE_M_S
+from graspsense_sim_gripper.solve.state import PlantState, StepState
 
 MIN_TICKS: Final = 4
 MAX_TICKS: Final = ROWS_AT_ONCE
@@ -74,12 +76,13 @@ def approach_ticks(
         return progress
     dt_s = params.dt_s
     way = _approach(params, motion, 0.5 * (contact.left_n + contact.right_n), n)
-    shown = progress.sensor.encoder_ticks, progress.sensor.gap_m, progress.sensor.velocity_m_s
-    first_m_s, effort, i = motion.speed_rev_s * motion.jacobian_m_rev, progress.effort_n, 0
+    shown, effort, i = progress.sensor.encoder, progress.tick.effort_n, 0
+    first_m_s = motion.speed_rev_s * motion.jacobian_m_rev
     while i < n:
-        t_s = (progress.ticks + i) * dt_s
+        t_s = (progress.tick.ticks + i) * dt_s
         next_shown = sense_motion(params.sensor, shown, motion, dt_s)
-        command, next_now = free_tick(params.controller, free, now, t_s, dt_s, next_shown[1], next_shown[2])
+        gap_m, rate_m_s = next_shown.gap_m, next_shown.velocity_m_s
+        command, next_now = free_tick(params.controller, free, now, t_s, dt_s, gap_m, rate_m_s)
         moved = _after_tick(way, motion, command, dt_s)
         change = abs(moved.speed_rev_s * moved.jacobian_m_rev - first_m_s)
         beyond = (moved.revolutions - way.begin_rev) * way.per_rev > 1.0
@@ -87,8 +90,8 @@ def approach_ticks(
         if not change <= way.speed_change_m_s or moved.gap_m <= nearest or beyond:
             break
         shown, now, motion = next_shown, next_now, moved
-        row = (progress.recorded + i) & NOT_NEGATIVE
-        columns[0][row], columns[1][row], columns[2][row] = t_s, shown[1], shown[2]
+        row = (progress.tick.recorded + i) & NOT_NEGATIVE
+        columns[0][row], columns[1][row], columns[2][row] = t_s, gap_m, rate_m_s
         columns[3][row], columns[8][row], phases[row] = effort, command, progress.controller.phase
         columns[4][row], columns[5][row] = frame.force_left_n, frame.force_right_n
         columns[6][row], columns[7][row] = frame.edge_left_n, frame.edge_right_n
@@ -96,18 +99,23 @@ def approach_ticks(
         i += 1
     if i == 0:
         return progress
-    state = after_free(params.controller, progress.controller, now, effort, (progress.ticks + i - 1) * dt_s)
+    state = after_free(
+        params.controller, progress.controller, now, effort, (progress.tick.ticks + i - 1) * dt_s
+    )
     gap, jacobian = gap_and_rate(params.plant.drive.link, motion.revolutions)
     _, _, (next_s, n_steps, unresolved), given, peak = progress.plant
     plant = PlantState(
-        Motion(motion.revolutions, motion.speed_rev_s, gap, jacobian),
-        _pushed(contact, gap - params.plant.object.width_m),
-        StepState(next_s, n_steps + 1, unresolved),
-        given,
-        peak,
+        motion=Motion(motion.revolutions, motion.speed_rev_s, gap, jacobian),
+        contact=_pushed(contact, gap - params.plant.object.width_m),
+        step=StepState(next_s, n_steps + 1, unresolved),
+        effort_n=given,
+        peak_n=peak,
     )
     return LoopProgress(
-        progress.ticks + i, progress.recorded + i, effort, plant, moved_sensor(progress.sensor, shown), state
+        LastTick(progress.tick.ticks + i, progress.tick.recorded + i, effort),
+        plant,
+        SensorState(shown, progress.sensor.cells),
+        state,
     )
 
 
@@ -129,11 +137,10 @@ def _nearest(params: GraspParams, contact: Contact) -> float:
 
 def _pushed(contact: Contact, space_m: float) -> Contact:
     """Return the contact of an object that a finger has pushed until the fingers are wider than it by this much."""
-    left_n, right_n, offset, touched, left, right, pending, unbalanced = contact
-    if touched == 0:
+    if contact.touched == 0:
         return contact
-    offset = offset_of_pushed(offset, 0.5 * space_m)
-    return Contact(left_n, right_n, offset, touched, left, right, pending, unbalanced)
+    offset = offset_of_pushed(contact.offset_m, 0.5 * space_m)
+    return with_forces_of(contact, offset, contact.pending_s)
 
 
 def _most_ticks(params: GraspParams, progress: LoopProgress, nearest_m: float, limits: FreeLimits) -> int:
@@ -142,13 +149,13 @@ def _most_ticks(params: GraspParams, progress: LoopProgress, nearest_m: float, l
     closing = -motion.speed_rev_s * motion.jacobian_m_rev
     if closing <= 0.0:
         return 0
-    t_s = progress.ticks * dt_s
+    t_s = progress.tick.ticks * dt_s
     left_s = min((motion.gap_m - nearest_m) / closing, limits.until_s - t_s, MAX_TICKS * dt_s)
     left_s = min(left_s, next_image_s(params.sensor, progress.sensor) - t_s)
     if left_s <= 0.0:
         return 0
     n: int = math.ceil(left_s / dt_s)
-    return min(n, params.max_ticks - progress.ticks)
+    return min(n, params.max_ticks - progress.tick.ticks)
 
 
 def _approach(params: GraspParams, motion: Motion, load_n: float, n: int) -> Approach:
@@ -172,14 +179,14 @@ def _approach(params: GraspParams, motion: Motion, load_n: float, n: int) -> App
         change = math.sqrt(2.0 * allowed / (per_inertia * abs(curvature) * n * dt_s))
     gain, gain2 = phi_1_2(resistance * per_inertia * dt_s)
     return Approach(
-        revolutions,
-        1.0 / way_rev,
-        hermite(gap, gap1, way_rev * jacobian, way_rev * jacobian1),
-        force,
-        resistance,
-        dt_s * gain / drive.inertia,
-        dt_s * dt_s * gain2 / drive.inertia,
-        change,
+        begin_rev=revolutions,
+        per_rev=1.0 / way_rev,
+        gap_m=hermite(gap, gap1, way_rev * jacobian, way_rev * jacobian1),
+        force_n=force,
+        resistance_n_s_m=resistance,
+        speed_gain=dt_s * gain / drive.inertia,
+        angle_gain=dt_s * dt_s * gain2 / drive.inertia,
+        speed_change_m_s=change,
     )
 
 

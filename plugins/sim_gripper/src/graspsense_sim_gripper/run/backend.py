@@ -37,7 +37,7 @@ from graspsense_sim_gripper.plant.sensing import (
     sense,
     with_listed_cells,
 )
-from graspsense_sim_gripper.plant.state import PlantReadings, PlantState, is_finite, right_of
+from graspsense_sim_gripper.plant.state import PlantReadings, right_of
 from graspsense_sim_gripper.run.accuracy.probe import FORCE_N, SPEED_M_S
 from graspsense_sim_gripper.run.accuracy.select import select
 from graspsense_sim_gripper.run.binding import bind_reachable
@@ -52,6 +52,7 @@ from graspsense_sim_gripper.run.term_failure import TermFailed, not_finite_in_ti
 from graspsense_sim_gripper.scene.library import kinds_in, object_kinds
 from graspsense_sim_gripper.scene.scaled import ScaledParameter
 from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
+from graspsense_sim_gripper.solve.state import PlantState, is_finite
 
 SIDES: Final = ("left", "right")
 
@@ -154,17 +155,17 @@ class SimBackend(BatchBackend[SimConfig]):
         else:
             self._move_on(effort)
         buffers = self._buffers
-        if self._sensor.images >= len(buffers.images):
+        if self._sensor.cells.images >= len(buffers.images):
             self._draw_noise()
         contact = self._state.contact
         measured = PlantReadings(self._state.motion, contact.left_n, contact.right_n)
         frame, self._sensor = _sense(
             setup.sensor, self._sensor, measured, self._ticks * dt, dt, effort, buffers
         )
-        count = self._sensor.images
+        count = self._sensor.cells.images
         if count != self._pads.counter:
             image = buffers.images[count - 1]
-            self._pads = Pads(self._sensor.image_t_s, count, tuple(image[0]), tuple(image[1]))
+            self._pads = Pads(self._sensor.cells.image_t_s, count, tuple(image[0]), tuple(image[1]))
         return _reading(frame, self._pads, ())
 
     def _move_on(self, effort_n: float) -> None:

@@ -28,7 +28,7 @@ from graspsense_sim_gripper.plant.sensing import (
     SensorState,
     initial_sensor,
 )
-from graspsense_sim_gripper.plant.state import Contact, ContactState, Motion, PlantState
+from graspsense_sim_gripper.plant.state import Contact, ContactState, Motion
 from graspsense_sim_gripper.run.accuracy.chosen_steps import ChosenSteps
 from graspsense_sim_gripper.run.accuracy.levels import step_tolerance
 from graspsense_sim_gripper.run.compiled.compose import all_active, uncompressed
@@ -47,6 +47,7 @@ from graspsense_sim_gripper.scene.random_numbers import key_of
 from graspsense_sim_gripper.scene.scaled import ScaledParameter
 from graspsense_sim_gripper.scene.spec import ObjectSpec, TermParams
 from graspsense_sim_gripper.solve.scheme import PlantParams, Steps
+from graspsense_sim_gripper.solve.state import PlantState
 
 EFFORT_LIMIT_N: Final = 100.0
 SPEED_LIMIT_M_S: Final = 0.2
@@ -234,7 +235,12 @@ def _plant(
     )
     at_rest = _uncompressed(() if spec is None else spec.kinds)
     right = (at_rest,) if model.held == 1 else ()
-    state = PlantState(gripper.motion, Contact(0.0, 0.0, drawn.placement.offset_m, 0, at_rest, right))
+    state = PlantState(
+        gripper.motion,
+        Contact(
+            left_n=0.0, right_n=0.0, offset_m=drawn.placement.offset_m, touched=0, left=at_rest, right=right
+        ),
+    )
     return PlantParams(drive, model, gripper.steps), state
 
 
@@ -283,7 +289,13 @@ def _gripper(config: SimConfig) -> _Gripper:
         exponent=float(config.pad_exponent),
     )
     motion = Motion(drive.open_rev, 0.0, *gap_and_rate(link, drive.open_rev))
-    return _Gripper(drive, pads, Steps(step_tolerance(config.accuracy)), motion, initial_sensor(link, motion))
+    return _Gripper(
+        drive=drive,
+        pads=pads,
+        steps=Steps(step_tolerance(config.accuracy)),
+        motion=motion,
+        sensor_state=initial_sensor(link, motion),
+    )
 
 
 def drive_and_pads(config: SimConfig) -> tuple[Drive, PadCompliance]:
@@ -304,7 +316,15 @@ def _sensor(config: SimConfig, drawn: Drawn, cells: CellArrays) -> SensorParams:
     period = float(config.pad_period_s)
     if config.sensor == "ideal":
         clock = ImageClock(0.0, period, 0.0)
-        return SensorParams(1, LINKAGES[config.transmission], clock, 1.0, 0.0, IDEAL_CELLS, IDEAL_CELLS)
+        return SensorParams(
+            ideal=1,
+            link=LINKAGES[config.transmission],
+            clock=clock,
+            share=1.0,
+            noise_counts=0.0,
+            left=IDEAL_CELLS,
+            right=IDEAL_CELLS,
+        )
     return SensorParams(
         ideal=0,
         link=LINKAGES[config.transmission],

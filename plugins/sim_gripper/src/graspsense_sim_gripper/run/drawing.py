@@ -41,7 +41,18 @@ FRICTION, PHASE, OFFSETS, INSTANCE = 0, 1, 2, 2 + 2 * CELLS
 """The places of the draws of a grasp; those of the instance are last, since their number differs."""
 NO_NUMBER: Final = np.zeros(0)
 """The draws of an object without a number."""
-NO_OBJECT: Final = NominalParams((), (), ()), InstanceSpread(0.0, -1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+NO_OBJECT: Final = (
+    NominalParams((), (), ()),
+    InstanceSpread(
+        stiffness=0.0,
+        width_m=-1.0,
+        width_spread_m=0.0,
+        offset_m=0.0,
+        offset_spread_m=0.0,
+        share=1.0,
+        share_spread=0.0,
+    ),
+)
 """No terms, and a negative width: the fingers close without touching anything."""
 
 

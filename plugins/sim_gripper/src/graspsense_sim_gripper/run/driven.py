@@ -24,9 +24,9 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.contact import (
     ObjectModel,
     has_event,
-    is_touched,
+    next_contacts,
     pad_forces,
-    restarted,
+    with_touch,
 )
 from graspsense_sim_gripper.plant.roots import MAX_ITERATIONS, bracketed_secant
 from graspsense_sim_gripper.plant.state import Contact
@@ -37,6 +37,7 @@ from graspsense_sim_gripper.run.compiled.jit import compile_part
 from graspsense_sim_gripper.run.compiled.padding import padded
 from graspsense_sim_gripper.scene.terms.registry import laws_of, moving_of, phases_of
 from graspsense_sim_gripper.solve.control import MIN_STEP_S
+from graspsense_sim_gripper.solve.events import until_event
 
 STEP_S: Final = 1e-3
 """The longest step between two recorded times, if the settings give no `step_s`."""
@@ -163,23 +164,19 @@ def to_gap(model: ObjectModel, state: Driven, gap_m: float, h: float) -> Driven:
     contact, gap, peak, missed = state
     speed, left_s = (gap - gap_m) / h, h
     while left_s > REST_SHARE * h:
-        reach = model.width_m + 2.0 * abs(contact.offset_m)
-        meeting = (
-            reach if gap > reach else model.width_m - (reach - model.width_m if model.held == 1 else 0.0)
-        )
+        reach, meeting = next_contacts(model, contact, gap)
         ahead, target = left_s, gap_m
         if gap > meeting > gap_m:
             ahead, target = min((gap - meeting) / speed, left_s), meeting
         if contact.touched == 1 or target <= reach:
-            after = _at(model, contact, target, speed, ahead)
-            if contact.touched == 1 and ahead > MIN_STEP_S and has_event(contact, after):
-                ahead = _until_event(model, contact, gap, speed, ahead)
+            # A contact that begins here has lasted no time.
+            lasted = ahead if contact.touched == 1 else 0.0
+            after = pad_forces(model, contact, target, speed, lasted, speed == 0.0)
+            if lasted > MIN_STEP_S and has_event(contact, after):
+                ahead, after = until_event(model, contact, gap, speed, ahead, speed == 0.0)
                 target = gap - speed * ahead
-                after = restarted(_at(model, contact, target, speed, ahead))
-            left_n, right_n, offset, _, left, right, pending, unbalanced = after
-            touched = is_touched(after, target, reach)
-            contact = Contact(left_n, right_n, offset, touched, left, right, pending, unbalanced)
-            peak = max(peak, left_n, right_n)
+            contact = with_touch(after, target, reach)
+            peak = max(peak, contact.left_n, contact.right_n)
         gap, left_s = target, left_s - ahead
     return Driven(contact, gap_m, peak, missed)
 
@@ -211,23 +208,6 @@ def to_force(model: ObjectModel, state: Driven, force_n: float, h: float) -> Dri
             break
         last, last_value, closed = closed, value, following
     return Driven(after.contact, after.gap_m, after.peak_n, after.missed + 1)
-
-
-def _at(model: ObjectModel, contact: Contact, gap_m: float, speed_m_s: float, h: float) -> Contact:
-    """Return the contact at this gap; one that begins there has lasted no time."""
-    return pad_forces(model, contact, gap_m, speed_m_s, h if contact.touched == 1 else 0.0, speed_m_s == 0.0)
-
-
-def _until_event(model: ObjectModel, contact: Contact, gap_m: float, speed_m_s: float, h: float) -> float:
-    """Return the time within `h` at which a term has an event."""
-    lower, upper = 0.0, h
-    while upper - lower > MIN_STEP_S:
-        middle = 0.5 * (lower + upper)
-        if has_event(contact, _at(model, contact, gap_m - speed_m_s * middle, speed_m_s, middle)):
-            upper = middle
-        else:
-            lower = middle
-    return upper
 
 
 @lru_cache(maxsize=64)

@@ -18,7 +18,7 @@ from graspsense_sim_gripper.plant.sensing import (
     apply_tare,
     sense,
 )
-from graspsense_sim_gripper.plant.state import PlantReadings, PlantState, is_finite
+from graspsense_sim_gripper.plant.state import PlantReadings
 from graspsense_sim_gripper.solve.macro_step import (
     FIRST_TICKS,
     DenseOutput,
@@ -28,6 +28,7 @@ from graspsense_sim_gripper.solve.macro_step import (
     with_peak,
 )
 from graspsense_sim_gripper.solve.scheme import PlantParams, Steps
+from graspsense_sim_gripper.solve.state import PlantState, is_finite
 from graspsense_sim_gripper.solve.trend import UNKNOWN, Trend
 
 COLUMNS: Final = (
@@ -89,19 +90,31 @@ def uses_macro_steps(steps: Steps) -> int:
     return 1 if steps.macro_tolerance > 0.0 else 0
 
 
-class LoopState(NamedTuple):
-    """The state of the loop itself between two ticks."""
+class LastTick(NamedTuple):
+    """The last tick."""
 
     ticks: int
     """Number of ticks so far."""
     recorded: int
     """Number of rows recorded so far."""
+    effort_n: float
+    """The commanded effort."""
+
+
+class LastPhase(NamedTuple):
+    """The phase of the last tick."""
+
     phase: int
-    """The phase of the last tick; -1 before the first."""
+    """-1 before the first."""
     tare_from: int
     """Number of images when the phase began. The tare is the mean of the images from there on."""
-    effort_n: float
-    """The commanded effort of the last tick."""
+
+
+class LoopState(NamedTuple):
+    """The state of the loop itself between two ticks."""
+
+    tick: LastTick
+    phase: LastPhase
     failed: int
     """1: a force or the motion was not finite after the last tick (see `before_failure`)."""
     macro: MacroControl
@@ -110,10 +123,7 @@ class LoopState(NamedTuple):
 class LoopProgress(NamedTuple):
     """The part of the state that changes where several ticks are run at once."""
 
-    ticks: int
-    recorded: int
-    effort_n: float
-    """The effort that was commanded last."""
+    tick: LastTick
     plant: PlantState
     sensor: SensorState
     controller: TickState
@@ -168,7 +178,9 @@ class Buffers(NamedTuple):
 
 EVENT_SHIFT: Final = 8
 """Number of bits of a phase in `Buffers.phases`."""
-NOT_STARTED: Final = LoopState(0, 0, -1, 0, 0.0, 0, MacroControl(FIRST_TICKS, 0, 1, UNKNOWN))
+NOT_STARTED: Final = LoopState(
+    LastTick(0, 0, 0.0), LastPhase(-1, 0), 0, MacroControl(FIRST_TICKS, 0, 1, UNKNOWN)
+)
 ROWS_AT_ONCE: Final = 128
 """The most rows that are recorded at once. The loop stops this many rows before the end of a buffer, so that none is
 cut by it."""
@@ -224,21 +236,21 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
     same values.
     """
     dt_s, pad_buffers, images = params.dt_s, buffers.pads, buffers.pads.images
-    ticks, recorded, phase, tare_from, effort, failed, macro = progress.loop
+    (ticks, recorded, effort), (phase, tare_from), failed, macro = progress.loop
     plant, sensor, state = progress.plant, progress.sensor, progress.controller
     capacity = len(buffers.columns[0]) - ROWS_AT_ONCE
     # The macro-step that is being taken, its number of ticks (0: there is none), and how many of them are over.
-    ahead, n, k, peak, count = no_step(plant, macro), 0, 0, plant.peak_n, sensor.images
-    pads = Pads(sensor.image_t_s, count, images[count - 1][0], images[count - 1][1])
-    while n > 0 or (ticks < params.max_ticks and recorded < capacity and sensor.images < len(images)):
+    ahead, n, k, peak, count = no_step(plant, macro), 0, 0, plant.peak_n, sensor.cells.images
+    pads = Pads(sensor.cells.image_t_s, count, images[count - 1][0], images[count - 1][1])
+    while n > 0 or (ticks < params.max_ticks and recorded < capacity and sensor.cells.images < len(images)):
         measured = values_at(ahead.values, k / n) if n > 0 else _readings(plant)
         peak = max(peak, measured.left_n, measured.right_n)
         t_s, last_effort = ticks * dt_s, effort
         frame, sensor = sense(params.sensor, sensor, measured, t_s, dt_s, effort, pad_buffers)
-        if sensor.images != count:
-            count = sensor.images
-            buffers.image_times[count - 1] = sensor.image_t_s
-            pads = Pads(sensor.image_t_s, count, images[count - 1][0], images[count - 1][1])
+        if sensor.cells.images != count:
+            count = sensor.cells.images
+            buffers.image_times[count - 1] = sensor.cells.image_t_s
+            pads = Pads(sensor.cells.image_t_s, count, images[count - 1][0], images[count - 1][1])
         command, state = control(params.controller, state, Reading(frame, pads, ()))
         past_tare, same_phase = phase != TARING, state.phase == phase
         if not same_phase:
@@ -269,10 +281,10 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
             failed = 1
             break
         if single and same_phase and phase != SQUEEZE and phase != HOLD:
-            advanced = LoopProgress(ticks, recorded, effort, plant, sensor, state)
+            advanced = LoopProgress(LastTick(ticks, recorded, effort), plant, sensor, state)
             advanced = run_approach_ticks(params, advanced, frame, buffers.columns, buffers.phases)
-            ticks, recorded, effort, plant, sensor, state = advanced
-    ended = LoopState(ticks, recorded, phase, tare_from, effort, failed, macro)
+            (ticks, recorded, effort), plant, sensor, state = advanced
+    ended = LoopState(LastTick(ticks, recorded, effort), LastPhase(phase, tare_from), failed, macro)
     return SimulationState(ended, plant, sensor, state)
 
 
@@ -288,7 +300,7 @@ def before_failure(
     The loop runs again up to that tick. Steps over several ticks may end elsewhere then, so that the state is near the
     one before.
     """
-    if start.loop.ticks >= failed_at - 1:
+    if start.loop.tick.ticks >= failed_at - 1:
         return start.plant
     return loop(params._replace(max_ticks=failed_at - 1), start, buffers).plant
 
@@ -297,13 +309,13 @@ def ending(state: SimulationState) -> Ending:
     """Return what is always read of a state in which the loop ended."""
     loop, controller = state.loop, state.controller
     return Ending(
-        loop.ticks,
-        loop.recorded,
-        state.sensor.images,
-        loop.failed,
-        1 if has_ended(controller) else 0,
-        controller.guard.stopped,
-        controller.law.outcome,
+        ticks=loop.tick.ticks,
+        recorded=loop.tick.recorded,
+        images=state.sensor.cells.images,
+        failed=loop.failed,
+        ended=1 if has_ended(controller) else 0,
+        stopped=controller.guard.stopped,
+        outcome=controller.law.outcome,
     )
 
 

@@ -6,17 +6,17 @@ import math
 from typing import Final
 
 from graspsense_sim_gripper.plant.sensing import SensorState, next_image_s
-from graspsense_sim_gripper.plant.state import PlantState
 from graspsense_sim_gripper.run.loop import Ahead, GraspParams, MacroControl, no_step
+from graspsense_sim_gripper.solve.events import HALF
 from graspsense_sim_gripper.solve.macro_step import (
     FIRST_TICKS,
-    HALF,
     MAX_TICKS,
     MacroStep,
     constant_values,
     macro_step,
     next_ticks,
 )
+from graspsense_sim_gripper.solve.state import PlantState
 from graspsense_sim_gripper.solve.trend import UNKNOWN
 
 SHORTEST_ERROR: Final = 8.0
@@ -42,7 +42,9 @@ def begin_macro_step(
     if params.macro_steps == 0 or most < FIRST_TICKS:
         return no_step(plant, now)
     n, event = min(now.length, most), False
-    step = MacroStep(math.inf, 0.0, plant, constant_values(plant), UNKNOWN)
+    step = MacroStep(
+        error=math.inf, event_share=0.0, after=plant, values=constant_values(plant), trend=UNKNOWN
+    )
     # In any other tick the plant has moved since the last macro-step ended.
     trend = now.trend if ticks == now.from_tick + 1 else UNKNOWN
     accepted = False

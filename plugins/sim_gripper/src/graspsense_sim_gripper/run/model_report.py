@@ -9,12 +9,12 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from graspsense_sim_gripper.plant.state import PlantState
 from graspsense_sim_gripper.run.accuracy.chosen_steps import QUANTITIES, ChosenSteps
 from graspsense_sim_gripper.run.compiled.padding import PaddedLayout
 from graspsense_sim_gripper.run.nested import TupleType, first_place, with_places
 from graspsense_sim_gripper.scene.terms.registry import find_term
 from graspsense_sim_gripper.scene.terms.term import TermState, never_beyond
+from graspsense_sim_gripper.solve.state import PlantState
 
 
 def model_report(state: PlantState, kinds: Sequence[str]) -> dict[str, Any]:

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from graspsense.plugin_api import Controller, FeatureSet
 from graspsense.simulator_api import RunConfig
 from graspsense_sim_gripper.plant.sensing import SensorParams, SensorState
-from graspsense_sim_gripper.plant.state import PlantState
 from graspsense_sim_gripper.run.drawing import image_noise
 from graspsense_sim_gripper.scene.random_numbers import key_of
 from graspsense_sim_gripper.scene.spec import TermParams
 from graspsense_sim_gripper.solve.scheme import PlantParams
+from graspsense_sim_gripper.solve.state import PlantState
 
 IMAGES_PER_BLOCK: Final = 64
 """Number of cell images whose noise is drawn at once where it is not known how many a grasp needs."""

@@ -90,7 +90,18 @@ def _linearised(setup: GraspSetup, controller: GraspController) -> Array | None:
         setup.state.motion.gap_m,
     )
     nan = math.nan
-    frame = Frame(0.0, setup.dt_s, gap_m, 0.0, 0.0, 0.0, 0.0, nan, nan, 0)
+    frame = Frame(
+        t_s=0.0,
+        dt_s=setup.dt_s,
+        gap_m=gap_m,
+        velocity_m_s=0.0,
+        effort_n=0.0,
+        force_left_n=0.0,
+        force_right_n=0.0,
+        edge_left_n=nan,
+        edge_right_n=nan,
+        status=0,
+    )
     _, state = controller.step(params, state, Reading(frame, no_pads(CELLS)))
     memory, limits = free.begin(params, state, frame)
     if limits == NOT_FREE:

@@ -8,12 +8,12 @@ from traceback import walk_tb
 from types import CodeType
 
 from graspsense.gripper_api import GraspsenseError
-from graspsense_sim_gripper.plant.state import PlantState
 from graspsense_sim_gripper.run.compiled.compose import hardens, plant_move
 from graspsense_sim_gripper.scene.terms.registry import active_laws, phases_of
 from graspsense_sim_gripper.scene.terms.switchable import Switchable
 from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS, Law, OnSum, SumLaw, TermState
 from graspsense_sim_gripper.solve.scheme import PlantParams
+from graspsense_sim_gripper.solve.state import PlantState
 
 
 class TermFailed(GraspsenseError):

@@ -145,8 +145,13 @@ class ObjectSpec:
     def spread(self) -> InstanceSpread:
         """How its instances differ."""
         return InstanceSpread(
-            *(float(self.stiffness_spread), float(self.width_m), float(self.width_spread_m)),
-            *(float(self.offset_m), float(self.offset_spread_m), float(self.share), float(self.share_spread)),
+            stiffness=float(self.stiffness_spread),
+            width_m=float(self.width_m),
+            width_spread_m=float(self.width_spread_m),
+            offset_m=float(self.offset_m),
+            offset_spread_m=float(self.offset_spread_m),
+            share=float(self.share),
+            share_spread=float(self.share_spread),
         )
 
     @cached_property

@@ -6,9 +6,9 @@ import math
 from typing import Final
 
 from graspsense.gripper_api import gap_and_rate
-from graspsense_sim_gripper.plant.contact import has_event, is_pressed, is_touched, restarted
+from graspsense_sim_gripper.plant.contact import has_event, is_pressed, restarted, with_touch
 from graspsense_sim_gripper.plant.drive import Drive, is_held
-from graspsense_sim_gripper.plant.state import Contact, Motion, PlantState, StepState
+from graspsense_sim_gripper.plant.state import Contact, Motion
 from graspsense_sim_gripper.scene.terms.phi import phi1
 from graspsense_sim_gripper.solve.coast import coast
 from graspsense_sim_gripper.solve.control import (
@@ -22,14 +22,13 @@ from graspsense_sim_gripper.solve.control import (
     next_length,
     relative_error,
 )
-from graspsense_sim_gripper.solve.events import parting, pressing
+from graspsense_sim_gripper.solve.events import HALF, event_share
 from graspsense_sim_gripper.solve.scheme import (
-    Attempt,
     PlantParams,
-    Start,
     comes_to_rest,
     start_of,
 )
+from graspsense_sim_gripper.solve.state import PlantState, StepState, with_step
 from graspsense_sim_gripper.solve.stick import stick
 from graspsense_sim_gripper.solve.verlet import verlet
 
@@ -38,8 +37,6 @@ LAG_SHARE: Final = 0.25
 MAX_LAG_PIECES: Final = 1000
 """Pieces per time constant in which the force of a drive that lags is constant: at least the first number, or the
 second over the cube root of the tolerance, since their error is of second order. The third is the most in a tick."""
-BISECTION: Final = 0.5
-"""A step that contains an event of a term is repeated with this share of its length, until it is `MIN_STEP_S` long."""
 REST_SHARE: Final = 1e-12
 """Fraction of the tick below which what is left of it is rounding."""
 
@@ -58,7 +55,9 @@ def move(params: PlantParams, state: PlantState, effort_n: float, dt: float) -> 
             decay, difference = math.exp(-h / lag), state.effort_n - effort_n
             mean = effort_n + difference * phi1(h / lag, decay)
             motion, contact, step, _, peak = state
-            state = PlantState(motion, contact, step, effort_n + difference * decay, peak)
+            state = PlantState(
+                motion=motion, contact=contact, step=step, effort_n=effort_n + difference * decay, peak_n=peak
+            )
         state = advance(params, state, mean, h)
     return state
 
@@ -108,46 +107,33 @@ def take_step(
         )
     start = start_of(params, state, effort_n)
     if comes_to_rest(start):
-        attempt = _standing(start)
+        motion1, contact1, duration = stopped(start.motion), contact, 0.0
         after_step = StepState(step.next_s, step.n_steps + 1, step.unresolved)
     else:
         attempt = verlet(params, start, effort_n, h)
-        changes = contact.touched == 1 and has_event(contact, attempt.contact)
-        duration = attempt.duration_s
+        motion1, contact1, duration = attempt.motion, attempt.contact, attempt.duration_s
+        changes = contact.touched == 1 and has_event(contact, contact1)
         if duration > MIN_STEP_S and not forced:
-            fraction = BISECTION
-            if not changes:
-                # The step ends at the other events by itself.
-                fraction = parting(params, start, attempt)
-                if fraction == 0.0:
-                    fraction = pressing(params, start, attempt)
+            fraction = HALF if changes else event_share(params, start, attempt)
             if fraction > 0.0:
-                retry = StepState(duration * fraction, step.n_steps, step.unresolved)
-                return PlantState(state.motion, contact, retry, state.effort_n, state.peak_n), 0.0
-        attempt = _without_reversal(start, attempt)
+                return with_step(state, StepState(duration * fraction, step.n_steps, step.unresolved)), 0.0
         # A step across an event of a term has an error only where the force jumps, and none that shorter steps reduce.
         error = 0.0 if changes else relative_error(steps.tolerance, start, attempt)
         growth = steps.growth
-        if not is_pressed(attempt.contact):
+        if not is_pressed(contact1):
             growth = FREE_GROWTH if steps.tolerance < math.inf else math.inf
-        accepted, after_step = accept(error, attempt.duration_s, step, growth, forced)
+        accepted, after_step = accept(error, duration, step, growth, forced)
         if not accepted:
-            return PlantState(state.motion, contact, after_step, state.effort_n, state.peak_n), 0.0
-        meets = state.motion.gap_m > start.meeting_m >= attempt.motion.gap_m
+            return with_step(state, after_step), 0.0
+        meets = state.motion.gap_m > start.meeting_m >= motion1.gap_m
         if (changes or meets) and steps.growth < math.inf:
             after_step = after_contact(steps, after_step)
         elif changes:
             # The force is still that of the law before the event; a step this short takes over the one after it.
             after_step = StepState(MIN_CONTACT_STEP_S, after_step.n_steps, after_step.unresolved)
         if changes:
-            attempt = _after_event(attempt)
-    return completed(params, state, start, attempt, after_step), attempt.duration_s
-
-
-def _after_event(attempt: Attempt) -> Attempt:
-    """Return the attempt for the steps after an event of a term."""
-    motion, contact, duration, speed_error, force_error = attempt
-    return Attempt(motion, restarted(contact), duration, speed_error, force_error)
+            contact1 = restarted(contact1)
+    return completed(params, state, motion1, contact1, after_step, start.reach_m), duration
 
 
 def rests(drive: Drive, state: PlantState, effort_n: float) -> bool:
@@ -155,39 +141,25 @@ def rests(drive: Drive, state: PlantState, effort_n: float) -> bool:
     return state.contact.touched == 0 and is_held(drive, state.motion, state.contact, effort_n)
 
 
-def _standing(start: Start) -> Attempt:
-    """Return an attempt of no duration: the start of the step, at rest."""
-    revolutions, _, gap, jacobian = start.motion
-    return Attempt(Motion(revolutions, 0.0, gap, jacobian), start.contact, 0.0, 0.0, 0.0)
-
-
-def _without_reversal(start: Start, attempt: Attempt) -> Attempt:
-    """Return the attempt with speed zero if the motion has reversed, because friction changes its sign there."""
-    revolutions, speed, gap, jacobian = attempt.motion
-    if speed * start.direction > 0.0:
-        return attempt
-    motion = Motion(revolutions, 0.0, gap, jacobian)
-    return Attempt(
-        motion, attempt.contact, attempt.duration_s, attempt.speed_error_m_s, attempt.force_error_n
-    )
+def stopped(motion: Motion) -> Motion:
+    """Return the same position, at rest."""
+    return Motion(motion.revolutions, 0.0, motion.gap_m, motion.jacobian_m_rev)
 
 
 def completed(
-    params: PlantParams, state: PlantState, start: Start, attempt: Attempt, step: StepState
+    params: PlantParams, state: PlantState, motion: Motion, contact: Contact, step: StepState, reach_m: float
 ) -> PlantState:
-    """Return the plant after an accepted step, with the contact, the peak and the ends of travel brought up to date."""
+    """Return the plant after a step from `state`, with the contact, the peak and the ends of travel brought up to date.
+
+    `reach_m`: the gap at which the nearer finger touched the object before the step.
+    """
     drive, peak = params.drive, state.peak_n
-    motion, contact = attempt.motion, attempt.contact
     revolutions, speed, gap, _ = motion
-    left, right, touched = contact.left, contact.right, contact.touched
-    if touched == 1 or gap <= start.reach_m:
-        touched = is_touched(contact, gap, start.reach_m)
+    if contact.touched == 1 or gap <= reach_m:
+        contact = with_touch(contact, gap, reach_m)
         peak = max(peak, contact.left_n, contact.right_n)
-    if touched != contact.touched:
-        left_n, right_n, offset, _, _, _, pending, unbalanced = contact
-        contact = Contact(left_n, right_n, offset, touched, left, right, pending, unbalanced)
     if (revolutions >= drive.open_rev and speed >= 0.0) or (revolutions <= drive.closed_rev and speed <= 0.0):
         end = drive.open_rev if revolutions >= drive.open_rev else drive.closed_rev
         gap, jacobian = gap_and_rate(drive.link, end)
         motion = Motion(end, 0.0, gap, jacobian)
-    return PlantState(motion, contact, step, state.effort_n, peak)
+    return PlantState(motion=motion, contact=contact, step=step, effort_n=state.effort_n, peak_n=peak)

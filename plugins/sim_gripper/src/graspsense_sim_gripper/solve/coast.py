@@ -11,10 +11,11 @@ from __future__ import annotations
 from typing import Final
 
 from graspsense.gripper_api import gap_and_rate
-from graspsense_sim_gripper.plant.contact import ObjectModel, offset_of_pushed
+from graspsense_sim_gripper.plant.contact import ObjectModel, offset_of_pushed, with_forces_of
 from graspsense_sim_gripper.plant.drive import ARREST_M_S, is_held, stribeck_excess
-from graspsense_sim_gripper.plant.state import Contact, Motion, PlantState, StepState, right_of
+from graspsense_sim_gripper.plant.state import Contact, Motion, right_of
 from graspsense_sim_gripper.solve.scheme import SPEED_SCALE_M_S, PlantParams
+from graspsense_sim_gripper.solve.state import PlantState, StepState
 
 SHAPE_SCALE_M: Final = 1e-3
 """The change of a released object's shape is relative to its compression, or to this where that is smaller."""
@@ -28,7 +29,13 @@ def coast(params: PlantParams, state: PlantState, effort_n: float, h: float) -> 
     _, _, (next_s, n_steps, unresolved), given, peak = state
     if state.motion.speed_rev_s != 0.0:
         n_steps += 1
-    return True, PlantState(motion, contact, StepState(next_s, n_steps, unresolved), given, peak)
+    return True, PlantState(
+        motion=motion,
+        contact=contact,
+        step=StepState(next_s, n_steps, unresolved),
+        effort_n=given,
+        peak_n=peak,
+    )
 
 
 def _glide(
@@ -40,9 +47,9 @@ def _glide(
     """
     if motion.speed_rev_s == 0.0:
         return _rested(params, motion, contact, effort_n, h)
-    touched, pending = contact.touched, 0.0
+    pending = 0.0
     reach = params.object.width_m + 2.0 * abs(contact.offset_m)
-    if touched == 1:
+    if contact.touched == 1:
         coasts, reach, pending = _free_until(params, contact, motion, h)
         if not coasts:
             return False, motion, contact
@@ -50,12 +57,12 @@ def _glide(
     coasts, motion1 = _coasted(params, motion, load, effort_n, h)
     if not coasts or motion1.gap_m <= reach:
         return False, motion, contact
-    if touched == 1:
-        left_n, right_n, offset, _, left, right, _, unbalanced = contact
+    if contact.touched == 1:
+        offset = contact.offset_m
         if load > 0.0:
             # The finger pushes the object towards the middle.
             offset = offset_of_pushed(offset, 0.5 * (motion1.gap_m - reach))
-        contact = Contact(left_n, right_n, offset, touched, left, right, pending, unbalanced)
+        contact = with_forces_of(contact, offset, pending)
     return True, motion1, contact
 
 
@@ -67,11 +74,10 @@ def _rested(
         return False, motion, contact
     if contact.touched == 0:
         return True, motion, contact
-    left_n, right_n, offset, touched, left, right, _, unbalanced = contact
-    if left_n + right_n > 0.0:
+    if contact.left_n + contact.right_n > 0.0:
         return False, motion, contact
     recovers, _, pending = _free_until(params, contact, motion, h)
-    return recovers, motion, Contact(left_n, right_n, offset, touched, left, right, pending, unbalanced)
+    return recovers, motion, with_forces_of(contact, contact.offset_m, pending)
 
 
 def _free_until(params: PlantParams, contact: Contact, motion: Motion, h: float) -> tuple[bool, float, float]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from graspsense_sim_gripper.plant.state import StepState
 from graspsense_sim_gripper.solve.scheme import (
     FORCE_SCALE_N,
     SPEED_SCALE_M_S,
@@ -17,6 +16,7 @@ from graspsense_sim_gripper.solve.scheme import (
     Start,
     Steps,
 )
+from graspsense_sim_gripper.solve.state import StepState
 
 SAFETY: Final = 0.9
 """Factor on the step whose error would be the tolerance."""

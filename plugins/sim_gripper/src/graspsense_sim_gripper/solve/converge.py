@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Final
 
-from graspsense_sim_gripper.plant.state import PlantState, StepState, right_of
+from graspsense_sim_gripper.plant.state import right_of
 from graspsense_sim_gripper.solve.advance import rests, take_steps
 from graspsense_sim_gripper.solve.coast import SHAPE_SCALE_M, coast
 from graspsense_sim_gripper.solve.control import MAX_STEPS, fits_a_step
 from graspsense_sim_gripper.solve.scheme import FORCE_SCALE_N, SPEED_SCALE_M_S, PlantParams, Steps
+from graspsense_sim_gripper.solve.state import PlantState, StepState, with_step
 
 MAX_HALVINGS: Final = 4
 """Halvings after which a change of `LOOSE` times the tolerance is accepted too."""
@@ -56,9 +57,7 @@ def refine_until_converged(params: PlantParams, state: PlantState, effort_n: flo
 def _unresolved(state: PlantState) -> PlantState:
     """Return the plant after a tick that has not converged."""
     next_s, n, unresolved = state.step
-    return PlantState(
-        state.motion, state.contact, StepState(next_s, n, unresolved + 1), state.effort_n, state.peak_n
-    )
+    return with_step(state, StepState(next_s, n, unresolved + 1))
 
 
 def _alike(coarser: PlantState, finer: PlantState, share: float) -> bool:
@@ -84,10 +83,10 @@ def _alike(coarser: PlantState, finer: PlantState, share: float) -> bool:
 def _halved(steps: Steps, dt: float) -> Steps:
     """Return steps of half the length, also where the end of the tick `dt` cut them."""
     return Steps(
-        max(ERROR_RATIO * steps.tolerance, min(steps.tolerance, MIN_TOLERANCE)),
-        0.5 * min(steps.longest_s, dt),
-        steps.settle,
-        1.0 + 0.5 * (steps.growth - 1.0),
-        0.5 * min(steps.longest_touched_s, dt),
-        0.0,
+        tolerance=max(ERROR_RATIO * steps.tolerance, min(steps.tolerance, MIN_TOLERANCE)),
+        longest_s=0.5 * min(steps.longest_s, dt),
+        settle=steps.settle,
+        growth=1.0 + 0.5 * (steps.growth - 1.0),
+        longest_touched_s=0.5 * min(steps.longest_touched_s, dt),
+        macro_tolerance=0.0,
     )

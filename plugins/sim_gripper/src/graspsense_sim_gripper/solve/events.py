@@ -1,7 +1,14 @@
 """Events that end a step: a contact, an end of the travel, a reversal, the release of the object, a contact after it.
 
-The equation of motion changes at an event, so no step goes beyond it. The path of a Verlet step is known in advance,
-and it ends at the event (`drift`). For a macro-step, `event_share` returns the fraction of it at which the event lies.
+The equation of motion changes at an event, so no step goes beyond it. An event is a quantity that passes zero in one
+direction. How it is located depends on what is known of the path:
+
+- The path of a Verlet step is known in advance, so it ends at the first three (`drift`).
+- Of other paths both ends are known: the step is repeated up to where the secants through them say (`event_share`).
+- An event of a term is the change of a whole number, which says nothing of how near it is. A step that contains one is
+  repeated with half of its length. Where the motion of the fingers is given, bisection finds it (`until_event`).
+
+When held fingers slip depends on forces alone (`stick`).
 """
 
 from __future__ import annotations
@@ -9,10 +16,10 @@ from __future__ import annotations
 from typing import Final
 
 from graspsense.gripper_api import gap_and_rate
-from graspsense_sim_gripper.plant.contact import CONTACT_TOL_M
+from graspsense_sim_gripper.plant.contact import CONTACT_TOL_M, ObjectModel, has_event, pad_forces, restarted
 from graspsense_sim_gripper.plant.drive import ARREST_M_S
-from graspsense_sim_gripper.plant.state import ContactState, Motion, right_of
-from graspsense_sim_gripper.solve.control import contact_step_s
+from graspsense_sim_gripper.plant.state import Contact, ContactState, Motion, right_of
+from graspsense_sim_gripper.solve.control import MIN_STEP_S, contact_step_s
 from graspsense_sim_gripper.solve.scheme import Attempt, PlantParams, Start, end_of_travel
 
 NEWTON_ITERATIONS: Final = 4
@@ -20,6 +27,8 @@ NEWTON_ITERATIONS: Final = 4
 MIN_FRACTION: Final = 0.01
 MAX_FRACTION: Final = 0.99
 """A repeated step is shorter by at least a hundredth, and no shorter than a hundredth."""
+HALF: Final = 0.5
+"""The share of a step after which an event is assumed that is only known to be in it."""
 
 
 def drift(params: PlantParams, start: Start, h: float) -> tuple[Motion, float]:
@@ -52,76 +61,87 @@ def drift(params: PlantParams, start: Start, h: float) -> tuple[Motion, float]:
 
 
 def event_share(params: PlantParams, start: Start, attempt: Attempt) -> float:
-    """Return the fraction of a macro-step at which an event lies, by the secant; 0 if there is none."""
+    """Return the fraction of a step at which its first event lies, by the secant; 0 if there is none.
+
+    Events of terms are not among them.
+    """
     revolutions, speed, gap, jacobian = start.motion
     revolutions1, speed1, gap1, jacobian1 = attempt.motion
-    direction, meeting = start.direction, start.meeting_m
+    contact, contact1 = start.contact, attempt.contact
+    direction, meeting, model = start.direction, start.meeting_m, params.object
     end = end_of_travel(params.drive, direction)
-    fraction = 0.0
+    share = 1.0
     if gap > meeting and gap1 < meeting - CONTACT_TOL_M:
-        fraction = (gap - meeting) / (gap - gap1)
-    elif (revolutions1 - end) * direction * abs(jacobian) > CONTACT_TOL_M:
-        fraction = (end - revolutions) / (revolutions1 - revolutions)
-    elif speed1 * direction < 0.0 and speed != 0.0 and abs(speed1 * jacobian1) >= ARREST_M_S:
-        fraction = abs(speed) / (abs(speed) + abs(speed1))
-    return min(max(fraction, MIN_FRACTION), MAX_FRACTION) if fraction > 0.0 else 0.0
+        share = min(share, _limited((gap - meeting) / (gap - gap1)))
+    if (revolutions1 - end) * direction * abs(jacobian) > CONTACT_TOL_M:
+        share = min(share, _limited((end - revolutions) / (revolutions1 - revolutions)))
+    if speed1 * direction < 0.0 and speed != 0.0 and abs(speed1 * jacobian1) >= ARREST_M_S:
+        share = min(share, _limited(abs(speed) / (abs(speed) + abs(speed1))))
+    if contact.touched == 1 and gap1 != gap:
+        shift = 2.0 * contact.offset_m if model.held == 1 else 0.0
+        left, left1 = contact.left, contact1.left
+        share = min(share, _share_of_half(params, start, attempt, left, left1, shift))
+        if model.held == 1:
+            right, right1 = right_of(left, contact.right), right_of(left1, contact1.right)
+            share = min(share, _share_of_half(params, start, attempt, right, right1, -shift))
+    return share if share < 1.0 else 0.0
 
 
-def parting(params: PlantParams, start: Start, attempt: Attempt) -> float:
-    """Return the fraction of a step at which a finger leaves the object that it pressed, 0 if none does.
+def _limited(share: float) -> float:
+    return min(max(share, MIN_FRACTION), MAX_FRACTION)
 
-    Beyond the end of the recovering object nothing drives the fingers.
+
+def _share_of_half(
+    params: PlantParams,
+    start: Start,
+    attempt: Attempt,
+    half: ContactState,
+    half1: ContactState,
+    shift_m: float,
+) -> float:
+    """Return the fraction of a step at which a finger leaves the object that it pressed, or presses it again.
+
+    1 if it does neither. `shift_m`: by how much wider the fingers stand where the finger touches its half, as the
+    object does not stand in the middle.
     """
-    gap, gap1 = start.motion.gap_m, attempt.motion.gap_m
-    if gap1 <= gap:
-        return 0.0
-    contact0, contact1 = start.contact, attempt.contact
-    left = contact0.left.force_n > 0.0 and contact1.left.force_n == 0.0
-    right = (
-        right_of(contact0.left, contact0.right).force_n > 0.0
-        and right_of(contact1.left, contact1.right).force_n == 0.0
-    )
-    if not (left or right):
-        return 0.0
-    model = params.object
-    shift = 2.0 * contact1.offset_m if model.held == 1 else 0.0
-    beyond = _gap_beyond(contact1.left, gap1 - model.width_m + shift) if left else 0.0
-    if right:
-        beyond = max(
-            beyond, _gap_beyond(right_of(contact1.left, contact1.right), gap1 - model.width_m - shift)
-        )
-    if beyond <= CONTACT_TOL_M:
-        return 0.0
-    return min(max(1.0 - beyond / (gap1 - gap), MIN_FRACTION), MAX_FRACTION)
-
-
-def pressing(params: PlantParams, start: Start, attempt: Attempt) -> float:
-    """Return the fraction of a step at which a finger presses an object again that has not recovered its shape.
-
-    0 if none does. A step that begins at this contact is the first after it, and no longer than that.
-    """
-    gap, gap1 = start.motion.gap_m, attempt.motion.gap_m
-    contact0, contact1 = start.contact, attempt.contact
-    if contact0.touched == 0 or gap1 >= gap:
-        return 0.0
-    right0, right1 = right_of(contact0.left, contact0.right), right_of(contact1.left, contact1.right)
-    left = contact0.left.force_n <= 0.0 < contact1.left.force_n
-    right = right0.force_n <= 0.0 < right1.force_n
-    if not (left or right):
-        return 0.0
-    model, h = params.object, attempt.duration_s
-    shift = 2.0 * contact0.offset_m if model.held == 1 else 0.0
-    half = contact0.left if left else right0
-    apart = _gap_beyond(half, gap - model.width_m + (shift if left else -shift))
-    if apart <= CONTACT_TOL_M:
-        first_s = contact_step_s(params.steps)
-        return first_s / h if first_s < h else 0.0
-    # The end of the object comes towards the finger as it recovers.
-    closing = gap - gap1 - h * half.past.rate_m_s
-    return min(max(apart / max(closing, apart), MIN_FRACTION), MAX_FRACTION)
+    gap, gap1, width = start.motion.gap_m, attempt.motion.gap_m, params.object.width_m
+    if gap1 > gap and half.force_n > 0.0 and half1.force_n == 0.0:
+        # Beyond the end of the recovering object nothing drives the fingers.
+        beyond = _gap_beyond(half1, gap1 - width + shift_m)
+        if beyond > CONTACT_TOL_M:
+            return _limited(1.0 - beyond / (gap1 - gap))
+    if gap1 < gap and half.force_n <= 0.0 < half1.force_n:
+        apart = _gap_beyond(half, gap - width + shift_m)
+        if apart <= CONTACT_TOL_M:
+            # A step that begins at this contact is the first after it, and no longer than that.
+            return contact_step_s(params.steps) / attempt.duration_s
+        # The end of an object that has not recovered its shape comes towards the finger as it recovers.
+        closing = gap - gap1 - attempt.duration_s * half.past.rate_m_s
+        return _limited(apart / max(closing, apart))
+    return 1.0
 
 
 def _gap_beyond(half: ContactState, opened_m: float) -> float:
     """Return by how much (m) the fingers have opened beyond the end of this half, when they are `opened_m` wider than
     the unloaded object."""
     return opened_m + half.compression_m + half.pad_m
+
+
+def until_event(
+    model: ObjectModel, contact: Contact, gap_m: float, speed_m_s: float, h: float, still: bool
+) -> tuple[float, Contact]:
+    """Return the time within `h` at which a term has its event, and the contact then.
+
+    The fingers close from `gap_m` at this constant speed; `still`: it is 0. A compiler that knows it leaves much out.
+    """
+    lower, upper = 0.0, h
+    while upper - lower > MIN_STEP_S:
+        middle = 0.5 * (lower + upper)
+        if has_event(
+            contact, pad_forces(model, contact, gap_m - speed_m_s * middle, speed_m_s, middle, still)
+        ):
+            upper = middle
+        else:
+            lower = middle
+    after = pad_forces(model, contact, gap_m - speed_m_s * upper, speed_m_s, upper, still)
+    return upper, restarted(after)

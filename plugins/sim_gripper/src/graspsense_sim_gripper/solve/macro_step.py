@@ -14,14 +14,7 @@ from typing import Final, NamedTuple
 from graspsense.gripper_api import gap_and_rate
 from graspsense_sim_gripper.plant.contact import ObjectModel, has_event, pad_forces
 from graspsense_sim_gripper.plant.drive import Drive, acceleration, is_held, sliding_friction
-from graspsense_sim_gripper.plant.state import (
-    Contact,
-    Motion,
-    PlantReadings,
-    PlantState,
-    StepState,
-    right_of,
-)
+from graspsense_sim_gripper.plant.state import Contact, Motion, PlantReadings, right_of
 from graspsense_sim_gripper.solve.advance import completed, rests
 from graspsense_sim_gripper.solve.coast import coast
 from graspsense_sim_gripper.solve.control import (
@@ -30,7 +23,7 @@ from graspsense_sim_gripper.solve.control import (
     SMALL_ERROR,
     relative_error,
 )
-from graspsense_sim_gripper.solve.events import event_share, parting
+from graspsense_sim_gripper.solve.events import HALF, event_share
 from graspsense_sim_gripper.solve.polynomial import Cubic, derivative, hermite, parabola, value
 from graspsense_sim_gripper.solve.scheme import (
     FORCE_SCALE_N,
@@ -42,6 +35,7 @@ from graspsense_sim_gripper.solve.scheme import (
     comes_to_rest,
     start_of,
 )
+from graspsense_sim_gripper.solve.state import PlantState, StepState
 from graspsense_sim_gripper.solve.stick import stick
 from graspsense_sim_gripper.solve.trend import (
     UNKNOWN,
@@ -62,8 +56,6 @@ GROWTH: Final = 4.0
 """Largest ratio of successive macro-steps."""
 EXPONENT: Final = -0.25
 """The error of a macro-step with a trend is proportional to the fourth power of its length."""
-HALF: Final = 0.5
-"""The share of a step after which an event is assumed that is only known to be in it."""
 
 
 class DenseOutput(NamedTuple):
@@ -98,7 +90,9 @@ def macro_step(params: PlantParams, state: PlantState, effort_n: float, h: float
         error, share, middle, after = _rested(params, state, effort_n, h)
     elif not _too_long(params, state, h):
         error, share, middle, after, later = _moved(params, state, effort_n, h, trend)
-    return MacroStep(error, share, after, dense_output(state, middle, after, h), later)
+    return MacroStep(
+        error=error, event_share=share, after=after, values=dense_output(state, middle, after, h), trend=later
+    )
 
 
 def _too_long(params: PlantParams, state: PlantState, h: float) -> bool:
@@ -145,7 +139,14 @@ def _moved(
         # A released object that recovers its shape, which is computed later, or one that a finger pushes.
         scale = max(abs(motion.speed_rev_s * motion.jacobian_m_rev) / SPEED_SCALE_M_S, 1.0)
         # All values are given: with defaults, `coast` would be compiled twice.
-        limits = Steps(scale * steps.macro_tolerance, math.inf, 0.0, math.inf, math.inf, 0.0)
+        limits = Steps(
+            tolerance=scale * steps.macro_tolerance,
+            longest_s=math.inf,
+            settle=0.0,
+            growth=math.inf,
+            longest_touched_s=math.inf,
+            macro_tolerance=0.0,
+        )
         coasting = PlantParams(drive, model, limits)
         coasts, after = coast(coasting, state, effort_n, h)
         if coasts or contact.left_n + contact.right_n > 0.0:
@@ -169,12 +170,18 @@ def _moved(
     speed_end = speed + h * (rate + 4.0 * rate1 + rate2) / 6.0
     motion2, rates = Motion(revolutions2, speed_end, gap2, jacobian2), (rate, rate1, rate2)
     off = errors(trend, change, rates, h)
-    attempt = Attempt(motion2, end, h, off.speed * abs(jacobian), force_error(start, motion2, end, off.angle))
+    attempt = Attempt(
+        motion=motion2,
+        contact=end,
+        duration_s=h,
+        speed_error_m_s=off.speed * abs(jacobian),
+        force_error_n=force_error(start, motion2, end, off.angle),
+    )
     share = _event_share(params, start, middle, attempt)
     if share > 0.0:
         return math.inf, share, contact, state, UNKNOWN
     next_s, n_steps, unresolved = state.step
-    after = completed(params, state, start, attempt, StepState(next_s, n_steps + 1, unresolved))
+    after = completed(params, state, motion2, end, StepState(next_s, n_steps + 1, unresolved), start.reach_m)
     error = relative_error(params.steps.macro_tolerance, start, attempt)
     return error, HALF, middle, after, trend_at_end(rates, h)
 
@@ -213,9 +220,7 @@ def _event_share(params: PlantParams, start: Start, middle: Contact, attempt: At
     contact0, contact1 = start.contact, attempt.contact
     if _has_event(contact0, middle) or _has_event(contact0, contact1):
         return HALF
-    share = parting(params, start, attempt)
-    if share == 0.0:
-        share = event_share(params, start, attempt)
+    share = event_share(params, start, attempt)
     if share == 0.0 and (
         attempt.motion.speed_rev_s * start.direction <= 0.0
         or start.motion.gap_m > start.meeting_m >= attempt.motion.gap_m
@@ -254,12 +259,12 @@ def dense_output(state0: PlantState, middle: Contact, state1: PlantState, h: flo
     revolutions1, speed1, gap1, jacobian1 = state1.motion
     contact, contact1 = state0.contact, state1.contact
     return DenseOutput(
-        h,
-        hermite(revolutions, revolutions1, h * speed, h * speed1),
-        hermite(gap, gap1, h * speed * jacobian, h * speed1 * jacobian1),
-        Cubic(jacobian, jacobian1 - jacobian, 0.0, 0.0),
-        parabola(contact.left_n, middle.left_n, contact1.left_n),
-        parabola(contact.right_n, middle.right_n, contact1.right_n),
+        duration_s=h,
+        revolutions=hermite(revolutions, revolutions1, h * speed, h * speed1),
+        gap_m=hermite(gap, gap1, h * speed * jacobian, h * speed1 * jacobian1),
+        jacobian_m_rev=Cubic(jacobian, jacobian1 - jacobian, 0.0, 0.0),
+        left_n=parabola(contact.left_n, middle.left_n, contact1.left_n),
+        right_n=parabola(contact.right_n, middle.right_n, contact1.right_n),
     )
 
 
@@ -271,7 +276,9 @@ def constant_values(state: PlantState) -> DenseOutput:
 def with_peak(state: PlantState, peak_n: float) -> PlantState:
     """Return the same state, in which the largest force on a pad so far was at least this."""
     peak_n = max(state.peak_n, peak_n)
-    return PlantState(state.motion, state.contact, state.step, state.effort_n, peak_n)
+    return PlantState(
+        motion=state.motion, contact=state.contact, step=state.step, effort_n=state.effort_n, peak_n=peak_n
+    )
 
 
 def held_at_once(model: PlantParams, plant: PlantState) -> PlantParams:
@@ -279,7 +286,18 @@ def held_at_once(model: PlantParams, plant: PlantState) -> PlantParams:
     drive, body, (tolerance, longest_s, settle, growth, touched_s, macro_tolerance) = model
     if plant.motion.speed_rev_s == 0.0:
         longest_s = math.inf
-    return PlantParams(drive, body, Steps(tolerance, longest_s, settle, growth, touched_s, macro_tolerance))
+    return PlantParams(
+        drive,
+        body,
+        Steps(
+            tolerance=tolerance,
+            longest_s=longest_s,
+            settle=settle,
+            growth=growth,
+            longest_touched_s=touched_s,
+            macro_tolerance=macro_tolerance,
+        ),
+    )
 
 
 def values_at(dense: DenseOutput, s: float) -> PlantReadings:

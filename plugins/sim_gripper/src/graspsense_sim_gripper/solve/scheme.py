@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from graspsense_sim_gripper.plant.contact import ObjectModel
+from graspsense_sim_gripper.plant.contact import ObjectModel, next_contacts
 from graspsense_sim_gripper.plant.drive import (
     ARREST_M_S,
     Drive,
@@ -14,7 +14,8 @@ from graspsense_sim_gripper.plant.drive import (
     load_at_rest,
     sliding_friction,
 )
-from graspsense_sim_gripper.plant.state import Contact, Motion, PlantState
+from graspsense_sim_gripper.plant.state import Contact, Motion
+from graspsense_sim_gripper.solve.state import PlantState
 
 SPEED_SCALE_M_S: Final = 1e-3
 FORCE_SCALE_N: Final = 1.0
@@ -90,10 +91,15 @@ def start_of(params: PlantParams, state: PlantState, effort_n: float) -> Start:
         direction = 1.0 if speed > 0.0 else -1.0
         friction_n = sliding_friction(drive.friction, speed * jacobian, load)
     rate = acceleration(drive, jacobian, speed, net, friction_n, direction)
-    offset = 2.0 * abs(contact.offset_m)
-    reach = model.width_m + offset
-    meeting = reach if gap > reach else model.width_m - (offset if model.held == 1 else 0.0)
-    return Start(motion, contact, direction, rate, reach, meeting)
+    reach, meeting = next_contacts(model, contact, gap)
+    return Start(
+        motion=motion,
+        contact=contact,
+        direction=direction,
+        acceleration=rate,
+        reach_m=reach,
+        meeting_m=meeting,
+    )
 
 
 def comes_to_rest(start: Start) -> bool:

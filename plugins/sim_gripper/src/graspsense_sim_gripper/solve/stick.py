@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import Final
 
-from graspsense_sim_gripper.plant.contact import has_event, pad_forces, restarted
+from graspsense_sim_gripper.plant.contact import has_event, pad_forces
 from graspsense_sim_gripper.plant.drive import breakaway_friction, load_at_rest
-from graspsense_sim_gripper.plant.state import Contact, Motion, PlantState, right_of
+from graspsense_sim_gripper.plant.state import Contact, Motion, right_of
 from graspsense_sim_gripper.solve.control import MIN_STEP_S
+from graspsense_sim_gripper.solve.events import until_event
 from graspsense_sim_gripper.solve.scheme import PlantParams
+from graspsense_sim_gripper.solve.state import PlantState
 
 SLIP_ITERATIONS: Final = 6
 SLIP_TOL_N: Final = 1e-6
@@ -36,28 +38,25 @@ def stick(params: PlantParams, state: PlantState, effort_n: float, h: float) -> 
             break
         t = max(t * (margin + SLIP_AIM_N) / (margin - margin1), min(t, MIN_STEP_S))
     if has_event(contact, after):
-        t, after = _until_event(params, contact, gap, t)
+        t, after = until_event(params.object, contact, gap, 0.0, t, True)
     if after.left.force_n == 0.0 and right_of(after.left, after.right).force_n == 0.0:
         after = _against_table(after, 2.0 * max(effort_n, 0.0))
     peak = max(peak, after.left_n, after.right_n)
-    return PlantState(Motion(revolutions, 0.0, gap, jacobian), after, step, given, peak), t
+    return PlantState(
+        motion=Motion(revolutions, 0.0, gap, jacobian), contact=after, step=step, effort_n=given, peak_n=peak
+    ), t
 
 
 def _against_table(contact: Contact, most_n: float) -> Contact:
     """Return the contact of an object that a finger presses against the table with at most this force."""
     left_n, right_n, offset, touched, left, right, pending, unbalanced = contact
     return Contact(
-        min(left_n, most_n), min(right_n, most_n), offset, touched, left, right, pending, unbalanced
+        left_n=min(left_n, most_n),
+        right_n=min(right_n, most_n),
+        offset_m=offset,
+        touched=touched,
+        left=left,
+        right=right,
+        pending_s=pending,
+        unbalanced=unbalanced,
     )
-
-
-def _until_event(params: PlantParams, contact: Contact, gap_m: float, h: float) -> tuple[float, Contact]:
-    """Return the time within `h` at which a term has an event while the fingers stand still, and the contact then."""
-    lower, upper = 0.0, h
-    while upper - lower > MIN_STEP_S:
-        middle = 0.5 * (lower + upper)
-        if has_event(contact, pad_forces(params.object, contact, gap_m, 0.0, middle, True)):
-            upper = middle
-        else:
-            lower = middle
-    return upper, restarted(pad_forces(params.object, contact, gap_m, 0.0, upper, True))

@@ -22,7 +22,7 @@ SEARCH_ROUNDING: Final = 4.0
 
 
 def verlet(params: PlantParams, start: Start, effort_n: float, h: float) -> Attempt:
-    """Return the state after a step of `h`, or at the first event within it."""
+    """Return the state after a step of `h`, or at the first event within it; a motion that reverses ends at rest."""
     drive = params.drive
     _, speed, _, _ = start.motion
     drifted, t = drift(params, start, h)
@@ -39,11 +39,16 @@ def verlet(params: PlantParams, start: Start, effort_n: float, h: float) -> Atte
         # The force of the contact belongs to the next step.
         rate1 = start.acceleration
     speed1 = speed + 0.5 * t * (start.acceleration + rate1)
+    speed_error = force_error = 0.0
+    if params.steps.tolerance < math.inf:
+        speed_error, force_error = _errors(params, start, contact1, rate1, speed1, t)
+    if not speed1 * start.direction > 0.0:
+        # The motion has reversed, and friction changes its sign there.
+        speed1 = 0.0
     motion1 = Motion(revolutions1, speed1, gap1, jacobian1)
-    if params.steps.tolerance == math.inf:
-        return Attempt(motion1, contact1, t, 0.0, 0.0)
-    speed_error, force_error = _errors(params, start, contact1, rate1, speed1, t)
-    return Attempt(motion1, contact1, t, speed_error, force_error)
+    return Attempt(
+        motion=motion1, contact=contact1, duration_s=t, speed_error_m_s=speed_error, force_error_n=force_error
+    )
 
 
 def _errors(

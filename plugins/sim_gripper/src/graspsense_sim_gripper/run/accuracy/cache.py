@@ -78,7 +78,12 @@ class ChosenStepsCache:
         spec = problem.spec
         features = _features_content(controller.features)
         return Key(
-            problem.model_config, spec.kinds, spec.content, controller.step, controller.content, features
+            config=problem.model_config,
+            kinds=spec.kinds,
+            spec=spec.content,
+            step=controller.step,
+            controller=controller.content,
+            features=features,
         )
 
     def get(self, key: Key) -> ChosenSteps | None:

@@ -68,9 +68,9 @@ def grip_of(problem: Problem, force_n: float | None = None, speed_m_s: float | N
         drive.link, revolutions_at(drive.link, min(max(model.width_m, 0.0), config.open_gap_m))
     )
     return Grip(
-        force,
-        config.expected_speed_m_s or speed_m_s or SPEED_M_S,
-        drive.inertia / (jacobian * jacobian),
-        largest,
-        touch.force_n / FIRST_M,
+        force_n=force,
+        speed_m_s=config.expected_speed_m_s or speed_m_s or SPEED_M_S,
+        mass_kg=drive.inertia / (jacobian * jacobian),
+        stiffness_n_m=largest,
+        touch_n_m=touch.force_n / FIRST_M,
     )

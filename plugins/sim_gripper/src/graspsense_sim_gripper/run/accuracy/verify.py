@@ -26,7 +26,7 @@ from graspsense.simulator_api import (
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.fingertip import CELLS
 from graspsense_sim_gripper.plant.sensing import PadBuffers
-from graspsense_sim_gripper.plant.state import Motion, PlantState
+from graspsense_sim_gripper.plant.state import Motion
 from graspsense_sim_gripper.run.accuracy.chosen_steps import ChosenSteps
 from graspsense_sim_gripper.run.accuracy.error import SCALES, UNIT_SCALES, GraspRecord
 from graspsense_sim_gripper.run.accuracy.own_features import OwnFeatures, beyond, own_features
@@ -49,6 +49,7 @@ from graspsense_sim_gripper.run.loop import (
 from graspsense_sim_gripper.run.problem import GraspController, GraspSetup
 from graspsense_sim_gripper.run.term_failure import TermFailed, not_finite_in_tick
 from graspsense_sim_gripper.scene.terms.switchable import switched_off
+from graspsense_sim_gripper.solve.state import PlantState
 
 _LOG: Final = logging.getLogger(__name__)
 MAX_SECONDS: Final = 40.0
@@ -173,40 +174,41 @@ class TrialGrasps:
         composed = composition(made.kinds, made.plant)
         loop = self._loops.loop_of(composed) if self.compiled else grasp_loop(composed, self.controller.step)
         params = GraspParams(
-            made.plant,
-            made.sensor,
-            self.params_near if self.near else self.params,
-            setup.dt_s,
-            most,
+            plant=made.plant,
+            sensor=made.sensor,
+            controller=self.params_near if self.near else self.params,
+            dt_s=setup.dt_s,
+            max_ticks=most,
             macro_steps=uses_macro_steps(made.plant.steps),
         )
         plant = _near(made) if self.near else made.state
         controller = first_state(self.controller.controller.init())
         progress = SimulationState(NOT_STARTED, plant, made.sensor_state, controller)
         pads, rows = _ideal_buffers(self.compiled), []
-        while not has_ended(progress.controller) and progress.loop.ticks < most:
+        while not has_ended(progress.controller) and progress.loop.tick.ticks < most:
             table: Any = np.zeros((len(COLUMNS), CAPACITY + ROWS_AT_ONCE))
             phases: Any = np.zeros(CAPACITY + ROWS_AT_ONCE, np.int64)
             if not self.compiled:
                 table, phases = table.tolist(), phases.tolist()
-            start, written = (
-                progress._replace(loop=progress.loop._replace(recorded=0)),
-                Buffers(*pads, table, phases),
-            )
+            last = progress.loop.tick._replace(recorded=0)
+            start = progress._replace(loop=progress.loop._replace(tick=last))
+            written = Buffers(*pads, table, phases)
             progress = loop(params, start, written)
             if progress.loop.failed == 1:
-                last_plant = before_failure(loop, params, start, written, progress.loop.ticks)
+                last_plant = before_failure(loop, params, start, written, progress.loop.tick.ticks)
                 raise TermFailed(
-                    not_finite_in_tick(made.kinds, made.plant, last_plant, progress.loop.effort_n, setup.dt_s)
+                    not_finite_in_tick(
+                        made.kinds, made.plant, last_plant, progress.loop.tick.effort_n, setup.dt_s
+                    )
                 )
-            n = progress.loop.recorded
+            n = progress.loop.tick.recorded
             rows.append(np.vstack((np.asarray(table)[:, :n], np.asarray(phases)[:n])))
             self._count(start, progress)
         return progress, np.concatenate(rows, axis=1)
 
     def _count(self, start: SimulationState, end: SimulationState) -> None:
         """Count the work between two states. Raises TooMuchWork."""
-        self.work += end.loop.ticks - start.loop.ticks
+        self.work += end.loop.tick.ticks - start.loop.tick.ticks
         self.work += end.plant.step.n_steps - start.plant.step.n_steps
         if self.work > MOST_WORK:
             raise TooMuchWork

@@ -75,11 +75,11 @@ class CompiledGrasps:
         key = key_of(seed)
         start = drawn.drawn(compiled_drawing(), key, number, self._memory[scene])
         prepared = CompiledStart(
-            start,
-            partial(scene.setup, seed, number),
-            key if drawn.has_cells else None,
-            drawn.layout,
-            scene.model,
+            start=start,
+            setup=partial(scene.setup, seed, number),
+            key=key if drawn.has_cells else None,
+            layout=drawn.layout,
+            model=scene.model,
         )
         return grasp_compiled(self.scenes.job, loop, prepared, self.storage, self.measure)
 
@@ -101,7 +101,7 @@ def grasp_compiled(
         setup = padded(prepared.setup(), prepared.layout.kinds)
         begin_images(buffers)
         last_plant = before_failure(loop, *started(job, setup), buffers, end.ticks)
-        effort_n, plant = state().loop.effort_n, lambda: last_plant
+        effort_n, plant = state().loop.tick.effort_n, lambda: last_plant
         reason = not_finite_in_tick(setup.kinds, setup.plant, last_plant, effort_n, setup.dt_s)
     storage.buffers = first_images(buffers)
     extracted, kept = extracted_from(job, buffers, end, measure)

@@ -85,7 +85,14 @@ def compiled_drawing() -> Drawing:
     )
     with generating():
         compiled(
-            scene, Places(0, 0, 0, 0, 0, 0, no_places), key_of(0), none, _array_buffers(scene), np.zeros(1)
+            scene,
+            Places(
+                coulomb_n=0, breakaway_n=0, width_m=0, offset_m=0, share=0, image_phase_s=0, params=no_places
+            ),
+            key_of(0),
+            none,
+            _array_buffers(scene),
+            np.zeros(1),
         )
     return entry_point(compiled)
 

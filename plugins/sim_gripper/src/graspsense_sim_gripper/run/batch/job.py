@@ -25,7 +25,6 @@ from graspsense.simulator_api import (
 )
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.sensing import with_listed_cells
-from graspsense_sim_gripper.plant.state import PlantState
 from graspsense_sim_gripper.run.batch.buffers import as_lists, begin_images, longer, new_buffers
 from graspsense_sim_gripper.run.build import device_info
 from graspsense_sim_gripper.run.compiled.compose import grasp_loop, guarded_loop
@@ -54,6 +53,7 @@ from graspsense_sim_gripper.run.term_failure import not_finite_in_tick, raised_i
 from graspsense_sim_gripper.scene.random_numbers import key_of
 from graspsense_sim_gripper.scene.scaled import ScaledParameter
 from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
+from graspsense_sim_gripper.solve.state import PlantState
 
 Extracted = Any
 """What `Job.extract` returns, such as features."""
@@ -191,7 +191,7 @@ def _interpreted(job: Job, setup: GraspSetup, loop: GraspLoop, model: GraspModel
     outcome, reason = ended_as(job, end)
     if end.failed == 1:
         plant = before_failure(loop, params, begun, buffers, end.ticks)
-        reason = not_finite_in_tick(setup.kinds, setup.plant, plant, state.loop.effort_n, setup.dt_s)
+        reason = not_finite_in_tick(setup.kinds, setup.plant, plant, state.loop.tick.effort_n, setup.dt_s)
     extracted, kept = extracted_from(job, buffers, end)
     return FinishedGrasp(
         outcome=outcome,

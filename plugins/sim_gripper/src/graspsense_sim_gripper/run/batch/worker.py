@@ -23,11 +23,11 @@ from graspsense.gripper_api import Outcome, Phase
 from graspsense.plugin_api import Controller, GraspEvent, Trace, create
 from graspsense.simulator_api import RunConfig, recipe_of
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.plant.state import PlantState
 from graspsense_sim_gripper.run.accuracy.cache import restored, stored
 from graspsense_sim_gripper.run.batch.job import FinishedGrasp, Job, grasp_plain
 from graspsense_sim_gripper.run.batch.scenes import Scenes
 from graspsense_sim_gripper.run.nested import Stored, TupleType, append
+from graspsense_sim_gripper.solve.state import PlantState
 
 _ARRAYS: Final = tuple(
     column.name for column in fields(Trace) if column.name not in ("units", "signals", "events")

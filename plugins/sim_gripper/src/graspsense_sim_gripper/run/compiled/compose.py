@@ -22,8 +22,8 @@ from graspsense_sim_gripper.plant.contact import (
     no_event,
     solve_contact,
 )
-from graspsense_sim_gripper.plant.sensing import SensorState
-from graspsense_sim_gripper.plant.state import Contact, ContactState, Motion, Past, PlantState, StepState
+from graspsense_sim_gripper.plant.sensing import CellReading, EncoderReading, SensorState
+from graspsense_sim_gripper.plant.state import Contact, ContactState, Motion, Past
 from graspsense_sim_gripper.run.approach import approach_ticks
 from graspsense_sim_gripper.run.binding import Constructors, bind_reachable
 from graspsense_sim_gripper.run.loop import SimulationState, grasp
@@ -35,6 +35,7 @@ from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS, Law, Moves, OnSu
 from graspsense_sim_gripper.solve.advance import advance, move
 from graspsense_sim_gripper.solve.converge import refine_until_converged
 from graspsense_sim_gripper.solve.scheme import Attempt, PlantParams, Start
+from graspsense_sim_gripper.solve.state import PlantState, StepState
 
 TermsStates = Any
 """A tuple with a state of its own type for each term."""
@@ -48,8 +49,8 @@ ContactSolver = Callable[[ObjectModel, ContactState, float, float, float], tuple
 INTERPRETED: Final[Constructors] = {
     kind: maker(kind)
     for kind in (
-        *(PlantState, Motion, Contact, ContactState, Past, StepState, SensorState, Frame),
-        *(Start, Attempt, PadLoad, BalanceSearch),
+        *(PlantState, Motion, Contact, ContactState, Past, StepState, Start, Attempt, PadLoad, BalanceSearch),
+        *(SensorState, EncoderReading, CellReading, Frame),
     )
 }
 """The named tuples that a tick creates, each with a constructor that takes the interpreter half the time."""
@@ -207,7 +208,9 @@ def all_active(terms: Sequence[Any]) -> tuple[Switchable, ...]:
 def uncompressed(kinds: Sequence[str]) -> ContactState:
     """Return the state of an object of these terms that nothing has pressed yet."""
     states = tuple([find_term(kind)[1].at_rest for kind in kinds])
-    return ContactState(0.0, 0.0, 0.0, states, 0.0, 0.0, Past(0.0, 0.0, math.inf, math.inf))
+    return ContactState(
+        compression_m=0.0, force_n=0.0, slope_n_m=0.0, states=states, pad_m=0.0, branch_n=0.0, past=Past()
+    )
 
 
 # ------------------------------------------------------------------------------------------ plant and loop
@@ -232,7 +235,7 @@ def composition(kinds: tuple[str, ...], plant: PlantParams) -> Composition:
     """Return the composition of a loop for this plant."""
     converges, lags = plant.steps.settle > 0.0, plant.drive.lag_s > 0.0
     held = plant.object.held == 1
-    return Composition(kinds, converges, lags, hardens(plant.object), held)
+    return Composition(kinds=kinds, converges=converges, lags=lags, hardens=hardens(plant.object), held=held)
 
 
 def hardens(model: ObjectModel) -> bool:

@@ -34,16 +34,16 @@ def measure_buffers(params: Any, columns: Table, phases: Any, n: int) -> Any:
     for i in range(n):
         without_events[i] = phases[i] & PHASE_BITS
     ticks = TickColumns(
-        columns[0][:n],
-        columns[1][:n],
-        columns[2][:n],
-        columns[3][:n],
-        columns[4][:n],
-        columns[5][:n],
-        columns[6][:n],
-        columns[7][:n],
-        columns[8][:n],
-        without_events,
+        t_s=columns[0][:n],
+        gap_m=columns[1][:n],
+        velocity_m_s=columns[2][:n],
+        effort_n=columns[3][:n],
+        force_left_n=columns[4][:n],
+        force_right_n=columns[5][:n],
+        edge_left_n=columns[6][:n],
+        edge_right_n=columns[7][:n],
+        command=columns[8][:n],
+        phase=without_events,
     )
     return measure(params, ticks)
 

@@ -17,7 +17,7 @@ _REMAIN_CALLS: Final = {
     _pressed.__code__: ("solve_contact",),
     solve_contact.__code__: ("_release_from_rigid_pads",),
     # These are rarely called: inlined, they would take registers from velocity Verlet.
-    take_step.__code__: ("stick", "_after_event"),
+    take_step.__code__: ("stick", "restarted"),
 }
 
 

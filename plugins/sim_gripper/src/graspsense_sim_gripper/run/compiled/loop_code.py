@@ -87,7 +87,7 @@ def stored_grasp(
         if noise.is_drawn == 1:
             for image in range(drawn, n):
                 draw_image_noise(noise.key, image, of_images[image])
-        if state.sensor.images == 0:
+        if state.sensor.cells.images == 0:
             # The loop reads it as the image before the first one.
             images[n - 1] = math.nan
         part = PadBuffers(left_zero, right_zero, of_images, images[:n])

@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 from attrs import frozen
 
 from graspsense_sim_gripper.plant.contact import ObjectModel
-from graspsense_sim_gripper.plant.state import Contact, ContactState, PlantState
+from graspsense_sim_gripper.plant.state import Contact, ContactState
 from graspsense_sim_gripper.run.compiled.compose import Composition, composition
 from graspsense_sim_gripper.run.problem import GraspSetup
 from graspsense_sim_gripper.scene.library import catalogue
@@ -23,6 +23,7 @@ from graspsense_sim_gripper.scene.terms.registry import find_term, in_order
 from graspsense_sim_gripper.scene.terms.switchable import Switchable
 from graspsense_sim_gripper.scene.terms.term import TermState
 from graspsense_sim_gripper.solve.scheme import PlantParams
+from graspsense_sim_gripper.solve.state import PlantState
 
 
 class Filler(NamedTuple):
@@ -89,7 +90,15 @@ def padded(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> GraspSetu
     drive, (width_m, table_n, pads, own, held, overshoots, rtol), steps = setup.plant
     terms = tuple([own[i] if i >= 0 else filler.params for i, filler in layout.sources])
     # Here and below, `evolve` and `_replace` would take several times as long.
-    model = ObjectModel(width_m, table_n, pads, terms, held, overshoots, rtol)
+    model = ObjectModel(
+        width_m=width_m,
+        table_friction_n=table_n,
+        pads=pads,
+        terms=terms,
+        held=held,
+        overshoots=overshoots,
+        balance_rtol=rtol,
+    )
     return GraspSetup(
         kinds=layout.kinds,
         terms=setup.terms,
@@ -117,9 +126,28 @@ def _with_term_states(state: PlantState, change: Callable[[TermStates], TermStat
     halves = []
     for half in (left, *right):
         compression_m, force_n, slope_n_m, states, pad_m, branch_n, past = half
-        halves.append(ContactState(compression_m, force_n, slope_n_m, change(states), pad_m, branch_n, past))
-    contact = Contact(left_n, right_n, offset_m, touched, halves[0], tuple(halves[1:]), pending_s, unbalanced)
-    return PlantState(motion, contact, step, effort_n, peak_n)
+        halves.append(
+            ContactState(
+                compression_m=compression_m,
+                force_n=force_n,
+                slope_n_m=slope_n_m,
+                states=change(states),
+                pad_m=pad_m,
+                branch_n=branch_n,
+                past=past,
+            )
+        )
+    contact = Contact(
+        left_n=left_n,
+        right_n=right_n,
+        offset_m=offset_m,
+        touched=touched,
+        left=halves[0],
+        right=tuple(halves[1:]),
+        pending_s=pending_s,
+        unbalanced=unbalanced,
+    )
+    return PlantState(motion=motion, contact=contact, step=step, effort_n=effort_n, peak_n=peak_n)
 
 
 @lru_cache(maxsize=256)
