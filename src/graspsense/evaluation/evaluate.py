@@ -219,7 +219,7 @@ class _Evaluator:
         for name, control in trials.variants.items():
             controls[name] = self._other_features(name, control, headline)
         self._warn_of_early_recognition(controls, majority_correct)
-        self._warn_of_leaks(controls)
+        self._warn_of_leaks(controls, majority_correct)
         self._warn_of_width(controls["width_only"], headline)
         return controls
 
@@ -540,7 +540,15 @@ class _Evaluator:
                 "shown to add anything"
             )
 
-    def _warn_of_leaks(self, controls: Mapping[str, Measurement]) -> None:
+    def _warn_of_leaks(self, controls: Mapping[str, Measurement], majority_correct: Sequence[bool]) -> None:
+        """Warn of other folds with a lower rate, if the stratified rate shows that anything is recognised.
+
+        Without anything to recognise, whole instances held out have a lower rate by the folds alone: the label of an
+        instance is rarer among the training trials than among those of its fold.
+        """
+        plain = self.pooled_by_protocol[self.stratified_name].right(self.labels)
+        if not self._difference(plain, majority_correct).is_positive:
+            return
         for name, why in (
             (INSTANCE_HELD_OUT, "part of the stratified rate comes from having seen the same objects"),
             ("recording_order", "part of the stratified rate comes from the time of recording"),
