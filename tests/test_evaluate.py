@@ -121,7 +121,7 @@ def test_a_rate_that_is_the_instance_is_found_out():
 
 
 def test_no_leak_is_found_in_noise():
-    """Without information, whole instances held out are recognised less often than guessing, by the folds alone."""
+    """Whole instances held out are recognised less often than single trials, by the folds alone."""
     things = np.repeat(np.arange(12), 5)
     for seed in (7, 9):
         noise = np.random.default_rng(seed).normal(size=(2, 60))
