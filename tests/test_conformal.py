@@ -293,6 +293,27 @@ def test_an_unknown_trial_and_a_model_without_calibration_have_no_set(tmp_path):
     assert load_model(str(tmp_path / "old.json"), installed()).predict(trials.table.row(0)).coverage is None
 
 
+@every_case("name", ["tree", "knn"])
+def test_a_trial_without_a_feature_that_all_training_trials_had_has_no_certainty(name, tmp_path):
+    """Without the force, the labels are guessed: half of the answers are right, whatever was measured with it."""
+    trials = bottles(spread=0.1)
+    write_model(tmp_path / "m.json", model_of(trials, name))
+    model = load_model(str(tmp_path / "m.json"), installed())
+    without = evolve(trials.table, values=trials.table.values * [np.nan, 1.0])
+    whole, lacking = model.predict(trials.table.row(0)), model.predict(without.row(0))
+    assert whole.certainty > 0.9
+    assert whole.prediction_set == ("full",)
+    assert lacking.label in trials.classes
+    assert (lacking.certainty, lacking.prediction_set) == (None, ())
+    assert lacking.no_certainty == "it was measured with trials that have x0"
+    assert [each.no_certainty for each in model.predictions(without)] == [lacking.no_certainty] * len(trials)
+
+    some = evolve(
+        trials, table=evolve(trials.table, values=np.vstack([without.values[:1], trials.table.values[1:]]))
+    )
+    assert model_of(some, name).predict(without.row(1)).certainty is not None
+
+
 def test_thresholds_of_other_labels_are_refused(tmp_path):
     model = model_of(bottles(), "tree")
     other = evolve(model.sets, thresholds={"full": model.sets.thresholds["full"]})

@@ -120,6 +120,21 @@ def test_a_rate_that_is_the_instance_is_found_out():
     assert any("having seen the same objects" in warning for warning in evaluation.warnings)
 
 
+def test_no_leak_is_found_in_noise():
+    """Whole instances held out are recognised less often than single trials, by the folds alone."""
+    things = np.repeat(np.arange(12), 5)
+    for seed in (7, 9):
+        noise = np.random.default_rng(seed).normal(size=(2, 60))
+        trials = labelled(
+            [("can", "jar", "tin")[thing % 3] for thing in things],
+            *noise,
+            instances=tuple(f"thing{thing}" for thing in things),
+        )
+        evaluation = judged(trials, "knn", folds=12, permutations=0)
+
+        assert not any("part of the stratified rate" in warning for warning in evaluation.warnings)
+
+
 def test_a_rate_that_is_the_moment_of_the_recording_is_found_out():
     """A value that drifts, each label recorded now and then: neighbours in time are alike."""
     rng = np.random.default_rng(0)

@@ -247,6 +247,9 @@ DOUBTFUL = {
         (1.77e6 + 0.037 * np.arange(N) + RNG.uniform(0, 0.02, N)).tolist(),
     ),
     "values of one label only": ("x", [*NOISE[:30], *[""] * 30]),
+    "values of hardly any trial of a label": ("x", [*NOISE[:33], *[""] * 27]),
+    "fewer digits for a label": ("x", [*NOISE[:30], *map(round, NOISE[30:])]),
+    "measured once for each object": ("weight [g]", [98.0 + 0.37 * (i // 5) for i in range(N)]),
     "a number for what is missing": ("x", [value if i % 4 else -999 for i, value in enumerate(NOISE)]),
     "millimetres and metres": ("x", [*NOISE[:30], *[f"{value / 1000:.6f}" for value in NOISE[30:]]]),
 }
@@ -255,6 +258,12 @@ DOUBTFUL = {
 @every_case("doubt", DOUBTFUL)
 def test_a_column_that_may_reveal_the_labels_is_told(doubt, tmp_path):
     assert notes_on(tmp_path / "t.csv", *DOUBTFUL[doubt])
+
+
+def test_a_column_that_all_trials_of_a_label_have_alike_is_told(tmp_path):
+    three = [f"object {i // 20}" for i in range(N)]
+    for column, values in (("rate [Hz]", (100.0, 99.7, 100.0)), ("is_first", (1, 0, 0)), ("lid", "aba")):
+        assert notes_on(tmp_path / "t.csv", column, [values[i // 20] for i in range(N)], three)
 
 
 @given(seed=st.integers(0, 10_000))

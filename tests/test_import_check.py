@@ -106,6 +106,28 @@ def test_check_of_a_manifest_tells_each_channel(tmp_path):
     assert by_name["force_left"]["unit"] == "N"
 
 
+def rests_of(folder, *points):
+    """Return what a check tells of the rests of a squeeze whose gap (mm) goes through these points (s, mm)."""
+    t_s = np.arange(800) * 0.01
+    gap_mm = np.interp(t_s, *zip(*points, strict=True))
+    table(folder / "jar_1.csv", {"t": t_s, "pos": gap_mm, "F": np.maximum(2.0 * (50.0 - gap_mm), 0.0)})
+    manifest = folder / "m.toml"
+    manifest.write_text('files = "{label}_{order:d}.csv"\ntime = "t"\ngap = "pos [mm]"\nforce = "F"\n')
+    code, out, err = graspsense("import", manifest, "--check", "--json", "--plot", folder / "x.png")
+    assert code == 0, err
+    told = json.loads(out)
+    assert told["outcomes"] == {"steady": 1}
+    return told["rests"]
+
+
+def test_a_rest_after_which_the_squeeze_goes_on_is_told(tmp_path):
+    """The fingers stick for 0.6 s, at a sixth of the force that the squeeze comes to."""
+    stuck = rests_of(tmp_path / "stuck", (0, 80), (1, 50), (1.4, 49.2), (2, 49.2), (4, 45), (8, 45))
+    assert stuck.startswith("1 of 1 grasp tried")
+    assert "controller.rest_window_s" in stuck
+    assert rests_of(tmp_path / "resting", (0, 80), (1, 50), (4, 45), (8, 45)) == ""
+
+
 # Sets in the shape of the public ones, without their manifests: what is suggested, and which lines are right.
 
 

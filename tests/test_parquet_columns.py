@@ -26,6 +26,7 @@ COLUMNS = {
     "nothing": (pyarrow.nulls(3), [NAN, NAN, NAN]),
     "written": (pyarrow.array(["1.5", None, "-2"]), [1.5, NAN, -2.0]),
     "pairs": (pyarrow.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]), [[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]),
+    "half known": (pyarrow.array([[1, None], [3, 4], [None, None]]), [[1.0, NAN], [3.0, 4.0], [NAN, NAN]]),
     "single": (pyarrow.array([[1.0], [2.0], [3.0]]), [1.0, 2.0, 3.0]),
     "fixed": (
         pyarrow.FixedSizeListArray.from_arrays(pyarrow.array(np.arange(6.0)), 2),

@@ -403,8 +403,8 @@ def test_the_headline_of_an_evaluation_compares_with_guessing(rate, words):
 @every_case(
     ("difference", "words"),
     [
-        (Difference(0.3, (0.2, 0.4)), "better than always"),
-        (Difference(-0.3, (-0.4, -0.2)), "worse than always"),
+        (Difference(0.3, (0.2, 0.4)), "This is better than always"),
+        (Difference(-0.3, (-0.4, -0.2)), "not better than always"),
         (Difference(0.0, (-0.01, 0.01)), "agrees with always"),
         (Difference(0.1, (-0.2, 0.4)), "cannot be told"),
         (Difference(0.1, None, "2 instances"), "cannot be told: 2 instances"),

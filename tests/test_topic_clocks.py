@@ -70,6 +70,15 @@ def test_headers_of_another_clock_are_not_used(clock: str, swapped: bool) -> Non
     assert "recorded" in common.notices[0]
 
 
+@every_case("ahead_s", [0.2, -0.2])
+def test_a_slow_topic_is_not_told_from_a_clock_that_is_a_little_off(ahead_s: float) -> None:
+    """With fingers at 30 mm/s, the gap of the contact is wrong by 6 mm if it is the clock."""
+    common = common_clock("bag", {"/hand": HEALTHY, "/tip": messages(T_S, T_S + ahead_s)})
+    assert common.topics["/tip"].ns[0] - common.topics["/hand"].ns[0] == pytest.approx(ahead_s * S)
+    assert "200 ms older" in common.notices[0]
+    assert not common_clock("bag", {"/hand": HEALTHY, "/tip": messages(T_S, delay_s=0.03)}).notices
+
+
 @pytest.mark.parametrize("delay_s", [0.0, 0.1, 3600.0])
 def test_headers_of_one_clock_are_used_whatever_the_delay_of_the_recording(delay_s: float) -> None:
     """A bag that is played and recorded again has times of recording that are all late."""

@@ -316,6 +316,14 @@ def _other_schema(folder):
     pq.write_table(pa.table({"a": [1, 2]}), folder / "data/chunk-000/file-000.parquet")
 
 
+def _ragged(folder):
+    path = folder / DATA
+    frames = pq.read_table(path)
+    states = [state[: 1 + k % 2] for k, state in enumerate(frames["observation.state"].to_pylist())]
+    number = frames.schema.get_field_index("observation.state")
+    pq.write_table(frames.set_column(number, "observation.state", pa.array(states)), path)
+
+
 def _episodes(**changed):
     def damage(folder):
         path = folder / "meta/episodes/chunk-000/file-000.parquet"
@@ -341,6 +349,7 @@ DATA, META = "data/chunk-000/file-000.parquet", "meta/info.json"
         (_cut(META), DataDamaged, "JSON"),
         (_cut(DATA), DataDamaged, "file-000.parquet"),
         (_other_schema, DataDamaged, "timestamp"),
+        (_ragged, DataDamaged, "observation.state"),
         (_episodes(length=[1, 2, 3]), DataDamaged, "90 frames"),
         (_episodes(**{"data/file_index": [7, 7, 7]}), DataDamaged, "file-007.parquet is missing"),
         (_episodes(**{"data/file_index": [-1, 0, 0]}), DataDamaged, "file_index"),

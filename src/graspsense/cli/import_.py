@@ -277,9 +277,10 @@ def _import(
     """Import the recordings and print what became of each; those that cannot be replayed join `unreadable`."""
     from graspsense.core.values.errors import ConfigError
     from graspsense.recording.readable import error_of_all
-    from graspsense.sources.import_outcomes import outcomes_of, refuse_useless
+    from graspsense.sources.import_outcomes import refuse_useless, tried
 
-    refuse_useless(recordings, outcomes_of(recordings, chosen.settings), chosen.settings(recordings[0]))
+    ends = tried(recordings, chosen.settings)
+    refuse_useless(recordings, ends.outcomes, chosen.settings(recordings[0]))
     stored = _store(save, recordings, unreadable, chosen)
     if not stored.kept and not stored.refused:
         raise error_of_all(unreadable)
@@ -300,7 +301,7 @@ def _import(
             echo(f"  {note}", err=as_json)
     if stored.kept:
         echo(f"  {chosen.words}", err=as_json)
-        _echo_notices(_summary(recordings), err=as_json)
+        _echo_notices(_summary(recordings), ends.notice, err=as_json)
     if stored.refused:
         refused = counted(len(stored.refused), "recording")
         echo(f"  {refused} left out: {stored.refused[0]}", Style.CAUTION, err=as_json)
@@ -392,20 +393,29 @@ def _show(
     from graspsense.core.values.errors import DataDamaged, PluginUnavailable
     from graspsense.recording.readable import readable
     from graspsense.sources.dataset_recordings import handed_over
-    from graspsense.sources.import_outcomes import outcomes_of, refuse_useless
+    from graspsense.sources.import_outcomes import refuse_useless, tried
 
-    summary, outcomes = _summary(recordings), outcomes_of(recordings, chosen.settings)
+    summary, tries = _summary(recordings), tried(recordings, chosen.settings)
+    outcomes = tries.outcomes
     ends = {outcome.words: count for outcome, count in outcomes.most_common()}
     if as_json:
         failed = [recording.line for recording in unreadable]
-        echo_json({**asdict(summary), "unreadable": failed, "thresholds": chosen.words, "outcomes": ends})
+        echo_json(
+            {
+                **asdict(summary),
+                "unreadable": failed,
+                "thresholds": chosen.words,
+                "outcomes": ends,
+                "rests": tries.notice,
+            }
+        )
     else:
         _echo_summary(summary)
         echo_channels(summary.measured)
         echo_entry("thresholds", chosen.words.partition(": ")[2])
-        tried = "" if outcomes.total() == len(recordings) else f" (of {outcomes.total()} that were tried)"
-        echo_entry("outcomes", ", ".join(f"{count} {words}" for words, count in ends.items()) + tried)
-        _echo_notices(summary, err=False)
+        some = "" if outcomes.total() == len(recordings) else f" (of {outcomes.total()} that were tried)"
+        echo_entry("outcomes", ", ".join(f"{count} {words}" for words, count in ends.items()) + some)
+        _echo_notices(summary, tries.notice, err=False)
     middle = recordings[len(recordings) // 2]
     try:
         with readable(middle.labelled.source), handed_over(middle.name, middle.labelled.recording):
@@ -462,6 +472,9 @@ def _span(values: Sequence[float]) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def _echo_notices(summary: ImportSummary, *, err: bool) -> None:
-    for notice, count in summary.notices:
-        echo(f"  {count} of {counted(summary.grasps, 'grasp')}: {notice}", Style.CAUTION, indent=2, err=err)
+def _echo_notices(summary: ImportSummary, of_rests: str, *, err: bool) -> None:
+    notices = [
+        f"{count} of {counted(summary.grasps, 'grasp')}: {notice}" for notice, count in summary.notices
+    ]
+    for notice in [*notices, *filter(None, [of_rests])]:
+        echo(f"  {notice}", Style.CAUTION, indent=2, err=err)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -159,10 +160,10 @@ def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) ->
         because = "; ".join(reason.words for reason in prediction.because)
         rows.append((str(i + 1), prediction.label, certainty, *of_set, *label, because))
     echo_table(header, rows, {"PREDICTION": prediction_style, "CORRECT": correct_style})
-    for reason in dict.fromkeys(
-        prediction.no_certainty for prediction in predictions if prediction.no_certainty
-    ):
-        echo_entry("certainty", f"none: {reason}")
+    reasons = Counter(prediction.no_certainty for prediction in predictions if prediction.no_certainty)
+    for reason, count in reasons.items():
+        trials = "" if count == len(predictions) else f" for {count} of {len(predictions)} trials"
+        echo_entry("certainty", f"none{trials}: {reason}")
 
 
 def _known(prediction: Prediction) -> bool:

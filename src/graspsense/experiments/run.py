@@ -181,7 +181,8 @@ def _changed_inputs(results: Results, planned: Planned) -> list[str]:
     if not names:
         return []
     return [
-        f"changed since the results from before were made, so that their tasks were run again: {listed(names)}"
+        "changed since the folder of results was last used, so that only results of the present content count: "
+        f"{listed(names)}"
     ]
 
 

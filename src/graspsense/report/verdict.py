@@ -71,7 +71,7 @@ def _against_guessing(majority: Measurement | None) -> str:
     if interval is None:
         return f"Whether this is better than {guessing} cannot be told: {majority.difference.no_interval}."
     told = {
-        "differs": f"This is {'better' if majority.difference.is_positive else 'worse'} than {guessing}.",
+        "differs": f"This is {'' if majority.difference.is_positive else 'not '}better than {guessing}.",
         "agrees": f"This agrees with {guessing} within {100 * MARGIN:g} points.",
         "cannot be told": f"This is not shown to be better than {guessing}: it cannot be told from so few trials.",
     }

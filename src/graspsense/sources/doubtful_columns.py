@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Hashable, Sequence
+from decimal import Decimal
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -15,7 +16,7 @@ import numpy as np
 from graspsense.core.components.caller import option
 from graspsense.core.values.errors import listed
 from graspsense.core.values.features import LARGEST_VALUE
-from graspsense.sources.identifiers import LEAST_LINES, TIMES, is_count, is_time, words_in
+from graspsense.sources.identifiers import LEAST_LINES, TIMES, is_count, is_time, name_objects, words_in
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -43,6 +44,10 @@ _OF_TIMES: Final = TIMES | {
 }
 _OFTEN: Final = 3
 """Lines with the same value from which on it may stand for something else than a measurement."""
+_FEW: Final = 0.1
+"""Share of the lines of a label that may differ from the others in whether they have a value."""
+_ROUNDED: Final = 6
+"""Most digits of a number that is taken for a rounded one."""
 _ENOUGH_LINES: Final = 30
 _USUAL: Final = 2.0
 """Largest step between two labels over the median step within labels."""
@@ -65,53 +70,77 @@ def doubts(
         return _doubts_of_target(columns, target, table)
     used = [name for name in names if set(columns.columns_of(name)) <= set(table.names)]
     numbers = _numbers(columns, [name for name in used if not columns.is_nominal(name)])
-    rising = [name for name, values in numbers.items() if keeps_rising(values)]
-    same = [name for name in used if says_the_label(columns.cells[name], labels)]
-    free = [name for name in used if is_count(columns.units[name]) and name not in same]
-    missing = {name: np.isnan(table.columns(columns.columns_of(name)[:1]).values[:, 0]) for name in used}
+    checks = (*_of_recording(columns, labels, used, table), *_of_time_and_digits(columns, labels, numbers))
     leave_out = f"leave it out ({option('features', python='columns')})"
-    checks: tuple[tuple[str, list[str], str], ...] = (
+    notes = [
+        f"used, although {what}: {listed(doubted)}. {advice}{leave_out}"
+        for what, doubted, advice in checks
+        if doubted
+    ]
+    return notes + _mixed(numbers)
+
+
+def _of_recording(
+    columns: CsvColumns, labels: Sequence[str], used: Sequence[str], table: FeatureTable
+) -> tuple[tuple[str, list[str], str], ...]:
+    """Return what may tell of labels, devices or objects: how, the names of the columns, and what to do."""
+    same = [name for name in used if says_the_label(columns.cells[name], labels)]
+    missing = {name: np.isnan(table.columns(columns.columns_of(name)[:1]).values[:, 0]) for name in used}
+    return (
         (
-            "every line has more than the one before, or every line less",
-            rising,
-            f"If it is a time or a counter it reveals the labels: {leave_out}",
-        ),
-        (
-            "each label has one value of its own",
+            "all trials of a label have the same value",
             same,
-            f"If it is the label in other words, {leave_out}",
+            "If it is the label in other words, or tells of the recording, ",
         ),
         (
             "each of its values occurs with one label only",
-            [name for name in free if values_have_one_label(columns.cells[name], labels)],
-            f"If it names sessions, devices or objects, it reveals the labels: {leave_out}",
+            [
+                name
+                for name in used
+                if name not in same
+                and (
+                    name_objects(columns.cells[name], labels)
+                    or (is_count(columns.units[name]) and values_have_one_label(columns.cells[name], labels))
+                )
+            ],
+            "If it names sessions, devices or objects, or was measured once for each, it reveals the labels: ",
+        ),
+        (
+            "some labels have nearly all of its values, and others hardly any",
+            [name for name in used if says_of_labels(missing[name].tolist(), labels)],
+            "If the recording is the reason, and not the object, it reveals the labels: ",
+        ),
+    )
+
+
+def _of_time_and_digits(
+    columns: CsvColumns, labels: Sequence[str], numbers: dict[str, Numbers]
+) -> tuple[tuple[str, list[str], str], ...]:
+    """Return what may tell of times and rounding: how, the names of the columns, and what to do."""
+    rising = [name for name, values in numbers.items() if keeps_rising(values)]
+    counted = [name for name in numbers if is_count(columns.units[name]) or is_time(columns.units[name])]
+    return (
+        (
+            "every line has more than the one before, or every line less",
+            rising,
+            "If it is a time or a counter it reveals the labels: ",
         ),
         (
             "its name is that of a time",
-            [name for name in numbers if name not in rising and _is_named_as_time(name, columns.units[name])],
-            f"If it is the time of recording, it reveals the labels: {leave_out}",
+            [name for name in counted if name not in rising and _is_named_as_time(name)],
+            "If it is the time of recording, it reveals the labels: ",
         ),
         (
             "its values pass from label to label without a gap or an overlap, as those of a clock or a counter do",
-            [
-                name
-                for name, values in numbers.items()
-                if name not in rising
-                and (is_count(columns.units[name]) or is_time(columns.units[name]))
-                and passes_without_a_gap(values, labels)
-            ],
-            f"If it is a time or a counter it reveals the labels: {leave_out}",
+            [name for name in counted if name not in rising and passes_without_a_gap(numbers[name], labels)],
+            "If it is a time or a counter it reveals the labels: ",
         ),
         (
-            "some labels have all of its values, and others none",
-            [name for name in used if says_of_labels(missing[name].tolist(), labels)],
-            f"If the recording is the reason, and not the object, it reveals the labels: {leave_out}",
+            "it is written with fewer digits for some labels than for others",
+            [name for name, values in numbers.items() if digits_tell_labels(values, labels)],
+            "Digits tell the labels: round all values alike, or ",
         ),
     )
-    notes = [
-        f"used, although {what}: {listed(doubted)}. {advice}" for what, doubted, advice in checks if doubted
-    ]
-    return notes + _mixed(numbers)
 
 
 def _doubts_of_target(columns: CsvColumns, target: Sequence[float], table: FeatureTable) -> list[str]:
@@ -140,16 +169,48 @@ def keeps_rising(values: Sequence[float] | Numbers) -> bool:
 
 
 def says_the_label(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
-    """Return whether each value belongs to one label and each label to one value, as the label in other words does."""
+    """Return whether all lines of a label have the same value, which differs, as the label in other words does.
+
+    Where labels share a value, the lines of each must not be few, since values with few choices can agree by chance.
+    """
     pairs = set(zip(values, labels, strict=True))
-    return 1 < len(pairs) == len(set(values)) == len(set(labels)) < len(labels)
+    different, among = len(set(values)), len(set(labels))
+    few = different < among and min(Counter(labels).values()) < LEAST_LINES
+    return 1 < different <= len(pairs) == among < len(labels) and not few
 
 
 def says_of_labels(values: Sequence[bool], labels: Sequence[str]) -> bool:
-    """Return whether all lines of a label have the same one of two values, and both occur in lines that are not few."""
-    pairs = set(zip(values, labels, strict=True))
-    counts = Counter(values)
-    return len(counts) == 2 and min(counts.values()) >= LEAST_LINES and len(pairs) == len(set(labels))
+    """Return whether nearly all lines of some labels have one of two values, and nearly all of the others the other."""
+    counts = Counter(labels)
+    having = Counter(label for value, label in zip(values, labels, strict=True) if value)
+    shares = [having[label] / count for label, count in counts.items()]
+    telling = all(min(share, 1.0 - share) <= _FEW for share in shares)
+    return telling and min(shares) < 0.5 < max(shares) and min(counts.values()) >= LEAST_LINES
+
+
+def digits_tell_labels(values: Numbers, labels: Sequence[str]) -> bool:
+    """Return whether the values of a label, which are not few, have fewer digits than most of another label.
+
+    Only digits that were rounded count, and not those of numbers of another magnitude.
+    """
+    given = [(label, value) for label, value in zip(labels, values.tolist(), strict=True) if value == value]
+    counts, different = Counter(label for label, _ in given), Counter(label for label, _ in set(given))
+    written: dict[str, list[tuple[int, int]]] = {}
+    for label, value in given:
+        if counts[label] >= LEAST_LINES and different[label] >= _OFTEN:
+            number = Decimal(repr(value)).normalize().as_tuple()
+            written.setdefault(label, []).append((-int(number.exponent), len(number.digits)))
+    most = {
+        label: (max(places for places, _ in all_of), max(digits for _, digits in all_of))
+        for label, all_of in written.items()
+    }
+    return any(
+        places < most[other][0]
+        and digits < min(most[other][1], _ROUNDED)
+        and 2 * sum(finer > places for finer, _ in all_of) > len(all_of)
+        for places, digits in most.values()
+        for other, all_of in written.items()
+    )
 
 
 def values_have_one_label(values: Sequence[str], labels: Sequence[str]) -> bool:
@@ -191,13 +252,9 @@ def _numbers(columns: CsvColumns, names: Sequence[str]) -> dict[str, Numbers]:
     return {name: values for name, values in numbers.items() if not (np.abs(values) > LARGEST_VALUE).any()}
 
 
-def _is_named_as_time(name: str, unit: str) -> bool:
-    words = words_in(name)
-    return (
-        (is_count(unit) or is_time(unit))
-        and bool(_TIME_NAMES & set(words))
-        and set(words) <= _TIME_NAMES | _OF_TIMES
-    )
+def _is_named_as_time(name: str) -> bool:
+    words = set(words_in(name))
+    return bool(_TIME_NAMES & words) and words <= _TIME_NAMES | _OF_TIMES
 
 
 def _mixed(numbers: dict[str, Numbers]) -> list[str]:

@@ -117,7 +117,7 @@ def identifies(
         if len(values_of) == len(column) >= _SPACED and _is_regular(values_of, _ALIKE):
             return "have equal steps, as those of a clock or a counter"
     hashed = whole and column.max() >= _HASHED and bool((column % 1000.0).any())
-    if (hashed or cells <= 2.0 * len(values_of)) and _name_objects(column.tolist(), known):
+    if (hashed or cells <= 2.0 * len(values_of)) and name_objects(column.tolist(), known):
         return "number the objects (name them by --instance)"
     return ""
 
@@ -137,7 +137,7 @@ def text_identifies(texts: Sequence[str], labels: Sequence[str]) -> str:
         return "are texts that hardly repeat, as names of trials, files and remarks do"
     numbered = all(re.search(r"\d", text) for text in counts)
     values, known = [text for text, _ in given], [label for _, label in given]
-    if (numbered and _enough_objects(len(counts), known) and len(set(given)) == len(counts)) or _name_objects(
+    if (numbered and _enough_objects(len(counts), known) and len(set(given)) == len(counts)) or name_objects(
         values, known
     ):
         return "name the objects (say so by --instance)"
@@ -233,7 +233,7 @@ def _hardly_repeats(n: int, distinct: int, cells: float) -> bool:
     return sum(terms) < _BY_CHANCE
 
 
-def _name_objects(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
+def name_objects(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
     """Return whether values name objects: each belongs to one label, and all have as many lines, or one block.
 
     Where two labels meet, an object may have lines of both. The objects at the ends may have fewer lines.

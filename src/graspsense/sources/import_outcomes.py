@@ -2,39 +2,82 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Final
 
+from attrs import field, frozen
+
 from graspsense.core.components.caller import set_option
 from graspsense.core.components.registry import installed
 from graspsense.core.pipeline.pipeline import grasp_with
-from graspsense.core.values.errors import ConfigError, GraspsenseError
+from graspsense.core.values.errors import ConfigError, GraspsenseError, counted
 from graspsense.core.values.signals import Outcome
 from graspsense.sources.dataset_recordings import handed_over
 
 if TYPE_CHECKING:
     from graspsense.core.components.config import Settings
+    from graspsense.core.values.features import Features
+    from graspsense.recording.replayable import Recording
     from graspsense.sources.import_sources import ImportedRecording
 
 MOST: Final = 24
 """Number of recordings that are tried."""
 FEWEST: Final = 4
 """Number of recordings from which on most of them are not a coincidence."""
+MOST_TRAVEL: Final = 0.5
+"""Share of the travel of a squeeze after a rest, and"""
+PRESSED: Final = 3.0
+"""ratio of a later force to that of the rest, from which on the fingers may only have stuck there."""
 
 
-def outcomes_of(
+@frozen
+class TriedRecordings:
+    """How many of the recordings that were tried end in which way, and how many press on after their rest."""
+
+    outcomes: Counter[Outcome] = field(factory=Counter)
+    pressing_on: int = 0
+
+    @property
+    def notice(self) -> str:
+        """What looks wrong in the rests, empty if nothing does."""
+        if not self.pressing_on:
+            return ""
+        return (
+            f"{self.pressing_on} of {counted(self.outcomes.total(), 'grasp')} tried: most of a squeeze, and "
+            "most of its force, comes after the rest that p_steady, f_steady and delta_t are of. If the fingers only "
+            f"stuck there, or a sensor stopped, ask for a longer rest: {set_option('controller.rest_window_s=SECONDS')}"
+        )
+
+
+def tried(
     recordings: Sequence[ImportedRecording], settings_of: Callable[[ImportedRecording], Settings]
-) -> Counter[Outcome]:
-    """Return how many of some recordings, evenly spread, end in which way."""
+) -> TriedRecordings:
+    """Return how some recordings, evenly spread, end."""
     outcomes: Counter[Outcome] = Counter()
+    pressing_on = 0
     for recording in recordings[:: -(-len(recordings) // MOST)]:
         with handed_over(recording.name, recording.labelled.recording):
             try:
-                outcomes[grasp_with(settings_of(recording), installed()).outcome] += 1
+                trial = grasp_with(settings_of(recording), installed())
             except GraspsenseError:  # which the import itself reports
                 continue
-    return outcomes
+        outcomes[trial.outcome] += 1
+        pressing_on += presses_on(trial.features, recording.labelled.recording)
+    return TriedRecordings(outcomes, pressing_on)
+
+
+def presses_on(features: Features, recording: Recording) -> bool:
+    """Return whether most of a squeeze comes after its rest, as it does if the fingers stick on their way."""
+    known = dict(zip(features.names, features.values, strict=True))
+    p_first, p_steady, f_steady = (known.get(name, math.nan) for name in ("p_first", "p_steady", "f_steady"))
+    later = [reading.frame for reading in recording.readings if reading.frame.gap_m < p_steady]
+    if not later:  # also without a rest, or without a gap
+        return False
+    narrowest = min(frame.gap_m for frame in later)
+    force = max((frame.force_left_n + frame.force_right_n) / 2.0 for frame in later)
+    return p_steady - narrowest > MOST_TRAVEL * (p_first - narrowest) and force > PRESSED * f_steady
 
 
 def refuse_useless(
@@ -42,13 +85,13 @@ def refuse_useless(
 ) -> None:
     """Raise ConfigError if most recordings end as too wide, soon after they began, or can have no contact."""
     _refuse_below_zero(recordings)
-    wide, tried = outcomes[Outcome.TOO_WIDE], outcomes.total()
-    if tried < FEWEST or 2 * wide <= tried:
+    wide, total = outcomes[Outcome.TOO_WIDE], outcomes.total()
+    if total < FEWEST or 2 * wide <= total:
         return
     given = settings.values["controller"]
     contact, travel = given.get("contact_force_n", 0.0), given.get("too_wide_m", 0.0)
     raise ConfigError(
-        f"{wide} of {tried} recordings end as too wide, soon after their beginning: both pads feel "
+        f"{wide} of {total} recordings end as too wide, soon after their beginning: both pads feel "
         f"contact_force_n = {contact:g} before the gap has closed by too_wide_m = {travel:g}. If the recordings "
         f"begin close to the object, add {set_option('controller.too_wide_m=0')}. If the force without contact is "
         f"larger than this, add {set_option('controller.contact_force_n=FORCE')}. Or leave both out, so that they "

@@ -23,6 +23,8 @@ Nanoseconds = NDArray[np.int64]
 
 CLOCKS_APART_NS: Final = 300_000_000
 """Delays of two topics, or of two parts of a topic, that differ by more are from different clocks."""
+DELAYS_APART_NS: Final = 50_000_000
+"""Delays of two topics that differ by more can be from different clocks, or one topic is slow: nothing tells which."""
 PARTS: Final = 5
 """Parts of a recording whose delays are compared."""
 RATES_APART: Final = 0.01
@@ -131,6 +133,8 @@ def common_clock(
     Raises DataDamaged if there is no time at which all topics have messages, or if times do not fit into 64 bits.
     """
     began_ns, times, notices = on_one_clock(source, topics)
+    if not notices:
+        notices = tuple(_doubtful_delays({topic: topics[topic] for topic in needed or topics}))
     wanted = {topic: times[topic] for topic in needed or times}
     lasting = {topic: stamps for topic, stamps in wanted.items() if stamps.usual_ns} or wanted
     begin = max(int(stamps.ns[0]) for stamps in lasting.values())
@@ -205,6 +209,31 @@ def _apart(stamped: Mapping[str, Nanoseconds], recorded: Mapping[str, Nanosecond
     elif apart > CLOCKS_APART_NS:
         yield (
             f"the times in the headers of {behind} are behind those of another topic, from another clock: {used}"
+        )
+
+
+def _doubtful_delays(topics: Mapping[str, Messages]) -> Iterator[str]:
+    """Yield a sentence if the delays of these topics differ, so that one of their clocks may be off."""
+    delays = {
+        topic: min(delays)
+        for topic, messages in topics.items()
+        if (
+            delays := [
+                recorded - stamped
+                for recorded, stamped in zip(messages.recorded_ns, messages.stamped_ns, strict=True)
+                if stamped
+            ]
+        )
+    }
+    behind, ahead = (
+        max(delays, key=delays.__getitem__, default=""),
+        min(delays, key=delays.__getitem__, default=""),
+    )
+    if delays and delays[behind] - delays[ahead] > DELAYS_APART_NS:
+        yield (
+            f"the headers of {behind} are {(delays[behind] - delays[ahead]) * 1e-6:.0f} ms older than those of {ahead} "
+            "when their messages are recorded: the topic is slow, or its clock is off, and then gap and force do not "
+            "belong together"
         )
 
 

@@ -202,11 +202,16 @@ class Folder:
 
     def _episode(self, row: Mapping[str, Any], path: str, table: ColumnTable) -> Episode:
         index = _whole(row, "episode_index", "meta/episodes")
+        observed = [name for name in self._wanted if name.startswith("observation") and name in table.texts]
         missing = [
-            name for name in ("timestamp", "frame_index", "episode_index") if name not in table.numbers
+            name
+            for name in ("timestamp", "frame_index", "episode_index", *observed)
+            if name not in table.numbers
         ]
         if missing:
-            raise DataDamaged(f"{self.place}/{path} has no column of numbers {', '.join(missing)}")
+            raise DataDamaged(
+                f"{self.place}/{path} has no column of numbers, as many in each row, {', '.join(missing)}"
+            )
         kept = table.numbers["episode_index"] == index
         length = _whole(row, "length", "meta/episodes")
         if int(kept.sum()) != length or not length:

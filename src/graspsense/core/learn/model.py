@@ -167,20 +167,24 @@ class Model:
         """Return predictions with certainty and sets, without reasons; those of unknown trials have no set.
 
         `shares` are the probabilities that the classifier gives. With `elsewhere`, the trials are not of the kind that
-        the model was measured on, and nothing is calibrated.
+        the model was measured on, and nothing is calibrated; nor is a trial that lacks what all training trials had.
         """
         classes = self.classifier.classes()
         known = np.array([label != UNKNOWN for label in labels])
         predicted = shares.argmax(axis=1)
         predicted[known] = [classes.index(label) for label in labels if label != UNKNOWN]
         no_certainty = "it was not measured under these settings" if elsewhere else self.no_certainty
+        lacking = self.novelty.lacking(table)
         probabilities, members = shares, np.zeros(shares.shape, dtype=np.bool_)
         if self.certainty is not None and not no_certainty:
             support = self.classifier.support(table)
             if support is None:
                 support = np.full(len(table), np.nan)
             certainty = self.certainty.rate(shares[np.arange(len(table)), predicted], support)
-            probabilities = with_certainty(at_temperature(shares, self.temperature), predicted, certainty)
+            measured = np.array([not names for names in lacking])
+            known &= measured
+            calibrated = with_certainty(at_temperature(shares, self.temperature), predicted, certainty)
+            probabilities = np.where(measured[:, np.newaxis], calibrated, shares)
             if self.sets is not None and self.sets.thresholds:
                 scores = scores_of(shares, self.novelty.closeness(table, classes))
                 answers = Answers(
@@ -193,6 +197,7 @@ class Model:
         made = []
         for i, label in enumerate(labels):
             order = sorted(np.flatnonzero(members[i]), key=lambda k: (k != predicted[i], -scores[i, k]))
+            without = no_certainty or (lacking[i] and f"it was measured with trials that have {lacking[i]}")
             made.append(
                 Prediction(
                     label=label,
@@ -200,8 +205,8 @@ class Model:
                     because=(),
                     prediction_set=tuple(classes[k] for k in order),
                     coverage=self.sets.coverage if self.sets is not None and order else None,
-                    calibrated=not no_certainty,
-                    no_certainty=no_certainty,
+                    calibrated=not without,
+                    no_certainty=without,
                 )
             )
         return made

@@ -15,6 +15,7 @@ import numpy as np
 from attrs import frozen
 
 from graspsense.core.learn.stored_values import StoredValues
+from graspsense.core.values.errors import listed
 from graspsense.core.values.features import Features, FeatureTable
 from graspsense.core.values.reasons import FeatureValue, Reason
 from graspsense.core.values.units import in_words
@@ -47,6 +48,16 @@ class Novelty:
     spread: NDArray[np.float64]
     featureless: bool
     """Whether a training trial had no feature at all, so that such a trial is not new."""
+    complete: NDArray[np.bool_]
+    """Whether each training trial had the feature, shape (features,); False where it is not known."""
+
+    def lacking(self, table: FeatureTable) -> list[str]:
+        """Return for each trial of a table the features that it lacks, in words, although each training trial had them.
+
+        What was measured with the training trials says nothing of such a trial.
+        """
+        missing = np.isnan(table.columns(self.names).values) & self.complete
+        return [listed([self.names[f] for f in np.flatnonzero(row)]) if row.any() else "" for row in missing]
 
     def unlike(self, features: Features) -> Reason | None:
         """Return why this trial is unlike every class, or None if it is like one of them."""
@@ -125,6 +136,7 @@ class Novelty:
         return {
             "reach": REACH,
             "featureless": self.featureless,
+            "complete": [name for name, complete in zip(self.names, self.complete, strict=True) if complete],
             "spread": _plain(self.spread),
             "ranges": {
                 label: [_plain(self.lowest[k]), _plain(self.highest[k])]
@@ -163,6 +175,7 @@ def novelty_of(table: FeatureTable, labels: Sequence[str]) -> Novelty:
         highest=highest,
         spread=spread,
         featureless=bool(np.isnan(values).all(axis=1).any()),
+        complete=np.asarray(~np.isnan(values).any(axis=0), dtype=np.bool_),
     )
 
 
@@ -181,6 +194,7 @@ def novelty_from(
     lowest, highest = ends
     if (np.isnan(lowest) != np.isnan(highest)).any() or (lowest > highest).any():
         raise kept.refusal("ranges", "a feature has one end only, or its highest value is below the lowest")
+    complete = kept.texts("complete") if "complete" in kept else ()
     spread = kept.numbers("spread", (len(names),), missing=True, least=0.0)
     if (np.isnan(spread) & ~np.isnan(lowest).all(axis=0)).any():
         raise kept.refusal("spread", "it is missing for a feature that has a range")
@@ -192,6 +206,7 @@ def novelty_from(
         highest=highest,
         spread=spread,
         featureless=kept.flag("featureless"),
+        complete=np.array([name in complete for name in names]),
     )
 
 

@@ -11,7 +11,9 @@ MISSING_LABELS: Final = frozenset({"", "nan", "?"})
 """What stands for a missing label. `none`, `null` and `NA` are labels."""
 _WHOLE: Final = re.compile(r"(?<![^:#])([-+]?[0-9]+)[.,]0+(?![^:#])")
 
-_JOINTS: Final = re.compile(r"(?<=[^\W\d])[\s_-]+(?=\w)|(?<=\w)[\s_-]+(?=[^\W\d])|(?<=\s)\s+")
+_JOINTS: Final = re.compile(
+    r"(?<=[^\W\d])[\s_\-\u2010-\u2015]+(?=\w)|(?<=\w)[\s_\-\u2010-\u2015]+(?=[^\W\d])|(?<=\s)\s+"
+)
 """Spaces, underscores and hyphens beside a letter."""
 _LEADING: Final = re.compile(r"(?<![\d.,])0+(?=\d)")
 _LAST_ZEROS: Final = re.compile(r"(?<!\d)(\d+[.,]\d*[1-9])0+(?![\d.,])")
@@ -34,6 +36,8 @@ def spelled_alike(texts: Iterable[str]) -> list[tuple[str, str]]:
     """Return pairs of different labels or names that differ in case, spaces, hyphens, width or leading zeros only,
     or in zeros at the end of a decimal number.
 
+    >>> spelled_alike(["tin-can", "tin\u2010can"])
+    [('tin-can', 'tin‐can')]
     >>> spelled_alike(["can1", "Can 01", "can2", "-2", "2", "1-2", "12", "0.5", "0.50", "1.20.30"])
     [('0.5', '0.50'), ('Can 01', 'can1')]
     """

@@ -124,7 +124,7 @@ def _numbers_of_lists(column: Any) -> Numbers | None:
     inner = whole.flatten()
     width, left_over = divmod(len(inner), len(whole)) if len(whole) else (0, 0)
     lengths = whole.value_lengths() if hasattr(whole, "value_lengths") else None
-    if inner.null_count or left_over or not width:
+    if left_over or not width:
         return None
     if lengths is not None and (lengths.to_numpy(zero_copy_only=False) != width).any():
         return None
