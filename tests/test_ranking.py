@@ -43,6 +43,15 @@ def test_features_without_information_are_worse_and_the_same_trials_are_compared
     assert ranking.chosen.words in ranking.verdict
 
 
+def test_the_best_of_several_in_noise_is_not_shown_to_be_better_than_guessing():
+    learners = {name: learner(name) for name in ("tree", "knn")}
+    trials = bottles(12, spread=0.1)
+    noise = evolve(trials.table, values=np.random.default_rng(1).normal(size=trials.table.values.shape))
+    guessing = "not shown to be better than always giving the most frequent label (50.0 %)"
+    assert guessing in rank(learners, {"noise": evolve(trials, table=noise)}).verdict
+    assert guessing not in rank(learners, {"force": trials}).verdict
+
+
 def test_intervals_are_wider_for_more_comparisons():
     right, wrong = [True] * 90 + [False] * 10, [True] * 80 + [False] * 20
     single, ten = difference(right, wrong).interval, difference(right, wrong, comparisons=10).interval

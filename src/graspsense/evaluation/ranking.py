@@ -19,7 +19,7 @@ from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.chosen import ChosenRate, comparisons_of, rate_of_chosen
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, cross_validate
 from graspsense.evaluation.doubt import HeldOut, SetCoverage, exchangeable_instances
-from graspsense.evaluation.folds import INSTANCE_HELD_OUT, in_order, instance_held_out, stratified
+from graspsense.evaluation.folds import INSTANCE_HELD_OUT, commonest, in_order, instance_held_out, stratified
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.evaluation.intervals import Difference, RecognitionRate, difference, rate_among, rate_of
 
@@ -71,6 +71,8 @@ class Ranking:
     notes: tuple[str, ...]
     chosen: ChosenRate | None = None
     """The rate of the best without the luck of being chosen; None for a single candidate."""
+    guessing: float = 0.0
+    """The rate of always giving the most frequent label."""
 
     @property
     def verdict(self) -> str:
@@ -83,6 +85,10 @@ class Ranking:
             text += (
                 f" As the best of {chosen.candidates} it was lucky too: of new trials expect {chosen.words}."
             )
+        interval = best.rates[self.protocol].interval
+        if interval is None or interval[0] <= self.guessing:
+            guessing = f"always giving the most frequent label ({100 * self.guessing:.1f} %)"
+            text += f" It is not shown to be better than {guessing}."
         text += f" {self.equals}"
         controls = [candidate for candidate in self.candidates if candidate.standing == "control"]
         if controls:
@@ -205,6 +211,7 @@ def ranking_of(
         candidates=_ranked(measured, headline, trials, chosen, comparisons_of(right_of, trials.instances)),
         notes=tuple(notes),
         chosen=chosen,
+        guessing=trials.labels.count(commonest(trials.labels)) / len(trials),
     )
 
 
