@@ -35,7 +35,7 @@ def results(name: str) -> str:
 
 def rates(text: str) -> list[float]:
     """Return the percentages of a text as shares."""
-    return [float(found.removesuffix(" %")) / 100.0 for found in PERCENTAGE.findall(text)]
+    return [float(share.removesuffix(" %")) / 100.0 for share in PERCENTAGE.findall(text)]
 
 
 def row(text: str, *begin: str) -> str:
@@ -133,7 +133,7 @@ def test_the_printed_identification_is_the_one_of_today(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for seed in (1, 2, 3):
         printed("run", "--object", "toy", "--seed", seed, "--save", "trials")
-    today = printed("identify", "store:trials", "--out", "my_toy.toml")
+    report = printed("identify", "store:trials", "--out", "my_toy.toml")
     shown = re.search(r"^The report begins like this .*\n\n((?:    \S.*\n|\n)+)", text, re.MULTILINE)[1]
     lines = [line.strip() for line in shown.splitlines() if line.strip()]
     rows = [line for line in lines if not line.startswith(("squeezes", "PARAMETER"))]
@@ -141,8 +141,8 @@ def test_the_printed_identification_is_the_one_of_today(tmp_path, monkeypatch):
     number = re.compile(r"\d+(?:\.\d+)?(?:e[+-]\d+)?")
     for line in rows:
         name = line.split()[0]
-        measured = next(other for other in today.splitlines() if other.startswith(f"{name} "))
-        told, found = (
+        measured = next(other for other in report.splitlines() if other.startswith(f"{name} "))
+        told, today = (
             [float(n) for n in number.findall(words.removeprefix(name))] for words in (line, measured)
         )
-        assert found == pytest.approx(told, rel=0.02), name
+        assert today == pytest.approx(told, rel=0.02), name
