@@ -12,6 +12,7 @@ from commands import printed
 from test_evaluate import judged, labelled, learner
 
 from graspsense.core.components.registry import installed
+from graspsense.core.learn.certainty import certainty_of
 from graspsense.core.learn.conformal import Answers, sets_of, units_lacking, units_needed
 from graspsense.core.learn.model_file import load_model, write_model
 from graspsense.core.learn.training import train
@@ -423,3 +424,15 @@ def test_the_page_shows_coverage_and_reliability():
     assert evaluation.sets.covered.words in section.body
     assert "<svg" in section.body
     assert "Not measured here: 6 calibration instances" in doubt_section(few.sets, few.reliability).body
+
+
+@every_case("n", [24, 60, 120, 300])
+def test_a_probability_that_tells_nothing_gives_hardly_more_certainty(n):
+    highest = []
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        probability, right = rng.uniform(0.3, 1.0, n), rng.uniform(size=n) < 0.6
+        certainty = certainty_of(probability, np.full(n, np.nan), right.tolist(), [str(i) for i in range(n)])
+        highest.append(certainty.rate(np.array([1.0]), np.array([np.nan]))[0])
+    # Of 60 %; chance alone makes the highest of several rates higher.
+    assert np.mean(highest) < 0.665
