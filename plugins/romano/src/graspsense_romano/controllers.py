@@ -100,18 +100,29 @@ class Params(NamedTuple):
     position: PositionServo
 
 
+class Stage(NamedTuple):
+    """What the controller does. Times are those of frames (s): since when, and since when the fingers settle."""
+
+    number: int
+    since_s: float
+    settling_s: float
+
+
+class HeldContact(NamedTuple):
+    """The gap at the contact (before it, at the start), the greatest force of the contact, and the force asked for."""
+
+    contact_m: float
+    contact_n: float
+    target_n: float
+
+
 class Progress(NamedTuple):
-    """How far a grasp is. Times are those of frames (s)."""
+    """How far a grasp is."""
 
     phase: int
     outcome: int
-    stage: int
-    since_s: float
-    settling_s: float
-    contact_m: float
-    """The gap at the contact; before it, at the start."""
-    contact_n: float
-    target_n: float
+    stage: Stage
+    contact: HeldContact
 
 
 class State(NamedTuple):
@@ -132,37 +143,34 @@ NOT_BEGUN: Final = -1
 def step(params: Params, state: State, reading: Reading) -> tuple[Command, State]:
     """Close until both pads touch, then load, hold and let go as planned."""
     frame, earlier, wanted = reading.frame, state.progress, state.wanted_m
-    if earlier.stage == NOT_BEGUN:
+    if earlier.stage.number == NOT_BEGUN:
         earlier = Progress(
-            phase=APPROACH,
-            outcome=RUNNING,
-            stage=CLOSE,
-            since_s=frame.t_s,
-            settling_s=frame.t_s,
-            contact_m=frame.gap_m,
-            contact_n=0.0,
-            target_n=0.0,
+            APPROACH, RUNNING, Stage(CLOSE, frame.t_s, frame.t_s), HeldContact(frame.gap_m, 0.0, 0.0)
         )
         wanted = frame.gap_m
     signals = updated(params.filters, state.signals, reading)
     now = conditions(params.thresholds, signals)
     progress = earlier
     if earlier.outcome == RUNNING or earlier.outcome == STEADY:
-        if earlier.stage == CLOSE:
+        if earlier.stage.number == CLOSE:
             progress = closing(params.plan, earlier, now, frame)
-        elif earlier.stage == TOUCH:
+        elif earlier.stage.number == TOUCH:
             progress = touching(params.plan, earlier, frame)
-        elif earlier.stage == LOAD:
+        elif earlier.stage.number == LOAD:
             progress = loading(params.plan, earlier, signals, frame)
         else:
             progress = keeping(params, earlier, signals, now, frame)
     events = begun(state.conditions, now)
-    if earlier.stage != KEEP:
+    if earlier.stage.number != KEEP:
         events &= ~SLIP_BIT
-    if progress.target_n >= params.plan.limit_n > earlier.target_n:
+    if progress.contact.target_n >= params.plan.limit_n > earlier.contact.target_n:
         events |= LIMIT_BIT
     if params.plan.places == 1:
-        if progress.stage == KEEP and earlier.stage == LOAD and signals.acceleration.present == 0:
+        if (
+            progress.stage.number == KEEP
+            and earlier.stage.number == LOAD
+            and signals.acceleration.present == 0
+        ):
             events |= UNFELT_BIT
         if progress.outcome == STEADY and earlier.outcome == RUNNING:
             events |= PLACE_BIT
@@ -185,7 +193,7 @@ def detect(params: Params, state: State, reading: Reading) -> tuple[Command, Sta
     """
     signals = updated(params.filters, state.signals, reading)
     now, earlier = conditions(params.thresholds, signals), state.conditions
-    stage, since_s, t_s = state.progress.stage, state.progress.since_s, reading.frame.t_s
+    stage, since_s, t_s = state.progress.stage.number, state.progress.stage.since_s, reading.frame.t_s
     if state.signals.left.begun == 0:
         since_s = t_s
     events = begun(earlier, now)
@@ -197,16 +205,7 @@ def detect(params: Params, state: State, reading: Reading) -> tuple[Command, Sta
         if present == 0:
             events |= UNFELT_BIT
     outcome = NEVER_STEADY if t_s - since_s > params.plan.place_timeout_s else RUNNING
-    progress = Progress(
-        phase=APPROACH,
-        outcome=outcome,
-        stage=stage,
-        since_s=since_s,
-        settling_s=since_s,
-        contact_m=0.0,
-        contact_n=0.0,
-        target_n=0.0,
-    )
+    progress = Progress(APPROACH, outcome, Stage(stage, since_s, since_s), HeldContact(0.0, 0.0, 0.0))
     return Command(EFFORT, 0.0, inf, inf), State(
         phase=APPROACH,
         outcome=outcome,
@@ -220,44 +219,27 @@ def detect(params: Params, state: State, reading: Reading) -> tuple[Command, Sta
 
 def ended(now: Progress, outcome: int) -> Progress:
     """Return this progress with an outcome."""
-    phase, _, stage, since, settling, contact_m, contact_n, target = now
-    return Progress(
-        phase=phase,
-        outcome=outcome,
-        stage=stage,
-        since_s=since,
-        settling_s=settling,
-        contact_m=contact_m,
-        contact_n=contact_n,
-        target_n=target,
-    )
+    return Progress(now.phase, outcome, now.stage, now.contact)
 
 
 def closing(plan: HoldingPlan, now: Progress, seen: TouchConditions, frame: Frame) -> Progress:
     """Close until both pads touch, or it is clear that they will not."""
-    elapsed = frame.t_s - now.since_s
+    elapsed = frame.t_s - now.stage.since_s
     if elapsed >= IGNORED_S and seen.left == 1 and seen.right == 1:
         force_n = 0.5 * (frame.force_left_n + frame.force_right_n)
         return Progress(
-            phase=SQUEEZE,
-            outcome=RUNNING,
-            stage=TOUCH,
-            since_s=frame.t_s,
-            settling_s=frame.t_s,
-            contact_m=frame.gap_m,
-            contact_n=force_n,
-            target_n=0.0,
+            SQUEEZE, RUNNING, Stage(TOUCH, frame.t_s, frame.t_s), HeldContact(frame.gap_m, force_n, 0.0)
         )
     if frame.gap_m <= plan.closed_gap_m:
         return ended(now, NOTHING_THERE)
-    if elapsed > max(plan.find_timeout_s, 1.5 * now.contact_m / plan.close_speed_m_s):
+    if elapsed > max(plan.find_timeout_s, 1.5 * now.contact.contact_m / plan.close_speed_m_s):
         return ended(now, ONE_FINGER if seen.left + seen.right == 1 else NOTHING_THERE)
     return now
 
 
 def touching(plan: HoldingPlan, now: Progress, frame: Frame) -> Progress:
     """Take the greatest force while the gap of the contact is kept, and choose the force of the grip from it."""
-    phase, outcome, stage, since, settling, contact_m, contact_n, target_n = now
+    phase, outcome, (stage, since, settling), (contact_m, contact_n, target_n) = now
     contact_n = max(contact_n, 0.5 * (frame.force_left_n + frame.force_right_n))
     if frame.t_s - since >= CONTACT_S:
         if plan.loads == 0:
@@ -270,20 +252,13 @@ def touching(plan: HoldingPlan, now: Progress, frame: Frame) -> Progress:
                     contact_n, plan.close_speed_m_s, plan.hardness, plan.lightest_n, plan.limit_n
                 )
     return Progress(
-        phase=phase,
-        outcome=outcome,
-        stage=stage,
-        since_s=since,
-        settling_s=settling,
-        contact_m=contact_m,
-        contact_n=contact_n,
-        target_n=target_n,
+        phase, outcome, Stage(stage, since, settling), HeldContact(contact_m, contact_n, target_n)
     )
 
 
 def loading(plan: HoldingPlan, now: Progress, signals: Signals, frame: Frame) -> Progress:
     """Wait until the weaker finger has its force and the fingers are at rest."""
-    phase, outcome, stage, since, settling, contact_m, contact_n, target_n = now
+    phase, outcome, (stage, since, settling), (contact_m, contact_n, target_n) = now
     error_n = target_n - min(frame.force_left_n, frame.force_right_n)
     reached = abs(error_n) < plan.force_tolerance_n and abs(signals.speed_m_s) < plan.speed_tolerance_m_s
     if not reached:
@@ -296,20 +271,13 @@ def loading(plan: HoldingPlan, now: Progress, signals: Signals, frame: Frame) ->
     elif frame.t_s - since > plan.force_timeout_s:
         outcome = NEVER_STEADY
     return Progress(
-        phase=phase,
-        outcome=outcome,
-        stage=stage,
-        since_s=since,
-        settling_s=settling,
-        contact_m=contact_m,
-        contact_n=contact_n,
-        target_n=target_n,
+        phase, outcome, Stage(stage, since, settling), HeldContact(contact_m, contact_n, target_n)
     )
 
 
 def keeping(params: Params, now: Progress, signals: Signals, seen: TouchConditions, frame: Frame) -> Progress:
     """Hold, with more force where the thing slips, until it is lost or put down."""
-    phase, outcome, stage, since, settling, contact_m, contact_n, target_n = now
+    phase, outcome, (stage, since, settling), (contact_m, contact_n, target_n) = now
     plan, held_s = params.plan, frame.t_s - since
     weaker_n = min(signals.left.force_n, signals.right.force_n)
     if weaker_n < plan.lightest_n - 0.25 or frame.gap_m <= plan.closed_gap_m:
@@ -322,30 +290,23 @@ def keeping(params: Params, now: Progress, signals: Signals, seen: TouchConditio
         elif held_s > plan.place_timeout_s:
             outcome = NEVER_STEADY
     return Progress(
-        phase=phase,
-        outcome=outcome,
-        stage=stage,
-        since_s=since,
-        settling_s=settling,
-        contact_m=contact_m,
-        contact_n=contact_n,
-        target_n=target_n,
+        phase, outcome, Stage(stage, since, settling), HeldContact(contact_m, contact_n, target_n)
     )
 
 
 def commanded(params: Params, now: Progress, wanted_m: float, frame: Frame) -> tuple[Command, float]:
     """Return the command of this stage, and the gap (m) that the position servo is to reach."""
     plan, rate = params.plan, 0.0
-    if now.stage == CLOSE:
+    if now.stage.number == CLOSE:
         rate = -plan.close_speed_m_s
-    elif now.stage >= LOAD:
-        rate = force_rate(params.servo, now.target_n, frame.force_left_n, frame.force_right_n)
-        if rate < 0.0 and frame.gap_m <= now.contact_m - plan.deformation_m:
+    elif now.stage.number >= LOAD:
+        rate = force_rate(params.servo, now.contact.target_n, frame.force_left_n, frame.force_right_n)
+        if rate < 0.0 and frame.gap_m <= now.contact.contact_m - plan.deformation_m:
             rate = 0.0
     bound, limit = params.position.bound_m, params.position.effort_limit_n
     wanted_m += rate * frame.dt_s
-    if now.stage == TOUCH:
-        wanted_m = now.contact_m
+    if now.stage.number == TOUCH:
+        wanted_m = now.contact.contact_m
     wanted_m = min(max(wanted_m, frame.gap_m - bound), frame.gap_m + bound)
     command = Command(VELOCITY, rate, limit, inf)
     if params.kind == POSITION:
@@ -449,16 +410,7 @@ class _Romano(Controller[ConfigT]):
 
     def init(self) -> State:
         """Return the state before the first tick."""
-        progress = Progress(
-            phase=APPROACH,
-            outcome=RUNNING,
-            stage=NOT_BEGUN,
-            since_s=0.0,
-            settling_s=0.0,
-            contact_m=0.0,
-            contact_n=0.0,
-            target_n=0.0,
-        )
+        progress = Progress(APPROACH, RUNNING, Stage(NOT_BEGUN, 0.0, 0.0), HeldContact(0.0, 0.0, 0.0))
         return State(
             phase=APPROACH,
             outcome=RUNNING,
@@ -471,7 +423,7 @@ class _Romano(Controller[ConfigT]):
 
     def reason(self, state: Any) -> str:
         """Return with which force a thing was lost, and whether the force limit cannot hold it."""
-        asked_n, limit_n = state.progress.target_n, float(self.config.force_limit_n)
+        asked_n, limit_n = state.progress.contact.target_n, float(self.config.force_limit_n)
         if state.outcome != SLIPPED:
             return ""
         if asked_n >= limit_n:
