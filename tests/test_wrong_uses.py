@@ -256,7 +256,7 @@ def test_a_long_compilation_is_told_and_a_short_one_is_not():
         compile_notice.tell_compiling(said)
     (line,) = told
     assert "compiling stored grasp" in line
-    assert "60 s" in line
+    assert "33 s" in line
 
 
 def test_a_warning_of_a_library_is_a_note_in_one_line(run, monkeypatch):

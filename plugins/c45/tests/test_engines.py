@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from graspsense_c45 import Attribute, Options, Schema, Table, class_indices, fit, make_table
+from graspsense_c45 import Attribute, Options, Schema, Table, class_indices, engines, fit, fitting, make_table
 from graspsense_c45.engines import Fits, choose_fast
 
 pytest.importorskip("numba", reason="the extra 'fast' (numba) is not installed: there is one engine only")
@@ -107,13 +107,26 @@ def test_auto_compiles_only_what_pays() -> None:
     assert choose_fast("fast", 1)
 
 
-def test_many_small_fits_load_compiled_code_that_is_on_disk(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_many_small_fits_use_compiled_code_once_numpy_took_as_long(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("graspsense")
     from graspsense_c45.depthfirst import compiled
 
-    for on_disk, expected in ((True, [False] * 9 + [True]), (False, [False] * 10)):
+    chosen = {}
+    for on_disk in (True, False):
         monkeypatch.setattr(compiled, "kept", lambda on_disk=on_disk: on_disk)
-        fits = Fits()
-        assert [fits.choose_fast("auto", 6_000) for _ in range(10)] == expected
+        fits, chosen[on_disk] = Fits(), []
+        for _ in range(8):
+            chosen[on_disk].append(fits.choose_fast("auto", 6_000))
+            fits.add_growing(1.0)
         assert not fits.choose_fast("numpy", 6_000)
-    assert [fits.choose_fast("auto", 200_000) for _ in range(3)] == [False, False, True]
+    assert chosen == {True: [False] + 7 * [True], False: 6 * [False] + 2 * [True]}
+
+
+def test_a_tree_that_numpy_grows_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    fits = Fits()
+    monkeypatch.setattr(fitting, "_FITS", fits)
+    monkeypatch.setattr(engines, "LOADING_S", 1e-9)
+    monkeypatch.setattr(engines, "COMPILING_S", 1e-9)
+    assert not fits.choose_fast("auto", 6_000)
+    fit(grasps(1, 300, None, "one"))
+    assert fits.choose_fast("auto", 6_000)

@@ -9,10 +9,12 @@ from typing import get_args
 from graspsense_c45.options import Engine
 
 WORTH_COMPILING = 500_000
-"""Values (rows x attributes) of one table, or of all fits of a process, from which "auto" chooses the compiled engine:
-numpy takes as long for so many as compiling does. An evaluation of 900 trials has 1.3 million."""
-WORTH_LOADING = 60_000
-"""The same where an earlier process has compiled it: loading takes a second."""
+"""Values (rows x attributes) of one table from which "auto" chooses the compiled engine at once."""
+COMPILING_S = 6.0
+"""Processor time for growing trees by numpy, in this process, after which "auto" compiles, which takes about as long.
+However many fits come, they take at most about twice as long as with the better engine from the beginning."""
+LOADING_S = 1.0
+"""The same where an earlier process has kept the machine code."""
 
 _NEEDED = ("numba", "graspsense")
 """numba compiles; graspsense keeps the compiled code on disk, under a fingerprint of the code."""
@@ -39,17 +41,20 @@ class Fits:
     """The fits of this process, by which "auto" chooses the engine of the next one."""
 
     def __init__(self) -> None:
-        self._n_values = 0
+        self._grown_s = 0.0
         self._kept: bool | None = None
 
     def choose_fast(self, engine: Engine, n_values: int) -> bool:
         """Return whether to fit a table of so many values by the compiled engine. Raises as `choose_fast` does."""
         if choose_fast(engine, n_values):
             return True
-        self._n_values += n_values
-        if engine != "auto" or self._n_values < WORTH_LOADING or missing_for_fast():
+        if engine != "auto" or self._grown_s < LOADING_S or missing_for_fast():
             return False
-        return self._n_values >= WORTH_COMPILING or self._is_kept()
+        return self._grown_s >= COMPILING_S or self._is_kept()
+
+    def add_growing(self, seconds: float) -> None:
+        """Count a tree that numpy has grown in so much processor time."""
+        self._grown_s += seconds
 
     def _is_kept(self) -> bool:
         if self._kept is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Protocol
 
 import numpy as np
@@ -81,7 +82,10 @@ def _builder(training: TrainingSet, engine: Engine) -> TreeBuilder:
 
         if DepthFirstTreeBuilder.can_build(training):
             return DepthFirstTreeBuilder(training)
-    return NodewiseTreeBuilder(training)
+    began = time.thread_time()
+    builder = NodewiseTreeBuilder(training)
+    _FITS.add_growing(time.thread_time() - began)
+    return builder
 
 
 def _use_actual_values(tree: GrowingTree, values: Reals) -> None:
