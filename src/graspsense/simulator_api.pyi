@@ -61,7 +61,6 @@ from graspsense.core.control.tick import TARING as TARING
 from graspsense.core.control.tick import tick as tick
 from graspsense.core.control.tick import first_state as first_state
 from graspsense.core.control.tick import events_of as events_of
-from graspsense.core.control.tick import CALLED as CALLED
 from graspsense.core.control.tick import CLOSES as CLOSES
 from graspsense.core.control.tick import FreeRun as FreeRun
 from graspsense.core.control.tick import after_free as after_free

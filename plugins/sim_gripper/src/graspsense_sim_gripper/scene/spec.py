@@ -16,10 +16,10 @@ from attrs.validators import ge, gt, in_, le
 from graspsense.plugin_api import ConfigError, UnknownName
 from graspsense.simulator_api import TomlError, gives, refuse_other_kind, suggestion, toml_values
 from graspsense_sim_gripper.scene.identified import check_identified
+from graspsense_sim_gripper.scene.terms.liquid import GRAVITY_M_S2
 from graspsense_sim_gripper.scene.terms.registry import find_term, in_order
 from graspsense_sim_gripper.scene.terms.term import not_dented
 
-GRAVITY_M_S2: Final = 9.80665
 PATCHES: Final = ("line", "face", "point")
 
 LARGEST: Final = 1e20
