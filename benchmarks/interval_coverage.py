@@ -17,8 +17,8 @@ import numpy as np
 from arguments import parser_of
 from scipy.special import stdtrit
 
-from graspsense.core.components.config import SelectedComponent
 from graspsense.core.components.registry import installed
+from graspsense.core.components.selected import SelectedComponent
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.features import FeatureTable
 from graspsense.evaluation.evaluate import evaluate

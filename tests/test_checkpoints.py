@@ -9,9 +9,10 @@ import pytest
 from attrs import evolve
 from cases import every_case
 
-from graspsense.core.components.config import SelectedComponent, build, resolve
+from graspsense.core.components.config import resolve
 from graspsense.core.components.registry import installed
 from graspsense.core.components.run_config import RunConfig
+from graspsense.core.components.selected import SelectedComponent, build
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.learn.checkpoints import (
     CheckpointFeatures,

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from graspsense.core.components.config import SelectedComponent
 from graspsense.core.components.registry import installed
+from graspsense.core.components.selected import SelectedComponent
 from graspsense.core.learn.labelled import ControlFeatures, Labelled
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import FeatureTable

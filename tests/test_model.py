@@ -13,8 +13,10 @@ from commands import graspsense
 from test_classifiers import NAMES, UNITS, trials
 from test_conformal import bottles
 
-from graspsense.core.components.config import Flag, SelectedComponent, resolve
+from graspsense.core.components.config import resolve
+from graspsense.core.components.layers import Flag
 from graspsense.core.components.registry import IsolatedPlugins, installed
+from graspsense.core.components.selected import SelectedComponent
 from graspsense.core.components.setting import worded
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.model_content import digest

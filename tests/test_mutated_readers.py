@@ -23,7 +23,8 @@ import recorded_files as write
 from attrs import frozen
 from cases import every_case
 
-from graspsense.core.components.config import Flag, resolve
+from graspsense.core.components.config import resolve
+from graspsense.core.components.layers import Flag
 from graspsense.core.components.registry import installed
 from graspsense.core.values.errors import GraspsenseError
 from graspsense.recording.atomic_file import SaveFailed

@@ -8,11 +8,11 @@ import types
 import pytest
 from cases import every_case
 
-from graspsense.core.components.config import select_component
 from graspsense.core.components.entries import PipelineEntry
 from graspsense.core.components.firstparty import provider
 from graspsense.core.components.registry import IsolatedPlugins, canonical, installed
 from graspsense.core.components.roles import SensorBackend
+from graspsense.core.components.selected import select_component
 from graspsense.core.values.errors import PluginUnavailable, UnknownName
 
 HEAD = """

@@ -11,8 +11,9 @@ from cases import every_case
 from commands import printed
 from PIL import Image
 
-from graspsense.core.components.config import resolve, select_component
+from graspsense.core.components.config import resolve
 from graspsense.core.components.registry import installed
+from graspsense.core.components.selected import select_component
 from graspsense.core.learn.checkpoints import split_checkpoints
 from graspsense.core.pipeline.pipeline_model import model_for
 from graspsense.evaluation.checkpoints import SURE, early_recognition

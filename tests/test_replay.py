@@ -18,7 +18,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from kept import keep
 
-from graspsense.core.components.config import Flag, resolve
+from graspsense.core.components.config import resolve
+from graspsense.core.components.layers import Flag
 from graspsense.core.components.registry import installed
 from graspsense.core.pipeline.pipeline import grasp_with
 from graspsense.core.values.device import DeviceInfo

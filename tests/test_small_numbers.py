@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from graspsense.core.components.config import select_component
+from graspsense.core.components.selected import select_component
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.features import FeatureTable
 from graspsense.evaluation.evaluate import evaluate

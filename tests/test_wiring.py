@@ -9,7 +9,8 @@ from cases import every_case
 from parts import CHANNELS_OF_HAND, Hand, HandConfig, Law, LawConfig, channels
 
 from graspsense import load_pipeline
-from graspsense.core.components.config import Flag, resolve
+from graspsense.core.components.config import resolve
+from graspsense.core.components.layers import Flag
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.pipeline.wiring import check
 from graspsense.core.values.errors import WiringError

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from graspsense.cli.progress import ProgressLine
-    from graspsense.core.components.config import SelectedComponent
     from graspsense.core.components.registry import Component
+    from graspsense.core.components.selected import SelectedComponent
     from graspsense.core.learn.labelled import Labelled
     from graspsense.evaluation.choosing import ChosenPipeline
 
@@ -207,7 +207,7 @@ def _with_union(
 
 def _config(united: Labelled, component: Component, **keys: Any) -> Any:
     """Return the config that a feature set has in the union; `keys` replace some of it."""
-    from graspsense.core.components.config import build
+    from graspsense.core.components.selected import build
     from graspsense.core.components.strict import keys_of
 
     known = keys_of(component.config_class())
@@ -235,8 +235,8 @@ def _part(united: Labelled, component: Component, columns: NDArray[np.int64], **
 
 def pipeline_text(chosen: Chosen, model: str) -> str:
     """Return a pipeline file with what was chosen, and with the gripper and the controller of the trials."""
-    from graspsense.core.components.config import toml_key, toml_value
     from graspsense.core.components.strict import plain
+    from graspsense.core.files.toml_values import toml_key, toml_value
     from graspsense.recording.provenance import recipe
 
     settings = recipe(chosen.labelled.provenance.get("settings") or {})

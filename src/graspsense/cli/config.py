@@ -41,7 +41,7 @@ def show(name: str | None, as_json: bool, **asked: Any) -> None:
             }
         )
         return
-    from graspsense.core.components.config import to_toml
+    from graspsense.core.components.settings_file import to_toml
 
     echo_as_it_is(to_toml(settings, origins=True), end="")
 

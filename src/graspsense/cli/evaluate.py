@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from graspsense.cli.progress import ProgressLine
-    from graspsense.core.components.config import SelectedComponent
+    from graspsense.core.components.selected import SelectedComponent
     from graspsense.core.learn.checkpoints import CheckpointTrials
     from graspsense.core.learn.labelled import Labelled
     from graspsense.evaluation.checkpoints import EarlyRecognition

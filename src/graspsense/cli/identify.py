@@ -80,8 +80,9 @@ def identify(
     `graspsense run --object FILE.toml` grasps the object in simulation.
     """
     from graspsense.cli.progress import ProgressLine
-    from graspsense.core.components.config import Flag, resolve
+    from graspsense.core.components.config import resolve
     from graspsense.core.components.entries import IdentifierEntry
+    from graspsense.core.components.layers import Flag
     from graspsense.core.components.registry import installed
     from graspsense.core.values.errors import ConfigError
     from graspsense.recording.atomic_file import write_or_replace
@@ -99,10 +100,7 @@ def identify(
     if not refused:
         write_or_replace(Path(out), result.scene.encode())
     if page:
-        from graspsense.report.identification import identification_page
-        from graspsense.report.write import write_html
-
-        write_html(Path(page), identification_page(result, Path(out).name))
+        _write_page(Path(page), result, Path(out).name)
     for note in result.notes:
         talk(f"note: {note}")
     if as_json:
@@ -117,6 +115,13 @@ def identify(
     if refused:
         reasons = "".join(f"\n  {reason}" for reason in refused)
         raise ConfigError(f"{out} is not written:{reasons}\n  --force writes it all the same")
+
+
+def _write_page(page: Path, result: Identification, scene: str) -> None:
+    from graspsense.report.identification import identification_page
+    from graspsense.report.write import write_html
+
+    write_html(page, identification_page(result, scene))
 
 
 def _print(result: Identification) -> None:

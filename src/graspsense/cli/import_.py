@@ -140,7 +140,7 @@ class _Chosen:
     """The settings of an import: those of the pipeline, and thresholds from the recordings where none is given."""
 
     def __init__(self, pipeline: str, options: Sequence[str]) -> None:
-        from graspsense.core.components.config import ImplausibleSettings
+        from graspsense.core.components.selected import ImplausibleSettings
 
         self._pipeline, self._options = pipeline, tuple(options)
         self._added: tuple[str, ...] = ()
@@ -245,7 +245,8 @@ class _Chosen:
         return self._resolved(recording.name)
 
     def _resolved(self, name: str) -> Settings:
-        from graspsense.core.components.config import Flag, resolve
+        from graspsense.core.components.config import resolve
+        from graspsense.core.components.layers import Flag
 
         flags = (
             Flag("--gripper", "gripper.type", "replay"),

@@ -92,7 +92,8 @@ def settings_of(
     force: bool = False,
 ) -> Settings:
     """Return the settings that these options ask for. Raises ConfigError with every error at once."""
-    from graspsense.core.components.config import Flag, resolve
+    from graspsense.core.components.config import resolve
+    from graspsense.core.components.layers import Flag
 
     flags = (
         Flag("--gripper", "gripper.type", gripper),

@@ -445,7 +445,7 @@ def _declared(component: Component) -> Any:
 def _key_lines(keys: dict[str, dict[str, Any]], indent: str) -> list[str]:
     from textwrap import wrap
 
-    from graspsense.core.components.config import key_facts
+    from graspsense.core.components.settings_file import key_facts
 
     lines = []
     for key, declaration in keys.items():

@@ -446,7 +446,7 @@ def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
         }
         echo_json(plan)
         return
-    from graspsense.core.components.config import toml_value
+    from graspsense.core.files.toml_values import toml_value
 
     echo("would open, tare, close, hold and release with:")
     for table, component in settings.components.items():

@@ -29,7 +29,7 @@ from graspsense.core.values.errors import counted
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from graspsense.core.components.config import SelectedComponent
+    from graspsense.core.components.selected import SelectedComponent
     from graspsense.core.learn.checkpoints import CheckpointTrials
     from graspsense.core.learn.labelled import Labelled
     from graspsense.core.learn.model import Model

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from graspsense.core.components.config import select_component
+from graspsense.core.components.selected import select_component
 from graspsense.core.learn.labelled import TARGETS, Labelled, Target, class_of
 from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.confusion import confusion

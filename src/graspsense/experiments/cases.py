@@ -8,9 +8,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from graspsense.core.components.config import Settings, build_plausible, resolve
+from graspsense.core.components.config import Settings, resolve
 from graspsense.core.components.layers import Layer, Merged, dotted
 from graspsense.core.components.registry import installed
+from graspsense.core.components.selected import build_plausible
 from graspsense.core.components.setting import worded
 from graspsense.core.components.strict import InvalidValue, ValidationFailed, plain, structured
 from graspsense.core.learn.copies import without_copies

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 from attrs import field, frozen
 from attrs.validators import ge, le
 
-from graspsense.core.components.config import SelectedComponent, build, settings_from
+from graspsense.core.components.config import settings_from
 from graspsense.core.components.registry import installed
+from graspsense.core.components.selected import SelectedComponent, build
 from graspsense.core.components.strict import structured
 from graspsense.core.learn.copies import apart_from, without_copies
 from graspsense.core.learn.labelled import class_of

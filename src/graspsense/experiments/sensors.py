@@ -7,8 +7,8 @@ from typing import Any
 
 from attrs import evolve
 
-from graspsense.core.components.config import SelectedComponent
 from graspsense.core.components.roles import BatchBackend
+from graspsense.core.components.selected import SelectedComponent
 
 
 def with_ideal_sensors(gripper: SelectedComponent) -> SelectedComponent:

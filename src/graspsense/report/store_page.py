@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 from attrs import frozen
 
-from graspsense.core.components.config import select_component
+from graspsense.core.components.selected import select_component
 from graspsense.core.learn.copies import without_copies
 from graspsense.core.values.errors import ConfigError, DataDamaged, counted
 from graspsense.evaluation.evaluate import evaluate

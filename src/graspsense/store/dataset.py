@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from attrs import evolve, fields_dict, frozen
 
-from graspsense.core.components.config import Flag
+from graspsense.core.components.layers import Flag
 from graspsense.core.components.strict import plain
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.target_value import TargetValue, values_of_labels

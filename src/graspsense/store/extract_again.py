@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, Final
 from attrs import evolve, frozen
 
 from graspsense.core.components.caller import set_option
-from graspsense.core.components.config import NONE, Flag, Settings, default_paths, resolve, without_followers
-from graspsense.core.components.layers import Layer
+from graspsense.core.components.config import NONE, Settings, default_paths, resolve, without_followers
+from graspsense.core.components.layers import Flag, Layer
 from graspsense.core.components.nearest_key import nearest_path
 from graspsense.core.grasp.runner import run_uninterrupted
 from graspsense.core.learn.checkpoints import with_checkpoints

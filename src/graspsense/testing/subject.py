@@ -8,8 +8,8 @@ from typing import Any
 
 from attrs import define, field
 
-from graspsense.core.components.config import build
 from graspsense.core.components.registry import Component, Plugins, PluginStatus, Resource, canonical
+from graspsense.core.components.selected import build
 from graspsense.testing.session import Session, readings_of
 
 

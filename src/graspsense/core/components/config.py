@@ -7,17 +7,12 @@ first. Then only the config class of the selected component is imported, and the
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from functools import cached_property
-from textwrap import indent, wrap
 from typing import TYPE_CHECKING, Any, Final, cast
 
 from attrs import fields, frozen
 
-from graspsense import __version__
-from graspsense.core.components.caller import option
 from graspsense.core.components.entries import TABLE_OF_ROLE, Role
 from graspsense.core.components.layers import (
     Flag,
@@ -26,11 +21,11 @@ from graspsense.core.components.layers import (
     dotted,
     option_layers,
     pipeline_layers,
-    read_layer,
     typed_path,
 )
 from graspsense.core.components.nearest_key import key_paths
 from graspsense.core.components.registry import Component, Plugins, installed
+from graspsense.core.components.selected import ImplausibleSettings, SelectedComponent, listed_errors
 from graspsense.core.components.setting import followed_settings
 from graspsense.core.components.strict import (
     InvalidValue,
@@ -42,60 +37,17 @@ from graspsense.core.components.strict import (
     structured,
 )
 from graspsense.core.files.toml_text import KeyPath
+from graspsense.core.files.toml_values import toml_value
 from graspsense.core.values.errors import ConfigError, PluginUnavailable, UnknownName
 
 if TYPE_CHECKING:
     from graspsense.core.components.run_config import RunConfig
-
-__all__ = [
-    "Flag",
-    "Layer",
-    "SelectedComponent",
-    "Settings",
-    "build",
-    "create",
-    "read_layer",
-    "recipe_of",
-    "resolve",
-    "select_component",
-    "settings_from",
-    "to_toml",
-    "without_followers",
-]
 
 NONE: Final = "none"
 """The `type` of a classifier table for a pipeline without a classifier."""
 
 _ROLE_OF_TABLE: Final[dict[str, Role]] = {table: role for role, table in TABLE_OF_ROLE.items()}
 _TABLES: Final = (*_ROLE_OF_TABLE, "run")
-
-
-class ImplausibleSettings(ConfigError):
-    """Settings are allowed, but outside of their plausible ranges; `resolve(..., force=True)` accepts them."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__(text)
-        self.add_note(f"Check the unit. If the value is meant, add {option('force', python='force=True')}")
-
-
-@frozen(eq=False)
-class SelectedComponent:
-    """A component that a pipeline selects, with its config."""
-
-    component: Component
-    config: Any
-
-    def create(self) -> Any:
-        """Return the component built from its config. Raises PluginUnavailable."""
-        return self.component.create(self.config)
-
-    @cached_property
-    def declared(self) -> Any:
-        """Its entry with all that its class declares under this config. Raises PluginUnavailable.
-
-        It is found once: the channels of a replay are those of its recording, which is read for them.
-        """
-        return self.component.declared(self.config)
 
 
 @frozen(eq=False, kw_only=True)
@@ -239,9 +191,9 @@ def _resolved_layers(
             owner = merged.owner.get(path)
             origins[dotted(path)] = owner.where(path) if owner else "default"
     if complaints:
-        raise ConfigError(_listed([*_told(complaints, classes, plugins), *doubts]))
+        raise ConfigError(listed_errors([*_told(complaints, classes, plugins), *doubts]))
     if doubts:
-        raise ImplausibleSettings(_listed(doubts))
+        raise ImplausibleSettings(listed_errors(doubts))
     return Settings(
         pipeline=pipeline,
         gripper=chosen["gripper"],
@@ -347,157 +299,6 @@ def without_followers(values: Mapping[str, Mapping[str, Any]]) -> dict[str, dict
     return kept
 
 
-def build(component: Component, values: Mapping[str, Any]) -> Any:
-    """Return the config of a component from plain values.
-
-    Raises ConfigError that lists all errors, and PluginUnavailable.
-    """
-    try:
-        return structured(values, component.config_class(), component.qualified)
-    except ValidationFailed as misfit:
-        lines = [f"{dotted((component.table, *problem.path))}: {problem.text}" for problem in misfit.problems]
-        raise ConfigError(_listed(lines)) from None
-
-
-def build_plausible(component: Component, values: Mapping[str, Any], *, force: bool) -> Any:
-    """Return the config of a component like `build`, and refuse values out of their plausible ranges unless `force`.
-
-    Raises ConfigError, of which ImplausibleSettings is one, and PluginUnavailable.
-    """
-    config = build(component, values)
-    doubts = [] if force else implausible_values(config)
-    if doubts:
-        lines = [f"{dotted((component.table, *doubt.path))}: {doubt.text}" for doubt in doubts]
-        raise ImplausibleSettings(_listed(lines))
-    return config
-
-
-def create(role: Role, name: str, /, **config: Any) -> Any:
-    """Return a component by role and name. Its config is checked as strictly as one from a file.
-
-    Raises UnknownName, PluginUnavailable, ConfigError.
-
-    >>> create("controller", "hybrid", closing_speed_m_s=0.01).config.closing_speed_m_s
-    0.01
-    """
-    return select_component(role, name, **config).create()
-
-
-def select_component(role: Role, name: str, **config: Any) -> SelectedComponent:
-    """Return a component by role and name with its config, without constructing it. Raises like `create`."""
-    component = installed().find(role, name)
-    return SelectedComponent(component, build(component, config))
-
-
-def recipe_of(role: Role, part: Any) -> tuple[str, dict[str, Any]]:
-    """Return the name and the plain values from which `create` makes an equal component.
-
-    Raises UnknownName if no plugin declares its class, ConfigError if plain values cannot represent its config.
-    """
-    cls = type(part)
-    for component in installed().components(role):
-        # A component of another package is not imported for the comparison.
-        if component.entry.target.split(":")[0].split(".")[0] != cls.__module__.split(".")[0]:
-            continue
-        try:
-            same = component.component_class() is cls
-        except PluginUnavailable:
-            same = False
-        if same:
-            values = {key: value for key, value in plain(part.config).items() if value is not None}
-            if plain(build(component, values)) != plain(part.config):
-                raise ConfigError(f"{component.qualified}: its settings are not all plain values")
-            return component.qualified, values
-    raise UnknownName(f"{cls.__module__}.{cls.__qualname__} is not a {role} that a plugin declares")
-
-
-def to_toml(settings: Settings, origins: bool = False) -> str:
-    """Return a complete pipeline file, which extends nothing and resolves to the same values.
-
-    With `origins`, comments tell the meaning, unit, range and default of each key, and the origin of its value.
-    """
-    lines = [f"# Resolved by graspsense {__version__} from the pipeline {json.dumps(settings.pipeline)}."]
-    versions = {part.component.table: part.component.version for part in settings.chosen}
-    for table, values in settings.values.items():
-        lines += ["", f"[{table}]"]
-        declarations = settings.keys(table) if origins else {}
-        for key, value in values.items():
-            if key in declarations:
-                lines += ["", *_comments(declarations[key])]
-            line = (
-                f"{toml_key(key)} = {toml_value(value)}"
-                if value is not None
-                else f"# {toml_key(key)} is not set"
-            )
-            notes = [f"version {versions[table]}"] if key == "type" else []
-            if origins:
-                inside = {
-                    path: origin
-                    for path, origin in settings.origins.items()
-                    if _within(path, f"{table}.{key}")
-                }
-                notes += list(dict.fromkeys(inside.values()))
-            lines.append(f"{line:<40}  # {', '.join(notes)}" if notes else line)
-    return "\n".join(lines) + "\n"
-
-
-def _comments(declaration: Mapping[str, Any], name: str = "") -> list[str]:
-    """Return what a key declares as comment lines, also what the keys of a table declare."""
-    facts = "; ".join(key_facts(declaration))
-    text = " ".join(fact for fact in (name, declaration["meaning"], f"[{facts}]" if facts else "") if fact)
-    lines = wrap(text, 98, initial_indent="# ", subsequent_indent="#   ") if text else []
-    for inner, inner_declaration in declaration.get("keys", {}).items():
-        lines += _comments(inner_declaration, f"{inner}:")
-    return lines
-
-
-def key_facts(declaration: Mapping[str, Any]) -> list[str]:
-    """Return unit, type, range and default of a key of `keys_of`, each in words."""
-    facts = [declaration["unit"], declaration["allowed"]]
-    if "|" in declaration["type"] and "'" in declaration["type"]:
-        facts.append(f"one of {declaration['type'].replace(' | ', ', ')}")
-    if declaration["plausible"]:
-        facts.append(f"plausible {declaration['plausible']}")
-    if declaration["required"]:
-        facts.append("must be given")
-    elif "keys" not in declaration:
-        default = declaration["default"]
-        facts.append("not set by default" if default is None else f"default {toml_value(default)}")
-    return [fact for fact in facts if fact]
-
-
-def _within(path: str, key: str) -> bool:
-    return path == key or path.startswith(f"{key}.")
-
-
-def toml_key(key: str) -> str:
-    """Return a key as TOML writes it."""
-    bare = key.isascii() and key.replace("-", "_").replace("_", "a").isalnum()
-    return key if bare else _toml_text(key)
-
-
-def toml_value(value: Any) -> str:
-    """Return a plain value as TOML writes it."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return _toml_text(value)
-    if isinstance(value, int | float):
-        return repr(value)
-    if isinstance(value, Mapping):
-        inner = (
-            f"{toml_key(key)} = {toml_value(member)}" for key, member in value.items() if member is not None
-        )
-        return "{ " + ", ".join(inner) + " }" if value else "{}"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(toml_value(member) for member in value) + "]"
-    raise TypeError(f"{value!r} is not a TOML value")
-
-
-def _toml_text(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
 def _tables_only(layer: Layer, complaints: list[_Complaint]) -> Layer:
     """Return the layer without keys that are not tables of a pipeline; add a complaint for each of them."""
     values = {}
@@ -572,11 +373,3 @@ def _leaves(values: Mapping[str, Any], path: KeyPath) -> Iterator[KeyPath]:
             yield from _leaves(value, (*path, key))
         else:
             yield (*path, key)
-
-
-def _listed(complaints: Sequence[str]) -> str:
-    if len(complaints) == 1:
-        return complaints[0]
-    return "\n".join(
-        [f"{len(complaints)} errors in the settings:", *(indent(complaint, "  ") for complaint in complaints)]
-    )

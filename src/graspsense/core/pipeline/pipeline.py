@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from attrs import frozen
 
-from graspsense.core.components.config import Flag, Settings, resolve
+from graspsense.core.components.config import Settings, resolve
+from graspsense.core.components.layers import Flag
 from graspsense.core.components.registry import Plugins, installed
 from graspsense.core.components.roles import Controller, FeatureSet, SensorBackend
 from graspsense.core.control.garbage_collection import no_collection

@@ -34,7 +34,7 @@ from graspsense.sources.simulated import simulated
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.core.components.config import SelectedComponent
+    from graspsense.core.components.selected import SelectedComponent
     from graspsense.core.learn.labelled import Labelled
     from graspsense.core.values.features import FeatureTable
 

@@ -9,7 +9,7 @@ import numpy as np
 from attrs import field, frozen
 from attrs.validators import ge, le
 
-from graspsense.core.components.config import SelectedComponent
+from graspsense.core.components.selected import SelectedComponent
 from graspsense.core.components.strict import structured
 from graspsense.core.learn.labelled import Labelled, Target
 from graspsense.core.values.errors import ConfigError, counted

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
-from graspsense.core.components.config import SelectedComponent, settings_from
+from graspsense.core.components.config import settings_from
+from graspsense.core.components.selected import SelectedComponent
 from graspsense.core.components.strict import structured
 from graspsense.core.learn.labelled import Target, class_of
 from graspsense.evaluation.crossval import cross_validate
