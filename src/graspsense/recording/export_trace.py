@@ -21,7 +21,7 @@ from graspsense.recording.parquet import parquet
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.recording.reader import RecordedGrasp
+    from graspsense.recording.recorded_grasp import RecordedGrasp
 
 
 def write_csv(path: Path, grasp: RecordedGrasp) -> None:

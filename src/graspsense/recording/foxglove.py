@@ -29,7 +29,7 @@ from graspsense.recording.reader import largest_record
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.recording.reader import RecordedGrasp
+    from graspsense.recording.recorded_grasp import RecordedGrasp
 
 PICTURE_TOPIC: Final = "/grasp/pictures/"
 """Before the name of an array; the fingertips are `pads_left` and `pads_right`."""

@@ -17,7 +17,7 @@ from graspsense.store.naming import STORE, as_source
 from graspsense.store.trial_ref import parse_trial_ref
 
 if TYPE_CHECKING:
-    from graspsense.recording.reader import RecordedGrasp
+    from graspsense.recording.recorded_grasp import RecordedGrasp
 
 
 def recorded_squeezes(sources: Sequence[str], name: str | None = None) -> tuple[RecordedSqueeze, ...]:

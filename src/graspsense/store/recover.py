@@ -21,7 +21,8 @@ from graspsense.core.values.features import Features
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.before_contact import before_contact, contact_force_of
 from graspsense.recording.layout import DEVICE, PART, START, TICK
-from graspsense.recording.reader import RecordedGrasp, TopicRows, read_recorded
+from graspsense.recording.reader import read_recorded
+from graspsense.recording.recorded_grasp import RecordedGrasp, TopicRows
 from graspsense.recording.recording_info import RecordingInfo
 from graspsense.recording.trial_record import FeatureValues, TrialRecord, TrialResult
 from graspsense.recording.writer import RecordingWriter

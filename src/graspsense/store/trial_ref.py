@@ -5,7 +5,8 @@ from __future__ import annotations
 from graspsense.core.components.config import NONE, without_followers
 from graspsense.core.components.layers import Layer
 from graspsense.core.values.errors import ConfigError, DataDamaged
-from graspsense.recording.reader import RecordedGrasp, read_recorded
+from graspsense.recording.reader import read_recorded
+from graspsense.recording.recorded_grasp import RecordedGrasp
 from graspsense.recording.replayable import Recording
 from graspsense.store.naming import store_folder
 from graspsense.store.store import Store
