@@ -44,6 +44,7 @@ from graspsense.simulator_api import (
     Viewer,
     first_call,
 )
+from graspsense_mujoco_gripper.arm_motion import ArmMotion
 from graspsense_mujoco_gripper.batch import GraspingJob, grasps
 from graspsense_mujoco_gripper.camera import Camera, Window, free_camera, offscreen, require_screen
 from graspsense_mujoco_gripper.catalogue import catalogue
@@ -64,13 +65,7 @@ from graspsense_mujoco_gripper.measurement import (
 from graspsense_mujoco_gripper.model import OBJ, identifier
 from graspsense_mujoco_gripper.prepared import Batch, prepare
 from graspsense_mujoco_gripper.roughness import Roughness
-from graspsense_mujoco_gripper.scene import (
-    PREFIX,
-    ArmMotion,
-    is_thing,
-    read_scene,
-    scene_named,
-)
+from graspsense_mujoco_gripper.scene import read_scene, scene_named
 from graspsense_mujoco_gripper.ticks import (
     MOST_TICKS,
     Forces,
@@ -80,6 +75,7 @@ from graspsense_mujoco_gripper.ticks import (
     Ticked,
     compiled_ticks,
 )
+from graspsense_mujoco_gripper.world import PREFIX, is_thing
 
 INTEGRATORS: Final = ("Euler", "implicitfast", "implicit", "RK4", "discrete")
 STEPS_S: Final = (1e-3, 5e-4, 2e-4, 1e-4)

@@ -14,7 +14,9 @@ from graspsense_mujoco_gripper.drive import Travel, test_move
 from graspsense_mujoco_gripper.gripper_file import GripperFile, read_gripper
 from graspsense_mujoco_gripper.measurement import width_m
 from graspsense_mujoco_gripper.model import compiled, gripper_spec
-from graspsense_mujoco_gripper.scene import SceneModel, add_thing, put_on_arm, read_scene, vary
+from graspsense_mujoco_gripper.scene import SceneModel, read_scene
+from graspsense_mujoco_gripper.variation import vary
+from graspsense_mujoco_gripper.world import add_thing, put_on_arm
 
 MOST_KNOWN: Final = 16
 
