@@ -23,7 +23,7 @@ from graspsense_identify.run import _own_settings, _ready, _used
 from graspsense_identify.share import Shares
 from graspsense_identify.spread import refits
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.plant.contact import PadCompliance
+from graspsense_sim_gripper.plant.pads import PadCompliance
 from graspsense_sim_gripper.scene.spec import parse_scene
 
 PADS = PadCompliance(15000.0, 0.0, 0.0, 1.0)

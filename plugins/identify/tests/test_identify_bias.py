@@ -19,7 +19,7 @@ from graspsense_identify.prepare import prepared
 from graspsense_identify.share import measured_share
 from graspsense_identify.spread import _scale_errors, at_least, uncertainty
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.plant.contact import PadCompliance
+from graspsense_sim_gripper.plant.pads import PadCompliance
 from graspsense_sim_gripper.run.build import drive_and_pads
 
 

@@ -18,7 +18,7 @@ from graspsense_identify.prepare import prepared
 from graspsense_identify.random_effects import between, own_spreads
 from graspsense_identify.run import identify
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.plant.contact import PadCompliance
+from graspsense_sim_gripper.plant.pads import PadCompliance
 
 MODEL = ForwardModel(pads=PadCompliance(15000.0, 0.0, 0.0, 1.0))
 OBJECTS = 6

@@ -10,7 +10,9 @@ from cases import every_case
 from unverified import unverified_setup
 
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.plant.contact import ObjectModel, PadCompliance, solve_contact
+from graspsense_sim_gripper.plant.balance import solve_contact
+from graspsense_sim_gripper.plant.object_model import ObjectModel
+from graspsense_sim_gripper.plant.pads import PadCompliance
 from graspsense_sim_gripper.plant.state import ContactState
 from graspsense_sim_gripper.run.accuracy.levels import balance_rtol
 from graspsense_sim_gripper.run.compiled.compose import bind_reachable, sum_of, uncompressed

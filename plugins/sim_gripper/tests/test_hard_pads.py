@@ -7,7 +7,7 @@ import pytest
 
 from graspsense.plugin_api import create
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.plant.contact import PadCompliance, pad_compression
+from graspsense_sim_gripper.plant.pads import PadCompliance, pad_compression
 from graspsense_sim_gripper.run.driven import RecordedPath, follow_many
 
 STIFF = """width_m = 0.06

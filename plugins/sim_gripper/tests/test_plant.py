@@ -11,9 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from graspsense.gripper_api import gap_and_rate, revolutions_at
-from graspsense_sim_gripper.plant.contact import ObjectModel, PadCompliance, solve_contact
+from graspsense_sim_gripper.plant.balance import solve_contact
 from graspsense_sim_gripper.plant.drive import Drive, Friction, sliding_friction, stribeck_excess
 from graspsense_sim_gripper.plant.drive_models import LINKAGES, STRAIGHT
+from graspsense_sim_gripper.plant.object_model import ObjectModel
+from graspsense_sim_gripper.plant.pads import PadCompliance
 from graspsense_sim_gripper.plant.state import Contact, ContactState, Motion
 from graspsense_sim_gripper.run.accuracy.levels import PLAIN, steps_for
 from graspsense_sim_gripper.run.binding import bind_reachable

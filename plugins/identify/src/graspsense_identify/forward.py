@@ -1,6 +1,6 @@
 """The forward model: the force of an object on a recorded path of the gap, through the fingertips and the sensor.
 
-The object's law and the fingertips are those of the simulator (`plant.contact.solve_contact`), compiled where numba
+The object's law and the fingertips are those of the simulator (`plant.balance.solve_contact`), compiled where numba
 is installed.
 """
 

@@ -33,6 +33,11 @@ class Past(NamedTuple):
     """Duration of the step before it; inf if the change says nothing about the next step."""
 
 
+def without_past(rate_m_s: float) -> Past:
+    """Return the last step of a compression that says nothing about the next one but its rate."""
+    return Past(rate_m_s, 0.0, math.inf, math.inf)
+
+
 class ContactState(NamedTuple):
     """The object between the pads, or one half of an object that is held fast: compression, force and memory."""
 

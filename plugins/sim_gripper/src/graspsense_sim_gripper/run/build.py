@@ -17,10 +17,11 @@ from attrs import evolve, fields, frozen
 from graspsense.gripper_api import gap_and_rate, revolutions_at
 from graspsense.plugin_api import EFFORT, Command, ConfigError, DeviceInfo
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.plant.contact import ObjectModel, PadCompliance
 from graspsense_sim_gripper.plant.drive import Drive, Friction
 from graspsense_sim_gripper.plant.drive_models import LINKAGES, STRAIGHT
 from graspsense_sim_gripper.plant.fingertip import CELL_OFFSET, CELLS
+from graspsense_sim_gripper.plant.object_model import ObjectModel
+from graspsense_sim_gripper.plant.pads import PadCompliance
 from graspsense_sim_gripper.plant.sensing import (
     ImageClock,
     PadCells,

@@ -21,13 +21,8 @@ from attrs import field, frozen
 from numpy.typing import ArrayLike, NDArray
 
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.plant.contact import (
-    ObjectModel,
-    has_event,
-    next_contacts,
-    pad_forces,
-    with_touch,
-)
+from graspsense_sim_gripper.plant.contact import has_event, next_contacts, pad_forces, with_touch
+from graspsense_sim_gripper.plant.object_model import ObjectModel
 from graspsense_sim_gripper.plant.roots import MAX_ITERATIONS, bracketed_secant
 from graspsense_sim_gripper.plant.state import Contact
 from graspsense_sim_gripper.run.binding import bind_reachable

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from graspsense_sim_gripper.plant.contact import pad_compression
+from graspsense_sim_gripper.plant.pads import pad_compression
 from graspsense_sim_gripper.run.problem import GraspSetup
 from graspsense_sim_gripper.scene.spec import TermParams
 from graspsense_sim_gripper.scene.terms.registry import find_term

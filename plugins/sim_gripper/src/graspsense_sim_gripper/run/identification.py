@@ -6,15 +6,11 @@ from collections.abc import Callable, Sequence
 from typing import Any, TypeVar, cast
 
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.plant.contact import (
-    BALANCE_RTOL,
-    ObjectModel,
-    PadCompliance,
-    pad_compression,
-    solve_contact,
-)
+from graspsense_sim_gripper.plant.balance import solve_contact
 from graspsense_sim_gripper.plant.drive import Drive, stribeck_excess
 from graspsense_sim_gripper.plant.fingertip import CELLS
+from graspsense_sim_gripper.plant.object_model import BALANCE_RTOL, ObjectModel
+from graspsense_sim_gripper.plant.pads import PadCompliance, pad_compression
 from graspsense_sim_gripper.plant.state import ContactState
 from graspsense_sim_gripper.run.binding import bind_reachable
 from graspsense_sim_gripper.run.build import drive_and_pads

@@ -11,8 +11,9 @@ from __future__ import annotations
 from typing import Final
 
 from graspsense.gripper_api import gap_and_rate
-from graspsense_sim_gripper.plant.contact import ObjectModel, offset_of_pushed, with_forces_of
+from graspsense_sim_gripper.plant.contact import offset_of_pushed, with_forces_of
 from graspsense_sim_gripper.plant.drive import ARREST_M_S, is_held, stribeck_excess
+from graspsense_sim_gripper.plant.object_model import ObjectModel
 from graspsense_sim_gripper.plant.state import Contact, Motion, right_of
 from graspsense_sim_gripper.solve.scheme import SPEED_SCALE_M_S, PlantParams
 from graspsense_sim_gripper.solve.state import PlantState, StepState

@@ -16,8 +16,9 @@ from __future__ import annotations
 from typing import Final
 
 from graspsense.gripper_api import gap_and_rate
-from graspsense_sim_gripper.plant.contact import CONTACT_TOL_M, ObjectModel, has_event, pad_forces, restarted
+from graspsense_sim_gripper.plant.contact import CONTACT_TOL_M, has_event, pad_forces, restarted
 from graspsense_sim_gripper.plant.drive import ARREST_M_S
+from graspsense_sim_gripper.plant.object_model import ObjectModel
 from graspsense_sim_gripper.plant.state import Contact, ContactState, Motion, right_of
 from graspsense_sim_gripper.solve.control import MIN_STEP_S, contact_step_s
 from graspsense_sim_gripper.solve.scheme import Attempt, PlantParams, Start, end_of_travel

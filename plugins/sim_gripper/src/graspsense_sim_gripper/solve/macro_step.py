@@ -12,8 +12,9 @@ import math
 from typing import Final, NamedTuple
 
 from graspsense.gripper_api import gap_and_rate
-from graspsense_sim_gripper.plant.contact import ObjectModel, has_event, pad_forces
+from graspsense_sim_gripper.plant.contact import has_event, pad_forces
 from graspsense_sim_gripper.plant.drive import Drive, acceleration, is_held, sliding_friction
+from graspsense_sim_gripper.plant.object_model import ObjectModel
 from graspsense_sim_gripper.plant.state import Contact, Motion, PlantReadings, right_of
 from graspsense_sim_gripper.solve.advance import completed, rests
 from graspsense_sim_gripper.solve.coast import coast

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from graspsense_sim_gripper.plant.contact import ObjectModel, next_contacts
+from graspsense_sim_gripper.plant.contact import next_contacts
 from graspsense_sim_gripper.plant.drive import (
     ARREST_M_S,
     Drive,
@@ -14,6 +14,7 @@ from graspsense_sim_gripper.plant.drive import (
     load_at_rest,
     sliding_friction,
 )
+from graspsense_sim_gripper.plant.object_model import ObjectModel
 from graspsense_sim_gripper.plant.state import Contact, Motion
 from graspsense_sim_gripper.solve.state import PlantState
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from graspsense_sim_gripper.plant.contact import balance_tolerance, pad_forces
+from graspsense_sim_gripper.plant.balance import balance_tolerance
+from graspsense_sim_gripper.plant.contact import pad_forces
 from graspsense_sim_gripper.plant.drive import acceleration, sliding_friction
 from graspsense_sim_gripper.plant.state import Contact, Motion, right_of
 from graspsense_sim_gripper.solve.events import drift

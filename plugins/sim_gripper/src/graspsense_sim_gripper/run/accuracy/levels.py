@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from graspsense_sim_gripper.plant.contact import BALANCE_RTOL
+from graspsense_sim_gripper.plant.object_model import BALANCE_RTOL
 from graspsense_sim_gripper.solve.scheme import Steps
 
 STEP_SHARE: Final = 0.34

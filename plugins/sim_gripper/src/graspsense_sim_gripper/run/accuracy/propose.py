@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.plant.contact import ObjectModel
+from graspsense_sim_gripper.plant.object_model import ObjectModel
 from graspsense_sim_gripper.run.accuracy.chosen_steps import QUANTITIES, ChosenSteps, StepDecision
 from graspsense_sim_gripper.run.accuracy.levels import (
     CONTROLLED,

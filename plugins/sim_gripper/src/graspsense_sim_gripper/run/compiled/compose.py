@@ -14,14 +14,10 @@ from typing import Any, Final, NamedTuple
 
 from graspsense.plugin_api import Frame
 from graspsense.simulator_api import bind, events_of, free_parts, maker, tick
-from graspsense_sim_gripper.plant.contact import (
-    BalanceSearch,
-    ObjectModel,
-    PadLoad,
-    hardening,
-    no_event,
-    solve_contact,
-)
+from graspsense_sim_gripper.plant.balance import BalanceSearch, PadLoad, solve_contact
+from graspsense_sim_gripper.plant.contact import no_event
+from graspsense_sim_gripper.plant.object_model import ObjectModel
+from graspsense_sim_gripper.plant.pads import hardening
 from graspsense_sim_gripper.plant.sensing import CellReading, EncoderReading, SensorState
 from graspsense_sim_gripper.plant.state import Contact, ContactState, Motion, Past
 from graspsense_sim_gripper.run.approach import approach_ticks
@@ -44,7 +40,7 @@ TermsParams = Any
 PlantMove = Callable[[Any, PlantState, float, float], PlantState]
 """`move(model, state, effort_n, dt_s) -> state` over one tick."""
 ContactSolver = Callable[[ObjectModel, ContactState, float, float, float], tuple[ContactState, int]]
-"""`plant.contact.solve_contact` with the terms of an object."""
+"""`plant.balance.solve_contact` with the terms of an object."""
 
 INTERPRETED: Final[Constructors] = {
     kind: maker(kind)

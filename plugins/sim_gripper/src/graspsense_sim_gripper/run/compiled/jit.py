@@ -8,7 +8,8 @@ from contextlib import contextmanager
 from typing import Any, Final
 
 from graspsense.simulator_api import CompileOptions, Inlining, compile_function, first_call
-from graspsense_sim_gripper.plant.contact import _pressed, solve_contact
+from graspsense_sim_gripper.plant.balance import solve_contact
+from graspsense_sim_gripper.plant.contact import _pressed
 from graspsense_sim_gripper.solve.advance import advance, move, take_step, take_steps
 from graspsense_sim_gripper.solve.converge import refine_until_converged
 
