@@ -333,3 +333,18 @@ def test_words_for_a_missing_number_are_labels_of_recordings_too(tmp_path):
     lines = [f"{HEADER},what", *(f"{row},{'NA' if k < 100 else 'none'}" for k, row in enumerate(ROWS))]
     keys = 'files = "*.csv"\nsplit = "what"\nlabel = "{what}"\ntime = "t"\ngap = "pos [mm]"\nforce = "f1"\n'
     assert [recording.label for recording in recordings(tmp_path, lines, keys)] == ["NA", "none"]
+
+
+def test_rows_without_a_value_of_the_column_that_splits_are_left_out_and_told(tmp_path):
+    keys = 'files = "*.csv"\nsplit = "trial"\nlabel = "jar"\ntime = "t"\ngap = "pos [mm]"\nforce = "f1"\n'
+    lines = [
+        f"{HEADER},trial",
+        *(f"{row},{'' if k in (30, 31) else 1 + k // 100}" for k, row in enumerate(ROWS)),
+    ]
+    found = recordings(tmp_path, lines, keys)
+    assert [len(recording.recording.readings) for recording in found] == [98, 100]
+    assert any(
+        "2 samples without a value of trial (from line 32 on)" in note for note in found[0].recording.notes
+    )
+    (refused,) = recordings(tmp_path, [f"{HEADER},trial", *(f"{row}," for row in ROWS)], keys)
+    assert "no value of trial" in str(refused.error)
