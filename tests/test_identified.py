@@ -171,4 +171,4 @@ def test_what_looks_wrong_in_an_imported_squeeze_goes_with_it(tmp_path):
     manifest = tmp_path / "m.toml"
     manifest.write_text('files = "{label}.csv"\ntime = "t [ms]"\ngap = "pos [mm]"\nforce = "F"\n')
     (squeeze,) = recorded_squeezes([str(manifest)])
-    assert any("0.149 ms" in warning for warning in squeeze.warnings)
+    assert any("lasts 0.15 ms only" in warning for warning in squeeze.warnings)
