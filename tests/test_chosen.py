@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy
+from cases import every_case
 
 from graspsense.evaluation.chosen import comparisons_of, rate_of_chosen
 from graspsense.evaluation.intervals import difference
@@ -85,3 +86,18 @@ def test_candidates_with_the_same_answers_are_one_comparison():
     assert comparisons_of(np.array([right] * 8), None) == 1.0
     # The quantile of 2000 draws is not exactly 1.96.
     assert comparisons_of(np.array([right, right, ~right]), None) == pytest.approx(1.0, abs=0.5)
+
+
+@every_case(
+    ("wins", "losses", "told"),
+    [(7, 0, False), (13, 3, False), (11, 2, False), (9, 0, True), (11, 1, True), (60, 20, True)],
+)
+def test_of_four_candidates_on_few_trials_one_is_worse_only_if_the_sign_test_says_so(wins, losses, told):
+    """4.4 comparisons: seven wins of seven have a probability of 2 / 2**7 = 0.016, which is not below 0.05 / 4.4."""
+    both = [True] * 7
+    best = both + [True] * wins + [False] * losses
+    other = both + [False] * wins + [True] * losses
+    low, high = difference(best, other, comparisons=4.4).interval
+    assert (low > 0.0) is told
+    turned = difference(other, best, comparisons=4.4).interval
+    assert turned == pytest.approx((-high, -low))

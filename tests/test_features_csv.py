@@ -12,6 +12,7 @@ from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.features import FeatureTable
 from graspsense.sources.features_csv import read_labelled, read_table, write_labelled
+from graspsense.sources.trial_source import load_trials
 
 GOOD = "what,p_first [m],f_steady\n" + "".join(
     f"{'ab'[i % 2]},{0.05 + 0.001 * (i % 3)},{6 + i % 2}\n" for i in range(8)
@@ -173,13 +174,36 @@ def test_constant_and_empty_columns_are_noted(csv):
     assert trials.table.names == ("p", "same")
 
 
-@every_case("other", ["Tin_can 1", "tin-can 01", "tin  can 1", "tin can \uff11"])
+@every_case(
+    "other",
+    [
+        "Tin_can 1",
+        "tin-can 01",
+        "tin  can 1",
+        "tin can \uff11",
+        "tin c\u0430n 1",
+        "\u03a4in can 1",
+        "t\u0131n can 1",
+    ],
+)
 def test_labels_that_differ_in_spelling_only_are_noted(csv, other):
     text = GOOD.replace("\na,", "\ntin can 1,")
-    trials = read_labelled(csv(text.replace("tin can 1", other, 1)), "what")
+    trials = load_trials(str(csv(text.replace("tin can 1", other, 1))), label="what")
 
     assert any("differ in spelling only" in note for note in trials.notes)
-    assert not any("spelling" in note for note in read_labelled(csv(text), "what").notes)
+    assert not any("spelling" in note for note in load_trials(str(csv(text)), label="what").notes)
+
+
+def test_a_letter_of_another_alphabet_is_shown_by_its_code_and_a_selector_is_left_out(csv):
+    text = GOOD.replace("\na,", "\ncan,")
+    (note,) = (
+        note
+        for note in load_trials(str(csv(text.replace("\ncan,", "\nc\u0430n,", 1))), label="what").notes
+        if "spelling" in note
+    )
+    assert note.endswith("'can' and 'c\\u0430n'")
+    selected = load_trials(str(csv(text.replace("\ncan,", "\ncan\ufe0f,", 1))), label="what")
+    assert set(selected.labels) == set(load_trials(str(csv(text)), label="what").labels)
 
 
 def test_instances_order_and_what_is_known_before_the_contact(csv):
@@ -214,7 +238,7 @@ def test_what_is_written_reads_back_to_the_bit(tmp_path_factory, rows):
 
 
 def test_a_table_without_labels(csv):
-    trials = read_table(csv(GOOD), ["f_steady", "p_first"])
+    trials, _ = read_table(csv(GOOD), ["f_steady", "p_first"])
 
     assert trials.names == ("f_steady", "p_first")
     assert trials.values[0].tolist() == [6.0, 0.05]

@@ -162,3 +162,13 @@ def test_a_scene_in_the_place_of_a_recording_is_named_as_such(tmp_path):
     path.write_text(CUP)
     with pytest.raises(ConfigError, match="is a scene, not a recording"):
         recorded_squeezes([str(path)])
+
+
+def test_what_looks_wrong_in_an_imported_squeeze_goes_with_it(tmp_path):
+    """The time is in ms, and the manifest does not say so."""
+    rows = [f"{k / 1000},{80 - 0.3 * min(k, 110)},{max(0, k - 100)}" for k in range(150)]
+    (tmp_path / "cup.csv").write_text("\n".join(["t,pos,F", *rows]) + "\n")
+    manifest = tmp_path / "m.toml"
+    manifest.write_text('files = "{label}.csv"\ntime = "t [ms]"\ngap = "pos [mm]"\nforce = "F"\n')
+    (squeeze,) = recorded_squeezes([str(manifest)])
+    assert any("lasts 0.15 ms only" in warning for warning in squeeze.warnings)

@@ -93,6 +93,10 @@ def test_train_then_predict(csv, tmp_path):
     ]
     assert answer["unknown"] == 1
     assert answer["rate"] is None
+    (assumed,) = (note for note in answer["notes"] if "states no unit" in note)
+    assert {"p_first in m", "f_steady in N"} == {
+        word.strip() for word in assumed.rpartition(" as ")[2].split(",")
+    }
     assert any(
         "f_steady is missing" in prediction["words"] for prediction in answer["predictions"][3]["because"]
     )

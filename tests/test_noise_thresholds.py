@@ -10,8 +10,10 @@ from attrs import evolve
 from cases import every_case
 
 from graspsense.core.control.contact import CONTACT_FORCE_N, REST_SPEED_M_S, REST_WINDOW_S, first_rest
+from graspsense.core.values.features import Features
 from graspsense.core.values.signals import NO_PADS, Frame, Reading
 from graspsense.recording.replayable import Recording
+from graspsense.sources.import_outcomes import presses_on
 from graspsense.sources.noise_thresholds import thresholds_for
 
 
@@ -254,3 +256,19 @@ def test_recordings_that_begin_in_contact_with_different_forces_are_in_contact_f
     thresholds = thresholds_for(held)
     assert 0.0 < thresholds.settings["controller.contact_force_n"] <= 950.0
     assert "from the beginning" in thresholds.words
+
+
+@every_case(
+    ("rest_mm", "rest_n", "goes_on"),
+    [(64.0, 3.6, True), (64.0, 7.5, False), (63.0, 3.6, True), (61.7, 3.6, False), (61.6, 7.9, False)],
+)
+def test_a_rest_before_most_of_the_force_is_doubted_also_where_the_gap_shows_no_travel(
+    rest_mm, rest_n, goes_on
+):
+    """The squeeze closes from 64 to 61.6 mm with up to 8 N, or stays at 64 mm if the rest is there."""
+    squeezed = slow_squeeze(hold_s=1.0)
+    if rest_mm == 64.0:
+        squeezed = coarse(squeezed, 0.032)
+    names, units = ("p_first", "p_steady", "f_steady"), ("m", "m", "N")
+    features = Features(names=names, values=(0.064, rest_mm / 1e3, rest_n), units=units)
+    assert presses_on(features, squeezed) is goes_on

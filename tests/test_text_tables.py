@@ -219,6 +219,48 @@ def test_units_that_the_file_states_are_used_or_compared(tmp_path):
     assert [notice for notice in recording.notices if "[mN]" in notice and "states N" in notice]
 
 
+@every_case(
+    ("units", "keys", "si"),
+    [
+        ("msec,MM,newtons,N", "", {"t_s": 1.99, "gap_m": 0.0485, "unit": ""}),
+        ("ms,mm,mA,mA", "", {"t_s": 1.99, "gap_m": 0.0485, "unit": "mA"}),
+        ("ms,deg,N,N", "", {"t_s": 1.99, "gap_m": 48.5, "unit": ""}),
+        ("", 'gap = "pos [Millimeters]"', {"t_s": 1.99, "gap_m": 0.0485, "unit": ""}),
+    ],
+)
+def test_a_unit_in_other_words_is_used_and_another_one_is_kept(units, keys, si, tmp_path):
+    """Without the line of units, the time is written as `t [msec]`."""
+    lines = [HEADER, *([units] if units else [])]
+    lines += [f"{1000 * float(t):.0f},{other}" for t, _, other in (row.partition(",") for row in ROWS)]
+    given = f'files = "{{label}}.csv"\ntime = "{"t" if units else "t [msec]"}"\nforce = "f1"\n' + (
+        keys or 'gap = "pos"'
+    )
+    (recording,) = recordings(tmp_path, lines, given)
+    last = recording.recording.readings[-1].frame
+    assert (last.t_s, last.gap_m) == pytest.approx((si["t_s"], si["gap_m"]), abs=1e-3)
+    assert recording.recording.units.get("force_left", "") == si["unit"]
+
+
+@every_case(
+    ("heading", "unit", "says"),
+    [("f1_mN", "", "[mN]"), ("f1_raw", "", ""), ("f1_N", "", ""), ("f1_kN", "N", ""), ("f1_mN", "kgf", "")],
+)
+def test_a_name_that_ends_in_another_unit_is_told(heading, unit, says, tmp_path):
+    lines = [f"t,pos,{heading},f2", *([f"s,mm,{unit},"] if unit else []), *ROWS]
+    keys = f'files = "{{label}}.csv"\ntime = "t"\ngap = "pos [mm]"\nforce = "{heading}"\n'
+    (recording,) = recordings(tmp_path, lines, keys)
+    assert [
+        notice for notice in recording.notices if "its name says" in notice and says in notice
+    ] or not says
+    assert says or not [notice for notice in recording.notices if "its name says" in notice]
+
+
+def test_an_effort_in_another_unit_is_told(tmp_path):
+    keys = 'files = "{label}.csv"\ntime = "t"\ngap = "pos"\nforce = "f1"\neffort = "f2"\n'
+    (recording,) = recordings(tmp_path, [HEADER, "s,mm,N,mA", *ROWS], keys)
+    assert [notice for notice in recording.notices if "states mA" in notice]
+
+
 def test_numbers_without_a_header_in_reach_ask_for_the_line(tmp_path):
     (refused,) = recordings(tmp_path, ["a,b", "a,b", "a,b", *ROWS])
     assert 'start = "' in str(refused.error)
@@ -291,3 +333,18 @@ def test_words_for_a_missing_number_are_labels_of_recordings_too(tmp_path):
     lines = [f"{HEADER},what", *(f"{row},{'NA' if k < 100 else 'none'}" for k, row in enumerate(ROWS))]
     keys = 'files = "*.csv"\nsplit = "what"\nlabel = "{what}"\ntime = "t"\ngap = "pos [mm]"\nforce = "f1"\n'
     assert [recording.label for recording in recordings(tmp_path, lines, keys)] == ["NA", "none"]
+
+
+def test_rows_without_a_value_of_the_column_that_splits_are_left_out_and_told(tmp_path):
+    keys = 'files = "*.csv"\nsplit = "trial"\nlabel = "jar"\ntime = "t"\ngap = "pos [mm]"\nforce = "f1"\n'
+    lines = [
+        f"{HEADER},trial",
+        *(f"{row},{'' if k in (30, 31) else 1 + k // 100}" for k, row in enumerate(ROWS)),
+    ]
+    found = recordings(tmp_path, lines, keys)
+    assert [len(recording.recording.readings) for recording in found] == [98, 100]
+    assert any(
+        "2 samples without a value of trial (from line 32 on)" in note for note in found[0].recording.notes
+    )
+    (refused,) = recordings(tmp_path, [f"{HEADER},trial", *(f"{row}," for row in ROWS)], keys)
+    assert "no value of trial" in str(refused.error)

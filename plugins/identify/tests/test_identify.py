@@ -19,7 +19,7 @@ from graspsense_identify.fracture import bears_again, fracture_of
 from graspsense_identify.laws import memories, scale_of, static_candidates
 from graspsense_identify.prepare import _smooth_course, prepared
 from graspsense_identify.refuse import shows_memory
-from graspsense_identify.run import _own_settings, _ready, _used
+from graspsense_identify.run import _looks_wrong, _own_settings, _ready, _used
 from graspsense_identify.share import Shares
 from graspsense_identify.spread import refits
 from graspsense_sim_gripper.config import SimConfig
@@ -391,3 +391,11 @@ def test_the_table_identified_of_a_scene_is_checked():
     ):
         with pytest.raises(ConfigError, match=message):
             parse_scene("width_m = 0.05\n" + bad, "cup", "cup.toml")
+
+
+def test_what_looks_wrong_in_a_recording_is_told_and_a_force_in_another_unit_as_well():
+    doubtful, plain = evolve(recorded(), warnings=("the gap rises while the force rises",)), recorded()
+    assert _looks_wrong([doubtful, plain]) == ["1 of the 2 recordings: the gap rises while the force rises"]
+    weak = recorded(lambda closure: closure)
+    (told,) = _looks_wrong([weak])
+    assert f"{1e3 * weak.trace.force_left_n.max():.3g} mN" in told

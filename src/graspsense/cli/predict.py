@@ -42,6 +42,7 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     from graspsense.core.components.registry import installed
     from graspsense.core.learn.copies import learned_from
     from graspsense.core.learn.model_file import load_model
+    from graspsense.core.values.features import assumed_units
     from graspsense.evaluation.json_codec import to_json
     from graspsense.regression.model import is_regression
 
@@ -55,6 +56,7 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     asked = load_model(model, installed())
     table, labelled, notes = _trials(asked, source, given)
     predictions = _predictions(asked, table, {} if labelled is None else labelled.provenance)
+    notes = (*notes, *assumed_units(asked.names, asked.units, table))
     if len(table) > MOST_WITH_REASONS:
         notes = (*notes, f"more than {MOST_WITH_REASONS} trials: the predictions have no reasons")
     learned = learned_from(asked.learned_from, table.columns(asked.names))
@@ -112,7 +114,8 @@ def _trials(
     if is_csv(source) and not given["label"]:
         from graspsense.sources.features_csv import read_table
 
-        return read_table(Path(source), model.names), None, ()
+        table, notes = read_table(Path(source), model.names)
+        return table, None, notes
     with ProgressLine() as progress:
         labelled = trials_of(
             source,

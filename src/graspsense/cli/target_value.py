@@ -108,6 +108,7 @@ def predict_value(model_name: str, source: str, as_json: bool, given: Mapping[st
     from attrs import evolve
 
     from graspsense.core.learn.copies import learned_from, row_hashes
+    from graspsense.core.values.features import assumed_units
     from graspsense.evaluation.json_codec import to_json
     from graspsense.regression.error import error_of
     from graspsense.regression.model import load_regression
@@ -115,6 +116,7 @@ def predict_value(model_name: str, source: str, as_json: bool, given: Mapping[st
     model = load_regression(model_name)
     table, labelled, notes = _to_predict(model, source, given)
     predictions = model.predict(table)
+    notes = (*notes, *assumed_units(model.table.names, model.table.units, table))
     warnings, error, truth = list(model.warnings), None, None
     learned = learned_from(row_hashes(model.table), table.columns(model.table.names))
     if learned:
@@ -176,7 +178,8 @@ def _to_predict(
     if is_csv(source) and not given["target_value"] and not given["label"]:
         from graspsense.sources.features_csv import read_table
 
-        return read_table(Path(source), model.table.names), None, ()
+        table, notes = read_table(Path(source), model.table.names)
+        return table, None, notes
     with ProgressLine() as progress:
         named = given["features"] or (model.table.names if is_csv(source) else None)
         labelled = trials_of(source, progress, {**given, "features": named}, copies=True)

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 Z: Final = 1.959963984540054
 """97.5 % quantile of the standard normal distribution."""
+ALPHA: Final = 0.05
+"""Probability of an error of an interval."""
 MIN_INSTANCES: Final = 6
 """With fewer instances there is no interval: the variance between instances is not known well enough."""
 
@@ -179,14 +181,17 @@ def difference(
     """Return the rate of `minuend` minus that of `subtrahend`; both state which of the same trials are correct.
 
     With `instances`, the object of each trial, the interval is Student's t of the differences by instance, and never
-    narrower than that of independent trials. It is corrected for a number of comparisons (Bonferroni). Raises
-    ValueError if the lengths differ or are zero.
+    narrower than that of independent trials. It is corrected for a number of comparisons (Bonferroni). With several of
+    them it holds zero unless the exact sign test of the trials that differ excludes it: so far out, Newcombe's interval
+    of a few trials is too narrow. Raises ValueError if the lengths differ or are zero.
     """
     n = len(minuend)
     if n == 0 or len(subtrahend) != n:
         raise ValueError(f"{n} and {len(subtrahend)} trials: both must be of the same trials")
     value = (sum(minuend) - sum(subtrahend)) / n
     independent = _newcombe(minuend, subtrahend, _z(comparisons))
+    if comparisons > 1.0 and _sign_test(minuend, subtrahend) * comparisons > ALPHA:
+        independent = (min(independent[0], 0.0), max(independent[1], 0.0))
     if instances is None:
         return Difference(value, independent)
     count = len(set(instances))
@@ -196,6 +201,15 @@ def difference(
     half = t_quantile(count - 1, comparisons) * math.sqrt(_variance_of_mean(each, instances)[0])
     low, high = min(value - half, independent[0]), max(value + half, independent[1])
     return Difference(value, (max(low, -1.0), min(high, 1.0)))
+
+
+def _sign_test(minuend: Sequence[bool], subtrahend: Sequence[bool]) -> float:
+    """Return the probability that so many of the trials that differ, or more, favour one side (Q. McNemar, 1947)."""
+    from scipy.special import bdtr
+
+    better = sum(x and not y for x, y in zip(minuend, subtrahend, strict=True))
+    worse = sum(y and not x for x, y in zip(minuend, subtrahend, strict=True))
+    return min(1.0, 2.0 * float(bdtr(min(better, worse), better + worse, 0.5)))
 
 
 def unpaired_difference(
@@ -249,7 +263,7 @@ def t_quantile(degrees: int, comparisons: float = 1.0) -> float:
     """Return the 97.5 % quantile of Student's distribution, for one of several comparisons."""
     from scipy.special import stdtrit
 
-    return float(stdtrit(degrees, 1.0 - 0.025 / comparisons))
+    return float(stdtrit(degrees, 1.0 - ALPHA / 2.0 / comparisons))
 
 
 def _z(comparisons: float) -> float:
@@ -258,7 +272,7 @@ def _z(comparisons: float) -> float:
         return Z
     from scipy.special import ndtri
 
-    return float(ndtri(1.0 - 0.025 / comparisons))
+    return float(ndtri(1.0 - ALPHA / 2.0 / comparisons))
 
 
 def _newcombe(minuend: Sequence[bool], subtrahend: Sequence[bool], quantile: float = Z) -> Interval:

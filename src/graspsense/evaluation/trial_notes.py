@@ -9,8 +9,8 @@ from itertools import groupby
 import numpy as np
 
 from graspsense.core.learn.labelled import Labelled
-from graspsense.core.values.errors import counted, listed
-from graspsense.core.values.label_text import spelled_alike
+from graspsense.core.values.errors import counted
+from graspsense.core.values.label_text import alike_words, spelled_alike
 from graspsense.evaluation.intervals import MIN_INSTANCES
 
 
@@ -47,10 +47,9 @@ def _on_instances(trials: Labelled) -> Iterator[str]:
             "in training and test, and the rate is not that of other objects"
         )
     if pairs := spelled_alike(trials.instances):
-        alike = listed([f"{name!r} and {other!r}" for name, other in pairs])
         yield (
-            f"instances that differ in spelling only count as two: {alike}. If they are one object, its grasps are "
-            "in training and test"
+            f"instances that differ in spelling only count as two: {alike_words(pairs)}. If they are one object, its "
+            "grasps are in training and test"
         )
 
 

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import frozen
 
+from graspsense.sources.manifest.units import GRAM_FORCE, known_unit
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -31,15 +33,6 @@ FORCE_WORDS: Final = frozenset((
     "force", "forces", "load", "f", "n", "newton", "newtons", "pressure", "pdc", "fsr", "gram", "grams", "g",
     "weight", "eucl", "taxels", "taxel", "tactile", "biotac",
 ))  # fmt: skip
-UNIT_WORDS: Final = {
-    "time": {"s": "s", "sec": "s", "seconds": "s", "ms": "ms", "msec": "ms", "us": "us", "ns": "ns"},
-    "gap": {"m": "m", "mm": "mm", "cm": "cm", "um": "um"},
-    "force": {
-        "n": "N", "newton": "N", "newtons": "N", "mn": "mN", "kn": "kN", "lbf": "lbf", "kg": "kgf", "kgf": "kgf",
-        **dict.fromkeys(("g", "gram", "grams", "gf", "weight"), "gf"),
-        **dict.fromkeys(("counts", "count", "raw", "adc"), "counts"),
-    },
-}  # fmt: skip
 TO_S: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _LONGEST_STEP_S: Final = 0.25
 """The time between the samples of a grasp, where no unit is stated."""
@@ -97,7 +90,7 @@ def time_column(table: ColumnTable) -> str | None:
     """Return the column that is most likely the time, None if none increases."""
     rising = [name for name, values in table.numbers.items() if values.ndim == 1 and _rises(values)]
     named = [name for name in rising if TIME_WORDS & set(words_of(name))]
-    states = [name for name in rising if table.units.get(name, "").lower() in UNIT_WORDS["time"]]
+    states = [name for name in rising if known_unit(table.units.get(name, ""), "time")]
     units = [name for name in rising if set(words_of(name)) & {"ms", "us", "ns", "sec"}]
     return next(iter((*states, *named, *units, *_evenly_rising(table, rising))), None)
 
@@ -119,7 +112,7 @@ def _evenly_rising(table: ColumnTable, rising: Sequence[str]) -> list[str]:
 def force_columns(table: ColumnTable, time: str | None) -> tuple[str, ...]:
     """Return the columns that are most likely forces."""
     columns = [name for name in table.numbers if name != time]
-    stated = [name for name in columns if table.units.get(name, "").lower() in UNIT_WORDS["force"]]
+    stated = [name for name in columns if _unit(table.units.get(name, ""), "force")]
     named = [
         name
         for name in columns
@@ -144,7 +137,7 @@ def numbered_groups(names: Sequence[str]) -> dict[str, list[str]]:
 def _gap_columns(table: ColumnTable, taken: Sequence[str | None]) -> tuple[str, ...]:
     """Return the column that is most likely the gap, or several of one kind, as the positions of fingers."""
     columns = [name for name, values in table.numbers.items() if name not in taken and values.ndim == 1]
-    stated = [name for name in columns if table.units.get(name, "").lower() in UNIT_WORDS["gap"]]
+    stated = [name for name in columns if known_unit(table.units.get(name, ""), "gap")]
     named = [name for name in columns if GAP_WORDS & set(words_of(name))]
     units = [name for name in columns if set(words_of(name)) & {"mm", "cm"}]
     able = [name for name in (*stated, *named, *units) if np.nanstd(table.numbers[name]) > 0.0]
@@ -291,12 +284,23 @@ def _mean(table: ColumnTable, names: Sequence[str]) -> Numbers | None:
 
 def _stated(table: ColumnTable, name: str, quantity: str) -> str:
     """Return the unit that a line of units or a name states, empty if neither does."""
-    units = UNIT_WORDS[quantity]
-    stated = units.get(table.units.get(name, "").lower(), "")
-    if stated:
-        return stated
-    words = words_of(name)
-    return next((units[word] for word in reversed(words[1:] or words) if word in units and len(name) > 1), "")
+    return _unit(table.units.get(name, ""), quantity) or unit_in_name(name, quantity)
+
+
+def unit_in_name(name: str, quantity: str) -> str:
+    """Return the unit of a quantity that a name ends with, such as `time_ms`; empty if it has none.
+
+    >>> unit_in_name("time_ms", "time"), unit_in_name("F1_mN", "force"), unit_in_name("built_in", "gap")
+    ('ms', 'mN', '')
+    """
+    words = [word for word in words_of(name) if len(name) > 1]
+    parts = [*(words[1:] or words), *re.findall("[A-Za-z]+", name)[1:]]
+    return next(filter(None, (_unit(word, quantity) for word in reversed(parts) if word != "in")), "")
+
+
+def _unit(text: str, quantity: str) -> str:
+    mass = GRAM_FORCE.get(text.lower(), "") if quantity == "force" else ""
+    return known_unit(text, quantity) or mass
 
 
 def _rises(values: Numbers) -> bool:

@@ -20,7 +20,7 @@ from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.target_value import TargetValue
 from graspsense.core.values.errors import ConfigError, DataDamaged, counted, listed
 from graspsense.core.values.features import UNKNOWN, FeatureTable
-from graspsense.core.values.label_text import is_missing_label, label_text, spelled_alike
+from graspsense.core.values.label_text import is_missing_label, label_text
 from graspsense.core.values.nominal import splits_of
 from graspsense.core.values.written_numbers import is_missing
 from graspsense.recording.atomic_file import write_or_replace
@@ -83,7 +83,6 @@ def read_labelled(
     if export is None:
         others = [name for name in columns.names if name not in reserved]
         notes += doubts(columns, labels, others, table, None if target is None else target.values)
-    _note_similar_labels(labels, notes)
     return Labelled(
         source=str(path),
         table=table,
@@ -140,9 +139,10 @@ def _order(
     return _ranks(columns, order, notes), ""
 
 
-def read_table(path: Path, names: Sequence[str]) -> FeatureTable:
-    """Return these columns of a CSV file. Raises ConfigError, DataDamaged."""
-    return columns_of_file(path).table(list(names))
+def read_table(path: Path, names: Sequence[str]) -> tuple[FeatureTable, tuple[str, ...]]:
+    """Return these columns of a CSV file, and what was left out of it. Raises ConfigError, DataDamaged."""
+    columns = columns_of_file(path)
+    return columns.table(list(names)), tuple(columns.notes)
 
 
 def columns_of_file(path: Path) -> CsvColumns:
@@ -186,12 +186,6 @@ def _labels(columns: CsvColumns, label: str | None, notes: list[str]) -> list[st
             f"{columns.path}: {UNKNOWN!r} cannot be a label: it is the prediction for an object unlike all others"
         )
     return labels
-
-
-def _note_similar_labels(labels: Sequence[str], notes: list[str]) -> None:
-    if pairs := spelled_alike(labels):
-        alike = listed([f"{label!r} and {other!r}" for label, other in pairs])
-        notes.append(f"labels that differ in spelling only count as two: {alike}")
 
 
 def _ranks(columns: CsvColumns, order: str | None, notes: list[str]) -> tuple[int, ...]:

@@ -28,8 +28,8 @@ FEWEST: Final = 4
 """Number of recordings from which on most of them are not a coincidence."""
 MOST_TRAVEL: Final = 0.5
 """Share of the travel of a squeeze after a rest, and"""
-PRESSED: Final = 3.0
-"""ratio of a later force to that of the rest, from which on the fingers may only have stuck there."""
+PRESSED: Final = 2.0
+"""ratio of a later force to that of the rest, from which on most of the squeeze comes after it."""
 
 
 @frozen
@@ -69,15 +69,18 @@ def tried(
 
 
 def presses_on(features: Features, recording: Recording) -> bool:
-    """Return whether most of a squeeze comes after its rest, as it does if the fingers stick on their way."""
+    """Return whether most of a squeeze comes after its rest, as it does if the fingers stick on their way.
+
+    A gap that shows no travel after the rest, nor before it, tells of no rest either.
+    """
     known = dict(zip(features.names, features.values, strict=True))
     p_first, p_steady, f_steady = (known.get(name, math.nan) for name in ("p_first", "p_steady", "f_steady"))
-    later = [reading.frame for reading in recording.readings if reading.frame.gap_m < p_steady]
+    later = [reading.frame for reading in recording.readings if reading.frame.gap_m <= p_steady]
     if not later:  # also without a rest, or without a gap
         return False
     narrowest = min(frame.gap_m for frame in later)
     force = max((frame.force_left_n + frame.force_right_n) / 2.0 for frame in later)
-    return p_steady - narrowest > MOST_TRAVEL * (p_first - narrowest) and force > PRESSED * f_steady
+    return p_steady - narrowest >= MOST_TRAVEL * (p_first - narrowest) and force > PRESSED * f_steady
 
 
 def refuse_useless(

@@ -90,6 +90,7 @@ def _of_grasp(grasp: RecordedGrasp, name: str, sha256: str) -> RecordedSqueeze:
     record = grasp.record()
     labels = record.labels
     gripper = dict(record.settings.get("gripper", {})) if record.simulated else {}
+    warnings = () if record.result is None else record.result.details.get("warnings", ())
     return RecordedSqueeze(
         name=name,
         sha256=sha256,
@@ -98,6 +99,7 @@ def _of_grasp(grasp: RecordedGrasp, name: str, sha256: str) -> RecordedSqueeze:
         instance=labels.get("instance", ""),
         gripper=gripper,
         simulated=record.simulated,
+        warnings=tuple(map(str, warnings)),
     )
 
 
@@ -118,6 +120,7 @@ def _of_import(source: str) -> Iterator[RecordedSqueeze]:
             trace=trace_of_recording(labelled.recording),
             label=labelled.label,
             instance=instance,
+            warnings=labelled.notices,
         )
 
 

@@ -33,7 +33,8 @@ UNITS: Final = frozenset((
     "um", "\u00b5m", "\u03bcm", "in", "inch", "n", "mn", "kn", "g", "gram", "grams", "kg", "gf", "kgf", "lb",
     "lbf", "v", "mv", "a", "ma", "hz", "khz", "c", "\u00b0c", "degc", "k", "deg", "\u00b0", "rad", "%", "-",
     "1", "pa", "kpa", "mpa", "bar", "psi", "nm", "n\u00b7m", "n*m", "m/s", "cm/s", "mm/s", "m/s2", "m/s^2",
-    "m/s\u00b2", "rad/s", "deg/s", "counts", "count", "raw", "adc", "a.u.", "au", "step", "steps",
+    "millisecond", "milliseconds", "millimeter", "millimeters", "millimetre", "millimetres", "inches", "newton",
+    "newtons", "m/s\u00b2", "rad/s", "deg/s", "counts", "count", "raw", "adc", "a.u.", "au", "step", "steps",
 ))  # fmt: skip
 """What stands in a line of units, in small letters."""
 _LINE_ENDS: Final = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"

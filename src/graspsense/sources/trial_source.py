@@ -15,6 +15,7 @@ from graspsense.core.components.toml_kinds import KINDS, toml_kind
 from graspsense.core.learn.checkpoints import with_checkpoints
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import ConfigError, PluginUnavailable
+from graspsense.core.values.label_text import alike_words, spelled_alike
 from graspsense.sources.identified import IDENTIFIED, gripper_flags, identified_scenes
 from graspsense.sources.simulated import Group, simulated
 from graspsense.store.naming import STORE, as_source
@@ -198,6 +199,9 @@ def labelled_trials(
         )
     else:
         trials = _data_set(source, features())
+    if pairs := spelled_alike(trials.labels):
+        said = f"labels that differ in spelling only count as two: {alike_words(pairs)}"
+        trials = evolve(trials, notes=(*trials.notes, said))
     return trials.of_class(source.only) if source.only else trials
 
 

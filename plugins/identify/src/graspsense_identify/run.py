@@ -39,6 +39,8 @@ Progress = Callable[[str, int, int], None]
 
 PADS_DIFFER: Final = 0.2
 """Share of the largest force by which the forces on both pads may differ without a note."""
+WEAK_N: Final = 0.1
+"""A largest force below this one is more likely in another unit than that of so weak a squeeze."""
 MAX_SQUEEZES: Final = 30
 """More recordings hardly narrow the intervals, and a fit of all takes minutes."""
 OF_FINGERTIPS: Final = (
@@ -66,6 +68,7 @@ def identify(
     # Compiled before several threads call it.
     path_forces(model.hardens)
     recorded, has_cells = _used(_distinct(squeezes, notes), notes), _has_cells(config, squeezes)
+    notes += _looks_wrong(recorded)
 
     def timed(lag: Lag) -> Timed:
         ready, shares = _ready(config, recorded, [] if lag.lag_s else notes, has_cells, lag.lag_s)
@@ -117,6 +120,19 @@ def _distinct(squeezes: Sequence[RecordedSqueeze], notes: list[str]) -> list[Rec
             notes.append(f"left out: {squeeze.name} is a copy of {by_content[content].name}")
         by_content.setdefault(content, squeeze)
     return list(by_content.values())
+
+
+def _looks_wrong(squeezes: Sequence[RecordedSqueeze]) -> list[str]:
+    """Return what looks wrong in the recordings, each with their number, and forces that can be in another unit."""
+    said = Counter(warning for squeeze in squeezes for warning in dict.fromkeys(squeeze.warnings))
+    wrong = [f"{count} of the {len(squeezes)} recordings: {warning}" for warning, count in said.items()]
+    pads = [pad for squeeze in squeezes for pad in (squeeze.trace.force_left_n, squeeze.trace.force_right_n)]
+    strongest = max(float(np.nanmax(pad, initial=0.0)) for pad in pads)
+    if 0.0 < strongest < WEAK_N:
+        wrong.append(
+            f"the largest force is {1e3 * strongest:.3g} mN, as if the forces were in another unit than N"
+        )
+    return wrong
 
 
 def _with_uncertainty(used: Timed, delay: Delay) -> tuple[Fitted, Uncertainty]:

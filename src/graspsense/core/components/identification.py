@@ -22,7 +22,8 @@ class RecordedSqueeze:
     """A recorded grasp of an object that is to be identified.
 
     `sha256` is the hash of its file or of its frames. `label` and `instance` are empty where they are not known.
-    `gripper` holds the settings of the gripper that it was recorded with, where the recording has them.
+    `gripper` holds the settings of the gripper that it was recorded with, where the recording has them. `warnings` are
+    sentences on what looks wrong in it.
     """
 
     name: str
@@ -32,6 +33,7 @@ class RecordedSqueeze:
     instance: str = ""
     gripper: Mapping[str, Any] = field(factory=dict)
     simulated: bool = False
+    warnings: tuple[str, ...] = ()
 
 
 @frozen(kw_only=True)

@@ -133,6 +133,17 @@ def misfit(taker: str, names: Sequence[str], units: Sequence[str], given: Featur
     return ""
 
 
+def assumed_units(names: Sequence[str], units: Sequence[str], given: FeatureTable) -> tuple[str, ...]:
+    """Return a note on the given features that state no unit where one is expected; empty if there are none."""
+    unit_of = dict(zip(given.names, given.units, strict=True))
+    assumed = [
+        f"{name} in {unit}" for name, unit in zip(names, units, strict=True) if unit and not unit_of[name]
+    ]
+    return (
+        (f"the table states no unit, and the model has one: taken as {listed(assumed)}",) if assumed else ()
+    )
+
+
 class FeatureRows:
     """Collects the features of trials for a table, and keeps their numbers only."""
 

@@ -7,6 +7,8 @@ import unicodedata
 from collections.abc import Iterable
 from typing import Final
 
+from graspsense.core.values.errors import listed
+
 MISSING_LABELS: Final = frozenset({"", "nan", "?"})
 """What stands for a missing label. `none`, `null` and `NA` are labels."""
 _WHOLE: Final = re.compile(r"(?<![^:#])([-+]?[0-9]+)[.,]0+(?![^:#])")
@@ -16,6 +18,15 @@ _JOINTS: Final = re.compile(
 )
 """Spaces, underscores and hyphens beside a letter."""
 _LEADING: Final = re.compile(r"(?<![\d.,])0+(?=\d)")
+_FILLERS: Final = re.compile(
+    "[\u034f\u115f\u1160\u17b4\u17b5\u180b-\u180f\u3164\ufe00-\ufe0f\uffa0\U000e0100-\U000e01ef]"
+)
+"""Letters and marks that nothing shows."""
+_LOOK_ALIKE: Final = str.maketrans(
+    "АВЕКМНОРСТУХІЈЅаеорсухіјѕһԁԛԝ" + "ΑΒΕΖΗΙΚΜΝΟΡΤΥΧαονρυικτχ" + "ıɡℓ",
+    "ABEKMHOPCTYXIJSaeopcyxijshdqw" + "ABEZHIKMNOPTYXaovpuiktx" + "igl",
+)
+"""Cyrillic, Greek and other letters, and the Latin ones that they look like."""
 _LAST_ZEROS: Final = re.compile(r"(?<!\d)(\d+[.,]\d*[1-9])0+(?![\d.,])")
 
 
@@ -27,14 +38,16 @@ def label_text(text: str) -> str:
     """
     if not text.isascii():
         text = unicodedata.normalize("NFC", text)
-        text = "".join(sign for sign in text if unicodedata.category(sign) not in ("Cf", "Cc"))
+        text = "".join(
+            sign for sign in _FILLERS.sub("", text) if unicodedata.category(sign) not in ("Cf", "Cc")
+        )
         text = "".join(" " if unicodedata.category(sign) == "Zs" else sign for sign in text)
     return _WHOLE.sub(r"\1", text.strip())
 
 
 def spelled_alike(texts: Iterable[str]) -> list[tuple[str, str]]:
     """Return pairs of different labels or names that differ in case, spaces, hyphens, width or leading zeros only,
-    or in zeros at the end of a decimal number.
+    in zeros at the end of a decimal number, or in letters of two alphabets that look the same.
 
     >>> spelled_alike(["tin-can", "tin\u2010can"])
     [('tin-can', 'tin‐can')]
@@ -44,12 +57,23 @@ def spelled_alike(texts: Iterable[str]) -> list[tuple[str, str]]:
     by_form: dict[str, str] = {}
     pairs = []
     for text in sorted(set(texts)):
-        form = _LEADING.sub("", _JOINTS.sub("", unicodedata.normalize("NFKC", text).casefold()))
+        form = unicodedata.normalize("NFKC", text.translate(_LOOK_ALIKE)).translate(_LOOK_ALIKE).casefold()
+        form = _LEADING.sub("", _JOINTS.sub("", form))
         form = _LAST_ZEROS.sub(r"\1", form)
         other = by_form.setdefault(form, text)
         if other != text:
             pairs.append((other, text))
     return pairs
+
+
+def alike_words(pairs: Iterable[tuple[str, str]]) -> str:
+    r"""Return pairs of `spelled_alike` in words, with the code of a letter that another alphabet has.
+
+    >>> print(alike_words([("can", "c\u0430n"), ("Can 1", "can1")]))
+    'can' and 'c\u0430n', 'Can 1' and 'can1'
+    """
+    shown = [map(ascii if x.isascii() != y.isascii() else repr, (x, y)) for x, y in pairs]
+    return listed([" and ".join(pair) for pair in shown])
 
 
 def is_missing_label(text: str) -> bool:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -12,15 +12,7 @@ from graspsense.core.values.written_numbers import number_in
 from graspsense.sources.manifest.description import ReadManifest
 from graspsense.sources.manifest.expression import Expression, ExpressionError
 from graspsense.sources.manifest.table import ColumnTable, Numbers
-
-TO_SI: Final[Mapping[str, Mapping[str, float]]] = {
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
-    "gap": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
-    "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3, "gf": 9.80665e-3, "kgf": 9.80665, "lbf": 4.4482216152605},
-    "effort": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
-    "velocity": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
-}
-"""The units of each quantity with their factor to the SI unit."""
+from graspsense.sources.manifest.units import GRAM_FORCE, TO_SI, WITHOUT_UNIT, known_unit
 
 
 class AvailableColumns(dict[str, Any]):
@@ -46,9 +38,14 @@ class AvailableColumns(dict[str, Any]):
         return next((part for part in parts if self.has(part)), parts[0])
 
     def unit(self, expression: Expression, quantity: str) -> str:
-        """Return the unit behind an expression, or the one that the file states for a column on its own."""
-        stated = self.stated(expression)
-        return expression.unit or (stated if stated in (*TO_SI[quantity], "counts") else "")
+        """Return the unit behind an expression, or the one that the file states for a column on its own.
+
+        A mass stands for no unit: it is doubtful which force is meant.
+        """
+        stated = expression.unit or self.stated(expression)
+        other = expression.unit or (quantity in ("force", "gap") and stated.lower() not in GRAM_FORCE)
+        known = known_unit(stated, quantity)
+        return known or (stated if other and stated not in WITHOUT_UNIT else "")
 
     def stated(self, expression: Expression) -> str:
         """Return the unit that the file states for an expression that is a column, empty if there is none."""

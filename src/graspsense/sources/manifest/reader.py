@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
@@ -11,7 +12,8 @@ from typing import Any
 import numpy as np
 from attrs import evolve
 
-from graspsense.core.values.errors import ConfigError, DataDamaged, listed
+from graspsense.core.values.errors import ConfigError, DataDamaged, counted, listed
+from graspsense.core.values.label_text import is_missing_label
 from graspsense.core.values.limits import RECORDINGS
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import each_readable, refuse_devices
@@ -189,7 +191,10 @@ def _bag(manifest: ReadManifest) -> Callable[[Path], list[ColumnTable]]:
 
 
 def _by_column(table: ColumnTable, column: str) -> list[ColumnTable]:
-    """Return a table for each value of a column, in the order in which the values occur. Raises ConfigError."""
+    """Return a table for each value of a column, in the order in which the values occur.
+
+    Rows without a value are of no grasp: they are left out, and a note tells how many. Raises ConfigError, DataDamaged.
+    """
     values: Sequence[Any]
     if column in table.texts:
         values = table.texts[column]
@@ -200,7 +205,14 @@ def _by_column(table: ColumnTable, column: str) -> list[ColumnTable]:
         raise ConfigError(f"split: {table.source} has no column {column!r}. Columns: {known}")
     rows: dict[Any, list[int]] = {}
     for k, value in enumerate(values):
-        rows.setdefault(value, []).append(k)
+        missing = is_missing_label(value) if isinstance(value, str) else math.isnan(value)
+        rows.setdefault("" if missing else value, []).append(k)
+    if without := rows.pop("", []):
+        line = f" (from line {table.lines[without[0]]} on)" if table.lines is not None else ""
+        left_out = f"left out: {counted(len(without), 'sample')} without a value of {column}{line}"
+        table = evolve(table, notes=(*table.notes, left_out))
+    if not rows:
+        raise DataDamaged(f"split: {table.source} has no value of {column}")
     if too_many := RECORDINGS.exceeded(len(rows)):
         raise DataDamaged(f"{table.source}: {too_many}")
     return [

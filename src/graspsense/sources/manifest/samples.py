@@ -14,13 +14,15 @@ import numpy as np
 from graspsense.core.values.errors import ConfigError, DataDamaged, listed
 from graspsense.core.values.fingers import PREFIX, FingerForce
 from graspsense.core.values.signals import CHANNELS, NO_GAP
+from graspsense.sources.column_guess import unit_in_name
 from graspsense.sources.grasp_columns import GraspColumns, finger_sides, without_missing
-from graspsense.sources.manifest.available import TO_SI, AvailableColumns
+from graspsense.sources.manifest.available import AvailableColumns
 from graspsense.sources.manifest.description import ReadManifest, hand_of, samples_of
 from graspsense.sources.manifest.events import labelled_events
 from graspsense.sources.manifest.expression import Expression
 from graspsense.sources.manifest.steps import without_duplicates
 from graspsense.sources.manifest.table import ColumnTable, Numbers
+from graspsense.sources.manifest.units import GRAM_FORCE, TO_SI, WITHOUT_UNIT, known_unit
 
 EARLIEST_STAMP_S: Final = 1e6
 """A first time beyond this is a stamp of a clock, and times are counted from it."""
@@ -28,12 +30,6 @@ EARLIEST_DATE_S: Final = 946_684_800.0
 """The year 2000, in seconds since 1970."""
 LATEST_DATE_S: Final = 4_102_444_800.0
 """The year 2100, in seconds since 1970."""
-GRAM_FORCE: Final = {
-    **dict.fromkeys(("g", "gram", "grams", "gramm", "weight"), "gf"),
-    **dict.fromkeys(("kg", "kilogram", "kilograms"), "kgf"),
-    **dict.fromkeys(("lb", "lbs", "pounds"), "lbf"),
-}
-"""Units of mass, and names, with the force that a scale means by them."""
 _NAME: Final = re.compile(r"[a-z][a-z0-9_]*")
 _TAKEN: Final = frozenset({*CHANNELS, "force", "t"})
 
@@ -146,7 +142,7 @@ def _doubts(manifest: ReadManifest, columns: AvailableColumns) -> Iterator[str]:
 
 
 def _doubtful_units(manifest: ReadManifest, columns: AvailableColumns) -> Iterator[str]:
-    """Yield a sentence for each quantity whose unit the file states otherwise than the manifest."""
+    """Yield a sentence for each quantity whose unit the file or a name states otherwise than it is read."""
     for key, parts in manifest.expressions.items():
         quantity = "force" if key in ("left", "right") or key.startswith(PREFIX) else key
         chosen = columns.chosen(parts) if parts else None
@@ -158,8 +154,24 @@ def _doubtful_units(manifest: ReadManifest, columns: AvailableColumns) -> Iterat
                 f"{key}: the unit or the name of the column is that of a mass, as of a scale: for gram-force write "
                 f'{key} = "{chosen.text} [{grams}]"'
             )
-        elif stated and chosen.unit and stated != chosen.unit and stated in TO_SI[quantity]:
+            continue
+        said = known_unit(stated, quantity)
+        if chosen.unit and said and said != known_unit(chosen.unit, quantity):
             yield f"{key}: the manifest says [{chosen.unit}], and the file states {stated}"
+        elif not columns.unit(chosen, quantity):
+            yield from _not_read(key, chosen, stated, quantity)
+
+
+def _not_read(key: str, chosen: Expression, stated: str, quantity: str) -> Iterator[str]:
+    """Yield that a column is read in the SI unit, although its file or its name states another one."""
+    si, named = next(iter(TO_SI[quantity])), unit_in_name(chosen.column, quantity)
+    if stated not in WITHOUT_UNIT:
+        yield f"{key}: the file states {stated}, and it is read in {si}: multiply it by a factor if it has to be"
+    elif named not in ("", si, "counts"):
+        yield (
+            f"{key}: it is read in {si}: if it is in {named}, as its name says, write "
+            f'{key} = "{chosen.text} [{named}]"'
+        )
 
 
 def _counted_time(manifest: ReadManifest, columns: AvailableColumns) -> Iterator[str]:

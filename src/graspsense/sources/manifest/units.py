@@ -1,0 +1,57 @@
+"""The units of times, gaps, forces, efforts and velocities in the files of others, and the words for them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+TO_SI: Final[Mapping[str, Mapping[str, float]]] = {
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
+    "gap": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
+    "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3, "gf": 9.80665e-3, "kgf": 9.80665, "lbf": 4.4482216152605},
+    "effort": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
+    "velocity": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
+}
+"""The units of each quantity with their factor to the SI unit."""
+_UNIT_WORDS: Final[Mapping[str, Mapping[str, str]]] = {
+    "time": {
+        **dict.fromkeys(("sec", "secs", "second", "seconds"), "s"),
+        **dict.fromkeys(("msec", "msecs", "millisecond", "milliseconds"), "ms"),
+        **dict.fromkeys(("usec", "\u00b5s", "\u03bcs", "microsecond", "microseconds"), "us"),
+        **dict.fromkeys(("mins", "minute", "minutes"), "min"),
+    },
+    "gap": {
+        **dict.fromkeys(("inch", "inches"), "in"),
+        **dict.fromkeys(("\u00b5m", "\u03bcm"), "um"),
+        **dict.fromkeys(("millimeter", "millimeters", "millimetre", "millimetres"), "mm"),
+        **dict.fromkeys(("meter", "meters", "metre", "metres"), "m"),
+        "counts": "counts",
+    },
+    "force": {
+        **dict.fromkeys(("newton", "newtons"), "N"),
+        **dict.fromkeys(("counts", "count", "raw", "adc"), "counts"),
+    },
+}
+"""Other words for the units of a quantity, in small letters."""
+GRAM_FORCE: Final = {
+    **dict.fromkeys(("g", "gram", "grams", "gramm", "weight"), "gf"),
+    **dict.fromkeys(("kg", "kilogram", "kilograms"), "kgf"),
+    **dict.fromkeys(("lb", "lbs", "pounds"), "lbf"),
+}
+"""Units of mass, and names, with the force that a scale means by them."""
+_MEGANEWTON: Final = "MN"
+WITHOUT_UNIT: Final = ("", "-", "1")
+"""What a line of units has for a column without one."""
+
+
+def known_unit(text: str, quantity: str) -> str:
+    """Return the unit of a quantity that a text means, empty if it means none.
+
+    >>> known_unit("msec", "time"), known_unit("MM", "gap"), known_unit("mA", "force"), known_unit("MN", "force")
+    ('ms', 'mm', '', '')
+    """
+    units = TO_SI[quantity]
+    if text in units or text == _MEGANEWTON:
+        return text if text in units else ""
+    words = {unit.lower(): unit for unit in units} | dict(_UNIT_WORDS.get(quantity, {}))
+    return words.get(text.lower(), "")
