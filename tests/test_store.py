@@ -322,9 +322,9 @@ def test_a_disk_that_is_full_is_told_and_what_was_kept_stays(mounted):
 
 
 def test_a_new_store_on_a_full_disk_is_not_called_damaged(mounted):
-    disk = mounted("size=64k")
+    disk = mounted("size=400k")
     with suppress(OSError):
-        (disk / "filler").write_bytes(b"x" * 60_000)
+        (disk / "filler").write_bytes(b"x" * 390_000)
     with pytest.raises(SaveFailed, match="full"):
         Store.open(disk / "store")
     (disk / "filler").unlink()
