@@ -18,9 +18,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from kept import keep
 
+from graspsense.cli.main import main
 from graspsense.core.components.config import resolve
 from graspsense.core.components.layers import Flag
-from graspsense.core.components.registry import installed
+from graspsense.core.components.registry import IsolatedPlugins, installed
 from graspsense.core.pipeline.pipeline import grasp_with
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError, DataDamaged, DeviceLost, RecordingEnded
@@ -428,3 +429,14 @@ def test_a_recording_offers_the_rate_at_which_it_was_recorded(tmp_path: Path) ->
 
     assert rates.pop("pads") == pytest.approx(24.4, rel=0.02)
     assert set(rates.values()) == {1000.0}
+
+
+def test_a_kind_whose_plugin_is_not_installed_is_told_with_how_to_install_it(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with IsolatedPlugins(), pytest.raises(SystemExit) as ended:
+        main(["replay", "lerobot:FOLDER#1"])
+    told = capsys.readouterr().err
+    assert ended.value.code == 2
+    assert all(word in told for word in ("graspsense-lerobot", "not installed", "pip install"))
+    assert "store.sqlite" not in told

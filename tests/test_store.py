@@ -321,6 +321,16 @@ def test_a_disk_that_is_full_is_told_and_what_was_kept_stays(mounted):
     assert verify_file(disk / "store.sqlite").trials == kept
 
 
+def test_a_new_store_on_a_full_disk_is_not_called_damaged(mounted):
+    disk = mounted("size=400k")
+    with suppress(OSError):
+        (disk / "filler").write_bytes(b"x" * 390_000)
+    with pytest.raises(SaveFailed, match="full"):
+        Store.open(disk / "store")
+    (disk / "filler").unlink()
+    Store.open(disk / "store").close()
+
+
 @pytest.mark.slow
 def test_a_grasp_ends_as_it_would_have_when_the_disk_fills_up_under_it(mounted):
     disk = mounted("size=200k")

@@ -65,7 +65,8 @@ def _settings(recording: str, pipeline: str | None, options: tuple[str, ...], fo
 
     kind, name = kind_and_name(recording)
     kinds = known_kinds()
-    if kind not in kinds and "#" in recording:
+    folder, number, _ = recording.rpartition("#")
+    if kind not in kinds and number and (not kind or Path(folder).expanduser().is_dir()):
         kind, name = "store", recording
     own: Any = None
     if pipeline is None and kind in ("store", "mcap"):

@@ -15,7 +15,10 @@ from graspsense.sources.input_content import contents_of, input_names
 from graspsense.sources.simulated import LARGEST_SEED
 from graspsense.sources.trial_source import TrialSource
 
-PIPELINE_TABLES: Final = (*(table for table in TABLE_OF_ROLE.values() if table != "classifier"), "run")
+PIPELINE_TABLES: Final[tuple[str, ...]] = (
+    *(table for table in TABLE_OF_ROLE.values() if table != "classifier"),
+    "run",
+)
 MOST_SEEDS: Final = 10_000
 """Largest number of seeds; intervals hardly narrow with more."""
 

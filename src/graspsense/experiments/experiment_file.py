@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from attrs import evolve
 
@@ -15,7 +15,7 @@ from graspsense.core.components.entries import ExperimentEntry
 from graspsense.core.components.layers import Layer, Merged, option_layers, read_toml, typed_path
 from graspsense.core.components.nearest_key import key_paths
 from graspsense.core.components.registry import Resource, installed
-from graspsense.core.components.strict import ValidationFailed, keys_of, structured
+from graspsense.core.components.strict import InvalidValue, ValidationFailed, keys_of, structured
 from graspsense.core.values.errors import ConfigError, GraspsenseError, UnknownName
 from graspsense.core.values.limits import CASES
 from graspsense.experiments.cases import CasePlan
@@ -32,6 +32,10 @@ def shipped() -> dict[str, Resource[ExperimentEntry]]:
     return {
         resource.name if times[resource.name] == 1 else resource.qualified: resource for resource in known
     }
+
+
+OF_CASES: Final = ("pipelines", "classifiers", "variants", "sweep", "data", "test", *PIPELINE_TABLES)
+"""Keys that describe the cases of an experiment, which one that consists of parts does not have."""
 
 
 def read_experiment(
@@ -64,6 +68,13 @@ def read_experiment(
                 problem = evolve(problem, path=typed_path(owner))
             complaints.append(owner.complain(problem, known))
         experiment = None
+    for key in OF_CASES if values.get("parts") else ():
+        if key in values:
+            owner = merged.owner_of((key,)) or layer
+            text = (
+                "an experiment of parts has no cases of its own, so this has no effect: set it in the parts"
+            )
+            complaints.append(owner.complain(InvalidValue((key,), text)))
     if experiment is None or complaints:
         raise ConfigError("\n".join(complaints))
     if experiment.parts:

@@ -21,7 +21,7 @@ from graspsense.sources.dataset_recordings import (
 )
 from graspsense.sources.grasp_csv import named
 from graspsense.sources.recording_notices import with_notices
-from graspsense.sources.replay import KINDS, kind_and_name, read_named
+from graspsense.sources.replay import KINDS, how_to_get, kind_and_name, read_named
 from graspsense.sources.text_table import JSON_LINES, text_suffix
 from graspsense.store.labels import labels_of
 
@@ -103,7 +103,7 @@ def _named_by(
         kinds = ", ".join(f"{kind}:" for kind in dict.fromkeys((*KINDS, *datasets_with_recordings())))
         raise ConfigError(
             f"{source!r} is not a source of recordings: name a FILE.csv, {', '.join(KIND_OF)}, a "
-            f"manifest FILE.toml, or write one of {kinds} before a file"
+            f"manifest FILE.toml, or write one of {kinds} before a file{how_to_get(kind)}"
         )
     recording = with_notices(LabelledRecording(recording=read_named(kind, file), source=source))
     yield ImportedRecording(source=source, name=name, labelled=_relabelled(recording, label))

@@ -12,6 +12,8 @@ from attrs import Attribute, frozen
 from attrs.validators import and_, instance_of
 
 from graspsense.core.components.entries import KINDS as COMMAND_KINDS
+from graspsense.core.components.firstparty import provider
+from graspsense.core.components.registry import installed
 from graspsense.core.components.roles import SensorBackend
 from graspsense.core.components.setting import NAMES_INPUT, setting
 from graspsense.core.values.channel import Channel
@@ -108,6 +110,14 @@ def kind_and_name(recording: str) -> tuple[str, str]:
     return (kind, name) if colon else ("", recording)
 
 
+def how_to_get(kind: str) -> str:
+    """Return lines on how to install or to enable what reads this kind of recording; empty if there is nothing."""
+    plugins, by = installed(), provider("data set", kind)
+    if by and by.distribution not in {status.distribution for status in plugins.statuses}:
+        return f"\n  {kind}: is read by {by.distribution}, which is not installed:\n  {by.hint}"
+    return plugins.absences()
+
+
 def _known_kind(_config: object, _attribute: Attribute[str], value: str) -> None:
     kind, name = kind_and_name(value)
     kinds = KINDS if kind in KINDS else known_kinds()
@@ -118,7 +128,9 @@ def _known_kind(_config: object, _attribute: Attribute[str], value: str) -> None
             "a store is DIR#NUMBER"
         )
     if kind not in kinds:
-        raise ValueError(f"unknown kind of recording {kind!r}. Known: {known}.{suggestion(kind, kinds)}")
+        raise ValueError(
+            f"unknown kind of recording {kind!r}. Known: {known}.{suggestion(kind, kinds)}{how_to_get(kind)}"
+        )
     if not name:
         raise ValueError(f"{value!r} names no file: write it after the colon")
 

@@ -206,7 +206,11 @@ def labelled_trials(
 
 
 def groups_of(source: TrialSource) -> tuple[Group, ...]:
-    """Return the groups of simulated trials that a source describes. Raises ConfigError."""
+    """Return the groups of simulated trials that a source describes. Raises ConfigError, also for recorded trials."""
+    if source.kind != "simulated":
+        raise ConfigError(
+            f"{source.source} has recorded trials, and here they are simulated: leave the source out"
+        )
     keys: Mapping[str, Any] = {name: getattr(source, name) for name in fields_dict(Group)}
     own = Group(**keys)
     if source.source.startswith(IDENTIFIED):

@@ -7,6 +7,7 @@ released, a statement never changes: a change is a new version.
 from __future__ import annotations
 
 import sqlite3
+from contextlib import suppress
 from functools import cache
 from typing import Final
 
@@ -95,7 +96,9 @@ def migrate(connection: sqlite3.Connection, version: int) -> None:
         connection.execute(f"PRAGMA user_version = {NEWEST}")
         connection.execute("COMMIT")
     except BaseException:
-        connection.execute("ROLLBACK")
+        # SQLite has rolled back by itself where the disk is full.
+        with suppress(sqlite3.Error):
+            connection.execute("ROLLBACK")
         raise
 
 
