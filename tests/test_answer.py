@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 from cases import every_case
 
 from graspsense.core.learn.labelled import Labelled
@@ -60,7 +61,7 @@ def test_equal_rates_of_few_grasps_are_not_said_to_agree():
     assert "cannot be told" not in told(0.5, 0.6, 0.7, n=2000)
 
 
-@every_case(("simulated", "seeds"), [(False, 1), (True, 30)])
+@pytest.mark.parametrize(("simulated", "seeds"), [(False, 1), pytest.param(True, 30, marks=pytest.mark.slow)])
 def test_among_many_cases_that_are_guesses_the_best_is_hardly_ever_said_to_be_better(simulated, seeds):
     """Of 20 cases that guess, the best and the worst differ by chance; a claim may be wrong once in 20 times."""
     rng = np.random.default_rng(0)

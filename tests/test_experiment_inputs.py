@@ -244,7 +244,12 @@ def dask_cluster():
 
 
 @pytest.mark.parametrize(
-    "executor", [Serial, partial(Processes, 2), dask_cluster], ids=["serial", "processes", "dask"]
+    "executor",
+    [
+        pytest.param(Serial, id="serial"),
+        pytest.param(partial(Processes, 2), id="processes", marks=pytest.mark.slow),
+        pytest.param(dask_cluster, id="dask", marks=pytest.mark.slow),
+    ],
 )
 def test_a_table_that_is_replaced_while_the_experiment_runs_is_no_result_of_what_it_was_before(
     tmp_path, executor

@@ -404,9 +404,8 @@ def test_trials_of_few_objects_to_test_on_have_no_interval_and_those_learned_fro
             "[data]\n", '[data]\ninstance = "bottle"\n'
         )
     )
-    code, told, _ = graspsense(
-        "experiment", str(file), "--out", str(tmp_path / "out"), "-o", "seeds=1", "--json"
-    )
+    command = ("experiment", file, "--out", tmp_path / "out", "--executor", "serial")
+    code, told, _ = graspsense(*command, "-o", "seeds=1", "--json")
     condition = json.loads(told)["conditions"][0]
 
     assert code == 0
@@ -421,7 +420,8 @@ def test_what_casts_doubt_on_a_rate_is_said_on_the_screen(tmp_path):
     rows = [f"{'ab'[k // 30]},{k % 7},{k + (k % 5) ** 2 / 100}" for k in range(60)]
     (tmp_path / "mine.csv").write_text("\n".join(["what,x,hours", *rows]) + "\n")
     (tmp_path / "e.toml").write_text('title = "t"\n[data]\nsource = "mine.csv"\nlabel = "what"\n')
-    assert "hours" in printed("experiment", tmp_path / "e.toml", "--out", tmp_path / "out")
+    command = ("experiment", tmp_path / "e.toml", "--out", tmp_path / "out", "--executor", "serial")
+    assert "hours" in printed(*command, "-o", "seeds=1")
 
 
 @pytest.mark.slow

@@ -120,6 +120,7 @@ def rests_of(folder, *points):
     return told["rests"]
 
 
+@pytest.mark.slow
 def test_a_rest_after_which_the_squeeze_goes_on_is_told(tmp_path):
     """The fingers stick for 0.6 s, at a sixth of the force that the squeeze comes to."""
     stuck = rests_of(tmp_path / "stuck", (0, 80), (1, 50), (1.4, 49.2), (2, 49.2), (4, 45), (8, 45))

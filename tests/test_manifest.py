@@ -810,7 +810,7 @@ GIVEN = 'files = "{label}_{order:d}.csv"\ntime = "t"\ngap = "gap"\nforce = "F"\n
 COUNTS = GIVEN.replace('"F"', '"F [counts]"')
 
 
-@every_case(
+@pytest.mark.parametrize(
     ("text", "scale", "offset", "options", "says", "remedy", "mended"),
     [
         (
@@ -823,7 +823,16 @@ COUNTS = GIVEN.replace('"F"', '"F [counts]"')
             GIVEN,
         ),
         # A signed sensor of 24 bit with an offset: no contact force above zero can be found in it.
-        (COUNTS, 2e4, -8.3e6, (), "is below zero", 'zero = "10 samples"', COUNTS + 'zero = "10 samples"'),
+        pytest.param(
+            COUNTS,
+            2e4,
+            -8.3e6,
+            (),
+            "is below zero",
+            'zero = "10 samples"',
+            COUNTS + 'zero = "10 samples"',
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_what_spoils_most_recordings_is_an_error_that_stores_nothing(

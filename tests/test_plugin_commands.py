@@ -157,6 +157,7 @@ def test_a_group_without_a_command_prints_its_help_once():
     assert "shows what there is" not in err
 
 
+@pytest.mark.slow
 def test_a_package_is_made_for_several_roles(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     code, out, _ = graspsense(

@@ -53,6 +53,7 @@ def test_the_percentages_of_a_page_are_those_of_its_results(name, further):
     assert told <= measured, f"docs/{name}.md"
 
 
+@pytest.mark.slow
 def test_the_picture_of_the_readme_shows_the_grasp_of_today(tmp_path):
     printed("run", "--plot", tmp_path / "grasp.png")
     with Image.open(tmp_path / "grasp.png") as today, Image.open(ROOT / "docs" / "grasp.png") as shown:

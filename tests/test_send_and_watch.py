@@ -80,15 +80,20 @@ def grasped(names=PADLESS, thing="a soft object", run=RUN, **keys):
     return body, run_grasp(body, SendAndWatchController(SendAndWatchConfig(**keys)), run)
 
 
-@every_case(
+@pytest.mark.parametrize(
     ("names", "thing", "sends"),
     [
         (PADLESS, "a soft object", "position"),
-        (PADLESS, "a hard object", "velocity"),
-        (PADLESS, "a soft object", "force"),
-        (WITH_PADS, "a hard object", "position"),
-        (WITH_PADS, "a soft object", "velocity"),
         (WITH_PADS, "a hard object", "force"),
+        *(
+            pytest.param(*case, marks=pytest.mark.slow)
+            for case in (
+                (PADLESS, "a hard object", "velocity"),
+                (PADLESS, "a soft object", "force"),
+                (WITH_PADS, "a hard object", "position"),
+                (WITH_PADS, "a soft object", "velocity"),
+            )
+        ),
     ],
 )
 def test_it_approaches_gently_stops_raises_the_force_in_steps_and_waits_for_rest(names, thing, sends):

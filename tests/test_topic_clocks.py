@@ -50,8 +50,9 @@ CLOCKS = {
 }
 
 
-def test_delays_of_a_busy_computer_are_no_clock_of_their_own() -> None:
-    for seed in range(300):
+@pytest.mark.parametrize("seeds", [30, pytest.param(300, marks=pytest.mark.slow)])
+def test_delays_of_a_busy_computer_are_no_clock_of_their_own(seeds: int) -> None:
+    for seed in range(seeds):
         rng = np.random.default_rng(seed)
         busy = (rng.uniform(1.0, 3.0) < T_S) & (rng.random(len(T_S)) > 0.1)
         late_s = rng.exponential(0.03, len(T_S)) + 0.2 * busy

@@ -103,7 +103,8 @@ def test_the_group_lists_what_there_is(capsys):
 def test_the_simulator_gets_better_with_finer_steps(capsys, tmp_path):
     page = tmp_path / "page.md"
     arguments = ["--scene", "can:empty_open", "--seeds", "1", "--markdown", str(page), "--json"]
-    assert ended(["tradeoff", "simulation", *arguments]) == 0
+    few = ["--recognition-seeds", "1", "--instances", "2"]
+    assert ended(["tradeoff", "simulation", *arguments, *few]) == 0
     answer = json.loads(capsys.readouterr().out)
     points = answer["points"]
     assert [p["role"] for p in points].count("reference") == 1

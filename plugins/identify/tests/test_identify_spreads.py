@@ -66,6 +66,7 @@ def claimed(name, spread, seed):
     return {spread.name.split(".")[1]: spread for spread in spreads}
 
 
+@pytest.mark.slow
 def test_scatter_that_the_errors_make_is_not_claimed_and_other_scatter_is():
     rng = np.random.default_rng(0)
     errors = np.array([0.02, 0.05, 0.1, 0.03, 0.04])

@@ -134,6 +134,7 @@ def test_what_was_written_reads_back_as_the_same_trials(written):
         assert {channel.name for channel in recording.recording.channels} >= {"f0", "f1"}
 
 
+@pytest.mark.slow
 def test_simulated_trials_are_written(tmp_path):
     printed("export", SAMPLES, "--to", f"lerobot:{tmp_path / 'out'}")
     rows, said = frames(tmp_path / "out"), info(tmp_path / "out")

@@ -435,6 +435,7 @@ def test_the_grasps_on_the_page_are_those_of_this_version(tmp_path):
             assert float(here) == pytest.approx(float(there), abs=0.11 if "." in here else 1.0)
 
 
+@pytest.mark.slow
 def test_every_shipped_experiment_can_be_planned():
     for name in shipped():
         assert read_experiment(name, ["seeds=1"]).tasks()

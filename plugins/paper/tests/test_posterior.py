@@ -48,6 +48,7 @@ def test_the_page_has_every_figure_of_the_model_and_of_the_data():
         assert f"| {percent(figure.value)} | {percent(figure.deviation)} |" in page
 
 
+@pytest.mark.slow
 def test_no_bayes_factor_is_given_where_too_few_particles_have_an_explanation_or_lack_it():
     pytest.importorskip("pyabc")
     posterior = pytest.importorskip("posterior")

@@ -110,6 +110,7 @@ def test_samples_before_a_gap_are_not_joined_to_those_after_it(fed: Any) -> None
     assert (arrival.words, arrival.sampled) == ((5, 6), 6)
 
 
+@pytest.mark.slow
 def test_every_sample_that_the_board_sends_reaches_the_trace(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Sent, "words", [])
     monkeypatch.setattr(emulation, "Wire", Sent)

@@ -49,7 +49,7 @@ def take_all(link: Link, times_us: list[int]) -> None:
         times_us.append(arrival.report.time_us)
 
 
-@every_case(("rate", "at_s"), [(0.0, 1.4), (0.5, 0.1)])
+@pytest.mark.parametrize(("rate", "at_s"), [(0.0, 1.4), pytest.param(0.5, 0.1, marks=pytest.mark.slow)])
 def test_grasp_ends_soon_after_the_clock_of_the_board_goes_wrong(rate: float, at_s: float) -> None:
     """In lock-step: 50 ms where it stands still, 0.2 s where it loses half.
 

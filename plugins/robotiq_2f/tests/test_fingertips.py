@@ -282,6 +282,7 @@ def test_damaged_packets_of_both_boards_count():
     assert TactileFingertips(boards).report()["tactile_damaged"] == 2
 
 
+@pytest.mark.slow
 def test_a_gripper_and_two_boards_are_three_ports_and_a_trial_tells_how_far_their_times_can_be_apart():
     options = ["gripper.port=emulated", "gripper.tactile_port=emulated,emulated", "features.type=chitta"]
     trial = load_pipeline("robotiq", options=options).grasp()

@@ -136,6 +136,7 @@ def test_a_gripper_lost_in_a_grasp_ends_it_and_is_told(fault, at_s):
     assert "cable and power" in trial.reason
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_time")
 def test_a_grasp_through_a_ur_cap_has_no_effort_and_the_features_that_need_none(emulated):
     gripper = emulated("ur")

@@ -6,7 +6,6 @@ import pwd
 
 import pytest
 from attrs import evolve
-from cases import every_case
 
 from graspsense.plugin_api import create
 from graspsense.simulator_api import RunConfig
@@ -123,7 +122,10 @@ def test_a_damaged_one_is_made_anew(trials, folder):
         assert len(trials) == n, damage
 
 
-@every_case("change", ["file", "folder", "above", "owner"])
+@pytest.mark.parametrize(
+    "change",
+    ["file", *(pytest.param(change, marks=pytest.mark.slow) for change in ("folder", "above", "owner"))],
+)
 def test_one_that_another_user_could_have_written_is_not_used(trials, folder, change, monkeypatch):
     made, so_far = select(), len(trials)
     (kept,) = folder.iterdir()

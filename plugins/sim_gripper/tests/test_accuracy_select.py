@@ -339,6 +339,7 @@ def test_a_step_per_tick_is_chosen_where_it_is_accurate_enough_and_not_where_it_
     assert not tight.valid_for(10.0 * tight.force_n)
 
 
+@pytest.mark.slow
 def test_a_step_per_tick_that_a_damper_makes_unstable_is_not_chosen():
     config = evolve(NEAR, rate_hz=CONFIG.rate_hz, pad_stiffness_n_m=math.inf)
     model = selected(config, thing(SHELL, ("loss", {"damping_n_s_m": 3e5})), hybrid())
@@ -401,7 +402,7 @@ def test_trial_grasps_end_at_a_limit_of_work_and_the_grasp_runs(monkeypatch):
 @pytest.mark.parametrize(
     ("terms", "further", "unsure"),
     [
-        ("k1_n_m = 1000.0", {}, []),
+        pytest.param("k1_n_m = 1000.0", {}, [], marks=pytest.mark.slow),
         pytest.param(
             "k1_n_m = 1000.0",
             {"expected_force_n": 5.0},

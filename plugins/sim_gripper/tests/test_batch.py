@@ -601,7 +601,7 @@ def test_few_grasps_are_compiled_only_if_their_code_is_on_disk_or_others_came_be
         monkeypatch.setattr(threads, "is_kept", lambda composition, step: kept)
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            run_many(SimConfig(), HYBRID, ["none"] * n, range(n), run=RunConfig(grasp_timeout_s=0.01))
+            run_many(SimConfig(open_gap_m=0.005), HYBRID, ["none"] * n, range(n))
         return any("numba is not installed" in str(warning.message) for warning in caught)
 
     assert not is_compiled(1, kept=True)

@@ -338,6 +338,7 @@ def test_covers_and_object_carry_one_force_however_stiff_they_are(stiffness, ski
             assert now.force_n == 0.0
 
 
+@pytest.mark.slow
 @every_case(
     ("name", "params"),
     [

@@ -411,7 +411,8 @@ SCENE = """
 """
 
 
-@pytest.mark.parametrize("compiled", ["plain", pytest.param("compiled", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("compiled", ["plain", "compiled"])
 def test_a_term_of_another_distribution_is_composed_and_checked_like_ours(tmp_path, compiled):
     site = tmp_path / "site"
     info = site / "lab_terms-0.3.dist-info"
