@@ -238,5 +238,5 @@ def test_a_column_of_texts_can_be_named_and_left_out(tmp_path):
         "colour=red",
     )
     assert read_labelled(path, "what", features=["weight"]).table.names == ("weight",)
-    known = read_table(path, ["colour=red", "colour=green"]).values
+    known = read_table(path, ["colour=red", "colour=green"])[0].values
     assert np.isnan(known[2]).all()  # blue is none of them
