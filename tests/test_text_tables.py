@@ -341,10 +341,10 @@ def test_rows_without_a_value_of_the_column_that_splits_are_left_out_and_told(tm
         f"{HEADER},trial",
         *(f"{row},{'' if k in (30, 31) else 1 + k // 100}" for k, row in enumerate(ROWS)),
     ]
-    found = recordings(tmp_path, lines, keys)
-    assert [len(recording.recording.readings) for recording in found] == [98, 100]
+    squeezes = recordings(tmp_path, lines, keys)
+    assert [len(recording.recording.readings) for recording in squeezes] == [98, 100]
     assert any(
-        "2 samples without a value of trial (from line 32 on)" in note for note in found[0].recording.notes
+        "2 samples without a value of trial (from line 32 on)" in note for note in squeezes[0].recording.notes
     )
     (refused,) = recordings(tmp_path, [f"{HEADER},trial", *(f"{row}," for row in ROWS)], keys)
     assert "no value of trial" in str(refused.error)
