@@ -348,3 +348,12 @@ def test_rows_without_a_value_of_the_column_that_splits_are_left_out_and_told(tm
     )
     (refused,) = recordings(tmp_path, [f"{HEADER},trial", *(f"{row}," for row in ROWS)], keys)
     assert "no value of trial" in str(refused.error)
+
+
+def test_a_table_before_the_names_of_another_one_is_not_left_out(tmp_path):
+    """A logger that was started anew with a column more."""
+    lines = [HEADER, *ROWS[:90], f"{HEADER},temperature", *(f"{row},21" for row in ROWS[90:])]
+    (refused,) = recordings(tmp_path, lines)
+    assert all(word in str(refused.error) for word in ("line 92", "90 lines", "two tables"))
+    (calibrated,) = recordings(tmp_path, ["1,2,3", "4,5,6", HEADER, *ROWS[:9]])
+    assert len(calibrated.recording.readings) == 9
