@@ -11,9 +11,11 @@ from commands import printed
 
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import DataDamaged
+from graspsense.sources.column_guess import guesses
 from graspsense.sources.features_csv import read_labelled
 from graspsense.sources.grasp_csv import named, read_squeeze
 from graspsense.sources.manifest.reader import read_recordings
+from graspsense.sources.manifest.text_format import read_text
 from graspsense.store.labels import labels_of
 
 N = 200
@@ -253,6 +255,14 @@ def test_a_name_that_ends_in_another_unit_is_told(heading, unit, says, tmp_path)
         notice for notice in recording.notices if "its name says" in notice and says in notice
     ] or not says
     assert says or not [notice for notice in recording.notices if "its name says" in notice]
+
+
+def test_a_unit_that_contradicts_the_file_is_told_and_the_unit_of_the_file_is_suggested(tmp_path):
+    keys = 'files = "{label}.csv"\ntime = "t"\ngap = "pos"\nforce = "f1 [N]"\n'
+    (recording,) = recordings(tmp_path, [HEADER, "s,mm,mA,mA", *ROWS], keys)
+    assert [notice for notice in recording.notices if "says [N]" in notice and "states mA" in notice]
+    (table,) = read_text(tmp_path / "jar.csv")
+    assert any(guess.value == "f1 [mA]" and "no unit" not in guess.check for guess in guesses(table))
 
 
 def test_an_effort_in_another_unit_is_told(tmp_path):
