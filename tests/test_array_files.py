@@ -224,3 +224,19 @@ def test_a_store_of_recordings_with_a_constant_gap_has_no_width(begin_s, tmp_pat
     trials = load_trials(f"store:{tmp_path / 'store'}")
     assert trials.width is None
     assert "no width" in trials.no_width
+
+
+def test_the_attribute_units_of_an_array_of_hdf5_is_its_unit(tmp_path):
+    """Times in ms, gaps in mm and forces in mN, in the groups of two grasps."""
+    columns = {"t": (T_S * 1e3, "ms"), "pos": (GAP * 1e3, b"millimeter"), "F": (FORCE * 1e3, "mN")}
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for k in (1, 2):
+            for name, (values, unit) in columns.items():
+                array = file.create_dataset(f"jar/{k}/{name}", data=values * (k if name == "F" else 1))
+                array.attrs["units"] = unit
+    text = 'files = "*.h5"\narrays = "{label}/{order:d}/{column}"\ntime = "t"\ngap = "pos"\nforce = "F"\n'
+    grasps = recordings(tmp_path, text)
+    assert peaks(grasps) == pytest.approx([FORCE.max(), 2.0 * FORCE.max()])
+    last = grasps[0].recording.readings[-1].frame
+    assert (last.t_s, last.gap_m) == pytest.approx((1.19, 0.05))
+    assert [grasp.label for grasp in grasps] == ["jar", "jar"]

@@ -11,9 +11,11 @@ from commands import printed
 
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import DataDamaged
+from graspsense.sources.column_guess import guesses
 from graspsense.sources.features_csv import read_labelled
 from graspsense.sources.grasp_csv import named, read_squeeze
 from graspsense.sources.manifest.reader import read_recordings
+from graspsense.sources.manifest.text_format import read_text
 from graspsense.store.labels import labels_of
 
 N = 200
@@ -255,6 +257,14 @@ def test_a_name_that_ends_in_another_unit_is_told(heading, unit, says, tmp_path)
     assert says or not [notice for notice in recording.notices if "its name says" in notice]
 
 
+def test_a_unit_that_contradicts_the_file_is_told_and_the_unit_of_the_file_is_suggested(tmp_path):
+    keys = 'files = "{label}.csv"\ntime = "t"\ngap = "pos"\nforce = "f1 [N]"\n'
+    (recording,) = recordings(tmp_path, [HEADER, "s,mm,mA,mA", *ROWS], keys)
+    assert [notice for notice in recording.notices if "says [N]" in notice and "states mA" in notice]
+    (table,) = read_text(tmp_path / "jar.csv")
+    assert any(guess.value == "f1 [mA]" and "no unit" not in guess.check for guess in guesses(table))
+
+
 def test_an_effort_in_another_unit_is_told(tmp_path):
     keys = 'files = "{label}.csv"\ntime = "t"\ngap = "pos"\nforce = "f1"\neffort = "f2"\n'
     (recording,) = recordings(tmp_path, [HEADER, "s,mm,N,mA", *ROWS], keys)
@@ -341,10 +351,19 @@ def test_rows_without_a_value_of_the_column_that_splits_are_left_out_and_told(tm
         f"{HEADER},trial",
         *(f"{row},{'' if k in (30, 31) else 1 + k // 100}" for k, row in enumerate(ROWS)),
     ]
-    grasps = recordings(tmp_path, lines, keys)
-    assert [len(recording.recording.readings) for recording in grasps] == [98, 100]
+    squeezes = recordings(tmp_path, lines, keys)
+    assert [len(recording.recording.readings) for recording in squeezes] == [98, 100]
     assert any(
-        "2 samples without a value of trial (from line 32 on)" in note for note in grasps[0].recording.notes
+        "2 samples without a value of trial (from line 32 on)" in note for note in squeezes[0].recording.notes
     )
     (refused,) = recordings(tmp_path, [f"{HEADER},trial", *(f"{row}," for row in ROWS)], keys)
     assert "no value of trial" in str(refused.error)
+
+
+def test_a_table_before_the_names_of_another_one_is_not_left_out(tmp_path):
+    """A logger that was started anew with a column more."""
+    lines = [HEADER, *ROWS[:90], f"{HEADER},temperature", *(f"{row},21" for row in ROWS[90:])]
+    (refused,) = recordings(tmp_path, lines)
+    assert all(word in str(refused.error) for word in ("line 92", "90 lines", "two tables"))
+    (calibrated,) = recordings(tmp_path, ["1,2,3", "4,5,6", HEADER, *ROWS[:9]])
+    assert len(calibrated.recording.readings) == 9

@@ -34,8 +34,11 @@ def shipped() -> dict[str, Resource[ExperimentEntry]]:
     }
 
 
-OF_CASES: Final = ("pipelines", "classifiers", "variants", "sweep", "data", "test", *PIPELINE_TABLES)
-"""Keys that describe the cases of an experiment, which one that consists of parts does not have."""
+OF_CASES: Final = ("classifiers", "variants", "sweep", "data", "test", *PIPELINE_TABLES)
+"""Keys that describe the cases of an experiment, which one that consists of parts does not have.
+
+The pipelines of the parts stand in the file that a folder of results keeps.
+"""
 
 
 def read_experiment(
@@ -68,8 +71,9 @@ def read_experiment(
                 problem = evolve(problem, path=typed_path(owner))
             complaints.append(owner.complain(problem, known))
         experiment = None
-    for key in OF_CASES if values.get("parts") else ():
-        if key in values:
+    without = Experiment(title="")
+    for key in OF_CASES if experiment is not None and experiment.parts else ():
+        if getattr(experiment, key) != getattr(without, key):
             owner = merged.owner_of((key,)) or layer
             text = (
                 "an experiment of parts has no cases of its own, so this has no effect: set it in the parts"

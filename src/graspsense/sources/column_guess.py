@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import frozen
 
-from graspsense.sources.manifest.units import GRAM_FORCE, known_unit
+from graspsense.sources.manifest.units import GRAM_FORCE, WITHOUT_UNIT, known_unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -284,7 +284,9 @@ def _mean(table: ColumnTable, names: Sequence[str]) -> Numbers | None:
 
 def _stated(table: ColumnTable, name: str, quantity: str) -> str:
     """Return the unit that a line of units or a name states, empty if neither does."""
-    return _unit(table.units.get(name, ""), quantity) or unit_in_name(name, quantity)
+    stated = table.units.get(name, "")
+    own = stated if quantity != "time" and stated not in WITHOUT_UNIT else ""
+    return _unit(stated, quantity) or own or unit_in_name(name, quantity)
 
 
 def unit_in_name(name: str, quantity: str) -> str:

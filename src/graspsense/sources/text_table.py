@@ -47,6 +47,9 @@ _WITH_UNIT: Final = re.compile(r"(.*[0-9.])\s*([^\s0-9]+)")
 _SAMPLED: Final = 400
 """Lines from which the separator and the kinds of the columns are found."""
 _SAMPLED_CELLS: Final = 100_000
+_FEW_BEFORE: Final = 4
+_MOST_BEFORE: Final = 0.1
+"""Lines of numbers before the names, and their share of those after them, beyond which they can be data."""
 _MOST_JSON_PARTS: Final = 8
 """Depth of lists and objects in a JSON line."""
 
@@ -209,12 +212,27 @@ class _Layout:
             )
         names = able[-1]
         if names:
+            self._refuse_numbers_before(names)
             skipped = [number for number, _ in self.rows[:names]]
             self.notes.append(
                 f"the names of the columns are those of line {self.rows[names][0]}; "
                 + _lines_words(skipped, "lines before them")
             )
         return self.rows[names][1], units, names + (2 if units else 1), self.rows[names][0]
+
+    def _refuse_numbers_before(self, names: int) -> None:
+        """Raise DataDamaged if rows of numbers that may be a part of the data come before the row `names`."""
+        numbers = [
+            number
+            for number, row in self.rows[:names]
+            if len(row) > 1 and all(is_number(cell) or is_missing(cell) for cell in row)
+        ]
+        if len(numbers) > max(_FEW_BEFORE, _MOST_BEFORE * (len(self.rows) - names)):
+            raise DataDamaged(
+                f"{self.path}: line {self.rows[names][0]} names the columns of the lines after it, and {len(numbers)} "
+                f"lines of numbers come before it, from line {numbers[0]} on: are these two tables? Divide the file, "
+                'or say in a manifest which line begins each grasp: start = "a text in that line"'
+            )
 
     def _names_in_comment(self, width: int) -> tuple[int, list[str], list[str] | None] | None:
         """Return the line, the names and the units that the last comments before the first row have.

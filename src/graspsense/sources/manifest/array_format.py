@@ -40,6 +40,8 @@ COLUMN: Final = "column"
 GRASP: Final = "grasp"
 _ALONE: Final = ""
 """Name of an array without one."""
+_UNITS: Final = ".units"
+"""Ending of the name of a text that is the unit of an array, as the reader of HDF5 files gives it."""
 
 
 @frozen(kw_only=True)
@@ -208,7 +210,8 @@ def _of_arrays(path: Path, arrays: Arrays, rows: int = 0) -> ColumnTable:
         and array.dtype.kind in "fiubU"
         and name
     }
-    return ColumnTable(source=path.name, numbers=columns, shapes=shapes, fields=scalars)
+    units = {name: scalars[f"{name}{_UNITS}"] for name in columns if f"{name}{_UNITS}" in scalars}
+    return ColumnTable(source=path.name, numbers=columns, shapes=shapes, fields=scalars, units=units)
 
 
 def _common_length(arrays: Arrays) -> int:

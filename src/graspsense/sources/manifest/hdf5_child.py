@@ -16,6 +16,8 @@ import numpy as np
 
 MOST_OBJECTS = 100_000
 DEEPEST = 32
+UNITS = ".units"
+"""Ending of the name of a text with the unit of an array, which is its attribute `units`."""
 
 
 def datasets(group: Any, name: str, seen: set[Any], depth: int) -> Iterator[tuple[str, Any]]:
@@ -63,6 +65,10 @@ def arrays(path: str, name: str, dataset: Any, left: int) -> Iterator[tuple[str,
             yield name, np.array("".join(map(chr, np.ravel(values, order="F").tolist())))
         else:
             yield name, np.asarray(values).T if matlab else np.asarray(values)
+            unit = dataset.attrs.get("units", dataset.attrs.get("unit", ""))
+            unit = unit.decode(errors="replace") if isinstance(unit, bytes) else unit
+            if isinstance(unit, str) and unit:
+                yield f"{name}{UNITS}", np.array(unit)
 
 
 def main(path: str, out: str, most: int) -> None:

@@ -155,8 +155,8 @@ def _doubtful_units(manifest: ReadManifest, columns: AvailableColumns) -> Iterat
                 f'{key} = "{chosen.text} [{grams}]"'
             )
             continue
-        said = known_unit(stated, quantity)
-        if chosen.unit and said and said != known_unit(chosen.unit, quantity):
+        said, written = (known_unit(unit, quantity) or unit for unit in (stated, chosen.unit))
+        if chosen.unit and stated not in WITHOUT_UNIT and said != written:
             yield f"{key}: the manifest says [{chosen.unit}], and the file states {stated}"
         elif not columns.unit(chosen, quantity):
             yield from _not_read(key, chosen, stated, quantity)
