@@ -29,7 +29,7 @@ from graspsense.store.store import Store
 from graspsense.store.verify import verify_store
 
 MUTATIONS = int(os.environ.get("GRASPSENSE_MUTATIONS", "0"))
-NUMBER = MUTATIONS or 40
+NUMBER = MUTATIONS or 20
 
 
 def digests(folder):

@@ -412,10 +412,11 @@ def test_trial_grasps_end_at_a_limit_of_work_and_the_grasp_runs(monkeypatch):
         ("k1_n_m = 1000.0", {"step_s": 1e-3}, ["peak", "trace", "features"]),
         pytest.param("k1_n_m = 1000.0", {"fidelity": "reference"}, [], marks=pytest.mark.slow),
         ("k1_n_m = 1e7", {"pad_stiffness_n_m": math.inf}, ["trace", "features"]),
-        (
+        pytest.param(
             'k1_n_m = 1000.0\n[[terms]]\ntype = "slosh"\nmass_kg = 1.0\nfrequency_hz = 1e5',
             {},
             ["peak", "trace", "features"],
+            marks=pytest.mark.slow,
         ),
         # The finest trial grasps miss it too, and agree.
         pytest.param(
