@@ -256,6 +256,7 @@ def test_foxglove_itself_is_let_in(kept_feed, origin):
         assert json.loads(viewer.recv(timeout=PATIENCE_S))["op"] == "serverInfo"
 
 
+@pytest.mark.slow
 def test_what_is_not_a_subscription_is_an_error_and_the_others_go_on(feed):
     good = Viewer(feed)
     for sent in (

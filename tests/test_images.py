@@ -517,6 +517,7 @@ def test_pictures_for_foxglove_have_the_colours_of_the_camera(seen):
     assert b"rgb8" in messages[0]
 
 
+@pytest.mark.slow
 def test_a_camera_is_a_small_picture_in_the_report():
     import base64
     import zlib

@@ -21,7 +21,6 @@ import mutated_files as change
 import pytest
 import recorded_files as write
 from attrs import frozen
-from cases import every_case
 
 from graspsense.core.components.config import resolve
 from graspsense.core.components.layers import Flag
@@ -204,13 +203,6 @@ def pattern_of(name, folder):
 def numbers(name, count):
     wanted, _, number = os.environ.get("GRASPSENSE_MUTATED", "").partition(":")
     return range(count) if not wanted else [int(number)] if wanted == name else []
-
-
-@every_case("name", FORMATS)
-def test_a_sample_of_each_format(name, tmp_path):
-    pattern = pattern_of(name, tmp_path / "pattern")
-    for number in numbers(name, QUICK):
-        check(name, number, pattern, tmp_path / "set")
 
 
 @pytest.mark.slow

@@ -29,7 +29,7 @@ from graspsense.store.store import Store
 from graspsense.store.verify import verify_store
 
 MUTATIONS = int(os.environ.get("GRASPSENSE_MUTATIONS", "0"))
-NUMBER = MUTATIONS or 40
+NUMBER = MUTATIONS or 20
 
 
 def digests(folder):
@@ -161,7 +161,7 @@ def test_settings(tmp_path):
 
 @pytest.mark.slow
 def test_many_more(tmp_path, monkeypatch):
-    monkeypatch.setitem(globals(), "NUMBER", MUTATIONS or 300)
+    monkeypatch.setitem(globals(), "NUMBER", MUTATIONS or 150)
     for test in (test_recordings, test_stores, test_models, test_settings):
         (tmp_path / test.__name__).mkdir()
         test(tmp_path / test.__name__)

@@ -95,6 +95,7 @@ def test_two_grippers_on_virtual_clocks_advance_together_whatever_their_rates():
             assert abs(latest["fast"] - latest["slow"]) <= 0.02 + 1e-9
 
 
+@pytest.mark.slow
 def test_a_grasp_of_a_pair_is_the_grasp_alone():
     run = RunConfig(hold_s=0.05)
     alone = run_grasp(Scripted(squeezing, bottle), create("controller", "hybrid"), run)

@@ -97,6 +97,7 @@ def test_a_sink_that_ends_the_program_is_dropped():
     assert any("SystemExit" in event.what for event in grasp.events)
 
 
+@pytest.mark.slow
 @every_case("outcome", [99, -1, None, "steady"])
 def test_an_outcome_that_there_is_not_aborts_the_grasp_and_keeps_the_trace(outcome):
     gripper = Scripted(squeezing, bottle)
@@ -220,6 +221,7 @@ class TwoFaced(Command):
     value = 1e6
 
 
+@pytest.mark.slow
 @every_case(
     "command",
     [

@@ -43,6 +43,7 @@ def test_features_without_information_are_worse_and_the_same_trials_are_compared
     assert ranking.chosen.words in ranking.verdict
 
 
+@pytest.mark.slow
 def test_the_best_of_several_in_noise_is_not_shown_to_be_better_than_guessing():
     learners = {name: learner(name) for name in ("tree", "knn")}
     trials = bottles(12, spread=0.1)

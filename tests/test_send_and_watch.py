@@ -211,7 +211,9 @@ def test_hybrid_with_the_simulated_body_behind_such_an_interface(rate_hz):
     assert 10.0 < held_n(trace) < 21.0
 
 
-@pytest.mark.parametrize("law", [HybridController, SendAndWatchController])
+@pytest.mark.parametrize(
+    "law", [HybridController, pytest.param(SendAndWatchController, marks=pytest.mark.slow)]
+)
 def test_an_approach_with_the_force_of_the_squeeze_closes_on_after_the_contact(law):
     config = {HybridController: HybridConfig, SendAndWatchController: SendAndWatchConfig}[law]
     body = Body(WITH_PADS)

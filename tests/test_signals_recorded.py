@@ -284,8 +284,8 @@ class Camera(Palm):
 
     channels = (
         *FRAME,
-        TactileArray("pads", "counts", 1000.0, rows=200, columns=200),
-        TactileArray("camera", "counts", 100.0, rows=240, columns=320),
+        TactileArray("pads", "counts", 50.0, rows=200, columns=200),
+        TactileArray("camera", "counts", 20.0, rows=240, columns=320),
     )
 
     def read(self, timeout_s):

@@ -114,7 +114,9 @@ def test_of_a_manifest(folder, kind):
         assert not isinstance(bad.error, DataDamaged)
 
 
-@pytest.mark.parametrize("kind", ["zlib", "huge", "disk"])
+@pytest.mark.parametrize(
+    "kind", ["zlib", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("huge", "disk"))]
+)
 def test_the_others_of_a_manifest_are_imported_and_loaded(folder, kind):
     SPOIL[kind](folder / "can_2.npz")
     code, out, err = graspsense("import", folder / "manifest.toml", "--save", folder / "trials", "--json")

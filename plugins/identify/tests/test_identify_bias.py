@@ -110,6 +110,7 @@ def test_an_error_of_the_scale_of_the_force_changes_more_than_forces_behind_comp
     assert errors[1] > 2e-3
 
 
+@pytest.mark.slow
 def test_a_stiffness_that_the_fit_leaves_out_has_an_interval_in_proportion_to_the_force():
     rng = np.random.default_rng(0)
     squeeze = prepared(

@@ -60,6 +60,7 @@ def test_a_delay_of_which_the_settings_do_not_know_does_not_bias_the_fingertips(
     assert "the delay of the settings" in said
 
 
+@pytest.mark.slow
 def test_a_squeeze_of_nothing_is_refused():
     (empty,) = squeezes("none", {"sensor": "ideal"}, 1)
     with pytest.raises(ConfigError, match="nothing was touched"):

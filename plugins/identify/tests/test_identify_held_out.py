@@ -27,6 +27,7 @@ def springs(*stiffnesses):
     return [recorded(lambda closure, k=k: k * closure) for k in stiffnesses]
 
 
+@pytest.mark.slow
 def test_a_recording_is_predicted_by_others_without_its_own_stiffness():
     ready = [prepared(squeeze, 0.0) for squeeze in springs(1000.0, 1500.0)]
     spring = static_candidates(scale_of(ready))[0]

@@ -75,6 +75,7 @@ def test_a_flat_thing_presses_on_all_cells_alike(tmp_path):
     assert np.ptp(image) < 0.1 * image.mean()
 
 
+@pytest.mark.slow
 def test_the_palm_feels_gravity_and_the_motion_of_the_fingers(tmp_path):
     backend = opened("none")
     still = [backend.read(1.0).signals.acceleration for _ in range(200)]
@@ -104,6 +105,7 @@ def test_a_thing_that_is_filled_weighs_more(tmp_path):
     assert sum(masses) == pytest.approx(0.15 + 0.3)
 
 
+@pytest.mark.slow
 def test_the_table_rises_as_the_scene_says(tmp_path):
     backend = opened(scene(tmp_path, "table_height = [[0.0, 0.0], [0.2, 0.02]]"))
     resting_m = float(backend._data.mocap_pos[0, 2])

@@ -190,6 +190,7 @@ def test_whatever_becomes_of_replies_the_fingers_are_told_to_stop(emulated, wire
     assert not gripper.state()["going"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_time")
 def test_fingers_that_open_slowly_begin_at_once(emulated):
     """The target of a slow closing is up to 4 mm ahead, within the object."""

@@ -57,6 +57,7 @@ def again(config=CONFIG, spec=None, **settings):
     return selection.select(Problem(config, spec or shell()), controller)
 
 
+@pytest.mark.slow
 def test_memory_finds_a_model_by_content_and_not_by_object(trials):
     model = select()
     # Another object of Python with the same content, and other settings that no model depends on.

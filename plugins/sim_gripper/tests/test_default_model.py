@@ -64,6 +64,7 @@ def test_what_it_never_saw_is_unknown(pipeline, name):
     assert "is unlike everything trained on" in said.because[0].words
 
 
+@pytest.mark.slow
 def test_nothing_there_is_unknown(pipeline):
     said = pipeline.grasp(object="none").prediction
 

@@ -9,14 +9,8 @@ from graspsense.plugin_api import ConfigError
 from graspsense_sim_gripper.config import SimConfig
 
 
-@pytest.mark.parametrize(
-    "case",
-    [
-        pytest.param(case, marks=() if case is extremes.approach else pytest.mark.slow)
-        for case in extremes.CASES
-    ],
-    ids=lambda case: case.__name__,
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("case", extremes.CASES, ids=lambda case: case.__name__)
 def test_what_must_hold_holds(case):
     rows = list(case(short=True))
     assert rows

@@ -68,7 +68,7 @@ def test_velocity_control_on_its_own_raises_its_effort_after_contact_and_crushes
     assert result.outcome is Outcome.CRUSHED
 
 
-@pytest.mark.parametrize("name", ["force", "hybrid"])
+@pytest.mark.parametrize("name", ["force", pytest.param("hybrid", marks=pytest.mark.slow)])
 def test_a_force_below_breakaway_does_not_move_the_gripper_at_all(name):
     options = {"probing_force_n": 6.0, "move_timeout_s": 0.3}
     if name == "hybrid":
@@ -104,7 +104,7 @@ def test_a_ramp_softens_the_switch():
 @pytest.mark.parametrize(
     ("config", "outcome"),
     [
-        ({"object": "none"}, Outcome.NOTHING_THERE),
+        pytest.param({"object": "none"}, Outcome.NOTHING_THERE, marks=pytest.mark.slow),
         ({"object": "can:full_closed", "open_gap_m": 0.060}, Outcome.TOO_WIDE),
         ({"object": "odwalla:empty_open", "open_gap_m": 0.064}, Outcome.STEADY),
     ],

@@ -396,7 +396,9 @@ def test_fingers_meet_an_object_that_has_not_recovered_its_shape_where_it_ends(s
     np.testing.assert_allclose(forces, expected, atol=0.012)
 
 
-@pytest.mark.parametrize("before_m", [0.0, 1e-15, 1e-12])
+@pytest.mark.parametrize(
+    "before_m", [1e-15, *(pytest.param(before_m, marks=pytest.mark.slow) for before_m in (0.0, 1e-12))]
+)
 def test_the_steps_from_a_contact_that_is_off_by_rounding_are_those_from_the_contact(before_m):
     # The search for the contact went on in steps of down to 3e-11 s, over which the rate of compression is rounding.
     terms, laws = (Elastic(4e4, 0.0), Surface(30.0, 410.0, 11.0, 4e4)), (elastic, surface)

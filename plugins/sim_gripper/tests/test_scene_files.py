@@ -58,6 +58,7 @@ def test_a_file_needs_no_more_than_a_width_and_its_terms(scene):
     assert [kind for kind, _ in spec.terms] == ["elastic", "maxwell"]
 
 
+@pytest.mark.slow
 def test_the_text_of_a_scene_is_grasped_like_its_file(scene):
     text, config = dedent(BOTTLE), NEAR
     from_file, from_text, other = run_many(config, HYBRID, [scene(BOTTLE), text, f"{text}#3"], [5, 5, 5])
@@ -68,6 +69,7 @@ def test_the_text_of_a_scene_is_grasped_like_its_file(scene):
     assert split_number(f"{text}# a comment\n") == (f"{text}# a comment\n", None)
 
 
+@pytest.mark.slow
 def test_the_report_of_a_grasp_is_of_the_scene_as_it_was_then(scene, tmp_path):
     grasp, again = run_many(NEAR, HYBRID, [scene(BOTTLE)] * 2, [5, 5], traces=False)
     report = grasp.report()

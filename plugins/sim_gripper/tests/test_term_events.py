@@ -127,7 +127,9 @@ def test_a_shell_snaps_at_its_critical_compression():
     assert forces[-1] < 5.0
 
 
-@pytest.mark.parametrize("event", ["parting", "breaking", "snapping"])
+@pytest.mark.parametrize(
+    "event", ["parting", *(pytest.param(event, marks=pytest.mark.slow) for event in ("breaking", "snapping"))]
+)
 def test_steps_of_a_tick_keep_their_order_through_an_event(event):
     # A motor without friction, whose steps are of second order if the event between them is located.
     config = SimConfig(

@@ -41,6 +41,7 @@ class Delivered:
         self._pads: Pads | None = None
         self._counter = 0
         self._signals: Any = ()
+        self._cells_of: dict[str, tuple[Any, ...]] = {}
 
     def problem(self, reading: Reading) -> str:
         """Return what is wrong with this reading, in words; an empty text if nothing is."""
@@ -80,12 +81,18 @@ class Delivered:
         if names != self._names:
             return f"its further channels are {', '.join(names) or 'none'}, and were {', '.join(self._names)}"
         for name, value in zip(names, signals, strict=True):
+            cells = value.cells if isinstance(value, Image) else None
+            # An image is in each reading until the next one comes; a tuple does not change meanwhile.
+            if cells is not None and cells is self._cells_of.get(name):
+                continue
             if name not in self._forms:
                 self._forms[name] = (shape_of(value), dtype_of(value))
             shape, dtype = self._forms[name]
             problem = _problem(value, shape, dtype)
             if problem:
                 return f"the channel {name!r} {problem}"
+            if isinstance(cells, tuple):
+                self._cells_of[name] = cells
         return ""
 
 
