@@ -288,6 +288,7 @@ def test_a_gripper_whose_connection_broke_is_told_to_stop_over_a_new_one(emulate
     other.close()
 
 
+@pytest.mark.slow
 def test_fingers_that_do_not_move_end_the_grasp():
     """A drive that more friction holds than it has force stands for an emergency stop, or for what blocks it."""
     options = ["gripper.port=emulated", "gripper.body_config={coulomb_n=500.0, breakaway_n=500.0}"]
