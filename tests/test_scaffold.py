@@ -49,7 +49,7 @@ def test_a_package_is_whole(roles, tmp_path):
         (
             "lab-thing",
             "features",
-            r"no role 'features'. There are:\n  sensor-backend .* Did you mean 'feature-set'\?",
+            r"no role 'features'. Did you mean 'feature-set'\? There are:\n  sensor-backend .*how each grasp ended$",
         ),
         ("Lab_Thing", "feature-set", "small letters, digits and single hyphens"),
         ("graspsense-chitta", "feature-set", "name 'chitta' is taken by graspsense/chitta: choose another"),

@@ -25,7 +25,9 @@ from graspsense.core.learn.copies import without_copies
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import ConfigError, counted
 from graspsense.core.values.features import FeatureTable
+from graspsense.core.values.signals import Outcome
 from graspsense.experiments.experiment import Experiment
+from graspsense.plugins.features.curve import CurveFeatures
 from graspsense.sources.manifest.description import Manifest
 from graspsense.store.naming import as_source, store_folder
 from graspsense.store.store import Store
@@ -274,3 +276,12 @@ def test_a_warning_of_a_library_is_a_note_in_one_line(run, monkeypatch):
     assert "note: sklearn remarks: raw words" in err
     assert "base.py" not in err
     assert "advice" not in err
+
+
+def test_features_of_a_wrong_type_are_blamed_on_the_feature_set(monkeypatch):
+    monkeypatch.setattr(CurveFeatures, "extract", lambda self, trace: {"peak": 1.0})
+    grasp = load_pipeline(options=["features.type=curve", "classifier.type=none"]).grasp()
+    assert grasp.outcome == Outcome.STEADY
+    assert set(grasp.features.reasons.values()) == {
+        "graspsense/curve failed: TypeError: extract returned dict: return graspsense.plugin_api.Features"
+    }

@@ -175,9 +175,8 @@ def _kinds(roles: Sequence[str]) -> dict[str, ScaffoldKind]:
     for role in roles:
         if role not in KINDS:
             raise ConfigError(
-                f"no role {role!r}. There are:\n"
+                f"no role {role!r}.{suggestion(role, KINDS)} There are:\n"
                 + "\n".join(f"  {known:<15} {kind.does}" for known, kind in KINDS.items())
-                + suggestion(role, KINDS)
             )
         if roles.count(role) > 1:
             raise ConfigError(f"--role {role} is given {roles.count(role)} times: give each role once")

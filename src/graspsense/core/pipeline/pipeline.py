@@ -200,6 +200,10 @@ def _recognised(
     """Return the features and the prediction of a whole grasp; its trace is kept whatever fails here."""
     try:
         features = feature_set.extract(grasp.trace)
+        if not isinstance(features, Features):
+            raise TypeError(
+                f"extract returned {type(features).__name__}: return graspsense.plugin_api.Features"
+            )
     except FAILURES as error:
         features = _undefined(settings, f"{settings.features.component.qualified} failed: {named(error)}")
     if model is None:

@@ -61,6 +61,8 @@ def own_features(
     except Exception:
         # A set that fails on every grasp is reported where the grasp itself is extracted from.
         return None
+    if not isinstance(features, Features):
+        return None
     return OwnFeatures(features, lambda: extracted(_half_a_tick_later(table)))
 
 
