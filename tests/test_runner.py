@@ -200,6 +200,22 @@ def test_whatever_stops_the_loop_the_fingers_are_opened(act, reason, after):
     assert gripper.closed == 1
 
 
+def test_a_step_that_fails_or_returns_no_command_is_named_with_what_it_returns():
+    class Halved(HybridController):
+        @staticmethod
+        def step(params, state, reading):
+            return Command(EFFORT, 5.0, math.inf, math.inf)
+
+    for controller, error in (
+        (controller_that(fail, 900), "ZeroDivisionError"),
+        (Halved(HybridConfig()), "ValueError"),
+    ):
+        grasp = run_grasp(Scripted(squeezing, bottle), controller, RUN)
+        assert grasp.outcome is Outcome.ABORTED
+        for part in ("test_runner", "step of the controller", error, "(Command, state)"):
+            assert part in grasp.reason
+
+
 def test_the_second_interrupt_still_relaxes_the_gripper():
     class Impatient(Scripted):
         interrupted = False

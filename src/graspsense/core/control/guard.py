@@ -13,6 +13,7 @@ from math import inf
 from typing import Any, NamedTuple
 
 from graspsense.core.control.contact import either_touches
+from graspsense.core.values.errors import FAILURES, named
 from graspsense.core.values.signals import EFFORT, FORCE, POSITION, VELOCITY, Command, Frame, Reading
 
 
@@ -107,25 +108,37 @@ def guard(
 Step = Callable[[Any, Any, Reading], tuple[Command, Any]]
 
 
+class StepFailed(Exception):
+    """A controller whose step raised an exception, or returned what is no command."""
+
+
 def with_plain_commands(step: Step) -> Step:
     """Return the step of a controller, run by the interpreter, with commands of plain numbers for the guard to compare.
 
     A controller is the code of others. A subclass of float, as numpy has one, can define what `<` means. The step
-    raises TypeError or ValueError where a command is not made of numbers.
+    raises StepFailed where the controller raises, or returns anything but a Command of numbers and a state.
     """
+    name = f"{getattr(step, '__module__', '')}.{getattr(step, '__qualname__', step)}"
 
     def plain_step(params: Any, state: Any, reading: Reading) -> tuple[Command, Any]:
-        command, state = step(params, state, reading)
-        kind, value, effort_limit, speed_limit = command
-        if (
-            type(command) is Command
-            and type(kind) is int
-            and type(value) is float
-            and type(effort_limit) is float
-            and type(speed_limit) is float
-        ):
-            return command, state
-        return Command(_integer(kind), _number(value), _number(effort_limit), _number(speed_limit)), state
+        try:
+            command, state = step(params, state, reading)
+            kind, value, effort_limit, speed_limit = command
+            if (
+                type(command) is Command
+                and type(kind) is int
+                and type(value) is float
+                and type(effort_limit) is float
+                and type(speed_limit) is float
+            ):
+                return command, state
+            plain = Command(_integer(kind), _number(value), _number(effort_limit), _number(speed_limit))
+            return plain, state
+        except FAILURES as error:
+            raise StepFailed(
+                f"{name} of the controller failed: {named(error)}. It takes (params, state, reading) and returns "
+                "(Command, state)"
+            ) from error
 
     return plain_step
 

@@ -22,7 +22,7 @@ from graspsense.core.components.run_config import RunConfig
 from graspsense.core.control.binding import bind, maker
 from graspsense.core.control.contact import RestState, at_rest, update_rest
 from graspsense.core.control.garbage_collection import no_collection
-from graspsense.core.control.guard import GuardParams, GuardState, guard, with_plain_commands
+from graspsense.core.control.guard import GuardParams, GuardState, StepFailed, guard, with_plain_commands
 from graspsense.core.control.tick import (
     OPEN_SPEED_M_S,
     OPEN_WINDOW_S,
@@ -297,7 +297,7 @@ class _Grasp:
             ending = Outcome.DEVICE_LOST, str(error)
         except RecordingEnded:
             ending = self._recording_ended()
-        except (TareRefused, _Overdue, _NotDelivered) as error:
+        except (TareRefused, _Overdue, _NotDelivered, StepFailed) as error:
             ending = Outcome.ABORTED, str(error)
         except KeyboardInterrupt:
             self.interrupted = True
