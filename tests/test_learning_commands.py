@@ -195,8 +195,8 @@ def test_features_are_kept(csv, tmp_path):
         (
             ["evaluate", "nothing"],
             2,
-            "is not a source of trials: name a FILE.csv, a data set as icub:FOLDER, a store as store:DIR, "
-            "`simulated`, or scenes of `graspsense identify` as identified:cup.toml,mug.toml",
+            "is not a source of trials: name a FILE.csv, recordings as manifest:FILE.toml, a data set as icub:FOLDER, "
+            "a store as store:DIR, `simulated`, or scenes of `graspsense identify` as identified:cup.toml,mug.toml",
         ),
         (["evaluate", "none.csv", "--label", "x"], 2, "none.csv cannot be read"),
         (["evaluate", "none.csv"], 2, "none.csv cannot be read: there is no file of this name"),

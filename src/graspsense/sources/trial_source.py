@@ -155,8 +155,9 @@ def kind_of(source: str) -> Kind:
     if ":" in source:
         return "data set"
     raise ConfigError(
-        f"{source!r} is not a source of trials: name a FILE.csv, a data set as icub:FOLDER, a store as "
-        f"store:DIR, `{SIMULATED}`, or scenes of `graspsense identify` as {IDENTIFIED}cup.toml,mug.toml"
+        f"{source!r} is not a source of trials: name a FILE.csv, recordings as manifest:FILE.toml, a data set as "
+        f"icub:FOLDER, a store as store:DIR, `{SIMULATED}`, or scenes of `graspsense identify` as "
+        f"{IDENTIFIED}cup.toml,mug.toml"
     )
 
 
