@@ -317,6 +317,8 @@ if __name__ == "__main__":
             if socket.status == psutil.CONN_LISTEN:
                 print(process.pid == os.getpid(), socket.laddr.ip)
     cluster.close()
+    # A program that the user starts later finds its own modules again.
+    assert "PYTHONSAFEPATH" not in os.environ
 """
 
 

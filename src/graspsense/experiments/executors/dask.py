@@ -7,7 +7,7 @@ import tempfile
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, contextmanager, suppress
 from importlib import import_module
 from typing import Any, Final, Literal
 
@@ -40,12 +40,12 @@ class DaskCluster:
             raise PluginUnavailable(f"{HINT} ({error})") from error
         self._cluster: Any = None
         self._wanted = workers
+        self._local = ExitStack()
         if address is None:
-            # Workers, and the process that tracks their resources, import nothing from the current folder.
-            os.environ["PYTHONSAFEPATH"] = "1"
+            self._local.enter_context(_without_current_folder())
             # Dask imports from its folder for temporary files: with its default, other users could write there.
-            self._scratch = tempfile.TemporaryDirectory(prefix="graspsense-", ignore_cleanup_errors=True)
-            dask.config.set({"temporary-directory": self._scratch.name})
+            scratch = tempfile.TemporaryDirectory(prefix="graspsense-", ignore_cleanup_errors=True)
+            dask.config.set({"temporary-directory": self._local.enter_context(scratch)})
             # Dask retries a task once: its worker may have been dying because of another task.
             dask.config.set({"distributed.scheduler.allowed-failures": 1})
             self._cluster = self._local_cluster(workers)
@@ -70,7 +70,7 @@ class DaskCluster:
                 silence_logs=50,
             )
         except Exception as error:  # Dask raises various exceptions, from several layers
-            self._scratch.cleanup()
+            self._local.close()
             cause: BaseException = error
             while cause.__cause__ is not None:
                 cause = cause.__cause__
@@ -194,7 +194,7 @@ class DaskCluster:
         if self._cluster is not None:
             with suppress(Exception):
                 self._cluster.close(timeout=5)
-            self._scratch.cleanup()
+        self._local.close()
 
     def _compare(self) -> None:
         """Raise ConfigError if no worker appears, or if one has other versions than this process."""
@@ -216,6 +216,24 @@ class DaskCluster:
                 "workers have other versions than this process, so that their results would not be comparable:\n  "
                 + "\n  ".join(differs)
             )
+
+
+@contextmanager
+def _without_current_folder() -> Iterator[None]:
+    """Have the processes that begin meanwhile import nothing from the current folder.
+
+    These are the workers, those that replace lost ones, and the process that tracks their resources.
+    """
+    name = "PYTHONSAFEPATH"
+    before = os.environ.get(name)
+    os.environ[name] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            os.environ.pop(name, None)
+        else:
+            os.environ[name] = before
 
 
 def _done(task: Task, answer: str | Exception) -> TaskResult:
