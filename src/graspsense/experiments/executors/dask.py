@@ -225,15 +225,15 @@ def _without_current_folder() -> Iterator[None]:
     These are the workers, those that replace lost ones, and the process that tracks their resources.
     """
     name = "PYTHONSAFEPATH"
-    before = os.environ.get(name)
+    users_own = os.environ.get(name)
     os.environ[name] = "1"
     try:
         yield
     finally:
-        if before is None:
+        if users_own is None:
             os.environ.pop(name, None)
         else:
-            os.environ[name] = before
+            os.environ[name] = users_own
 
 
 def _done(task: Task, answer: str | Exception) -> TaskResult:
