@@ -115,9 +115,7 @@ def test_whatever_a_task_does_the_others_are_kept(lab, executor):
     assert "it ended its worker" in reasons["kills, seed 0"]
 
     kept = lab.results("out")
-    code, summary, stderr = lab.run(
-        "out", "-o", "seeds=1", "--executor", "serial", "--resume", WAYWARD_TAMED="1"
-    )
+    code, summary, stderr = lab.run("out", *how, "--resume", WAYWARD_TAMED="1")
 
     assert code == 0, stderr
     assert (summary["kept"], summary["done"], summary["complete"]) == (3, 3, True)

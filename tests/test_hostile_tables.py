@@ -526,7 +526,7 @@ def test_arff_out_of_bounds_is_told_with_its_line(text):
 
 @pytest.mark.parametrize(
     ("seed", "number"),
-    [pytest.param(1, 100, marks=pytest.mark.slow), pytest.param(2, 400, marks=pytest.mark.long)],
+    [pytest.param(1, 200, marks=pytest.mark.slow), pytest.param(2, 400, marks=pytest.mark.long)],
 )
 def test_changed_texts_are_answered_by_a_result_or_an_error_that_names_the_file(seed, number):
     # A program that reads so many changed texts of each format, with a limit on its memory.

@@ -161,7 +161,7 @@ def test_settings(tmp_path):
 
 @pytest.mark.slow
 def test_many_more(tmp_path, monkeypatch):
-    monkeypatch.setitem(globals(), "NUMBER", MUTATIONS or 150)
+    monkeypatch.setitem(globals(), "NUMBER", MUTATIONS or 300)
     for test in (test_recordings, test_stores, test_models, test_settings):
         (tmp_path / test.__name__).mkdir()
         test(tmp_path / test.__name__)

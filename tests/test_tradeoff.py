@@ -122,7 +122,7 @@ def test_the_simulator_gets_better_with_finer_steps(capsys, tmp_path):
 
 @pytest.mark.slow
 def test_the_condition_of_features_is_told_and_sensors_make_it_worse(capsys):
-    arguments = ["--scene", "odwalla:full_closed", "--seeds", "1", "--json"]
+    arguments = ["--scene", "odwalla:full_closed", "--seeds", "3", "--json"]
     assert ended(["tradeoff", "condition", *arguments]) == 0
     ideal, pads = json.loads(capsys.readouterr().out)
     assert (ideal["sensor"], pads["sensor"]) == ("ideal", "pads")

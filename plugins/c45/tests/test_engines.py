@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -46,19 +45,9 @@ def grasps(seed: int, n: int, decimals: int | None, weights: str) -> Table:
     )
 
 
-WEIGHTS = ("one", "whole", "any")
-DECIMALS = (None, 0, 2)
-IN_CI = (("one", None), ("whole", 0), ("any", 2))
-"""Each kind of weights and each number of decimals once."""
-
-
-@pytest.mark.parametrize(
-    ("weights", "decimals"),
-    [
-        pytest.param(*pair, marks=pytest.mark.slow if pair in IN_CI else pytest.mark.long)
-        for pair in product(WEIGHTS, DECIMALS)
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("weights", ["one", "whole", "any"])
+@pytest.mark.parametrize("decimals", [None, 0, 2])
 def test_same_tree_and_predictions(weights: str, decimals: int | None) -> None:
     sizes = []
     for seed, options in enumerate(OPTIONS):

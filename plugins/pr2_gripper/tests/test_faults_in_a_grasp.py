@@ -62,16 +62,13 @@ def test_a_fault_in_the_squeeze_crushes_nothing_and_without_a_fault_nothing_is_t
 @pytest.mark.parametrize(
     ("controller", "faults", "sides"),
     [
-        ("hybrid", FAULTS, ("left",)),
+        ("hybrid", FAULTS, ("left", "right")),
         ("velocity", FAULTS[::2], ("right",)),
         ("force", FAULTS[1::2], ("right",)),
     ],
 )
 def test_every_fault_in_every_phase_crushes_nothing(controller, faults, sides):
-    """All of them under one law, on the left, and each under another one on the right.
-
-    What protects the object does not know the law.
-    """
+    """All of them under one law: what protects the object does not know the law."""
     # A drift is known by the way that the fingers go in free air.
     drifts, others = (
         [fault for fault in faults if ("drift" in fault.name) is drifting] for drifting in (True, False)

@@ -308,7 +308,7 @@ def test_a_threshold_that_is_nearly_met_at_a_tick_is_decided_as_by_the_reference
 def test_every_object_of_the_catalogue_has_a_model_of_ordinary_steps():
     for spec in catalogue().values():
         # Without spread, the trial grasps are among these, and may differ by more.
-        config = evolve(CONFIG, spread=True, open_gap_m=min(spec.width_m + 0.002, CONFIG.open_gap_m))
+        config = evolve(CONFIG, spread=True, open_gap_m=min(spec.width_m + 0.01, CONFIG.open_gap_m))
         model = selected(config, spec, hybrid())
         assert model.verification is not None, spec.name
         ordinary = [scale.level(config.accuracy) for scale in (PLAIN, CONTROLLED[0])]
