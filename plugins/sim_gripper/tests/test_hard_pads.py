@@ -44,7 +44,9 @@ def test_pads_on_a_rigid_object_have_the_force_of_their_law(exponent):
 
 
 def test_pads_that_harden_from_afar_are_linear():
-    linear, hard = (pressed(PadCompliance(1e4, hardening_m=at), 4000.0) for at in (math.inf, 2e3))
+    linear, hard = (
+        pressed(PadCompliance(1e4, hardening_m=hardening_m), 4000.0) for hardening_m in (math.inf, 2e3)
+    )
     forces = [[state.force_n for _, state in states] for states in (linear, hard)]
     np.testing.assert_allclose(forces[1], forces[0], atol=1e-8)
     assert forces[0][-1] == pytest.approx(1.3e-3 / (1 / 1e4 + 1 / 4000.0), rel=1e-6)
