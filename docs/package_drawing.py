@@ -47,9 +47,9 @@ def host_subpackages() -> Graph:
     return graph
 
 
-def rooms_of_core() -> Graph:
-    """Return the rooms of `graspsense.core`, each with those that it imports from."""
-    return _imports_within(ROOT / "src" / HOST / "core", f"{HOST}.core", leave_out={"__init__"})
+def rooms_of(package: str) -> Graph:
+    """Return the rooms of `graspsense.core` or `graspsense.sources`, each with those that it imports from."""
+    return _imports_within(ROOT / "src" / HOST / package, f"{HOST}.{package}", leave_out={"__init__"})
 
 
 def simulator_subpackages() -> Graph:
@@ -194,12 +194,13 @@ def _ordered(rows: list[list[str]], pairs: list[tuple[str, str]]) -> list[list[s
 
 
 def drawing() -> str:
-    """Return the drawing of the host, of its core and of the simulator as SVG."""
+    """Return the drawing of the host, of its core and sources, and of the simulator as SVG."""
     parts: list[str] = []
     top = 0.0
     for title, graph in (
         ("graspsense and the distributions beside it", host_subpackages()),
-        ("graspsense.core", rooms_of_core()),
+        ("graspsense.core", rooms_of("core")),
+        ("graspsense.sources", rooms_of("sources")),
         ("graspsense-sim-gripper", simulator_subpackages()),
     ):
         top = _draw(parts, panel(graph), title, top + 30)

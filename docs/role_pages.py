@@ -47,7 +47,7 @@ from graspsense.core.values.trial import RunInfo, Trial
 from graspsense.recording.labelled_recording import LabelledRecording
 from graspsense.recording.replayable import Recording
 from graspsense.scaffold.make import KINDS, plugin_module, words_of
-from graspsense.sources.grasp_columns import GraspColumns, checked_recording
+from graspsense.sources.columns.grasp_columns import GraspColumns, checked_recording
 from graspsense.store.stored_grasps import StoredGrasp
 from graspsense.testing import CHECKS, MINIMUM_CHECKS
 from graspsense_sim_gripper.scene.terms import Term

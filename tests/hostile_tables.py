@@ -23,10 +23,10 @@ from graspsense.experiments.experiment_file import read_experiment
 from graspsense.recording.export_trace import declared_beside
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.recording.layout import TICK_FIELDS
-from graspsense.sources.exported_grasp import read_exported
-from graspsense.sources.features_csv import read_labelled
-from graspsense.sources.grasp_csv import read_squeeze
 from graspsense.sources.manifest.reader import read_recordings
+from graspsense.sources.recordings.exported_grasp import read_exported
+from graspsense.sources.recordings.grasp_csv import read_squeeze
+from graspsense.sources.trial_table.features_csv import read_labelled
 from graspsense_c45.arff import ArffError, read_arff
 from graspsense_sim_gripper.scene.library import find
 

@@ -158,7 +158,7 @@ def pr2_bag(path: Path) -> None:
     from rosbags.rosbag1 import Writer
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-    from graspsense.sources.rosbag import DEFINITIONS
+    from graspsense.sources.recordings.rosbag import DEFINITIONS
 
     store = get_typestore(Stores.ROS1_NOETIC)
     for name, definition in DEFINITIONS.items():

@@ -13,7 +13,7 @@ from commands import printed
 
 from graspsense.core.values.errors import ConfigError, DataDamaged, TooLarge
 from graspsense.recording.labelled_recording import UnreadableRecording
-from graspsense.sources.manifest.hdf5_file import hdf5_arrays
+from graspsense.sources.formats.hdf5_file import hdf5_arrays
 from graspsense.sources.manifest.reader import read_recordings
 from graspsense.sources.trial_source import load_trials
 

@@ -16,7 +16,7 @@ from kept import keep
 from graspsense.core.files.csv_text import csv_text, text_of_cell
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.features import FeatureTable
-from graspsense.sources.features_csv import read_labelled, write_labelled
+from graspsense.sources.trial_table.features_csv import read_labelled, write_labelled
 from graspsense.store.dataset import labelled_store
 from graspsense.store.store import Store
 

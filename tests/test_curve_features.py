@@ -287,7 +287,7 @@ def test_every_trace_gives_numbers_or_reasons(rows):
 )
 def test_most_features_of_the_icub_recordings_are_defined_where_there_is_contact():
     from graspsense.plugin_api import create
-    from graspsense.sources.icub_dataset import read_dataset
+    from graspsense.sources.recordings.icub_dataset import read_dataset
 
     table = read_dataset(os.environ["GRASPSENSE_ICUB"], create("feature-set", "graspsense/curve")).table
     known = ~np.isnan(table.values)

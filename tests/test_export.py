@@ -20,8 +20,8 @@ from graspsense.evaluation.evaluate import evaluate
 from graspsense.evaluation.json_codec import to_json
 from graspsense.recording.recording_info import RecordingInfo
 from graspsense.recording.trial_record import FeatureValues
-from graspsense.sources.features_csv import read_labelled
-from graspsense.sources.import_sources import recordings_to_import
+from graspsense.sources.importing.import_sources import recordings_to_import
+from graspsense.sources.trial_table.features_csv import read_labelled
 from graspsense.store.changes import set_aside
 from graspsense.store.dataset import labelled_store
 from graspsense.store.export_table import ABOUT_BEFORE

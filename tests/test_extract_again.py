@@ -12,7 +12,7 @@ from commands import graspsense
 from kept import frame, keep
 
 from graspsense.core.values.errors import ConfigError, DataDamaged
-from graspsense.sources.features_csv import read_labelled
+from graspsense.sources.trial_table.features_csv import read_labelled
 from graspsense.store.dataset import labelled_store, read_dataset
 from graspsense.store.store import Store
 

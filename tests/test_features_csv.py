@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.features import FeatureTable
-from graspsense.sources.features_csv import read_labelled, read_table, write_labelled
 from graspsense.sources.trial_source import load_trials
+from graspsense.sources.trial_table.features_csv import read_labelled, read_table, write_labelled
 
 GOOD = "what,p_first [m],f_steady\n" + "".join(
     f"{'ab'[i % 2]},{0.05 + 0.001 * (i % 3)},{6 + i % 2}\n" for i in range(8)

@@ -41,9 +41,9 @@ from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.recording.reader import read_recorded
 from graspsense.report.further_channels import channel_figures
 from graspsense.report.trace_plot import draw_trace
-from graspsense.sources.dataset_recordings import readable_or_not
-from graspsense.sources.exported_grasp import read_exported
-from graspsense.sources.grasp_columns import GraspColumns, checked_recording
+from graspsense.sources.columns.grasp_columns import GraspColumns, checked_recording
+from graspsense.sources.recordings.dataset_recordings import readable_or_not
+from graspsense.sources.recordings.exported_grasp import read_exported
 from graspsense.store.record_grasp import record_grasp
 from graspsense.store.store import Store
 from graspsense.testing.conformance import Examined

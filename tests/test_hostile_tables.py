@@ -22,13 +22,13 @@ from graspsense.core.values.errors import ConfigError, DataDamaged, suggestion
 from graspsense.core.values.features import FeatureTable
 from graspsense.experiments.experiment_file import read_experiment
 from graspsense.recording.labelled_recording import UnreadableRecording
-from graspsense.sources.csv_columns import CsvColumns
-from graspsense.sources.features_csv import read_labelled
+from graspsense.sources.formats.csv_columns import CsvColumns
+from graspsense.sources.formats.patterns import PatternError, file_template, regular_expression, wildcard
+from graspsense.sources.formats.text_format import read_text
 from graspsense.sources.manifest.description import read_manifest
 from graspsense.sources.manifest.expression import ExpressionError, parse
-from graspsense.sources.manifest.patterns import PatternError, file_template, regular_expression, wildcard
 from graspsense.sources.manifest.reader import read_recordings
-from graspsense.sources.manifest.text_format import read_text
+from graspsense.sources.trial_table.features_csv import read_labelled
 from graspsense_c45.arff import ArffError, parse_arff
 from graspsense_sim_gripper.scene.library import find
 

@@ -13,7 +13,7 @@ from graspsense.core.components.selected import SelectedComponent
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.plugin_api import create
-from graspsense.sources.icub_dataset import read_dataset
+from graspsense.sources.recordings.icub_dataset import read_dataset
 
 real_data = pytest.mark.skipif(
     "GRASPSENSE_ICUB" not in os.environ,

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from graspsense.core.values.errors import ConfigError, DataDamaged
-from graspsense.sources.doubtful_columns import keeps_rising
-from graspsense.sources.features_csv import read_labelled
-from graspsense.sources.identifiers import identifies, text_identifies
+from graspsense.sources.trial_table.doubtful_columns import keeps_rising
+from graspsense.sources.trial_table.features_csv import read_labelled
+from graspsense.sources.trial_table.identifiers import identifies, text_identifies
 
 LABELS = ("can",) * 30 + ("jar",) * 30
 N = len(LABELS)

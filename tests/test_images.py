@@ -55,7 +55,7 @@ from graspsense.recording.layout import START, Topic, shown_array
 from graspsense.recording.reader import read_recorded
 from graspsense.recording.recorder import Recorder
 from graspsense.recording.replayable import content_sha256
-from graspsense.sources.replay import read_named
+from graspsense.sources.recordings.replay import read_named
 from graspsense.store.record_grasp import record_grasp
 from graspsense.store.store import Store
 from graspsense.testing.checks import CheckFailed

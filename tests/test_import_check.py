@@ -10,7 +10,7 @@ import pytest
 import scipy
 from commands import graspsense
 
-from graspsense.sources.channel_facts import channel_facts
+from graspsense.sources.columns.channel_facts import channel_facts
 from graspsense.sources.manifest.reader import read_recordings
 
 SAMPLES = Path(__file__).parents[1] / "samples"

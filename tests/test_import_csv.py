@@ -12,7 +12,7 @@ from grippers import bottle, squeezing
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.signals import Phase
 from graspsense.recording.reader import read_recorded
-from graspsense.sources.grasp_csv import named, read_squeeze
+from graspsense.sources.recordings.grasp_csv import named, read_squeeze
 from graspsense.store.store import Store
 
 TICKS = 2200

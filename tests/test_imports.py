@@ -58,8 +58,14 @@ MAY_KNOW = {
 }
 """Subpackage to the subpackages it may import from; every subpackage may import the package itself, for its version."""
 
-ROOMS = ("values", "files", "control", "components", "grasp", "compiling", "learn", "pipeline")
-"""The rooms of core. Each may import from those before it."""
+ROOMS = {
+    "core": ("values", "files", "control", "components", "grasp", "compiling", "learn", "pipeline"),
+    "sources": (
+        *("units", "formats", "columns", "trial_table", "manifest", "recordings", "importing"),
+        *("input_content", "simulated", "identified", "trial_source", "squeezes"),
+    ),
+}
+"""The rooms of a package, and its files outside of rooms. Each may import from those before it."""
 OPENED_TO = {"identify": {"graspsense_sim_gripper.run.identification"}}
 """Distribution to the modules of others that it may import besides the doors."""
 
@@ -152,16 +158,15 @@ def imports_of(name: str, known: dict[str, Path]) -> set[str]:
     return imported & known.keys()
 
 
-def test_a_room_of_core_knows_those_before_it_only():
-    known = modules()
+@every_case(("package", "rooms"), ROOMS.items())
+def test_a_room_knows_those_before_it_only(package, rooms):
+    known, begin = modules(), f"graspsense.{package}."
     for name in known:
-        if name.startswith("graspsense.core."):
+        if name.startswith(begin):
             room = name.split(".")[2]
-            allowed = {f"graspsense.core.{name_of}" for name_of in ROOMS[: ROOMS.index(room) + 1]}
-            within = [
-                name_of for name_of in imports_of(name, known) if name_of.startswith("graspsense.core.")
-            ]
-            assert {".".join(name_of.split(".")[:3]) for name_of in within} <= allowed, name
+            allowed = {f"{begin}{earlier}" for earlier in rooms[: rooms.index(room) + 1]}
+            within = [imported for imported in imports_of(name, known) if imported.startswith(begin)]
+            assert {".".join(imported.split(".")[:3]) for imported in within} <= allowed, name
 
 
 @every_case("package", [SOURCE, *map(package_of, distributions())])

@@ -194,7 +194,7 @@ def test_a_grasp_of_many_raises_after_the_release():
 
 def interrupting(monkeypatch, after):
     """Let Ctrl-C arrive in the replay of the recording number `after`."""
-    from graspsense.sources.replay import ReplayBackend as Replay
+    from graspsense.sources.recordings.replay import ReplayBackend as Replay
 
     begun = []
     read, opened = Replay.read, Replay.open

@@ -18,7 +18,7 @@ from graspsense.core.values.events import GraspEvent, event_as_json, event_from_
 from graspsense.core.values.signals import Phase
 from graspsense.evaluation.events import LabelledEvents, evaluate_kind, outcomes
 from graspsense.recording.labelled_recording import UnreadableRecording
-from graspsense.sources.dataset_recordings import readable_or_not
+from graspsense.sources.recordings.dataset_recordings import readable_or_not
 from graspsense.store.store import Store
 
 RATE_HZ = 200.0

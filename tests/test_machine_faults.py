@@ -152,7 +152,7 @@ def test_an_mcap_file_of_another_program_can_be_of_any_year(tmp_path):
     pytest.importorskip("rosbags")
     from mcap.writer import Writer
 
-    from graspsense.sources.manifest.ros_format import read_bag
+    from graspsense.sources.formats.ros_format import read_bag
 
     def file(times):
         path = tmp_path / f"{times[-1]}.mcap"

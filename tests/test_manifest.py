@@ -17,7 +17,7 @@ from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.trace import signals_of
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.recording.reader import read_recorded
-from graspsense.sources.dataset_recordings import readable_or_not
+from graspsense.sources.recordings.dataset_recordings import readable_or_not
 from graspsense.sources.trial_source import load_trials
 from graspsense.store.store import Store
 

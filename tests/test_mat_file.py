@@ -10,7 +10,7 @@ import scipy
 from cases import every_case
 
 from graspsense.core.values.errors import ConfigError, DataDamaged
-from graspsense.sources.manifest.mat_file import mat_variables
+from graspsense.sources.formats.mat_file import mat_variables
 
 VARIABLES = {
     "matrix": np.arange(6.0).reshape(2, 3),

@@ -19,7 +19,7 @@ from graspsense.plugin_api import create
 from graspsense.recording.export_trace import WRITERS
 from graspsense.recording.reader import read_recorded
 from graspsense.recording.trial_record import DeviceRecord
-from graspsense.sources.exported_grasp import read_exported
+from graspsense.sources.recordings.exported_grasp import read_exported
 from graspsense.store.comparable import check_settings, newest_grasp
 from graspsense.store.record_grasp import record_grasp
 from graspsense.store.store import Store

@@ -27,11 +27,11 @@ from graspsense.core.components.layers import Flag
 from graspsense.core.components.registry import installed
 from graspsense.core.values.errors import GraspsenseError
 from graspsense.recording.atomic_file import SaveFailed
-from graspsense.sources.dataset_recordings import handed_over
-from graspsense.sources.import_sources import recordings_to_import
-from graspsense.sources.import_summary import summary_of
-from graspsense.sources.importing import import_recording
-from graspsense.sources.noise_thresholds import thresholds_for
+from graspsense.sources.importing.import_recording import import_recording
+from graspsense.sources.importing.import_sources import recordings_to_import
+from graspsense.sources.importing.import_summary import summary_of
+from graspsense.sources.recordings.dataset_recordings import handed_over
+from graspsense.sources.recordings.noise_thresholds import thresholds_for
 from graspsense.sources.trial_source import load_trials
 from graspsense.store.imported_contents import AlreadyImported, ImportedContents
 from graspsense.store.store import Store

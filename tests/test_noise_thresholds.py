@@ -13,8 +13,8 @@ from graspsense.core.control.contact import CONTACT_FORCE_N, REST_SPEED_M_S, RES
 from graspsense.core.values.features import Features
 from graspsense.core.values.signals import NO_PADS, Frame, Reading
 from graspsense.recording.replayable import Recording
-from graspsense.sources.import_outcomes import presses_on
-from graspsense.sources.noise_thresholds import thresholds_for
+from graspsense.sources.importing.import_outcomes import presses_on
+from graspsense.sources.recordings.noise_thresholds import thresholds_for
 
 
 def squeeze(peak_n=8.0, force_noise_n=0.01, gap_noise_m=0.0, step_s=0.001, seed=0, **more):

@@ -16,8 +16,8 @@ from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.features import FeatureTable
 from graspsense.core.values.nominal import codes_of, value_name, with_codes
 from graspsense.evaluation.evaluate import evaluate
-from graspsense.sources.features_csv import read_labelled, read_table
 from graspsense.sources.trial_source import load_trials
+from graspsense.sources.trial_table.features_csv import read_labelled, read_table
 
 WEATHER = """\
 % The weather data of J. R. Quinlan (1986).

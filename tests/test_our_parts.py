@@ -6,7 +6,7 @@ import pytest
 from grippers import bottle, squeezing
 
 from graspsense.core.components.registry import installed
-from graspsense.sources.grasp_csv import named
+from graspsense.sources.recordings.grasp_csv import named
 from graspsense.testing import CHECKS, Conformance, examine, parametrize_checks
 
 

@@ -13,8 +13,8 @@ pyarrow = pytest.importorskip("pyarrow", reason="needs the extra parquet")
 pq = pytest.importorskip("pyarrow.parquet", reason="needs the extra parquet")
 
 from graspsense.core.values.errors import DataDamaged  # noqa: E402
-from graspsense.sources.manifest.parquet_footer import parquet_size  # noqa: E402
-from graspsense.sources.manifest.parquet_format import read_parquet  # noqa: E402
+from graspsense.sources.formats.parquet_footer import parquet_size  # noqa: E402
+from graspsense.sources.formats.parquet_format import read_parquet  # noqa: E402
 
 NAN = float("nan")
 COLUMNS = {

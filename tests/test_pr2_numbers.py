@@ -1,12 +1,12 @@
 """The published numbers of the PR2 gripper are the same in its driver, in the simulator and in the reader of its bags.
 
 Each has them as data of its own, because none of them may import another: `graspsense_pr2_gripper.linkage`,
-`graspsense_sim_gripper.plant.drive_models`, `sensing` and `fingertip`, `graspsense.sources.rosbag`.
+`graspsense_sim_gripper.plant.drive_models`, `sensing` and `fingertip`, `graspsense.sources.recordings.rosbag`.
 """
 
 from __future__ import annotations
 
-from graspsense.sources import rosbag
+from graspsense.sources.recordings import rosbag
 from graspsense_pr2_gripper import backend, fingertip, linkage
 from graspsense_sim_gripper.plant import drive_models, sensing
 from graspsense_sim_gripper.plant import fingertip as simulated_fingertip

@@ -11,7 +11,7 @@ import scipy
 from graspsense.core.values.signals import NO_GAP
 from graspsense.core.values.trace import signals_of
 from graspsense.recording.labelled_recording import UnreadableRecording
-from graspsense.sources.dataset_recordings import readable_or_not
+from graspsense.sources.recordings.dataset_recordings import readable_or_not
 
 MANIFESTS = Path(__file__).parents[1] / "docs" / "manifests"
 

@@ -11,7 +11,7 @@ from cases import every_case
 from graspsense.core.values.signals import NO_PADS, Frame, Reading
 from graspsense.recording.labelled_recording import LabelledRecording
 from graspsense.recording.replayable import Recording
-from graspsense.sources.recording_notices import with_notices
+from graspsense.sources.columns.recording_notices import with_notices
 
 T_S = np.arange(300) * 0.01
 LOAD_N = np.clip(T_S - 1.0, 0.0, 1.0) * 6.0

@@ -10,7 +10,7 @@ from commands import graspsense
 from graspsense.core.files.regular_file import NotAFile, first_bytes
 from graspsense.core.grasp.calibration_files import read_calibration
 from graspsense.core.values.errors import ConfigError
-from graspsense.sources.icub import read_grasp
+from graspsense.sources.recordings.icub import read_grasp
 
 ZERO = Path("/dev/zero")
 

@@ -27,8 +27,8 @@ from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError, DataDamaged, DeviceLost, RecordingEnded
 from graspsense.core.values.signals import EFFORT, NO_PADS, VELOCITY, Command, Frame, Phase
 from graspsense.core.values.trace import PAD_COLUMNS, TICK_COLUMNS
-from graspsense.sources.icub import IcubGrasp, read_grasp, read_recording, relative_readings
-from graspsense.sources.replay import ReplayBackend, ReplayConfig
+from graspsense.sources.recordings.icub import IcubGrasp, read_grasp, read_recording, relative_readings
+from graspsense.sources.recordings.replay import ReplayBackend, ReplayConfig
 from graspsense.store.record_grasp import record_grasp
 from graspsense.store.store import Store
 from graspsense.store.trial_ref import recorded_settings

@@ -14,7 +14,7 @@ from cases import every_case
 from graspsense import load_pipeline
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.trace import signals_of
-from graspsense.sources.rosbag import read_bag
+from graspsense.sources.recordings.rosbag import read_bag
 
 if find_spec("rosbags") is None:
     pytest.skip("rosbags is the extra `ros`", allow_module_level=True)

@@ -44,8 +44,8 @@ from graspsense.recording.export_trace import write_csv, write_npz, write_parque
 from graspsense.recording.layout import START
 from graspsense.recording.reader import read_recorded
 from graspsense.recording.recorder import Recorder
-from graspsense.sources.exported_grasp import read_exported
-from graspsense.sources.replay import read_named
+from graspsense.sources.recordings.exported_grasp import read_exported
+from graspsense.sources.recordings.replay import read_named
 from graspsense.store.record_grasp import record_grasp
 from graspsense.store.store import Store
 from graspsense.testing.model_gripper import ModelGripper

@@ -9,7 +9,7 @@ from graspsense.core.components.selected import select_component
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.features import FeatureTable
 from graspsense.evaluation.evaluate import evaluate
-from graspsense.sources.features_csv import read_labelled
+from graspsense.sources.trial_table.features_csv import read_labelled
 
 
 def measured(factor):

@@ -11,11 +11,11 @@ from commands import printed
 
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import DataDamaged
-from graspsense.sources.column_guess import guesses
-from graspsense.sources.features_csv import read_labelled
-from graspsense.sources.grasp_csv import named, read_squeeze
+from graspsense.sources.columns.column_guess import guesses
+from graspsense.sources.formats.text_format import read_text
 from graspsense.sources.manifest.reader import read_recordings
-from graspsense.sources.manifest.text_format import read_text
+from graspsense.sources.recordings.grasp_csv import named, read_squeeze
+from graspsense.sources.trial_table.features_csv import read_labelled
 from graspsense.store.labels import labels_of
 
 N = 200

@@ -12,9 +12,9 @@ from cases import every_case
 from graspsense.core.values.errors import DataDamaged
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.replayable import Recording
-from graspsense.sources.dataset_recordings import readable_or_not
-from graspsense.sources.import_sources import recordings_to_import
-from graspsense.sources.topic_clocks import Messages, common_clock
+from graspsense.sources.formats.topic_clocks import Messages, common_clock
+from graspsense.sources.importing.import_sources import recordings_to_import
+from graspsense.sources.recordings.dataset_recordings import readable_or_not
 
 S = 1_000_000_000
 BEGAN_NS = 1_700_000_000 * S

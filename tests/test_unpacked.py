@@ -23,8 +23,8 @@ from mcap.writer import Writer as McapWriter
 from graspsense.core.values.errors import ConfigError, DataDamaged, TooLarge
 from graspsense.recording.reader import read_recorded
 from graspsense.recording.unpacked import LIMIT_VARIABLE, Unpacked, limit_mb
-from graspsense.sources.manifest.array_format import read_arrays
-from graspsense.sources.numpy_files import npy_array, npz_arrays
+from graspsense.sources.formats.array_format import read_arrays
+from graspsense.sources.formats.numpy_files import npy_array, npz_arrays
 
 MB = 1_000_000
 BOMB = 700 * MB
@@ -37,10 +37,10 @@ import resource, sys
 from pathlib import Path
 import scipy.io
 from graspsense.recording.reader import read_recorded
-from graspsense.sources.exported_grasp import read_exported
-from graspsense.sources.manifest.array_format import read_arrays
-from graspsense.sources.manifest.parquet_format import read_parquet
-from graspsense.sources.manifest.ros_format import read_bag
+from graspsense.sources.recordings.exported_grasp import read_exported
+from graspsense.sources.formats.array_format import read_arrays
+from graspsense.sources.formats.parquet_format import read_parquet
+from graspsense.sources.formats.ros_format import read_bag
 try:
     import pyarrow.parquet
     import rosbags.highlevel
@@ -283,7 +283,7 @@ def test_a_long_text_that_is_repeated_takes_its_place_once(tmp_path):
     pyarrow = pytest.importorskip("pyarrow")
     import pyarrow.parquet as pq
 
-    from graspsense.sources.manifest.parquet_format import read_parquet
+    from graspsense.sources.formats.parquet_format import read_parquet
 
     path = tmp_path / "texts.parquet"
     rows = 3000
@@ -357,7 +357,7 @@ def ros2_bag(path, **options):
 @pytest.mark.parametrize("compression", ["FILE", "MESSAGE", "STORAGE"])
 def test_ros2_bags(tmp_path, compression, monkeypatch):
     rosbag2 = pytest.importorskip("rosbags.rosbag2")
-    from graspsense.sources.manifest.ros_format import read_bag
+    from graspsense.sources.formats.ros_format import read_bag
 
     plugin = rosbag2.StoragePlugin.MCAP if compression == "STORAGE" else rosbag2.StoragePlugin.SQLITE3
     ros2_bag(tmp_path / "bag", compression=compression, writer={"storage_plugin": plugin})
@@ -383,7 +383,7 @@ ENDLESS = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n)"
 )
 def test_a_ros2_bag_that_computes_is_refused(tmp_path, statement):
     ros2_bag(tmp_path / "bag")
-    from graspsense.sources.manifest.ros_format import read_bag
+    from graspsense.sources.formats.ros_format import read_bag
 
     (path,) = (tmp_path / "bag").glob("*.db3")
     connection = sqlite3.connect(path)
@@ -409,7 +409,7 @@ def test_definitions_of_messages_that_cannot_be_built(definition, more, says, tm
     pytest.importorskip("rosbags")
     from mcap.writer import Writer
 
-    from graspsense.sources.manifest.ros_format import read_bag
+    from graspsense.sources.formats.ros_format import read_bag
 
     path = tmp_path / "a.mcap"
     name, _, fields = more.partition(":")

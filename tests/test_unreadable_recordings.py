@@ -26,8 +26,8 @@ from graspsense.recording.readable import each_readable, readable
 from graspsense.recording.reader import read_recorded
 from graspsense.recording.replayable import Recording
 from graspsense.recording.writer import RecordingWriter
-from graspsense.sources.dataset_recordings import readable_or_not
-from graspsense.sources.replay import read_named
+from graspsense.sources.recordings.dataset_recordings import readable_or_not
+from graspsense.sources.recordings.replay import read_named
 from graspsense.sources.trial_source import load_trials
 from graspsense.store.store import Store
 from graspsense.store.verify import verify_store
@@ -329,7 +329,7 @@ def dataset_of(reader, monkeypatch):
             assert name == "lab"
             return Dataset()
 
-    monkeypatch.setattr("graspsense.sources.dataset_recordings.installed", Plugins)
+    monkeypatch.setattr("graspsense.sources.recordings.dataset_recordings.installed", Plugins)
 
 
 def grasps(number):

@@ -71,8 +71,8 @@ from graspsense.core.learn.stored_values import StoredValues as StoredValues
 from graspsense.core.values.trace import Trace as Trace
 
 # Readers of data sets
-from graspsense.sources.grasp_columns import GraspColumns as GraspColumns
-from graspsense.sources.grasp_columns import checked_recording as checked_recording
+from graspsense.sources.columns.grasp_columns import GraspColumns as GraspColumns
+from graspsense.sources.columns.grasp_columns import checked_recording as checked_recording
 from graspsense.recording.labelled_recording import LabelledRecording as LabelledRecording
 from graspsense.recording.labelled_recording import UnreadableRecording as UnreadableRecording
 from graspsense.recording.readable import each_readable as each_readable

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from graspsense.core.grasp.calibration_files import Calibration
     from graspsense.core.values.channel import TactileArray
     from graspsense.core.values.device import DeviceInfo
-    from graspsense.sources.csv_columns import CsvColumns
+    from graspsense.sources.formats.csv_columns import CsvColumns
 
 
 class _Setup(NamedTuple):
@@ -314,7 +314,7 @@ def _columns(path: str, *names: str) -> CsvColumns:
     from pathlib import Path
 
     from graspsense.core.values.errors import DataDamaged
-    from graspsense.sources.csv_columns import CsvColumns
+    from graspsense.sources.formats.csv_columns import CsvColumns
 
     columns = CsvColumns(Path(path))
     if missing := set(names) - set(columns.names):

@@ -47,7 +47,7 @@ def _evaluated(source: str, tolerance_s: float, folds: int, given: Mapping[str, 
     from graspsense.cli.progress import ProgressLine
     from graspsense.core.values.events import NOT_KNOWN
     from graspsense.evaluation.events import STEPS, EventsEvaluation, evaluate_kind
-    from graspsense.sources.event_recordings import (
+    from graspsense.sources.recordings.event_recordings import (
         EventTeller,
         check_detector,
         event_recordings,

@@ -38,7 +38,7 @@ def export(source: str, target: str, pictures: bool, as_json: bool) -> None:
     from graspsense.core.values.errors import ConfigError
     from graspsense.recording import export_trace
     from graspsense.recording.reader import read_recorded
-    from graspsense.sources.dataset_recordings import datasets_to_write, write_dataset
+    from graspsense.sources.recordings.dataset_recordings import datasets_to_write, write_dataset
     from graspsense.store import export_table
     from graspsense.store.trial_ref import stored_grasp
 

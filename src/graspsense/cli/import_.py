@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
     from graspsense.core.components.config import Settings
     from graspsense.recording.labelled_recording import UnreadableRecording
-    from graspsense.sources.import_sources import ImportedRecording
-    from graspsense.sources.import_summary import ImportSummary
+    from graspsense.sources.importing.import_sources import ImportedRecording
+    from graspsense.sources.importing.import_summary import ImportSummary
 
 LISTED: Final = 20
 """Largest number of unreadable recordings whose errors are printed; `--json` lists all."""
@@ -91,7 +91,7 @@ def import_(
     """
     from graspsense.cli.import_check import show_files, suggest_manifest
     from graspsense.core.values.errors import ConfigError, DataDamaged, GraspsenseError
-    from graspsense.sources.import_sources import is_csv, recordings_to_import
+    from graspsense.sources.importing.import_sources import is_csv, recordings_to_import
     from graspsense.store.labels import labels_of
 
     if suggest is not None:
@@ -219,7 +219,7 @@ class _Chosen:
 
     def fit(self, recordings: Sequence[ImportedRecording]) -> None:
         """Choose the thresholds that are not given. Raises ConfigError for implausible ones in SI units."""
-        from graspsense.sources.noise_thresholds import THRESHOLDS, thresholds_for
+        from graspsense.sources.recordings.noise_thresholds import THRESHOLDS, thresholds_for
 
         self._any_unit = any(recording.labelled.recording.units for recording in recordings)
         if not self._any_unit:
@@ -278,7 +278,7 @@ def _import(
     """Import the recordings and print what became of each; those that cannot be replayed join `unreadable`."""
     from graspsense.core.values.errors import ConfigError
     from graspsense.recording.readable import error_of_all
-    from graspsense.sources.import_outcomes import refuse_useless, tried
+    from graspsense.sources.importing.import_outcomes import refuse_useless, tried
 
     ends = tried(recordings, chosen.settings)
     refuse_useless(recordings, ends.outcomes, chosen.settings(recordings[0]))
@@ -329,8 +329,8 @@ def _store(
     from graspsense.recording.atomic_file import SaveFailed
     from graspsense.recording.labelled_recording import UnreadableRecording
     from graspsense.recording.readable import readable
-    from graspsense.sources.dataset_recordings import handed_over
-    from graspsense.sources.importing import import_recording
+    from graspsense.sources.importing.import_recording import import_recording
+    from graspsense.sources.recordings.dataset_recordings import handed_over
     from graspsense.store.imported_contents import AlreadyImported, ImportedContents
     from graspsense.store.store import Store
 
@@ -393,8 +393,8 @@ def _show(
     from graspsense.core.pipeline.pipeline import grasp_with
     from graspsense.core.values.errors import DataDamaged, PluginUnavailable
     from graspsense.recording.readable import readable
-    from graspsense.sources.dataset_recordings import handed_over
-    from graspsense.sources.import_outcomes import refuse_useless, tried
+    from graspsense.sources.importing.import_outcomes import refuse_useless, tried
+    from graspsense.sources.recordings.dataset_recordings import handed_over
 
     summary, tries = _summary(recordings), tried(recordings, chosen.settings)
     outcomes = tries.outcomes
@@ -428,7 +428,7 @@ def _show(
 
 
 def _summary(recordings: Sequence[ImportedRecording]) -> ImportSummary:
-    from graspsense.sources.import_summary import summary_of
+    from graspsense.sources.importing.import_summary import summary_of
 
     return summary_of([recording.labelled for recording in recordings])
 

@@ -13,7 +13,7 @@ from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, echo
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from graspsense.sources.channel_facts import ChannelFacts
+    from graspsense.sources.columns.channel_facts import ChannelFacts
     from graspsense.sources.manifest.understood import UnderstoodFile
 
 
@@ -25,7 +25,7 @@ def show_files(sources: Sequence[str], picture: str, as_json: bool) -> bool:
     from attrs import asdict
 
     from graspsense.core.values.errors import GraspsenseError
-    from graspsense.sources.import_sources import is_plain_file
+    from graspsense.sources.importing.import_sources import is_plain_file
     from graspsense.sources.manifest.understood import understood_file
 
     if not all(map(is_plain_file, sources)):

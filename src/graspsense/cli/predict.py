@@ -112,7 +112,7 @@ def _trials(
     from graspsense.cli.progress import ProgressLine
 
     if is_csv(source) and not given["label"]:
-        from graspsense.sources.features_csv import read_table
+        from graspsense.sources.trial_table.features_csv import read_table
 
         table, notes = read_table(Path(source), model.names)
         return table, None, notes

@@ -60,7 +60,7 @@ def replay(
 def _settings(recording: str, pipeline: str | None, options: tuple[str, ...], force: bool) -> Settings:
     from graspsense.core.components.config import resolve
     from graspsense.core.components.layers import Flag
-    from graspsense.sources.replay import kind_and_name, known_kinds
+    from graspsense.sources.recordings.replay import kind_and_name, known_kinds
     from graspsense.store.trial_ref import recorded_settings
 
     kind, name = kind_and_name(recording)

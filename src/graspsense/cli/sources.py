@@ -160,7 +160,7 @@ def keep_option(command: CommandT) -> CommandT:
 def keep_features(keep: str | None, labelled: Labelled) -> None:
     """Write the trials as a table of features, if a file is named."""
     if keep:
-        from graspsense.sources.features_csv import write_labelled
+        from graspsense.sources.trial_table.features_csv import write_labelled
 
         write_labelled(Path(keep), labelled)
 

@@ -176,7 +176,7 @@ def _to_predict(
     from graspsense.core.values.errors import ConfigError
 
     if is_csv(source) and not given["target_value"] and not given["label"]:
-        from graspsense.sources.features_csv import read_table
+        from graspsense.sources.trial_table.features_csv import read_table
 
         table, notes = read_table(Path(source), model.table.names)
         return table, None, notes

@@ -89,7 +89,7 @@ def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
     """Return the backend that replays a recording."""
     yield SensorBackendEntry(
         name="replay",
-        target="graspsense.sources.replay:ReplayBackend",
+        target="graspsense.sources.recordings.replay:ReplayBackend",
         summary="a recording instead of a gripper; a channel it lacks is NaN",
     )
 
@@ -120,8 +120,8 @@ def graspsense_datasets() -> Iterable[DatasetEntry]:
     """Return the readers of recorded data."""
     yield DatasetEntry(
         name="icub",
-        target="graspsense.sources.icub_dataset:read_dataset",
-        recordings="graspsense.sources.icub_dataset:read_recordings",
+        target="graspsense.sources.recordings.icub_dataset:read_dataset",
+        recordings="graspsense.sources.recordings.icub_dataset:read_recordings",
         summary="iCub Grasp Dataset (Soh, Su and Demiris 2012), as icub:FOLDER",
     )
     yield DatasetEntry(

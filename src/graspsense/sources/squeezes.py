@@ -105,8 +105,8 @@ def _of_grasp(grasp: RecordedGrasp, name: str, sha256: str) -> RecordedSqueeze:
 
 def _of_import(source: str) -> Iterator[RecordedSqueeze]:
     from graspsense.recording.replayable import content_sha256
-    from graspsense.sources.import_sources import recordings_to_import
-    from graspsense.sources.labelled_recordings import trace_of_recording
+    from graspsense.sources.importing.import_sources import recordings_to_import
+    from graspsense.sources.recordings.labelled_recordings import trace_of_recording
 
     readable, unreadable = recordings_to_import([source], {}, None)
     if unreadable:

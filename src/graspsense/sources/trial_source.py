@@ -229,7 +229,7 @@ def groups_of(source: TrialSource) -> tuple[Group, ...]:
 
 
 def _csv(source: TrialSource) -> Labelled:
-    from graspsense.sources.features_csv import read_labelled
+    from graspsense.sources.trial_table.features_csv import read_labelled
 
     return read_labelled(
         Path(source.source),
@@ -251,7 +251,7 @@ def _data_set(source: TrialSource, features: FeatureSet[Any]) -> Labelled:
         raise ConfigError(f"{source.source!r} names no folder: write it after the colon")
     dataset = installed().resource(DatasetEntry, name)
     if not dataset.entry.target:
-        from graspsense.sources.labelled_recordings import labelled_recordings
+        from graspsense.sources.recordings.labelled_recordings import labelled_recordings
 
         return labelled_recordings(name, folder, features, source.checkpoints_s)
     trials = dataset.load()(

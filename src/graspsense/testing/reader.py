@@ -13,7 +13,7 @@ from graspsense.core.components.registry import Resource
 from graspsense.core.values.errors import GraspsenseError
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.replayable import content_sha256
-from graspsense.sources.dataset_recordings import recordings_of
+from graspsense.sources.recordings.dataset_recordings import recordings_of
 from graspsense.testing.checks import CheckFailed, CheckSkipped, demand
 from graspsense.testing.subject import Package
 

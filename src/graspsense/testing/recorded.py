@@ -28,7 +28,7 @@ from graspsense.recording.reader import read_recorded
 from graspsense.recording.recorder import Recorder
 from graspsense.recording.replayable import Recording
 from graspsense.recording.trial_record import TrialRecord
-from graspsense.sources.replay import read_named
+from graspsense.sources.recordings.replay import read_named
 from graspsense.testing.checks import CheckFailed, demand
 from graspsense.testing.gentle import GentleController, kind_of
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from graspsense.core.values.errors import ConfigError, listed
 from graspsense.core.values.written_numbers import number_in
+from graspsense.sources.formats.table import ColumnTable, Numbers
 from graspsense.sources.manifest.description import ReadManifest
 from graspsense.sources.manifest.expression import Expression, ExpressionError
-from graspsense.sources.manifest.table import ColumnTable, Numbers
-from graspsense.sources.manifest.units import GRAM_FORCE, TO_SI, WITHOUT_UNIT, known_unit
+from graspsense.sources.units import GRAM_FORCE, TO_SI, WITHOUT_UNIT, known_unit
 
 
 class AvailableColumns(dict[str, Any]):

@@ -17,14 +17,12 @@ from graspsense.core.values.errors import ConfigError, listed
 from graspsense.core.values.events import NOT_KNOWN
 from graspsense.core.values.fingers import PREFIX, FingerForce
 from graspsense.core.values.limits import ENTRIES
+from graspsense.sources.formats.array_format import AXES, TIME
+from graspsense.sources.formats.patterns import file_template, regular_expression
 from graspsense.sources.manifest.expression import Expression, ExpressionError, parse
-from graspsense.sources.manifest.patterns import file_template, regular_expression
 
 Text = str | tuple[str, ...]
 """An expression, or several of which the first is used whose columns exist."""
-TIME: Final = "time"
-AXES: Final = ("grasp", TIME, "row", "column")
-"""What an axis of an array of three dimensions can be."""
 QUANTITIES: Final = ("time", "gap", "force", "left", "right", "effort", "velocity")
 _EVENT: Final = re.compile(r"[a-z][a-z0-9 _-]{0,99}")
 _AMOUNT: Final = re.compile(r"(?P<number>\d+(?:\.\d+)?)\s*(?P<unit>samples?|s|ms)")

@@ -11,11 +11,11 @@ import numpy as np
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.events import NOT_KNOWN
 from graspsense.core.values.written_numbers import is_missing, number_in
-from graspsense.sources.grasp_columns import Spans
+from graspsense.sources.columns.grasp_columns import Spans
+from graspsense.sources.formats.table import Numbers
 from graspsense.sources.manifest.available import AvailableColumns
 from graspsense.sources.manifest.expression import Expression
-from graspsense.sources.manifest.table import Numbers
-from graspsense.sources.manifest.units import TO_SI
+from graspsense.sources.units import TO_SI
 
 _SEPARATORS: Final = re.compile(r"[\s;,|]+")
 

@@ -21,7 +21,7 @@ from attrs import frozen
 
 from graspsense.core.values.errors import ConfigError, listed, suggestion
 from graspsense.core.values.limits import CELLS
-from graspsense.sources.manifest.patterns import PatternError, wildcard
+from graspsense.sources.formats.patterns import PatternError, wildcard
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -15,11 +15,11 @@ from graspsense.core.values.errors import ConfigError, DataDamaged, listed
 from graspsense.core.values.label_text import label_text
 from graspsense.core.values.written_numbers import number_in
 from graspsense.recording.readable import readable
+from graspsense.sources.formats.numpy_files import npy_array
+from graspsense.sources.formats.table import ColumnTable
 from graspsense.sources.manifest.available import AvailableColumns
 from graspsense.sources.manifest.description import ReadManifest
 from graspsense.sources.manifest.files import NamedFile
-from graspsense.sources.manifest.table import ColumnTable
-from graspsense.sources.numpy_files import npy_array
 
 _FIELD: Final = re.compile(r"\{(\w+)\}")
 _NOT_IN_LABELS: Final = re.compile(r"[\s#,]+")

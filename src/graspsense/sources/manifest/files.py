@@ -11,9 +11,9 @@ from attrs import frozen
 
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.label_text import is_missing_label
-from graspsense.sources.csv_columns import CsvColumns
+from graspsense.sources.formats.csv_columns import CsvColumns
+from graspsense.sources.formats.patterns import FileTemplate, PatternError, file_template
 from graspsense.sources.manifest.description import ReadManifest, texts_of
-from graspsense.sources.manifest.patterns import FileTemplate, PatternError, file_template
 
 
 @frozen(kw_only=True)

@@ -10,9 +10,9 @@ import numpy as np
 from attrs import field, frozen
 
 from graspsense.core.values.errors import ConfigError, listed
+from graspsense.sources.formats.ros_format import numbers_in
 from graspsense.sources.manifest.expression import OVER_TIME, Expression, parse
-from graspsense.sources.manifest.ros_format import numbers_in
-from graspsense.sources.manifest.units import TO_SI
+from graspsense.sources.units import TO_SI
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -10,12 +10,12 @@ import numpy as np
 
 from graspsense.core.control.contact import CONTACT_FORCE_N, both_touch
 from graspsense.core.values.errors import DataDamaged
-from graspsense.sources.grasp_columns import GraspColumns
+from graspsense.sources.columns.grasp_columns import GraspColumns
+from graspsense.sources.columns.recording_notices import FEWEST, STEADY, ZERO_SAMPLES
 from graspsense.sources.manifest.steps import NOISE, squeezes
-from graspsense.sources.recording_notices import FEWEST, STEADY, ZERO_SAMPLES
 
 if TYPE_CHECKING:
-    from graspsense.sources.grasp_columns import Numbers
+    from graspsense.sources.columns.grasp_columns import Numbers
 
 BEGINS_LOADED: Final = 0.25
 """Share of its range above which the force of the first sample is that of a contact, or of a wrong zero."""

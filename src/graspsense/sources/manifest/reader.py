@@ -18,17 +18,17 @@ from graspsense.core.values.limits import RECORDINGS
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import each_readable, refuse_devices
 from graspsense.recording.replayable import Recording
-from graspsense.sources.grasp_columns import GraspColumns, checked_recording
-from graspsense.sources.manifest.array_format import ARRAY_SUFFIXES, ArrayRules, read_arrays
+from graspsense.sources.columns.grasp_columns import GraspColumns, checked_recording
+from graspsense.sources.formats.array_format import ARRAY_SUFFIXES, ArrayRules, read_arrays
+from graspsense.sources.formats.raw_tables import BAG_SUFFIXES, PARQUET_SUFFIXES, TEXT_SUFFIXES
+from graspsense.sources.formats.table import ColumnTable
+from graspsense.sources.formats.text_table import text_suffix
 from graspsense.sources.manifest.description import ReadManifest, axes_of, read_manifest, texts_of
 from graspsense.sources.manifest.facts import instance_of, label_of, order_of, recorded_at_of, values_of
 from graspsense.sources.manifest.files import NamedFile, files_of
 from graspsense.sources.manifest.notices import notices_of
-from graspsense.sources.manifest.raw_tables import BAG_SUFFIXES, PARQUET_SUFFIXES, TEXT_SUFFIXES
 from graspsense.sources.manifest.samples import samples
 from graspsense.sources.manifest.steps import cut_at, resampled, squeezes
-from graspsense.sources.manifest.table import ColumnTable
-from graspsense.sources.text_table import text_suffix
 
 
 def read_recordings(place: str) -> Iterator[LabelledRecording | UnreadableRecording]:
@@ -158,7 +158,7 @@ def _format(manifest: ReadManifest, path: Path) -> Callable[[Path], list[ColumnT
     if text_suffix(path) in (*TEXT_SUFFIXES, ""):
         if path.is_dir():
             return _bag(manifest)
-        from graspsense.sources.manifest.text_format import read_text
+        from graspsense.sources.formats.text_format import read_text
 
         return lambda file: read_text(file, manifest.keys.start)
     if suffix in ARRAY_SUFFIXES:
@@ -169,7 +169,7 @@ def _format(manifest: ReadManifest, path: Path) -> Callable[[Path], list[ColumnT
         rules = ArrayRules(pattern=manifest.keys.arrays, axes=axes_of(manifest.keys.axes), used=used)
         return lambda file: read_arrays(file, rules)
     if suffix in PARQUET_SUFFIXES:
-        from graspsense.sources.manifest.parquet_format import read_parquet
+        from graspsense.sources.formats.parquet_format import read_parquet
 
         return read_parquet
     if suffix in BAG_SUFFIXES:
@@ -181,7 +181,7 @@ def _format(manifest: ReadManifest, path: Path) -> Callable[[Path], list[ColumnT
 
 
 def _bag(manifest: ReadManifest) -> Callable[[Path], list[ColumnTable]]:
-    from graspsense.sources.manifest.ros_format import read_bag
+    from graspsense.sources.formats.ros_format import read_bag
 
     texts = [part.text for parts in manifest.expressions.values() for part in parts]
     further = (*manifest.channels.values(), *manifest.values.values(), *manifest.events.values())

@@ -14,15 +14,15 @@ import numpy as np
 from graspsense.core.values.errors import ConfigError, DataDamaged, listed
 from graspsense.core.values.fingers import PREFIX, FingerForce
 from graspsense.core.values.signals import CHANNELS, NO_GAP
-from graspsense.sources.column_guess import unit_in_name
-from graspsense.sources.grasp_columns import GraspColumns, finger_sides, without_missing
+from graspsense.sources.columns.column_guess import unit_in_name
+from graspsense.sources.columns.grasp_columns import GraspColumns, finger_sides, without_missing
+from graspsense.sources.formats.table import ColumnTable, Numbers
 from graspsense.sources.manifest.available import AvailableColumns
 from graspsense.sources.manifest.description import ReadManifest, hand_of, samples_of
 from graspsense.sources.manifest.events import labelled_events
 from graspsense.sources.manifest.expression import Expression
 from graspsense.sources.manifest.steps import without_duplicates
-from graspsense.sources.manifest.table import ColumnTable, Numbers
-from graspsense.sources.manifest.units import GRAM_FORCE, TO_SI, WITHOUT_UNIT, known_unit
+from graspsense.sources.units import GRAM_FORCE, TO_SI, WITHOUT_UNIT, known_unit
 
 EARLIEST_STAMP_S: Final = 1e6
 """A first time beyond this is a stamp of a clock, and times are counted from it."""

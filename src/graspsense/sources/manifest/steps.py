@@ -13,7 +13,13 @@ from attrs import evolve
 from graspsense.core.grasp.gap_resolution import gap_resolution
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.limits import SAMPLES
-from graspsense.sources.grasp_columns import PLAUSIBLE, GraspColumns, check_increasing, finger_sides, only
+from graspsense.sources.columns.grasp_columns import (
+    PLAUSIBLE,
+    GraspColumns,
+    check_increasing,
+    finger_sides,
+    only,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

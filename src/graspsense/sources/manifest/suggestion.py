@@ -21,21 +21,21 @@ from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.printable import in_one_line
 from graspsense.core.values.written_numbers import is_number
 from graspsense.recording.readable import readable
-from graspsense.sources.column_guess import Guess, guesses
-from graspsense.sources.manifest.array_format import (
+from graspsense.sources.columns.column_guess import Guess, guesses
+from graspsense.sources.formats.array_format import (
     ARRAY_SUFFIXES,
     COLUMN,
     GRASP,
+    TIME,
     ArrayRules,
     arrays_in,
     read_arrays,
 )
-from graspsense.sources.manifest.description import TIME
+from graspsense.sources.formats.raw_tables import BAG_SUFFIXES, PARQUET_SUFFIXES, TEXT_SUFFIXES, raw_tables
+from graspsense.sources.formats.table import ColumnTable
+from graspsense.sources.formats.text_format import read_text
+from graspsense.sources.formats.text_table import read_lines, text_suffix
 from graspsense.sources.manifest.files import tree_below
-from graspsense.sources.manifest.raw_tables import BAG_SUFFIXES, PARQUET_SUFFIXES, TEXT_SUFFIXES, raw_tables
-from graspsense.sources.manifest.table import ColumnTable
-from graspsense.sources.manifest.text_format import read_text
-from graspsense.sources.text_table import read_lines, text_suffix
 
 READ_SUFFIXES: Final = (*TEXT_SUFFIXES, *ARRAY_SUFFIXES, *BAG_SUFFIXES, *PARQUET_SUFFIXES)
 _DOCUMENTS: Final = frozenset({"readme", "license", "licence", "requirements", "changelog", "citation"})
@@ -207,7 +207,7 @@ def _table_of(path: Path) -> tuple[ColumnTable, list[Guess]]:
                 lines.append(Guess(key="axes", value=", ".join(axes), check=f"what the axes of {shape} are"))
             return read_arrays(path, ArrayRules(pattern=pattern, axes=axes))[0], lines
     if path.is_dir() or path.suffix.lower() in BAG_SUFFIXES:
-        from graspsense.sources.manifest.ros_format import read_bag
+        from graspsense.sources.formats.ros_format import read_bag
 
         return read_bag(path)[0], []
     tables = raw_tables(path)

@@ -10,12 +10,12 @@ import numpy as np
 from attrs import frozen
 
 from graspsense.core.values.errors import DataDamaged
-from graspsense.sources.channel_facts import ChannelFacts, channel_facts
-from graspsense.sources.column_guess import TO_S, force_columns, guesses, time_column
-from graspsense.sources.grasp_columns import GraspColumns
-from graspsense.sources.manifest.raw_tables import raw_tables
+from graspsense.sources.columns.channel_facts import ChannelFacts, channel_facts
+from graspsense.sources.columns.column_guess import TO_S, force_columns, guesses, time_column
+from graspsense.sources.columns.grasp_columns import GraspColumns
+from graspsense.sources.formats.raw_tables import raw_tables
+from graspsense.sources.formats.table import ColumnTable
 from graspsense.sources.manifest.steps import squeezes
-from graspsense.sources.manifest.table import ColumnTable
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

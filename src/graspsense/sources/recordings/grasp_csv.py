@@ -17,14 +17,14 @@ from urllib.parse import parse_qsl, urlencode
 from graspsense.core.values.errors import ConfigError, DataDamaged, suggestion
 from graspsense.recording.readable import not_opened
 from graspsense.recording.replayable import Recording
-from graspsense.sources.exported_grasp_tables import header_of, refuse_table_of_store
-from graspsense.sources.grasp_columns import checked_recording
+from graspsense.sources.columns.grasp_columns import checked_recording
+from graspsense.sources.formats.table import ColumnTable
+from graspsense.sources.formats.text_format import read_text
 from graspsense.sources.manifest.description import QUANTITIES as MAPPED
 from graspsense.sources.manifest.description import Manifest, ReadManifest
 from graspsense.sources.manifest.expression import Expression, ExpressionError, parse
 from graspsense.sources.manifest.samples import samples
-from graspsense.sources.manifest.table import ColumnTable
-from graspsense.sources.manifest.text_format import read_text
+from graspsense.sources.recordings.exported_grasp_tables import header_of, refuse_table_of_store
 
 REQUIRED: Final = ("time", "gap", "force")
 QUANTITIES: Final = (*REQUIRED, "effort", "velocity")

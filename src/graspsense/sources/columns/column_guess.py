@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import frozen
 
-from graspsense.sources.manifest.units import GRAM_FORCE, WITHOUT_UNIT, known_unit
+from graspsense.sources.units import GRAM_FORCE, WITHOUT_UNIT, known_unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.sources.manifest.table import ColumnTable
+    from graspsense.sources.formats.table import ColumnTable
 
     Numbers = NDArray[np.float64]
 

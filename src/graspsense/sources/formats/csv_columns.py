@@ -20,7 +20,7 @@ from graspsense.core.values.label_text import is_missing_label
 from graspsense.core.values.nominal import splits_of, value_name
 from graspsense.core.values.written_numbers import NotNumbers, columns_of_numbers, is_missing, is_number
 from graspsense.core.values.written_times import seconds_since_first
-from graspsense.sources.text_table import numbers_with_unit, read_lines, table_of
+from graspsense.sources.formats.text_table import numbers_with_unit, read_lines, table_of
 
 if TYPE_CHECKING:
     from graspsense.core.values.written_numbers import Numbers

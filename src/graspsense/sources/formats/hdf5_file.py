@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 from graspsense.core.values.errors import DataDamaged, PluginUnavailable, TooLarge
 from graspsense.recording.readable import refuse_devices
 from graspsense.recording.unpacked import limit_mb, limit_words
-from graspsense.sources.numpy_files import npz_arrays
+from graspsense.sources.formats.numpy_files import npz_arrays
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -34,9 +34,9 @@ from graspsense.core.values.signals import Frame, Pads, Reading
 from graspsense.recording.readable import readable
 from graspsense.recording.replayable import Recording
 from graspsense.recording.unpacked import Unpacked
-from graspsense.sources.fast_samples import most_in_a_tick, sample_blocks
-from graspsense.sources.ros_bags import opened_bag, stamp_ns
-from graspsense.sources.topic_clocks import Messages, TopicTimes, common_clock
+from graspsense.sources.columns.fast_samples import most_in_a_tick, sample_blocks
+from graspsense.sources.formats.ros_bags import opened_bag, stamp_ns
+from graspsense.sources.formats.topic_clocks import Messages, TopicTimes, common_clock
 
 SIDES: Final = {"l": "left", "r": "right"}
 TIP_FIELDS: Final = (("l_finger_tip", "r_finger_tip"), ("data0", "data1"))

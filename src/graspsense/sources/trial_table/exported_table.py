@@ -11,7 +11,7 @@ from attrs import evolve
 
 from graspsense.core.values.errors import DataDamaged, counted
 from graspsense.core.values.label_text import is_missing_label
-from graspsense.sources.csv_columns import CsvColumns
+from graspsense.sources.formats.csv_columns import CsvColumns
 from graspsense.store.export_table import ABOUT, ABOUT_BEFORE, BEFORE, FIRST, VALUE
 from graspsense.store.store import NOT_ENDED
 from graspsense.store.time_recorded import order_recorded

@@ -18,9 +18,15 @@ from graspsense.core.values.errors import ConfigError, DataDamaged, PluginUnavai
 from graspsense.recording.mcap_records import records_in, records_of
 from graspsense.recording.readable import readable, refuse_devices
 from graspsense.recording.unpacked import Unpacked
-from graspsense.sources.manifest.table import ColumnTable, Numbers
-from graspsense.sources.ros_bags import Definitions, opened_bag, stamp_ns
-from graspsense.sources.topic_clocks import Messages, Nanoseconds, TopicTimes, common_clock, on_one_clock
+from graspsense.sources.formats.ros_bags import Definitions, opened_bag, stamp_ns
+from graspsense.sources.formats.table import ColumnTable, Numbers
+from graspsense.sources.formats.topic_clocks import (
+    Messages,
+    Nanoseconds,
+    TopicTimes,
+    common_clock,
+    on_one_clock,
+)
 
 MOST_COMPONENTS: Final = 4096
 """An array with more numbers is a picture, and is left out."""

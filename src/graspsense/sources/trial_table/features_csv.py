@@ -25,11 +25,11 @@ from graspsense.core.values.nominal import splits_of
 from graspsense.core.values.written_numbers import is_missing
 from graspsense.recording.atomic_file import write_or_replace
 from graspsense.recording.controls import Controls, controls
-from graspsense.sources.arff_columns import ArffColumns
-from graspsense.sources.csv_columns import CsvColumns
-from graspsense.sources.doubtful_columns import doubts
-from graspsense.sources.exported_table import ExportedTable, exported
-from graspsense.sources.identifiers import identifies, names_a_recording, text_identifies
+from graspsense.sources.formats.arff_columns import ArffColumns
+from graspsense.sources.formats.csv_columns import CsvColumns
+from graspsense.sources.trial_table.doubtful_columns import doubts
+from graspsense.sources.trial_table.exported_table import ExportedTable, exported
+from graspsense.sources.trial_table.identifiers import identifies, names_a_recording, text_identifies
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -24,10 +24,17 @@ from graspsense.core.values.written_numbers import (
     truths,
 )
 from graspsense.core.values.written_times import seconds_since_first
-from graspsense.sources.csv_columns import INDEX
-from graspsense.sources.manifest.patterns import regular_expression
-from graspsense.sources.manifest.table import ColumnTable, Numbers
-from graspsense.sources.text_table import UNITS, Line, TextTable, numbers_with_unit, read_lines, table_of
+from graspsense.sources.formats.csv_columns import INDEX
+from graspsense.sources.formats.patterns import regular_expression
+from graspsense.sources.formats.table import ColumnTable, Numbers
+from graspsense.sources.formats.text_table import (
+    UNITS,
+    Line,
+    TextTable,
+    numbers_with_unit,
+    read_lines,
+    table_of,
+)
 
 
 @define

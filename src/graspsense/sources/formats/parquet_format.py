@@ -17,8 +17,8 @@ from graspsense.core.values.written_times import seconds_since_first
 from graspsense.recording.parquet import PARQUET_HINT
 from graspsense.recording.readable import readable, refuse_devices
 from graspsense.recording.unpacked import Unpacked
-from graspsense.sources.manifest.parquet_footer import parquet_size
-from graspsense.sources.manifest.table import ColumnTable, Numbers
+from graspsense.sources.formats.parquet_footer import parquet_size
+from graspsense.sources.formats.table import ColumnTable, Numbers
 
 _BYTES_OF_A_NUMBER: Final = 8
 _BYTES_OF_A_TEXT: Final = 64

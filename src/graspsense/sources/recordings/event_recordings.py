@@ -15,7 +15,7 @@ from graspsense.recording.labelled_recording import LabelledRecording, Unreadabl
 from graspsense.recording.readable import each_readable, error_of_all, note_on
 from graspsense.recording.reader import read_recorded
 from graspsense.recording.replayable import content_sha256
-from graspsense.sources.dataset_recordings import datasets_with_recordings, readable_or_not
+from graspsense.sources.recordings.dataset_recordings import datasets_with_recordings, readable_or_not
 from graspsense.store.naming import STORE
 from graspsense.store.stored_grasps import StoredGrasp, stored_grasps
 

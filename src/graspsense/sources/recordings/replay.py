@@ -22,14 +22,14 @@ from graspsense.core.values.errors import DeviceLost, GraspsenseError, Recording
 from graspsense.core.values.signals import CHANNELS, EFFORT, Command, Pads, Reading
 from graspsense.recording.readable import readable
 from graspsense.recording.replayable import Recording, check_recording, recorded_channels
-from graspsense.sources.dataset_recordings import (
+from graspsense.sources.columns.recording_notices import signal_notices
+from graspsense.sources.recordings.dataset_recordings import (
     datasets_with_recordings,
     handed_recording,
     is_recording_number,
     numbered_recording,
 )
-from graspsense.sources.icub import read_recording
-from graspsense.sources.recording_notices import signal_notices
+from graspsense.sources.recordings.icub import read_recording
 from graspsense.store.naming import as_source
 
 
@@ -48,7 +48,7 @@ def _stored(name: str) -> Recording:
 def _csv(name: str) -> Recording:
     """Read a CSV file: with columns that the name lists, or an exported grasp, which declares its own."""
     from graspsense.recording.export_trace import declared_beside
-    from graspsense.sources.grasp_csv import read_squeeze
+    from graspsense.sources.recordings.grasp_csv import read_squeeze
 
     file, _, columns = name.partition("?")
     if not columns and declared_beside(Path(file).expanduser()).exists():
@@ -57,13 +57,13 @@ def _csv(name: str) -> Recording:
 
 
 def _bag(name: str) -> Recording:
-    from graspsense.sources.rosbag import read_bag
+    from graspsense.sources.recordings.rosbag import read_bag
 
     return read_bag(name)
 
 
 def _exported(name: str) -> Recording:
-    from graspsense.sources.exported_grasp import read_exported
+    from graspsense.sources.recordings.exported_grasp import read_exported
 
     return read_exported(name)
 

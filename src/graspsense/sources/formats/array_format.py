@@ -17,12 +17,11 @@ from attrs import evolve, frozen
 
 from graspsense.core.values.errors import ConfigError, DataDamaged, listed
 from graspsense.core.values.limits import RECORDINGS
-from graspsense.sources.manifest.description import AXES, TIME
-from graspsense.sources.manifest.hdf5_file import hdf5_arrays
-from graspsense.sources.manifest.mat_file import mat_variables
-from graspsense.sources.manifest.patterns import file_template
-from graspsense.sources.manifest.table import ColumnTable, Numbers
-from graspsense.sources.numpy_files import npy_array, npz_arrays
+from graspsense.sources.formats.hdf5_file import hdf5_arrays
+from graspsense.sources.formats.mat_file import mat_variables
+from graspsense.sources.formats.numpy_files import npy_array, npz_arrays
+from graspsense.sources.formats.patterns import file_template
+from graspsense.sources.formats.table import ColumnTable, Numbers
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -38,6 +37,9 @@ ARRAY_SUFFIXES: Final = (".npy", *READERS)
 COLUMN: Final = "column"
 """The field of `arrays` that names the column which an array is."""
 GRASP: Final = "grasp"
+TIME: Final = "time"
+AXES: Final = (GRASP, TIME, "row", COLUMN)
+"""What an axis of an array of three dimensions can be."""
 _ALONE: Final = ""
 """Name of an array without one."""
 _UNITS: Final = ".units"

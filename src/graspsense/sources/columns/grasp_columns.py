@@ -16,7 +16,7 @@ from graspsense.core.values.events import GraspEvent
 from graspsense.core.values.fingers import FingerForce, opposed_forces
 from graspsense.core.values.signals import NO_PADS, Frame, Image, Phase, Reading, Samples
 from graspsense.recording.replayable import Recording
-from graspsense.sources.fast_samples import latest_values, most_in_a_tick, sample_blocks
+from graspsense.sources.columns.fast_samples import latest_values, most_in_a_tick, sample_blocks
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -27,8 +27,8 @@ from graspsense.recording.labelled_recording import LabelledRecording, Unreadabl
 from graspsense.recording.readable import each_readable, error_of_all, note_on
 from graspsense.recording.replayable import Recording, recorded_channels
 from graspsense.recording.same_grasp import curve_bytes, grasp_numbers
-from graspsense.sources.dataset_recordings import readable_or_not
-from graspsense.sources.noise_thresholds import THRESHOLDS, thresholds_for
+from graspsense.sources.recordings.dataset_recordings import readable_or_not
+from graspsense.sources.recordings.noise_thresholds import THRESHOLDS, thresholds_for
 from graspsense.store.first_line import NAMES, UNITS, numbers_of
 
 

@@ -20,8 +20,8 @@ from graspsense.core.values.limits import CELLS, CHANNEL_NUMBERS
 from graspsense.core.values.written_numbers import NotNumbers, columns_of_numbers
 from graspsense.recording.export_trace import beside, declared_beside, images_beside
 from graspsense.recording.layout import PADS_TOPIC, SCALARS_TOPIC, SIGNAL_TOPIC, TICK_FIELDS
-from graspsense.sources.numpy_files import npz_arrays
-from graspsense.sources.text_table import check_columns, check_lines, text_of
+from graspsense.sources.formats.numpy_files import npz_arrays
+from graspsense.sources.formats.text_table import check_columns, check_lines, text_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -127,7 +127,7 @@ def _numbered(table: Columns, prefix: str, number: int) -> NDArray[np.float64]:
 def _names(path: Path) -> Sequence[str]:
     """Return the names of the columns of a file."""
     if path.suffix.lower() == ".parquet":
-        from graspsense.sources.manifest.parquet_format import read_parquet
+        from graspsense.sources.formats.parquet_format import read_parquet
 
         table = read_parquet(path)[0]
         return (*table.numbers, *table.texts)
@@ -146,7 +146,7 @@ def header_of(path: Path) -> Sequence[str]:
 def _columns(path: Path) -> Columns:
     """Return the columns of one file. Raises ConfigError, DataDamaged, PluginUnavailable."""
     if path.suffix.lower() == ".parquet":
-        from graspsense.sources.manifest.parquet_format import read_parquet
+        from graspsense.sources.formats.parquet_format import read_parquet
 
         return dict(read_parquet(path)[0].numbers)
     text = text_of(path)

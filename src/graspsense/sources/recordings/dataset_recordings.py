@@ -20,7 +20,7 @@ from graspsense.core.values.errors import (
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import is_mistake, readable
 from graspsense.recording.replayable import Recording, check_recording
-from graspsense.sources.recording_notices import with_notices
+from graspsense.sources.columns.recording_notices import with_notices
 from graspsense.store.stored_grasps import stored_grasps
 
 _NUMBERED: Final = re.compile(r"(?P<place>.+)#(?P<number>[1-9]\d{0,8})", re.DOTALL)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from graspsense.core.values.errors import ConfigError
 from graspsense.recording.readable import readable, refuse_devices
 from graspsense.recording.unpacked import Unpacked
-from graspsense.sources.manifest.hdf5_file import hdf5_arrays
+from graspsense.sources.formats.hdf5_file import hdf5_arrays
 
 _HEADER_BYTES: Final = 128
 _MATRIX: Final = 14

@@ -14,13 +14,13 @@ from graspsense.core.components.registry import installed
 from graspsense.core.pipeline.pipeline import grasp_with
 from graspsense.core.values.errors import ConfigError, GraspsenseError, counted
 from graspsense.core.values.signals import Outcome
-from graspsense.sources.dataset_recordings import handed_over
+from graspsense.sources.recordings.dataset_recordings import handed_over
 
 if TYPE_CHECKING:
     from graspsense.core.components.config import Settings
     from graspsense.core.values.features import Features
     from graspsense.recording.replayable import Recording
-    from graspsense.sources.import_sources import ImportedRecording
+    from graspsense.sources.importing.import_sources import ImportedRecording
 
 MOST: Final = 24
 """Number of recordings that are tried."""

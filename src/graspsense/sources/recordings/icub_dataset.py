@@ -27,7 +27,7 @@ from graspsense.recording.controls import controls
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import each_readable, error_of_all, note_on
 from graspsense.recording.replayable import recorded_channels
-from graspsense.sources.icub import (
+from graspsense.sources.recordings.icub import (
     DATA_FOLDER,
     FINGER_FLEXION,
     FINGERS,
@@ -40,7 +40,7 @@ from graspsense.sources.icub import (
     read_recording,
     recording_of,
 )
-from graspsense.sources.labelled_recordings import trace_of_recording
+from graspsense.sources.recordings.labelled_recordings import trace_of_recording
 
 UNRELIABLE: Final = "full_coke"
 """The class whose data the author of the data set calls unreliable in its README."""

@@ -14,8 +14,8 @@ from typing import Final
 from graspsense.core.learn.target_value import name_and_unit
 from graspsense.core.values.errors import DataDamaged, counted, listed
 from graspsense.core.values.limits import CELLS
-from graspsense.sources.csv_columns import CsvColumns
-from graspsense.sources.text_table import check_columns, check_lines, text_of
+from graspsense.sources.formats.csv_columns import CsvColumns
+from graspsense.sources.formats.text_table import check_columns, check_lines, text_of
 
 _TOKEN: Final = re.compile(
     r"""[\s,]*(?:'((?:\\.|[^'\\])*)'|"((?:\\.|[^"\\])*)"|([{}])|([^\s,{}'"][^\s,{}]*))"""

@@ -20,7 +20,7 @@ from graspsense.recording.layout import DEVICE, RESULT, START, TICK, pads_number
 from graspsense.recording.replayable import content_sha256
 from graspsense.recording.trial_record import TrialRecord
 from graspsense.recording.writer import RecordingWriter
-from graspsense.sources.labelled_recordings import trace_of_recording
+from graspsense.sources.recordings.labelled_recordings import trace_of_recording
 from graspsense.store.imported_contents import CONTENT, ImportedContents
 
 if TYPE_CHECKING:

@@ -26,13 +26,13 @@ from graspsense.core.values.mounting import mounting_from_json
 from graspsense.core.values.signals import Frame, Image, Pads, Reading, no_pads
 from graspsense.recording.readable import readable
 from graspsense.recording.replayable import REPLAY_NOTE, Recording
-from graspsense.sources.exported_grasp_tables import (
+from graspsense.sources.columns.fast_samples import latest_values, sample_blocks
+from graspsense.sources.formats.numpy_files import npz_arrays
+from graspsense.sources.recordings.exported_grasp_tables import (
     TABLE_SUFFIXES,
     read_exported_tables,
     refuse_table_of_store,
 )
-from graspsense.sources.fast_samples import latest_values, sample_blocks
-from graspsense.sources.numpy_files import npz_arrays
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

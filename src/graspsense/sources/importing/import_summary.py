@@ -13,7 +13,7 @@ from graspsense.core.values.channel import FLOATS
 from graspsense.core.values.signals import Frame, Image, Samples
 from graspsense.core.values.trace import SI_UNITS
 from graspsense.recording.labelled_recording import LabelledRecording
-from graspsense.sources.channel_facts import ChannelFacts, channel_facts, together
+from graspsense.sources.columns.channel_facts import ChannelFacts, channel_facts, together
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -1,7 +1,7 @@
 """Columns that are used as features and may reveal the labels, or that hold more than one kind of number.
 
-No value shows it for certain, so that a note asks the reader. `graspsense.sources.identifiers` finds the columns that
-are no features at all.
+No value shows it for certain, so that a note asks the reader. `identifiers` finds the columns that are no features at
+all.
 """
 
 from __future__ import annotations
@@ -16,13 +16,20 @@ import numpy as np
 from graspsense.core.components.caller import option
 from graspsense.core.values.errors import listed
 from graspsense.core.values.features import LARGEST_VALUE
-from graspsense.sources.identifiers import LEAST_LINES, TIMES, is_count, is_time, name_objects, words_in
+from graspsense.sources.trial_table.identifiers import (
+    LEAST_LINES,
+    TIMES,
+    is_count,
+    is_time,
+    name_objects,
+    words_in,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from graspsense.core.values.features import FeatureTable
-    from graspsense.sources.csv_columns import CsvColumns
+    from graspsense.sources.formats.csv_columns import CsvColumns
 
     Numbers = NDArray[np.float64]
 

@@ -13,16 +13,16 @@ from graspsense.core.values.errors import ConfigError
 from graspsense.recording.export_trace import declared_beside
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import each_readable, error_of_all
-from graspsense.sources.dataset_recordings import (
+from graspsense.sources.columns.recording_notices import with_notices
+from graspsense.sources.formats.text_table import JSON_LINES, text_suffix
+from graspsense.sources.recordings.dataset_recordings import (
     datasets_with_recordings,
     is_recording_number,
     numbered_recording,
     readable_or_not,
 )
-from graspsense.sources.grasp_csv import named
-from graspsense.sources.recording_notices import with_notices
-from graspsense.sources.replay import KINDS, how_to_get, kind_and_name, read_named
-from graspsense.sources.text_table import JSON_LINES, text_suffix
+from graspsense.sources.recordings.grasp_csv import named
+from graspsense.sources.recordings.replay import KINDS, how_to_get, kind_and_name, read_named
 from graspsense.store.labels import labels_of
 
 CSV_SUFFIXES = (".csv", ".tsv", ".txt", *JSON_LINES)

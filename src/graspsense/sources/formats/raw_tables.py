@@ -7,8 +7,8 @@ from typing import Final
 
 from graspsense.core.values.errors import ConfigError
 from graspsense.recording.readable import refuse_devices
-from graspsense.sources.manifest.table import ColumnTable
-from graspsense.sources.text_table import JSON_LINES, text_suffix
+from graspsense.sources.formats.table import ColumnTable
+from graspsense.sources.formats.text_table import JSON_LINES, text_suffix
 
 TEXT_SUFFIXES: Final = (".csv", ".tsv", ".txt", ".dat", ".data", *JSON_LINES)
 BAG_SUFFIXES: Final = (".bag", ".mcap", ".db3")
@@ -20,15 +20,15 @@ def raw_tables(path: Path) -> list[ColumnTable]:
     refuse_devices(path)
     suffix = path.suffix.lower()
     if path.is_dir() or suffix in BAG_SUFFIXES:
-        from graspsense.sources.manifest.ros_format import read_topics
+        from graspsense.sources.formats.ros_format import read_topics
 
         return read_topics(path)
     if suffix in PARQUET_SUFFIXES:
-        from graspsense.sources.manifest.parquet_format import read_parquet
+        from graspsense.sources.formats.parquet_format import read_parquet
 
         return read_parquet(path)
-    from graspsense.sources.manifest.array_format import ARRAY_SUFFIXES, read_arrays
-    from graspsense.sources.manifest.text_format import read_text
+    from graspsense.sources.formats.array_format import ARRAY_SUFFIXES, read_arrays
+    from graspsense.sources.formats.text_format import read_text
 
     if suffix in ARRAY_SUFFIXES:
         return read_arrays(path)

@@ -1,0 +1,1 @@
+"""What `graspsense import` does: which recordings are named, what was understood of them, and how they are stored."""
