@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from graspsense import load_pipeline
-from graspsense.core.grasp.device_clock import DeviceClock, clock_report
+from graspsense.core.drivers.device_clock import DeviceClock, clock_report
 from graspsense.core.values.channel_times import apart_s
 from graspsense.core.values.errors import UnknownName
 

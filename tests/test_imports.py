@@ -59,7 +59,17 @@ MAY_KNOW = {
 """Subpackage to the subpackages it may import from; every subpackage may import the package itself, for its version."""
 
 ROOMS = {
-    "core": ("values", "files", "control", "components", "grasp", "compiling", "learn", "pipeline"),
+    "core": (
+        "values",
+        "files",
+        "control",
+        "components",
+        "grasp",
+        "drivers",
+        "compiling",
+        "learn",
+        "pipeline",
+    ),
     "sources": (
         *("units", "formats", "columns", "trial_table", "manifest", "recordings", "importing"),
         *("input_content", "simulated", "identified", "trial_source", "squeezes"),

@@ -41,7 +41,7 @@ MANY_PARAMETERS = {
     "graspsense/cli/run.py:run": OPTIONS,
     "graspsense/cli/train.py:train": OPTIONS,
     "graspsense/core/components/setting.py:setting": "public; every part of a declaration is optional, by keyword only",
-    "graspsense/core/grasp/transmission.py:screw_linkage": "the ten published constants of a linkage, by keyword only",
+    "graspsense/core/drivers/transmission.py:screw_linkage": "the ten constants of a linkage, by keyword only",
     "graspsense/evaluation/crossval.py:cross_validate": "public; three optional ones are by keyword only",
     "graspsense/evaluation/evaluate.py:evaluate": "public; all settings of an evaluation, by keyword only",
     "graspsense/store/record_grasp.py:record_grasp": "what, where, and who watches; all but three by keyword only",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from graspsense.core.grasp.transmission import gap_and_rate, revolutions_at, straight_linkage
+from graspsense.core.drivers.transmission import gap_and_rate, revolutions_at, straight_linkage
 
 
 @pytest.mark.parametrize("gap_m", [0.0, 0.03, 0.09])

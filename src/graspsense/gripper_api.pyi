@@ -3,10 +3,10 @@
 # Finding devices and their faults
 from graspsense.core.components.entries import FoundDevice as FoundDevice
 from graspsense.core.components.entries import Finding as Finding
-from graspsense.core.components.serial_converters import converter_findings as converter_findings
-from graspsense.core.components.serial_converters import found_converters as found_converters
-from graspsense.core.components.serial_converters import port_failed as port_failed
-from graspsense.core.components.serial_converters import why_not_opened as why_not_opened
+from graspsense.core.drivers.serial_converters import converter_findings as converter_findings
+from graspsense.core.drivers.serial_converters import found_converters as found_converters
+from graspsense.core.drivers.serial_converters import port_failed as port_failed
+from graspsense.core.drivers.serial_converters import why_not_opened as why_not_opened
 from graspsense.core.components.caller import set_option as set_option
 from graspsense.core.values.faults import StatusBit as StatusBit
 from graspsense.core.values.errors import TareRefused as TareRefused
@@ -14,24 +14,24 @@ from graspsense.core.values.errors import GraspsenseError as GraspsenseError
 
 # Emulated devices
 from graspsense.core.components.emulated import EmulatedDevice as EmulatedDevice
-from graspsense.core.components.emulated_port import EmulatedPort as EmulatedPort
-from graspsense.core.components.emulated_serial import EmulatedSerial as EmulatedSerial
-from graspsense.core.components.emulated_serial import EmulatorFaults as EmulatorFaults
-from graspsense.core.components.emulated_serial import SerialFaults as SerialFaults
-from graspsense.core.grasp.emulated_body import BackendWithEmulator as BackendWithEmulator
-from graspsense.core.grasp.emulated_body import EmulatorSettings as EmulatorSettings
-from graspsense.core.grasp.emulated_body import opened_body as opened_body
-from graspsense.core.grasp.emulated_body import own_keys_first as own_keys_first
-from graspsense.core.grasp.emulated_fingers import EmulatedFingers as EmulatedFingers
-from graspsense.core.grasp.emulated_fingers import FingerTarget as FingerTarget
+from graspsense.core.drivers.emulated_port import EmulatedPort as EmulatedPort
+from graspsense.core.drivers.emulated_serial import EmulatedSerial as EmulatedSerial
+from graspsense.core.drivers.emulated_serial import EmulatorFaults as EmulatorFaults
+from graspsense.core.drivers.emulated_serial import SerialFaults as SerialFaults
+from graspsense.core.drivers.emulated_body import BackendWithEmulator as BackendWithEmulator
+from graspsense.core.drivers.emulated_body import EmulatorSettings as EmulatorSettings
+from graspsense.core.drivers.emulated_body import opened_body as opened_body
+from graspsense.core.drivers.emulated_body import own_keys_first as own_keys_first
+from graspsense.core.drivers.emulated_fingers import EmulatedFingers as EmulatedFingers
+from graspsense.core.drivers.emulated_fingers import FingerTarget as FingerTarget
 from graspsense.core.components.entries import EmulatorEntry as EmulatorEntry
 
 # Polling, reading threads and clocks of devices
-from graspsense.core.grasp.polling import Polling as Polling
-from graspsense.core.grasp.reading_thread import ReadingThread as ReadingThread
-from graspsense.core.grasp.device_clock import DeviceClock as DeviceClock
-from graspsense.core.grasp.device_clock import clock_report as clock_report
-from graspsense.core.grasp.dead_man_switch import DeadManSwitch as DeadManSwitch
+from graspsense.core.drivers.polling import Polling as Polling
+from graspsense.core.drivers.reading_thread import ReadingThread as ReadingThread
+from graspsense.core.drivers.device_clock import DeviceClock as DeviceClock
+from graspsense.core.drivers.device_clock import clock_report as clock_report
+from graspsense.core.drivers.dead_man_switch import DeadManSwitch as DeadManSwitch
 
 # Fingers, and where the gripper is mounted
 from graspsense.core.values.fingers import FingerForce as FingerForce
@@ -65,10 +65,10 @@ from graspsense.core.grasp.calibration_files import stored_tables as stored_tabl
 from graspsense.core.grasp.calibration_files import stored_zero as stored_zero
 
 # Transmission: from motor revolutions to the gap
-from graspsense.core.grasp.transmission import ScrewLinkage as ScrewLinkage
-from graspsense.core.grasp.transmission import gap_and_rate as gap_and_rate
-from graspsense.core.grasp.transmission import revolutions_at as revolutions_at
-from graspsense.core.grasp.transmission import screw_linkage as screw_linkage
+from graspsense.core.drivers.transmission import ScrewLinkage as ScrewLinkage
+from graspsense.core.drivers.transmission import gap_and_rate as gap_and_rate
+from graspsense.core.drivers.transmission import revolutions_at as revolutions_at
+from graspsense.core.drivers.transmission import screw_linkage as screw_linkage
 
 # Contact, and rest where the gap is coarse
 from graspsense.core.control.contact import both_touch_samples as both_touch_samples

@@ -40,7 +40,7 @@ from graspsense.core.components.identification import RecordedSqueeze as Recorde
 from graspsense.core.components.identification import SqueezeFit as SqueezeFit
 from graspsense.core.components.identification import Undetermined as Undetermined
 from graspsense.core.components.identification import repeatability as repeatability
-from graspsense.core.grasp.transmission import straight_linkage as straight_linkage
+from graspsense.core.drivers.transmission import straight_linkage as straight_linkage
 
 # Laws and features that are compiled
 from graspsense.core.components.step_params import params_of as params_of

@@ -18,7 +18,7 @@ from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from graspsense import WiringError, load_pipeline
-from graspsense.core.components import emulated_serial
+from graspsense.core.drivers import emulated_serial
 from graspsense.gripper_api import SerialFaults
 from graspsense.plugin_api import POSITION, VELOCITY, Command, DeviceLost, NoDevice, create
 from graspsense.testing_api import parametrize_checks

@@ -13,7 +13,7 @@ import pytest
 from cases import every_case
 
 from graspsense import WiringError, load_pipeline
-from graspsense.core.components import emulated_serial
+from graspsense.core.drivers import emulated_serial
 from graspsense.plugin_api import (
     POSITION,
     VELOCITY,

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from math import inf
 from typing import Any, Final, NamedTuple
 
-from graspsense.core.grasp.emulated_body import opened_body
+from graspsense.core.drivers.emulated_body import opened_body
 from graspsense.core.values.signals import EFFORT, Command
 
 GAIN_N_S_M: Final = 15000.0

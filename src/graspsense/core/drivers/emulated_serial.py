@@ -12,8 +12,8 @@ from typing import Final, Literal, NamedTuple
 from attrs import frozen
 
 from graspsense.core.components.emulated import EmulatedDevice
-from graspsense.core.components.emulated_port import EmulatedPort
 from graspsense.core.components.setting import setting
+from graspsense.core.drivers.emulated_port import EmulatedPort
 
 KEEP_UP_S: Final = 0.02
 """How often the fingers move on without a request, so that the next one need not wait until they have."""

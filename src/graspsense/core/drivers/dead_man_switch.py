@@ -1,6 +1,6 @@
 """A process that stops a gripper whose program was killed, since a killed program cannot.
 
-python -m graspsense.core.grasp.dead_man_switch MODULE:FUNCTION ARGUMENTS
+python -m graspsense.core.drivers.dead_man_switch MODULE:FUNCTION ARGUMENTS
 """
 
 from __future__ import annotations
