@@ -31,13 +31,13 @@ import numpy as np
 from arguments import parser_of
 from attrs import evolve
 
-from graspsense.core.components.config import resolve
 from graspsense.core.components.registry import installed
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.grasp.sinks import Sink
 from graspsense.core.pipeline.anytime import Anytime, anytime_of
 from graspsense.core.pipeline.pipeline_model import model_for
+from graspsense.core.settings.resolved import resolve
 from graspsense.experiments.versions import where_measured
 from graspsense.live.feeds import FILE_TIMEOUT_S, LiveFeed
 from graspsense.plugin_api import SQUEEZE, DeviceInfo, create

@@ -18,8 +18,8 @@ from arguments import parser_of
 from scipy.special import stdtrit
 
 from graspsense.core.components.registry import installed
-from graspsense.core.components.selected import SelectedComponent
 from graspsense.core.learn.labelled import Labelled
+from graspsense.core.settings.selected import SelectedComponent
 from graspsense.core.values.features import FeatureTable
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.evaluation.intervals import Interval, clustered, wilson

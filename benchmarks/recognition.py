@@ -37,8 +37,8 @@ from graspsense.cli.compare import compare, compared_trials
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import learner_of
 from graspsense.cli.train import train
-from graspsense.core.components.config import resolve
 from graspsense.core.learn.labelled import Labelled
+from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.trace import Trace
 from graspsense.evaluation.choosing import FOLDS
 from graspsense.evaluation.intervals import percent, percentages

@@ -17,7 +17,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from graspsense.core.components.config import resolve
+from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.errors import GraspsenseError
 from graspsense.experiments.experiment_file import read_experiment
 from graspsense.recording.export_trace import declared_beside

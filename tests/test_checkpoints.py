@@ -9,10 +9,8 @@ import pytest
 from attrs import evolve
 from cases import every_case
 
-from graspsense.core.components.config import resolve
 from graspsense.core.components.registry import installed
 from graspsense.core.components.run_config import RunConfig
-from graspsense.core.components.selected import SelectedComponent, build
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.learn.checkpoints import (
     CheckpointFeatures,
@@ -26,6 +24,8 @@ from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.model_file import load_model, write_model
 from graspsense.core.learn.training import train
 from graspsense.core.pipeline.anytime import Anytime, anytime_of
+from graspsense.core.settings.resolved import resolve
+from graspsense.core.settings.selected import SelectedComponent, build
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.features import CheckpointPrediction, Features, Prediction, table_of
 from graspsense.core.values.signals import Outcome, Phase

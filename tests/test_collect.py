@@ -12,8 +12,8 @@ from commands import graspsense
 from grippers import Scripted, bottle, squeezing
 from kept import BENCH, keep
 
-from graspsense.core.components.config import resolve
 from graspsense.core.components.registry import installed
+from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.errors import ConfigError
 from graspsense.store.collecting import Collection, Wanted
 from graspsense.store.comparable import check_settings, newest_grasp

@@ -15,13 +15,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from graspsense.core.components.caller import command_line
-from graspsense.core.components.config import resolve
-from graspsense.core.components.layers import Flag, Layer, read_layer
 from graspsense.core.components.registry import IsolatedPlugins
-from graspsense.core.components.selected import build, create, recipe_of
-from graspsense.core.components.settings_file import to_toml
 from graspsense.core.files.toml_text import key_lines
 from graspsense.core.files.toml_values import toml_key, toml_value
+from graspsense.core.settings.layers import Flag, Layer, read_layer
+from graspsense.core.settings.resolved import resolve
+from graspsense.core.settings.selected import build, create, recipe_of
+from graspsense.core.settings.settings_file import to_toml
 from graspsense.core.values.errors import ConfigError, UnknownName
 
 PARTS = """

@@ -12,8 +12,8 @@ import pytest
 from attrs import evolve
 
 from graspsense.core.components.registry import installed
-from graspsense.core.components.selected import SelectedComponent
 from graspsense.core.learn.labelled import ControlFeatures, Labelled
+from graspsense.core.settings.selected import SelectedComponent
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import FeatureTable
 from graspsense.evaluation.confusion import confusion

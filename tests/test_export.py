@@ -14,7 +14,7 @@ from cases import every_case
 from commands import graspsense, printed
 from kept import ended, frame, keep, pads, write_recording
 
-from graspsense.core.components.selected import select_component
+from graspsense.core.settings.selected import select_component
 from graspsense.core.values.errors import ConfigError, PluginUnavailable
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.evaluation.json_codec import to_json

@@ -13,10 +13,10 @@ from cases import every_case
 from commands import graspsense
 
 from graspsense.core.components.channels import from_json
-from graspsense.core.components.layers import Layer, Merged, option_layers, read_layer
 from graspsense.core.files.toml_text import MOST_NESTED, TomlError, toml_values
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.target_value import name_and_unit
+from graspsense.core.settings.layers import Layer, Merged, option_layers, read_layer
 from graspsense.core.values import limits
 from graspsense.core.values.errors import ConfigError, DataDamaged, suggestion
 from graspsense.core.values.features import FeatureTable

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from graspsense.core.components.registry import installed
-from graspsense.core.components.selected import SelectedComponent
+from graspsense.core.settings.selected import SelectedComponent
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.plugin_api import create

@@ -60,15 +60,8 @@ MAY_KNOW = {
 
 ROOMS = {
     "core": (
-        "values",
-        "files",
-        "control",
-        "components",
-        "grasp",
-        "drivers",
-        "compiling",
-        "learn",
-        "pipeline",
+        *("values", "files", "control", "components", "settings"),
+        *("grasp", "drivers", "compiling", "learn", "pipeline"),
     ),
     "sources": (
         *("units", "formats", "columns", "trial_table", "manifest", "recordings", "importing"),
@@ -374,7 +367,7 @@ def test_examples_need_nothing_of_the_simulators_module():
 
 
 def test_settings_are_read_without_the_simulator():
-    loaded = loaded_after("from graspsense.core.components.config import resolve; resolve('default')")
+    loaded = loaded_after("from graspsense.core.settings.resolved import resolve; resolve('default')")
 
     assert not {name for name in loaded if name.startswith("graspsense_sim_gripper.")} - {
         "graspsense_sim_gripper.plugin",

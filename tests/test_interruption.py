@@ -13,11 +13,11 @@ from commands import graspsense, printed
 from grippers import Scripted, bottle, squeezing
 
 from graspsense import GraspInterrupted, load_pipeline
-from graspsense.core.components.config import resolve
 from graspsense.core.components.registry import installed
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_uninterrupted
 from graspsense.core.pipeline.pipeline import grasp_with
+from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.signals import Outcome
 from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
 from graspsense.store.changes import relabel

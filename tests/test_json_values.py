@@ -10,12 +10,12 @@ import pytest
 from attrs import evolve, field, frozen
 from kept import BENCH, keep
 
-from graspsense.core.components.config import resolve
-from graspsense.core.components.layers import Flag
 from graspsense.core.components.registry import installed
-from graspsense.core.components.settings_file import to_toml
 from graspsense.core.learn.model_file import load_model, write_model
 from graspsense.core.learn.training import train
+from graspsense.core.settings.layers import Flag
+from graspsense.core.settings.resolved import resolve
+from graspsense.core.settings.settings_file import to_toml
 from graspsense.core.values.json_values import json_ready, json_text, settings_from_json
 from graspsense.store.dataset import labelled_store
 from graspsense.store.store import Store

@@ -13,16 +13,16 @@ from commands import graspsense
 from test_classifiers import NAMES, UNITS, trials
 from test_conformal import bottles
 
-from graspsense.core.components.config import resolve
-from graspsense.core.components.layers import Flag
 from graspsense.core.components.registry import IsolatedPlugins, installed
-from graspsense.core.components.selected import SelectedComponent
 from graspsense.core.components.setting import worded
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.model_content import digest
 from graspsense.core.learn.model_file import as_json, load_model, write_model
 from graspsense.core.learn.training import train
 from graspsense.core.pipeline.pipeline_model import model_for
+from graspsense.core.settings.layers import Flag
+from graspsense.core.settings.resolved import resolve
+from graspsense.core.settings.selected import SelectedComponent
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError, DataDamaged, UnknownName
 from graspsense.core.values.features import UNKNOWN, Features

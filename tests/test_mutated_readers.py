@@ -22,9 +22,9 @@ import pytest
 import recorded_files as write
 from attrs import frozen
 
-from graspsense.core.components.config import resolve
-from graspsense.core.components.layers import Flag
 from graspsense.core.components.registry import installed
+from graspsense.core.settings.layers import Flag
+from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.errors import GraspsenseError
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.sources.importing.import_recording import import_recording

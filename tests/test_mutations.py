@@ -15,11 +15,11 @@ import pytest
 from kept import SETTINGS, ended, keep, write_recording
 from mutated_files import bytes_of
 
-from graspsense.core.components.config import resolve
 from graspsense.core.components.registry import installed
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.model_file import as_json, load_model
 from graspsense.core.learn.training import train
+from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.errors import GraspsenseError
 from graspsense.plugin_api import create
 from graspsense.recording.reader import read_recorded

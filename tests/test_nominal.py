@@ -11,7 +11,7 @@ from commands import graspsense
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.core.components.selected import select_component
+from graspsense.core.settings.selected import select_component
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.features import FeatureTable
 from graspsense.core.values.nominal import codes_of, value_name, with_codes

@@ -9,12 +9,12 @@ from cases import every_case
 from commands import graspsense
 from grippers import Scripted, bottle, squeezing
 
-from graspsense.core.components.config import resolve
 from graspsense.core.components.registry import installed
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.components.strict import ValidationFailed, structured
 from graspsense.core.grasp.runner import ended_by_itself, run_grasp
 from graspsense.core.pipeline.pipeline import GraspInterrupted, grasp_with
+from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.errors import DeviceLost
 from graspsense.core.values.signals import EFFORT, Command, Outcome
 from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController

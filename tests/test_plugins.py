@@ -12,7 +12,7 @@ from graspsense.core.components.entries import PipelineEntry
 from graspsense.core.components.firstparty import provider
 from graspsense.core.components.registry import IsolatedPlugins, canonical, installed
 from graspsense.core.components.roles import SensorBackend
-from graspsense.core.components.selected import select_component
+from graspsense.core.settings.selected import select_component
 from graspsense.core.values.errors import PluginUnavailable, UnknownName
 
 HEAD = """

@@ -11,11 +11,11 @@ from cases import every_case
 from commands import printed
 from PIL import Image
 
-from graspsense.core.components.config import resolve
 from graspsense.core.components.registry import installed
-from graspsense.core.components.selected import select_component
 from graspsense.core.learn.checkpoints import split_checkpoints
 from graspsense.core.pipeline.pipeline_model import model_for
+from graspsense.core.settings.resolved import resolve
+from graspsense.core.settings.selected import select_component
 from graspsense.evaluation.checkpoints import SURE, early_recognition
 from graspsense.sources.trial_source import load_trials
 

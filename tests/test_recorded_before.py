@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from graspsense.core.components.config import settings_from
 from graspsense.core.components.registry import installed
 from graspsense.core.pipeline.pipeline import grasp_with
+from graspsense.core.settings.resolved import settings_from
 from graspsense.recording.export_trace import write_npz
 from graspsense.recording.reader import read_recorded
 from graspsense.store.verify import verify_store

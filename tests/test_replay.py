@@ -19,10 +19,10 @@ from hypothesis import strategies as st
 from kept import keep
 
 from graspsense.cli.main import main
-from graspsense.core.components.config import resolve
-from graspsense.core.components.layers import Flag
 from graspsense.core.components.registry import IsolatedPlugins, installed
 from graspsense.core.pipeline.pipeline import grasp_with
+from graspsense.core.settings.layers import Flag
+from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError, DataDamaged, DeviceLost, RecordingEnded
 from graspsense.core.values.signals import EFFORT, NO_PADS, VELOCITY, Command, Frame, Phase

@@ -15,8 +15,8 @@ from grippers import Scripted, bottle, squeezing
 
 from graspsense import load_pipeline
 from graspsense.cli.run import effort_words, print_trial
-from graspsense.core.components.config import resolve
 from graspsense.core.grasp.dry_run import dry_run
+from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.channel import Channel
 from graspsense.core.values.signals import VELOCITY, Command
 from graspsense.store.store import Store

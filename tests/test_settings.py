@@ -10,15 +10,15 @@ from cases import every_case
 from commands import graspsense
 
 from graspsense import load_pipeline
-from graspsense.core.components.config import resolve, settings_from, without_followers
-from graspsense.core.components.layers import Layer
 from graspsense.core.components.registry import installed
 from graspsense.core.components.run_config import RunConfig
-from graspsense.core.components.selected import ImplausibleSettings
 from graspsense.core.components.setting import unit_of_name
-from graspsense.core.components.settings_file import to_toml
 from graspsense.core.components.strict import keys_of
 from graspsense.core.grasp.runner import tick_params
+from graspsense.core.settings.layers import Layer
+from graspsense.core.settings.resolved import resolve, settings_from, without_followers
+from graspsense.core.settings.selected import ImplausibleSettings
+from graspsense.core.settings.settings_file import to_toml
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.signals import EFFORT, Command

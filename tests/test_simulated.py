@@ -9,8 +9,8 @@ from attrs import evolve, frozen
 from parts import CHANNELS_OF_HAND, Hand, HandConfig, channels
 
 from graspsense import load_pipeline
-from graspsense.core.components.config import resolve
 from graspsense.core.components.registry import IsolatedPlugins
+from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.errors import ConfigError
 from graspsense.plugin_api import (
     ObjectKind,

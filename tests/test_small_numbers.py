@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from graspsense.core.components.selected import select_component
 from graspsense.core.learn.labelled import Labelled
+from graspsense.core.settings.selected import select_component
 from graspsense.core.values.features import FeatureTable
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.sources.trial_table.features_csv import read_labelled

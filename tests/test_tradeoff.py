@@ -146,7 +146,7 @@ def test_who_asks_for_more_than_a_feature_can_give_is_told(capsys):
 
 @pytest.mark.slow
 def test_recognition_and_distances_of_variants_against_the_reference(tmp_path):
-    from graspsense.core.components.config import resolve
+    from graspsense.core.settings.resolved import resolve
     from graspsense.experiments.sensed import sensed_trade
     from graspsense.experiments.sensed_report import conclusion, sensed_png, sensed_rows
 

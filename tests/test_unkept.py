@@ -9,8 +9,8 @@ from attrs import frozen
 from commands import graspsense
 from parts import ACCELERATION, CHANNELS_OF_HAND, Hand, HandConfig, channels
 
-from graspsense.core.components.config import resolve
 from graspsense.core.components.registry import IsolatedPlugins
+from graspsense.core.settings.resolved import resolve
 from graspsense.plugin_api import Reading, SensorBackend, SensorBackendEntry, hookimpl, setting
 from graspsense.recording.reader import read_recorded
 from graspsense.store.record_grasp import record_grasp

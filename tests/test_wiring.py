@@ -9,10 +9,10 @@ from cases import every_case
 from parts import CHANNELS_OF_HAND, Hand, HandConfig, Law, LawConfig, channels
 
 from graspsense import load_pipeline
-from graspsense.core.components.config import resolve
-from graspsense.core.components.layers import Flag
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.pipeline.wiring import check
+from graspsense.core.settings.layers import Flag
+from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.errors import WiringError
 from graspsense.plugin_api import (
     Channel,

@@ -17,7 +17,7 @@ from graspsense.core.values.features import Prediction as Prediction
 
 # Trials and evaluation
 from graspsense.sources.trial_source import load_trials as load_trials
-from graspsense.core.components.selected import select_component as select_component
+from graspsense.core.settings.selected import select_component as select_component
 from graspsense.core.learn.labelled import Labelled as Labelled
 from graspsense.evaluation.evaluate import evaluate as evaluate
 from graspsense.evaluation.results import Evaluation as Evaluation

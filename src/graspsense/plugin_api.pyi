@@ -12,7 +12,7 @@ from graspsense.core.components.entries import PipelineEntry as PipelineEntry
 from graspsense.core.components.entries import CommandEntry as CommandEntry
 from graspsense.core.components.setting import setting as setting
 from graspsense.core.components.setting import NAMES_INPUT as NAMES_INPUT
-from graspsense.core.components.selected import create as create
+from graspsense.core.settings.selected import create as create
 
 # What a gripper measures
 from graspsense.core.values.channel import Channel as Channel

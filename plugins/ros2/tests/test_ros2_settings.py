@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from cases import every_case
 
-from graspsense.core.components.selected import create
 from graspsense.core.pipeline.pipeline import load_pipeline
+from graspsense.core.settings.selected import create
 from graspsense.core.values.errors import ConfigError, NoDevice
 from graspsense.gripper_api import MessageNumber, message_columns
 from graspsense_ros2.message_types import message

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
     from graspsense.cli.progress import ProgressLine
     from graspsense.core.components.registry import Component
-    from graspsense.core.components.selected import SelectedComponent
     from graspsense.core.learn.labelled import Labelled
+    from graspsense.core.settings.selected import SelectedComponent
     from graspsense.evaluation.choosing import ChosenPipeline
 
 CLASSIFIERS: Final = ("c45", "knn", "svm", "forest", "extra-trees", "mlp")
@@ -52,8 +52,8 @@ class Chosen:
 
 def pipeline_beside(model: str) -> str:
     """Return the file of the pipeline beside a model. Raises ConfigError if it is a TOML file of another kind."""
-    from graspsense.core.components.layers import read_toml
-    from graspsense.core.components.toml_kinds import refuse_other_kind
+    from graspsense.core.settings.layers import read_toml
+    from graspsense.core.settings.toml_kinds import refuse_other_kind
 
     path = Path(model).with_suffix(".toml")
     if path.is_file():
@@ -207,8 +207,8 @@ def _with_union(
 
 def _config(united: Labelled, component: Component, **keys: Any) -> Any:
     """Return the config that a feature set has in the union; `keys` replace some of it."""
-    from graspsense.core.components.selected import build
     from graspsense.core.components.strict import keys_of
+    from graspsense.core.settings.selected import build
 
     known = keys_of(component.config_class())
     given = {**united.provenance.get("settings", {}).get("features", {}), **keys}

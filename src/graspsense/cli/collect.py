@@ -23,7 +23,7 @@ from graspsense.cli.terminal import Style, echo_as_it_is, echo_entry, talk
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from graspsense.core.components.config import Settings
+    from graspsense.core.settings.resolved import Settings
     from graspsense.core.values.trial import Trial
     from graspsense.store.collecting import Collection
     from graspsense.store.store import Store

@@ -12,7 +12,7 @@ from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_as_it_is
 
 if TYPE_CHECKING:
-    from graspsense.core.components.config import Settings
+    from graspsense.core.settings.resolved import Settings
 
 
 @click.group()
@@ -41,7 +41,7 @@ def show(name: str | None, as_json: bool, **asked: Any) -> None:
             }
         )
         return
-    from graspsense.core.components.settings_file import to_toml
+    from graspsense.core.settings.settings_file import to_toml
 
     echo_as_it_is(to_toml(settings, origins=True), end="")
 

@@ -13,9 +13,9 @@ from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, stat
 from graspsense.core.values.exit_code import ExitCode
 
 if TYPE_CHECKING:
-    from graspsense.core.components.config import Settings
     from graspsense.core.components.entries import Finding
     from graspsense.core.components.registry import HookAnswer, Plugins
+    from graspsense.core.settings.resolved import Settings
 
 MARKS: Final = {"ok": "ok", "note": "note", "problem": "PROBLEM"}
 _MARK: Final = 11

@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from graspsense.cli.progress import ProgressLine
-    from graspsense.core.components.selected import SelectedComponent
     from graspsense.core.learn.checkpoints import CheckpointTrials
     from graspsense.core.learn.labelled import Labelled
+    from graspsense.core.settings.selected import SelectedComponent
     from graspsense.evaluation.checkpoints import EarlyRecognition
     from graspsense.evaluation.results import Evaluation, Measurement
 

@@ -80,10 +80,10 @@ def identify(
     `graspsense run --object FILE.toml` grasps the object in simulation.
     """
     from graspsense.cli.progress import ProgressLine
-    from graspsense.core.components.config import resolve
     from graspsense.core.components.entries import IdentifierEntry
-    from graspsense.core.components.layers import Flag
     from graspsense.core.components.registry import installed
+    from graspsense.core.settings.layers import Flag
+    from graspsense.core.settings.resolved import resolve
     from graspsense.core.values.errors import ConfigError
     from graspsense.recording.atomic_file import write_or_replace
     from graspsense.sources.squeezes import recorded_squeezes

@@ -19,7 +19,7 @@ from graspsense.core.values.errors import counted
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from graspsense.core.components.config import Settings
+    from graspsense.core.settings.resolved import Settings
     from graspsense.recording.labelled_recording import UnreadableRecording
     from graspsense.sources.importing.import_sources import ImportedRecording
     from graspsense.sources.importing.import_summary import ImportSummary
@@ -140,7 +140,7 @@ class _Chosen:
     """The settings of an import: those of the pipeline, and thresholds from the recordings where none is given."""
 
     def __init__(self, pipeline: str, options: Sequence[str]) -> None:
-        from graspsense.core.components.selected import ImplausibleSettings
+        from graspsense.core.settings.selected import ImplausibleSettings
 
         self._pipeline, self._options = pipeline, tuple(options)
         self._added: tuple[str, ...] = ()
@@ -245,8 +245,8 @@ class _Chosen:
         return self._resolved(recording.name)
 
     def _resolved(self, name: str) -> Settings:
-        from graspsense.core.components.config import resolve
-        from graspsense.core.components.layers import Flag
+        from graspsense.core.settings.layers import Flag
+        from graspsense.core.settings.resolved import resolve
 
         flags = (
             Flag("--gripper", "gripper.type", "replay"),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import click
 
 if TYPE_CHECKING:
-    from graspsense.core.components.config import Settings
+    from graspsense.core.settings.resolved import Settings
 
 CommandT = TypeVar("CommandT", bound=Callable[..., Any])
 
@@ -92,8 +92,8 @@ def settings_of(
     force: bool = False,
 ) -> Settings:
     """Return the settings that these options ask for. Raises ConfigError with every error at once."""
-    from graspsense.core.components.config import resolve
-    from graspsense.core.components.layers import Flag
+    from graspsense.core.settings.layers import Flag
+    from graspsense.core.settings.resolved import resolve
 
     flags = (
         Flag("--gripper", "gripper.type", gripper),

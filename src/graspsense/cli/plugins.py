@@ -262,7 +262,7 @@ def _named_folder(option: str) -> tuple[str, str]:
 
 def _settings(options: Sequence[str]) -> dict[str, Any]:
     """Return the keys that options like `-o port=/dev/ttyUSB0` set. Raises ConfigError."""
-    from graspsense.core.components.layers import Merged, option_layers
+    from graspsense.core.settings.layers import Merged, option_layers
     from graspsense.core.values.errors import ConfigError
 
     layers, complaints = option_layers(options)
@@ -445,7 +445,7 @@ def _declared(component: Component) -> Any:
 def _key_lines(keys: dict[str, dict[str, Any]], indent: str) -> list[str]:
     from textwrap import wrap
 
-    from graspsense.core.components.settings_file import key_facts
+    from graspsense.core.settings.settings_file import key_facts
 
     lines = []
     for key, declaration in keys.items():

@@ -11,7 +11,7 @@ from graspsense.cli.options import force_option, keys_option
 from graspsense.cli.output import echo_json
 
 if TYPE_CHECKING:
-    from graspsense.core.components.config import Settings
+    from graspsense.core.settings.resolved import Settings
 
 
 @click.command()
@@ -58,8 +58,8 @@ def replay(
 
 
 def _settings(recording: str, pipeline: str | None, options: tuple[str, ...], force: bool) -> Settings:
-    from graspsense.core.components.config import resolve
-    from graspsense.core.components.layers import Flag
+    from graspsense.core.settings.layers import Flag
+    from graspsense.core.settings.resolved import resolve
     from graspsense.sources.recordings.replay import kind_and_name, known_kinds
     from graspsense.store.trial_ref import recorded_settings
 

@@ -29,8 +29,8 @@ from graspsense.core.values.exit_code import ExitCode
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from graspsense.core.components.config import Settings
     from graspsense.core.grasp.sinks import Sink
+    from graspsense.core.settings.resolved import Settings
     from graspsense.core.values.device import DeviceInfo
     from graspsense.core.values.features import Prediction
     from graspsense.core.values.trial import Trial

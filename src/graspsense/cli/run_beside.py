@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from graspsense.core.components.config import Settings
     from graspsense.core.grasp.pair import Member
+    from graspsense.core.settings.resolved import Settings
     from graspsense.core.values.trial import Trial
 
 Ended = tuple["Trial", bool, dict[str, Any] | None]

@@ -14,9 +14,9 @@ from graspsense.cli.output import file_to_write
 
 if TYPE_CHECKING:
     from graspsense.cli.progress import ProgressLine
-    from graspsense.core.components.config import Settings
-    from graspsense.core.components.selected import SelectedComponent
     from graspsense.core.learn.labelled import Labelled
+    from graspsense.core.settings.resolved import Settings
+    from graspsense.core.settings.selected import SelectedComponent
 
 CommandT = TypeVar("CommandT", bound=Callable[..., Any])
 
@@ -297,8 +297,8 @@ def _refuse_misplaced(kind: str) -> None:
 
 
 def _settings(source: str, given: Mapping[str, Any], classifier: str | None) -> Settings:
-    from graspsense.core.components.config import resolve
-    from graspsense.core.components.layers import Flag
+    from graspsense.core.settings.layers import Flag
+    from graspsense.core.settings.resolved import resolve
     from graspsense.sources.identified import gripper_flags
 
     flags = gripper_flags(source)
@@ -314,12 +314,12 @@ def _settings(source: str, given: Mapping[str, Any], classifier: str | None) -> 
 
 def _alone(table: str, name: str, given: Mapping[str, Any], source: str) -> SelectedComponent:
     """Return a component outside of any pipeline, with the keys that options give it."""
-    from graspsense.core.components.config import default_paths
     from graspsense.core.components.entries import TABLE_OF_ROLE
-    from graspsense.core.components.layers import Merged, option_layers, typed_path
     from graspsense.core.components.nearest_key import nearest_path
     from graspsense.core.components.registry import installed
-    from graspsense.core.components.selected import SelectedComponent, build_plausible
+    from graspsense.core.settings.layers import Merged, option_layers, typed_path
+    from graspsense.core.settings.resolved import default_paths
+    from graspsense.core.settings.selected import SelectedComponent, build_plausible
     from graspsense.core.values.errors import ConfigError
     from graspsense.store.extract_again import CHANGEABLE
     from graspsense.store.naming import STORE

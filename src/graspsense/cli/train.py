@@ -29,10 +29,10 @@ from graspsense.core.values.errors import counted
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from graspsense.core.components.selected import SelectedComponent
     from graspsense.core.learn.checkpoints import CheckpointTrials
     from graspsense.core.learn.labelled import Labelled
     from graspsense.core.learn.model import Model
+    from graspsense.core.settings.selected import SelectedComponent
 
 
 _NOT_EVALUATED: Final = ("out", "keep", "overwrite", "as_json", "calibration_instances", "choose")

@@ -197,7 +197,7 @@ def _change(refs: Sequence[str], change: Callable[[Store, Sequence[int]], None],
 
 def _refuse_contradiction(trial: StoredTrial, label: str) -> None:
     """Refuse a label that contradicts the object that was simulated. Raises ConfigError."""
-    from graspsense.core.components.config import settings_from
+    from graspsense.core.settings.resolved import settings_from
     from graspsense.core.values.errors import ConfigError, GraspsenseError
     from graspsense.store.labels import agrees
 

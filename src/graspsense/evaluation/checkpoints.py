@@ -18,9 +18,9 @@ from graspsense.evaluation.intervals import RecognitionRate, rate_among
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.core.components.selected import SelectedComponent
     from graspsense.core.learn.checkpoints import CheckpointTrials
     from graspsense.core.learn.labelled import Labelled
+    from graspsense.core.settings.selected import SelectedComponent
     from graspsense.evaluation.folds import Folds
 
 WHOLE: Final = "whole grasp"

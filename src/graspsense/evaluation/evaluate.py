@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from graspsense.core.components.selected import select_component
 from graspsense.core.learn.labelled import TARGETS, Labelled, Target, class_of
+from graspsense.core.settings.selected import select_component
 from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.confusion import confusion
 from graspsense.evaluation.controls import PERMUTATIONS, ControlMeasurements

@@ -8,13 +8,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from graspsense.core.components.config import Settings, resolve
-from graspsense.core.components.layers import Layer, Merged, dotted
 from graspsense.core.components.registry import installed
-from graspsense.core.components.selected import build_plausible
 from graspsense.core.components.setting import worded
 from graspsense.core.components.strict import InvalidValue, ValidationFailed, plain, structured
 from graspsense.core.learn.copies import without_copies
+from graspsense.core.settings.layers import Layer, Merged, dotted
+from graspsense.core.settings.resolved import Settings, resolve
+from graspsense.core.settings.selected import build_plausible
 from graspsense.core.values.errors import ConfigError, GraspsenseError, counted, suggestion
 from graspsense.core.values.limits import CASES
 from graspsense.experiments.experiment import (

@@ -17,8 +17,8 @@ import numpy as np
 from attrs import asdict, frozen
 from numpy.typing import NDArray
 
-from graspsense.core.components.config import Settings
 from graspsense.core.components.roles import BatchBackend
+from graspsense.core.settings.resolved import Settings
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import Features
 from graspsense.experiments.sensors import sensors_of

@@ -7,9 +7,9 @@ from typing import Any, Final
 
 from attrs import evolve, field, frozen
 
-from graspsense.core.components.config import Settings
 from graspsense.core.components.entries import TABLE_OF_ROLE
 from graspsense.core.components.strict import plain
+from graspsense.core.settings.resolved import Settings
 from graspsense.experiments.task import Task
 from graspsense.sources.input_content import contents_of, input_names
 from graspsense.sources.simulated import LARGEST_SEED

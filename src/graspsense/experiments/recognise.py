@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 from attrs import field, frozen
 from attrs.validators import ge, le
 
-from graspsense.core.components.config import settings_from
 from graspsense.core.components.registry import installed
-from graspsense.core.components.selected import SelectedComponent, build
 from graspsense.core.components.strict import structured
 from graspsense.core.learn.copies import apart_from, without_copies
 from graspsense.core.learn.labelled import class_of
+from graspsense.core.settings.resolved import settings_from
+from graspsense.core.settings.selected import SelectedComponent, build
 from graspsense.core.values.errors import ConfigError, counted, listed
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.evaluation.folds import trials_by_class
@@ -29,8 +29,8 @@ from graspsense.report.grasp_curve import GraspCurve, grasp_curve
 from graspsense.sources.trial_source import TrialSource, labelled_trials
 
 if TYPE_CHECKING:
-    from graspsense.core.components.config import Settings
     from graspsense.core.learn.labelled import Labelled, Target
+    from graspsense.core.settings.resolved import Settings
     from graspsense.core.values.features import FeatureTable
     from graspsense.core.values.trace import Trace
     from graspsense.core.values.tree import TreeNode

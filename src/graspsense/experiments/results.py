@@ -22,10 +22,10 @@ from typing import Any, Final
 from attrs import evolve, frozen
 
 from graspsense.core.components.caller import option
-from graspsense.core.components.config import without_followers
-from graspsense.core.components.settings_file import to_toml
 from graspsense.core.components.strict import plain
 from graspsense.core.files.toml_values import toml_key, toml_value
+from graspsense.core.settings.resolved import without_followers
+from graspsense.core.settings.settings_file import to_toml
 from graspsense.core.values.errors import ConfigError, named
 from graspsense.experiments.experiment import PipelineOf, Planned
 from graspsense.experiments.experiment_file import read_experiment

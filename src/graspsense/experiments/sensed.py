@@ -23,9 +23,9 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from graspsense.core.components.caller import set_option
-from graspsense.core.components.config import Settings
 from graspsense.core.components.roles import BatchBackend, SimulationVariant
-from graspsense.core.components.selected import SelectedComponent
+from graspsense.core.settings.resolved import Settings
+from graspsense.core.settings.selected import SelectedComponent
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import FeatureTable, table_of
 from graspsense.evaluation.distribution import DistributionDistance, distribution_distance

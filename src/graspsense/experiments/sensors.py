@@ -8,7 +8,7 @@ from typing import Any
 from attrs import evolve
 
 from graspsense.core.components.roles import BatchBackend
-from graspsense.core.components.selected import SelectedComponent
+from graspsense.core.settings.selected import SelectedComponent
 
 
 def with_ideal_sensors(gripper: SelectedComponent) -> SelectedComponent:

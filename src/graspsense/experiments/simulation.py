@@ -22,7 +22,7 @@ from graspsense.report.simulation import PEAK, TRACE, SimulationTrade, VariantPo
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.core.components.config import Settings
+    from graspsense.core.settings.resolved import Settings
     from graspsense.core.values.features import Features
     from graspsense.core.values.trace import Trace
 

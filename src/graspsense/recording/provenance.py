@@ -15,7 +15,7 @@ from graspsense.core.values.json_values import json_text
 from graspsense.recording.checkout import checkout_state
 
 if TYPE_CHECKING:
-    from graspsense.core.components.config import Settings
+    from graspsense.core.settings.resolved import Settings
 
 _WITH: Final = ("numpy", "scikit-learn", "mcap")
 

@@ -31,7 +31,7 @@ from graspsense.recording.layout import DEVICE, RESULT, START, VERSION
 from graspsense.recording.provenance import provenance
 
 if TYPE_CHECKING:
-    from graspsense.core.components.config import Settings
+    from graspsense.core.settings.resolved import Settings
     from graspsense.core.values.device import DeviceInfo
     from graspsense.core.values.features import Features
     from graspsense.core.values.trial import Trial

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from graspsense import __version__
-from graspsense.core.components.selected import SelectedComponent
+from graspsense.core.settings.selected import SelectedComponent
 from graspsense.report.evaluation_sections import (
     confusion_section,
     controls_section,

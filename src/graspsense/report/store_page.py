@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Final
 
 from attrs import frozen
 
-from graspsense.core.components.selected import select_component
 from graspsense.core.learn.copies import without_copies
+from graspsense.core.settings.selected import select_component
 from graspsense.core.values.errors import ConfigError, DataDamaged, counted
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.recording.labelled_recording import UnreadableRecording

@@ -12,7 +12,7 @@ from typing import Any, Final
 from attrs import frozen
 
 from graspsense.core.components.caller import option
-from graspsense.core.components.layers import Flag, read_toml
+from graspsense.core.settings.layers import Flag, read_toml
 from graspsense.core.values.errors import ConfigError
 
 IDENTIFIED: Final = "identified:"

@@ -36,8 +36,8 @@ from graspsense.recording.before_contact import (
 from graspsense.recording.controls import controls
 
 if TYPE_CHECKING:
-    from graspsense.core.components.config import Settings
     from graspsense.core.components.roles import ObjectKind
+    from graspsense.core.settings.resolved import Settings
     from graspsense.core.values.trace import Trace
 
 OBJECTS_PER_SEED: Final = 1000

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import evolve, field, fields_dict, frozen
 
-from graspsense.core.components.layers import read_toml
 from graspsense.core.components.strict import ValidationFailed, structured
-from graspsense.core.components.toml_kinds import KINDS, toml_kind
 from graspsense.core.learn.checkpoints import with_checkpoints
 from graspsense.core.learn.labelled import Labelled
+from graspsense.core.settings.layers import read_toml
+from graspsense.core.settings.toml_kinds import KINDS, toml_kind
 from graspsense.core.values.errors import ConfigError, PluginUnavailable
 from graspsense.core.values.label_text import alike_words, spelled_alike
 from graspsense.sources.identified import IDENTIFIED, gripper_flags, identified_scenes
@@ -21,8 +21,8 @@ from graspsense.sources.simulated import Group, simulated
 from graspsense.store.naming import STORE, as_source
 
 if TYPE_CHECKING:
-    from graspsense.core.components.config import Settings
     from graspsense.core.components.roles import FeatureSet
+    from graspsense.core.settings.resolved import Settings
     from graspsense.core.values.trace import Trace
 
 SIMULATED: Final = "simulated"
@@ -104,8 +104,8 @@ def load_trials(
     features; `keys` are the further fields of `TrialSource`, such as `label` or `objects`. Raises ConfigError,
     DataDamaged.
     """
-    from graspsense.core.components.config import resolve
     from graspsense.core.learn.copies import without_copies
+    from graspsense.core.settings.resolved import resolve
 
     try:
         described = structured({**keys, "source": source}, TrialSource, source)

@@ -25,9 +25,9 @@ from graspsense.store.rows import StoredTrial
 from graspsense.store.store import Store
 
 if TYPE_CHECKING:
-    from graspsense.core.components.config import Settings
     from graspsense.core.components.registry import Plugins
     from graspsense.core.grasp.sinks import Sink
+    from graspsense.core.settings.resolved import Settings
     from graspsense.core.values.device import DeviceInfo
     from graspsense.core.values.trial import Trial
 

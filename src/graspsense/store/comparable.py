@@ -16,7 +16,7 @@ from graspsense.recording.provenance import recipe
 from graspsense.recording.trial_record import DeviceRecord, without_none
 
 if TYPE_CHECKING:
-    from graspsense.core.components.config import Settings
+    from graspsense.core.settings.resolved import Settings
     from graspsense.core.values.device import DeviceInfo
     from graspsense.store.rows import StoredTrial
     from graspsense.store.store import Store

@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from attrs import evolve, fields_dict, frozen
 
-from graspsense.core.components.layers import Flag
 from graspsense.core.components.strict import plain
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.target_value import TargetValue, values_of_labels
+from graspsense.core.settings.layers import Flag
 from graspsense.core.values.errors import ConfigError, DataDamaged, counted
 from graspsense.core.values.features import FeatureTable
 from graspsense.recording.controls import Controls, controls, without_constant_gap

@@ -10,7 +10,7 @@ from graspsense.core.values.features import UNKNOWN
 from graspsense.core.values.label_text import label_text
 
 if TYPE_CHECKING:
-    from graspsense.core.components.config import Settings
+    from graspsense.core.settings.resolved import Settings
     from graspsense.core.values.device import DeviceInfo
 
 _WORD: Final = re.compile(r"(?P<kind>[^\s:#,]+)(?P<state>:[^\s:#,]+)?(?P<number>#[^\s:#,]+)?")

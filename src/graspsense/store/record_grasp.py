@@ -17,10 +17,10 @@ from graspsense.recording.trial_record import Origin, TrialRecord
 from graspsense.store.store import Store
 
 if TYPE_CHECKING:
-    from graspsense.core.components.config import Settings
     from graspsense.core.components.registry import Plugins
     from graspsense.core.grasp.pair import Member
     from graspsense.core.grasp.sinks import Sink
+    from graspsense.core.settings.resolved import Settings
     from graspsense.core.values.device import DeviceInfo
     from graspsense.core.values.trial import Trial
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 from attrs import asdict, evolve, frozen
 
 from graspsense.core.components.registry import installed
-from graspsense.core.components.selected import build
+from graspsense.core.settings.selected import build
 from graspsense.core.values.errors import FAILURES, ConfigError, DataDamaged, GraspsenseError
 from graspsense.core.values.features import Features
 from graspsense.recording.atomic_file import SaveFailed

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from graspsense.core.components.config import NONE, without_followers
-from graspsense.core.components.layers import Layer
+from graspsense.core.settings.layers import Layer
+from graspsense.core.settings.resolved import NONE, without_followers
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.recording.reader import read_recorded
 from graspsense.recording.recorded_grasp import RecordedGrasp

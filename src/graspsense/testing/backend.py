@@ -12,10 +12,10 @@ from typing import Any, Final
 from graspsense.core.components.entries import KINDS
 from graspsense.core.components.roles import SensorBackend
 from graspsense.core.components.run_config import RunConfig
-from graspsense.core.components.selected import create
 from graspsense.core.components.strict import keys_of
 from graspsense.core.grasp.protection.effort_ceiling import MARGIN
 from graspsense.core.grasp.runner import Grasp, run_uninterrupted
+from graspsense.core.settings.selected import create
 from graspsense.core.values.errors import DeviceLost, NoDevice, RecordingEnded, TareRefused, named
 from graspsense.core.values.signals import (
     FORCE,

@@ -11,10 +11,10 @@ from typing import Any, Final
 import attrs
 
 from graspsense.core.components.roles import ClassifierConfig
-from graspsense.core.components.selected import build
 from graspsense.core.components.setting import unit_of_name
 from graspsense.core.components.strict import keys_of, plain
 from graspsense.core.files.toml_values import toml_key, toml_value
+from graspsense.core.settings.selected import build
 from graspsense.core.values.errors import ConfigError, PluginUnavailable
 from graspsense.testing.checks import CheckFailed, checks_of, demand
 from graspsense.testing.subject import Subject

@@ -19,10 +19,10 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import unquote, urlparse
 
-from graspsense.core.components.config import resolve
 from graspsense.core.components.entries import ConformanceCheckEntry, PipelineEntry
 from graspsense.core.components.registry import SLOW_IMPORT_S, Resource
 from graspsense.core.pipeline.wiring import check as check_wiring
+from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.errors import GraspsenseError
 from graspsense.testing import reader
 from graspsense.testing.checks import Check, CheckFailed, CheckSkipped, checks_of, demand, raises_nothing

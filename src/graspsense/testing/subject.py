@@ -9,7 +9,7 @@ from typing import Any
 from attrs import define, field
 
 from graspsense.core.components.registry import Component, Plugins, PluginStatus, Resource, canonical
-from graspsense.core.components.selected import build
+from graspsense.core.settings.selected import build
 from graspsense.testing.session import Session, readings_of
 
 

@@ -8,8 +8,8 @@ from typing import Any, ClassVar, Final, TypeVar
 from attrs import evolve, fields, frozen
 
 from graspsense.core.components.roles import ObjectKind, SensorBackend
-from graspsense.core.components.selected import create
 from graspsense.core.components.setting import NAMES_INPUT, setting
+from graspsense.core.settings.selected import create
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError
 

@@ -31,8 +31,8 @@ from graspsense.core.values.reasons import Reason
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.core.components.config import Settings
     from graspsense.core.components.roles import Classifier
+    from graspsense.core.settings.resolved import Settings
     from graspsense.core.values.device import DeviceInfo
 
 

@@ -22,9 +22,9 @@ from graspsense.core.values.signals import HOLD, SQUEEZE
 from graspsense.core.values.trace import trace_of
 
 if TYPE_CHECKING:
-    from graspsense.core.components.config import Settings
     from graspsense.core.components.roles import FeatureSet
     from graspsense.core.learn.model import Model
+    from graspsense.core.settings.resolved import Settings
     from graspsense.core.values.device import DeviceInfo
     from graspsense.core.values.features import Features, Prediction
     from graspsense.core.values.signals import Frame

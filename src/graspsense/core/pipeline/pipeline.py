@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from attrs import frozen
 
-from graspsense.core.components.config import Settings, resolve
-from graspsense.core.components.layers import Flag
 from graspsense.core.components.registry import Plugins, installed
 from graspsense.core.components.roles import Controller, FeatureSet, SensorBackend
 from graspsense.core.control.garbage_collection import no_collection
@@ -20,6 +18,8 @@ from graspsense.core.learn.model import Model
 from graspsense.core.pipeline.anytime import Anytime, anytime_of
 from graspsense.core.pipeline.pipeline_model import model_for
 from graspsense.core.pipeline.wiring import check
+from graspsense.core.settings.layers import Flag
+from graspsense.core.settings.resolved import Settings, resolve
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import FAILURES, named
 from graspsense.core.values.events import GraspEvent

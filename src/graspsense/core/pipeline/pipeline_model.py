@@ -16,8 +16,8 @@ from graspsense.core.values.errors import ConfigError, WiringError
 from graspsense.core.values.features import FeatureTable
 
 if TYPE_CHECKING:
-    from graspsense.core.components.config import Settings
     from graspsense.core.components.registry import Component, Plugins
+    from graspsense.core.settings.resolved import Settings
 
 
 MODELS_KEPT: Final = 4

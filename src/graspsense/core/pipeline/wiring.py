@@ -9,11 +9,11 @@ from attrs import asdict, frozen
 
 from graspsense.core.components.caller import set_option
 from graspsense.core.components.channels import declared_dtype, declared_shape
-from graspsense.core.components.config import Settings
 from graspsense.core.components.entries import Role
 from graspsense.core.components.registry import Component, installed
 from graspsense.core.components.roles import FeatureSet
-from graspsense.core.components.selected import SelectedComponent, select_component
+from graspsense.core.settings.resolved import Settings
+from graspsense.core.settings.selected import SelectedComponent, select_component
 from graspsense.core.values.channel import FLOATS, Channel, FastChannel, TactileArray
 from graspsense.core.values.errors import GraspsenseError, PluginUnavailable, WiringError
 from graspsense.core.values.fingers import FingerForce

@@ -16,8 +16,8 @@ import numpy as np
 from attrs import field, frozen
 from attrs.validators import ge, le
 
-from graspsense.core.components.config import settings_from
 from graspsense.core.components.strict import structured
+from graspsense.core.settings.resolved import settings_from
 from graspsense.evaluation.folds import INSTANCE_HELD_OUT, instance_held_out
 from graspsense.experiments.recognise import classifiers_of
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
@@ -34,8 +34,8 @@ from graspsense.sources.simulated import simulated
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.core.components.selected import SelectedComponent
     from graspsense.core.learn.labelled import Labelled
+    from graspsense.core.settings.selected import SelectedComponent
     from graspsense.core.values.features import FeatureTable
 
     Floats = NDArray[np.float64]

@@ -8,8 +8,8 @@ from typing import Any, Final
 from attrs import field, frozen
 from attrs.validators import ge
 
-from graspsense.core.components.config import settings_from
 from graspsense.core.components.strict import structured
+from graspsense.core.settings.resolved import settings_from
 from graspsense.core.values.errors import ConfigError
 from graspsense.experiments.recognise import TEST_SEED_OFFSET, classifiers_of, true_and_predicted
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult

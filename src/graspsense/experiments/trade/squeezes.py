@@ -9,9 +9,9 @@ import numpy as np
 from attrs import field, frozen
 from attrs.validators import ge, le
 
-from graspsense.core.components.selected import SelectedComponent
 from graspsense.core.components.strict import structured
 from graspsense.core.learn.labelled import Labelled, Target
+from graspsense.core.settings.selected import SelectedComponent
 from graspsense.core.values.errors import ConfigError, counted
 from graspsense.evaluation.folds import INSTANCE_HELD_OUT, instance_held_out, trials_by_class
 from graspsense.experiments.recognise import classifiers_of

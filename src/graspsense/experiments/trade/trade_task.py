@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
-from graspsense.core.components.config import settings_from
-from graspsense.core.components.selected import SelectedComponent
 from graspsense.core.components.strict import structured
 from graspsense.core.learn.labelled import Target, class_of
+from graspsense.core.settings.resolved import settings_from
+from graspsense.core.settings.selected import SelectedComponent
 from graspsense.evaluation.crossval import cross_validate
 from graspsense.evaluation.folds import stratified, trials_by_class
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
 from graspsense.sources.trial_source import TrialSource, groups_of
 
 if TYPE_CHECKING:
-    from graspsense.core.components.config import Settings
     from graspsense.core.learn.labelled import Labelled
+    from graspsense.core.settings.resolved import Settings
     from graspsense.core.values.features import FeatureTable
     from graspsense.evaluation.folds import Folds
     from graspsense.sources.simulated import Group

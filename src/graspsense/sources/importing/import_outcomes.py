@@ -17,7 +17,7 @@ from graspsense.core.values.signals import Outcome
 from graspsense.sources.recordings.dataset_recordings import handed_over
 
 if TYPE_CHECKING:
-    from graspsense.core.components.config import Settings
+    from graspsense.core.settings.resolved import Settings
     from graspsense.core.values.features import Features
     from graspsense.recording.replayable import Recording
     from graspsense.sources.importing.import_sources import ImportedRecording

@@ -24,8 +24,8 @@ from graspsense.sources.recordings.labelled_recordings import trace_of_recording
 from graspsense.store.imported_contents import CONTENT, ImportedContents
 
 if TYPE_CHECKING:
-    from graspsense.core.components.config import Settings
     from graspsense.core.components.registry import Plugins
+    from graspsense.core.settings.resolved import Settings
     from graspsense.core.values.features import Features
     from graspsense.core.values.trace import Trace
     from graspsense.core.values.trial import Trial

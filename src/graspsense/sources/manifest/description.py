@@ -10,9 +10,9 @@ from typing import Any, Final, Literal
 
 from attrs import Attribute, field, frozen
 
-from graspsense.core.components.layers import read_toml
 from graspsense.core.components.setting import setting
 from graspsense.core.components.strict import ValidationFailed, structured
+from graspsense.core.settings.layers import read_toml
 from graspsense.core.values.errors import ConfigError, listed
 from graspsense.core.values.events import NOT_KNOWN
 from graspsense.core.values.fingers import PREFIX, FingerForce

@@ -15,9 +15,9 @@ from graspsense.core.components.caller import set_option
 from graspsense.core.components.entries import PipelineEntry
 from graspsense.core.components.registry import Plugins
 from graspsense.core.components.strict import InvalidValue, shown
-from graspsense.core.components.toml_kinds import KINDS, refuse_other_kind
 from graspsense.core.files.regular_file import first_bytes
 from graspsense.core.files.toml_text import KeyPath, TomlError, key_lines, toml_values
+from graspsense.core.settings.toml_kinds import KINDS, refuse_other_kind
 from graspsense.core.values.errors import ConfigError, UnknownName
 from graspsense.core.values.limits import SETTINGS_BYTES
 

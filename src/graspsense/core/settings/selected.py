@@ -11,9 +11,9 @@ from attrs import frozen
 
 from graspsense.core.components.caller import option
 from graspsense.core.components.entries import Role
-from graspsense.core.components.layers import dotted
 from graspsense.core.components.registry import Component, installed
 from graspsense.core.components.strict import ValidationFailed, implausible_values, plain, structured
+from graspsense.core.settings.layers import dotted
 from graspsense.core.values.errors import ConfigError, PluginUnavailable, UnknownName
 
 

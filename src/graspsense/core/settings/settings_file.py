@@ -11,7 +11,7 @@ from graspsense import __version__
 from graspsense.core.files.toml_values import toml_key, toml_value
 
 if TYPE_CHECKING:
-    from graspsense.core.components.config import Settings
+    from graspsense.core.settings.resolved import Settings
 
 
 def to_toml(settings: Settings, origins: bool = False) -> str:

@@ -14,18 +14,8 @@ from typing import TYPE_CHECKING, Any, Final, cast
 from attrs import fields, frozen
 
 from graspsense.core.components.entries import TABLE_OF_ROLE, Role
-from graspsense.core.components.layers import (
-    Flag,
-    Layer,
-    Merged,
-    dotted,
-    option_layers,
-    pipeline_layers,
-    typed_path,
-)
 from graspsense.core.components.nearest_key import key_paths
 from graspsense.core.components.registry import Component, Plugins, installed
-from graspsense.core.components.selected import ImplausibleSettings, SelectedComponent, listed_errors
 from graspsense.core.components.setting import followed_settings
 from graspsense.core.components.strict import (
     InvalidValue,
@@ -38,6 +28,16 @@ from graspsense.core.components.strict import (
 )
 from graspsense.core.files.toml_text import KeyPath
 from graspsense.core.files.toml_values import toml_value
+from graspsense.core.settings.layers import (
+    Flag,
+    Layer,
+    Merged,
+    dotted,
+    option_layers,
+    pipeline_layers,
+    typed_path,
+)
+from graspsense.core.settings.selected import ImplausibleSettings, SelectedComponent, listed_errors
 from graspsense.core.values.errors import ConfigError, PluginUnavailable, UnknownName
 
 if TYPE_CHECKING:
