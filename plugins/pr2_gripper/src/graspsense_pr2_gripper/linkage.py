@@ -1,7 +1,7 @@
 """The linkage and the encoder of the PR2 gripper, and the scale of its pressure cells: published numbers.
 
 The simulator (graspsense-sim-gripper, `drive_models.py` and `sensing.py`) has the same numbers as data of its model;
-`tests/test_pr2_numbers.py` holds the two equal. The map from motor revolutions to the gap is
+`tests/sources/test_pr2_numbers.py` holds the two equal. The map from motor revolutions to the gap is
 `pr2_mechanism_model/src/pr2_gripper_transmission.cpp`, here `graspsense.gripper_api.gap_and_rate`.
 """
 

@@ -48,7 +48,7 @@ FIRST_PAD_CELL: Final = 7
 """The first cell on its gripping face."""
 PAD_COUNTS_PER_N: Final = 1600.0
 """Counts of the sum of the fifteen cells of the gripping face under one newton (fingertip_pressure, scripts/
-fingertip_geometry.py). The driver of the gripper has the same scales: `tests/test_pr2_numbers.py`."""
+fingertip_geometry.py). The driver of the gripper has the same scales: `tests/sources/test_pr2_numbers.py`."""
 EDGE_COUNTS_PER_N: Final = (600.0, 400.0, 600.0, 600.0, 600.0, 600.0, 400.0)
 """Counts of each of the cells 0 to 6 under one newton: back, side, corner, tip, tip, corner, side; source as above."""
 PRESSURE: Final = "/pressure/{}_gripper_motor"

@@ -1,7 +1,7 @@
 """The drives that the simulator can model, by the name that the setting `transmission` gives.
 
 The numbers of the PR2 are published. The driver of the real gripper (graspsense-pr2-gripper, `linkage.py`) has the
-same ones; `tests/test_pr2_numbers.py` holds the two equal. The map from motor revolutions to the gap is
+same ones; `tests/sources/test_pr2_numbers.py` holds the two equal. The map from motor revolutions to the gap is
 `pr2_mechanism_model/src/pr2_gripper_transmission.cpp`, here `graspsense.gripper_api.gap_and_rate`.
 """
 

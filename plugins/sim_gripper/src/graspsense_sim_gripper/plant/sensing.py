@@ -28,7 +28,7 @@ LARGEST_COUNT: Final = 65535.0
 """The largest reading of a cell: 16 bits."""
 PAD_COUNTS_PER_N: Final = 1600.0
 """Counts of the sum of the fifteen cells of the PR2's gripping face under one newton (fingertip_pressure, scripts/
-fingertip_geometry.py). The driver of the real gripper has the same scales: `tests/test_pr2_numbers.py`."""
+fingertip_geometry.py). The driver of the real gripper has the same scales: `tests/sources/test_pr2_numbers.py`."""
 EDGE_COUNTS_PER_N: Final = (600.0, 400.0, 600.0, 600.0, 600.0, 600.0, 400.0)
 """Counts per newton of each of the cells 0 to 6: back, side, corner, tip, tip, corner, side. Source as above."""
 CLOCK_TOLERANCE_S: Final = 1e-10

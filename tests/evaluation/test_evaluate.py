@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import re
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pytest
 from attrs import evolve
+from repository import ROOT
 
 from graspsense.core.components.registry import installed
 from graspsense.core.learn.labelled import ControlFeatures, Labelled
@@ -310,7 +310,7 @@ def test_the_json_is_whole_and_stable():
     counts, headline = evaluation["confusion"]["counts"], evaluation["headline"]
     assert sum(map(sum, counts)) == headline["n"] == 120
     assert sum(counts[k][k] for k in range(4)) == headline["correct"] == round(headline["rate"] * 120)
-    page = (Path(__file__).parents[1] / "docs" / "evaluation.md").read_text()
+    page = (ROOT / "docs" / "evaluation.md").read_text()
     sample = re.search(r"^## JSON\n.*?```text\n(.*?)```", page, re.DOTALL | re.MULTILINE)[1]
     assert set(re.findall(r'"(\w+)":', sample)) <= names_in(evaluation) | {"stratified_10_fold"}
     # A row is the truth: every label was there thirty times.

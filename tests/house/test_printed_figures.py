@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import re
-from pathlib import Path
 
 import pytest
 from cases import every_case
 from commands import printed
 from PIL import Image
+from repository import ROOT
 
 from graspsense.core.components.registry import installed
 from graspsense.core.learn.checkpoints import split_checkpoints
@@ -19,7 +19,6 @@ from graspsense.core.settings.selected import select_component
 from graspsense.evaluation.checkpoints import SURE, early_recognition
 from graspsense.sources.trial_source import load_trials
 
-ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "benchmarks" / "results"
 PERCENTAGE = re.compile(r"\b\d+\.\d %")
 SAME_ON_ANY_PROCESSOR = 0.006

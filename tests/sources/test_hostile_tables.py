@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from cases import every_case
 from commands import graspsense
+from repository import ROOT, TESTS
 
 from graspsense.core.components.channels import from_json
 from graspsense.core.files.toml_text import MOST_NESTED, TomlError, toml_values
@@ -32,7 +32,6 @@ from graspsense.sources.trial_table.features_csv import read_labelled
 from graspsense_c45.arff import ArffError, parse_arff
 from graspsense_sim_gripper.scene.library import find
 
-HERE = Path(__file__).parent
 MANIFEST = 'files = "*.csv"\ntime = "t"\ngap = "g [mm]"\nforce = "F"\nlabel = "jar"\n'
 GRASP = "t,g,F\n" + "".join(f"{k * 0.01:.2f},{60 - k},{max(0, k - 20)}\n" for k in range(50))
 
@@ -156,7 +155,7 @@ def test_a_limit_that_is_not_a_number_is_refused_by_its_name(monkeypatch, given)
 
 
 def test_every_limit_is_documented():
-    page = (HERE.parent / "docs" / "import.md").read_text()
+    page = (ROOT / "docs" / "import.md").read_text()
     for limit in (value for value in vars(limits).values() if isinstance(value, limits.SizeLimit)):
         assert f"`{limit.variable}`" in page
         assert f"{limit.default:,}".replace(",", " ") in page
@@ -531,7 +530,7 @@ def test_arff_out_of_bounds_is_told_with_its_line(text):
 def test_changed_texts_are_answered_by_a_result_or_an_error_that_names_the_file(seed, number):
     # A program that reads so many changed texts of each format, with a limit on its memory.
     done = subprocess.run(
-        [sys.executable, HERE / "hostile_tables.py", str(seed), str(number)], capture_output=True, text=True
+        [sys.executable, TESTS / "hostile_tables.py", str(seed), str(number)], capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr[-2000:]
     answers = json.loads(done.stdout)

@@ -13,13 +13,13 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
 from attrs import evolve
 from forked_commands import Commands
 from grippers import bottle, squeezing
 from kept import BENCH, begun, keep, write_recording
+from repository import TESTS
 from test_kills import recovered
 
 from graspsense.core.components.registry import installed
@@ -240,7 +240,7 @@ def test_a_store_as_the_disk_has_it_after_a_loss_of_power(tmp_path):
     """The program is stopped at a moment and its folder copied; what was not synced since is cut off at random."""
     rng = random.Random(4)
     program = [sys.executable, "-c", WRITES, str(tmp_path / "trials")]
-    environ = {**os.environ, "PYTHONPATH": str(Path(__file__).parent)}
+    environ = {**os.environ, "PYTHONPATH": str(TESTS)}
     copies = cut = 0
     announced = synced = 0
     with subprocess.Popen(program, stdout=subprocess.PIPE, text=True, env=environ) as process:

@@ -3,17 +3,17 @@
 import json
 import shutil
 import tomllib
-from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy
 from commands import graspsense
+from repository import ROOT
 
 from graspsense.sources.columns.channel_facts import channel_facts
 from graspsense.sources.manifest.reader import read_recordings
 
-SAMPLES = Path(__file__).parents[1] / "samples"
+SAMPLES = ROOT / "samples"
 N = 300
 T_S = np.arange(N) * 0.01
 GAP_MM = np.where(T_S < 1.0, 60.0 - 10.0 * T_S, 50.0)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 import sys
 from html.parser import HTMLParser
-from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 from attrs import evolve
 from cases import every_case
+from repository import ROOT
 
 from graspsense import Evaluation, Features, Prediction, load_pipeline
 from graspsense.core.components.moved_names import SPECIAL
@@ -20,7 +20,6 @@ from graspsense.evaluation.intervals import RecognitionRate
 from graspsense.evaluation.results import Measurement
 from graspsense.testing_api import a_trial, squeeze, with_channels
 
-ROOT = Path(__file__).parents[1]
 PAGES = [*ROOT.glob("docs/**/*.md"), ROOT / "README.md", *ROOT.glob("examples/*/README.md")]
 SOURCES = [*ROOT.glob("examples/**/*.py"), *ROOT.glob("src/graspsense/scaffold/templates/**/*.py.txt")]
 

@@ -6,11 +6,9 @@ import ast
 import re
 from collections import Counter, defaultdict
 from itertools import chain
-from pathlib import Path
 
-from sources import parsed, statements
-
-ROOT = Path(__file__).parents[1]
+from repository import ROOT
+from source_code import parsed, statements
 
 
 def repeated_public_classes() -> dict[str, list[str]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +12,7 @@ from commands import graspsense
 from hypothesis import given
 from hypothesis import strategies as st
 from kept import keep
+from repository import ROOT
 
 from graspsense import evaluate, load_pipeline, load_trials
 from graspsense.core.compiling import compile_notice
@@ -112,7 +112,7 @@ def test_a_kind_of_file_is_recognised_by_keys_that_it_has():
 
 def test_every_component_of_an_example_is_known_by_its_folder():
     for example in EXAMPLES:
-        folder = Path(__file__).parents[1] / example.hint.rpartition("-e ")[2]
+        folder = ROOT / example.hint.rpartition("-e ")[2]
         declared = next(folder.glob("src/*/plugin.py")).read_text()
         assert all(f'name="{name}"' in declared for names in example.names.values() for name in names)
         assert f'name = "{example.distribution}"' in (folder / "pyproject.toml").read_text()

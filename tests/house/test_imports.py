@@ -13,13 +13,13 @@ from pathlib import Path
 
 import pytest
 from cases import every_case
-from sources import parsed, statements
+from repository import ROOT
+from source_code import parsed, statements
 
 import graspsense
 from graspsense import plugin_api
 from graspsense.core.components.moved_names import REPLACED, SPECIAL, new_form
 
-ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src" / "graspsense"
 
 DOORS = ("plugin_api", *SPECIAL)

@@ -289,6 +289,7 @@ def test_a_trial_is_stored_as_without_a_page(tmp_path):
 
 OBSERVER = """
 import json, os, sys, time
+
 HERE = os.path.dirname(__file__)
 
 def observe(batches):

@@ -8,9 +8,9 @@ import stat
 import subprocess
 import sys
 import threading
-from pathlib import Path
 
 import pytest
+from repository import ROOT
 
 from graspsense.core.files import whole_file
 from graspsense.core.files.whole_file import write_whole
@@ -276,10 +276,9 @@ def test_pipes_and_links_in_a_store_do_not_stop_recover_and_verify(tmp_path):
 
 def test_all_of_the_code_replaces_files_in_one_place():
     """A second place would be a second rule: only recordings, which have an owner each, are renamed elsewhere."""
-    repository = Path(__file__).parent.parent
-    sources = [*repository.glob("src/**/*.py"), *repository.glob("plugins/*/src/**/*.py")]
+    sources = [*ROOT.glob("src/**/*.py"), *ROOT.glob("plugins/*/src/**/*.py")]
     writers = {
-        path.relative_to(repository).as_posix()
+        path.relative_to(ROOT).as_posix()
         for path in sources
         if any(word in path.read_text() for word in ("os.replace(", "os.rename(", ".savefig(path"))
     }

@@ -13,6 +13,7 @@ import click
 import pytest
 from cases import every_case
 from commands import graspsense
+from repository import ROOT
 
 from graspsense import __version__
 from graspsense.cli.main import COMMANDS
@@ -78,8 +79,7 @@ def test_version(run):
 
 
 def test_version_is_that_of_the_distribution():
-    root = os.path.dirname(os.path.dirname(__file__))
-    with open(os.path.join(root, "pyproject.toml"), "rb") as file:
+    with (ROOT / "pyproject.toml").open("rb") as file:
         assert tomllib.load(file)["project"]["version"] == __version__
 
 

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import scipy
+from repository import ROOT
 
 from graspsense.core.values.signals import NO_GAP
 from graspsense.core.values.trace import signals_of
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.sources.recordings.dataset_recordings import readable_or_not
 
-MANIFESTS = Path(__file__).parents[1] / "docs" / "manifests"
+MANIFESTS = ROOT / "docs" / "manifests"
 
 
 def recordings(folder, name):

@@ -14,9 +14,9 @@ from functools import cache
 from pathlib import Path
 from typing import Final
 
-from sources import parsed, statements
+from repository import ROOT
+from source_code import parsed, statements
 
-ROOT = Path(__file__).parents[1]
 SOURCES = (ROOT / "src", *sorted((ROOT / "plugins").glob("*/src")))
 SIMULATOR = "graspsense_sim_gripper"
 

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 from paced_recorder import PROGRESS
+from repository import TESTS
 
 from graspsense.recording.reader import read_recorded
 from graspsense.store.recover import recover_store
@@ -29,7 +30,6 @@ pytestmark = [
 KILLS = int(os.environ.get("GRASPSENSE_KILLS", "6"))
 MOST_MISSING_S = 0.1
 TICKS = 400
-HERE = Path(__file__).parent
 
 
 def report(name, **figures):
@@ -105,7 +105,7 @@ def test_a_recorder_killed_with_its_writer_loses_at_most_100_ms_of_the_running_t
     missing = []
     for k in range(KILLS):
         folder, progress = tmp_path / f"{k}", tmp_path / f"{k}.progress"
-        program = [sys.executable, HERE / "paced_recorder.py", folder, progress, f"{TICKS / 1000}"]
+        program = [sys.executable, TESTS / "paced_recorder.py", folder, progress, f"{TICKS / 1000}"]
         with subprocess.Popen(program, stdout=subprocess.PIPE, text=True) as process:
             writer = until_tick(progress, rng.randrange(2 * TICKS), process)
             if k % 3 == 2:

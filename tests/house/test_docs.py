@@ -17,13 +17,12 @@ import click
 import numpy
 import pytest
 from cases import every_case
+from repository import ROOT
 from test_imports import DOORS, MAY_KNOW, ROOMS
 
 from graspsense import plugin_api, simulator_api
 from graspsense.cli.main import cli
 from graspsense.experiments.experiment_file import read_experiment
-
-ROOT = Path(__file__).parents[1]
 
 
 def script(name):

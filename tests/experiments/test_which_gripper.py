@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 from cases import every_case
+from repository import ROOT
 
 from graspsense import read_experiment
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.pipeline.wiring import check
 
 CASES = read_experiment("which_gripper").cases
-ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "which_gripper.md").read_text(encoding="utf-8")
 THINGS = (ROOT / "benchmarks" / "results" / "which_gripper.md").read_text(encoding="utf-8")
 

@@ -5,10 +5,10 @@
 
 import csv
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
+from repository import TESTS
 
 from graspsense.core.components.registry import installed
 from graspsense.core.pipeline.pipeline import grasp_with
@@ -17,7 +17,7 @@ from graspsense.recording.export_trace import write_npz
 from graspsense.recording.reader import read_recorded
 from graspsense.store.verify import verify_store
 
-DATA = Path(__file__).parent / "data" / "layout2"
+DATA = TESTS / "data" / "layout2"
 NAMES = ["p_first [m]", "p_steady [m]", "f_steady [N]", "delta_t [s]", "dp_dt [m/s]", "df_dt [N/s]"]
 
 

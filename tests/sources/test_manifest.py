@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from pathlib import Path
 from textwrap import dedent
 
 import numpy as np
@@ -12,6 +11,7 @@ import pytest
 import scipy
 from cases import every_case
 from commands import graspsense, printed
+from repository import ROOT
 
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.trace import signals_of
@@ -64,7 +64,7 @@ def pandas_csv(path, columns):
 
 
 def shipped(name):
-    return (Path(__file__).parents[1] / "docs" / "manifests" / f"{name}.toml").read_text()
+    return (ROOT / "docs" / "manifests" / f"{name}.toml").read_text()
 
 
 FRUIT = shipped("fruit")
@@ -248,7 +248,7 @@ def test_taps_in_one_array_are_split_by_a_column(tmp_path):
 
 
 def test_the_page_of_public_data_sets_links_these_manifests_and_no_other():
-    docs = Path(__file__).parents[1] / "docs"
+    docs = ROOT / "docs"
     page = (docs / "other_data.md").read_text()
     there = {path.name for path in (docs / "manifests").glob("*.toml")}
     assert set(re.findall(r"\]\(manifests/([\w.]+)\)", page)) == there

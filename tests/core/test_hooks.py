@@ -7,11 +7,11 @@ import logging
 import re
 import textwrap
 import types
-from pathlib import Path
 
 import click
 import pytest
 from cases import every_case
+from repository import ROOT
 
 from graspsense.core.components import hookspecs
 from graspsense.core.components.entries import (
@@ -42,7 +42,7 @@ from graspsense.plugin_api import (
 from graspsense.simulator_api import collect
 
 HOOKS = {name: spec for name, spec in vars(hookspecs).items() if name.startswith("graspsense_")}
-DOCS = (Path(__file__).parents[1] / "docs" / "hooks.md").read_text(encoding="utf-8")
+DOCS = (ROOT / "docs" / "hooks.md").read_text(encoding="utf-8")
 RUN = RunInfo(components={"gripper": "graspsense/replay 0.1.0"}, settings={"run": {"seed": 7}}, seed=7)
 EVENT = GraspEvent(1.5, Phase.SQUEEZE, "both pads touch")
 

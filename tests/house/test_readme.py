@@ -10,10 +10,11 @@ from pathlib import Path
 
 import pytest
 from commands import graspsense
+from repository import ROOT
 
 from graspsense.cli.main import COMMANDS
 
-README = (Path(__file__).parents[1] / "README.md").read_text()
+README = (ROOT / "README.md").read_text()
 
 
 def block(language: str) -> str:
@@ -49,7 +50,7 @@ def test_every_command_that_the_readme_names_exists() -> None:
     assert named - {"--help"} <= set(COMMANDS)
 
 
-SAMPLES = Path(__file__).parents[1] / "samples"
+SAMPLES = ROOT / "samples"
 ENDED_BY_A_FAULT = 4
 MINUTES = ("experiment ", "tradeoff ", "compare simulated", "evaluate simulated", "train simulated", "hold ")
 """Commands that are tried by their own tests, since they grasp for a while."""
@@ -73,7 +74,7 @@ def test_each_row_of_the_table_can_be_typed_as_printed(
 
 
 def test_the_page_of_commands_has_every_command_and_no_other() -> None:
-    page = (Path(__file__).parents[1] / "docs" / "commands.md").read_text()
+    page = (ROOT / "docs" / "commands.md").read_text()
     named = {line.split()[1] for line in re.findall(r"`(?:sudo )?(graspsense [^`]+)`", page)}
     assert named - {"COMMAND"} == set(COMMANDS)
 
@@ -82,4 +83,4 @@ def test_links_lead_somewhere() -> None:
     targets = re.findall(r"\]\((?!https?:|#)([^)]+)\)", README)
     assert "docs/icub.md" in targets
     for target in targets:
-        assert (Path(__file__).parents[1] / target).is_file(), target
+        assert (ROOT / target).is_file(), target

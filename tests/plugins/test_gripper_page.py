@@ -8,11 +8,11 @@ import sys
 import threading
 import time
 from math import nan
-from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
+from repository import ROOT
 
 from graspsense import load_pipeline
 from graspsense.core.components.registry import IsolatedPlugins
@@ -21,8 +21,8 @@ from graspsense.testing import examine
 
 LATE_S = 0.15
 """Longer than the page's driver waits for an answer before it asks again; this is waited for in earnest."""
-PAGE = (Path(__file__).parents[1] / "docs" / "tcp_gripper.md").read_text(encoding="utf-8")
-EXAMPLE = Path(__file__).parents[1] / "examples" / "tcp_gripper"
+PAGE = (ROOT / "docs" / "tcp_gripper.md").read_text(encoding="utf-8")
+EXAMPLE = ROOT / "examples" / "tcp_gripper"
 
 
 class Plugin:

@@ -10,7 +10,6 @@ import subprocess
 import sys
 from functools import cache
 from io import BytesIO
-from pathlib import Path
 from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
 
 import numpy as np
@@ -19,6 +18,7 @@ import pytest
 from attrs import evolve
 from cases import every_case
 from parts import Nearest
+from repository import TESTS
 from test_classifiers import trials
 
 from graspsense.core.components.registry import Component, installed
@@ -72,7 +72,7 @@ def trained(name, **config):
 
 def read_damaged(seed, places, damages, *files):
     """Run `damaged_models.py` on these files, and return how many damages it read."""
-    script = Path(__file__).with_name("damaged_models.py")
+    script = TESTS / "damaged_models.py"
     done = subprocess.run(
         [sys.executable, script, str(seed), str(places), str(damages), *map(str, files)],
         capture_output=True,

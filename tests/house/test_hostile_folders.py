@@ -12,13 +12,13 @@ from pathlib import Path
 import pytest
 from cases import every_case
 from grippers import bottle, squeezing
+from repository import ROOT
 from wayward import CSV
 
 from graspsense.recording.checkout import checkout_state
 from graspsense.recording.provenance import commit_text
 
 PROGRAM = Path(sys.executable).parent / "graspsense"
-REPOSITORY = Path(__file__).parent.parent
 MODULES = [
     "attr",
     "attrs",
@@ -110,7 +110,7 @@ def test_no_command_imports_from_the_current_folder(folder, command):
 def test_every_python_process_is_started_without_the_current_folder():
     """The rule for all the code: whatever starts an interpreter gives it `-P` first."""
     starts = []
-    for path in (*REPOSITORY.glob("src/**/*.py"), *REPOSITORY.glob("plugins/*/src/**/*.py")):
+    for path in (*ROOT.glob("src/**/*.py"), *ROOT.glob("plugins/*/src/**/*.py")):
         text = path.read_text()
         for node in ast.walk(ast.parse(text)) if "sys.executable" in text else ():
             words = [ast.unparse(word) for word in getattr(node, "elts", [])]
