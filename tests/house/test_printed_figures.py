@@ -63,6 +63,13 @@ def test_the_percentages_of_a_page_are_those_of_its_results(name, stored):
     assert told <= measured, f"docs/{name}.md"
 
 
+def test_what_a_shake_tells_is_what_its_results_say():
+    stored = (ROOT / "plugins/romano/benchmarks/results/contents_shake.md").read_text()
+    for case in ("shake", "six features"):
+        rate, low, high = re.findall(r"\d+\.\d", row(stored, case, "class"))
+        assert f"{rate} % ({low} to {high})" in page("hold")
+
+
 @pytest.mark.slow
 def test_the_picture_of_the_readme_shows_the_grasp_of_today(tmp_path):
     printed("run", "--plot", tmp_path / "grasp.png")
