@@ -393,7 +393,7 @@ def test_a_validator_that_looks_at_other_keys_keeps_its_words(plugins, write):
         ("gripper.retries=3.0", "expected a whole number, found 3.0 (a number)"),
         ("gripper.retries=true", "expected a whole number, found true (a boolean)"),
         ("gripper.rate_hz=true", "expected a number, found true (a boolean)"),
-        ("gripper.rate_hz=nan", "expected a number, found nan (a number)"),
+        ("gripper.rate_hz=nan", "expected a number, found nan (not a number)"),
         ("gripper.rate_hz=fast", "expected a number, found 'fast' (text)"),
         ("gripper.echo=1", "expected true or false, found 1 (a whole number)"),
         (

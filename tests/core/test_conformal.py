@@ -16,7 +16,7 @@ from graspsense.core.learn.certainty import certainty_of
 from graspsense.core.learn.conformal import Answers, sets_of, units_lacking, units_needed
 from graspsense.core.learn.model_file import load_model, write_model
 from graspsense.core.learn.training import train
-from graspsense.core.values.errors import DataDamaged
+from graspsense.core.values.errors import ComponentFailed, DataDamaged
 from graspsense.core.values.features import UNKNOWN
 from graspsense.evaluation.doubt import calibrated
 from graspsense.evaluation.json_codec import from_json, to_json
@@ -278,6 +278,9 @@ def test_every_classifier_has_sets_that_loading_keeps_exactly(name, tmp_path):
         assert said.label in said.prediction_set
         assert said.coverage == 0.9
         assert said.set_in_words.endswith(", 90 %")
+    model.classifier.to_json = lambda: {"means": np.zeros(2)}
+    with pytest.raises(ComponentFailed, match="Its to_json gives lists"):
+        write_model(tmp_path / "m.json", model)
 
 
 def test_an_unknown_trial_and_a_model_without_calibration_have_no_set(tmp_path):

@@ -206,6 +206,14 @@ def test_a_step_that_fails_or_returns_no_command_is_named_with_what_it_returns()
         def step(params, state, reading):
             return Command(EFFORT, 5.0, math.inf, math.inf)
 
+    class Lost(HybridController):
+        @staticmethod
+        def step(params, state, reading):
+            return Command(EFFORT, 5.0, math.inf, math.inf), state._replace(phase=99)
+
+    lost = run_grasp(Scripted(squeezing, bottle), Lost(HybridConfig()), RUN)
+    assert lost.outcome is Outcome.ABORTED
+    assert "the controller gave the phase 99" in lost.reason
     for controller, error in (
         (controller_that(fail, 900), "ZeroDivisionError"),
         (Halved(HybridConfig()), "ValueError"),
@@ -455,7 +463,7 @@ def test_a_report_that_fails_costs_nothing_else():
 @pytest.mark.parametrize(
     ("opened", "says"),
     [
-        (lambda: Path("/dev/no-such-port").read_bytes(), "raised it"),
+        (lambda: Path("/dev/no-such-port").read_bytes(), "was running"),
         (lambda: None, "returned None: return graspsense.plugin_api.DeviceInfo"),
     ],
 )
@@ -626,6 +634,16 @@ def test_fingers_that_do_not_come_to_rest_are_relaxed_after_the_opening_time():
     assert len(opening) == pytest.approx(2000, abs=3)
     assert gripper.commands[-1].value == 0.0
     assert grasp.outcome is Outcome.ABORTED
+    assert "in tests/test_runner.py:" in grasp.reason
+
+
+def test_a_gripper_that_returns_no_reading_is_named():
+    class Bare(Scripted):
+        def read(self, timeout_s):
+            return super().read(timeout_s).frame
+
+    reason = run_grasp(Bare(squeezing, bottle), HYBRID, RUN).reason
+    assert "scripted delivered what it does not declare: read returned Frame: return graspsense" in reason
 
 
 def test_fingers_whose_clock_stands_still_are_relaxed_after_the_opening_time_on_the_wall(monkeypatch):

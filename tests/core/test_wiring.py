@@ -259,3 +259,10 @@ def test_what_a_gripper_cannot_do_gently_is_refused_before_it_is_opened(refusal,
     assert bool(told) == bool(says)
     for words in says:
         assert words in told
+
+
+def test_a_controller_that_asks_for_no_number_is_named(refusal, monkeypatch):
+    monkeypatch.setattr(Stepping, "asked_force_n", lambda _: "much")
+    assert "stepping asks for a force of 'much'. Let its class return a number" in refusal(
+        *FIRST, "controller.type=stepping"
+    )

@@ -14,7 +14,7 @@ from repository import ROOT
 from graspsense.core.components.registry import installed
 from graspsense.core.learn.labelled import ControlFeatures, Labelled
 from graspsense.core.settings.selected import SelectedComponent
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.errors import ComponentFailed, ConfigError
 from graspsense.core.values.features import FeatureTable
 from graspsense.evaluation.confusion import confusion
 from graspsense.evaluation.crossval import thinned
@@ -385,6 +385,20 @@ def test_a_fit_that_refuses_few_trials_costs_its_figure_only():
     )
     with pytest.raises(ConfigError, match="refused 90 training trials of 4 labels: 1000 trials are needed"):
         evaluate(Choosy(1000), trials, classifier="choosy", folds=4)
+
+
+class Vague:
+    """A learner whose classifier gives no probabilities."""
+
+    def create(self):
+        classifier = learner().create()
+        classifier.probabilities = lambda table: np.full((len(table), 4), np.nan)
+        return classifier
+
+
+def test_a_classifier_without_probabilities_is_named_and_not_scored():
+    with pytest.raises(ComponentFailed, match="Cart cannot be used: it gives no probabilities"):
+        evaluate(Vague(), labelled(*four_states()), classifier="vague", folds=4)
 
 
 def test_unlike_trials_are_counted():

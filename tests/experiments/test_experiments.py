@@ -343,6 +343,7 @@ def test_seeds_that_agree_are_no_certainty():
     value, (low, high) = same.value, same.interval
     assert value == pytest.approx(0.1)
     assert low < value < high
+    assert mean_difference((0.9, 0.5), (0.1, 0.9), 50).interval == (-1.0, 1.0)  # no rates differ by more
 
 
 def test_one_seed_has_the_interval_of_its_trials():

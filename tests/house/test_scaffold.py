@@ -59,6 +59,8 @@ def test_a_package_is_whole(roles, tmp_path):
             "name 'numpy' is taken: numpy has a package numpy, which this one would hide",
         ),
         ("json", "feature-set", "Python itself has a module json"),
+        ("graspsense", "controller", "graspsense itself has it"),
+        ("graspsense-c45", "classifier", "graspsense itself has it"),
         ("class", "observer", "class is a keyword of Python"),
         ("hybrid", "controller", "name 'hybrid' is taken by graspsense/hybrid: choose another"),
         ("lab hand", "sensor-backend", "without spaces, as in lab-hand"),

@@ -103,7 +103,12 @@ def test_what_counts_as_missing(csv, gap):
             DataDamaged,
             "line 3: byte 0xe1 is not UTF-8",
         ),
-        (b"PK\x03\x04\x00\x00what,p", DataDamaged, "contains zero bytes: it is not a text file"),
+        (b"what,p\n\x00\x00,1\n", DataDamaged, "contains zero bytes: it is not a text file"),
+        (
+            b"PK\x03\x04\x00\x00what,p",
+            DataDamaged,
+            "is a spreadsheet or an archive, not text: save its table as CSV",
+        ),
         ("what,p\na,\nb,\n" * 1, DataDamaged, "no feature has any value: p"),
         ("what,name\na,x\na,y\nb,z\n", ConfigError, "has no column to learn from besides what"),
     ],

@@ -199,7 +199,7 @@ def test_it_takes_its_answers_from_a_pipe(tmp_path):
     assert "next: block  (1 of 1)" in done.stderr
     counts, sets = done.stdout.splitlines()[:2]
     assert counts.split() == ["block", "1", "of", "1"]
-    assert sets.endswith("of 90 %, by trials: block 8 more")
+    assert sets.endswith("of 90 % need more trials: block 8")
     assert trials_in(tmp_path / "trials") == [(1, "block", None)]
 
 

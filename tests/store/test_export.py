@@ -104,7 +104,9 @@ def test_the_table_as_npz(folder, tmp_path):
 
 def test_one_grasp_tick_by_tick(folder, tmp_path):
     for ending in ("csv", "npz", "mcap", "toml"):
-        assert export(f"{folder}#1", tmp_path / f"one.{ending}")[0] == 0
+        code, out, _ = graspsense("export", f"{folder}#1", "--to", tmp_path / f"one.{ending}")
+        assert code == 0
+        assert ("the settings of" if ending == "toml" else "120 ticks, ") in out
     with (tmp_path / "one.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert [float(row["gap_m"]) for row in rows] == [frame(k).gap_m for k in range(120)]
@@ -256,7 +258,7 @@ def test_a_table_of_arrays_is_refused_as_trials(folder, tmp_path, command):
     assert export(folder, table)[0] == 0
     done = graspsense(command, table, *(["--out", tmp_path / "m.json"] if command == "train" else []))
     assert done.returncode == 2
-    assert "name the store as store:DIR, or a table of it as FILE.csv" in done.stderr
+    assert "write the table as FILE.csv. If it is of a store, name the store as store:DIR" in done.stderr
 
 
 @pytest.mark.parametrize("ending", ["npz", "PARQUET"])

@@ -25,6 +25,7 @@ def test_the_order_of_an_import_is_not_that_of_recording():
     order, why = order_recorded([MADE] * 3, ["import"] * 3, ["{}", '{"recorded_at": "2020-05-02"}', "{}"])
     assert order is None
     assert why.startswith("2 of 3 trials were imported without the time at which they were recorded")
+    assert why.endswith("(the key recorded of a manifest)")
 
 
 def test_a_manifest_may_number_its_trials_instead():

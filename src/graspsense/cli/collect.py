@@ -169,11 +169,10 @@ def _print_counts(save: str, collection: Collection, as_json: bool) -> None:
         return
     for word, n in counts.items():
         echo_entry(word, f"{n:>4} of {each}", Style.GOOD if n >= each else None, width=24)
-    more = [f"{label} {n} more" for label, n in lacking.items() if n]
+    more = [f"{label} {n}" for label, n in lacking.items() if n]
     if more:
-        echo_entry(
-            "for sets", f"of {100 * COVERAGE:.0f} %, by {unit}: {', '.join(more)}", Style.CAUTION, width=24
-        )
+        words = f"of {100 * COVERAGE:.0f} % need more {unit}: {', '.join(more)}"
+        echo_entry("prediction sets", words, Style.CAUTION, width=24)
 
 
 def _label_selects_object(settings: Settings, labels: Sequence[str], object_is_named: bool) -> bool:

@@ -75,6 +75,9 @@ def export(source: str, target: str, pictures: bool, as_json: bool) -> None:
         else:
             export_trace.WRITERS[path.suffix](path, grasp)
         written = {"ticks": len(grasp), "images": grasp.images}
+        if path.suffix == ".toml" and not as_json:
+            echo(f"{target}: the settings of {source}")
+            return
     echo_written(target, written, as_json)
 
 

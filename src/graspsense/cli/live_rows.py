@@ -36,11 +36,10 @@ class LiveRows:
             phase == self._phase
             and frame.t_s - self._t_s < self._quiet_s
             and not abs(force - self._force_n) >= 4.0  # of a gripper without pads it is NaN
-            and abs(frame.gap_m - self._gap_m) < 0.01
+            and not abs(frame.gap_m - self._gap_m) >= 0.01  # NaN where it could not be measured
         ):
             return
         if self._phase == -1:
-            self._widest_m = max(frame.gap_m, 1e-9)
             # On a clock of frames, not seconds, every frame is worth a line.
             self._quiet_s = max(0.5, frame.dt_s) if frame.dt_s < 0.5 else 0.0
             room = (terminal_width(sys.stderr) or _ROW + BAR) - _ROW
@@ -48,10 +47,12 @@ class LiveRows:
             gap = f"{'gap':<{self._bar + 13}}"
             talk(f"      t  phase       {gap}  left     right")
         self._phase, self._t_s, self._gap_m, self._force_n = phase, frame.t_s, frame.gap_m, force
-        share = min(max(frame.gap_m / self._widest_m, 0.0), 1.0)
+        if self._widest_m == 0.0:
+            self._widest_m = max(0.0, frame.gap_m)
+        share = min(max(0.0, frame.gap_m / self._widest_m), 1.0) if self._widest_m else 0.0
         bar = "█" * round(self._bar * share)
         talk(
-            f"{frame.t_s:7.3f}  {_phase_name(phase):<10}{frame.gap_m * 1e3:6.1f} mm  {bar:<{self._bar}}"
+            f"{frame.t_s:7.3f}  {_phase_name(phase):<10}{_millimetres(frame.gap_m)}  {bar:<{self._bar}}"
             f"{_newtons(frame.force_left_n)} {_newtons(frame.force_right_n)}"
         )
 
@@ -59,6 +60,10 @@ class LiveRows:
         """Print a prediction that was made while the grasp goes on."""
         if event.source == "model":
             talk(f"{event.t_s:7.3f}  {_phase_name(event.phase):<10}{event.what}")
+
+
+def _millimetres(gap_m: float) -> str:
+    return f"{gap_m * 1e3:6.1f} mm" if gap_m == gap_m else f"{'-':>6}   "
 
 
 def _newtons(force_n: float) -> str:

@@ -12,6 +12,8 @@ import click
 def advice(error: Exception, arguments: Sequence[str]) -> list[str]:
     """Return what to type instead of these arguments of the program, which were refused with this error."""
     advised = list(_split_options(arguments))
+    if isinstance(error, PermissionError):
+        advised.append("Choose another folder, or change who may read and write this one")
     context = getattr(error, "ctx", None)
     if not advised and isinstance(error, click.UsageError) and context is not None:
         advised = list(_misplaced_words(context, arguments))

@@ -10,8 +10,9 @@ import numpy as np
 from attrs import frozen
 
 from graspsense.core.learn.conformal import scores_of
+from graspsense.core.learn.model import refuse_improbable
 from graspsense.core.learn.novelty import novelty_of
-from graspsense.core.values.errors import ConfigError, counted
+from graspsense.core.values.errors import ComponentFailed, ConfigError, counted
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -154,7 +155,7 @@ def fit_and_predict(
 ) -> tuple[tuple[str, ...], NDArray[np.float64], NDArray[np.float64] | float]:
     """Return the classes, their probabilities for the test trials, and the support of the answers.
 
-    `known` are the labels of the training trials. Raises FitRefused.
+    `known` are the labels of the training trials. Raises FitRefused, and ComponentFailed for what are no probabilities.
     """
     if len(set(known)) == 1:
         return (known[0],), np.ones((len(test), 1)), nan
@@ -168,4 +169,12 @@ def fit_and_predict(
         ) from error
     tested = table.rows(test)
     support = classifier.support(tested)
-    return classifier.classes(), classifier.probabilities(tested), nan if support is None else support
+    classes, shares = classifier.classes(), classifier.probabilities(tested)
+    try:
+        refuse_improbable(shares, len(test), len(classes))
+    except ValueError as error:
+        name = f"{type(classifier).__module__}.{type(classifier).__qualname__}"
+        raise ComponentFailed(
+            f"the classifier {name} cannot be used: {error}. Correct it, or choose another"
+        ) from error
+    return classes, shares, nan if support is None else support

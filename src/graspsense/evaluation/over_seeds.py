@@ -103,4 +103,4 @@ def mean_difference(
     error = max(stdev(each), 1 / n) / math.sqrt(len(each))
     half = t_quantile(len(each) - 1, comparisons) * error
     p = 2.0 * float(stdtr(len(each) - 1, -abs(mean) / error))
-    return MeanDifference(mean, (mean - half, mean + half), min(1.0, comparisons * p))
+    return MeanDifference(mean, (max(mean - half, -1.0), min(mean + half, 1.0)), min(1.0, comparisons * p))

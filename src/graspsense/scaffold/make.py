@@ -17,6 +17,7 @@ from attrs import frozen
 
 from graspsense import __version__
 from graspsense.core.components.entries import TABLE_OF_ROLE, Role
+from graspsense.core.components.firstparty import DISTRIBUTION, EXAMPLES, SHIPPED
 from graspsense.core.components.hookspecs import API
 from graspsense.core.components.registry import canonical, installed, installed_sources
 from graspsense.core.values.errors import ConfigError, suggestion
@@ -261,6 +262,11 @@ def _check_importable(name: str) -> None:
     package = name.replace("-", "_")
     if keyword.iskeyword(package):
         raise ConfigError(f"the name {name!r} is not valid: {package} is a keyword of Python")
+    ours = (DISTRIBUTION, *(shipped.distribution for shipped in (*SHIPPED, *EXAMPLES)))
+    if name in ours:
+        raise ConfigError(
+            f"the name {name!r} is taken: graspsense itself has it. Choose another name, as lab-hand"
+        )
     if package in sys.stdlib_module_names:
         raise ConfigError(f"the name {name!r} is taken: Python itself has a module {package}")
     if package not in sys.modules and find_spec(package) is None:

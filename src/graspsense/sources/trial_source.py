@@ -126,8 +126,8 @@ def load_trials(
     )
 
 
-NOT_READ: Final = (".npz", ".parquet")
-"""Endings of the tables that `graspsense export` writes for other programs, and that are not read as trials."""
+NOT_READ: Final = (".npz", ".parquet", ".json", ".jsonl", ".ndjson")
+"""Endings of files that can hold a table, which is not read as trials."""
 OF_RECORDINGS: Final = (".mcap", ".bag", ".db3", ".npy", ".mat", ".h5")
 """Endings of files of recordings, which are imported before there is anything to learn from."""
 
@@ -138,8 +138,8 @@ def kind_of(source: str) -> Kind:
         return "simulated"
     if source.lower().endswith(NOT_READ) and Path(source).is_file():
         raise ConfigError(
-            f"{source} is not read as a table of trials: name the store as store:DIR, or a table of it as FILE.csv "
-            "(graspsense export DIR --to FILE.csv)"
+            f"{source} is not read as a table of trials: write the table as FILE.csv. If it is of a store, name the "
+            "store as store:DIR"
         )
     if source.lower().endswith(OF_RECORDINGS) and Path(source).is_file():
         raise ConfigError(

@@ -39,7 +39,7 @@ def order_recorded(
         unknown = len(times) - len(known_times)
         return None, (
             f"{unknown} of {counted(len(times), 'trial')} were imported without the time at which they were recorded "
-            f"({RECORDED_AT} of a manifest)"
+            "(the key recorded of a manifest)"
         )
     return _positions(known_times), ""
 

@@ -8,7 +8,7 @@ from typing import Any, Final, Literal, Protocol
 
 from attrs import define, field, frozen
 
-from graspsense.core.values.errors import FAILURES, GraspsenseError, named
+from graspsense.core.values.errors import FAILURES, GraspsenseError, named, place_of
 
 State = Literal["passed", "failed", "skipped", "expected failure"]
 
@@ -90,7 +90,7 @@ def raises_nothing(what: str, advice: str) -> Iterator[None]:
     except CheckFailed:
         raise
     except Exception as error:
-        raise CheckFailed(f"{what} raised {named(error)}{advice}") from error
+        raise CheckFailed(f"{what} raised {named(error)}{place_of(error)}{advice}") from error
 
 
 def outcome_of(check: Check, subject: Named, expected: Mapping[str, str]) -> Result:
@@ -109,7 +109,7 @@ def outcome_of(check: Check, subject: Named, expected: Mapping[str, str]) -> Res
     except GraspsenseError as error:  # its message says what to do
         state, text = "failed", str(error)
     except FAILURES as error:
-        where = _place(error)
+        where = place_of(error)
         state, text = "failed", f"it raised {named(error)}{where}: catch it there, or return what is required"
     if check.id in expected:
         if state == "failed":
@@ -118,15 +118,6 @@ def outcome_of(check: Check, subject: Named, expected: Mapping[str, str]) -> Res
             state = "failed"
             text = f"it was expected to fail ({expected[check.id]}) and passes: take it out of the expected failures"
     return Result(subject.name, subject.role, check.id, check.title, state, text)
-
-
-def _place(error: BaseException) -> str:
-    """Return the place of the innermost frame of an exception: ` in file.py:12`."""
-    trace, place = error.__traceback__, ""
-    while trace is not None:
-        path = trace.tb_frame.f_code.co_filename.replace("\\", "/").rpartition("/")[2]
-        place, trace = f" in {path}:{trace.tb_lineno}", trace.tb_next
-    return place
 
 
 @define

@@ -90,6 +90,10 @@ def fresh_ticks(
         )
         with raises_nothing("step", advice):
             command, after = step(params, state, reading)
+        demand(
+            isinstance(command, tuple) and len(command) == len(Command._fields),
+            f"step returned {command!r} as the command: return graspsense.plugin_api.Command",
+        )
         ticks.append(Tick(state, reading, command, after))
         state = after
         if getattr(after, "outcome", RUNNING) != RUNNING:

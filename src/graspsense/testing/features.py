@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import inspect
 import json
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from attrs import evolve
 
 from graspsense.core.components.compiled_features import columns_of_ticks, compiled_extraction
+from graspsense.core.components.roles import FeatureSet
 from graspsense.core.values.features import Features
 from graspsense.core.values.signals import Phase
 from graspsense.core.values.trace import Trace
@@ -31,10 +32,12 @@ from graspsense.testing.subject import Subject
 CUTS: Final = 48
 
 
-def _features(subject: Subject, trace: Trace, which: str = "a whole grasp") -> Features:
+def _features(
+    subject: Subject, trace: Trace, which: str = "a whole grasp", set_: FeatureSet[Any] | None = None
+) -> Features:
     advice = f" on {which}: return NaN with a reason in `reasons` where a feature is not defined"
     with raises_nothing("extract", advice):
-        features: Features = subject.create().extract(trace)
+        features: Features = (set_ or subject.create()).extract(trace)
     demand(
         isinstance(features, Features),
         f"extract returned {features!r}: return graspsense.plugin_api.Features",
@@ -122,9 +125,9 @@ def handles_a_trace_that_ends_anywhere(subject: Subject) -> None:
 def same_trace_same_features(subject: Subject) -> None:
     """The same trace gives the same features with the same and with another instance."""
     set_, trace = subject.create(), _whole(subject)
-    features = set_.extract(trace)
-    set_.extract(_whole(subject, stiffness_n_m=500.0))
-    for again in (set_.extract(trace), subject.create().extract(trace)):
+    features = _features(subject, trace, set_=set_)
+    _features(subject, _whole(subject, stiffness_n_m=500.0), set_=set_)
+    for again in (_features(subject, trace, set_=set_), _features(subject, trace)):
         demand(
             _same(features, again),
             f"called again it gives {again.as_dict()}, not {features.as_dict()}: keep no state between calls and draw "

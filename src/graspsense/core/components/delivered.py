@@ -45,6 +45,8 @@ class Delivered:
 
     def problem(self, reading: Reading) -> str:
         """Return what is wrong with this reading, in words; an empty text if nothing is."""
+        if not isinstance(reading, Reading):
+            return f"read returned {type(reading).__name__}: return graspsense.plugin_api.Reading"
         frame, pads, signals = reading
         try:
             _FRAME.pack(*frame)

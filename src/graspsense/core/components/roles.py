@@ -488,7 +488,7 @@ class FeatureSet(ABC, Generic[ConfigT]):
         """Return the declared features with these values, for `extract` to return.
 
         A feature without a value is NaN, and `reasons` says why. Raises ValueError for a name that the class does not
-        declare, for an infinite value, and for a NaN without a reason.
+        declare, for what is no number or infinite, and for a NaN without a reason.
         """
         from graspsense.core.values.features import Features
 
@@ -498,9 +498,16 @@ class FeatureSet(ABC, Generic[ConfigT]):
                 raise ValueError(
                     f"{type(self).__name__} declares no feature {name!r}; it has {', '.join(names)}"
                 )
+        numbers = []
+        for name in names:
+            try:
+                numbers.append(float(values.get(name, nan)))
+            except (TypeError, ValueError) as error:
+                kind = type(values[name]).__name__
+                raise ValueError(f"feature {name!r} is of type {kind}: give one number") from error
         return Features(
             names=names,
-            values=tuple(float(values.get(name, nan)) for name in names),
+            values=tuple(numbers),
             units=tuple(feature.unit for feature in self.features),
             reasons=dict(reasons or {}),
         )

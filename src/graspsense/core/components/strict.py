@@ -225,7 +225,7 @@ def shown(value: object) -> str:
         digits = str(value) if value.bit_length() <= 1000 else f"a number of {value.bit_length()} bits"
         return f"{digits} (a whole number)"
     if isinstance(value, float):
-        return f"{value} (a number)"
+        return "nan (not a number)" if math.isnan(value) else f"{value} (a number)"
     if isinstance(value, Mapping):
         return "a table"
     if isinstance(value, list | tuple):

@@ -24,7 +24,7 @@ def opened_gripper(backend: SensorBackend[Any], seed: int) -> DeviceInfo:
     except SystemExit as error:
         raise DeviceLost(f"`open` of the gripper {name} raised {named(error)}") from error
     except Exception as error:
-        error.add_note(f"`open` of the gripper {name} raised it")
+        error.add_note(f"`open` of the gripper {name} was running")
         raise
     if not isinstance(info, DeviceInfo):
         raise TypeError(

@@ -42,7 +42,7 @@ from graspsense.core.grasp.opened_gripper import described, opened_gripper
 from graspsense.core.grasp.sinks import DeviceSink, EventSink, PictureSink, Sink, Watcher
 from graspsense.core.grasp.time_limits import frame_timeout_s, no_frame, overdue, seconds_at_most
 from graspsense.core.values.device import DeviceInfo
-from graspsense.core.values.errors import FAILURES, DeviceLost, RecordingEnded, TareRefused, named
+from graspsense.core.values.errors import FAILURES, DeviceLost, RecordingEnded, TareRefused, named, place_of
 from graspsense.core.values.events import EventSource, GraspEvent, event_name
 from graspsense.core.values.faults import LIMITED, Fault
 from graspsense.core.values.features import Prediction
@@ -223,6 +223,7 @@ def _announce(
 
 MOSTLY: Final = 0.1
 """Share of the commands of a squeeze from which on it is not the one that the controller commanded."""
+_PHASES: Final = frozenset(Phase)
 
 
 class _NotDelivered(Exception):
@@ -304,7 +305,7 @@ class _Grasp:
             ending = Outcome.ABORTED, "interrupted"
         except FAILURES as error:
             # A controller can raise anything; the gripper must still be released and the trace kept.
-            ending = Outcome.ABORTED, named(error)
+            ending = Outcome.ABORTED, f"{named(error)}{place_of(error)}"
         finally:
             self.interrupts.deferred = True
             # A lost gripper may still receive commands, so it is commanded to relax.
@@ -365,7 +366,7 @@ class _Grasp:
             if not same_phase:
                 if phase == TARING and not self._tared(images, frame):
                     return
-                self.state = state = self._not_yet_at_rest(state, frame)
+                self.state = state = self._not_yet_at_rest(self._known(state, frame), frame)
                 phase, newest = state.phase, pads.counter
                 self._event(frame.t_s, Phase(phase), Phase(phase).name.lower())
             if state.guard is not watcher:
@@ -404,6 +405,13 @@ class _Grasp:
         if problem := self.delivered.problem(reading):
             raise _NotDelivered(f"{self.info.name} delivered what it does not declare: {problem}")
         return reading
+
+    def _known(self, state: TickState, frame: Frame) -> TickState:
+        """Return a state whose phase exists. Raises StepFailed, after which the gripper releases."""
+        if state.phase in _PHASES:
+            return state
+        self.state = stopped(self.params.schedule, state, frame)
+        raise StepFailed(f"the controller gave the phase {state.phase}: it has APPROACH, SQUEEZE and HOLD")
 
     def _not_yet_at_rest(self, state: TickState, frame: Frame) -> TickState:
         """Return the state of a phase that begins: fingers that open rest at the earliest when the gripper has acted.

@@ -29,6 +29,7 @@ from graspsense.core.learn.novelty import Novelty, novelty_from
 from graspsense.core.learn.stored_values import StoredValueError, StoredValues
 from graspsense.core.learn.temperature import RANGE as TEMPERATURES
 from graspsense.core.values.errors import (
+    ComponentFailed,
     ConfigError,
     DataDamaged,
     PluginUnavailable,
@@ -51,8 +52,14 @@ _READ: Final = (1, VERSION)
 
 
 def write_model(path: Path, model: Model) -> None:
-    """Write the file of a model atomically. Raises OSError."""
-    write_json_lines(path, as_json(model))
+    """Write the file of a model atomically. Raises OSError, and ComponentFailed if its classifier gives no JSON."""
+    try:
+        write_json_lines(path, as_json(model))
+    except (TypeError, ValueError) as error:
+        raise ComponentFailed(
+            f"the model of {model.component} cannot be stored: {named(error)}. Its to_json gives lists, tables, texts "
+            "and finite numbers"
+        ) from error
 
 
 def as_json(model: Model) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from graspsense.core.pipeline.wiring import check
 from graspsense.core.settings.layers import Flag
 from graspsense.core.settings.resolved import Settings, resolve
 from graspsense.core.values.device import DeviceInfo
-from graspsense.core.values.errors import FAILURES, named
+from graspsense.core.values.errors import FAILURES, named, place_of
 from graspsense.core.values.events import GraspEvent
 from graspsense.core.values.features import UNKNOWN, Features, Prediction, missing
 from graspsense.core.values.signals import Outcome
@@ -205,13 +205,14 @@ def _recognised(
                 f"extract returned {type(features).__name__}: return graspsense.plugin_api.Features"
             )
     except FAILURES as error:
-        features = _undefined(settings, f"{settings.features.component.qualified} failed: {named(error)}")
+        why = f"{settings.features.component.qualified} failed: {named(error)}{place_of(error)}"
+        features = _undefined(settings, why)
     if model is None:
         return features, None
     try:
         return features, model.predict(features, settings, grasp.device)
     except FAILURES as error:
-        why = f"{model.component} failed: {named(error)}"
+        why = f"{model.component} failed: {named(error)}{place_of(error)}"
         return features, Prediction(label=UNKNOWN, probabilities={}, because=(why,))
 
 

@@ -65,7 +65,9 @@ def _too_small(settings: Settings) -> Iterator[str]:
     if gripper.closes_itself and "effort" in sent_kinds(settings.controller):
         yield f"{asks} commands an effort, which has no speed, and {cannot} closes by itself. Send one of its kinds"
     for what, unit, can, asked, factor in least:
-        if asked is not None and asked < can:
+        if asked is not None and not isinstance(asked, int | float):
+            yield f"{asks} asks for a {what} of {asked!r}. Let its class return a number in SI units, or None"
+        elif asked is not None and asked < can:
             yield (
                 f"{asks} asks for a {what} of {asked * factor:g} {unit}, and the least {what} of {cannot} is "
                 f"{can * factor:g} {unit}. Ask for at least that, or choose another gripper"

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from itertools import islice
+from pathlib import Path
 from typing import Final
 
 from graspsense.core.values.exit_code import ExitCode
@@ -17,6 +18,7 @@ MOST_NAMED: Final = 24
 """Limit on the names that an error lists."""
 _LONGEST_NAME: Final = 100
 _MOST_COMPARED: Final = 1000
+_FRAMEWORK: Final = Path(__file__).parents[2]
 
 
 class GraspsenseError(Exception):
@@ -89,6 +91,21 @@ class RecordingEnded(Exception):
 def named(error: BaseException) -> str:
     """Return an exception in words: `ZeroDivisionError: float division by zero`."""
     return f"{type(error).__name__}: {error}"
+
+
+def place_of(error: BaseException) -> str:
+    """Return the innermost place of a caught exception in the plugin that was called: ` in lab_hand/backend.py:12`.
+
+    It is empty if no code of a plugin is in the traceback.
+    """
+    trace, folder, place = error.__traceback__, None, ""
+    while trace is not None:
+        path = Path(trace.tb_frame.f_code.co_filename)
+        ours = path.is_relative_to(_FRAMEWORK) and not path.is_relative_to(_FRAMEWORK / "plugins")
+        if path.is_file() and not ours and (folder is None or path.is_relative_to(folder)):
+            folder, place = path.parent, f" in {path.parent.name}/{path.name}:{trace.tb_lineno}"
+        trace = trace.tb_next
+    return place
 
 
 def suggestion(word: str, allowed: Iterable[str]) -> str:

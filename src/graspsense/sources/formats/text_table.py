@@ -41,6 +41,8 @@ _LINE_ENDS: Final = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
 """The characters at which `str.splitlines` divides a text."""
 _COMMENTS: Final = ("#", "%")
 _SEPARATOR_LINE: Final = re.compile(r'"?sep=([;,\t|])"?\s*')
+SPREADSHEETS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
+"""The first bytes of a ZIP file, as which spreadsheets are saved, and of those of old programs."""
 _CODE_PAGES: Final = ("cp1252", "cp1250", "iso8859-1", "iso8859-15")
 """They agree on degrees, micro and the letters of several languages."""
 _WITH_UNIT: Final = re.compile(r"(.*[0-9.])\s*([^\s0-9]+)")
@@ -505,6 +507,8 @@ def text_of(path: Path) -> str:
         with readable(path, "a file compressed by gzip"):
             data = Unpacked(path).unpack("gzip", data)
             size = max(size, len(data))
+    if data.startswith(SPREADSHEETS):
+        raise DataDamaged(f"{path} is a spreadsheet or an archive, not text: save its table as CSV in UTF-8")
     if too_large := TEXT_BYTES.exceeded(size):
         raise DataDamaged(f"{path}: {too_large}")
     text = _decoded(path, data)

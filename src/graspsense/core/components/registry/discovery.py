@@ -97,7 +97,10 @@ def disabled_in_config() -> tuple[str, ...]:
     except (FileNotFoundError, NotADirectoryError):
         return ()
     except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path} cannot be read: {error}") from error
+        raise ConfigError(
+            f"{path} cannot be read: {getattr(error, 'strerror', error)}. It names the plugins that are switched off: "
+            f"correct it, or set XDG_CONFIG_HOME to another folder than {path.parent.parent}"
+        ) from error
     try:
         values = toml_values(text)
     except TomlError as error:

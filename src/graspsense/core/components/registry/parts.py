@@ -161,7 +161,7 @@ class Component(Declared[ComponentEntry]):
                 raise self._unavailable(str(error)) from error
             name = f"{config_class.__module__}:{config_class.__qualname__}"
         if not (isinstance(config_class, type) and attrs.has(config_class)):
-            raise self._unavailable(f"{name} is not an attrs class")
+            raise self._unavailable(f"{name} is not an attrs class: write @attrs.frozen above it")
         return config_class
 
     def component_class(self) -> type:
