@@ -240,3 +240,16 @@ def test_the_attribute_units_of_an_array_of_hdf5_is_its_unit(tmp_path):
     last = grasps[0].recording.readings[-1].frame
     assert (last.t_s, last.gap_m) == pytest.approx((1.19, 0.05))
     assert [grasp.label for grasp in grasps] == ["jar", "jar"]
+
+
+def test_packed_numbers_of_netcdf_are_unpacked(tmp_path):
+    """Forces in steps of 0.01 N above -5 N, as whole numbers, and a gap in which -1 stands for no number."""
+    with h5py.File(tmp_path / "a.nc", "w") as file:
+        file["t"] = T_S
+        packed = file.create_dataset("F", data=np.round((FORCE + 5.0) * 100.0).astype("i2"))
+        packed.attrs.update(scale_factor=np.array([0.01]), add_offset=-5.0)
+        gap = file.create_dataset("pos", data=np.where(np.arange(len(T_S)) == 3, -1.0, GAP))
+        gap.attrs["_FillValue"] = np.array([-1.0])
+    arrays = hdf5_arrays(tmp_path / "a.nc")
+    assert arrays["F"] == pytest.approx(FORCE, abs=0.006)
+    assert np.flatnonzero(np.isnan(arrays["pos"])).tolist() == [3]

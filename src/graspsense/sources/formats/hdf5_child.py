@@ -64,11 +64,25 @@ def arrays(path: str, name: str, dataset: Any, left: int) -> Iterator[tuple[str,
         if matlab == b"char":
             yield name, np.array("".join(map(chr, np.ravel(values, order="F").tolist())))
         else:
-            yield name, np.asarray(values).T if matlab else np.asarray(values)
+            yield name, np.asarray(values).T if matlab else unpacked(np.asarray(values), dataset.attrs)
             unit = dataset.attrs.get("units", dataset.attrs.get("unit", ""))
             unit = unit.decode(errors="replace") if isinstance(unit, bytes) else unit
             if isinstance(unit, str) and unit:
                 yield f"{name}{UNITS}", np.array(unit)
+
+
+def unpacked(values: Any, attributes: Any) -> Any:
+    """Return the numbers that the stored ones stand for, by the attributes of netCDF; NaN where one is missing.
+
+    A number is `add_offset` + `scale_factor` * the stored one, unless that is `_FillValue` or a `missing_value`.
+    """
+    missing = [attributes[key] for key in ("_FillValue", "missing_value") if key in attributes]
+    absent = np.isin(values, np.concatenate([np.ravel(value) for value in missing])) if missing else None
+    scale, offset = attributes.get("scale_factor"), attributes.get("add_offset")
+    if scale is not None or offset is not None:
+        values = values * np.float64(1.0 if scale is None else np.ravel(scale)[0])
+        values = values + np.float64(0.0 if offset is None else np.ravel(offset)[0])
+    return values if absent is None or not absent.any() else np.where(absent, np.nan, values)
 
 
 def main(path: str, out: str, most: int) -> None:
