@@ -634,7 +634,7 @@ def test_fingers_that_do_not_come_to_rest_are_relaxed_after_the_opening_time():
     assert len(opening) == pytest.approx(2000, abs=3)
     assert gripper.commands[-1].value == 0.0
     assert grasp.outcome is Outcome.ABORTED
-    assert "in tests/test_runner.py:" in grasp.reason
+    assert "in core/test_runner.py:" in grasp.reason
 
 
 def test_a_gripper_that_returns_no_reading_is_named():
