@@ -88,7 +88,7 @@ def _weak_runs(
     return [
         (begin, end)
         for begin, end in _held_runs(force, np.diff(columns.t_s), UNLOADED)
-        if 0 < begin
+        if begin > 0
         and end < len(force)
         and not held[begin:end].any()
         and gap[begin:end].mean() < half_closed
