@@ -311,7 +311,7 @@ class ExperimentKindEntry:
     findings: str = field(default="", validator=_IS_TARGET_OR_EMPTY)
     """The import string of a function from a `Summary` to `Findings`; empty if the rates are the whole report."""
     simulates: bool = False
-    """Whether a task simulates its trials itself, so that `[data]` cannot name recorded ones."""
+    """Whether tasks simulate all trials: recorded ones are refused."""
     seconds_per_trial: float | None = field(default=None, validator=optional(ge(0.0)))
     """Processor time per trial, from which the duration of a user's experiment is estimated; None if not known."""
     needs: str = ""
