@@ -28,7 +28,6 @@ from graspsense.experiments.summary import summarise
 from graspsense.experiments.task import Task, TaskResult
 from graspsense.experiments.timing import TimeLeft
 from graspsense.plugin_api import hookimpl
-from graspsense.sources.trial_source import groups_of
 from graspsense.store.store import Store
 
 EXPERIMENT = """
@@ -473,12 +472,11 @@ def test_what_an_experiment_of_parts_would_ignore_is_refused(option):
 
 
 def test_recorded_trials_are_not_simulated_in_silence(tmp_path):
-    """A trade-off of classifiers simulated its own trials, whatever its source."""
+    """A trade-off of classifiers simulated its own trials, whatever its source. It is refused before it runs."""
     table = tmp_path / "t.csv"
     table.write_text("what,a\n" + "x,1\ny,2\n" * 5)
-    planned = read_experiment("trade_next", [f'data.source="{table}"', 'data.label="what"', "seeds=1"])
     with pytest.raises(ConfigError, match="has recorded trials"):
-        groups_of(planned.cases[0].data)
+        read_experiment("trade_next", [f'data.source="{table}"', 'data.label="what"', "seeds=1"])
 
 
 def test_an_experiment_does_not_write_into_a_store(file, tmp_path):

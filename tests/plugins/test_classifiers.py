@@ -13,6 +13,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from attrs import evolve
 from cases import every_case
 
 from graspsense.core.values.errors import ConfigError
@@ -97,6 +98,12 @@ class TestEvery:
 
         assert rate(classifier, wide, labels) > 0.95
         assert np.isfinite(classifier.probabilities(wide)).all()
+
+    def test_values_too_small_to_be_squared_are_told_apart(self, name):
+        table, labels = trials()
+        small = evolve(table, values=table.values * 1e-310)
+
+        assert rate(fitted(name, small, labels), small, labels) > 0.95
 
     def test_the_order_of_columns_does_not_matter(self, name):
         classifier = learned(name)

@@ -411,6 +411,15 @@ def test_squeezes_of_any_force_are_found_with_drift_and_faults(factors, change, 
     assert begins == pytest.approx([0.0, 6.0, 12.0, 18.0], abs=0.6)
 
 
+def test_a_squeeze_that_is_too_weak_to_be_found_is_told(tmp_path):
+    """The third one has 5 % of the force of the others; none is told among equal ones."""
+    for factors, told in ((1.0, 1.0, 0.05, 1.0), 1), ((1.0, 1.0, 1.0, 1.0), 0):
+        gaps, force, time = repeated(*factors)
+        squeezes = plain(tmp_path, 'split = "force"', force=force, gap=gaps, time=time)
+        notes = [note for squeeze in squeezes for note in squeeze.notices if "taken for no squeeze" in note]
+        assert len(notes) == told
+
+
 def test_a_clock_that_begins_anew_between_two_squeezes_costs_neither(tmp_path):
     gaps, forces, time = repeated(1.0, 1.0)
     anew = np.where(time < 5.3, time, time - 5.3)

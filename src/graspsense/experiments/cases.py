@@ -175,7 +175,13 @@ class CasePlan:
         )
         if any(source is not None and source.kind == SIMULATED for source in (data, test)):
             simulated_objects(settings)
-        judge = self._keys(values.get("judge", {}), kind_of(experiment.kind).keys_class(), "judge")
+        kind = kind_of(experiment.kind)
+        if data is not None and kind.declared.entry.simulates:
+            try:
+                groups_of(data)
+            except ConfigError as error:
+                raise ConfigError(f"{self.layer.where(('data', 'source'))}: {error}") from error
+        judge = self._keys(values.get("judge", {}), kind.keys_class(), "judge")
         if test is None and data is not None and judge is not None:
             self._check_folds(settings, data, judge)
         return ExperimentCase(

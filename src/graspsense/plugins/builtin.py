@@ -182,6 +182,7 @@ def graspsense_experiment_kinds() -> Iterable[ExperimentKindEntry]:
             run=f"{trades}.{module}:{name}",
             keys=f"{trades}.{module}:{keys}",
             findings=f"{trades}.findings:findings",
+            simulates=name != "trade",
             seconds_per_trial=seconds,
             summary=summary,
         )

@@ -29,6 +29,7 @@ def graspsense_experiment_kinds() -> Iterable[ExperimentKindEntry]:
         keys="graspsense_paper.grasping:GraspSettings",
         result="graspsense_paper.grasp_result:GraspResult",
         findings=_FINDINGS,
+        simulates=True,
         seconds_per_trial=0.264,
         summary="grasps only: peak forces, breakage, speed at contact, raw sums of the pads",
     )

@@ -310,6 +310,8 @@ class ExperimentKindEntry:
     """The import string of the class of the result; empty for recognition rates."""
     findings: str = field(default="", validator=_IS_TARGET_OR_EMPTY)
     """The import string of a function from a `Summary` to `Findings`; empty if the rates are the whole report."""
+    simulates: bool = False
+    """Whether tasks simulate all trials: recorded ones are refused."""
     seconds_per_trial: float | None = field(default=None, validator=optional(ge(0.0)))
     """Processor time per trial, from which the duration of a user's experiment is estimated; None if not known."""
     needs: str = ""

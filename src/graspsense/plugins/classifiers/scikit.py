@@ -175,17 +175,19 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
             warnings.simplefilter("ignore", RuntimeWarning)  # by numpy, for a column without values
             fill = np.nan_to_num(np.nanmedian(table.values, axis=0), nan=0.0)
         filled = np.where(np.isnan(table.values), fill, table.values)
-        origin, scale = self.origin_and_scale(filled)
+        # Powers of two, which keep every digit: the square of a value below 1e-162 would be 0.
+        units = np.ldexp(1.0, np.frexp(np.abs(filled).max(axis=0))[1] - 1)
+        origin, scale = self.origin_and_scale(filled / units)
         # A feature that varies only by rounding is constant; scaling would amplify it to noise.
-        constant = scale <= 1e-12 * np.maximum(np.abs(filled).max(axis=0), np.finfo(np.float64).tiny)
+        constant = scale <= 1e-12
         fitted = FittedEstimator(
             estimator=self.estimator(seed, len(labels)),
             table=table,
             labels=tuple(labels),
             seed=seed,
             fill=fill,
-            mean=origin,
-            scale=np.where(constant, 1.0, scale),
+            mean=origin * units,
+            scale=np.where(constant, 1.0, scale * units),
         )
         # A training that diverges is told by what it gives, and not by warnings of numpy.
         with one_thread(), np.errstate(over="ignore", invalid="ignore", divide="ignore"):

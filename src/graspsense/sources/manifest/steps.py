@@ -11,7 +11,7 @@ import numpy as np
 from attrs import evolve
 
 from graspsense.core.grasp.gap_resolution import gap_resolution
-from graspsense.core.values.errors import DataDamaged
+from graspsense.core.values.errors import DataDamaged, counted
 from graspsense.core.values.limits import SAMPLES
 from graspsense.sources.columns.grasp_columns import (
     PLAUSIBLE,
@@ -66,8 +66,38 @@ def squeezes(columns: GraspColumns) -> list[GraspColumns]:
         raise DataDamaged(f"{columns.source}: no squeeze was found, because its force never rises")
     between = (_middle(columns.t_s, end, begin) for (_, end), (begin, _) in pairwise(runs))
     bounds = [0, *between, len(force)]
-    return [
+    parts = [
         columns.rows(slice(start, end), f"squeeze {k}") for k, (start, end) in enumerate(pairwise(bounds), 1)
+    ]
+    weak = _weak_runs(columns, force, runs)
+    if weak:
+        strongest = max(float(np.ptp(force[begin - 1 : end])) for begin, end in weak)
+        unit = columns.units.get("force") or "N"
+        note = (
+            f"{counted(len(weak), 'rise')} of the force by at most {strongest:.2g} {unit} (the first at "
+            f"{columns.t_s[weak[0][0]]:.4g} s) is taken for no squeeze: less than {WEAKEST:.0%} of the usual force. "
+            "If fingers closed then, split by a column"
+        )
+        parts[0] = evolve(parts[0], warnings=(*parts[0].warnings, note))
+    return parts
+
+
+def _weak_runs(
+    columns: GraspColumns, force: NDArray[np.float64], runs: list[tuple[int, int]]
+) -> list[tuple[int, int]]:
+    """Return where the force rises by less than a squeeze and comes back, while the fingers are closed."""
+    held = np.zeros(len(force), dtype=bool)
+    for begin, end in runs:
+        held[begin:end] = True
+    gap = columns.gap_m
+    half_closed = 0.5 * (float(np.nanmax(gap, initial=0.0)) + float(np.nanmin(gap[held], initial=np.inf)))
+    return [
+        (begin, end)
+        for begin, end in _held_runs(force, np.diff(columns.t_s), UNLOADED)
+        if begin > 0
+        and end < len(force)
+        and not held[begin:end].any()
+        and gap[begin:end].mean() < half_closed
     ]
 
 
@@ -77,7 +107,9 @@ def _middle(t_s: NDArray[np.float64], end: int, begin: int) -> int:
     return end + int(back[0]) if len(back) else (end + begin) // 2
 
 
-def _held_runs(force: NDArray[np.float64], steps_s: NDArray[np.float64]) -> list[tuple[int, int]]:
+def _held_runs(
+    force: NDArray[np.float64], steps_s: NDArray[np.float64], weakest: float = WEAKEST
+) -> list[tuple[int, int]]:
     """Return the first sample of each squeeze and the one after its last."""
     noise = NOISE * float(np.median(np.abs(np.diff(force, 2)))) if len(force) > 2 else 0.0
     around = np.pad(force, FEWEST - 1, mode="edge")
@@ -87,7 +119,7 @@ def _held_runs(force: NDArray[np.float64], steps_s: NDArray[np.float64]) -> list
         return []
     loaded = force[force > low + max(noise, UNLOADED * (high - low))]
     usual = float(np.median(loaded)) - float(low) if len(loaded) else float(high - low)
-    rise = max(noise, WEAKEST * usual)
+    rise = max(noise, weakest * usual)
     shortest = SHORTEST_RELEASE_S / float(np.median(steps_s)) if len(steps_s) else 0.0
     joined: list[tuple[int, int]] = []
     for begin, end in _rises(force, rise, max(rise, 0.5 * usual)):
