@@ -139,7 +139,12 @@ def test_with_json_an_error_is_an_object_on_stdout_too(run):
     [
         (NoDevice("no gripper on any bus"), 3, "graspsense: no gripper on any bus\n"),
         (DeviceLost("no frame for 100 ms"), 4, "graspsense: no frame for 100 ms\n"),
-        (PermissionError(13, "Permission denied", "/root/x"), 2, "graspsense: Permission denied: /root/x\n"),
+        (
+            PermissionError(13, "Permission denied", "/root/x"),
+            2,
+            "graspsense: Permission denied: /root/x\n"
+            "  Choose another folder, or change who may read and write this one\n",
+        ),
         (KeyboardInterrupt(), 130, "interrupted\n"),
         (
             KeyError("gap"),
