@@ -433,7 +433,9 @@ def _constant(name: str) -> str:
                 and ast.unparse(statement.target) == name
                 and isinstance(text, ast.Expr)
             ):
-                return f"| `{name}` | {value:g} | {_cell(' '.join(ast.literal_eval(text.value).split()))} |"
+                home = "" if DOOR_OF[name] is plugin_api else f" (in `{DOOR_OF[name].__name__}`)"
+                meaning = _cell(" ".join(ast.literal_eval(text.value).split()))
+                return f"| `{name}` | {value:g} | {meaning}{home} |"
     raise LookupError(f"{name} has no docstring")
 
 

@@ -32,6 +32,7 @@ def test_without_any_option_it_grasps_a_bottle_and_shows_it_live():
     assert "outcome     steady" in done.stdout
     for name in ("p_first", "p_steady", "f_steady", "delta_t", "dp_dt", "df_dt"):
         assert f"\n{name}" in done.stdout
+    assert "\nbecause     p_first = " in done.stdout
     assert "simulated" in done.stdout
     assert "Traceback" not in done.stderr
 

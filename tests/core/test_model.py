@@ -150,6 +150,7 @@ def test_further_features_and_another_order_do_no_harm():
 
 
 def test_simulated_training_is_said_and_louder_on_a_real_gripper():
+    assert "on 120 simulated and recorded grasps" in model(simulated=True, recorded_too=True).in_a_line
     simulated = model(simulated=True)
 
     assert simulated.predict(CAN).warnings == (

@@ -80,6 +80,7 @@ def test_every_value_within_what_is_declared_is_accepted():
         ),
         ({"default": 7, "maximum": 5, "meaning": "m"}, "the default 7 is not allowed: a value is at most 5"),
         ({"default": 1.0, "meaning": "M.", "minimum": 0.0, "above": 0.0}, "one lower"),
+        ({"default": 1.0, "meaning": "M.", "factory": float}, "one default"),
         ({"default": 1.0, "meaning": "M.", "plausible": (2.0, 1.0)}, "is empty"),
         ({"default": 1.0, "meaning": "M.", "plausible": (2.0, 3.0)}, "not in the plausible range"),
     ],
@@ -87,6 +88,15 @@ def test_every_value_within_what_is_declared_is_accepted():
 def test_a_declaration_that_is_wrong_is_refused_when_the_class_is_made(declaration, says):
     with pytest.raises(TypeError, match=says):
         setting(**declaration)
+
+
+def test_a_number_that_may_be_infinite_is_still_a_number():
+    @frozen
+    class Patience:
+        most_s: float = setting(default=math.inf, meaning="Longest wait.")
+
+    with pytest.raises(ValueError, match="'most_s' must be a number: nan"):
+        Patience(math.nan)
 
 
 def all_keys(keys, above=""):

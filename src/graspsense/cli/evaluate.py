@@ -64,7 +64,7 @@ if TYPE_CHECKING:
     default=0.25,
     show_default=True,
     metavar="SECONDS",
-    help="--events: longest time from the begin of an event to its detection, before or after.",
+    help="--events: longest time from the beginning of an event to its detection, before or after.",
 )
 @classifier_option
 @source_options

@@ -128,7 +128,7 @@ def _print(evaluation: EventsEvaluation) -> None:
     echo()
     echo_entry(
         "rule",
-        f"an event is found by a detection at most {evaluation.tolerance_s:g} s from its begin, and a detection "
+        f"an event is found by a detection at most {evaluation.tolerance_s:g} s from its beginning, and a detection "
         "finds one event at most. Other detections while an event goes on do not count; all others are false",
     )
     for name in evaluation.not_told:

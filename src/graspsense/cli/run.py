@@ -403,8 +403,8 @@ def _print_prediction(prediction: Prediction) -> None:
     echo_entry("prediction", f"{prediction.label}{certainty}", prediction_style(prediction.label))
     if prediction.set_in_words:
         echo_entry("set", prediction.set_in_words)
-    for reason in prediction.because:
-        echo_entry("", reason.words)
+    for i, reason in enumerate(prediction.because):
+        echo_entry("" if i else "because", reason.words)
     echo_entry("model", prediction.model)
     for warning in prediction.warnings:
         echo_entry("warning", warning, Style.CAUTION)

@@ -28,7 +28,7 @@ def _split_options(arguments: Sequence[str]) -> Iterator[str]:
         if word != "-o" or key.startswith("-") or value.startswith("-o"):
             continue
         if "=" not in key or key.endswith("="):
-            yield f"Write -o {key.rstrip('=')}={value.removeprefix('=')}, without a blank"
+            yield f"Write -o {key.rstrip('=')}={value.removeprefix('=')}, without a space"
 
 
 def _misplaced_words(context: click.Context, arguments: Sequence[str]) -> Iterator[str]:

@@ -1,10 +1,10 @@
 """How well a detector tells the events that others labelled: precision, recall and delay, with whole groups held out.
 
-An event is found by the first detection that is at most the tolerance from its begin; each detection finds one event at
-most. Another detection while an event goes on is neither right nor wrong, and every other one is a false alarm. Nothing
-counts where the labels are missing, or as near to that as the tolerance. Thresholds are fitted by one factor for all of
-them, that with the best F1 on the recordings of the other groups. As a control, the same detections are moved by half
-of the length of their recording: what remains of their rates is chance.
+An event is found by the first detection that is at most the tolerance from its beginning; each detection finds one
+event at most. Another detection while an event goes on is neither right nor wrong, and every other one is a false
+alarm. Nothing counts where the labels are missing, or as near to that as the tolerance. Thresholds are fitted by one
+factor for all of them, that with the best F1 on the recordings of the other groups. As a control, the same detections
+are moved by half of the length of their recording: what remains of their rates is chance.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class LabelledEvents:
         return outcomes(self.labelled[name], self.labelled.get(name + NOT_KNOWN, ()), told, tolerance_s)
 
     def moved(self, told: Sequence[float]) -> list[float]:
-        """Return detections moved by half of the recording; what leaves it at the end comes in at the begin."""
+        """Return detections moved by half of the recording; what leaves it at the end comes in at the beginning."""
         if not self.seconds:
             return list(told)
         return [self.begin_s + (value - self.begin_s + 0.5 * self.seconds) % self.seconds for value in told]

@@ -171,6 +171,7 @@ def _provenance(
 ) -> dict[str, Any]:
     return {
         "simulated": any(rows.simulated),
+        "recorded_too": any(rows.simulated) and not all(rows.simulated),
         "store": str(folder),
         "newest_trial": newest,
         "recipes": len(set(rows.recipe)),

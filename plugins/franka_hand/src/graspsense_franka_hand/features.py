@@ -46,7 +46,7 @@ class WidthAndTime(FeatureSet[WidthAndTimeConfig]):
         Feature("p_steady", "m", "gap at which they rest when the squeeze ends"),
         Feature("squeezed", "m", "p_first - p_steady: how far the rising force pressed the object together"),
         Feature("delta_t", "s", "time from the first to the last rest"),
-        Feature("approach_t", "s", "time from the begin of the closing to the first rest"),
+        Feature("approach_t", "s", "time from the beginning of the closing to the first rest"),
     )
 
     def extract(self, trace: Trace) -> Features:

@@ -120,8 +120,7 @@ def setting(
     ...     speed_m_s: float = setting(default=0.02, unit="m/s", above=0.0, meaning="Speed of closing.")
     >>> assert GentleConfig(speed_m_s=0.01).speed_m_s == 0.01
     """
-    if not meaning.strip():
-        raise TypeError("a setting needs a meaning: say in a sentence what its value does")
+    _check_meaning_and_default(meaning, default, factory)
     _check_limits(default, minimum, maximum, above, below)
     _check_origin(origin)
     plain_number = isinstance(default, int | float) and not isinstance(default, bool)
@@ -145,6 +144,14 @@ def setting(
     if factory is not None:
         return attrs.field(factory=factory, validator=check, metadata=metadata)
     return attrs.field(default=default, validator=check, metadata=metadata)
+
+
+def _check_meaning_and_default(meaning: str, default: Any, factory: Callable[[], Any] | None) -> None:
+    """Raise TypeError if the meaning is missing, or there are two defaults."""
+    if not meaning.strip():
+        raise TypeError("a setting needs a meaning: say in a sentence what its value does")
+    if factory is not None and default is not attrs.NOTHING:
+        raise TypeError("a setting has one default: give `default` or `factory`")
 
 
 def _check_plausible(declaration: Declaration, default: Any) -> None:
@@ -302,7 +309,13 @@ def _limits(
         checks.append(validators.lt(math.inf))
     if number and not infinite and minimum is None and above is None:
         checks.append(validators.gt(-math.inf))
-    return checks
+    return [*checks, _is_not_nan] if infinite else checks
+
+
+def _is_not_nan(instance: Any, attribute: attrs.Attribute[Any], value: Any) -> None:
+    """Raise ValueError for NaN, which no comparison refuses where a number may be infinite."""
+    if value != value:
+        raise ValueError(f"{attribute.name!r} must be a number: {value}")
 
 
 def _is_a_choice(instance: Any, attribute: attrs.Attribute[Any], value: Any) -> None:

@@ -80,6 +80,8 @@ class Model:
     def in_a_line(self) -> str:
         """The classifier and its training data, in one line."""
         kind = "simulated grasps" if self.simulated else f"trials of {self.provenance.get('source', '?')}"
+        if self.provenance.get("recorded_too"):
+            kind = "simulated and recorded grasps"
         settings = self.provenance.get("settings", {}).get("controller") or {}
         grasp_settings = [
             worded(key, settings[key])[1]

@@ -36,6 +36,7 @@ from graspsense.core.values.errors import (
     UnknownName,
     listed,
     named,
+    place_of,
 )
 from graspsense.core.values.features import FeatureTable
 from graspsense.core.values.json_values import json_ready, settings_from_json
@@ -188,7 +189,9 @@ def classifier_from(
     except DataDamaged as error:
         raise StoredValueError(f"{stored.field('model')}.{error}") from error
     except Exception as error:
-        raise stored.refusal("model", named(error)) from error
+        # What `from_json` may raise is about the file; anything else is a mistake of the classifier.
+        place = "" if isinstance(error, KeyError | TypeError | ValueError) else place_of(error)
+        raise stored.refusal("model", f"{named(error)}{place}") from error
     return classifier
 
 

@@ -27,7 +27,7 @@ class GraspEvent:
     `source` is `runner` for a change of phase, an action of the guard or a sink that failed, and `controller` for an
     event that the controller told; `what` is then the name of the event, one of `Controller.events`. It is `model` for
     a prediction while the grasp goes on, which `prediction` then has. It is `label` for what others labelled in a
-    recording that they made: from `t_s` until `until_s`, which is `t_s` where only the begin is known.
+    recording that they made: from `t_s` until `until_s`, which is `t_s` where only the beginning is known.
     """
 
     t_s: float

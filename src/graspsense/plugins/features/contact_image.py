@@ -204,7 +204,7 @@ class ContactImageFeatures(FeatureSet[ContactImageConfig]):
         )
 
     def extract(self, trace: Trace) -> Features:
-        """Return the features of the image with the largest total between the begin of the squeeze and the release."""
+        """Return the features of the image with the largest total from the beginning of the squeeze to the release."""
         values: dict[str, float] = {}
         reasons: dict[str, str] = {}
         for side in self._sides:

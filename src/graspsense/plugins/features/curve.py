@@ -142,13 +142,13 @@ _RELEASE: Final = (
     Feature(
         "unloading_stiffness",
         "N/m",
-        "slope of force over compression from 75 % to 25 % of the force at the begin of the release; needs a release",
+        "slope of force over compression from 75 % to 25 % of the force where the release begins; needs a release",
     ),
     *(
         Feature(
             f"release_x{100 * q:.0f}",
             "N",
-            f"force in the release at {100 * q:.0f} % of the compression at its begin; needs a release",
+            f"force in the release at {100 * q:.0f} % of the compression at its beginning; needs a release",
         )
         for q in reversed(LOADS)
     ),

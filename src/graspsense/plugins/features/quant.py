@@ -115,7 +115,7 @@ class QuantFeatures(FeatureSet[QuantConfig]):
     features = _FEATURES
 
     def extract(self, trace: Trace) -> Features:
-        """Return the quantiles from the begin of the approach to the last sample; a contact is not needed."""
+        """Return the quantiles from the beginning of the approach to the last sample; a contact is not needed."""
         names = tuple(feature.name for feature in _FEATURES)
         t_s, columns = _samples(trace)
         duration = float(t_s[-1] - t_s[0]) if len(t_s) >= LEAST_SAMPLES else math.nan
