@@ -50,6 +50,23 @@ def test_a_first_estimate_of_a_width_that_is_far_off_does_not_spoil_the_errors_o
     assert max(held_out_errors(fitted, own_stiffness=True)) < 0.001
 
 
+@pytest.mark.slow
+def test_the_order_of_the_squeezes_changes_no_candidate():
+    rng = np.random.default_rng(5)
+    ready = [
+        prepared(recorded(lambda d, k=k: k * d * (1.0 - 20.0 * d) + rng.normal(0.0, 0.05, len(d))), 0.0)
+        for k in (1000.0, 1100.0, 1250.0)
+    ]
+    choices = [
+        choose(RIGID, [ready[i] for i in order], scale_of(ready), False, lambda done, total: None)
+        for order in ((0, 1, 2), (2, 1, 0), (1, 2, 0))
+    ]
+    given, reversed_, turned = choices
+    # As texts: an error that is NaN is the same.
+    assert repr(given.scores) == repr(reversed_.scores) == repr(turned.scores)
+    assert given.fitted.widths_m == reversed_.fitted.widths_m[::-1]
+
+
 def test_a_copy_of_a_recording_confirms_nothing():
     soft, stiff = springs(1000.0, 1100.0)
     notes = []

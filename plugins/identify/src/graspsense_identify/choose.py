@@ -91,7 +91,25 @@ def choose(
     has_memory: bool,
     progress: Callable[[int, int], None],
 ) -> Choice:
-    """Return the chosen fit. `has_memory`: whether the squeezes can determine a term with a memory."""
+    """Return the chosen fit. `has_memory`: whether the squeezes can determine a term with a memory.
+
+    The order of the squeezes changes nothing: folds and fits take them in the order of their forces.
+    """
+    order = sorted(range(len(squeezes)), key=lambda i: squeezes[i].force_n.tobytes())
+    choice = _chosen(model, [squeezes[i] for i in order], scale, has_memory, progress)
+    given = np.argsort(order).tolist()
+    refined = tuple(fitted.part(given) for fitted in choice.refined)
+    return evolve(choice, fitted=choice.fitted.part(given), refined=refined)
+
+
+def _chosen(
+    model: ForwardModel,
+    squeezes: Sequence[Squeeze],
+    scale: DataScale,
+    has_memory: bool,
+    progress: Callable[[int, int], None],
+) -> Choice:
+    """Return what `choose` returns, with the squeezes in this order."""
     laws, with_memory = static_candidates(scale), memories(scale) if has_memory else []
     total = (3 if has_memory else 1) * len(laws) + STATIC_KEPT * len(with_memory) + MANY
     numbers = count(1)
