@@ -63,8 +63,26 @@ def test_the_percentages_of_a_page_are_those_of_its_results(name, stored):
     assert told <= measured, f"docs/{name}.md"
 
 
+OF_ROMANO = ROOT / "plugins/romano/benchmarks/results"
+
+
+@every_case(
+    ("name", "case", "words"),
+    [
+        ("romano_place", "acceleration,", "{} are let go"),
+        ("romano_place", "slip and acceleration,", "the default, {}."),
+        ("romano_slip", "slip servo, thresholds of the pipeline hold, fill 0.3 kg", "held in {}"),
+    ],
+)
+def test_how_often_a_grip_ended_as_planned_is_what_its_results_say(name, case, words):
+    stored = (OF_ROMANO / f"{name}.md").read_text()
+    counts = re.findall(rf"^\| {re.escape(case)}[^|]*\| (\d+) of (\d+) ", stored, flags=re.MULTILINE)
+    planned, grasps = (sum(map(int, column)) for column in zip(*counts, strict=True))
+    assert words.format(f"{planned} of {grasps}") in page("hold")
+
+
 def test_what_a_shake_tells_is_what_its_results_say():
-    stored = (ROOT / "plugins/romano/benchmarks/results/contents_shake.md").read_text()
+    stored = (OF_ROMANO / "contents_shake.md").read_text()
     for case in ("shake", "six features"):
         rate, low, high = re.findall(r"\d+\.\d", row(stored, case, "class"))
         assert f"{rate} % ({low} to {high})" in page("hold")
