@@ -31,7 +31,7 @@ def truth():
 def test_both_simulators_have_the_same_features(truth, tmp_path, step_s):
     off = truth.errors(truth.by_mujoco(tmp_path, step_s), truth.by_simulator(tmp_path))
     assert set(off) >= {"p_first", "p_steady", "f_steady", "delta_t", "dp_dt", "df_dt"}
-    assert max(off.values()) < 0.02, off
+    assert max(off.values()) < 0.01, off
 
 
 def extreme(folder, mass_kg, friction, speed_m_s, step_s):
