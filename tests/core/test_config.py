@@ -381,6 +381,12 @@ contact-image, curve, none-at-all, quant, quantiles, union.
     )
 
 
+def test_a_misspelt_type_of_a_table_is_proposed(plugins, write):
+    assert "has no key 'typ'. Did you mean 'gripper.type'?" in complaint(
+        write(BASE), options=["gripper.typ=pr2"]
+    )
+
+
 def test_a_validator_that_looks_at_other_keys_keeps_its_words(plugins, write):
     assert complaint(write(BASE), options=["controller.low_n=13"]) == (
         "-o controller.low_n=13: low_n 13.0 is above force_n 12.0"

@@ -216,7 +216,8 @@ _Complaint = str | tuple[Layer | None, InvalidValue]
 
 def _told(complaints: Sequence[_Complaint], classes: Mapping[str, type], plugins: Plugins) -> list[str]:
     """Return what is wrong, line by line; a key that is unknown may mean one of any table."""
-    known = [path for table, cls in classes.items() for path in key_paths(keys_of(cls), table)]
+    known = [f"{table}.type" for table in classes if table in _ROLE_OF_TABLE]
+    known += [path for table, cls in classes.items() for path in key_paths(keys_of(cls), table)]
     return [
         complaint
         if isinstance(complaint, str)
