@@ -115,11 +115,11 @@ def test_many_small_fits_use_compiled_code_once_numpy_took_as_long(monkeypatch: 
     for on_disk in (True, False):
         monkeypatch.setattr(compiled, "kept", lambda on_disk=on_disk: on_disk)
         fits, chosen[on_disk] = Fits(), []
-        for _ in range(8):
+        for _ in range(5):
             chosen[on_disk].append(fits.choose_fast("auto", 6_000))
             fits.add_growing(1.0)
         assert not fits.choose_fast("numpy", 6_000)
-    assert chosen == {True: [False] + 7 * [True], False: 6 * [False] + 2 * [True]}
+    assert chosen == {True: [False] + 4 * [True], False: 3 * [False] + 2 * [True]}
 
 
 def test_a_tree_that_numpy_grows_counts(monkeypatch: pytest.MonkeyPatch) -> None:

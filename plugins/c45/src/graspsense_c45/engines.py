@@ -10,8 +10,8 @@ from graspsense_c45.options import Engine
 
 WORTH_COMPILING = 500_000
 """Values (rows x attributes) of one table from which "auto" chooses the compiled engine at once."""
-COMPILING_S = 6.0
-"""Processor time for growing trees by numpy, in this process, after which "auto" compiles, which takes about as long.
+COMPILING_S = 3.0
+"""Processor time for growing trees by numpy, in this process, after which "auto" compiles, which takes 3 to 7 s.
 However many fits come, they take at most about twice as long as with the better engine from the beginning."""
 LOADING_S = 1.0
 """The same where an earlier process has kept the machine code."""
