@@ -1,4 +1,4 @@
-"""Every hook has a test, `test_hook_NAME` but for those of components, and an example in its docstring that runs."""
+"""Every hook has a test, `test_hook_NAME` or a case of its kind, and an example in its docstring that runs."""
 
 from __future__ import annotations
 
@@ -83,9 +83,52 @@ COMPONENTS = {
 """Hooks of components; the role, the name and the target of what its example gives."""
 
 
+RESOURCES = {
+    "graspsense_models": (ModelEntry, "lab-cans", {"resource": "lab_hand:models/cans.json"}),
+    "graspsense_datasets": (DatasetEntry, "lab-csv", {"recordings": "lab_hand.csv:recordings"}),
+    "graspsense_emulators": (
+        EmulatorEntry,
+        "lab-hand",
+        {"target": "lab_hand.emulator:emulate", "wires": ("pty",), "options": ()},
+    ),
+    "graspsense_live_observers": (LiveObserverEntry, "lab-wall", {"target": "lab_hand.wall:observe"}),
+    "graspsense_conformance_checks": (
+        ConformanceCheckEntry,
+        "fingers-have-names",
+        {"hook": "lab_hand_fingers"},
+    ),
+}
+"""Hooks of resources; the kind, the name and the fields of what its example gives."""
+OBSERVERS = {
+    "graspsense_run_starting": ("run_starting", (RUN,), "started", 7),
+    "graspsense_grasp_event": ("grasp_event", (RUN, EVENT), "events", "both pads touch"),
+    "graspsense_run_finished": ("run_finished", (RUN, trial()), "outcomes", "never steady"),
+}
+"""Hooks that observe a grasp; how they are called, and what the example appends to which list."""
+
+
 @every_case("hook", HOOKS)
 def test_every_hook_has_a_test(hook):
-    assert hook in COMPONENTS or f"test_hook_{hook}" in globals()
+    assert hook in {*COMPONENTS, *RESOURCES, *OBSERVERS} or f"test_hook_{hook}" in globals()
+
+
+@every_case("hook", RESOURCES)
+def test_a_resource_hook_gives_its_resource(hook):
+    kind, name, fields = RESOURCES[hook]
+    (resource,) = IsolatedPlugins(example(hook), builtins=False).resources(kind)
+
+    assert resource.name == name
+    assert {field: getattr(resource.entry, field) for field in fields} == fields
+
+
+@every_case("hook", OBSERVERS)
+def test_an_observer_hook_is_called_with_what_it_observes(hook):
+    method, arguments, kept, value = OBSERVERS[hook]
+    module = example(hook)
+
+    getattr(IsolatedPlugins(module), method)(*arguments)
+
+    assert getattr(module, kept) == [value]
 
 
 @every_case("hook", COMPONENTS)
@@ -125,18 +168,6 @@ def test_hook_graspsense_pipelines():
     assert "[gripper]" in plugins.resource(PipelineEntry, "graspsense/default").file().read_text()
 
 
-def test_hook_graspsense_models():
-    plugins = IsolatedPlugins(example("graspsense_models"))
-
-    assert plugins.resource(ModelEntry, "lab-cans").entry.resource == "lab_hand:models/cans.json"
-
-
-def test_hook_graspsense_datasets():
-    plugins = IsolatedPlugins(example("graspsense_datasets"))
-
-    assert plugins.resource(DatasetEntry, "lab-csv").entry.recordings == "lab_hand.csv:recordings"
-
-
 def test_hook_graspsense_commands():
     class Plugin:
         GRASPSENSE_API = (2, 0)
@@ -149,20 +180,6 @@ def test_hook_graspsense_commands():
 
     assert [command.name for command in plugins.resources(CommandEntry)] == ["again", "home-hand"]
     assert plugins.resource(CommandEntry, "again").load() is click.Command
-
-
-def test_hook_graspsense_emulators():
-    plugins = IsolatedPlugins(example("graspsense_emulators"))
-
-    entry = plugins.resource(EmulatorEntry, "lab-hand").entry
-    assert (entry.target, entry.wires, entry.options) == ("lab_hand.emulator:emulate", ("pty",), ())
-
-
-def test_hook_graspsense_live_observers():
-    plugins = IsolatedPlugins(example("graspsense_live_observers"))
-    assert [observer.entry.target for observer in plugins.resources(LiveObserverEntry)] == [
-        "lab_hand.wall:observe"
-    ]
 
 
 def test_hook_graspsense_identifiers():
@@ -190,13 +207,6 @@ def test_hook_graspsense_experiments():
     assert worn.entry.resource == "lab_study:experiments/worn_cans.toml"
     with pytest.raises(PluginUnavailable, match="lab_study"):
         worn.file()
-
-
-def test_hook_graspsense_conformance_checks():
-    plugins = IsolatedPlugins(example("graspsense_conformance_checks"))
-
-    (check,) = plugins.resources(ConformanceCheckEntry)
-    assert (check.name, check.entry.hook) == ("fingers-have-names", "lab_hand_fingers")
 
 
 def test_hook_graspsense_diagnose():
@@ -270,30 +280,6 @@ def test_a_probe_that_gives_something_else_is_reported_as_failed():
     (probe,) = IsolatedPlugins(Plugin(), builtins=False).probe_devices(1.0)
 
     assert probe.error == "graspsense_probe_devices gave '/dev/ttyUSB0': it takes FoundDevice only"
-
-
-def test_hook_graspsense_run_starting():
-    module = example("graspsense_run_starting")
-
-    IsolatedPlugins(module).run_starting(RUN)
-
-    assert module.started == [7]
-
-
-def test_hook_graspsense_grasp_event():
-    module = example("graspsense_grasp_event")
-
-    IsolatedPlugins(module).grasp_event(RUN, EVENT)
-
-    assert module.events == ["both pads touch"]
-
-
-def test_hook_graspsense_run_finished():
-    module = example("graspsense_run_finished")
-
-    IsolatedPlugins(module).run_finished(RUN, trial())
-
-    assert module.outcomes == ["never steady"]
 
 
 @pytest.mark.parametrize("failure", [RuntimeError("no room on the disk"), SystemExit("no room on the disk")])
