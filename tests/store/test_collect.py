@@ -1,9 +1,8 @@
 """`graspsense collect` with an operator whose answers are written down."""
 
 import json
-import subprocess
-import sys
 from collections import Counter
+from types import SimpleNamespace
 
 import pytest
 from attrs import evolve
@@ -179,22 +178,9 @@ def test_another_gripper_is_refused_before_it_moves(tmp_path):
 
 
 @pytest.mark.slow
-def test_it_takes_its_answers_from_a_pipe(tmp_path):
-    command = [
-        sys.executable,
-        "-m",
-        "graspsense",
-        "collect",
-        "--labels",
-        "block",
-        "--each",
-        "1",
-        *PLAIN,
-        *COARSE,
-    ]
-    done = subprocess.run(
-        command, input="\n", capture_output=True, text=True, cwd=tmp_path, timeout=300, check=False
-    )
+def test_without_a_folder_it_is_trials_and_what_is_there_is_printed(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = graspsense("collect", "--labels", "block", "--each", "1", *PLAIN, *COARSE, answers="\n")
     assert done.returncode == 0, done.stderr
     assert "next: block  (1 of 1)" in done.stderr
     counts, sets = done.stdout.splitlines()[:2]
@@ -203,14 +189,11 @@ def test_it_takes_its_answers_from_a_pipe(tmp_path):
     assert trials_in(tmp_path / "trials") == [(1, "block", None)]
 
 
-@pytest.mark.parametrize(
-    ("labels", "says"),
-    [("", "nothing to collect"), ("block,block", "named twice")],
-)
-def test_labels_that_make_no_sense_are_told(tmp_path, labels, says):
-    done = collect(tmp_path / "t", "", labels=labels)
-    assert done.returncode == 2
-    assert says in done.stderr
+def test_labels_that_make_no_sense_are_told(tmp_path):
+    for labels, says in (("", "nothing to collect"), ("block,block", "named twice")):
+        done = collect(tmp_path / "t", "", labels=labels)
+        assert done.returncode == 2
+        assert says in done.stderr
 
 
 def test_nothing_there_counts_since_it_is_an_answer_of_the_gripper(tmp_path):
@@ -286,18 +269,12 @@ def test_an_object_from_a_file_can_have_any_label(tmp_path):
     assert held(tmp_path / "t") == [("sponge:dry", str(scene), True)]
 
 
-def test_a_gripper_that_cannot_be_told_takes_the_word_of_the_operator(tmp_path):
+def test_a_gripper_that_cannot_be_told_takes_the_word_of_the_operator():
     from graspsense.cli.collect import _label_selects_object
 
-    class Choice:
-        def create(self):
-            return Scripted(squeezing, bottle)
-
-    class Asked:
-        gripper = Choice()
-        values = resolve("default").values
-
-    assert not _label_selects_object(Asked(), ["jar:full"], object_is_named=False)
+    choice = SimpleNamespace(create=lambda: Scripted(squeezing, bottle))
+    asked = SimpleNamespace(gripper=choice, values=resolve("default").values)
+    assert not _label_selects_object(asked, ["jar:full"], object_is_named=False)
 
 
 @pytest.mark.slow
