@@ -1,6 +1,7 @@
 """SystemExit and KeyboardInterrupt in the code of a plugin: no trace is lost, and nothing ends in silence."""
 
 import math
+from itertools import count
 
 import numpy as np
 import pytest
@@ -29,18 +30,13 @@ def leaving(*arguments, **named):
 
 def law(act, after=1100):
     """The hybrid law, whose result is changed by `act` from the step `after` on."""
-    calls = [0]
+    calls = count(1)
 
     def step(params, state, reading):
-        calls[0] += 1
         command, state = HybridController.step(params, state, reading)
-        return act(command, state) if calls[0] >= after else (command, state)
+        return act(command, state) if next(calls) >= after else (command, state)
 
-    class Changed(HybridController):
-        pass
-
-    Changed.step = staticmethod(step)
-    return Changed(HybridConfig())
+    return type("Changed", (HybridController,), {"step": staticmethod(step)})(HybridConfig())
 
 
 def released(gripper):
@@ -49,18 +45,14 @@ def released(gripper):
 
 @every_case("method", ["read", "apply", "tare", "close", "report"])
 def test_a_gripper_that_ends_the_program_ends_the_grasp_and_keeps_the_trace(method):
-    class Leaving(Scripted):
-        pass
-
-    usual = getattr(Leaving, method)
+    usual = getattr(Scripted, method)
 
     def method_of(self, *arguments):
         if self.k >= 1200:
             raise SystemExit(0)
         return usual(self, *arguments)
 
-    setattr(Leaving, method, method_of)
-    grasp = run_grasp(Leaving(squeezing, bottle), HYBRID, RUN)
+    grasp = run_grasp(type("Leaving", (Scripted,), {method: method_of})(squeezing, bottle), HYBRID, RUN)
     if method != "tare":
         assert len(grasp.trace) > 900
     if method == "report":
@@ -113,12 +105,12 @@ def test_an_outcome_that_there_is_not_aborts_the_grasp_and_keeps_the_trace(outco
 def scripted():
     """Return the settings of a scripted gripper, with a feature set that `extract` replaces."""
 
-    def settings(extract=None):
+    def settings(extract=None, gripper=Scripted):
         settings = resolve("default", plugins=installed(), options=["classifier.type=none"])
 
         class Gripper(type(settings.gripper)):
             def create(self):
-                return Scripted(squeezing, bottle)
+                return gripper(squeezing, bottle)
 
         class Features(type(settings.features)):
             def create(self):
@@ -126,10 +118,10 @@ def scripted():
                 features.extract = extract or features.extract
                 return features
 
-        gripper, features = settings.gripper, settings.features
+        chosen, features = settings.gripper, settings.features
         return evolve(
             settings,
-            gripper=Gripper(gripper.component, gripper.config),
+            gripper=Gripper(chosen.component, chosen.config),
             features=Features(features.component, features.config),
         )
 
@@ -157,15 +149,8 @@ def test_ctrl_c_that_a_plugin_raises_is_not_swallowed(scripted):
                 interrupt()
             return super().read(timeout_s)
 
-    settings = scripted()
-
-    class Choice(type(settings.gripper)):
-        def create(self):
-            return Interrupting(squeezing, bottle)
-
-    gripper = Choice(settings.gripper.component, settings.gripper.config)
     with pytest.raises(GraspInterrupted) as ended:
-        grasp_with(evolve(settings, gripper=gripper), installed())
+        grasp_with(scripted(gripper=Interrupting), installed())
     assert len(ended.value.trial.trace) > 900
 
 
