@@ -16,7 +16,7 @@ import click
 import pytest
 from click.testing import CliRunner
 from commands import graspsense
-from live_grasp import COMMAND, device, port_of, reading
+from live_grasp import COMMAND, device, port_of, reading, shown
 
 from graspsense.cli.live import _host_and_port
 from graspsense.cli.main import cli
@@ -66,13 +66,6 @@ def refused(address, headers=None):
     with pytest.raises(InvalidStatus) as answer, connect(address, additional_headers=headers):
         pass
     return answer.value.response.status_code
-
-
-def shown(feed, n=20):
-    feed.opened(device())
-    for k in range(n):
-        feed.take(reading(k), SQUEEZE, COMMAND)
-    feed.told("outcome", {"outcome": "steady", "reason": ""})
 
 
 def column(messages, kind, name):
