@@ -16,12 +16,12 @@ import pytest
 from attrs import evolve, frozen
 from cases import every_case
 from kept import begun
+from lab_grasp import recorded_grasp
 from mcap.reader import make_reader
 from parts import NoKeys, channels
 
 from graspsense import load_pipeline
 from graspsense.core.components.channels import as_json, cells_of, from_json, no_signals, read_only
-from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.pipeline import wiring
@@ -56,8 +56,6 @@ from graspsense.recording.reader import read_recorded
 from graspsense.recording.recorder import Recorder
 from graspsense.recording.replayable import content_sha256
 from graspsense.sources.recordings.replay import read_named
-from graspsense.store.record_grasp import record_grasp
-from graspsense.store.store import Store
 from graspsense.testing.checks import CheckFailed
 from graspsense.testing.conformance import examine
 from graspsense.testing.controller import state_holds_everything, state_is_numbers
@@ -167,19 +165,9 @@ GRASPSENSE_API = (2, 0)
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory):
     """One grasp, which no test changes: the trial, the path of its recording, and the plugins."""
-    folder = tmp_path_factory.mktemp("seen") / "trials"
-    options = ["gripper.type=eyes", "features.type=chitta", "classifier.type=none", "run.hold_s=0.1"]
-    with (
-        pytest.MonkeyPatch.context() as patch,
-        IsolatedPlugins() as plugins,
-        Store.open(folder) as store,
-    ):
-        patch.setitem(sys.modules, __name__, HERE)
-        plugins.add(HERE, "lab-hand")
-        settings = load_pipeline(options=options, plugins=plugins).settings
-        trial = record_grasp(store, settings, plugins, labels={}, origin="run").trial
-        (path,) = (folder / "recordings").glob("*.mcap")
-        yield trial, path, plugins
+    options = ("gripper.type=eyes", "features.type=chitta", "run.hold_s=0.1")
+    with recorded_grasp(HERE, tmp_path_factory.mktemp("seen"), *options) as (kept, path, plugins):
+        yield kept.trial, path, plugins
 
 
 def demand_same(signals, trace):
