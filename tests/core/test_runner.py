@@ -185,7 +185,14 @@ def fail():
     raise ZeroDivisionError("float division by zero")
 
 
-@every_case(("act", "reason"), [(interrupt, "interrupted"), (fail, "ZeroDivisionError: float div")])
+def leave():
+    raise SystemExit(3)
+
+
+@every_case(
+    ("act", "reason"),
+    [(interrupt, "interrupted"), (fail, "ZeroDivisionError: float div"), (leave, "SystemExit: 3")],
+)
 @every_case("after", [1, 900, 1100])
 def test_whatever_stops_the_loop_the_fingers_are_opened(act, reason, after):
     gripper = Scripted(squeezing, bottle)
@@ -262,29 +269,6 @@ def test_pads_that_never_report_end_the_taring_in_time():
     assert "no cell image" in grasp.reason
 
 
-def test_a_gripper_that_is_not_there_is_an_error_not_an_outcome():
-    class Absent(Scripted):
-        def open(self, seed):
-            raise NoDevice("looked for a gripper")
-
-    gripper = Absent(squeezing, bottle)
-    with pytest.raises(NoDevice):
-        run_grasp(gripper, HYBRID, RUN)
-    assert gripper.closed == 1
-
-
-def test_a_gripper_that_cannot_be_closed_leaves_the_trace_and_says_so():
-    class Stubborn(Scripted):
-        def close(self):
-            super().close()
-            raise OSError("Input/output error")
-
-    grasp = run_grasp(Stubborn(squeezing, bottle), HYBRID, RUN)
-    assert grasp.outcome is Outcome.ABORTED
-    assert "could not be closed: OSError: Input/output error (steady)" in grasp.reason
-    assert Phase.HOLD in phases_of(grasp)
-
-
 class Recorded(Scripted):
     """A recording of so many ticks."""
 
@@ -347,13 +331,17 @@ def test_every_tick_reaches_the_sinks_and_one_that_fails_decides_nothing():
         def take(self, reading, phase, command):
             raise OSError("No space left on device")
 
+    class Leaving:
+        def take(self, reading, phase, command):
+            raise SystemExit(3)
+
     ticks = []
     sink = SimpleNamespace(take=lambda reading, phase, command: ticks.append(reading))
-    grasp = run_grasp(Scripted(squeezing, bottle), HYBRID, RUN, sinks=[FullDisk(), sink])
+    grasp = run_grasp(Scripted(squeezing, bottle), HYBRID, RUN, sinks=[FullDisk(), Leaving(), sink])
     assert grasp.outcome is Outcome.STEADY
     assert len(ticks) == len(grasp.trace) == grasp.counts["ticks"]
     said = [event.what for event in grasp.events if "failed" in event.what]
-    assert said == ["FullDisk failed: OSError: No space left on device"]
+    assert said == ["FullDisk failed: OSError: No space left on device", "Leaving failed: SystemExit: 3"]
 
 
 def test_however_often_somebody_interrupts_the_trace_is_kept_and_the_gripper_let_go():
@@ -422,29 +410,25 @@ def test_a_device_whose_clock_stands_still_does_not_squeeze_for_ever():
     assert gripper.commands[-1].value == 0.0
 
 
-def test_a_report_that_fails_costs_nothing_else():
-    class Mute(Scripted):
-        def report(self):
-            raise ValueError("no report")
-
-    grasp = run_grasp(Mute(squeezing, bottle), HYBRID, RUN)
-    assert grasp.outcome is Outcome.STEADY
-    assert grasp.report == {"report_failed": "ValueError: no report"}
+def absent(self, seed):
+    raise NoDevice("looked for a gripper")
 
 
 @every_case(
     ("opened", "says"),
     [
+        (absent, "was running"),
         (lambda self, seed: Path("/dev/no-such-port").read_bytes(), "was running"),
         (lambda self, seed: None, "returned None: return graspsense.plugin_api.DeviceInfo"),
     ],
 )
-def test_a_gripper_that_cannot_be_opened_is_named(opened, says):
-    unready = type("Unready", (Scripted,), {"open": opened})
-    with pytest.raises((OSError, TypeError)) as raised:
-        run_grasp(unready(squeezing, bottle), HYBRID, RUN)
+def test_a_gripper_that_cannot_be_opened_is_an_error_that_names_it_and_no_outcome(opened, says):
+    gripper = type("Unready", (Scripted,), {"open": opened})(squeezing, bottle)
+    with pytest.raises((NoDevice, OSError, TypeError)) as raised:
+        run_grasp(gripper, HYBRID, RUN)
     *_, text = str(raised.value), *getattr(raised.value, "__notes__", [])
-    assert text == f"`open` of the gripper {unready.__module__}.Unready {says}"
+    assert opened is absent or text == f"`open` of the gripper {type(gripper).__module__}.Unready {says}"
+    assert gripper.closed == 1
 
 
 def test_no_garbage_is_collected_within_a_grasp_and_again_after_it():
