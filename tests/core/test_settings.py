@@ -44,6 +44,7 @@ class Squeeze:
     limit_n: float | None = setting(default=None, unit="N", minimum=0.0, meaning="Limit.")
     stiffness_n_m: float = setting(default=1e4, unit="N/m", maximum=math.inf, meaning="Stiffness.")
     loop: Literal["open", "closed"] = setting(default="open", meaning="Loop.")
+    most_s: float = setting(default=math.inf, meaning="Longest wait.")
 
 
 @every_case(
@@ -57,7 +58,7 @@ class Squeeze:
         {"times": 2.5},
         {"limit_n": -1.0},
         {"stiffness_n_m": -math.inf},
-        {"stiffness_n_m": math.nan},
+        {"most_s": math.nan},
         {"loop": "ajar"},
     ],
 )
