@@ -70,7 +70,6 @@ class Signalled(Scripted):
 @pytest.fixture
 def signalled():
     """Return settings of a gripper that is interrupted, and the class of this gripper."""
-    number = signal.SIGINT
 
     class Gripper(Signalled):
         pass
@@ -81,7 +80,6 @@ def signalled():
         def create(self):
             return Gripper()
 
-    Gripper.number = number
     return evolve(settings, gripper=Choice(settings.gripper.component, settings.gripper.config)), Gripper
 
 
@@ -182,14 +180,12 @@ def test_an_interrupted_grasp_raises_so_that_a_loop_over_grasps_ends_and_keeps_i
     assert len(ended.value.trial.trace) > 900
     with pytest.raises(KeyboardInterrupt):
         grasp_with(settings, installed())
-
-
-def test_a_grasp_of_many_raises_after_the_release():
-    gripper = Signalled()
+    # A grasp of many raises after the release.
+    interrupted = Signalled()
     with pytest.raises(KeyboardInterrupt):
-        run_uninterrupted(gripper, HybridController(HybridConfig()), RunConfig())
-    assert gripper.closed == 1
-    assert gripper.commands[-1].value == 0.0
+        run_uninterrupted(interrupted, HybridController(HybridConfig()), RunConfig())
+    assert interrupted.closed == 1
+    assert interrupted.commands[-1].value == 0.0
 
 
 def interrupting(monkeypatch, after):
