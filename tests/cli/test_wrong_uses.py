@@ -143,24 +143,6 @@ def test_a_store_may_be_named_in_every_way(store):
         assert len(load_trials(named)) == 12
 
 
-@pytest.mark.slow
-def test_every_command_takes_the_database_of_a_store(run, store):
-    # Other tests name the folder, or `store:` and the folder.
-    named = f"{store}/store.sqlite"
-    for command in (
-        ("verify", named),
-        ("trials", "list", named),
-        ("evaluate", named, "--folds", "2"),
-        ("compare", named, "--folds", "2", "--classifiers", "c45,tree"),
-        ("train", named, "--out", "model.json"),
-        ("predict", "model.json", named),
-        ("export", named, "--to", "exported.csv"),
-        ("report", named, "--folds", "2", "--out", "page"),
-        ("recover", named),
-    ):
-        assert run(*command)[0] == 0, command
-
-
 def test_folds_are_refused_before_the_first_grasp(run, monkeypatch):
     monkeypatch.setattr("graspsense.sources.trial_source.simulated", lambda *_, **__: pytest.fail("grasped"))
     few = ("simulated", "--objects", "can:full_open,can:empty_open", "--instances", "1", "--trials", "1")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import json
 import os
-import re
 import socket
 import struct
 import threading
@@ -15,7 +14,6 @@ from xml.etree import ElementTree
 
 import pytest
 from cases import every_case
-from commands import graspsense
 from live_grasp import COMMAND, device, port_of, reading, shown
 from mcap.reader import make_reader
 
@@ -334,14 +332,3 @@ def test_the_layouts_show_fields_that_a_recording_has():
         return [place] if isinstance(place, str) else [*leaves(place["first"]), *leaves(place["second"])]
 
     assert sorted(leaves(layout["layout"])) == sorted(panels)
-
-
-def test_a_port_that_is_taken_is_an_error_before_the_grasp(tmp_path):
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        port = taken.getsockname()[1]
-        done = graspsense("run", "--foxglove", port, "--save", tmp_path / "store")
-    assert done.returncode == 2
-    assert re.search(f"--foxglove.*{port}", done.stderr)
-    assert not (tmp_path / "store").exists()

@@ -311,23 +311,28 @@ def test_a_store_and_files_with_spaces_in_their_names_work_everywhere(tmp_path, 
     monkeypatch.chdir(tmp_path)
     (tmp_path / "my lab.toml").write_text('extends = "default"\n[classifier]\ntype = "none"\n')
     pipeline, store = ("--pipeline", "my lab.toml"), "my trials"
+    # Other tests name the folder of a store; its database names it as well.
+    named = f"{store}/store.sqlite"
 
     command = ("collect", *pipeline, *COARSE, "--labels", "block,none", "--each", "2")
     command += ("--operator", "A B", "--save", store)
     assert graspsense(*command, answers="\n" * 4).returncode == 0
     for command in (
-        ("trials", "list", store),
+        ("trials", "list", named),
         ("trials", "aside", f"{store}#1", "--why", "moved by hand"),
         ("replay", f"{store}#2"),
-        ("verify", store),
-        ("recover", store),
-        ("export", store, "--to", "my table.csv"),
+        ("verify", named),
+        ("recover", named),
+        ("export", named, "--to", "my table.csv"),
         ("export", f"{store}#2", "--to", "one grasp.csv"),
+        ("evaluate", named, "--folds", "2"),
+        ("compare", named, "--folds", "2", "--classifiers", "c45,tree"),
         ("train", f"store:{store}", "--out", "my model.json"),
-        ("predict", "my model.json", f"store:{store}"),
+        ("train", named, "--out", "model.json"),
+        ("predict", "my model.json", named),
         ("predict", "my model.json", "my table.csv"),
         ("run", "-o", "classifier.type=c45", "-o", "classifier.model=my model.json"),
-        ("report", store, "--folds", "2"),
+        ("report", named, "--folds", "2"),
     ):
         done = graspsense(*command)
         assert done.returncode == 0, (command, done.stderr)
