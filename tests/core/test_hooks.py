@@ -57,6 +57,21 @@ def example(hook: str) -> types.ModuleType:
     return module
 
 
+def implementing(hook: str, implementation, **options) -> object:
+    """Return a plugin that implements this hook by this function."""
+    implementation = hookimpl(implementation, **options)
+    return type("Plugin", (), {"GRASPSENSE_API": (2, 0), hook: implementation})()
+
+
+def raising(error: BaseException):
+    """Return an implementation of a hook that raises this error, whatever it is given."""
+
+    def raise_it(self):
+        raise error
+
+    return raise_it
+
+
 def trial() -> Trial:
     return Trial(
         run=RUN,
@@ -169,14 +184,9 @@ def test_hook_graspsense_pipelines():
 
 
 def test_hook_graspsense_commands():
-    class Plugin:
-        GRASPSENSE_API = (2, 0)
-
-        @hookimpl
-        def graspsense_commands(self):
-            return [CommandEntry("again", "click:Command", "a class that is there to be imported")]
-
-    plugins = IsolatedPlugins(example("graspsense_commands"), Plugin())
+    again = CommandEntry("again", "click:Command", "a class that is there to be imported")
+    plugin = implementing("graspsense_commands", lambda self: [again])
+    plugins = IsolatedPlugins(example("graspsense_commands"), plugin)
 
     assert [command.name for command in plugins.resources(CommandEntry)] == ["again", "home-hand"]
     assert plugins.resource(CommandEntry, "again").load() is click.Command
@@ -210,30 +220,20 @@ def test_hook_graspsense_experiments():
 
 
 def test_hook_graspsense_diagnose():
-    class Failing:
-        GRASPSENSE_API = (2, 0)
+    def told(self, config, timeout_s):
+        return [Finding("what I was told", "ok", f"{config} for {timeout_s} s")]
 
-        @hookimpl
-        def graspsense_diagnose(self):
-            raise PermissionError("cannot list the bus")
-
-    class Told:
-        GRASPSENSE_API = (2, 0)
-
-        @hookimpl
-        def graspsense_diagnose(self, config, timeout_s):
-            return [Finding("what I was told", "ok", f"{config} for {timeout_s} s")]
-
+    hook = "graspsense_diagnose"
     plugins = IsolatedPlugins(builtins=False)
-    plugins.add(Failing(), "lab-a")
-    plugins.add(example("graspsense_diagnose"), "lab-b")
-    plugins.add(Told(), "lab-c")
+    plugins.add(implementing(hook, raising(PermissionError("cannot list the bus"))), "lab-a")
+    plugins.add(example(hook), "lab-b")
+    plugins.add(implementing(hook, told), "lab-c")
 
-    failed, diagnoses, told = plugins.diagnose("these settings", 0.25)
+    failed, diagnoses, told_findings = plugins.diagnose("these settings", 0.25)
 
     assert (failed.given, failed.error) == ((), "PermissionError: cannot list the bus")
     assert (diagnoses.given[0].state, diagnoses.given[0].numbers) == ("problem", {"baud": 115200})
-    assert told.given[0].words == "these settings for 0.25 s"
+    assert told_findings.given[0].words == "these settings for 0.25 s"
 
 
 def test_a_finding_is_in_one_of_three_states():
@@ -242,60 +242,32 @@ def test_a_finding_is_in_one_of_three_states():
 
 
 def test_hook_graspsense_probe_devices():
-    class Failing:
-        GRASPSENSE_API = (2, 0)
+    def timed(self, timeout_s):
+        return [FoundDevice("mine", str(timeout_s), "bus 1", ready=True)]
 
-        @hookimpl
-        def graspsense_probe_devices(self):
-            raise PermissionError("cannot list the bus")
-
-    class Timed:
-        GRASPSENSE_API = (2, 0)
-
-        @hookimpl
-        def graspsense_probe_devices(self, timeout_s):
-            return [FoundDevice("mine", str(timeout_s), "bus 1", ready=True)]
-
+    hook = "graspsense_probe_devices"
     plugins = IsolatedPlugins(builtins=False)
-    plugins.add(Failing(), "lab-a")
-    plugins.add(example("graspsense_probe_devices"), "lab-b")
-    plugins.add(Timed(), "lab-c")
+    plugins.add(implementing(hook, raising(PermissionError("cannot list the bus"))), "lab-a")
+    plugins.add(example(hook), "lab-b")
+    plugins.add(implementing(hook, timed), "lab-c")
+    plugins.add(implementing(hook, lambda self: ["/dev/ttyUSB0"]), "lab-d")
 
-    failed, devices, timed = plugins.probe_devices(0.25)
+    failed, devices, timed_devices, other = plugins.probe_devices(0.25)
 
     assert (failed.distribution, failed.given) == ("lab-a", ())
     assert failed.error == "PermissionError: cannot list the bus"
     assert (devices.error, devices.given[0].advice) == ("", "add yourself to the group dialout")
-    assert timed.given[0].serial == "0.25"
-
-
-def test_a_probe_that_gives_something_else_is_reported_as_failed():
-    class Plugin:
-        GRASPSENSE_API = (2, 0)
-
-        @hookimpl
-        def graspsense_probe_devices(self):
-            return ["/dev/ttyUSB0"]
-
-    (probe,) = IsolatedPlugins(Plugin(), builtins=False).probe_devices(1.0)
-
-    assert probe.error == "graspsense_probe_devices gave '/dev/ttyUSB0': it takes FoundDevice only"
+    assert timed_devices.given[0].serial == "0.25"
+    assert other.error == "graspsense_probe_devices gave '/dev/ttyUSB0': it takes FoundDevice only"
 
 
 @pytest.mark.parametrize("failure", [RuntimeError("no room on the disk"), SystemExit("no room on the disk")])
 def test_an_observer_that_raises_stops_nobody_and_is_reported_once(caplog, failure):
-    class Raising:
-        GRASPSENSE_API = (2, 0)
-
-        @hookimpl
-        def graspsense_grasp_event(self, event):
-            raise failure
-
     seen = example("graspsense_grasp_event")
+    failing = implementing("graspsense_grasp_event", raising(failure))
     plugins = IsolatedPlugins()
-    plugins.add(Raising(), "lab-first")
-    plugins.add(seen, "lab-seen")
-    plugins.add(Raising(), "lab-last")
+    for plugin, name in ((failing, "lab-first"), (seen, "lab-seen"), (type(failing)(), "lab-last")):
+        plugins.add(plugin, name)
 
     with caplog.at_level(logging.WARNING, "graspsense.plugins"):
         plugins.grasp_event(RUN, EVENT)
@@ -310,36 +282,20 @@ def test_an_observer_that_raises_stops_nobody_and_is_reported_once(caplog, failu
 
 
 def test_an_observer_does_not_swallow_an_interrupt():
-    class Interrupted:
-        GRASPSENSE_API = (2, 0)
-
-        @hookimpl
-        def graspsense_run_starting(self):
-            raise KeyboardInterrupt
+    interrupted = implementing("graspsense_run_starting", raising(KeyboardInterrupt()))
 
     with pytest.raises(KeyboardInterrupt):
-        IsolatedPlugins(Interrupted()).run_starting(RUN)
+        IsolatedPlugins(interrupted).run_starting(RUN)
 
 
 def test_a_hook_that_a_plugin_owns_collects_from_all_that_implement_it(caplog):
-    class Stiff:
-        GRASPSENSE_API = (2, 0)
+    def stiff(self, scale):
+        return 2.0 * scale
 
-        @hookimpl(optionalhook=True)
-        def lab_terms(self, scale):
-            return 2.0 * scale
-
-    class Broken:
-        GRASPSENSE_API = (2, 0)
-
-        @hookimpl(optionalhook=True)
-        def lab_terms(self, scale):
-            raise ValueError("no such term")
-
+    failing = raising(ValueError("no such term"))
     with IsolatedPlugins(builtins=False) as plugins:
-        plugins.add(Stiff(), "lab-a")
-        plugins.add(Broken(), "lab-b")
-        plugins.add(Stiff(), "lab-c")
+        for implementation, name in ((stiff, "lab-a"), (failing, "lab-b"), (stiff, "lab-c")):
+            plugins.add(implementing("lab_terms", implementation, optionalhook=True), name)
 
         assert collect("lab_terms", scale=3.0) == (("lab-a", 6.0), ("lab-c", 6.0))
         assert collect("nobody_implements_this") == ()
