@@ -12,15 +12,15 @@ from graspsense.store.store import Store
 
 
 @contextmanager
-def recorded_grasp(module, folder, *options, others=()):
+def recorded_grasp(module, plugin, folder, *options, others=()):
     """Grasp with these options, and yield what was kept, the path of its recording, and the plugins.
 
-    `others` are further plugins, each with the name of its distribution.
+    `plugin` offers parts of the module; `others` are further plugins, each with the name of its distribution.
     """
     with pytest.MonkeyPatch.context() as patch, IsolatedPlugins() as plugins, Store.open(folder) as store:
         patch.setitem(sys.modules, module.__name__, module)
-        for plugin, distribution in (*others, (module, "lab-hand")):
-            plugins.add(plugin, distribution)
+        for added, distribution in (*others, (plugin, "lab-hand")):
+            plugins.add(added, distribution)
         settings = load_pipeline(options=[*options, "classifier.type=none"], plugins=plugins).settings
         kept = record_grasp(store, settings, plugins, labels={}, origin="run")
         (path,) = (folder / "recordings").glob("*.mcap")

@@ -29,7 +29,6 @@ from graspsense.plugin_api import (
     FeatureSet,
     FeatureSetEntry,
     SensorBackendEntry,
-    hookimpl,
 )
 
 HERE = sys.modules[__name__]
@@ -202,22 +201,12 @@ def settings(plugins, fingers):
 
 
 def test_the_wiring_knows_the_channels_of_the_fitted_fingers():
-    class Lab:
-        GRASPSENSE_API = (2, 0)
-
-        @hookimpl
-        def graspsense_sensor_backends(self):
-            yield SensorBackendEntry("fingers", f"{__name__}:Fingers", "a hand")
-
-        @hookimpl
-        def graspsense_controllers(self):
-            yield ControllerEntry("law", f"{__name__}:Law", "a law")
-
-        @hookimpl
-        def graspsense_feature_sets(self):
-            yield FeatureSetEntry("summit", f"{__name__}:Summit", "a peak")
-
-    plugins = IsolatedPlugins(Lab(), builtins=False)
+    lab = parts.offering(
+        SensorBackendEntry("fingers", f"{__name__}:Fingers", "a hand"),
+        ControllerEntry("law", f"{__name__}:Law", "a law"),
+        FeatureSetEntry("summit", f"{__name__}:Summit", "a peak"),
+    )
+    plugins = IsolatedPlugins(lab, builtins=False)
 
     check(settings(plugins, "force"))
     with pytest.raises(WiringError) as error:

@@ -13,6 +13,7 @@ from commands import graspsense
 from hypothesis import given
 from hypothesis import strategies as st
 from lab_grasp import recorded_grasp
+from parts import offering
 
 import graspsense_sim_gripper.plugin as simulator
 from graspsense import load_pipeline
@@ -32,7 +33,6 @@ from graspsense.plugin_api import (
     SensorBackend,
     SensorBackendEntry,
     create,
-    hookimpl,
     setting,
     signal_type,
 )
@@ -122,17 +122,10 @@ class ThumbPeak(FeatureSet[JawsConfig]):
         return self.result({"thumb_peak": trace.signals["force_thumb"].max()})
 
 
-GRASPSENSE_API = (2, 0)
-
-
-@hookimpl
-def graspsense_sensor_backends():
-    return [SensorBackendEntry(name="jaws", target=f"{__name__}:ThreeJaws", summary="three fingers")]
-
-
-@hookimpl
-def graspsense_feature_sets():
-    return [FeatureSetEntry(name="thumb-peak", target=f"{__name__}:ThumbPeak", summary="peak of the thumb")]
+LAB_HAND = offering(
+    SensorBackendEntry(name="jaws", target=f"{__name__}:ThreeJaws", summary="three fingers"),
+    FeatureSetEntry(name="thumb-peak", target=f"{__name__}:ThumbPeak", summary="peak of the thumb"),
+)
 
 
 @pytest.fixture(scope="module")
@@ -141,7 +134,7 @@ def grasped(tmp_path_factory):
     others = ((simulator, "graspsense-sim-gripper"),)
     options = ("gripper.type=jaws", "run.hold_s=0.05")
     folder = tmp_path_factory.mktemp("recorded")
-    with recorded_grasp(HERE, folder, *options, others=others) as (kept, path, plugins):
+    with recorded_grasp(HERE, LAB_HAND, folder, *options, others=others) as (kept, path, plugins):
         yield kept.trial, path, plugins
 
 

@@ -18,7 +18,7 @@ from cases import every_case
 from kept import begun
 from lab_grasp import recorded_grasp
 from mcap.reader import make_reader
-from parts import NoKeys, channels
+from parts import NoKeys, channels, offering
 
 from graspsense import load_pipeline
 from graspsense.core.components.channels import as_json, cells_of, from_json, no_signals, read_only
@@ -46,7 +46,6 @@ from graspsense.plugin_api import (
     SensorBackend,
     SensorBackendEntry,
     TactileArray,
-    hookimpl,
     setting,
     signal_type,
 )
@@ -125,48 +124,29 @@ class Eyes(ModelGripper, SensorBackend[Held]):
         return Reading(frame, NO_PADS, self._images)
 
 
-@hookimpl
-def graspsense_sensor_backends():
-    return [
-        SensorBackendEntry(
-            name="eyes",
-            target=f"{__name__}:Eyes",
-            config=f"{__name__}:Held",
-            summary="a gripper with cameras",
-        )
-    ]
-
-
-@hookimpl
-def graspsense_controllers():
-    return [
-        ControllerEntry(
-            name="watching",
-            target=f"{__name__}:Watching",
-            config=f"{__name__}:NoKeys",
-            summary="compares each image with the first one",
-            requires=(Channel("gap", "m"), Channel("velocity", "m/s"), EYE),
-            commands=("effort",),
-        ),
-        ControllerEntry(
-            name="deep",
-            target=f"{__name__}:Watching",
-            config=f"{__name__}:NoKeys",
-            summary="needs another type of cells",
-            requires=(evolve(EYE, dtype="uint16"),),
-            commands=("effort",),
-        ),
-    ]
-
-
-GRASPSENSE_API = (2, 0)
+WATCHING = ControllerEntry(
+    name="watching",
+    target=f"{__name__}:Watching",
+    config=f"{__name__}:NoKeys",
+    summary="compares each image with the first one",
+    requires=(Channel("gap", "m"), Channel("velocity", "m/s"), EYE),
+    commands=("effort",),
+)
+LAB_HAND = offering(
+    SensorBackendEntry(
+        name="eyes", target=f"{__name__}:Eyes", config=f"{__name__}:Held", summary="a gripper with cameras"
+    ),
+    WATCHING,
+    # It needs another type of cells.
+    evolve(WATCHING, name="deep", requires=(evolve(EYE, dtype="uint16"),)),
+)
 
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory):
     """One grasp, which no test changes: the trial, the path of its recording, and the plugins."""
     options = ("gripper.type=eyes", "features.type=chitta", "run.hold_s=0.1")
-    with recorded_grasp(HERE, tmp_path_factory.mktemp("seen"), *options) as (kept, path, plugins):
+    with recorded_grasp(HERE, LAB_HAND, tmp_path_factory.mktemp("seen"), *options) as (kept, path, plugins):
         yield kept.trial, path, plugins
 
 

@@ -14,7 +14,7 @@ from cases import every_case
 from click.testing import CliRunner
 from kept import begun
 from lab_grasp import recorded_grasp
-from parts import NoKeys, channels
+from parts import NoKeys, channels, offering
 
 from graspsense import load_pipeline
 from graspsense.cli.main import cli
@@ -27,6 +27,7 @@ from graspsense.plugin_api import (
     Channel,
     Command,
     FastChannel,
+    Feature,
     Features,
     FeatureSet,
     FeatureSetEntry,
@@ -38,7 +39,6 @@ from graspsense.plugin_api import (
     SensorBackend,
     SensorBackendEntry,
     TactileArray,
-    hookimpl,
 )
 from graspsense.recording.export_trace import write_csv, write_npz, write_parquet
 from graspsense.recording.layout import START
@@ -100,44 +100,35 @@ class Shaking(FeatureSet[NoKeys]):
         return Features(names=("hottest", "mean"), values=(hottest, mean), units=("K", "m/s2"), reasons={})
 
 
-@hookimpl
-def graspsense_sensor_backends():
-    return [
-        SensorBackendEntry(name="palm", target=f"{__name__}:Palm", summary="a gripper with a palm"),
-        SensorBackendEntry(name="camera", target=f"{__name__}:Camera", summary="a gripper with a camera"),
-    ]
-
-
-@hookimpl
-def graspsense_feature_sets():
-    from graspsense.plugin_api import Feature
-
-    return [
-        FeatureSetEntry(
-            name="shaking",
-            target=f"{__name__}:Shaking",
-            config=f"{__name__}:NoKeys",
-            summary="acceleration and temperature",
-            requires=(
-                FastChannel("acceleration", "m/s2", samples=3, axes=("x", "y")),
-                Channel("motor_temperature", "K"),
-            ),
-            features=(
-                Feature("hottest", "K", "highest temperature of the motor"),
-                Feature("mean", "m/s2", "mean acceleration"),
-            ),
-        )
-    ]
-
-
-GRASPSENSE_API = (2, 0)
+LAB_HAND = offering(
+    SensorBackendEntry(name="palm", target=f"{__name__}:Palm", summary="a gripper with a palm"),
+    SensorBackendEntry(name="camera", target=f"{__name__}:Camera", summary="a gripper with a camera"),
+    FeatureSetEntry(
+        name="shaking",
+        target=f"{__name__}:Shaking",
+        config=f"{__name__}:NoKeys",
+        summary="acceleration and temperature",
+        requires=(
+            FastChannel("acceleration", "m/s2", samples=3, axes=("x", "y")),
+            Channel("motor_temperature", "K"),
+        ),
+        features=(
+            Feature("hottest", "K", "highest temperature of the motor"),
+            Feature("mean", "m/s2", "mean acceleration"),
+        ),
+    ),
+)
 
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     """One grasp, which no test changes: the trial, the path of its recording, and the plugins."""
     options = ("gripper.type=palm", "features.type=shaking")
-    with recorded_grasp(HERE, tmp_path_factory.mktemp("recorded"), *options) as (kept, path, plugins):
+    with recorded_grasp(HERE, LAB_HAND, tmp_path_factory.mktemp("recorded"), *options) as (
+        kept,
+        path,
+        plugins,
+    ):
         yield kept.trial, path, plugins
 
 
@@ -280,7 +271,7 @@ class Camera(Palm):
 @pytest.mark.slow
 def test_arrays_of_any_size_are_recorded_replayed_and_exported(tmp_path):
     options = ("gripper.type=camera", "features.type=chitta", "run.hold_s=0.01")
-    with recorded_grasp(HERE, tmp_path / "trials", *options) as (kept, path, _):
+    with recorded_grasp(HERE, LAB_HAND, tmp_path / "trials", *options) as (kept, path, _):
         trace, read = kept.trial.trace, read_recorded(path)
     assert kept.number == 1
     assert kept.counts["ticks"] == len(trace) > 0

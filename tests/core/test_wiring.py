@@ -6,7 +6,7 @@ import sys
 
 import pytest
 from cases import every_case
-from parts import CHANNELS_OF_HAND, Hand, HandConfig, Law, LawConfig, channels
+from parts import CHANNELS_OF_HAND, Hand, HandConfig, Law, LawConfig, channels, offering
 
 from graspsense import load_pipeline
 from graspsense.core.components.registry import IsolatedPlugins
@@ -20,7 +20,6 @@ from graspsense.plugin_api import (
     ControllerEntry,
     SensorBackend,
     SensorBackendEntry,
-    hookimpl,
 )
 
 HERE = sys.modules[__name__]
@@ -211,22 +210,16 @@ class Stepping(Law, Controller[LawConfig]):
         return 1e-4
 
 
-class StiffPlugin:
-    GRASPSENSE_API = (2, 0)
-
-    @hookimpl
-    def graspsense_sensor_backends(self):
-        yield SensorBackendEntry(name="stiff", target=f"{__name__}:Stiff", summary="a stiff hand")
-
-    @hookimpl
-    def graspsense_controllers(self):
-        yield ControllerEntry(name="stepping", target=f"{__name__}:Stepping", summary="moves in small steps")
+STIFF_PLUGIN = offering(
+    SensorBackendEntry(name="stiff", target=f"{__name__}:Stiff", summary="a stiff hand"),
+    ControllerEntry(name="stepping", target=f"{__name__}:Stepping", summary="moves in small steps"),
+)
 
 
 @pytest.fixture
 def refusal(monkeypatch):
     monkeypatch.setitem(sys.modules, __name__, HERE)
-    with IsolatedPlugins(StiffPlugin()) as plugins:
+    with IsolatedPlugins(STIFF_PLUGIN) as plugins:
 
         def refusal(*options):
             options = ["gripper.type=stiff", "classifier.type=none", *options]

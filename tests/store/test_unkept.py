@@ -8,18 +8,17 @@ import pytest
 from attrs import frozen
 from cases import every_case
 from commands import graspsense
-from parts import ACCELERATION, CHANNELS_OF_HAND, Hand, HandConfig, channels
+from parts import ACCELERATION, CHANNELS_OF_HAND, Hand, HandConfig, channels, offering
 
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.settings.resolved import resolve
-from graspsense.plugin_api import Reading, SensorBackend, SensorBackendEntry, hookimpl, setting
+from graspsense.plugin_api import Reading, SensorBackend, SensorBackendEntry, setting
 from graspsense.recording.reader import read_recorded
 from graspsense.store.record_grasp import record_grasp
 from graspsense.store.store import Store
 
 HERE = sys.modules[__name__]
 PLAIN = ("classifier.type=none", "features.type=chitta")
-GRASPSENSE_API = (2, 0)
 
 
 @frozen(kw_only=True)
@@ -91,19 +90,19 @@ class Thingless(Uncountable):
         super().apply(command)
 
 
-@hookimpl
-def graspsense_sensor_backends():
-    for cls in (Uncountable, Thingless, Shortening):
-        yield SensorBackendEntry(
-            name=cls.__name__.lower(), target=f"{__name__}:{cls.__name__}", summary="a hand"
-        )
+LAB_HAND = offering(
+    *(
+        SensorBackendEntry(name=cls.__name__.lower(), target=f"{__name__}:{cls.__name__}", summary="a hand")
+        for cls in (Uncountable, Thingless, Shortening)
+    )
+)
 
 
 @pytest.fixture(autouse=True)
 def plugins(monkeypatch):
     monkeypatch.setitem(sys.modules, __name__, HERE)
     with IsolatedPlugins() as plugins:
-        plugins.add(HERE, "lab-hand")
+        plugins.add(LAB_HAND, "lab-hand")
         yield plugins
 
 
