@@ -311,6 +311,11 @@ def offering(*entries):
     return type("Plugin", (), {"GRASPSENSE_API": (2, 0), **hooks})()
 
 
+def implementing(hook, implementation, **options):
+    """Return a plugin that implements this hook by this function."""
+    return type("Plugin", (), {"GRASPSENSE_API": (2, 0), hook: hookimpl(implementation, **options)})()
+
+
 HAND_LOST = {"vanishes_s": 0.3}
 HAND_ABSENT = {"here": False}
 

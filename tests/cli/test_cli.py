@@ -13,6 +13,7 @@ import click
 import pytest
 from cases import every_case
 from commands import graspsense
+from parts import implementing
 from repository import ROOT
 
 from graspsense import __version__
@@ -21,7 +22,6 @@ from graspsense.core.components.entries import CommandEntry, FoundDevice
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.components.registry import plugins as loader
 from graspsense.core.values.errors import DeviceLost, NoDevice
-from graspsense.plugin_api import hookimpl
 
 REPLAY = ["--gripper", "replay", "-o", "gripper.recording=icub:some/file.txt", "-o", "classifier.type=none"]
 """What is here without any other distribution; the default pipeline's classifier is not."""
@@ -40,15 +40,8 @@ def adding(name: str, command: click.Command):
     module = f"command_{name}"
     sys.modules[module] = type(sys)(module)
     sys.modules[module].command = command
-
-    class Plugin:
-        GRASPSENSE_API = (2, 0)
-
-        @hookimpl
-        def graspsense_commands(self):
-            return [CommandEntry(name, f"{module}:command", "a command of a plugin")]
-
-    return Plugin()
+    entry = CommandEntry(name, f"{module}:command", "a command of a plugin")
+    return implementing("graspsense_commands", lambda self: [entry])
 
 
 def failing(error: Exception):
@@ -407,23 +400,15 @@ class TestDevices:
         )
 
     def test_found_and_failed(self, run):
-        class Looking:
-            GRASPSENSE_API = (2, 0)
+        def look(self, timeout_s):
+            assert timeout_s == 0.5
+            return [FoundDevice("hand", "42", "bus 1", ready=False, advice="add a udev rule")]
 
-            @hookimpl
-            def graspsense_probe_devices(self, timeout_s):
-                assert timeout_s == 0.5
-                return [FoundDevice("hand", "42", "bus 1", ready=False, advice="add a udev rule")]
+        def fail(self, timeout_s):
+            raise OSError("no bus")
 
-        class Failing:
-            GRASPSENSE_API = (2, 0)
-
-            @hookimpl
-            def graspsense_probe_devices(self, timeout_s):
-                raise OSError("no bus")
-
-        loader.installed().add(Failing(), "lab-a")
-        loader.installed().add(Looking(), "lab-b")
+        for probe, distribution in ((fail, "lab-a"), (look, "lab-b")):
+            loader.installed().add(implementing("graspsense_probe_devices", probe), distribution)
 
         ran = run("devices", "--timeout", "0.5")
         assert ran.returncode == 0

@@ -11,6 +11,7 @@ import types
 import click
 import pytest
 from cases import every_case
+from parts import implementing
 from repository import ROOT
 
 from graspsense.core.components import hookspecs
@@ -37,7 +38,6 @@ from graspsense.plugin_api import (
     PipelineEntry,
     PluginUnavailable,
     UnknownName,
-    hookimpl,
 )
 from graspsense.simulator_api import collect
 
@@ -55,12 +55,6 @@ def example(hook: str) -> types.ModuleType:
     vars(module)["GRASPSENSE_API"] = (2, 0)
     exec(code, vars(module))
     return module
-
-
-def implementing(hook: str, implementation, **options) -> object:
-    """Return a plugin that implements this hook by this function."""
-    implementation = hookimpl(implementation, **options)
-    return type("Plugin", (), {"GRASPSENSE_API": (2, 0), hook: implementation})()
 
 
 def raising(error: BaseException):

@@ -8,14 +8,13 @@ import pytest
 from attrs import evolve, field, frozen
 from cases import every_case
 from commands import graspsense
-from grippers import Scripted, bottle, squeezing
+from grippers import Scripted, bottle, settings_with, squeezing
 
 from graspsense.core.components.registry import installed
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.components.strict import ValidationFailed, structured
 from graspsense.core.grasp.runner import ended_by_itself, run_grasp
 from graspsense.core.pipeline.pipeline import GraspInterrupted, grasp_with
-from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.errors import DeviceLost
 from graspsense.core.values.signals import EFFORT, Command, Outcome
 from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
@@ -95,11 +94,7 @@ def scripted():
     """Return the settings of a scripted gripper, with a feature set that `extract` replaces."""
 
     def settings(extract=None, gripper=Scripted):
-        settings = resolve("default", plugins=installed(), options=["classifier.type=none"])
-
-        class Gripper(type(settings.gripper)):
-            def create(self):
-                return gripper(squeezing, bottle)
+        settings = settings_with(lambda: gripper(squeezing, bottle))
 
         class Features(type(settings.features)):
             def create(self):
@@ -107,12 +102,8 @@ def scripted():
                 features.extract = extract or features.extract
                 return features
 
-        chosen, features = settings.gripper, settings.features
-        return evolve(
-            settings,
-            gripper=Gripper(chosen.component, chosen.config),
-            features=Features(features.component, features.config),
-        )
+        features = settings.features
+        return evolve(settings, features=Features(features.component, features.config))
 
     return settings
 

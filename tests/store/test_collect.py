@@ -8,7 +8,7 @@ import pytest
 from attrs import evolve
 from cases import every_case
 from commands import graspsense
-from grippers import Scripted, bottle, squeezing
+from grippers import Scripted, bottle, settings_with, squeezing
 from kept import BENCH, keep
 
 from graspsense.core.components.registry import installed
@@ -148,13 +148,7 @@ def test_another_gripper_is_refused_before_it_moves(tmp_path):
             super().apply(command)
 
     def settings_for(word, seed):
-        settings = resolve("default", options=["classifier.type=none", f"run.seed={seed}"])
-
-        class Choice(type(settings.gripper)):
-            def create(self):
-                return Serial(squeezing, bottle)
-
-        return evolve(settings, gripper=Choice(settings.gripper.component, settings.gripper.config))
+        return settings_with(lambda: Serial(squeezing, bottle), f"run.seed={seed}")
 
     answers = iter(["", "", "q"])
     with Store.open(tmp_path / "t") as store:

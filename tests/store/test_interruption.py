@@ -10,14 +10,13 @@ import sys
 import pytest
 from attrs import evolve
 from commands import graspsense, printed
-from grippers import Scripted, bottle, squeezing
+from grippers import Scripted, bottle, settings_with, squeezing
 
 from graspsense import GraspInterrupted, load_pipeline
 from graspsense.core.components.registry import installed
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_uninterrupted
 from graspsense.core.pipeline.pipeline import grasp_with
-from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.signals import Outcome
 from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
 from graspsense.store.changes import relabel
@@ -74,13 +73,7 @@ def signalled():
     class Gripper(Signalled):
         pass
 
-    settings = resolve("default", plugins=installed(), options=["classifier.type=none"])
-
-    class Choice(type(settings.gripper)):
-        def create(self):
-            return Gripper()
-
-    return evolve(settings, gripper=Choice(settings.gripper.component, settings.gripper.config)), Gripper
+    return settings_with(Gripper), Gripper
 
 
 @pytest.fixture(autouse=True)
