@@ -162,12 +162,6 @@ def test_any_two_opposed_fingers_touch_where_the_thumb_and_another_one_do(forces
     assert both == (forces[0] >= contact_n and max(forces[1:]) >= contact_n)
 
 
-def test_the_forces_of_a_side_count_along_its_direction_so_that_three_jaws_balance():
-    left, right = opposed_forces(JAWS)((8.0, 8.0, 8.0))
-
-    assert right == pytest.approx(left)
-
-
 def test_a_finger_without_a_number_is_no_contact_of_its_side_or_of_every_finger():
     forces = (5.0, nan, 5.0, 5.0, 5.0)
 
@@ -190,14 +184,17 @@ def test_fingers_that_cannot_touch_are_refused(fingers, says):
         opposed_forces(fingers)
 
 
-@pytest.mark.parametrize("name", ["thumb", "force_left", "force_"])
-def test_the_name_of_a_finger_is_not_that_of_another_channel(name):
-    with pytest.raises(ValueError, match="finger"):
-        FingerForce(name, "N")
+def test_the_forces_of_a_side_count_along_its_direction_so_that_three_jaws_balance():
+    left, right = opposed_forces(JAWS)((8.0, 8.0, 8.0))
 
-
-def test_a_declared_finger_survives_json():
+    assert right == pytest.approx(left)
     assert [from_json(as_json(jaw)) for jaw in JAWS] == list(JAWS)
+
+
+def test_the_name_of_a_finger_is_not_that_of_another_channel():
+    for name in ("thumb", "force_left", "force_"):
+        with pytest.raises(ValueError, match="finger"):
+            FingerForce(name, "N")
 
 
 # ------------------------------------------------------------------------------------------------- a grasp
