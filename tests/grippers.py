@@ -2,7 +2,11 @@
 
 from math import inf
 
+from attrs import evolve
+
+from graspsense.core.components.registry import installed
 from graspsense.core.components.roles import SensorBackend
+from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import DeviceLost
 from graspsense.core.values.signals import EFFORT, Command, Frame, Pads, Reading
@@ -76,3 +80,14 @@ def bottle(t):
     """Forces that go with `squeezing`."""
     force = 0.0 if t < CONTACT_S else 1.0 + 7.0 * min((t - CONTACT_S) / (REST_S - CONTACT_S), 1.0)
     return force, force
+
+
+def settings_with(create, *options):
+    """Return the settings of the pipeline `default` whose gripper this function creates; there is no classifier."""
+    settings = resolve("default", plugins=installed(), options=["classifier.type=none", *options])
+
+    class Choice(type(settings.gripper)):
+        def create(self):
+            return create()
+
+    return evolve(settings, gripper=Choice(settings.gripper.component, settings.gripper.config))

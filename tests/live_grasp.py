@@ -4,7 +4,7 @@ import math
 
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.device import DeviceInfo
-from graspsense.core.values.signals import EFFORT, NO_PADS, Command, Frame, Image, Reading, Samples
+from graspsense.core.values.signals import EFFORT, NO_PADS, SQUEEZE, Command, Frame, Image, Reading, Samples
 from graspsense.plugin_api import signal_type
 
 COMMAND = Command(EFFORT, 5.0, math.inf, math.inf)
@@ -43,3 +43,11 @@ def reading(k):
 
 def port_of(feed):
     return int(feed.answer["address"].split(":")[2].partition("/")[0])
+
+
+def shown(feed, n=20):
+    """Show a grasp of so many ticks that ends as steady."""
+    feed.opened(device())
+    for k in range(n):
+        feed.take(reading(k), SQUEEZE, COMMAND)
+    feed.told("outcome", {"outcome": "steady", "reason": ""})

@@ -37,6 +37,7 @@ from graspsense.plugin_api import (
     SensorBackend,
     SensorBackendEntry,
     TactileArray,
+    hookimpl,
     setting,
 )
 from graspsense.simulator_api import CompiledFeatures
@@ -293,6 +294,28 @@ ENTRIES = {
         summary="the nearest mean",
     ),
 }
+HOOKS = {
+    "graspsense_sensor_backends": SensorBackendEntry,
+    "graspsense_controllers": ControllerEntry,
+    "graspsense_feature_sets": FeatureSetEntry,
+}
+
+
+def offering(*entries):
+    """Return a plugin that offers these components."""
+
+    def of_kind(kind):
+        return hookimpl(lambda self: [entry for entry in entries if isinstance(entry, kind)])
+
+    hooks = {hook: of_kind(kind) for hook, kind in HOOKS.items()}
+    return type("Plugin", (), {"GRASPSENSE_API": (2, 0), **hooks})()
+
+
+def implementing(hook, implementation, **options):
+    """Return a plugin that implements this hook by this function."""
+    return type("Plugin", (), {"GRASPSENSE_API": (2, 0), hook: hookimpl(implementation, **options)})()
+
+
 HAND_LOST = {"vanishes_s": 0.3}
 HAND_ABSENT = {"here": False}
 

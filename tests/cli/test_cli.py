@@ -13,6 +13,7 @@ import click
 import pytest
 from cases import every_case
 from commands import graspsense
+from parts import implementing
 from repository import ROOT
 
 from graspsense import __version__
@@ -21,7 +22,6 @@ from graspsense.core.components.entries import CommandEntry, FoundDevice
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.components.registry import plugins as loader
 from graspsense.core.values.errors import DeviceLost, NoDevice
-from graspsense.plugin_api import hookimpl
 
 REPLAY = ["--gripper", "replay", "-o", "gripper.recording=icub:some/file.txt", "-o", "classifier.type=none"]
 """What is here without any other distribution; the default pipeline's classifier is not."""
@@ -40,15 +40,8 @@ def adding(name: str, command: click.Command):
     module = f"command_{name}"
     sys.modules[module] = type(sys)(module)
     sys.modules[module].command = command
-
-    class Plugin:
-        GRASPSENSE_API = (2, 0)
-
-        @hookimpl
-        def graspsense_commands(self):
-            return [CommandEntry(name, f"{module}:command", "a command of a plugin")]
-
-    return Plugin()
+    entry = CommandEntry(name, f"{module}:command", "a command of a plugin")
+    return implementing("graspsense_commands", lambda self: [entry])
 
 
 def failing(error: Exception):
@@ -74,13 +67,10 @@ def test_help_lists_the_commands(run):
         assert re.findall(r"^  (\w+)  +\w", ran.stdout, re.MULTILINE) == list(COMMANDS)
 
 
-def test_version(run):
-    assert run("--version").stdout == f"graspsense, version {__version__}\n"
-
-
-def test_version_is_that_of_the_distribution():
+def test_version_is_that_of_the_distribution(run):
     with (ROOT / "pyproject.toml").open("rb") as file:
         assert tomllib.load(file)["project"]["version"] == __version__
+    assert run("--version").stdout == f"graspsense, version {__version__}\n"
 
 
 @every_case(
@@ -216,88 +206,84 @@ def test_with_strict_plugins_the_broken_one_is_named(run, site, monkeypatch):
     )
 
 
-class TestCommandsOfPlugins:
-    def test_one_is_found_by_its_short_and_its_qualified_name(self, run):
-        @click.command()
-        @click.argument("word")
-        def say(word):
-            click.echo(word)
+def test_a_command_of_a_plugin_is_found_by_its_short_and_its_qualified_name(run):
+    @click.command()
+    @click.argument("word")
+    def say(word):
+        click.echo(word)
 
-        loader.installed().add(adding("say", say), "lab-a")
+    loader.installed().add(adding("say", say), "lab-a")
 
-        assert run("say", "hello").stdout == "hello\n"
-        assert run("lab-a/say", "hello").stdout == "hello\n"
-        assert "Did you mean 'say'?" in run("sya").stderr
-
-    def test_one_that_is_no_command_says_so(self, run):
-        loader.installed().add(adding("say", print), "lab-a")
-
-        ran = run("say")
-
-        assert ran.returncode == 2
-        assert ran.stderr == (
-            "graspsense: command 'say' of lab-a 0.1 cannot be used here: command_say:command is not a click command\n"
-        )
-
-    def test_two_of_one_name_are_an_error_naming_both(self, run):
-        loader.installed().add(adding("say", click.Command("say")), "lab-a")
-        loader.installed().add(adding("say", click.Command("say")), "lab-b")
-
-        ran = run("say")
-
-        assert ran.returncode == 2
-        assert ran.stderr == "graspsense: command 'say' is provided by lab-a and lab-b; write \"lab-a/say\"\n"
+    assert run("say", "hello").stdout == run("lab-a/say", "hello").stdout == "hello\n"
+    assert "Did you mean 'say'?" in run("sya").stderr
 
 
-class TestPluginsList:
-    def test_json_has_one_object_a_component(self, run):
-        rows = run("plugins", "list", "--json").json
+@every_case(
+    ("commands", "said"),
+    [
+        (
+            {"lab-a": print},
+            "command 'say' of lab-a 0.1 cannot be used here: command_say:command is not a click command",
+        ),
+        (
+            dict.fromkeys(("lab-a", "lab-b"), click.Command("say")),
+            "command 'say' is provided by lab-a and lab-b; write \"lab-a/say\"",
+        ),
+    ],
+)
+def test_a_command_of_a_plugin_that_is_none_or_is_there_twice_says_so(run, monkeypatch, commands, said):
+    monkeypatch.setattr(loader, "_current", IsolatedPlugins())
+    for distribution, command in commands.items():
+        loader.installed().add(adding("say", command), distribution)
 
-        assert {"role", "name", "distribution", "version", "state"} <= set(rows[0])
-        named = {(row["role"], row["name"]): row for row in rows}
-        hybrid = named["controller", "hybrid"]
-        assert (hybrid["distribution"], hybrid["version"], hybrid["state"]) == (
-            "graspsense",
-            __version__,
-            "loaded",
-        )
-        c45 = named["classifier", "c45"]
-        assert (c45["version"], c45["state"]) == (None, "not installed")
-        assert c45["reason"].startswith("in a clone: pip install -r requirements-all.txt ")
+    ran = run("say")
 
-    def test_a_broken_and_an_observing_plugin_are_listed(self, run, site, monkeypatch):
-        site.install("lab-broken", "import no_such_driver", version="3.1")
-        observer = """
-            from graspsense.plugin_api import hookimpl
-            GRASPSENSE_API = (2, 0)
-            @hookimpl
-            def graspsense_run_starting(run): pass
-            """
-        site.install("lab-observer", observer)
-        monkeypatch.setattr(loader, "_current", site.discover(GRASPSENSE_DISABLED_PLUGINS="lab-off"))
+    assert (ran.returncode, ran.stderr) == (2, f"graspsense: {said}\n")
 
-        rows = {row["distribution"]: row for row in run("plugins", "list", "--json").json}
-        table = run("plugins", "list").stdout
 
-        broken = rows["lab-broken"]
-        assert (broken["role"], broken["name"], broken["version"]) == (None, "main", "3.1")
-        assert (broken["state"], broken["reason"]) == (
-            "broken",
-            "ModuleNotFoundError: No module named 'no_such_driver'",
-        )
-        assert rows["lab-observer"]["summary"] == "graspsense_run_starting"
-        assert re.search(
-            r"^- +main +lab-broken +3\.1 +broken +ModuleNotFoundError: No module named 'no_such_driver'$",
-            table,
-            re.MULTILINE,
-        )
+def test_the_list_of_plugins_as_json_has_one_object_a_component(run):
+    rows = run("plugins", "list", "--json").json
 
-        shown = run("plugins", "show", "lab-broken")
-        assert shown.returncode == 0
-        assert "state        broken: ModuleNotFoundError" in shown.stdout
-        assert "import no_such_driver" in shown.stdout
-        (status,) = run("plugins", "show", "lab-broken", "--json").json["plugins"]
-        assert status["state"] == "broken"
+    assert {"role", "name", "distribution", "version", "state"} <= set(rows[0])
+    named = {(row["role"], row["name"]): row for row in rows}
+    hybrid = named["controller", "hybrid"]
+    assert (hybrid["distribution"], hybrid["version"], hybrid["state"]) == (
+        "graspsense",
+        __version__,
+        "loaded",
+    )
+    c45 = named["classifier", "c45"]
+    assert (c45["version"], c45["state"]) == (None, "not installed")
+    assert c45["reason"].startswith("in a clone: pip install -r requirements-all.txt ")
+
+
+def test_a_broken_and_an_observing_plugin_are_listed_and_shown(run, site, monkeypatch):
+    site.install("lab-broken", "import no_such_driver", version="3.1")
+    observer = """
+        from graspsense.plugin_api import hookimpl
+        GRASPSENSE_API = (2, 0)
+        @hookimpl
+        def graspsense_run_starting(run): pass
+        """
+    site.install("lab-observer", observer)
+    monkeypatch.setattr(loader, "_current", site.discover(GRASPSENSE_DISABLED_PLUGINS="lab-off"))
+    reason = "ModuleNotFoundError: No module named 'no_such_driver'"
+
+    rows = {row["distribution"]: row for row in run("plugins", "list", "--json").json}
+
+    broken = rows["lab-broken"]
+    assert (broken["role"], broken["name"], broken["version"]) == (None, "main", "3.1")
+    assert (broken["state"], broken["reason"]) == ("broken", reason)
+    assert rows["lab-observer"]["summary"] == "graspsense_run_starting"
+    row = rf"^- +main +lab-broken +3\.1 +broken +{reason}$"
+    assert re.search(row, run("plugins", "list").stdout, re.MULTILINE)
+
+    shown = run("plugins", "show", "lab-broken")
+    assert shown.returncode == 0
+    assert "state        broken: ModuleNotFoundError" in shown.stdout
+    assert "import no_such_driver" in shown.stdout
+    (status,) = run("plugins", "show", "lab-broken", "--json").json["plugins"]
+    assert status["state"] == "broken"
 
 
 class TestPluginsShow:
@@ -366,16 +352,11 @@ class TestConfig:
         assert asked["origins"]["controller.ramp_s"] == "default"
         assert "seed = 3                                  # --seed\n" in shown.stdout
 
-    def test_show_takes_the_pipeline_either_way(self, run):
-        assert run("config", "show", "default", *REPLAY).stdout == run("config", "show", *REPLAY).stdout
-        assert (
-            run("config", "show", "--pipeline", "default", *REPLAY).stdout
-            == run("config", "show", *REPLAY).stdout
-        )
-
-    def test_json_has_no_infinity(self, run):
+    def test_show_takes_the_pipeline_either_way_and_json_has_no_infinity(self, run):
+        shown = run("config", "show", *REPLAY).stdout
+        assert run("config", "show", "default", *REPLAY).stdout == shown
+        assert run("config", "show", "--pipeline", "default", *REPLAY).stdout == shown
         ran = run("config", "show", *REPLAY, "-o", "run.late_periods=inf", "--json")
-
         assert ran.json["values"]["run"]["late_periods"] == "inf"
 
     def test_validate_says_yes_and_names_the_components(self, run):
@@ -414,25 +395,20 @@ class TestDevices:
         ran = run("devices")
         assert (ran.returncode, ran.stderr) == (0, "")
         assert ran.stdout == "no installed plugin looks for devices (graspsense plugins list)\n"
+        assert (
+            run("devices", "--timeout", "0").returncode == run("devices", "--timeout", "nan").returncode == 2
+        )
 
     def test_found_and_failed(self, run):
-        class Looking:
-            GRASPSENSE_API = (2, 0)
+        def look(self, timeout_s):
+            assert timeout_s == 0.5
+            return [FoundDevice("hand", "42", "bus 1", ready=False, advice="add a udev rule")]
 
-            @hookimpl
-            def graspsense_probe_devices(self, timeout_s):
-                assert timeout_s == 0.5
-                return [FoundDevice("hand", "42", "bus 1", ready=False, advice="add a udev rule")]
+        def fail(self, timeout_s):
+            raise OSError("no bus")
 
-        class Failing:
-            GRASPSENSE_API = (2, 0)
-
-            @hookimpl
-            def graspsense_probe_devices(self, timeout_s):
-                raise OSError("no bus")
-
-        loader.installed().add(Failing(), "lab-a")
-        loader.installed().add(Looking(), "lab-b")
+        for probe, distribution in ((fail, "lab-a"), (look, "lab-b")):
+            loader.installed().add(implementing("graspsense_probe_devices", probe), distribution)
 
         ran = run("devices", "--timeout", "0.5")
         assert ran.returncode == 0
@@ -440,31 +416,24 @@ class TestDevices:
         assert ran.stdout == (
             "GRIPPER  SERIAL  WHERE  STATE      ADVICE\nhand     42      bus 1  not ready  add a udev rule\n"
         )
-        json = run("devices", "--timeout", "0.5", "--json").json
-        assert json["devices"] == [
-            {
-                "backend": "hand",
-                "serial": "42",
-                "where": "bus 1",
-                "ready": False,
-                "advice": "add a udev rule",
-                "distribution": "lab-b",
-            }
-        ]
-        assert json["failed"] == {"lab-a": "OSError: no bus"}
-
-    def test_a_timeout_is_positive(self, run):
-        assert run("devices", "--timeout", "0").returncode == 2
-        assert run("devices", "--timeout", "nan").returncode == 2
+        (device,), failed = (
+            run("devices", "--timeout", "0.5", "--json").json[key] for key in ("devices", "failed")
+        )
+        assert (device["backend"], device["serial"], device["where"]) == ("hand", "42", "bus 1")
+        assert (device["ready"], device["advice"], device["distribution"]) == (
+            False,
+            "add a udev rule",
+            "lab-b",
+        )
+        assert failed == {"lab-a": "OSError: no bus"}
 
 
 class TestCompletion:
-    @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-    def test_the_script_calls_us_back(self, run, shell):
-        ran = run("completion", shell)
-
-        assert ran.returncode == 0
-        assert f"_GRASPSENSE_COMPLETE={shell}_complete" in ran.stdout
+    def test_the_script_calls_us_back(self, run):
+        for shell in ("bash", "zsh", "fish"):
+            ran = run("completion", shell)
+            assert ran.returncode == 0
+            assert f"_GRASPSENSE_COMPLETE={shell}_complete" in ran.stdout
 
     @every_case(
         ("words", "offered"),

@@ -86,20 +86,14 @@ def test_train_then_predict(csv, tmp_path):
     code, out, _ = graspsense("predict", model, new, "--json")
     answer = json.loads(out)
     assert code == 0
-    assert [prediction["label"] for prediction in answer["predictions"]][:3] == [
-        "can:full",
-        "jar:empty",
-        "unknown",
-    ]
+    predicted = [prediction["label"] for prediction in answer["predictions"]]
+    assert predicted[:3] == ["can:full", "jar:empty", "unknown"]
     assert answer["unknown"] == 1
     assert answer["rate"] is None
     (assumed,) = (note for note in answer["notes"] if "states no unit" in note)
-    assert {"p_first in m", "f_steady in N"} == {
-        word.strip() for word in assumed.rpartition(" as ")[2].split(",")
-    }
-    assert any(
-        "f_steady is missing" in prediction["words"] for prediction in answer["predictions"][3]["because"]
-    )
+    assert assumed.endswith((" as p_first in m, f_steady in N", " as f_steady in N, p_first in m"))
+    reasons = answer["predictions"][3]["because"]
+    assert any("f_steady is missing" in reason["words"] for reason in reasons)
 
     code, out, _ = graspsense("predict", model, csv, "--label", "what")
     assert code == 0
@@ -164,10 +158,8 @@ def test_a_model_of_states_or_classes(csv, tmp_path):
     code, _, err = graspsense("train", csv, "--label", "what", "--out", model, "--target", "state")
     assert code == 2
     assert "select it with --only: can, jar" in err
-    assert (
-        graspsense("train", csv, "--label", "what", "--out", model, "--target", "state", "--only", "jar")[0]
-        == 0
-    )
+    states = ("--target", "state", "--only", "jar")
+    assert graspsense("train", csv, "--label", "what", "--out", model, *states).returncode == 0
     assert json.loads(model.read_text())["target"] == "state"
     again = ("train", csv, "--label", "what", "--out", model, "--target", "class", "--json")
     assert graspsense(*again, "--overwrite")[0] == 0
@@ -190,66 +182,49 @@ def test_features_are_kept(csv, tmp_path):
 
 
 @every_case(
-    ("arguments", "code", "said"),
+    ("arguments", "said"),
     [
         (
             ["evaluate", "nothing"],
-            2,
-            "is not a source of trials: name a FILE.csv, recordings as manifest:FILE.toml, a data set as icub:FOLDER, "
-            "a store as store:DIR, `simulated`, or scenes of `graspsense identify` as identified:cup.toml,mug.toml",
+            "is not a source of trials: name a FILE.csv, recordings as manifest:FILE.toml, ",
         ),
-        (["evaluate", "none.csv", "--label", "x"], 2, "none.csv cannot be read"),
-        (["evaluate", "none.csv"], 2, "none.csv cannot be read: there is no file of this name"),
-        (["evaluate", "nosuch:x"], 2, "no data set named 'nosuch'. Known: icub"),
-        (["evaluate", "icub:"], 2, "names no folder"),
-        (["evaluate", "icub:nowhere"], 2, "there is no folder nowhere"),
-        (["evaluate", "icub:x", "--label", "y"], 2, "--label is for a CSV source; this one is a data set"),
-        (
-            ["evaluate", "x.csv", "--instances", "3"],
-            2,
-            "--instances is for a simulated source; this one is a CSV",
-        ),
+        (["evaluate", "none.csv", "--label", "x"], "none.csv cannot be read"),
+        (["evaluate", "none.csv"], "none.csv cannot be read: there is no file of this name"),
+        (["evaluate", "nosuch:x"], "no data set named 'nosuch'. Known: icub"),
+        (["evaluate", "icub:"], "names no folder"),
+        (["evaluate", "icub:nowhere"], "there is no folder nowhere"),
+        (["evaluate", "icub:x", "--label", "y"], "--label is for a CSV source; this one is a data set"),
+        (["evaluate", "x.csv", "--instances", "3"], "--instances is for a simulated source"),
         (
             ["evaluate", "x.csv", "--states-per-instance", "one"],
-            2,
-            "--states-per-instance is for a simulated source; this one is a CSV",
+            "--states-per-instance is for a simulated source",
         ),
         (
             ["evaluate", "simulated", "--instances", "2", "--states-per-instance", "one"],
-            2,
             "2 instances cannot be in one of 4 states each: give at least 4 instances",
         ),
-        (["evaluate", "x.csv", "--label", "y", "--classifier", "treee"], 2, "no classifier named 'treee'"),
+        (["evaluate", "x.csv", "--label", "y", "--classifier", "treee"], "no classifier named 'treee'"),
         (
             ["evaluate", "x.csv", "--label", "y", "-o", "controller.ramp_s=1"],
-            2,
             "only keys of [classifier] and [features]",
         ),
-        (["evaluate", "x.csv", "--label", "y", "-o", "classifier.trees=3"], 2, "no key 'trees'"),
-        (["evaluate", "simulated", "--instances", "0"], 2, "0 instances of an object: give 1 to 1000"),
-        (["evaluate", "simulated", "--trials", "0"], 2, "0 trials per instance"),
-        (["evaluate", "simulated", "--objects", "canoe"], 2, "no object named 'canoe'"),
-        (["evaluate", "simulated", "--objects", "can,can:full_open"], 2, "an object is named twice"),
-        (["evaluate", "simulated", "--objects", "can:full_open#3"], 2, "without an instance"),
-        (
-            ["train", "x.csv", "--label", "y", "--out", "model.pkl"],
-            2,
-            "model.pkl: the name of the file must end in .json",
-        ),
-        (
-            ["train", "x.csv", "--label", "y", "--out", "gone/model.json"],
-            2,
-            "gone/model.json cannot be written: there is no folder gone",
-        ),
-        (["evaluate", "x.csv", "--label", "y", "--keep", "."], 2, ". is a folder: name a file in it"),
-        (["predict", "nosuch", "x.csv"], 2, "no model named 'nosuch'"),
+        (["evaluate", "x.csv", "--label", "y", "-o", "classifier.trees=3"], "no key 'trees'"),
+        (["evaluate", "simulated", "--instances", "0"], "0 instances of an object: give 1 to 1000"),
+        (["evaluate", "simulated", "--trials", "0"], "0 trials per instance"),
+        (["evaluate", "simulated", "--objects", "canoe"], "no object named 'canoe'"),
+        (["evaluate", "simulated", "--objects", "can,can:full_open"], "an object is named twice"),
+        (["evaluate", "simulated", "--objects", "can:full_open#3"], "without an instance"),
+        (["train", "x.csv", "--label", "y", "--out", "model.pkl"], "the name of the file must end in .json"),
+        (["train", "x.csv", "--label", "y", "--out", "gone/model.json"], "there is no folder gone"),
+        (["evaluate", "x.csv", "--label", "y", "--keep", "."], ". is a folder: name a file in it"),
+        (["predict", "nosuch", "x.csv"], "no model named 'nosuch'"),
     ],
 )
-def test_mistakes(monkeypatch, tmp_path, arguments, code, said):
+def test_mistakes(monkeypatch, tmp_path, arguments, said):
     monkeypatch.chdir(tmp_path)
     ended, _, err = graspsense(*arguments)
 
-    assert ended == code
+    assert ended == 2
     assert said in err
     assert "Traceback" not in err
 

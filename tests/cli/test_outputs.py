@@ -84,18 +84,6 @@ def test_a_pipe_or_a_device_is_not_replaced(table, tmp_path, option):
     assert pipe.is_fifo()
 
 
-@pytest.mark.parametrize("command", ["evaluate", "compare", "train"])
-def test_a_negative_seed_is_refused(table, tmp_path, command):
-    more = {
-        "train": ("--out", tmp_path / "m.json"),
-        "evaluate": ("--folds", "2"),
-        "compare": ("--classifiers", "knn"),
-    }
-    done = graspsense(command, table, "--label", "kind", *more[command], "--seed", "-1")
-    assert done.returncode == 2
-    assert "--seed" in done.stderr
-
-
 @every_case(
     ("name", "says"),
     [

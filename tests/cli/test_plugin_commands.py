@@ -13,32 +13,15 @@ from commands import graspsense
 from mutants import MUTANTS
 
 from graspsense.core.components.registry import IsolatedPlugins
-from graspsense.plugin_api import hookimpl
 from graspsense.scaffold.make import make
 from graspsense.testing import CHECKS, MINIMUM_CHECKS
-
-
-class Lab:
-    GRASPSENSE_API = (2, 0)
-
-    def __init__(self, *entries):
-        self.entries = entries
-
-    @hookimpl
-    def graspsense_feature_sets(self):
-        return [entry for entry in self.entries if hasattr(entry, "features")]
-
-    @hookimpl
-    def graspsense_sensor_backends(self):
-        return [entry for entry in self.entries if hasattr(entry, "accepts")]
-
 
 CHECKS_WITH_SETTINGS = {"settings-survive-a-file", "reports-a-lost-device", "reports-a-missing-device"}
 """Checks of a gripper that need the settings of the command line; the others take seconds."""
 
 
 def test_a_part_that_conforms():
-    with IsolatedPlugins(Lab(parts.ENTRIES["feature-set"])):
+    with IsolatedPlugins(parts.offering(parts.ENTRIES["feature-set"])):
         code, out, err = graspsense("plugins", "check", "peak")
 
     count = len(CHECKS["feature-set"])
@@ -55,7 +38,7 @@ def test_a_part_that_does_not():
         for mutant in MUTANTS
         if mutant.check == "requires-what-it-reads" and mutant.role == "feature-set"
     ]
-    with IsolatedPlugins(Lab(broken.entry)):
+    with IsolatedPlugins(parts.offering(broken.entry)):
         code, out, _ = graspsense("plugins", "check", "peak", "--json")
 
     assert code == 1
@@ -73,7 +56,7 @@ def test_settings_reach_the_part_that_is_checked(monkeypatch):
     assert len(asking) == len(CHECKS_WITH_SETTINGS)
     monkeypatch.setitem(CHECKS, "sensor-backend", tuple(asking))
     monkeypatch.setitem(MINIMUM_CHECKS, "sensor-backend", len(asking))
-    with IsolatedPlugins(Lab(parts.ENTRIES["sensor-backend"])):
+    with IsolatedPlugins(parts.offering(parts.ENTRIES["sensor-backend"])):
         code, out, err = graspsense(
             "plugins",
             *("check", "hand", "-o", "here=true", "--unplugged", "vanishes_s=0.3", "--absent", "here=false"),

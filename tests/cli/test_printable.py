@@ -68,7 +68,7 @@ def test_whatever_prints_a_text_prints_it_harmlessly(capsys, monkeypatch, stream
     assert "\\u001b" in out
 
 
-def test_a_text_of_several_lines_looks_like_no_other_text(capsys):
+def test_a_text_of_several_lines_looks_like_no_other_text_and_a_row_of_a_table_is_one_line(capsys):
     echo(f"  note {FORGED}")
     echo_entry("label", FORGED)
     echo("first\n  try: this\nfirst again")
@@ -76,9 +76,6 @@ def test_a_text_of_several_lines_looks_like_no_other_text(capsys):
     assert lines[1].startswith("    9  2026")
     assert lines[3].startswith(" " * 12)
     assert lines[4:] == ["first", "  try: this", "  first again"]
-
-
-def test_a_row_of_a_table_is_one_line_whatever_is_in_it(capsys):
     echo_table(("LABEL", "N"), [(FORGED, "1"), ("block", "2")])
     assert len(capsys.readouterr().out.splitlines()) == 3
 

@@ -126,26 +126,23 @@ def test_a_trial_that_is_kept_runs_again_from_its_recording_and_from_its_setting
 
 
 @pytest.mark.slow
-def test_a_recording_is_drawn_as_the_grasp_itself_was(tmp_path):
+def test_every_grasp_and_its_recording_is_drawn(tmp_path):
     pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
-    picture, again, store = tmp_path / "first.png", tmp_path / "again.png", tmp_path / "kept"
-    done = graspsense("run", "--save", str(store), "--plot", str(picture))
-    assert done.returncode == 0, done.stderr
-    done = graspsense("replay", f"{store}#1", "--plot", str(again))
-    assert done.returncode == 0, done.stderr
-    assert again.is_file()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("arguments", [[], ["--object", "none"], ["-o", "classifier.type=none"]])
-def test_every_grasp_is_drawn(tmp_path, arguments):
-    pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
-    picture = tmp_path / "grasp.png"
-    done = graspsense("run", "--plot", str(picture), *arguments)
-    assert done.returncode == 0, done.stderr
-    assert f"picture written to {picture}" in done.stderr
-    assert picture.read_bytes().startswith(b"\x89PNG")
-    assert picture.stat().st_size < 150_000
+    store = tmp_path / "kept"
+    for k, command in enumerate(
+        (
+            ("run", "--save", store),
+            ("run", "--object", "none"),
+            ("run", "-o", "classifier.type=none"),
+            ("replay", f"{store}#1"),
+        )
+    ):
+        picture = tmp_path / f"grasp{k}.png"
+        done = graspsense(*command, "--plot", picture)
+        assert done.returncode == 0, done.stderr
+        assert f"picture written to {picture}" in done.stderr
+        assert picture.read_bytes().startswith(b"\x89PNG")
+        assert picture.stat().st_size < 150_000
 
 
 @pytest.mark.slow

@@ -38,6 +38,7 @@ FILES = {
     "ex.toml": 'title = "x"\n[sweep]\n"controller.probing_force_n" = [17.0]\n',
     "table.csv": "what,a\nx,1\ny,2\n",
     "man.toml": 'files = "{label}.csv"\ntime = "t"\ngap = "g"\n',
+    "bare.toml": "width_m = 0.06\n",
 }
 
 
@@ -67,6 +68,7 @@ def run(monkeypatch, tmp_path):
         ("import a.csv --check -o run.seed 17", "-o run.seed=17"),
         ("run can:empty_open", "--object can:empty_open"),
         ("run scene.toml", "--object scene.toml"),
+        ("run --object bare.toml", "[[terms]]"),
         ("run pipe.toml", "--pipeline pipe.toml"),
         ("run pr2", "--gripper pr2"),
         ("collect can:empty_open", "--labels can:empty_open"),
@@ -118,12 +120,6 @@ def test_every_component_of_an_example_is_known_by_its_folder():
         assert f'name = "{example.distribution}"' in (folder / "pyproject.toml").read_text()
 
 
-def test_a_scene_without_terms_is_refused(run, tmp_path):
-    (tmp_path / "bare.toml").write_text("width_m = 0.06\n")
-    code, _, err = run("run", "--object", "bare.toml")
-    assert (code, "[[terms]]" in err) == (2, True)
-
-
 def test_a_value_of_several_types_is_asked_for_in_words():
     with pytest.raises(ValidationFailed) as refused:
         structured({"title": "x", "seeds": "a"}, Experiment, "an experiment")
@@ -147,24 +143,6 @@ def test_a_store_may_be_named_in_every_way(store):
         assert len(load_trials(named)) == 12
 
 
-@pytest.mark.slow
-def test_every_command_takes_the_database_of_a_store(run, store):
-    # Other tests name the folder, or `store:` and the folder.
-    named = f"{store}/store.sqlite"
-    for command in (
-        ("verify", named),
-        ("trials", "list", named),
-        ("evaluate", named, "--folds", "2"),
-        ("compare", named, "--folds", "2", "--classifiers", "c45,tree"),
-        ("train", named, "--out", "model.json"),
-        ("predict", "model.json", named),
-        ("export", named, "--to", "exported.csv"),
-        ("report", named, "--folds", "2", "--out", "page"),
-        ("recover", named),
-    ):
-        assert run(*command)[0] == 0, command
-
-
 def test_folds_are_refused_before_the_first_grasp(run, monkeypatch):
     monkeypatch.setattr("graspsense.sources.trial_source.simulated", lambda *_, **__: pytest.fail("grasped"))
     few = ("simulated", "--objects", "can:full_open,can:empty_open", "--instances", "1", "--trials", "1")
@@ -181,10 +159,9 @@ def test_options_in_python_are_a_list():
                 ask(options=options)
 
 
-def test_an_error_in_python_names_arguments_and_not_options_of_commands(tmp_path):
-    (tmp_path / "x.csv").write_text("what,a\nx,1\ny,2\n")
+def test_an_error_in_python_names_arguments_and_not_options_of_commands(run):
     with pytest.raises(ConfigError) as refused:
-        load_trials(str(tmp_path / "x.csv"))
+        load_trials("table.csv")
     assert "label=COLUMN" in str(refused.value)
     assert "--" not in str(refused.value)
 
@@ -215,18 +192,17 @@ def test_arguments_of_an_evaluation_that_are_something_else_are_refused():
             evaluate(*arguments)
     with pytest.raises(ConfigError, match="'state'"):
         evaluate("c45", trials, target="size")
+    with pytest.raises(ConfigError, match="no feature is defined in any of the 12 trials"):
+        evaluate("c45", some_trials([np.nan] * 12), folds=2)
+    evaluation = evaluate("c45", trials, folds=2, permutations=1)
+    assert evaluation.classifier.startswith("graspsense-c45/c45 ")
+    assert evaluation.headline.rate == 1.0
 
 
 def some_trials(values):
     labels = tuple(("a", "b")[k % 2] for k in range(len(values)))
     table = FeatureTable(names=("f",), units=("N",), values=np.array(values, float).reshape(-1, 1))
     return Labelled(source="trials", table=table, labels=labels)
-
-
-def test_the_classifier_of_an_evaluation_is_named_once():
-    evaluation = evaluate("c45", some_trials([1.0, 2.0] * 6), folds=2, permutations=1)
-    assert evaluation.classifier.startswith("graspsense-c45/c45 ")
-    assert evaluation.headline.rate == 1.0
 
 
 def test_a_note_on_one_thing_is_in_the_singular():
@@ -240,11 +216,6 @@ def test_a_note_on_one_thing_is_in_the_singular():
     (note,) = without_copies(doubled).notes
     assert "1 trial is left out" in note
     assert "1 of them has another label" in note
-
-
-def test_trials_without_any_feature_have_no_rate():
-    with pytest.raises(ConfigError, match="no feature is defined in any of the 12 trials"):
-        evaluate("c45", some_trials([np.nan] * 12), folds=2)
 
 
 def test_a_long_compilation_is_told_and_a_short_one_is_not():

@@ -95,12 +95,8 @@ def _with_forces(trace, factor):
 
 @pytest.fixture(scope="module")
 def trials(traces):
-    features = CheckpointFeatures(curve(), CHECKPOINTS)
-    return Labelled(
-        source="grasps of a model gripper",
-        table=table_of([features.extract(trace) for _, trace in traces]),
-        labels=tuple(label for label, _ in traces),
-        instances=tuple(f"{label}#{k}" for k, (label, _) in enumerate(traces)),
+    return of_grasps(
+        traces, CHECKPOINTS, instances=tuple(f"{label}#{k}" for k, (label, _) in enumerate(traces))
     )
 
 
@@ -166,7 +162,7 @@ def test_predictions_in_the_loop_are_those_of_the_same_part_afterwards(model, tm
     assert "0.05 s after the contact" in anytime.predictions[-1].prediction.model
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("labels", "said"),
     [
         (("soft", "stiff", "hard"), "soft or stiff or hard, 90 %"),
@@ -174,14 +170,9 @@ def test_predictions_in_the_loop_are_those_of_the_same_part_afterwards(model, tm
     ],
 )
 def test_a_large_set_stays_one_line(labels, said):
-    made = CheckpointPrediction(
-        after_s=0.2,
-        t_s=1.0,
-        features=Features(names=(), values=(), units=()),
-        prediction=Prediction(
-            label="soft", probabilities={}, because=(), prediction_set=labels, coverage=0.9
-        ),
-    )
+    features = Features(names=(), values=(), units=())
+    prediction = Prediction(label="soft", probabilities={}, because=(), prediction_set=labels, coverage=0.9)
+    made = CheckpointPrediction(after_s=0.2, t_s=1.0, features=features, prediction=prediction)
     assert made.words == f"0.2 s after the contact: {said}"
 
 
@@ -287,21 +278,23 @@ def test_checkpoints_that_are_no_times(text):
         checkpoints_of(text)
 
 
-def test_a_source_of_features_alone_has_no_checkpoints(trials):
+def of_grasps(traces, checkpoints, **more):
+    """Return the trials of these traces with their features at these checkpoints."""
+    features = CheckpointFeatures(curve(), checkpoints)
+    return Labelled(
+        source="grasps of a model gripper",
+        table=table_of([features.extract(trace) for _, trace in traces]),
+        labels=tuple(label for label, _ in traces),
+        **more,
+    )
+
+
+def test_trials_without_traces_or_of_short_grasps_have_no_checkpoints(traces, trials):
     plain = split_checkpoints(trials, CHECKPOINTS)[-1].labelled
     with pytest.raises(ConfigError, match="gives features and not the traces"):
         split_checkpoints(plain, CHECKPOINTS)
-
-
-def test_a_checkpoint_that_hardly_any_grasp_reaches(traces):
-    features = CheckpointFeatures(curve(), (60.0,))
-    late = Labelled(
-        source="grasps",
-        table=table_of([features.extract(trace) for _, trace in traces]),
-        labels=tuple(label for label, _ in traces),
-    )
     with pytest.raises(ConfigError, match="only 0 of 20 grasps still go on 60 s after the contact"):
-        split_checkpoints(late, (60.0,))
+        split_checkpoints(of_grasps(traces, (60.0,)), (60.0,))
 
 
 def test_recognition_against_seconds_and_newtons(trials, learner):

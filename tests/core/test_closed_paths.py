@@ -8,9 +8,11 @@ import subprocess
 import sys
 import tempfile
 import textwrap
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from cases import every_case
 
 from graspsense.core.files import closed_paths
 from graspsense.core.files.closed_paths import is_closed, make_closed, why_open
@@ -59,19 +61,18 @@ def test_a_path_of_the_users_own_is_closed(file):
 
 
 @pytest.mark.parametrize("place", [".", "..", "../.."])
-def test_a_path_is_open_if_another_user_owns_it_or_a_folder_above(file, to_stranger, place):
+def test_a_path_is_open_if_another_user_owns_it_or_others_may_write_to_it_or_a_folder_above(
+    file, to_stranger, place
+):
     changed = (file / place).resolve() if place != "." else file
+    mode = changed.stat().st_mode
+    for open_mode in (0o777, 0o757, 0o702):
+        changed.chmod(open_mode)
+        assert f"mode {open_mode:o}" in why_open(file)
+        assert str(changed) in why_open(file)
+    changed.chmod(mode)
     to_stranger(changed)
     assert f"belongs to user {STRANGER if IS_ROOT else os.getuid()}" in why_open(file)
-
-
-@pytest.mark.parametrize("place", [".", "..", "../.."])
-@pytest.mark.parametrize("mode", [0o777, 0o757, 0o702])
-def test_a_path_is_open_if_others_may_write_to_it_or_to_a_folder_above(file, place, mode):
-    changed = (file / place).resolve() if place != "." else file
-    changed.chmod(mode)
-    assert f"mode {mode:o}" in why_open(file)
-    assert str(changed) in why_open(file)
 
 
 def test_a_folder_with_the_sticky_bit_protects_what_is_in_it(file):
@@ -81,20 +82,18 @@ def test_a_folder_with_the_sticky_bit_protects_what_is_in_it(file):
     assert why_open(file)
 
 
-@pytest.mark.parametrize("members", [["ada"], [], ["ada", "bob"], ["bob"]])
-@pytest.mark.parametrize("name", ["ada", "users"])
-def test_a_folder_that_its_group_may_write_to_is_closed_if_the_group_is_the_users_alone(
-    file, monkeypatch, members, name
-):
+def test_a_folder_that_its_group_may_write_to_is_closed_if_the_group_is_the_users_alone(file, monkeypatch):
     import grp
     import pwd
 
-    monkeypatch.setattr(grp, "getgrgid", lambda gid: grp.struct_group((name, "x", gid, members)))
-    monkeypatch.setattr(
-        pwd, "getpwuid", lambda uid: pwd.struct_passwd(("ada", "x", uid, 1000, "", "/home/ada", "/bin/sh"))
-    )
+    ada = ("ada", "x", os.getuid(), 1000, "", "/home/ada", "/bin/sh")
+    monkeypatch.setattr(pwd, "getpwuid", lambda uid: pwd.struct_passwd(ada))
     file.parent.chmod(0o775)
-    assert (why_open(file) == "") == (name == "ada" and "bob" not in members)
+    for name in ("ada", "users"):
+        for members in (["ada"], [], ["ada", "bob"], ["bob"]):
+            group = grp.struct_group((name, "x", 1000, members))
+            monkeypatch.setattr(grp, "getgrgid", lambda gid, group=group: group)
+            assert (why_open(file) == "") == (name == "ada" and "bob" not in members)
 
 
 def test_links_are_followed_and_their_places_count(file, tmp_path, to_stranger):
@@ -106,20 +105,25 @@ def test_links_are_followed_and_their_places_count(file, tmp_path, to_stranger):
     file.parent.chmod(0o755)
     to_stranger(link)
     assert why_open(link / "file")
-
-
-def test_links_in_a_circle_are_open(tmp_path):
+    # In a circle they are open.
     (tmp_path / "a").symlink_to(tmp_path / "b")
     (tmp_path / "b").symlink_to(tmp_path / "a")
     assert why_open(tmp_path / "a" / "file")
 
 
-def test_folders_are_made_closed_whatever_the_mask_of_the_user_is(tmp_path):
+@contextmanager
+def no_mask():
+    """The mask of a user whose new files everybody may write to."""
     mask = os.umask(0)
     try:
-        make_closed(tmp_path / "a" / "b" / "c")
+        yield
     finally:
         os.umask(mask)
+
+
+def test_folders_are_made_closed_whatever_the_mask_of_the_user_is(tmp_path):
+    with no_mask():
+        make_closed(tmp_path / "a" / "b" / "c")
     assert why_open(tmp_path / "a" / "b" / "c") == ""
 
 
@@ -139,19 +143,16 @@ CALIBRATION = Calibration(
 )
 
 
-@pytest.mark.parametrize("change", ["file", "folder", "owner"])
-@pytest.mark.parametrize("named", [True, False])
+@every_case("change", ["file", "folder", "owner"])
+@every_case("named", [True, False])
 def test_a_calibration_that_another_user_could_have_changed_is_refused(
     tmp_path, monkeypatch, to_stranger, change, named
 ):
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     folder = str(tmp_path / "lab") if named else ""
     path = calibration_path(folder, "L7", "tare")
-    mask = os.umask(0)
-    try:
+    with no_mask():
         write_calibration(path, CALIBRATION)
-    finally:
-        os.umask(mask)
     assert list(calibrations_of(folder, "L7", {})) == ["tare"]
     if change == "owner":
         to_stranger(path)

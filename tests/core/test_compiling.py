@@ -102,24 +102,19 @@ def _numba():
 
 
 def test_a_fingerprint_changes_with_constants_called_functions_and_defaults():
-    same = bind(_scaled, FACTOR=2.0)
-    assert fingerprint(same) == fingerprint(_scaled)
-    assert fingerprint(bind(_scaled, FACTOR=3.0)) != fingerprint(_scaled)
-    assert fingerprint(bind(_scaled, FACTOR=2)) != fingerprint(_scaled)
-    assert fingerprint(bind(_scaled, helper=_thrice)) != fingerprint(_scaled)
-
-
-def test_a_fingerprint_changes_with_what_an_array_an_enumeration_or_a_module_holds():
-    # All of these are constants in the machine code.
-    assert fingerprint(bind(_by_table, TABLE=np.array([1.0, 3.0]))) != fingerprint(_by_table)
-    other = IntEnum("Gear", {"LOW": 2}, module=__name__)
-    assert fingerprint(bind(_in_gear, Gear=other)) != fingerprint(_in_gear)
+    assert fingerprint(bind(_scaled, FACTOR=2.0)) == fingerprint(_scaled)
     numbers = type(math)("math")
     numbers.pi = 3.0
-    assert fingerprint(bind(_by_module, math=numbers)) != fingerprint(_by_module)
-
-
-def test_a_fingerprint_covers_the_function_that_is_compiled_in_place_of_another():
+    for function, changes in (
+        (_scaled, {"FACTOR": 3.0}),
+        (_scaled, {"FACTOR": 2}),
+        (_scaled, {"helper": _thrice}),
+        # What an array, an enumeration or a module holds is a constant in the machine code.
+        (_by_table, {"TABLE": np.array([1.0, 3.0])}),
+        (_in_gear, {"Gear": IntEnum("Gear", {"LOW": 2}, module=__name__)}),
+        (_by_module, {"math": numbers}),
+    ):
+        assert fingerprint(bind(function, **changes)) != fingerprint(function), changes
     assert fingerprint(_scaled, {_twice: _thrice}) == fingerprint(bind(_scaled, helper=_thrice))
 
 
@@ -149,29 +144,24 @@ def test_a_fingerprint_covers_the_functions_that_generate_the_code_of_an_intrins
     assert prints[0] == fingerprint(bind(_calls_half, half=declared(_half_type)))
 
 
-def test_closures_recursion_and_builtins_are_refused_by_name():
+@pytest.mark.usefixtures("_numba")
+def test_closures_recursion_and_builtins_are_refused_by_name_before_they_are_called():
     factor = 2.0
 
     def closing_over(x):
         return factor * x
 
-    with pytest.raises(NotCompilable, match=r"closing_over is a closure over factor"):
-        fingerprint(closing_over)
-    with pytest.raises(NotCompilable, match="_countdown calls itself"):
-        fingerprint(_countdown)
-    with pytest.raises(NotCompilable, match="len> is not a plain function"):
-        fingerprint(len)
+    for function, says in (
+        (closing_over, r"closing_over is a closure over factor"),
+        (_countdown, "_countdown calls itself"),
+        (len, "len> is not a plain function"),
+    ):
+        for ask in (fingerprint, compile_function):
+            with pytest.raises(NotCompilable, match=says):
+                ask(function)
 
 
 # ------------------------------------------------------------------------------------------------- compiling
-
-
-@pytest.mark.usefixtures("_numba")
-def test_what_cannot_be_compiled_is_refused_before_it_is_called():
-    with pytest.raises(NotCompilable, match="calls itself"):
-        compile_function(_countdown)
-    with pytest.raises(NotCompilable, match="is not a plain function"):
-        compile_function(len)
 
 
 @pytest.mark.usefixtures("_numba")

@@ -151,6 +151,8 @@ def test_defaults_file_options_and_flags_are_laid_over_each_other(plugins, write
         "speed_m_s": 0.03,
         "low_n": 0.0,
     }
+    # A whole number is taken for a number and becomes one.
+    assert type(settings.controller.config.force_n) is float
     assert settings.components["gripper"] == "lab-parts/hand 0.3"
     assert settings.classifier is None
     origins = settings.origins
@@ -160,12 +162,6 @@ def test_defaults_file_options_and_flags_are_laid_over_each_other(plugins, write
     assert origins["controller.force_n"] == "lab.toml:7"
     assert origins["controller.speed_m_s"] == "--speed"
     assert origins["run.seed"] == "default"
-
-
-def test_a_whole_number_is_taken_for_a_number_and_becomes_one(plugins, write):
-    force = resolve(write(BASE)).controller.config.force_n
-
-    assert (force, type(force)) == (12.0, float)
 
 
 def test_every_leaf_has_an_origin_and_every_origin_a_leaf(plugins, write):
@@ -256,25 +252,19 @@ def test_a_file_that_extends_nothing_known_is_named_with_its_line(plugins, write
 
 
 class TestChangeOfType:
+    OTHER = (Flag("--gripper", "gripper.type", "other"),)
+
     def test_keys_of_the_files_other_component_are_dropped(self, plugins, write):
-        settings = resolve(write(BASE), flags=[Flag("--gripper", "gripper.type", "other")])
+        settings = resolve(write(BASE), flags=self.OTHER)
 
         assert settings.values["gripper"] == {"type": "lab-parts/other", "transport": "tcp"}
 
     def test_options_apply_to_the_final_type_whatever_their_order(self, plugins, write):
-        settings = resolve(
-            write(BASE),
-            options=["gripper.transport=emulated"],
-            flags=[Flag("--gripper", "gripper.type", "other")],
-        )
+        settings = resolve(write(BASE), options=["gripper.transport=emulated"], flags=self.OTHER)
 
         assert settings.gripper.config.transport == "emulated"
-
-    def test_an_option_for_the_other_type_is_an_error_not_dropped(self, plugins, write):
         assert (
-            complaint(
-                write(BASE), options=["gripper.port=b"], flags=[Flag("--gripper", "gripper.type", "other")]
-            )
+            complaint(write(BASE), options=["gripper.port=b"], flags=self.OTHER)
             == "-o gripper.port=b: lab-parts/other has no key 'port'. It is a key of gripper.type = \"hand\""
         )
 
@@ -297,35 +287,26 @@ class TestChangeOfType:
 
 
 class TestClassifier:
-    def test_a_table_names_one(self, plugins, write):
-        settings = resolve(write(BASE + '[classifier]\ntype = "guess"\nforce_n = 3\n'))
+    GUESS = BASE + '[classifier]\ntype = "guess"\nforce_n = 3\n'
+
+    def test_a_table_names_one_and_none_removes_it(self, plugins, write):
+        settings = resolve(write(self.GUESS))
 
         assert settings.classifier is not None
         assert settings.classifier.config.force_n == 3.0
-        assert [choice.component.table for choice in settings.chosen] == [
-            "gripper",
-            "controller",
-            "features",
-            "classifier",
-        ]
+        tables = [choice.component.table for choice in settings.chosen]
+        assert tables == ["gripper", "controller", "features", "classifier"]
 
-    def test_none_removes_it(self, plugins, write):
-        settings = resolve(
-            write(BASE + '[classifier]\ntype = "guess"\nforce_n = 3\n'), options=["classifier.type=none"]
-        )
+        removed = resolve(write(self.GUESS), options=["classifier.type=none"])
+        assert removed.classifier is None
+        assert "classifier" not in removed.values
 
-        assert settings.classifier is None
-        assert "classifier" not in settings.values
-
-    def test_a_key_for_none_is_an_error(self, plugins, write):
+    def test_a_key_for_none_or_a_table_without_a_type_is_an_error(self, plugins, write):
         assert complaint(write(BASE), options=["classifier.type=none", "classifier.force_n=3"]) == (
             '-o classifier.force_n=3: classifier.type is "none", so this key has no meaning'
         )
-
-    def test_a_table_without_a_type_is_an_error(self, plugins, write):
-        assert complaint(write(BASE + "[classifier]\nforce_n = 3\n")) == (
-            "lab.toml:11: classifier.type is not given: name a classifier. "
-            "Known: backprop, boosted, ebm, extra-trees, forest, guess, knn, mlp, svm, tree"
+        assert complaint(write(BASE + "[classifier]\nforce_n = 3\n")).startswith(
+            "lab.toml:11: classifier.type is not given: name a classifier. Known: backprop, "
         )
 
 
@@ -443,20 +424,11 @@ def test_what_is_no_toml_value_is_text(plugins, write, typed, value):
     assert resolve(write(BASE), options=[f"gripper.port={typed}"]).gripper.config.port == value
 
 
-def test_an_infinity_is_a_number(plugins, write):
-    assert resolve(write(BASE), options=["gripper.rate_hz=inf"]).gripper.config.rate_hz == float("inf")
-
-
 def test_tables_that_are_missing_altogether_are_named(plugins, write):
-    assert (
-        complaint(write(""))
-        == """\
-3 errors in the settings:
-  gripper.type is not given: name a sensor backend. Known: hand, other, replay
-  controller.type is not given: name a controller. Known: force, hybrid, law, send-and-watch, velocity
-  features.type is not given: name a feature set. Known: catch22, chitta, chitta-without-pads, contact-image, curve, \
-none-at-all, quant, quantiles, union"""
-    )
+    head, *lines = complaint(write("")).splitlines()
+    assert head == "3 errors in the settings:"
+    for table, line in zip(("gripper", "controller", "features"), lines, strict=True):
+        assert re.match(rf"  {table}\.type is not given: name a .*Known: .*(hand|law|none-at-all)", line)
 
 
 class TestFiles:
@@ -506,12 +478,11 @@ class TestFiles:
     def test_not_toml(self, plugins, write, text, said):
         assert complaint(write(text)).startswith(said)
 
-    def test_a_byte_order_mark_is_no_matter(self, plugins, write):
-        assert resolve(write("\ufeff" + BASE)).gripper.config.port == "a"
-
-    def test_windows_line_ends_are_no_matter(self, plugins, write):
-        Path(write("")).write_bytes(BASE.replace("\n", "\r\n").encode())
-        assert resolve("lab.toml").origins["controller.force_n"] == "lab.toml:7"
+    def test_a_byte_order_mark_and_windows_line_ends_are_no_matter(self, plugins, write):
+        Path(write("")).write_bytes(("\ufeff" + BASE).replace("\n", "\r\n").encode())
+        settings = resolve("lab.toml")
+        assert settings.gripper.config.port == "a"
+        assert settings.origins["controller.force_n"] == "lab.toml:7"
 
 
 def test_a_layer_can_be_read_by_itself(plugins, write):

@@ -45,11 +45,6 @@ def model_of(trials, name):
     return calibrated(model, learner(name), trials, 0)
 
 
-@every_case(("coverage", "needed"), [(0.9, 9), (0.95, 19), (0.8, 4), (0.99, 99)])
-def test_units_needed_are_the_smallest_n_with_a_finite_quantile(coverage, needed):
-    assert units_needed(coverage) == needed
-
-
 def calibrated_by(truth, labels, instances=None, right=None, support_class=None):
     """The sets of held-out trials with these scores of their true labels; those that are not right are `other`."""
     n = len(truth)
@@ -88,6 +83,8 @@ def test_the_threshold_is_reached_by_90_percent_of_the_trials_that_are_not_recog
 
     # With the trial that is not known yet, 18 of 20.
     assert threshold(calibrated_by(truth, ["a"] * 19)) == truth[1]
+    # The smallest number with a finite quantile.
+    assert [units_needed(coverage) for coverage in (0.8, 0.9, 0.95, 0.99)] == [4, 9, 19, 99]
 
 
 @pytest.mark.parametrize(
@@ -124,16 +121,11 @@ def test_a_label_that_is_recognised_more_often_than_asked_needs_no_other_member(
 
 
 def test_a_set_keeps_a_single_label_only_if_the_answer_is_certain_enough():
-    labels = ["a"] * 20 + ["b"] * 20
-    sets = calibrated_by(np.full(40, 0.5), labels)
+    sets = calibrated_by(np.full(40, 0.5), ["a"] * 20 + ["b"] * 20)
 
     assert set_of(sets, {"a": 0.9, "b": 0.1}, "a", certainty=0.95) == {"a"}
     assert set_of(sets, {"a": 0.9, "b": 0.1}, "a", certainty=0.85) == {"a", "b"}
-
-
-def test_a_label_whose_score_is_its_threshold_is_a_member_whatever_the_rounding():
-    sets = calibrated_by(np.full(40, 0.5), ["a"] * 20 + ["b"] * 20)
-
+    # A label whose score is its threshold is a member, whatever the rounding.
     for score in (0.5, np.nextafter(0.5, 0.0)):
         assert set_of(sets, {"a": 0.9, "b": score}, "a") == {"a", "b"}
     assert set_of(sets, {"a": 0.9, "b": 0.499}, "a") == {"a"}
@@ -201,13 +193,10 @@ def test_predictions_say_which_labels_are_in_every_set():
     lacking = model_of(trials.rows(np.array(fewer)), "knn")
 
     assert not any("in every set" in text for text in model.predict(trials.table.row(0)).warnings)
-    said = [lacking.predict(trials.table.row(i)) for i in range(0, len(trials), 7)]
-    known = [prediction for prediction in said if prediction.label != UNKNOWN]
-    assert all("empty" in prediction.prediction_set for prediction in known)
-    assert all(
-        any("in every set" in text and "empty" in text for text in prediction.warnings)
-        for prediction in known
-    )
+    for said in (lacking.predict(trials.table.row(i)) for i in range(0, len(trials), 7)):
+        if said.label != UNKNOWN:
+            assert "empty" in said.prediction_set
+            assert any("in every set" in text and "empty" in text for text in said.warnings)
 
 
 @pytest.mark.parametrize(
@@ -341,21 +330,16 @@ def test_evaluate_measures_coverage_size_and_reliability_with_instances_held_out
     assert evaluation.reliability.calibration_error < 0.15
 
 
-def test_noise_gives_sets_of_both_labels():
+def test_noise_gives_sets_of_both_labels_and_too_few_instances_have_no_coverage():
     trials = bottles(20)
     noise = evolve(trials.table, values=np.random.default_rng(3).normal(size=trials.table.values.shape))
-
     evaluation = judged(evolve(trials, table=noise), "svm", controls=False)
-
     assert evaluation.sets.mean_size > 1.7
     assert evaluation.sets.covered.rate > 0.85
 
-
-def test_too_few_instances_have_no_coverage_with_the_reason():
-    evaluation = judged(bottles(4), "tree", controls=False)
-
-    assert evaluation.sets.covered is None
-    assert "90 % needs 9" in evaluation.sets.reason
+    few = judged(bottles(4), "tree", controls=False)
+    assert few.sets.covered is None
+    assert "90 % needs 9" in few.sets.reason
 
 
 def test_states_within_classes_are_covered_too():
@@ -401,19 +385,21 @@ def test_the_commands_print_and_keep_the_sets(csv_file, tmp_path, monkeypatch):
     asked = json.loads(printed("predict", model, csv_file, *given, "--json"))
     measured = printed("evaluate", csv_file, *given, "--classifier", "knn")
 
-    assert "90 % for 2 of 2 labels (12 instances or more of each)" in trained
-    assert "of the held-out trials are called unknown (false alarms)" in trained
-    assert "90 % SET" in listed
-    assert " or " in listed
-    known = [prediction for prediction in asked["predictions"] if prediction["label"] != UNKNOWN]
-    assert all(
-        prediction["label"] in prediction["prediction_set"] and prediction["coverage"] == 0.9
-        for prediction in known
-    )
-    assert "contain the true label; 90 % asked for, by instances" in measured
-    assert "Brier score" in measured
-    assert "expected calibration error" in measured
-    assert "reliability of the probabilities" in measured
+    for printed_text, words in (
+        (trained, "90 % for 2 of 2 labels (12 instances or more of each)"),
+        (trained, "of the held-out trials are called unknown (false alarms)"),
+        (listed, "90 % SET"),
+        (listed, " or "),
+        (measured, "contain the true label; 90 % asked for, by instances"),
+        (measured, "Brier score"),
+        (measured, "expected calibration error"),
+        (measured, "reliability of the probabilities"),
+    ):
+        assert words in printed_text
+    for prediction in asked["predictions"]:
+        if prediction["label"] != UNKNOWN:
+            assert prediction["label"] in prediction["prediction_set"]
+            assert prediction["coverage"] == 0.9
 
 
 @pytest.mark.slow

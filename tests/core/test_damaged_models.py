@@ -111,51 +111,39 @@ def written(folder, names, **config):
     return files
 
 
+@pytest.mark.parametrize(
+    ("names", "kept_as"),
+    [(KINDS, {}), (["mlp"], {"kept_as": "weights"}), (KEPT_AS_SKOPS, {"kept_as": "skops"})],
+)
 @pytest.mark.parametrize(("damages", "least"), [SOME, EVERY])
-def test_damages_of_a_model_are_refused_or_answer(tmp_path, damages, least):
-    assert read_damaged(*damages, *written(tmp_path, KINDS)) >= len(KINDS) * least
-
-
-@pytest.mark.parametrize(("damages", "least"), [SOME, EVERY])
-def test_damages_of_the_weights_of_a_network_are_refused_or_answer(tmp_path, damages, least):
-    assert read_damaged(*damages, *written(tmp_path, ["mlp"], kept_as="weights")) >= least
-
-
-@pytest.mark.parametrize(("damages", "least"), [SOME, EVERY])
-def test_damages_of_a_model_kept_as_skops_are_refused_or_answer(tmp_path, damages, least):
-    pytest.importorskip("skops", reason="the extra 'skops' is not installed")
-    assert (
-        read_damaged(*damages, *written(tmp_path, KEPT_AS_SKOPS, kept_as="skops"))
-        >= len(KEPT_AS_SKOPS) * least
-    )
+def test_damages_of_a_model_are_refused_or_answer(tmp_path, names, kept_as, damages, least):
+    if names is KEPT_AS_SKOPS:
+        pytest.importorskip("skops", reason="the extra 'skops' is not installed")
+    assert read_damaged(*damages, *written(tmp_path, names, **kept_as)) >= len(names) * least
 
 
 @every_case(
-    ("name", "setting", "value"),
+    ("name", "settings"),
     [
-        ("mlp", "hidden", 10**9),
-        ("backprop", "hidden", 10**9),
-        ("backprop", "epochs", 10**12),
-        ("backprop", "epochs", 10**5),
-        ("forest", "trees", 10**9),
-        ("boosted", "stages", 10**9),
-        ("boosted", "stages", 10**4),
-        ("boosted", "depth", 10**6),
-        ("knn", "neighbours", 0),
-        ("svm", "c", 1e300),
-        ("tree", "min_leaf", 10**30),
-        ("c45", "rep_folds", -1),
-        ("c45", "further", 1),
+        ("mlp", {"hidden": 10**9}),
+        ("backprop", {"hidden": 10**9}),
+        ("backprop", {"epochs": 10**12}),
+        ("backprop", {"epochs": 10**5, "hidden": 10**4}),
+        ("forest", {"trees": 10**9}),
+        ("boosted", {"stages": 10**9}),
+        ("boosted", {"stages": 10**4}),
+        ("boosted", {"depth": 10**6}),
+        ("knn", {"neighbours": 0}),
+        ("svm", {"c": 1e300}),
+        ("tree", {"min_leaf": 10**30}),
+        ("c45", {"rep_folds": -1}),
+        ("c45", {"further": 1}),
     ],
 )
-def test_settings_that_would_take_all_memory_or_time_are_refused(tmp_path, name, setting, value):
-    if (name, setting, value) == ("backprop", "epochs", 10**5):
-        changes = {"epochs": 10**5, "hidden": 10**4}
-    else:
-        changes = {setting: value}
+def test_settings_that_would_take_all_memory_or_time_are_refused(tmp_path, name, settings):
     path = tmp_path / "m.json"
     write_model(path, trained(name))
-    resealed(path, lambda content: content["settings"].update(changes))
+    resealed(path, lambda content: content["settings"].update(settings))
     with pytest.raises(DataDamaged, match=r"is damaged: (settings\.|model: .*with these settings)"):
         load_model(str(path), installed())
 
@@ -337,17 +325,14 @@ class TestKeptAsSkops:
         self.refused(tmp_path, "extra-trees", lambda trees: setattr(trees, "estimators_", other_trees(trees)))
 
     def test_an_archive_that_is_larger_than_it_looks(self, tmp_path):
-        model = trained("tree", kept_as="skops")
-        path = tmp_path / "m.json"
-        for compression, name in ((ZIP_DEFLATED, "x.npy"), (ZIP_STORED, "x.npy")):
+        path, header = tmp_path / "m.json", BytesIO()
+        shape = {"descr": "<f8", "fortran_order": False, "shape": (10**12,)}
+        np.lib.format.write_array_header_1_0(header, shape)
+        for compression in (ZIP_DEFLATED, ZIP_STORED):
             data = BytesIO()
             with ZipFile(data, "w", compression) as archive:
-                header = BytesIO()
-                np.lib.format.write_array_header_1_0(
-                    header, {"descr": "<f8", "fortran_order": False, "shape": (10**12,)}
-                )
-                archive.writestr(name, header.getvalue())
-            write_model(path, model)
+                archive.writestr("x.npy", header.getvalue())
+            write_model(path, trained("tree", kept_as="skops"))
             text = base64.b64encode(data.getvalue()).decode()
             resealed(path, lambda content, text=text: content["model"].update(skops=text))
             with pytest.raises(DataDamaged, match=r"compressed|not as long as it says"):

@@ -29,7 +29,6 @@ from graspsense.plugin_api import (
     FeatureSet,
     FeatureSetEntry,
     SensorBackendEntry,
-    hookimpl,
 )
 
 HERE = sys.modules[__name__]
@@ -103,38 +102,30 @@ def test_an_entry_is_completed_by_the_class():
 
 
 def test_the_config_class_is_that_of_the_nearest_base():
-    hand = part(Fingers, "sensor-backend", SensorBackendEntry)
+    assert part(Fingers, "sensor-backend", SensorBackendEntry).config_class() is FingersConfig
+    assert config_of(parts.Nearest, Classifier) is parts.ClassifierConfig
 
-    assert hand.config_class() is FingersConfig
 
-
-def test_a_class_that_does_not_say_what_its_settings_are(monkeypatch):
+def test_a_class_that_does_not_declare_what_is_needed(monkeypatch):
     class Bare(FeatureSet):
         def extract(self, trace):
             raise NotImplementedError
 
-    monkeypatch.setattr(HERE, "Bare", Bare, raising=False)
-
-    with pytest.raises(PluginUnavailable, match=r"write class Bare\(FeatureSet\[Config\]\), where Config"):
-        part(Bare).config_class()
-
-
-def test_a_class_that_does_not_declare_what_is_missing(monkeypatch):
     class Mute(Peak):
         requires = ()
 
     class Wrong(Summit):
         requires = (Channel("force_left", "N"), "gap")
 
-    monkeypatch.setattr(HERE, "Mute", Mute, raising=False)
-    monkeypatch.setattr(HERE, "Wrong", Wrong, raising=False)
-
-    with pytest.raises(
-        PluginUnavailable, match=r"Mute does not declare `features`: write features = \(Feature"
+    for cls in (Bare, Mute, Wrong):
+        monkeypatch.setattr(HERE, cls.__name__, cls, raising=False)
+    for ask, says in (
+        (part(Bare).config_class, r"write class Bare\(FeatureSet\[Config\]\), where Config"),
+        (part(Mute).declared, r"Mute does not declare `features`: write features = \(Feature"),
+        (part(Wrong).declared, r"Wrong: 'requires' must be <class '.*Channel'>"),
     ):
-        part(Mute).declared()
-    with pytest.raises(PluginUnavailable, match=r"Wrong: 'requires' must be <class '.*Channel'>"):
-        part(Wrong).declared()
+        with pytest.raises(PluginUnavailable, match=says):
+            ask()
 
 
 class Sided(Peak, FeatureSet[PeakConfig]):
@@ -160,20 +151,22 @@ def test_what_entry_and_class_declare_is_told():
 
 
 def test_the_result_has_the_declared_names_and_units():
-    features = Summit(PeakConfig()).extract(None)
+    summit = Summit(PeakConfig())
+    features = summit.extract(None)
 
     assert features.as_dict() == {"summit": 3.0, "width": None}
     assert features.units == ("N", "m")
     assert type(features.values[0]) is float
-    with pytest.raises(ValueError, match="Summit declares no feature 'summits'; it has summit, width"):
-        Summit(PeakConfig()).result({"summits": 1.0})
-    with pytest.raises(ValueError, match="feature 'width' is NaN without a reason"):
-        Summit(PeakConfig()).result({"summit": 1.0, "width": nan})
-    for value in (inf, -inf):
-        with pytest.raises(ValueError, match=f"feature 'summit' is {-value}: give NaN with a reason"):
-            Summit(PeakConfig()).result({"summit": -value, "width": value})
-    assert Summit(PeakConfig()).result({"summit": 1.7e308, "width": 1.7e308}).values == (1.7e308, 1.7e308)
-    undefined = Summit(PeakConfig()).undefined("the trace is empty")
+    for values, says in (
+        ({"summits": 1.0}, "Summit declares no feature 'summits'; it has summit, width"),
+        ({"summit": 1.0, "width": nan}, "feature 'width' is NaN without a reason"),
+        ({"summit": inf, "width": -inf}, "feature 'summit' is inf: give NaN with a reason"),
+        ({"summit": -inf, "width": inf}, "feature 'summit' is -inf: give NaN with a reason"),
+    ):
+        with pytest.raises(ValueError, match=says):
+            summit.result(values)
+    assert summit.result({"summit": 1.7e308, "width": 1.7e308}).values == (1.7e308, 1.7e308)
+    undefined = summit.undefined("the trace is empty")
     assert dict(undefined.reasons) == {"summit": "the trace is empty", "width": "the trace is empty"}
 
 
@@ -208,22 +201,12 @@ def settings(plugins, fingers):
 
 
 def test_the_wiring_knows_the_channels_of_the_fitted_fingers():
-    class Lab:
-        GRASPSENSE_API = (2, 0)
-
-        @hookimpl
-        def graspsense_sensor_backends(self):
-            yield SensorBackendEntry("fingers", f"{__name__}:Fingers", "a hand")
-
-        @hookimpl
-        def graspsense_controllers(self):
-            yield ControllerEntry("law", f"{__name__}:Law", "a law")
-
-        @hookimpl
-        def graspsense_feature_sets(self):
-            yield FeatureSetEntry("summit", f"{__name__}:Summit", "a peak")
-
-    plugins = IsolatedPlugins(Lab(), builtins=False)
+    lab = parts.offering(
+        SensorBackendEntry("fingers", f"{__name__}:Fingers", "a hand"),
+        ControllerEntry("law", f"{__name__}:Law", "a law"),
+        FeatureSetEntry("summit", f"{__name__}:Summit", "a peak"),
+    )
+    plugins = IsolatedPlugins(lab, builtins=False)
 
     check(settings(plugins, "force"))
     with pytest.raises(WiringError) as error:
@@ -270,7 +253,3 @@ def test_a_law_with_the_numbers_of_its_config_is_compiled_once_and_then_loaded(t
     ]
 
     assert said == ["1.5 0\n", "1.5 1\n"]
-
-
-def test_the_config_class_of_a_classifier_is_the_parameter_of_its_base():
-    assert config_of(parts.Nearest, Classifier) is parts.ClassifierConfig

@@ -12,11 +12,12 @@ from cases import every_case
 from commands import graspsense
 from hypothesis import given
 from hypothesis import strategies as st
+from lab_grasp import recorded_grasp
+from parts import offering
 
 import graspsense_sim_gripper.plugin as simulator
 from graspsense import load_pipeline
 from graspsense.core.components.channels import as_json, from_json
-from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.control.contact import both_touch
 from graspsense.core.pipeline.pipeline import grasp_with
 from graspsense.core.values.errors import ConfigError, DataDamaged
@@ -32,7 +33,6 @@ from graspsense.plugin_api import (
     SensorBackend,
     SensorBackendEntry,
     create,
-    hookimpl,
     setting,
     signal_type,
 )
@@ -44,8 +44,6 @@ from graspsense.report.trace_plot import draw_trace
 from graspsense.sources.columns.grasp_columns import GraspColumns, checked_recording
 from graspsense.sources.recordings.dataset_recordings import readable_or_not
 from graspsense.sources.recordings.exported_grasp import read_exported
-from graspsense.store.record_grasp import record_grasp
-from graspsense.store.store import Store
 from graspsense.testing.conformance import Examined
 from graspsense.testing.subject import Subject
 
@@ -124,37 +122,20 @@ class ThumbPeak(FeatureSet[JawsConfig]):
         return self.result({"thumb_peak": trace.signals["force_thumb"].max()})
 
 
-GRASPSENSE_API = (2, 0)
-
-
-@hookimpl
-def graspsense_sensor_backends():
-    return [SensorBackendEntry(name="jaws", target=f"{__name__}:ThreeJaws", summary="three fingers")]
-
-
-@hookimpl
-def graspsense_feature_sets():
-    return [FeatureSetEntry(name="thumb-peak", target=f"{__name__}:ThumbPeak", summary="peak of the thumb")]
+LAB_HAND = offering(
+    SensorBackendEntry(name="jaws", target=f"{__name__}:ThreeJaws", summary="three fingers"),
+    FeatureSetEntry(name="thumb-peak", target=f"{__name__}:ThumbPeak", summary="peak of the thumb"),
+)
 
 
 @pytest.fixture(scope="module")
 def grasped(tmp_path_factory):
-    """One grasp with three fingers: the trial, its store, its recording, and the plugins."""
-    folder = tmp_path_factory.mktemp("recorded") / "trials"
-    with (
-        pytest.MonkeyPatch.context() as patch,
-        IsolatedPlugins() as plugins,
-        Store.open(folder) as store,
-    ):
-        patch.setitem(sys.modules, __name__, HERE)
-        plugins.add(simulator, "graspsense-sim-gripper")
-        plugins.add(HERE, "lab-hand")
-        settings = load_pipeline(
-            options=["gripper.type=jaws", "run.hold_s=0.05", "classifier.type=none"], plugins=plugins
-        ).settings
-        trial = record_grasp(store, settings, plugins, labels={}, origin="run").trial
-        (path,) = (folder / "recordings").glob("*.mcap")
-        yield trial, folder, path, plugins
+    """One grasp with three fingers: the trial, the path of its recording, and the plugins."""
+    others = ((simulator, "graspsense-sim-gripper"),)
+    options = ("gripper.type=jaws", "run.hold_s=0.05")
+    folder = tmp_path_factory.mktemp("recorded")
+    with recorded_grasp(HERE, LAB_HAND, folder, *options, others=others) as (kept, path, plugins):
+        yield kept.trial, path, plugins
 
 
 # ------------------------------------------------------------------------------------------------- the rule
@@ -181,12 +162,6 @@ def test_any_two_opposed_fingers_touch_where_the_thumb_and_another_one_do(forces
     assert both == (forces[0] >= contact_n and max(forces[1:]) >= contact_n)
 
 
-def test_the_forces_of_a_side_count_along_its_direction_so_that_three_jaws_balance():
-    left, right = opposed_forces(JAWS)((8.0, 8.0, 8.0))
-
-    assert right == pytest.approx(left)
-
-
 def test_a_finger_without_a_number_is_no_contact_of_its_side_or_of_every_finger():
     forces = (5.0, nan, 5.0, 5.0, 5.0)
 
@@ -209,21 +184,24 @@ def test_fingers_that_cannot_touch_are_refused(fingers, says):
         opposed_forces(fingers)
 
 
-@pytest.mark.parametrize("name", ["thumb", "force_left", "force_"])
-def test_the_name_of_a_finger_is_not_that_of_another_channel(name):
-    with pytest.raises(ValueError, match="finger"):
-        FingerForce(name, "N")
+def test_the_forces_of_a_side_count_along_its_direction_so_that_three_jaws_balance():
+    left, right = opposed_forces(JAWS)((8.0, 8.0, 8.0))
 
-
-def test_a_declared_finger_survives_json():
+    assert right == pytest.approx(left)
     assert [from_json(as_json(jaw)) for jaw in JAWS] == list(JAWS)
+
+
+def test_the_name_of_a_finger_is_not_that_of_another_channel():
+    for name in ("thumb", "force_left", "force_"):
+        with pytest.raises(ValueError, match="finger"):
+            FingerForce(name, "N")
 
 
 # ------------------------------------------------------------------------------------------------- a grasp
 
 
 def test_a_grasp_with_three_fingers_says_of_which_fingers_its_features_are(grasped):
-    trial, _, _, _ = grasped
+    trial, _, _ = grasped
 
     assert trial.outcome.words == "steady"
     assert not isnan(trial.features.as_dict()["f_steady"])
@@ -233,7 +211,7 @@ def test_a_grasp_with_three_fingers_says_of_which_fingers_its_features_are(grasp
 
 
 def test_every_finger_is_in_trace_recording_and_replay(grasped):
-    trial, _, path, plugins = grasped
+    trial, path, plugins = grasped
     recorded = read_recorded(path)
     options = ["gripper.type=replay", f"gripper.recording={path}", "classifier.type=none"]
     replayed = grasp_with(load_pipeline(options=options, plugins=plugins).settings, plugins)
@@ -251,7 +229,7 @@ def test_every_finger_is_in_trace_recording_and_replay(grasped):
 
 @pytest.mark.parametrize("suffix", [pytest.param(".csv", marks=pytest.mark.slow), ".npz"])
 def test_an_export_declares_the_fingers_and_has_their_forces(grasped, tmp_path, suffix):
-    _, _, path, _ = grasped
+    _, path, _ = grasped
     file = tmp_path / f"grasp{suffix}"
     WRITERS[suffix](file, read_recorded(path))
 
@@ -264,7 +242,7 @@ def test_an_export_declares_the_fingers_and_has_their_forces(grasped, tmp_path, 
 
 @pytest.mark.slow
 def test_the_pages_and_the_picture_draw_the_force_of_each_finger(grasped):
-    trial, _, _, _ = grasped
+    trial, _, _ = grasped
     figures = channel_figures(trial.trace, trial.device.channels)
     from matplotlib.figure import Figure
 
@@ -278,7 +256,7 @@ def test_the_pages_and_the_picture_draw_the_force_of_each_finger(grasped):
 
 
 def test_features_may_require_the_force_of_a_finger(grasped):
-    trial, _, _, plugins = grasped
+    trial, _, plugins = grasped
     options = ["gripper.type=jaws", "features.type=thumb-peak", "classifier.type=none"]
 
     settings = load_pipeline(
@@ -290,7 +268,7 @@ def test_features_may_require_the_force_of_a_finger(grasped):
 
 @pytest.mark.slow
 def test_a_hand_with_three_fingers_conforms(grasped):
-    _, _, _, plugins = grasped
+    _, _, plugins = grasped
     report = Examined((Subject(component=plugins.find("sensor-backend", "jaws")),)).report()
 
     assert report.failures == []
@@ -327,35 +305,30 @@ def five_fingers(folder, manifest_lines, offset_n=0.0):
     return recordings
 
 
-def last_frame(recording):
-    return recording[0].recording.readings[-1].frame
-
-
 @every_case(
     ("touch", "left_n", "right_n"),
     [("thumb", 10.0, 9.0), ("thumb, index", 14.0, 5.0), ("each", 0.0, 10.0), ("any", 10.0, 4.0)],
 )
 def test_a_recording_of_five_fingers_has_the_forces_of_its_rule(tmp_path, touch, left_n, right_n):
-    frame = last_frame(five_fingers(tmp_path, [NAMED, f'touch = "{touch}"']))
+    (finger_grasp,) = five_fingers(tmp_path, [NAMED, f'touch = "{touch}"'])
+    frame = finger_grasp.recording.readings[-1].frame
 
     assert sorted((frame.force_left_n, frame.force_right_n)) == pytest.approx(sorted((left_n, right_n)))
 
 
 def test_each_finger_of_a_recording_has_its_own_zero(tmp_path):
-    recordings = five_fingers(tmp_path, [NAMED, 'touch = "thumb"', 'zero = "10 samples"'], offset_n=0.7)
+    (finger_grasp,) = five_fingers(tmp_path, [NAMED, 'touch = "thumb"', 'zero = "10 samples"'], offset_n=0.7)
 
-    last = recordings[0].recording.readings[-1]
-    assert [getattr(last.signals, f"force_{name}") for name in FINGERS] == pytest.approx(
-        list(LOADS_N.values())
-    )
+    last = finger_grasp.recording.readings[-1]
+    forces = [getattr(last.signals, f"force_{name}") for name in FINGERS]
+    assert forces == pytest.approx(list(LOADS_N.values()))
     assert last.frame.force_right_n == pytest.approx(9.0)
 
 
 def test_a_resampled_recording_keeps_the_rule(tmp_path):
-    recordings = five_fingers(tmp_path, [NAMED, 'touch = "each"', "resample_hz = 37.0"])
-    (recording,) = (finger.recording for finger in recordings)
+    (finger_grasp,) = five_fingers(tmp_path, [NAMED, 'touch = "each"', "resample_hz = 37.0"])
 
-    for reading in recording.readings:
+    for reading in finger_grasp.recording.readings:
         assert reading.frame.force_left_n == min(reading.signals)
         assert reading.frame.force_right_n == max(reading.signals)
 

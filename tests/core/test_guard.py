@@ -20,16 +20,29 @@ def frame(velocity=0.0, left=0.0, right=0.0):
     return Frame(0.0, 0.001, 0.05, velocity, 0.0, left, right, 0.0, 0.0, 0)
 
 
-@every_case(("asked", "given_"), [(150.0, 100.0), (-150.0, -100.0), (99.0, 99.0), (inf, 100.0)])
-def test_effort_is_clamped_to_the_gripper_both_ways(asked, given_):
-    command, state = guard(LIMITS, FRESH, frame(), Command(EFFORT, asked, inf, inf))
-    assert command.value == given_
-    assert state.acted == (asked != given_)
+@every_case(
+    ("asked", "value"),
+    [
+        *((Command(EFFORT, n, inf, inf), v) for n, v in ((150.0, 100.0), (-150.0, -100.0), (99.0, 99.0))),
+        (Command(EFFORT, inf, inf, inf), 100.0),
+        # The command's own limit is tighter; one of nothing is a limit and no mistake.
+        (Command(EFFORT, 50.0, 10.0, inf), 10.0),
+        (Command(EFFORT, 5.0, 0.0, 0.0), 0.0),
+        (Command(VELOCITY, -1.0, inf, inf), -0.2),
+        (Command(FORCE, 500.0, inf, inf), 100.0),
+        (Command(FORCE, -5.0, inf, inf), 0.0),
+        (Command(POSITION, -0.01, inf, inf), 0.0),
+    ],
+)
+def test_a_command_is_held_to_the_limit_that_bounds_it(asked, value):
+    command, state = guard(LIMITS, FRESH, frame(), asked)
+    assert (command.value, state.stopped) == (value, 0)
+    assert state.acted == (asked.value != value)
 
 
-def test_the_commands_own_limit_is_tighter():
-    command, _ = guard(LIMITS, FRESH, frame(), Command(EFFORT, 50.0, 10.0, inf))
-    assert command.value == 10.0
+def test_a_position_has_the_limits_of_the_gripper():
+    position, _ = guard(LIMITS, FRESH, frame(), Command(POSITION, 0.05, inf, inf))
+    assert (position.effort_limit_n, position.speed_limit_m_s) == (100.0, 0.2)
 
 
 @every_case(
@@ -67,15 +80,6 @@ def test_a_command_that_makes_no_sense_stops_the_grasp_for_good(command):
     assert (later.value, state.stopped) == (0.0, 1)
 
 
-def test_other_kinds_are_held_to_the_limit_that_bounds_them():
-    assert guard(LIMITS, FRESH, frame(), Command(VELOCITY, -1.0, inf, inf))[0].value == -0.2
-    assert guard(LIMITS, FRESH, frame(), Command(FORCE, 500.0, inf, inf))[0].value == 100.0
-    assert guard(LIMITS, FRESH, frame(), Command(FORCE, -5.0, inf, inf))[0].value == 0.0
-    assert guard(LIMITS, FRESH, frame(), Command(POSITION, -0.01, inf, inf))[0].value == 0.0
-    position, _ = guard(LIMITS, FRESH, frame(), Command(POSITION, 0.05, inf, inf))
-    assert (position.effort_limit_n, position.speed_limit_m_s) == (100.0, 0.2)
-
-
 def test_a_real_gripper_is_weak_and_slow_until_a_pad_has_felt_something():
     strong = Command(EFFORT, 80.0, inf, inf)
     command, state = guard(REAL, FRESH, frame(), strong)
@@ -106,11 +110,6 @@ def test_whatever_is_asked_nothing_leaves_over_a_limit_or_not_a_number(kind, val
 @pytest.mark.parametrize("touch", [{"left": 0.625}, {"right": 0.625}])
 def test_touching_with_exactly_the_contact_force_counts_as_felt(touch, effort):
     assert guard(REAL, FRESH, frame(**touch), Command(EFFORT, effort, inf, inf))[1].contact_seen == 1
-
-
-def test_a_limit_of_nothing_is_a_limit_and_no_mistake():
-    command, state = guard(LIMITS, FRESH, frame(), Command(EFFORT, 5.0, 0.0, 0.0))
-    assert (command.value, state.stopped) == (0.0, 0)
 
 
 def test_an_effort_within_its_limits_is_handed_on_as_it_is():

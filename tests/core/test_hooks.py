@@ -1,4 +1,4 @@
-"""Every hook has a test, `test_hook_NAME` but for those of components, and an example in its docstring that runs."""
+"""Every hook has a test, `test_hook_NAME` or a case of its kind, and an example in its docstring that runs."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import types
 import click
 import pytest
 from cases import every_case
+from parts import implementing
 from repository import ROOT
 
 from graspsense.core.components import hookspecs
@@ -37,7 +38,6 @@ from graspsense.plugin_api import (
     PipelineEntry,
     PluginUnavailable,
     UnknownName,
-    hookimpl,
 )
 from graspsense.simulator_api import collect
 
@@ -55,6 +55,15 @@ def example(hook: str) -> types.ModuleType:
     vars(module)["GRASPSENSE_API"] = (2, 0)
     exec(code, vars(module))
     return module
+
+
+def raising(error: BaseException):
+    """Return an implementation of a hook that raises this error, whatever it is given."""
+
+    def raise_it(self):
+        raise error
+
+    return raise_it
 
 
 def trial() -> Trial:
@@ -83,9 +92,52 @@ COMPONENTS = {
 """Hooks of components; the role, the name and the target of what its example gives."""
 
 
+RESOURCES = {
+    "graspsense_models": (ModelEntry, "lab-cans", {"resource": "lab_hand:models/cans.json"}),
+    "graspsense_datasets": (DatasetEntry, "lab-csv", {"recordings": "lab_hand.csv:recordings"}),
+    "graspsense_emulators": (
+        EmulatorEntry,
+        "lab-hand",
+        {"target": "lab_hand.emulator:emulate", "wires": ("pty",), "options": ()},
+    ),
+    "graspsense_live_observers": (LiveObserverEntry, "lab-wall", {"target": "lab_hand.wall:observe"}),
+    "graspsense_conformance_checks": (
+        ConformanceCheckEntry,
+        "fingers-have-names",
+        {"hook": "lab_hand_fingers"},
+    ),
+}
+"""Hooks of resources; the kind, the name and the fields of what its example gives."""
+OBSERVERS = {
+    "graspsense_run_starting": ("run_starting", (RUN,), "started", 7),
+    "graspsense_grasp_event": ("grasp_event", (RUN, EVENT), "events", "both pads touch"),
+    "graspsense_run_finished": ("run_finished", (RUN, trial()), "outcomes", "never steady"),
+}
+"""Hooks that observe a grasp; how they are called, and what the example appends to which list."""
+
+
 @every_case("hook", HOOKS)
 def test_every_hook_has_a_test(hook):
-    assert hook in COMPONENTS or f"test_hook_{hook}" in globals()
+    assert hook in {*COMPONENTS, *RESOURCES, *OBSERVERS} or f"test_hook_{hook}" in globals()
+
+
+@every_case("hook", RESOURCES)
+def test_a_resource_hook_gives_its_resource(hook):
+    kind, name, fields = RESOURCES[hook]
+    (resource,) = IsolatedPlugins(example(hook), builtins=False).resources(kind)
+
+    assert resource.name == name
+    assert {field: getattr(resource.entry, field) for field in fields} == fields
+
+
+@every_case("hook", OBSERVERS)
+def test_an_observer_hook_is_called_with_what_it_observes(hook):
+    method, arguments, kept, value = OBSERVERS[hook]
+    module = example(hook)
+
+    getattr(IsolatedPlugins(module), method)(*arguments)
+
+    assert getattr(module, kept) == [value]
 
 
 @every_case("hook", COMPONENTS)
@@ -125,44 +177,13 @@ def test_hook_graspsense_pipelines():
     assert "[gripper]" in plugins.resource(PipelineEntry, "graspsense/default").file().read_text()
 
 
-def test_hook_graspsense_models():
-    plugins = IsolatedPlugins(example("graspsense_models"))
-
-    assert plugins.resource(ModelEntry, "lab-cans").entry.resource == "lab_hand:models/cans.json"
-
-
-def test_hook_graspsense_datasets():
-    plugins = IsolatedPlugins(example("graspsense_datasets"))
-
-    assert plugins.resource(DatasetEntry, "lab-csv").entry.recordings == "lab_hand.csv:recordings"
-
-
 def test_hook_graspsense_commands():
-    class Plugin:
-        GRASPSENSE_API = (2, 0)
-
-        @hookimpl
-        def graspsense_commands(self):
-            return [CommandEntry("again", "click:Command", "a class that is there to be imported")]
-
-    plugins = IsolatedPlugins(example("graspsense_commands"), Plugin())
+    again = CommandEntry("again", "click:Command", "a class that is there to be imported")
+    plugin = implementing("graspsense_commands", lambda self: [again])
+    plugins = IsolatedPlugins(example("graspsense_commands"), plugin)
 
     assert [command.name for command in plugins.resources(CommandEntry)] == ["again", "home-hand"]
     assert plugins.resource(CommandEntry, "again").load() is click.Command
-
-
-def test_hook_graspsense_emulators():
-    plugins = IsolatedPlugins(example("graspsense_emulators"))
-
-    entry = plugins.resource(EmulatorEntry, "lab-hand").entry
-    assert (entry.target, entry.wires, entry.options) == ("lab_hand.emulator:emulate", ("pty",), ())
-
-
-def test_hook_graspsense_live_observers():
-    plugins = IsolatedPlugins(example("graspsense_live_observers"))
-    assert [observer.entry.target for observer in plugins.resources(LiveObserverEntry)] == [
-        "lab_hand.wall:observe"
-    ]
 
 
 def test_hook_graspsense_identifiers():
@@ -192,38 +213,21 @@ def test_hook_graspsense_experiments():
         worn.file()
 
 
-def test_hook_graspsense_conformance_checks():
-    plugins = IsolatedPlugins(example("graspsense_conformance_checks"))
-
-    (check,) = plugins.resources(ConformanceCheckEntry)
-    assert (check.name, check.entry.hook) == ("fingers-have-names", "lab_hand_fingers")
-
-
 def test_hook_graspsense_diagnose():
-    class Failing:
-        GRASPSENSE_API = (2, 0)
+    def told(self, config, timeout_s):
+        return [Finding("what I was told", "ok", f"{config} for {timeout_s} s")]
 
-        @hookimpl
-        def graspsense_diagnose(self):
-            raise PermissionError("cannot list the bus")
-
-    class Told:
-        GRASPSENSE_API = (2, 0)
-
-        @hookimpl
-        def graspsense_diagnose(self, config, timeout_s):
-            return [Finding("what I was told", "ok", f"{config} for {timeout_s} s")]
-
+    hook = "graspsense_diagnose"
     plugins = IsolatedPlugins(builtins=False)
-    plugins.add(Failing(), "lab-a")
-    plugins.add(example("graspsense_diagnose"), "lab-b")
-    plugins.add(Told(), "lab-c")
+    plugins.add(implementing(hook, raising(PermissionError("cannot list the bus"))), "lab-a")
+    plugins.add(example(hook), "lab-b")
+    plugins.add(implementing(hook, told), "lab-c")
 
-    failed, diagnoses, told = plugins.diagnose("these settings", 0.25)
+    failed, diagnoses, told_findings = plugins.diagnose("these settings", 0.25)
 
     assert (failed.given, failed.error) == ((), "PermissionError: cannot list the bus")
     assert (diagnoses.given[0].state, diagnoses.given[0].numbers) == ("problem", {"baud": 115200})
-    assert told.given[0].words == "these settings for 0.25 s"
+    assert told_findings.given[0].words == "these settings for 0.25 s"
 
 
 def test_a_finding_is_in_one_of_three_states():
@@ -232,84 +236,32 @@ def test_a_finding_is_in_one_of_three_states():
 
 
 def test_hook_graspsense_probe_devices():
-    class Failing:
-        GRASPSENSE_API = (2, 0)
+    def timed(self, timeout_s):
+        return [FoundDevice("mine", str(timeout_s), "bus 1", ready=True)]
 
-        @hookimpl
-        def graspsense_probe_devices(self):
-            raise PermissionError("cannot list the bus")
-
-    class Timed:
-        GRASPSENSE_API = (2, 0)
-
-        @hookimpl
-        def graspsense_probe_devices(self, timeout_s):
-            return [FoundDevice("mine", str(timeout_s), "bus 1", ready=True)]
-
+    hook = "graspsense_probe_devices"
     plugins = IsolatedPlugins(builtins=False)
-    plugins.add(Failing(), "lab-a")
-    plugins.add(example("graspsense_probe_devices"), "lab-b")
-    plugins.add(Timed(), "lab-c")
+    plugins.add(implementing(hook, raising(PermissionError("cannot list the bus"))), "lab-a")
+    plugins.add(example(hook), "lab-b")
+    plugins.add(implementing(hook, timed), "lab-c")
+    plugins.add(implementing(hook, lambda self: ["/dev/ttyUSB0"]), "lab-d")
 
-    failed, devices, timed = plugins.probe_devices(0.25)
+    failed, devices, timed_devices, other = plugins.probe_devices(0.25)
 
     assert (failed.distribution, failed.given) == ("lab-a", ())
     assert failed.error == "PermissionError: cannot list the bus"
     assert (devices.error, devices.given[0].advice) == ("", "add yourself to the group dialout")
-    assert timed.given[0].serial == "0.25"
-
-
-def test_a_probe_that_gives_something_else_is_reported_as_failed():
-    class Plugin:
-        GRASPSENSE_API = (2, 0)
-
-        @hookimpl
-        def graspsense_probe_devices(self):
-            return ["/dev/ttyUSB0"]
-
-    (probe,) = IsolatedPlugins(Plugin(), builtins=False).probe_devices(1.0)
-
-    assert probe.error == "graspsense_probe_devices gave '/dev/ttyUSB0': it takes FoundDevice only"
-
-
-def test_hook_graspsense_run_starting():
-    module = example("graspsense_run_starting")
-
-    IsolatedPlugins(module).run_starting(RUN)
-
-    assert module.started == [7]
-
-
-def test_hook_graspsense_grasp_event():
-    module = example("graspsense_grasp_event")
-
-    IsolatedPlugins(module).grasp_event(RUN, EVENT)
-
-    assert module.events == ["both pads touch"]
-
-
-def test_hook_graspsense_run_finished():
-    module = example("graspsense_run_finished")
-
-    IsolatedPlugins(module).run_finished(RUN, trial())
-
-    assert module.outcomes == ["never steady"]
+    assert timed_devices.given[0].serial == "0.25"
+    assert other.error == "graspsense_probe_devices gave '/dev/ttyUSB0': it takes FoundDevice only"
 
 
 @pytest.mark.parametrize("failure", [RuntimeError("no room on the disk"), SystemExit("no room on the disk")])
 def test_an_observer_that_raises_stops_nobody_and_is_reported_once(caplog, failure):
-    class Raising:
-        GRASPSENSE_API = (2, 0)
-
-        @hookimpl
-        def graspsense_grasp_event(self, event):
-            raise failure
-
     seen = example("graspsense_grasp_event")
+    failing = implementing("graspsense_grasp_event", raising(failure))
     plugins = IsolatedPlugins()
-    plugins.add(Raising(), "lab-first")
-    plugins.add(seen, "lab-seen")
-    plugins.add(Raising(), "lab-last")
+    for plugin, name in ((failing, "lab-first"), (seen, "lab-seen"), (type(failing)(), "lab-last")):
+        plugins.add(plugin, name)
 
     with caplog.at_level(logging.WARNING, "graspsense.plugins"):
         plugins.grasp_event(RUN, EVENT)
@@ -324,36 +276,20 @@ def test_an_observer_that_raises_stops_nobody_and_is_reported_once(caplog, failu
 
 
 def test_an_observer_does_not_swallow_an_interrupt():
-    class Interrupted:
-        GRASPSENSE_API = (2, 0)
-
-        @hookimpl
-        def graspsense_run_starting(self):
-            raise KeyboardInterrupt
+    interrupted = implementing("graspsense_run_starting", raising(KeyboardInterrupt()))
 
     with pytest.raises(KeyboardInterrupt):
-        IsolatedPlugins(Interrupted()).run_starting(RUN)
+        IsolatedPlugins(interrupted).run_starting(RUN)
 
 
 def test_a_hook_that_a_plugin_owns_collects_from_all_that_implement_it(caplog):
-    class Stiff:
-        GRASPSENSE_API = (2, 0)
+    def stiff(self, scale):
+        return 2.0 * scale
 
-        @hookimpl(optionalhook=True)
-        def lab_terms(self, scale):
-            return 2.0 * scale
-
-    class Broken:
-        GRASPSENSE_API = (2, 0)
-
-        @hookimpl(optionalhook=True)
-        def lab_terms(self, scale):
-            raise ValueError("no such term")
-
+    failing = raising(ValueError("no such term"))
     with IsolatedPlugins(builtins=False) as plugins:
-        plugins.add(Stiff(), "lab-a")
-        plugins.add(Broken(), "lab-b")
-        plugins.add(Stiff(), "lab-c")
+        for implementation, name in ((stiff, "lab-a"), (failing, "lab-b"), (stiff, "lab-c")):
+            plugins.add(implementing("lab_terms", implementation, optionalhook=True), name)
 
         assert collect("lab_terms", scale=3.0) == (("lab-a", 6.0), ("lab-c", 6.0))
         assert collect("nobody_implements_this") == ()

@@ -7,6 +7,7 @@ from collections import deque
 from math import nan
 
 import pytest
+from cases import every_case
 from commands import graspsense, printed
 
 from graspsense.core.components.run_config import RunConfig
@@ -76,7 +77,7 @@ class DelayedGripper(SensorBackend[None]):
         pass
 
 
-@pytest.mark.parametrize("delay", [0, 3, 17])
+@every_case("delay", [0, 3, 17])
 def test_a_known_delay_is_measured_to_a_frame(delay):
     gripper = DelayedGripper(delay)
     measured = measured_latency(gripper, gripper.accepts, gripper.info(), RunConfig(), 3)

@@ -177,9 +177,7 @@ def test_a_damaged_arff_file_is_told_with_its_line(weather, old, new, line):
     weather.write_text(WEATHER.replace(old, new, 1))
     with pytest.raises(DataDamaged, match=line):
         load_trials(str(weather))
-
-
-def test_a_store_that_is_exported_to_arff_can_be_read(weather):
+    weather.write_text(WEATHER)
     with pytest.raises(ConfigError, match="no column 'x'"):
         load_trials(str(weather), label="x")
 
@@ -232,11 +230,8 @@ def test_numbers_with_an_equal_sign_in_their_name_stay_numbers():
 
 def test_a_column_of_texts_can_be_named_and_left_out(tmp_path):
     path = shapes(tmp_path)
-    assert read_labelled(path, "what", features=["colour"]).table.names == (
-        "colour=blue",
-        "colour=green",
-        "colour=red",
-    )
+    colours = ("colour=blue", "colour=green", "colour=red")
+    assert read_labelled(path, "what", features=["colour"]).table.names == colours
     assert read_labelled(path, "what", features=["weight"]).table.names == ("weight",)
     known = read_table(path, ["colour=red", "colour=green"])[0].values
     assert np.isnan(known[2]).all()  # blue is none of them

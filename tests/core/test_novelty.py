@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from cases import every_case
 
 from graspsense.core.learn.novelty import REACH, novelty_from, novelty_of
 from graspsense.core.values.features import Features, FeatureTable
@@ -31,17 +32,13 @@ def test_the_spread_is_the_one_within_classes():
     assert SPAN.spread == pytest.approx([math.sqrt(2) * 1e-3, math.sqrt(2) * 0.1])
 
 
-def test_what_was_trained_on_is_known():
+def test_the_edge_of_the_known_is_three_spreads_outside_a_class():
     assert not SPAN.unlike_rows(table(ROWS)).any()
     assert all(SPAN.unlike(features(*row)) is None for row in ROWS)
-
-
-@pytest.mark.parametrize("share", [0.99, 1.01])
-def test_the_edge_of_the_known_is_three_spreads_outside_a_class(share):
-    beyond = 0.067 + share * REACH * SPAN.spread[0]
-
-    assert (SPAN.unlike(features(beyond, 0.6)) is not None) is (share > 1.0)
-    assert SPAN.unlike_rows(table([[beyond, 0.6]])).tolist() == [share > 1.0]
+    for share in (0.99, 1.01):
+        beyond = 0.067 + share * REACH * SPAN.spread[0]
+        assert (SPAN.unlike(features(beyond, 0.6)) is not None) is (share > 1.0)
+        assert SPAN.unlike_rows(table([[beyond, 0.6]])).tolist() == [share > 1.0]
 
 
 def test_the_reason_names_the_feature_the_value_and_the_nearest_class_in_units():
@@ -51,14 +48,6 @@ def test_the_reason_names_the_feature_the_value_and_the_nearest_class_in_units()
         "p_first = 30 mm is unlike everything trained on: the nearest, bottle, has 57 mm to 59 mm"
     )
     assert reason.features == (FeatureValue("p_first", 0.030, "m"),)
-
-
-def test_like_one_class_in_one_feature_and_another_in_the_other_is_unknown():
-    wide = novelty_of(
-        table([[0.0570, 0.2], [0.0571, 0.21], [0.067, 0.9], [0.0671, 0.91]]), ["a", "a", "b", "b"]
-    )
-
-    assert wide.unlike(features(0.057, 0.9)) is not None
 
 
 def test_a_missing_feature_is_not_judged_and_no_feature_at_all_is_unknown():
@@ -76,18 +65,22 @@ def test_trials_without_any_feature_are_known_where_a_class_has_such():
     assert span.unlike(features(0.030, 0.3)) is not None
 
 
-def test_a_feature_that_was_constant_allows_rounding_only():
-    span = novelty_of(table([[0.05, 0.2], [0.05, 0.3], [0.05, 0.4]]), ["a", "a", "b"])
+@every_case(
+    ("rows", "labels", "known", "unknown"),
+    [
+        # Like one class in one feature and another in the other.
+        ([[0.0570, 0.2], [0.0571, 0.21], [0.067, 0.9], [0.0671, 0.91]], "aabb", (0.057, 0.2), (0.057, 0.9)),
+        # A feature that was constant allows rounding only.
+        ([[0.05, 0.2], [0.05, 0.3], [0.05, 0.4]], "aab", (0.05 * (1 + 1e-12), 0.3), (0.0501, 0.3)),
+        # One trial a class is judged by what differs between classes.
+        ([[0.05, 0.2], [0.06, 0.3]], "ab", (0.055, 0.25), (0.155, 0.25)),
+    ],
+)
+def test_what_is_known_follows_from_the_classes(rows, labels, known, unknown):
+    span = novelty_of(table(rows), list(labels))
 
-    assert span.unlike(features(0.05 * (1 + 1e-12), 0.3)) is None
-    assert span.unlike(features(0.0501, 0.3)) is not None
-
-
-def test_one_trial_a_class_is_judged_by_what_differs_between_classes():
-    span = novelty_of(table([[0.05, 0.2], [0.06, 0.3]]), ["a", "b"])
-
-    assert span.unlike(features(0.055, 0.25)) is None
-    assert span.unlike(features(0.155, 0.25)) is not None
+    assert span.unlike(features(*known)) is None
+    assert span.unlike(features(*unknown)) is not None
 
 
 def test_it_comes_back_from_json_the_same():

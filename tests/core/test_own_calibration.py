@@ -8,7 +8,7 @@ import pytest
 from attrs import evolve, frozen
 from cases import every_case
 from commands import graspsense
-from parts import CHANNELS_OF_HAND, Hand, HandConfig, channels
+from parts import CHANNELS_OF_HAND, Hand, HandConfig, channels, offering
 
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.gripper_api import (
@@ -19,7 +19,7 @@ from graspsense.gripper_api import (
     stored_tables,
     stored_zero,
 )
-from graspsense.plugin_api import NAMES_INPUT, SensorBackend, SensorBackendEntry, hookimpl, setting
+from graspsense.plugin_api import NAMES_INPUT, SensorBackend, SensorBackendEntry, setting
 
 HERE = sys.modules[__name__]
 NUMBERS = {"pad_counts_per_n": 2200.0}
@@ -46,16 +46,10 @@ class Keyless(Hand):
     accepts = ("effort",)
 
 
-class Plugin:
-    GRASPSENSE_API = (2, 0)
-
-    @hookimpl
-    def graspsense_sensor_backends(self):
-        for cls in (Counting, Keyless):
-            config = "parts:HandConfig" if cls is Keyless else ""
-            yield SensorBackendEntry(
-                cls.__name__.lower(), f"{__name__}:{cls.__name__}", "a hand", config=config
-            )
+PLUGIN = offering(
+    SensorBackendEntry("counting", f"{__name__}:Counting", "a hand"),
+    SensorBackendEntry("keyless", f"{__name__}:Keyless", "a hand", config="parts:HandConfig"),
+)
 
 
 @pytest.fixture
@@ -63,7 +57,7 @@ def calibrate(monkeypatch):
     monkeypatch.setitem(sys.modules, __name__, HERE)
 
     def calibrate(gripper, *arguments):
-        with IsolatedPlugins(Plugin()):
+        with IsolatedPlugins(PLUGIN):
             done = graspsense("calibrate", *arguments, "--gripper", gripper, "-o", "classifier.type=none")
         return done.returncode, done.stderr
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import pytest
 from attrs import evolve
@@ -56,21 +57,17 @@ class Absent(Scripted):
         raise NoDevice("no gripper at port 7")
 
 
-class Ticks:
-    """A sink of both grippers: their ticks in the order in which they came."""
-
-    def __init__(self, seen, name):
-        self.seen, self.name = seen, name
-
-    def take(self, reading, phase, command):
-        self.seen.append((self.name, reading.frame.t_s))
-
-
 def grasping(backend, seen=None, name=""):
-    """Return the grasp of a member of a pair, which fails for the other as `graspsense run` says."""
+    """Return the grasp of a member of a pair, which fails for the other as `graspsense run` says.
+
+    Into `seen` go the ticks of both grippers, in the order in which they came.
+    """
 
     def grasp(member):
-        sinks = [] if seen is None else [Ticks(seen, name)]
+        def take(reading, phase, command):
+            seen.append((name, reading.frame.t_s))
+
+        sinks = [] if seen is None else [SimpleNamespace(take=take)]
         controller = create("controller", "hybrid")
         done = run_grasp(member.gripper(backend), controller, RunConfig(hold_s=0.05), sinks=sinks)
         failed = done.outcome in (Outcome.ABORTED, Outcome.DEVICE_LOST)

@@ -1,20 +1,20 @@
 """SystemExit and KeyboardInterrupt in the code of a plugin: no trace is lost, and nothing ends in silence."""
 
 import math
+from itertools import count
 
 import numpy as np
 import pytest
 from attrs import evolve, field, frozen
 from cases import every_case
 from commands import graspsense
-from grippers import Scripted, bottle, squeezing
+from grippers import Scripted, bottle, settings_with, squeezing
 
 from graspsense.core.components.registry import installed
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.components.strict import ValidationFailed, structured
 from graspsense.core.grasp.runner import ended_by_itself, run_grasp
 from graspsense.core.pipeline.pipeline import GraspInterrupted, grasp_with
-from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.errors import DeviceLost
 from graspsense.core.values.signals import EFFORT, Command, Outcome
 from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
@@ -29,44 +29,42 @@ def leaving(*arguments, **named):
 
 def law(act, after=1100):
     """The hybrid law, whose result is changed by `act` from the step `after` on."""
-    calls = [0]
+    calls = count(1)
 
     def step(params, state, reading):
-        calls[0] += 1
         command, state = HybridController.step(params, state, reading)
-        return act(command, state) if calls[0] >= after else (command, state)
+        return act(command, state) if next(calls) >= after else (command, state)
 
-    class Changed(HybridController):
-        pass
-
-    Changed.step = staticmethod(step)
-    return Changed(HybridConfig())
+    return type("Changed", (HybridController,), {"step": staticmethod(step)})(HybridConfig())
 
 
 def released(gripper):
     return gripper.closed == 1 and gripper.commands[-1].value == 0.0
 
 
+@every_case("error", [SystemExit(0), OSError("Input/output error")])
 @every_case("method", ["read", "apply", "tare", "close", "report"])
-def test_a_gripper_that_ends_the_program_ends_the_grasp_and_keeps_the_trace(method):
-    class Leaving(Scripted):
-        pass
-
-    usual = getattr(Leaving, method)
+def test_a_gripper_that_ends_the_program_or_fails_ends_the_grasp_and_keeps_the_trace(method, error):
+    usual = getattr(Scripted, method)
 
     def method_of(self, *arguments):
         if self.k >= 1200:
-            raise SystemExit(0)
+            self.closed += method == "close"
+            raise error
         return usual(self, *arguments)
 
-    setattr(Leaving, method, method_of)
-    grasp = run_grasp(Leaving(squeezing, bottle), HYBRID, RUN)
+    grasp = run_grasp(type("Leaving", (Scripted,), {method: method_of})(squeezing, bottle), HYBRID, RUN)
+    name = type(error).__name__
     if method != "tare":
         assert len(grasp.trace) > 900
     if method == "report":
-        assert "SystemExit" in grasp.report["report_failed"]
+        assert grasp.outcome is Outcome.STEADY
+        assert grasp.report == {"report_failed": f"{name}: {error}"}
     elif method != "tare":
-        assert (grasp.outcome, "SystemExit" in grasp.reason) == (Outcome.ABORTED, True)
+        assert (grasp.outcome, name in grasp.reason) == (Outcome.ABORTED, True)
+    if method == "close":
+        assert f"could not be closed: {name}" in grasp.reason
+        assert "(steady)" in grasp.reason
 
 
 def test_a_gripper_that_ends_the_program_on_opening_is_named():
@@ -77,24 +75,6 @@ def test_a_gripper_that_ends_the_program_on_opening_is_named():
     with pytest.raises(DeviceLost, match=r"Leaving raised SystemExit"):
         run_grasp(gripper, HYBRID, RUN)
     assert gripper.closed == 1
-
-
-def test_a_controller_that_ends_the_program_is_aborted_with_the_fingers_open():
-    gripper = Scripted(squeezing, bottle)
-    grasp = run_grasp(gripper, law(leaving), RUN)
-    assert grasp.outcome is Outcome.ABORTED
-    assert "SystemExit: 3" in grasp.reason
-    assert len(grasp.trace) > 900
-    assert released(gripper)
-
-
-def test_a_sink_that_ends_the_program_is_dropped():
-    class Leaving:
-        take = leaving
-
-    grasp = run_grasp(Scripted(squeezing, bottle), HYBRID, RUN, sinks=[Leaving()])
-    assert grasp.outcome is Outcome.STEADY
-    assert any("SystemExit" in event.what for event in grasp.events)
 
 
 @pytest.mark.slow
@@ -113,12 +93,8 @@ def test_an_outcome_that_there_is_not_aborts_the_grasp_and_keeps_the_trace(outco
 def scripted():
     """Return the settings of a scripted gripper, with a feature set that `extract` replaces."""
 
-    def settings(extract=None):
-        settings = resolve("default", plugins=installed(), options=["classifier.type=none"])
-
-        class Gripper(type(settings.gripper)):
-            def create(self):
-                return Scripted(squeezing, bottle)
+    def settings(extract=None, gripper=Scripted):
+        settings = settings_with(lambda: gripper(squeezing, bottle))
 
         class Features(type(settings.features)):
             def create(self):
@@ -126,12 +102,8 @@ def scripted():
                 features.extract = extract or features.extract
                 return features
 
-        gripper, features = settings.gripper, settings.features
-        return evolve(
-            settings,
-            gripper=Gripper(gripper.component, gripper.config),
-            features=Features(features.component, features.config),
-        )
+        features = settings.features
+        return evolve(settings, features=Features(features.component, features.config))
 
     return settings
 
@@ -157,15 +129,8 @@ def test_ctrl_c_that_a_plugin_raises_is_not_swallowed(scripted):
                 interrupt()
             return super().read(timeout_s)
 
-    settings = scripted()
-
-    class Choice(type(settings.gripper)):
-        def create(self):
-            return Interrupting(squeezing, bottle)
-
-    gripper = Choice(settings.gripper.component, settings.gripper.config)
     with pytest.raises(GraspInterrupted) as ended:
-        grasp_with(evolve(settings, gripper=gripper), installed())
+        grasp_with(scripted(gripper=Interrupting), installed())
     assert len(ended.value.trial.trace) > 900
 
 

@@ -13,15 +13,12 @@ from attrs import evolve
 from cases import every_case
 from grippers import CONTACT_S, REST_S, Scripted, bottle, squeezing
 
-from graspsense.core.components.roles import Controller
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp import runner
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.values.errors import NoDevice, RecordingEnded, TareRefused
 from graspsense.core.values.signals import EFFORT, VELOCITY, Command, Outcome, Phase, Reading
 from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
-from graspsense.plugins.controllers.supervision import not_begun
-from graspsense.plugins.controllers.velocity import VelocityState
 from graspsense.testing import gentle
 
 HYBRID = HybridController(HybridConfig())
@@ -100,18 +97,13 @@ def test_a_gripper_that_acts_late_is_not_taken_for_open_before_it_moves():
     assert grasp.trace.gap_m[-1] == pytest.approx(0.074)
 
 
-def test_the_hold_lasts_as_long_as_asked():
+def test_contact_and_rest_are_where_the_script_puts_them_and_the_hold_lasts_as_long_as_asked():
     grasp = run_grasp(Scripted(squeezing, bottle), HYBRID, RunConfig(hold_s=0.5))
-    held = grasp.trace.t_s[grasp.trace.phase == Phase.HOLD]
-    assert held[-1] - held[0] == pytest.approx(0.5, abs=0.003)
-
-
-def test_contact_and_rest_are_where_the_script_puts_them(ordinary):
-    _, grasp, _ = ordinary
-    squeeze = grasp.trace.t_s[grasp.trace.phase == Phase.SQUEEZE]
+    squeeze, held = (grasp.trace.t_s[grasp.trace.phase == phase] for phase in (Phase.SQUEEZE, Phase.HOLD))
     assert squeeze[0] == pytest.approx(CONTACT_S, abs=0.0011)
     # At rest is known once the window of 50 ms is full.
     assert squeeze[-1] == pytest.approx(REST_S + 0.05, abs=0.002)
+    assert held[-1] - held[0] == pytest.approx(0.5, abs=0.003)
 
 
 def let_go(gripper):
@@ -120,14 +112,18 @@ def let_go(gripper):
     return values[-1] == 0.0 and -20.0 in values[-110:]
 
 
-@every_case("phase", [0, 1, 50, 200, 600, 1200, 1600])
-def test_a_device_lost_in_any_phase_is_an_outcome_with_the_trace_to_the_last_frame(phase):
-    gripper = Scripted(squeezing, bottle, lose_at=phase)
+@every_case("tick", [0, 1, 50, 200, 600, 1200, 1600, 1850])
+def test_a_device_lost_in_any_phase_is_an_outcome_with_the_trace_to_the_last_frame(tick):
+    gripper = Scripted(squeezing, bottle, lose_at=tick)
     grasp = run_grasp(gripper, HYBRID, RUN)
     assert grasp.outcome is Outcome.DEVICE_LOST
-    assert "unplugged" in grasp.reason
+    # At rest since 1.55 s, the grasp is steady; the hold ends at 1.8 s, and then the fingers are opening.
+    assert grasp.reason == "unplugged" + (" (after the grasp had ended: steady)" if tick >= 1600 else "")
     assert gripper.closed == 1
-    assert len(grasp.trace) == 0 or grasp.trace.t_s[-1] == pytest.approx((phase - 1) * 0.001)
+    if tick == 1200:  # in the squeeze, it is only told to relax
+        assert [c.value for c in gripper.commands[-2:]] == [20.0, 0.0]
+    if tick <= 1600:
+        assert len(grasp.trace) == 0 or grasp.trace.t_s[-1] == pytest.approx((tick - 1) * 0.001)
 
 
 def test_a_slow_gripper_has_three_of_its_own_periods_for_a_frame():
@@ -189,7 +185,14 @@ def fail():
     raise ZeroDivisionError("float division by zero")
 
 
-@every_case(("act", "reason"), [(interrupt, "interrupted"), (fail, "ZeroDivisionError: float div")])
+def leave():
+    raise SystemExit(3)
+
+
+@every_case(
+    ("act", "reason"),
+    [(interrupt, "interrupted"), (fail, "ZeroDivisionError: float div"), (leave, "SystemExit: 3")],
+)
 @every_case("after", [1, 900, 1100])
 def test_whatever_stops_the_loop_the_fingers_are_opened(act, reason, after):
     gripper = Scripted(squeezing, bottle)
@@ -224,40 +227,15 @@ def test_a_step_that_fails_or_returns_no_command_is_named_with_what_it_returns()
             assert part in grasp.reason
 
 
-def test_the_second_interrupt_still_relaxes_the_gripper():
-    class Impatient(Scripted):
-        interrupted = False
-
-        def read(self, timeout_s):
-            if self.interrupted or self.k == 1200:
-                self.interrupted = True
-                raise KeyboardInterrupt
-            return super().read(timeout_s)
-
-    gripper = Impatient(squeezing, bottle)
-    grasp = run_grasp(gripper, HYBRID, RUN)
-    assert grasp.outcome is Outcome.ABORTED
-    assert gripper.commands[-1].value == 0.0
-    assert gripper.closed == 1
-
-
 def test_a_command_that_is_no_number_ends_the_grasp_safely():
-    class Broken(Controller):
+    class Broken(HybridController):
         @staticmethod
         def step(params, state, reading):
-            frame = reading.frame
-            value = math.nan if frame.t_s > 0.5 else 5.0
-            return Command(EFFORT, value, math.inf, math.inf), state
-
-        def params(self):
-            return ()
-
-        def init(self):
-            progress = not_begun()
-            return VelocityState(progress.phase, progress.outcome, progress, 0.0)
+            command, state = HybridController.step(params, state, reading)
+            return command._replace(value=nan if reading.frame.t_s > 0.5 else 5.0), state
 
     gripper = Scripted(squeezing, bottle)
-    grasp = run_grasp(gripper, Broken(None), RUN)
+    grasp = run_grasp(gripper, Broken(HybridConfig()), RUN)
     assert grasp.outcome is Outcome.ABORTED
     assert "NaN" in grasp.reason
     assert all(c.value == c.value for c in gripper.commands)
@@ -291,40 +269,20 @@ def test_pads_that_never_report_end_the_taring_in_time():
     assert "no cell image" in grasp.reason
 
 
-def test_a_gripper_that_is_not_there_is_an_error_not_an_outcome():
-    class Absent(Scripted):
-        def open(self, seed):
-            raise NoDevice("looked for a gripper")
+class Recorded(Scripted):
+    """A recording of so many ticks."""
 
-    gripper = Absent(squeezing, bottle)
-    with pytest.raises(NoDevice):
-        run_grasp(gripper, HYBRID, RUN)
-    assert gripper.closed == 1
+    def __init__(self, path, felt, length):
+        super().__init__(path, felt)
+        self.length = length
 
+    def open(self, seed):
+        return evolve(super().open(seed), opening=None, tare_images=0)
 
-def test_a_gripper_that_cannot_be_closed_leaves_the_trace_and_says_so():
-    class Stubborn(Scripted):
-        def close(self):
-            super().close()
-            raise OSError("Input/output error")
-
-    grasp = run_grasp(Stubborn(squeezing, bottle), HYBRID, RUN)
-    assert grasp.outcome is Outcome.ABORTED
-    assert "could not be closed: OSError: Input/output error (steady)" in grasp.reason
-    assert Phase.HOLD in phases_of(grasp)
-
-
-def recorded(length):
-    class Recorded(Scripted):
-        def open(self, seed):
-            return evolve(super().open(seed), opening=None, tare_images=0)
-
-        def read(self, timeout_s):
-            if self.k >= length - 1:
-                raise RecordingEnded
-            return super().read(timeout_s)
-
-    return Recorded(squeezing, bottle)
+    def read(self, timeout_s):
+        if self.k >= self.length - 1:
+            raise RecordingEnded
+        return super().read(timeout_s)
 
 
 @every_case(
@@ -338,19 +296,25 @@ def recorded(length):
     ],
 )
 def test_a_recording_ends_as_what_it_showed(length, outcome):
-    grasp = run_grasp(recorded(length), HYBRID, RUN)
-    assert grasp.outcome is outcome
+    assert run_grasp(Recorded(squeezing, bottle, length), HYBRID, RUN).outcome is outcome
 
 
 def test_late_frames_are_counted_on_a_device_clock_only():
     class Jerky(Scripted):
+        late_s = 0.006
+
         def read(self, timeout_s):
             frame, pads, _ = super().read(timeout_s)
-            return Reading(frame._replace(dt_s=0.006) if self.k % 100 == 50 else frame, pads)
+            return Reading(frame._replace(dt_s=self.late_s) if self.k % 100 == 50 else frame, pads)
 
-    late = run_grasp(Jerky(squeezing, bottle, clock="device", lose_at=700), HYBRID, RUN).counts["late"]
-    assert late == 5  # of the 450 ticks from the approach on
-    assert run_grasp(Jerky(squeezing, bottle, lose_at=700), HYBRID, RUN).counts["late"] == 0
+    class JustInTime(Jerky):
+        late_s = 5.0 / 1000.0
+
+    def late(gripper, clock):
+        return run_grasp(gripper(squeezing, bottle, clock=clock, lose_at=700), HYBRID, RUN).counts["late"]
+
+    assert late(Jerky, "device") == 5  # of the 450 ticks from the approach on
+    assert late(Jerky, "virtual") == late(JustInTime, "device") == 0
 
 
 def test_a_real_gripper_is_held_weak_until_first_contact():
@@ -362,26 +326,22 @@ def test_a_real_gripper_is_held_weak_until_first_contact():
     assert max(c.value for c in gripper.commands) == 20.0
 
 
-class Counting:
-    def __init__(self):
-        self.ticks = 0
-
-    def take(self, reading, phase, command):
-        self.ticks += 1
-
-
-class FullDisk:
-    def take(self, reading, phase, command):
-        raise OSError("No space left on device")
-
-
 def test_every_tick_reaches_the_sinks_and_one_that_fails_decides_nothing():
-    sink = Counting()
-    grasp = run_grasp(Scripted(squeezing, bottle), HYBRID, RUN, sinks=[FullDisk(), sink])
+    class FullDisk:
+        def take(self, reading, phase, command):
+            raise OSError("No space left on device")
+
+    class Leaving:
+        def take(self, reading, phase, command):
+            raise SystemExit(3)
+
+    ticks = []
+    sink = SimpleNamespace(take=lambda reading, phase, command: ticks.append(reading))
+    grasp = run_grasp(Scripted(squeezing, bottle), HYBRID, RUN, sinks=[FullDisk(), Leaving(), sink])
     assert grasp.outcome is Outcome.STEADY
-    assert sink.ticks == len(grasp.trace) == grasp.counts["ticks"]
+    assert len(ticks) == len(grasp.trace) == grasp.counts["ticks"]
     said = [event.what for event in grasp.events if "failed" in event.what]
-    assert said == ["FullDisk failed: OSError: No space left on device"]
+    assert said == ["FullDisk failed: OSError: No space left on device", "Leaving failed: SystemExit: 3"]
 
 
 def test_however_often_somebody_interrupts_the_trace_is_kept_and_the_gripper_let_go():
@@ -450,36 +410,25 @@ def test_a_device_whose_clock_stands_still_does_not_squeeze_for_ever():
     assert gripper.commands[-1].value == 0.0
 
 
-def test_a_report_that_fails_costs_nothing_else():
-    class Mute(Scripted):
-        def report(self):
-            raise ValueError("no report")
-
-    grasp = run_grasp(Mute(squeezing, bottle), HYBRID, RUN)
-    assert grasp.outcome is Outcome.STEADY
-    assert grasp.report == {"report_failed": "ValueError: no report"}
+def absent(self, seed):
+    raise NoDevice("looked for a gripper")
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("opened", "says"),
     [
-        (lambda: Path("/dev/no-such-port").read_bytes(), "was running"),
-        (lambda: None, "returned None: return graspsense.plugin_api.DeviceInfo"),
+        (absent, "was running"),
+        (lambda self, seed: Path("/dev/no-such-port").read_bytes(), "was running"),
+        (lambda self, seed: None, "returned None: return graspsense.plugin_api.DeviceInfo"),
     ],
 )
-def test_a_gripper_that_cannot_be_opened_is_named(opened, says, monkeypatch):
-    monkeypatch.setattr(Unready, "answer", staticmethod(opened))
-    with pytest.raises((OSError, TypeError)) as raised:
-        run_grasp(Unready(squeezing, bottle), HYBRID, RUN)
+def test_a_gripper_that_cannot_be_opened_is_an_error_that_names_it_and_no_outcome(opened, says):
+    gripper = type("Unready", (Scripted,), {"open": opened})(squeezing, bottle)
+    with pytest.raises((NoDevice, OSError, TypeError)) as raised:
+        run_grasp(gripper, HYBRID, RUN)
     *_, text = str(raised.value), *getattr(raised.value, "__notes__", [])
-    assert text == f"`open` of the gripper {Unready.__module__}.Unready {says}"
-
-
-class Unready(Scripted):
-    answer = None
-
-    def open(self, seed):
-        return self.answer()
+    assert opened is absent or text == f"`open` of the gripper {type(gripper).__module__}.Unready {says}"
+    assert gripper.closed == 1
 
 
 def test_no_garbage_is_collected_within_a_grasp_and_again_after_it():
@@ -517,18 +466,13 @@ def test_who_asks_is_told_what_was_opened_before_anything_moves_and_may_refuse()
 
 def test_a_recording_is_heard_to_its_end_however_long():
     # Longer than any grasp may take; nothing in it ends the approach, as its clock stands still.
-    class Long(Scripted):
-        def open(self, seed):
-            return evolve(super().open(seed), opening=None, tare_images=0)
-
+    class Long(Recorded):
         def read(self, timeout_s):
-            if self.k >= 2000:
-                raise RecordingEnded
             frame, pads, _ = super().read(timeout_s)
             return Reading(frame._replace(t_s=0.0, gap_m=0.05), pads)
 
     run = RunConfig(grasp_timeout_s=0.5, opening_timeout_s=0.1)
-    grasp = run_grasp(Long(squeezing, lambda t: (0.0, 0.0)), HYBRID, run)
+    grasp = run_grasp(Long(squeezing, lambda t: (0.0, 0.0), 2001), HYBRID, run)
     assert grasp.outcome is Outcome.NOTHING_THERE
     assert grasp.counts["ticks"] == 2001
 
@@ -592,26 +536,26 @@ def test_that_the_guard_limits_is_said_once_and_counted_each_time():
     assert grasp.counts["guarded"] == sum(grasp.trace.command >= RUN.first_effort_n)
 
 
-def interrupted(times):
+def test_one_interrupt_opens_the_fingers_and_a_second_only_relaxes_them():
     class Pressed(Scripted):
         """So many interrupts: one in the squeeze, the others while the fingers open."""
 
-        pressed = 0
+        pressed, times = 0, 1
 
         def read(self, timeout_s):
-            if (self.pressed == 0 and self.k == 1200) or 0 < self.pressed < times:
+            if (self.pressed == 0 and self.k == 1200) or 0 < self.pressed < self.times:
                 self.pressed += 1
                 signal.raise_signal(signal.SIGINT)
             return super().read(timeout_s)
 
-    gripper = Pressed(squeezing, bottle)
-    run_grasp(gripper, HYBRID, RUN)
-    return len([c for c in gripper.commands[1200:] if c.value == -20.0])
+    def openings(times):
+        gripper = Pressed(squeezing, bottle)
+        gripper.times = times
+        run_grasp(gripper, HYBRID, RUN)
+        return sum(command.value == -20.0 for command in gripper.commands[1200:])
 
-
-def test_one_interrupt_opens_the_fingers_and_a_second_only_relaxes_them():
-    assert interrupted(1) >= 100  # until they have stood open for 0.1 s
-    assert interrupted(2) == 1
+    assert openings(1) >= 100  # until they have stood open for 0.1 s
+    assert openings(2) == 1
 
 
 @pytest.mark.usefixtures("no_wall_clock")
@@ -668,36 +612,10 @@ def test_fingers_whose_clock_stands_still_are_relaxed_after_the_opening_time_on_
     assert gripper.commands[-1].value == 0.0
 
 
-def test_a_device_lost_after_the_grasp_had_ended_says_how_it_had():
-    # The hold ends at REST_S + 0.05 + 0.25; at 1.85 s the fingers are opening.
-    grasp = run_grasp(Scripted(squeezing, bottle, lose_at=1850), HYBRID, RUN)
-    assert grasp.outcome is Outcome.DEVICE_LOST
-    assert grasp.reason == "unplugged (after the grasp had ended: steady)"
-
-
-def test_a_gripper_that_is_lost_in_the_squeeze_is_only_told_to_relax():
-    gripper = Scripted(squeezing, bottle, lose_at=1200)
-    assert run_grasp(gripper, HYBRID, RUN).reason == "unplugged"
-    assert [c.value for c in gripper.commands[-2:]] == [20.0, 0.0]
-
-
 def test_fingers_that_are_open_are_not_opened_again(ordinary):
-    gripper, _, _ = ordinary
-    values = [c.value for c in gripper.commands]
+    values = [c.value for c in ordinary[0].commands]
     # The release ends when the gap has stood still for 0.1 s, and then there is one more command.
-    assert values[-1] == 0.0
-    opening = values[::-1].index(20.0) - 1
-    assert opening == pytest.approx(101, abs=2)
-
-
-def test_a_frame_of_just_the_allowed_age_is_not_late():
-    class Paced(Scripted):
-        def read(self, timeout_s):
-            frame, pads, _ = super().read(timeout_s)
-            return Reading(frame._replace(dt_s=5.0 / 1000.0), pads)
-
-    paced = Paced(squeezing, bottle, clock="device", lose_at=700)
-    assert run_grasp(paced, HYBRID, RUN).counts["late"] == 0
+    assert values[::-1].index(20.0) - 1 == pytest.approx(101, abs=2)
 
 
 def test_the_wall_clock_of_a_grasp_is_what_it_took():

@@ -13,11 +13,11 @@ from attrs import evolve
 from cases import every_case
 from click.testing import CliRunner
 from kept import begun
-from parts import NoKeys, channels
+from lab_grasp import recorded_grasp
+from parts import NoKeys, channels, offering
 
 from graspsense import load_pipeline
 from graspsense.cli.main import cli
-from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.pipeline.pipeline import grasp_with
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.trace import ImageTrace, SampleTrace
@@ -27,6 +27,7 @@ from graspsense.plugin_api import (
     Channel,
     Command,
     FastChannel,
+    Feature,
     Features,
     FeatureSet,
     FeatureSetEntry,
@@ -38,7 +39,6 @@ from graspsense.plugin_api import (
     SensorBackend,
     SensorBackendEntry,
     TactileArray,
-    hookimpl,
 )
 from graspsense.recording.export_trace import write_csv, write_npz, write_parquet
 from graspsense.recording.layout import START
@@ -46,8 +46,6 @@ from graspsense.recording.reader import read_recorded
 from graspsense.recording.recorder import Recorder
 from graspsense.sources.recordings.exported_grasp import read_exported
 from graspsense.sources.recordings.replay import read_named
-from graspsense.store.record_grasp import record_grasp
-from graspsense.store.store import Store
 from graspsense.testing.model_gripper import ModelGripper
 
 HERE = sys.modules[__name__]
@@ -102,55 +100,36 @@ class Shaking(FeatureSet[NoKeys]):
         return Features(names=("hottest", "mean"), values=(hottest, mean), units=("K", "m/s2"), reasons={})
 
 
-@hookimpl
-def graspsense_sensor_backends():
-    return [
-        SensorBackendEntry(name="palm", target=f"{__name__}:Palm", summary="a gripper with a palm"),
-        SensorBackendEntry(name="camera", target=f"{__name__}:Camera", summary="a gripper with a camera"),
-    ]
-
-
-@hookimpl
-def graspsense_feature_sets():
-    from graspsense.plugin_api import Feature
-
-    return [
-        FeatureSetEntry(
-            name="shaking",
-            target=f"{__name__}:Shaking",
-            config=f"{__name__}:NoKeys",
-            summary="acceleration and temperature",
-            requires=(
-                FastChannel("acceleration", "m/s2", samples=3, axes=("x", "y")),
-                Channel("motor_temperature", "K"),
-            ),
-            features=(
-                Feature("hottest", "K", "highest temperature of the motor"),
-                Feature("mean", "m/s2", "mean acceleration"),
-            ),
-        )
-    ]
-
-
-GRASPSENSE_API = (2, 0)
+LAB_HAND = offering(
+    SensorBackendEntry(name="palm", target=f"{__name__}:Palm", summary="a gripper with a palm"),
+    SensorBackendEntry(name="camera", target=f"{__name__}:Camera", summary="a gripper with a camera"),
+    FeatureSetEntry(
+        name="shaking",
+        target=f"{__name__}:Shaking",
+        config=f"{__name__}:NoKeys",
+        summary="acceleration and temperature",
+        requires=(
+            FastChannel("acceleration", "m/s2", samples=3, axes=("x", "y")),
+            Channel("motor_temperature", "K"),
+        ),
+        features=(
+            Feature("hottest", "K", "highest temperature of the motor"),
+            Feature("mean", "m/s2", "mean acceleration"),
+        ),
+    ),
+)
 
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     """One grasp, which no test changes: the trial, the path of its recording, and the plugins."""
-    folder = tmp_path_factory.mktemp("recorded") / "trials"
-    options = ["gripper.type=palm", "features.type=shaking", "classifier.type=none"]
-    with (
-        pytest.MonkeyPatch.context() as patch,
-        IsolatedPlugins() as plugins,
-        Store.open(folder) as store,
+    options = ("gripper.type=palm", "features.type=shaking")
+    with recorded_grasp(HERE, LAB_HAND, tmp_path_factory.mktemp("recorded"), *options) as (
+        kept,
+        path,
+        plugins,
     ):
-        patch.setitem(sys.modules, __name__, HERE)
-        plugins.add(HERE, "lab-hand")
-        settings = load_pipeline(options=options, plugins=plugins).settings
-        trial = record_grasp(store, settings, plugins, labels={}, origin="run").trial
-        (path,) = (folder / "recordings").glob("*.mcap")
-        yield trial, path, plugins
+        yield kept.trial, path, plugins
 
 
 def same(expected, now):
@@ -158,6 +137,12 @@ def same(expected, now):
         return expected.tobytes() == now.tobytes()
     arrays = ("t_s", "cells") if isinstance(expected, ImageTrace) else ("t_s", "values")
     return all(getattr(expected, name).tobytes() == getattr(now, name).tobytes() for name in arrays)
+
+
+def replayed(recording, plugins):
+    options = ["gripper.type=replay", f"gripper.recording={recording}", "features.type=shaking"]
+    settings = load_pipeline(options=[*options, "classifier.type=none"], plugins=plugins).settings
+    return grasp_with(settings, plugins)
 
 
 def test_the_trace_has_each_sample_and_image_once_and_counts_the_lost_ones(recorded):
@@ -188,9 +173,7 @@ def test_the_recording_has_the_same_signals_to_the_last_bit(recorded):
 @pytest.mark.slow
 def test_a_replay_gives_the_same_signals_and_features(recorded):
     trial, path, plugins = recorded
-    options = [f"gripper.recording={path}", "features.type=shaking", "classifier.type=none"]
-    settings = load_pipeline(options=["gripper.type=replay", *options], plugins=plugins).settings
-    again = grasp_with(settings, plugins)
+    again = replayed(path, plugins)
     assert again.features.values == trial.features.values
     assert not any(isnan(value) for value in again.features.values)
     for name, signal in trial.trace.signals.items():
@@ -212,14 +195,7 @@ def test_an_export_has_the_signals_as_arrays(recorded, tmp_path):
 def test_an_exported_grasp_comes_back_with_the_same_features_arrays_and_samples(recorded, tmp_path):
     trial, path, plugins = recorded
     write_npz(tmp_path / "grasp.npz", read_recorded(path))
-    options = [
-        f"gripper.recording=npz:{tmp_path / 'grasp.npz'}",
-        "features.type=shaking",
-        "classifier.type=none",
-    ]
-    again = grasp_with(
-        load_pipeline(options=["gripper.type=replay", *options], plugins=plugins).settings, plugins
-    )
+    again = replayed(f"npz:{tmp_path / 'grasp.npz'}", plugins)
     assert again.features.values == trial.features.values
     original, now = trial.trace, again.trace
     assert now.gap_m.tobytes() == original.gap_m.tobytes()
@@ -292,26 +268,13 @@ class Camera(Palm):
         return ModelGripper.read(self, timeout_s)
 
 
-@pytest.fixture
-def large(tmp_path, monkeypatch):
-    """A grasp with large arrays: the trial, its store, and the path of its recording."""
-    monkeypatch.setitem(sys.modules, __name__, HERE)
-    options = ["gripper.type=camera", "features.type=chitta", "classifier.type=none", "run.hold_s=0.01"]
-    with IsolatedPlugins() as plugins, Store.open(tmp_path / "trials") as store:
-        plugins.add(HERE, "lab-hand")
-        settings = load_pipeline(options=options, plugins=plugins).settings
-        kept = record_grasp(store, settings, plugins, labels={}, origin="run")
-        (path,) = (tmp_path / "trials" / "recordings").glob("*.mcap")
-        yield kept, path
-
-
 @pytest.mark.slow
-def test_arrays_of_any_size_are_recorded_replayed_and_exported(large, tmp_path):
-    kept, path = large
-    trace = kept.trial.trace
+def test_arrays_of_any_size_are_recorded_replayed_and_exported(tmp_path):
+    options = ("gripper.type=camera", "features.type=chitta", "run.hold_s=0.01")
+    with recorded_grasp(HERE, LAB_HAND, tmp_path / "trials", *options) as (kept, path, _):
+        trace, read = kept.trial.trace, read_recorded(path)
     assert kept.number == 1
     assert kept.counts["ticks"] == len(trace) > 0
-    read = read_recorded(path)
     assert len(read) == len(trace)
     assert same(trace.signals["camera"], read.trace().signals["camera"])
     assert trace.pad_left.shape[1] == 40_000

@@ -8,6 +8,8 @@ from importlib import import_module
 import numpy as np
 import pytest
 from cases import every_case
+from sklearn.linear_model import LogisticRegression
+from sklearn.neighbors import KNeighborsClassifier
 
 from graspsense.core.components.registry import installed
 from graspsense.core.learn.labelled import Labelled
@@ -62,45 +64,32 @@ def resigned(path, change):
     path.write_text(json.dumps({**content, "sha256": digest(content)}))
 
 
-def test_types_that_are_not_listed_are_refused_before_anything_is_made(tmp_path):
-    skops = import_module("skops.io")
-    from sklearn.neighbors import KNeighborsClassifier
-
+def with_estimator(tmp_path, text):
+    """Return the file of a model whose estimator is this text."""
     trained("tree", tmp_path)
-    path = tmp_path / "m.json"
-    other = KNeighborsClassifier().fit(np.random.default_rng(1).normal(size=(20, 3)), [0, 1] * 10)
-    resigned(path, lambda model: model.update(skops=base64.b64encode(skops.dumps(other)).decode()))
-    with pytest.raises(DataDamaged, match=r"types that no model of ours needs: .*KDTree"):
-        load_model(str(path), installed())
-
-
-def test_an_estimator_of_another_kind_is_refused(tmp_path):
-    skops = import_module("skops.io")
-    from sklearn.linear_model import LogisticRegression
-
-    trained("tree", tmp_path)
-    other = LogisticRegression().fit(np.eye(3), [0, 1, 2])
-    resigned(
-        tmp_path / "m.json", lambda model: model.update(skops=base64.b64encode(skops.dumps(other)).decode())
-    )
-    with pytest.raises(DataDamaged, match="no DecisionTreeClassifier of 3 features"):
-        load_model(str(tmp_path / "m.json"), installed())
+    resigned(tmp_path / "m.json", lambda model: model.update(skops=text))
+    return str(tmp_path / "m.json")
 
 
 @every_case(
-    "text",
+    ("estimator", "says"),
     [
-        "",
-        "no base64!",
-        base64.b64encode(b"no archive").decode(),
-        base64.b64encode(b"\x80\x04K\x01.").decode(),
+        (KNeighborsClassifier(), r"types that no model of ours needs: .*KDTree"),
+        (LogisticRegression(), "no DecisionTreeClassifier of 3 features"),
     ],
 )
-def test_what_is_no_estimator_is_told(tmp_path, text):
-    trained("tree", tmp_path)
-    resigned(tmp_path / "m.json", lambda model: model.update(skops=text))
+def test_an_estimator_of_another_kind_is_refused_before_anything_is_made(tmp_path, estimator, says):
+    rows = np.random.default_rng(1).normal(size=(20, 3))
+    other = import_module("skops.io").dumps(estimator.fit(rows, [0, 1] * 10))
+    with pytest.raises(DataDamaged, match=says):
+        load_model(with_estimator(tmp_path, base64.b64encode(other).decode()), installed())
+
+
+@every_case("data", [b"", None, b"no archive", b"\x80\x04K\x01."])
+def test_what_is_no_estimator_is_told(tmp_path, data):
+    text = "no base64!" if data is None else base64.b64encode(data).decode()
     with pytest.raises(DataDamaged, match="is damaged"):
-        load_model(str(tmp_path / "m.json"), installed())
+        load_model(with_estimator(tmp_path, text), installed())
 
 
 def test_without_skops_it_says_what_to_install(monkeypatch):

@@ -51,16 +51,12 @@ def test_the_order_of_the_labels_stays_and_probabilities_sum_to_one(raw, tempera
         assert (np.diff(after[np.argsort(uncalibrated)]) >= 0.0).all()
 
 
-def test_a_label_that_is_not_possible_stays_so():
+def test_a_label_that_is_not_possible_stays_so_and_few_trials_leave_the_probabilities_as_they_are():
     calibrated = at_temperature(np.array([[0.8, np.nan, 0.2]]), 2.0)
-
     assert np.isnan(calibrated[0, 1])
     assert calibrated[0, [0, 2]].tolist() == pytest.approx([2 / 3, 1 / 3])
 
-
-def test_few_trials_leave_the_probabilities_as_they_are():
     given, truth, _ = drawn(MIN_TRIALS - 1, 2, 3.0)
-
     assert temperature_of(given, truth) is None
     assert at_temperature(given, None) is given
 

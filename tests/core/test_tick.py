@@ -72,15 +72,9 @@ def test_opened_means_slower_than_1_mm_s_for_a_tenth_of_a_second():
     seen, _ = walk(law_that_ends_at(9.0), gap, 600)
     assert first_of(seen, Phase.TARING) == pytest.approx(0.4, abs=0.06)
     assert all(value == -20.0 for t, p, value in seen if p == Phase.OPENING)
-
-
-def test_fingers_that_go_on_opening_faster_than_that_are_not_open():
+    # Fingers that go on opening faster than that are not open, until the time is over.
     seen, state = walk(law_that_ends_at(9.0), lambda t: 0.02 + 0.0015 * t, 600)
-    assert state.phase == Phase.OPENING
-    assert {p for _, p, _ in seen} == {Phase.OPENING}
-
-
-def test_opening_ends_at_its_time_out_whatever_the_fingers_do():
+    assert {p for _, p, _ in seen} == {Phase.OPENING} == {state.phase}
     seen, _ = walk(law_that_ends_at(9.0), lambda t: 0.02 + 0.02 * t, 1200, timeout_s=1.0)
     assert first_of(seen, Phase.TARING) == pytest.approx(1.0, abs=0.0011)
 
@@ -95,9 +89,7 @@ def test_the_taring_waits_for_its_images_relaxed():
     values = [value for _, p, value in seen if p == Phase.TARING]
     assert values[0] == -20.0
     assert set(values[1:]) == {0.0}
-
-
-def test_no_images_wanted_no_waiting():
+    # No images wanted, no waiting.
     seen, _ = walk(law_that_ends_at(9.0), lambda t: 0.086, 400, tare_images=0)
     assert first_of(seen, Phase.APPROACH) - first_of(seen, Phase.TARING) == pytest.approx(0.001)
 
@@ -110,9 +102,7 @@ def test_a_steady_grasp_is_held_then_released_then_done():
     # Released is: still for a tenth of a second.
     assert seen[-1][0] == pytest.approx(1.85, abs=0.004)
     assert seen[-1][2] == -20.0
-
-
-def test_any_other_ending_is_released_at_once():
+    # Any other ending is released at once.
     seen, _ = walk(law_that_ends_at(1.5, outcome=STEADY + 3), lambda t: 0.05, 5000)
     assert first_of(seen, Phase.RELEASE) == pytest.approx(1.5)
 

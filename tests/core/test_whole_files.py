@@ -8,8 +8,11 @@ import stat
 import subprocess
 import sys
 import threading
+from contextlib import contextmanager
+from unittest.mock import patch
 
 import pytest
+from cases import every_case
 from repository import ROOT
 
 from graspsense.core.files import whole_file
@@ -79,19 +82,23 @@ def known_token(monkeypatch):
     return "0" * 16
 
 
+def plant(kind, path, victim):
+    """Put a link to a file of somebody else, a pipe or a second name of that file in place of a path."""
+    if kind != "dangling link":
+        victim.write_text("precious")
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "file":
+        os.link(victim, path)
+    else:
+        path.symlink_to(victim)
+
+
 @pytest.mark.parametrize("kind", ["link", "dangling link", "pipe", "file"])
 def test_what_somebody_planted_under_the_passing_name_is_never_written_to(tmp_path, known_token, kind):
     """Not even if the name could be guessed."""
     victim = tmp_path / "victim"
-    planted = tmp_path / f"out.csv.{known_token}.part"
-    if kind != "dangling link":
-        victim.write_text("precious")
-    if kind == "pipe":
-        os.mkfifo(planted)
-    elif kind == "file":
-        os.link(victim, planted)
-    else:
-        planted.symlink_to(victim)
+    plant(kind, tmp_path / f"out.csv.{known_token}.part", victim)
     whole_file._SWEPT.add(str(tmp_path))
     with pytest.raises(FileExistsError):
         write_whole(tmp_path / "out.csv", b"new")
@@ -100,21 +107,14 @@ def test_what_somebody_planted_under_the_passing_name_is_never_written_to(tmp_pa
     assert kind == "dangling link" or victim.read_text() == "precious"
 
 
-@pytest.mark.parametrize("name", ["model.json.part", "model.part", "model.new"])
-def test_a_link_under_a_fixed_name_is_left_alone(tmp_path, name):
-    (tmp_path / "victim").write_text("precious")
-    (tmp_path / name).symlink_to(tmp_path / "victim")
-    write_whole(tmp_path / "model.json", b"{}")
-    assert (tmp_path / "victim").read_text() == "precious"
-    assert (tmp_path / name).is_symlink()
-
-
-def test_a_name_that_is_a_link_is_replaced_and_its_target_kept(tmp_path):
-    (tmp_path / "victim").write_text("precious")
-    (tmp_path / "report.html").symlink_to(tmp_path / "victim")
-    write_or_replace(tmp_path / "report.html", b"new")
-    assert (tmp_path / "victim").read_text() == "precious"
-    assert (tmp_path / "report.html").read_bytes() == b"new"
+@every_case("name", ["model.json", "model.json.part", "model.part", "model.new"])
+def test_a_name_that_is_a_link_is_replaced_and_its_target_and_other_links_are_kept(tmp_path, name):
+    victim = tmp_path / "victim"
+    plant("link", tmp_path / name, victim)
+    write_or_replace(tmp_path / "model.json", b"{}")
+    assert victim.read_text() == "precious"
+    assert (tmp_path / name).is_symlink() == (name != "model.json")
+    assert (tmp_path / "model.json").read_bytes() == b"{}"
 
 
 @pytest.mark.parametrize("kind", ["pipe", "device"])
@@ -191,41 +191,43 @@ def test_what_a_killed_writer_left_is_deleted_by_the_next_and_a_living_one_is_le
 
 
 def test_a_link_or_a_pipe_with_the_name_of_a_leftover_does_no_harm(tmp_path):
-    (tmp_path / "victim").write_text("precious")
-    (tmp_path / f"a.{'0' * 16}.part").symlink_to(tmp_path / "victim")
-    os.mkfifo(tmp_path / f"b.{'0' * 16}.part")
+    victim = tmp_path / "victim"
+    for kind in ("link", "pipe"):
+        plant(kind, tmp_path / f"{kind}.{'0' * 16}.part", victim)
     whole_file._SWEPT.discard(str(tmp_path))
     write_whole(tmp_path / "c", b"{}")
-    assert (tmp_path / "victim").read_text() == "precious"
+    assert victim.read_text() == "precious"
     assert (tmp_path / "c").read_bytes() == b"{}"
 
 
+@contextmanager
+def longest_file(size):
+    """Let this process write no file longer than so many bytes: a real error of a write."""
+    resource = pytest.importorskip("resource")
+    import signal
+
+    limits, handler = resource.getrlimit(resource.RLIMIT_FSIZE), signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, handler)
+
+
 @pytest.mark.parametrize("call", ["write", "fsync", "replace", "open"])
-def test_an_error_of_the_disk_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch, call):
+def test_an_error_of_the_disk_leaves_the_old_file_and_nothing_else(tmp_path, call):
     path = tmp_path / "a.json"
     write_or_replace(path, b"old")
 
     def refuse(*arguments, **options):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    if call == "write":
-        # A real one: the process may not write longer files.
-        resource = pytest.importorskip("resource")
-        import signal
-
-        limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-        monkeypatch.setattr(signal, "ignored", signal.signal(signal.SIGXFSZ, signal.SIG_IGN), raising=False)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (100, limits[1]))
-    else:
-        monkeypatch.setattr(whole_file.os, call, refuse)
-    try:
-        with pytest.raises(SaveFailed):
-            write_or_replace(path, b"new" * 1000)
-    finally:
-        if call == "write":
-            resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-            signal.signal(signal.SIGXFSZ, signal.ignored)
-    monkeypatch.undo()
+    with (
+        longest_file(100) if call == "write" else patch.object(whole_file.os, call, refuse),
+        pytest.raises(SaveFailed),
+    ):
+        write_or_replace(path, b"new" * 1000)
     assert path.read_bytes() == b"old"
     assert entries(tmp_path) == ["a.json"]
 
@@ -245,16 +247,13 @@ def test_a_recording_that_another_writer_finished_meanwhile_is_not_overwritten(t
     assert entries(tmp_path) == ["g.mcap"]
 
 
-@pytest.mark.parametrize("kind", ["link", "pipe"])
+@every_case("kind", ["dangling link", "pipe"])
 def test_a_recording_is_never_written_through_what_somebody_planted(tmp_path, kind):
-    part = tmp_path / "g.mcap.part"
-    if kind == "pipe":
-        os.mkfifo(part)
-    else:
-        part.symlink_to(tmp_path / "victim")
+    victim = tmp_path / "victim"
+    plant(kind, tmp_path / "g.mcap.part", victim)
     with pytest.raises(FileExistsError):
         RecordingWriter(tmp_path / "g.mcap")
-    assert not (tmp_path / "victim").exists()
+    assert not victim.exists() or victim.read_text() == "precious"
 
 
 def test_pipes_and_links_in_a_store_do_not_stop_recover_and_verify(tmp_path):

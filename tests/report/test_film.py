@@ -25,34 +25,28 @@ def filmed(film):
         film.picture(plain(grey))
 
 
-def test_the_picture_is_the_last_one_before_the_release(tmp_path):
-    film = Film(str(tmp_path / "p.png"), None)
-    filmed(film)
-    assert film.write() == [tmp_path / "p.png"]
-    with Image.open(tmp_path / "p.png") as image:
-        assert image.getpixel((0, 0)) == (120, 120, 120)
+def test_the_picture_is_the_last_one_before_the_release_and_a_video_has_all(tmp_path):
+    for kind in ("gif", "webp"):
+        picture, video = tmp_path / "p.png", tmp_path / f"v.{kind}"
+        film = Film(str(picture), str(video))
+        filmed(film)
+        assert set(film.write()) == {picture, video}
+        with Image.open(picture) as image:
+            assert image.getpixel((0, 0)) == (120, 120, 120)
+        with Image.open(video) as images:
+            assert images.n_frames == 3
+        picture.unlink()
 
 
-@pytest.mark.parametrize("kind", ["gif", "webp"])
-def test_a_video_has_all_pictures(tmp_path, kind):
-    film = Film(None, str(tmp_path / f"v.{kind}"))
-    filmed(film)
-    film.write()
-    with Image.open(tmp_path / f"v.{kind}") as image:
-        assert image.n_frames == 3
-
-
-@pytest.mark.parametrize(
-    ("picture", "video", "said"),
-    [("p.bmp", None, ".png"), (None, "v.avi", ".mp4"), ("missing/p.png", None, "no folder")],
-)
-def test_what_cannot_be_written_is_refused_before_the_grasp(tmp_path, monkeypatch, picture, video, said):
+def test_what_cannot_be_written_is_refused_before_the_grasp(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(ConfigError, match=said):
-        Film(picture, video)
-
-
-def test_an_mp4_without_its_package_says_what_to_install(tmp_path, monkeypatch):
+    for picture, video, said in (
+        ("p.bmp", None, ".png"),
+        (None, "v.avi", ".mp4"),
+        ("missing/p.png", None, "no folder"),
+    ):
+        with pytest.raises(ConfigError, match=said):
+            Film(picture, video)
     monkeypatch.setattr(module, "find_spec", lambda name: None)
     with pytest.raises(PluginUnavailable, match=r"graspsense\[video\]"):
         Film(None, str(tmp_path / "v.mp4"))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import json
 import os
-import re
 import socket
 import struct
 import threading
@@ -15,8 +14,7 @@ from xml.etree import ElementTree
 
 import pytest
 from cases import every_case
-from commands import graspsense
-from live_grasp import COMMAND, device, port_of, reading
+from live_grasp import COMMAND, device, port_of, reading, shown
 from mcap.reader import make_reader
 
 from graspsense import load_pipeline
@@ -123,13 +121,6 @@ def messages_until_the_end(link):
             return count
 
 
-def shown(feed, n=20):
-    feed.opened(device())
-    for k in range(n):
-        feed.take(reading(k), SQUEEZE, COMMAND)
-    feed.told("outcome", {"outcome": "steady", "reason": ""})
-
-
 def check_complete(messages, n=20):
     times = [struct.unpack_from("<4xd", data)[0] for _, data in messages["/grasp/tick"]]
     assert times == [k / 1000 for k in range(n)]
@@ -209,15 +200,16 @@ def test_without_the_token_nothing_is_answered(kept_feed, path):
 
 
 @every_case(
-    ("headers", "status"),
-    [
-        ({"Origin": "https://elsewhere.example"}, 403),
-        ({"Origin": "null"}, 403),
-        ({"Origin": "https://app.foxglove.dev.elsewhere.example"}, 403),
-    ],
+    "origin",
+    ["https://elsewhere.example", "null", "https://app.foxglove.dev.elsewhere.example"],
 )
-def test_the_pages_of_others_cannot_listen(kept_feed, headers, status):
-    assert refused(kept_feed, headers=headers) == status
+def test_the_pages_of_others_cannot_listen(kept_feed, origin):
+    assert refused(kept_feed, headers={"Origin": origin}) == 403
+
+
+@every_case("protocols", [(), ("chat",)])
+def test_what_is_no_viewer_of_foxglove_is_told_so(kept_feed, protocols):
+    assert refused(kept_feed, protocols=protocols) == 400
 
 
 @every_case(
@@ -242,11 +234,6 @@ def test_what_is_no_request_of_a_viewer_is_refused_or_dropped(kept_feed, head, s
             while data := link.recv(4096):
                 answer += data
     assert answer.split(b" ")[1:2] == ([] if status is None else [str(status).encode()])
-
-
-def test_what_is_no_viewer_of_foxglove_is_told_so(kept_feed):
-    assert refused(kept_feed, protocols=()) == 400
-    assert refused(kept_feed, protocols=("chat",)) == 400
 
 
 @every_case("origin", ["https://app.foxglove.dev", "file://"])
@@ -345,14 +332,3 @@ def test_the_layouts_show_fields_that_a_recording_has():
         return [place] if isinstance(place, str) else [*leaves(place["first"]), *leaves(place["second"])]
 
     assert sorted(leaves(layout["layout"])) == sorted(panels)
-
-
-def test_a_port_that_is_taken_is_an_error_before_the_grasp(tmp_path):
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        port = taken.getsockname()[1]
-        done = graspsense("run", "--foxglove", port, "--save", tmp_path / "store")
-    assert done.returncode == 2
-    assert re.search(f"--foxglove.*{port}", done.stderr)
-    assert not (tmp_path / "store").exists()

@@ -16,7 +16,7 @@ import click
 import pytest
 from click.testing import CliRunner
 from commands import graspsense
-from live_grasp import COMMAND, device, port_of, reading
+from live_grasp import COMMAND, device, port_of, reading, shown
 
 from graspsense.cli.live import _host_and_port
 from graspsense.cli.main import cli
@@ -68,13 +68,6 @@ def refused(address, headers=None):
     return answer.value.response.status_code
 
 
-def shown(feed, n=20):
-    feed.opened(device())
-    for k in range(n):
-        feed.take(reading(k), SQUEEZE, COMMAND)
-    feed.told("outcome", {"outcome": "steady", "reason": ""})
-
-
 def column(messages, kind, name):
     return [value for message in messages if message["kind"] == kind for value in message[name]]
 
@@ -118,14 +111,21 @@ def test_a_new_grasp_replaces_the_one_before_for_viewers_who_come_later(feed):
     check_received(last_grasp(messages), 5)
 
 
-@every_case("path", ["/", "/wrong/", "/wrong/frames"])
-def test_without_the_token_nothing_is_answered(idle_feed, path):
-    assert refused(f"ws://127.0.0.1:{port_of(idle_feed)}{path}") == 404
-
-
-@every_case("headers", [{"Origin": "http://elsewhere.example"}, {"Origin": "null"}])
-def test_another_page_cannot_listen(idle_feed, headers):
-    assert refused(frames_of(idle_feed), headers) == 403
+def test_only_the_page_itself_is_let_in_and_it_asks_for_nothing_from_outside(idle_feed):
+    for path in ("/", "/wrong/", "/wrong/frames"):
+        assert refused(f"ws://127.0.0.1:{port_of(idle_feed)}{path}") == 404, "without the token"
+    for origin in ("http://elsewhere.example", "null"):
+        assert refused(frames_of(idle_feed), {"Origin": origin}) == 403
+    # As a page elsewhere has it that makes its own name lead to 127.0.0.1.
+    host = {"Host": f"elsewhere.example:{port_of(idle_feed)}"}
+    with pytest.raises(HTTPError) as refusal:
+        urlopen(Request(idle_feed.answer["address"], headers=host), timeout=PATIENCE_S)
+    refusal.value.close()
+    assert refusal.value.code == 403
+    with urlopen(idle_feed.answer["address"], timeout=PATIENCE_S) as answer:
+        text, policy = answer.read().decode(), answer.headers["Content-Security-Policy"]
+    assert policy.startswith("default-src 'none'")
+    assert "://" not in text
 
 
 def test_a_viewer_that_sends_something_is_dropped_and_the_others_stay(feed):
@@ -211,29 +211,15 @@ def _rest(connection):
     return n
 
 
-def test_the_page_asks_for_nothing_from_outside(idle_feed):
-    with urlopen(idle_feed.answer["address"], timeout=PATIENCE_S) as answer:
-        text, policy = answer.read().decode(), answer.headers["Content-Security-Policy"]
-    assert policy.startswith("default-src 'none'")
-    assert "://" not in text
-
-
-def test_a_name_that_leads_to_this_machine_is_refused(idle_feed):
-    """As a page elsewhere has it that makes its own name lead to 127.0.0.1."""
-    asked = Request(idle_feed.answer["address"], headers={"Host": f"elsewhere.example:{port_of(idle_feed)}"})
-    with pytest.raises(HTTPError) as refusal:
-        urlopen(asked, timeout=PATIENCE_S)
-    refusal.value.close()
-    assert refusal.value.code == 403
-
-
-def test_a_port_that_is_taken_is_an_error_before_the_grasp(tmp_path):
+@every_case(("option", "address"), [("--live-address", "127.0.0.1:{}"), ("--foxglove", "{}")])
+def test_a_port_that_is_taken_is_an_error_before_the_grasp(tmp_path, option, address):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        done = graspsense("run", "--live-address", f"127.0.0.1:{port}", "--save", str(tmp_path / "store"))
+        done = graspsense("run", option, address.format(port), "--save", tmp_path / "store")
     assert done.returncode == 2
+    assert option.removesuffix("-address") in done.stderr
     assert str(port) in done.stderr
     assert "Traceback" not in done.stderr
     assert not (tmp_path / "store").exists()
@@ -261,9 +247,7 @@ def test_a_page_that_is_killed_loses_no_grasp(feed):
     assert trial.reason == ""
 
 
-@pytest.mark.parametrize(
-    ("option", "module"), [("live", "websockets"), ("foxglove", "foxglove"), ("rerun", "rerun")]
-)
+@every_case(("option", "module"), [("live", "websockets"), ("foxglove", "foxglove"), ("rerun", "rerun")])
 def test_a_package_that_is_missing_is_named_before_the_grasp(monkeypatch, option, module):
     monkeypatch.setitem(sys.modules, module, None)
     done = CliRunner().invoke(cli, ["run", f"--{option}"])

@@ -19,7 +19,6 @@ from cases import every_case
 from commands import graspsense, printed
 from kept import keep
 
-from graspsense.cli.main import main
 from graspsense.core.components.registry import installed
 from graspsense.evaluation.confusion import confusion
 from graspsense.evaluation.intervals import Difference, RecognitionRate
@@ -30,6 +29,7 @@ from graspsense.experiments.page import write_page
 from graspsense.experiments.results import Results
 from graspsense.experiments.run import run_experiment
 from graspsense.experiments.summary import summarise
+from graspsense.recording.recording_info import RecordingInfo
 from graspsense.report.html import Page, table
 from graspsense.report.matrix import confusion_table
 from graspsense.report.rates import RateRow, rate_scale, rates_over, rates_picture
@@ -276,10 +276,10 @@ def test_ticks_are_round_and_within(low, high):
     assert len({f"{width:.3g}" for width in (b - a for a, b in pairwise(ticks))}) == 1
 
 
-def test_the_page_of_an_empty_answer():
-    assert Reader(Page(kind="k", title="t", question="", answer="none").html()).text.startswith(
-        "t – graspsense"
-    )
+def test_words_in_backticks_are_code_and_names_cannot_make_elements():
+    page = Page(kind="k", title="t", question="", answer="use `run --object <b>`").html()
+    assert "use <code>run --object &lt;b&gt;</code>" in page
+    assert Reader(page).text.startswith("t – graspsense")
 
 
 @pytest.fixture
@@ -308,20 +308,6 @@ def test_the_page_of_a_store(folder, tmp_path):
     assert {line["data-trial"] for line in lines if "class" not in line} == {"8", "7"}
 
 
-def test_the_warnings_of_a_trial_are_on_its_page(tmp_path):
-    from graspsense.recording.recording_info import RecordingInfo
-
-    with Store.open(tmp_path / "trials") as store:
-        record = kept.ended()
-        result = evolve(record.result, details={"warnings": ["left fingertip stuck: check its cable"]})
-        path = store.new_recording(record.made_at)
-        kept.write_recording(path, 120, evolve(record, result=result))
-        store.add(evolve(record, result=result), RecordingInfo.hashed(path, 120, 3), complete=True)
-    page = store_page(str(tmp_path / "trials")).html()
-
-    assert '<ul class="warning"><li>left fingertip stuck: check its cable</li></ul>' in page
-
-
 def test_evaluate_writes_a_page_and_replaces_none_of_a_store(folder, tmp_path):
     command = ("evaluate", folder, "--folds", "2", "--report")
     written = graspsense(*command, tmp_path / "page")
@@ -334,11 +320,6 @@ def test_evaluate_writes_a_page_and_replaces_none_of_a_store(folder, tmp_path):
     for part in ("Controls", "Confusion matrix", "Features", "graspsense evaluate"):
         assert part in reader.text
     assert " of 8" in reader.text
-
-
-def test_words_in_backticks_are_code_and_names_cannot_make_elements():
-    page = Page(kind="k", title="t", question="", answer="use `run --object <b>`").html()
-    assert "use <code>run --object &lt;b&gt;</code>" in page
 
 
 def test_long_names_are_wrapped_within_a_picture():
@@ -386,18 +367,17 @@ def evaluated(right, difference, width=None):
     )
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("rate", "words"),
     [(0.5, "is not shown to be more than the 50 by guessing"), (0.95, ", against 50 by guessing")],
 )
 def test_the_headline_of_an_evaluation_compares_with_guessing(rate, words):
     right = round(rate * 100)
-    evaluation = evaluated(right, Difference(rate - 0.5, (rate - 0.6, rate - 0.4)))
+    told = headline(evaluated(right, Difference(rate - 0.5, (rate - 0.6, rate - 0.4))))
 
-    assert headline(evaluation).startswith(
-        f"{right} of 100 grasps tell the object ({right} of 100)"  # the labels have no state
-    )
-    assert headline(evaluation).endswith(words)
+    # The labels have no state.
+    assert told.startswith(f"{right} of 100 grasps tell the object ({right} of 100)")
+    assert told.endswith(words)
 
 
 @every_case(
@@ -415,43 +395,43 @@ def test_a_verdict_says_one_of_three_things(difference, words):
 
 
 def test_the_recording_explains_nothing_only_where_the_rate_is_shown_to_be_higher():
+    higher = Difference(0.3, (0.2, 0.4))
+
     def told(low):
-        measurement = Measurement(
-            what="w", rate=RecognitionRate(30, 60), difference=Difference(0.1, (low, 0.3))
-        )
-        evaluation = evaluated(60, Difference(0.3, (0.2, 0.4)))
-        return verdict(evolve(evaluation, controls={**evaluation.controls, "before_contact": measurement}))
+        difference = Difference(0.1, (low, 0.3))
+        control = Measurement(what="w", rate=RecognitionRate(30, 60), difference=difference)
+        evaluation = evaluated(60, higher)
+        return verdict(evolve(evaluation, controls={**evaluation.controls, "before_contact": control}))
 
     assert "so the recording does not explain the rate" in told(0.05)
     assert "whether the recording explains the rate cannot be told" in told(-0.1)
-
-
-def test_no_verdict_comes_from_a_control_of_two_trials():
+    # No verdict comes from a control of two trials.
     few = Measurement(what="w", rate=RecognitionRate(2, 2), difference=Difference(-0.4, (-0.6, -0.2)))
-    told = verdict(evaluated(60, Difference(0.3, (0.2, 0.4)), few))
-
-    assert "100.0 % of 2 of 100 trials, too few to say" in told
+    assert "100.0 % of 2 of 100 trials, too few to say" in verdict(evaluated(60, higher, few))
 
 
-def test_the_page_of_a_store_that_cannot_be_judged(tmp_path):
+def test_the_page_of_a_store_that_cannot_be_judged_has_its_grasp_with_its_warnings(tmp_path):
     with Store.open(tmp_path / "trials") as store:
-        keep(store, None)
+        record = kept.ended(label=None)
+        result = evolve(record.result, details={"warnings": ["left fingertip stuck: check its cable"]})
+        path = store.new_recording(record.made_at)
+        kept.write_recording(path, 120, evolve(record, result=result))
+        store.add(evolve(record, result=result), RecordingInfo.hashed(path, 120, 3), complete=True)
     page = store_page(str(tmp_path / "trials"))
 
     assert page.answer.startswith("There is 1 grasp, but no recognition rate: ")
     assert "One grasp, from the approach to rest" in Reader(page.html()).text
+    assert '<ul class="warning"><li>left fingertip stuck: check its cable</li></ul>' in page.html()
 
 
 @pytest.mark.slow
-def test_the_page_of_an_experiment_once_more(tmp_path, capsys):
+def test_the_page_of_an_experiment_once_more(tmp_path):
     (tmp_path / "trials.csv").write_text(wayward.CSV)
     (tmp_path / "it.toml").write_text(
         'title = "x"\n[data]\nsource = "trials.csv"\nlabel = "what"\n[judge]\nfolds = 2\ncontrols = false\n'
     )
     results = Results(tmp_path / "out")
     run_experiment(read_experiment(str(tmp_path / "it.toml")), results, Serial)
-    with pytest.raises(SystemExit):
-        main(["report", str(results.folder)])
 
-    assert "recorded grasps" in capsys.readouterr().out
+    assert "recorded grasps" in printed("report", results.folder)
     assert "recorded grasps" in Reader((results.folder / "report.html").read_text()).text

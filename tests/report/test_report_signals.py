@@ -68,12 +68,9 @@ def test_an_array_is_shown_at_contact_peak_and_rest_as_its_change_since_before_c
 
     assert [shown["contact", cell] for cell in range(6)] == pytest.approx([0.0] * 6, abs=0.2)
     # The last image before the peak at 0.6 s is from 0.595 s, where the force is 8.85 N.
-    assert [shown["peak", cell] for cell in range(6)] == pytest.approx(
-        [8.85 * cell for cell in range(6)], rel=1e-3
-    )
-    assert [shown["rest", cell] for cell in range(6)] == pytest.approx(
-        [6.15 * cell for cell in range(6)], rel=1e-3
-    )
+    for moment, force_n in (("peak", 8.85), ("rest", 6.15)):
+        for cell in range(6):
+            assert shown[moment, cell] == pytest.approx(force_n * cell, rel=1e-3)
     assert "44.2 N" in palm
     assert "Palm on the palm: 6 cells. Change of each cell since shortly before contact, in N." in palm
 
@@ -123,15 +120,12 @@ def test_fast_and_scalar_channels_have_curves_and_a_fast_one_its_spectrogram():
     assert "spectrogram" not in temperature
 
 
-def test_a_curve_keeps_the_single_highest_sample():
+def test_a_curve_keeps_the_single_highest_sample_and_a_spectrogram_has_its_maximum_at_the_tone():
     signal = grasp().signals["acceleration"]
     points = envelope(signal.t_s, signal.values[:, 1])
     assert max(value for _, value in points) == 7.0
     assert len(points) <= 2 * INTERVALS
 
-
-def test_a_spectrogram_has_its_maximum_at_the_tone():
-    signal = grasp().signals["acceleration"]
     _, frequencies, decibels = spectrogram(signal.t_s, {"x": signal.values[:, 0]})
     assert frequencies[decibels.max(axis=1).argmax()] == pytest.approx(400.0, abs=RATE_HZ / 256)
     assert decibels.max() == 0.0

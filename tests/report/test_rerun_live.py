@@ -15,12 +15,11 @@ import click
 import numpy as np
 import pytest
 from cases import every_case
-from live_grasp import COMMAND, device, reading
+from live_grasp import reading, shown
 
 from graspsense import load_pipeline
 from graspsense.cli.live import RERUN_VIEWER, _rerun_target
 from graspsense.core.values.errors import ConfigError
-from graspsense.core.values.signals import SQUEEZE
 from graspsense.live.feeds import LiveFeed
 from graspsense.recording.layout import TICK_FIELDS
 
@@ -40,22 +39,12 @@ def logged(path):
         batch = chunk.to_record_batch()
         if "t" not in batch.schema.names:
             continue
-        name = next(
-            column
-            for column in batch.schema.names
-            if column.endswith((":scalars", ":text", ":data", ":buffer"))
-        )
+        kinds = (":scalars", ":text", ":data", ":buffer")
+        name = next(column for column in batch.schema.names if column.endswith(kinds))
         values = [value[0] for value in batch.column(name).to_pylist()]
         times = batch.column("t").cast("int64").to_pylist()
         columns.setdefault(chunk.entity_path, []).extend(zip(times, values, strict=True))
     return {path: ([t for t, _ in rows], [v for _, v in rows]) for path, rows in columns.items()}
-
-
-def shown(feed, n=20):
-    feed.opened(device())
-    for k in range(n):
-        feed.take(reading(k), SQUEEZE, COMMAND)
-    feed.told("outcome", {"outcome": "steady", "reason": ""})
 
 
 def check_complete(columns, n=20):

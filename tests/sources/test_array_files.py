@@ -184,46 +184,41 @@ def test_a_damaged_or_large_hdf5_file_is_told_by_its_name(tmp_path, monkeypatch)
 
 
 def test_a_reader_that_is_killed_by_a_file_is_an_error_of_the_file(tmp_path, monkeypatch):
-    path = tmp_path / "jar.h5"
+    path, run = tmp_path / "jar.h5", subprocess.run
     path.write_bytes(b"")
-    monkeypatch.setattr(subprocess, "run", _run_that_dies(subprocess.run))
+    killed = [sys.executable, "-c", "import os, signal; os.kill(os.getpid(), signal.SIGKILL)"]
+    monkeypatch.setattr(subprocess, "run", lambda command, **given: run(killed, **given))
     with pytest.raises(DataDamaged, match=r"jar\.h5.*-9"):
         hdf5_arrays(path)
 
 
-def _run_that_dies(run):
-    def killed(command, **given):
-        return run([sys.executable, "-c", "import os, signal; os.kill(os.getpid(), signal.SIGKILL)"], **given)
-
-    return killed
-
-
-@pytest.mark.parametrize("gaps", [("0.06", "0.06"), ("0.05", "0.06")])
-def test_a_gap_that_does_not_change_is_no_width(gaps, tmp_path):
+def nominal_gaps(folder, gaps, begin=0, offset_n=0.0):
+    """Write four grasps of each of two labels with a constant gap; return their manifest."""
     for label, gap in zip("ab", gaps, strict=True):
-        data = solid(4)[:, :, [0, 2]] + (label == "b") * np.array([0.0, 0.01])
-        np.savez(tmp_path / f"{label}.npz", data=data, nominal=np.full((4, N), float(gap)))
+        data = solid(4)[:, begin:, [0, 2]] + (label == "b") * np.array([0.0, offset_n])
+        np.savez(folder / f"{label}.npz", data=data, nominal=np.full(data.shape[:2], gap))
     text = 'files = "{label}.npz"\naxes = "grasp, time, column"\ntime = "data[0]"\ngap = "nominal"\nforce = "data[1]"\n'
-    (tmp_path / "m.toml").write_text(text)
-    trials = load_trials(f"manifest:{tmp_path / 'm.toml'}")
+    (folder / "m.toml").write_text(text)
+    return folder / "m.toml"
+
+
+def assert_no_width(trials):
     assert len(trials) == 8
     assert trials.width is None
     assert "no width" in trials.no_width
 
 
+@every_case("gaps", [(0.06, 0.06), (0.05, 0.06)])
+def test_a_gap_that_does_not_change_is_no_width(gaps, tmp_path):
+    assert_no_width(load_trials(f"manifest:{nominal_gaps(tmp_path, gaps, offset_n=0.01)}"))
+
+
 @pytest.mark.parametrize("begin_s", [pytest.param(0.0, marks=pytest.mark.slow), 0.3])
 def test_a_store_of_recordings_with_a_constant_gap_has_no_width(begin_s, tmp_path):
     """Also where the approach is too short for features from before the contact (from 0.3 s on)."""
-    begin = int(np.searchsorted(solid(1)[0, :, 0], begin_s))
-    for label, gap in (("a", 0.05), ("b", 0.06)):
-        data = solid(4)[:, begin:, [0, 2]]
-        np.savez(tmp_path / f"{label}.npz", data=data, nominal=np.full(data.shape[:2], gap))
-    text = 'files = "{label}.npz"\naxes = "grasp, time, column"\ntime = "data[0]"\ngap = "nominal"\nforce = "data[1]"\n'
-    (tmp_path / "m.toml").write_text(text)
-    assert "of their beginning" not in printed("import", tmp_path / "m.toml", "--save", tmp_path / "store")
-    trials = load_trials(f"store:{tmp_path / 'store'}")
-    assert trials.width is None
-    assert "no width" in trials.no_width
+    place = nominal_gaps(tmp_path, (0.05, 0.06), begin=int(np.searchsorted(T_S, begin_s)))
+    assert "of their beginning" not in printed("import", place, "--save", tmp_path / "store")
+    assert_no_width(load_trials(f"store:{tmp_path / 'store'}"))
 
 
 def test_the_attribute_units_of_an_array_of_hdf5_is_its_unit(tmp_path):

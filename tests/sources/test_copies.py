@@ -56,9 +56,12 @@ def test_measured_trials_count_once_however_often_they_are_pasted(seed, times, f
     assert copies_said(kept)
 
 
-def test_trials_without_copies_stay_as_they_are():
+def test_trials_without_copies_stay_as_they_are_and_one_without_any_feature_is_no_copy():
     trials = labelled(measured())
     assert without_copies(trials) is trials
+    values = measured()
+    values[::4] = np.nan
+    assert len(without_copies(labelled(values))) == 40
 
 
 @every_case(
@@ -80,12 +83,6 @@ def test_coarse_features_that_are_equal_by_chance_count_and_it_is_said(values):
 def test_copies_of_coarse_trials_are_found_where_chance_cannot_make_them():
     values = np.random.default_rng(2).integers(0, 50, size=(30, 6))
     assert len(without_copies(labelled(np.concatenate([values, values])))) == 30
-
-
-def test_a_trial_without_any_feature_is_no_copy():
-    values = measured()
-    values[::4] = np.nan
-    assert len(without_copies(labelled(values))) == 40
 
 
 def test_of_a_grasp_with_a_damaged_copy_the_one_with_more_features_is_kept():
@@ -207,16 +204,13 @@ def test_equal_features_of_recordings_that_were_compared_and_differ_are_no_copie
 @every_case("column", [0, 1, 2])
 @every_case("change", ["another value", "a missing value"])
 def test_copies_with_one_value_changed_are_told(change, column):
-    rng = np.random.default_rng(1)
-    values = rng.normal(size=(40, 3)).round(4)
+    values = measured(seed=1).round(4)
     edited = values.copy()
     edited[:, column] = np.nan if change == "a missing value" else edited[:, column] + 0.5
-    labels = ("a",) * 20 + ("b",) * 20
-    table = FeatureTable(names=("x", "y", "z"), units=("",) * 3, values=np.concatenate([values, edited]))
-    kept = without_copies(Labelled(source="t", table=table, labels=labels * 2))
+    labels = ["a"] * 20 + ["b"] * 20
+    kept = without_copies(labelled(np.concatenate([values, edited]), labels * 2))
     assert any("single feature: 40 (trial 41 from trial 1)" in note for note in kept.notes)
-    alone = FeatureTable(names=("x", "y", "z"), units=("",) * 3, values=values)
-    assert without_copies(Labelled(source="t", table=alone, labels=labels)).notes == ()
+    assert without_copies(labelled(values, labels)).notes == ()
 
 
 NEAR = {

@@ -63,17 +63,14 @@ def test_a_pattern_that_backtracks_is_matched_in_linear_time():
     assert wildcard("*a*a*a*a*a*a*a*a*a*a*b").fullmatch("a" * 400) is None
 
 
-@every_case("pattern", [r"(\w)\1", "(?=x)y", "(?<!x)y", "(?P<a>x)(?P=a)", "(?>a)b", "a++"])
-def test_what_needs_backtracking_is_refused_with_the_reason(tmp_path, pattern):
-    path = manifest(tmp_path, MANIFEST + f"start = '{pattern}'\n")
-    with pytest.raises(ConfigError, match=r"manifest\.toml:6: start.*not supported.*RE2"):
-        read_manifest(path)
-
-
-@every_case("pattern", ["a{1000}{1000}", "x" * 1001, "(", "[z-a]"])
-def test_a_pattern_that_is_too_large_or_malformed_is_refused(pattern):
-    with pytest.raises(PatternError):
-        regular_expression(pattern)
+def test_what_needs_backtracking_or_is_too_large_is_refused_with_the_reason(tmp_path):
+    for pattern in (r"(\w)\1", "(?=x)y", "(?<!x)y", "(?P<a>x)(?P=a)", "(?>a)b", "a++"):
+        path = manifest(tmp_path, MANIFEST + f"start = '{pattern}'\n")
+        with pytest.raises(ConfigError, match=r"manifest\.toml:6: start.*not supported.*RE2"):
+            read_manifest(path)
+    for pattern in ("a{1000}{1000}", "x" * 1001, "(", "[z-a]"):
+        with pytest.raises(PatternError):
+            regular_expression(pattern)
 
 
 def test_named_groups_are_fields(tmp_path):
@@ -186,13 +183,7 @@ def test_a_table_that_is_none_names_the_file(tmp_path, data):
         assert graspsense(*command, path, "--label", "label").returncode in (2, 5)
 
 
-def test_a_cell_of_many_digits_takes_linear_time(tmp_path):
-    path = tmp_path / "digits.csv"
-    path.write_text(f"a b c\n{'1' * 300_000}x 1 1\n0 1 2\n")
-    assert "a" in read_text(path)[0].texts
-
-
-@pytest.mark.parametrize("end", ["\n", "\r", "\r\n"])
+@every_case("end", ["\n", "\r", "\r\n"])
 def test_a_long_text_of_short_lines_is_read(tmp_path, monkeypatch, end):
     monkeypatch.setenv(limits.LINE_CHARACTERS.variable, "10")
     path = tmp_path / "lines.csv"
@@ -211,16 +202,29 @@ def test_errors_list_a_few_of_many_columns(tmp_path):
     assert len(str(refused.value)) < 1000
 
 
-def test_no_suggestion_is_sought_for_a_text_that_is_no_name():
+def test_long_texts_take_linear_time(tmp_path):
+    # No suggestion is sought for a text that is no name.
     assert suggestion("x" * 100_000, ["x" * 99_999]) == ""
     assert "'width'" in suggestion("widht", ["width", "y" * 100_000])
-
-
-def test_headings_with_many_brackets_take_linear_time():
+    # Headings of many brackets, a cell of many digits, many keys, and a long row of ARFF.
     assert name_and_unit("[" * 100_000 + "x]")[1] == "x"
     assert name_and_unit(" " * 100_000 + "x")[1] == ""
     assert name_and_unit("a [b] c [N]") == ("a [b] c", "N")
     assert name_and_unit("a]b]") == ("a]b]", "")
+    path = tmp_path / "digits.csv"
+    path.write_text(f"a b c\n{'1' * 300_000}x 1 1\n0 1 2\n")
+    assert "a" in read_text(path)[0].texts
+    merged = Merged()
+    layer = Layer.without_file({"table": {f"k{i}": i for i in range(20_000)}}, "file")
+    merged.add((), layer.values, layer)
+    assert merged.owner_of(("table", "k7")) is layer
+    merged.add((), {"table": 3}, layer)
+    assert merged.owner.keys() == {(), ("table",)}
+    values = ", ".join(f"v{k}" for k in range(9000))
+    head = f"@relation r\n@attribute a {{{values}}}\n@attribute label {{x, y}}\n@data\n"
+    assert len(parse_arff(head + "v1, x\nv8999, y\n").labels) == 2
+    with pytest.raises(ArffError, match="values"):
+        parse_arff(head + "v1, " * 20_000 + "x\n")
 
 
 # Classes and features
@@ -257,14 +261,6 @@ def test_too_many_labels_and_features_of_trials_of_any_source_are_refused(monkey
     assert len(trials(300, 1).classes) == 300
 
 
-def test_a_table_with_more_features_than_the_limit_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setenv(limits.FEATURES.variable, "50")
-    path = table(tmp_path / "table.csv", ["a", "b"] * 4, features=51)
-    done = graspsense("evaluate", path, "--label", "label", "--classifier", "ebm")
-    assert done.returncode == 2
-    assert limits.FEATURES.variable in done.stderr
-
-
 @every_case(
     "option",
     [
@@ -272,9 +268,16 @@ def test_a_table_with_more_features_than_the_limit_is_refused(tmp_path, monkeypa
         *(("--seed", seed) for seed in ("-1", str(2**63), "9" * 30)),
     ],
 )
-def test_thousands_of_checkpoints_and_a_seed_out_of_range_are_wrong_use(tmp_path, option):
+def test_thousands_of_features_or_checkpoints_and_a_seed_out_of_range_are_wrong_use(
+    tmp_path, monkeypatch, option
+):
     path = table(tmp_path / "table.csv", ["a", "b"] * 20)
     assert graspsense("evaluate", path, "--label", "label", *option).returncode == 2
+    monkeypatch.setenv(limits.FEATURES.variable, "50")
+    path = table(tmp_path / "table.csv", ["a", "b"] * 4, features=51)
+    done = graspsense("evaluate", path, "--label", "label", "--classifier", "ebm")
+    assert done.returncode == 2
+    assert limits.FEATURES.variable in done.stderr
 
 
 # TOML
@@ -333,15 +336,6 @@ def test_thousands_of_unknown_keys_are_told_in_a_few_lines(tmp_path):
     with pytest.raises(ConfigError, match="1980 more") as refused:
         read_manifest(path)
     assert len(str(refused.value).splitlines()) < 30
-
-
-def test_merging_many_keys_takes_linear_time():
-    merged = Merged()
-    layer = Layer.without_file({"table": {f"k{i}": i for i in range(20_000)}}, "file")
-    merged.add((), layer.values, layer)
-    assert merged.owner_of(("table", "k7")) is layer
-    merged.add((), {"table": 3}, layer)
-    assert merged.owner.keys() == {(), ("table",)}
 
 
 @every_case("value", ["0x" + "f" * 9999, "9" * 5000, str(2**63), "[" * 3000, "a." * 3000])
@@ -440,16 +434,13 @@ def test_a_scene_with_thousands_of_terms_is_refused(tmp_path):
         find(str(path))
 
 
-@pytest.mark.parametrize(
-    "channel",
-    [
+def test_a_channel_of_a_file_has_a_bounded_size():
+    for channel in (
         {"kind": "array", "name": "a", "unit": "N", "finger": "x", "rows": 10**9, "columns": 10**9},
         {"kind": "fast", "name": "a", "unit": "N", "rate_hz": 1.0, "samples": 10**12, "axes": ["x"]},
-    ],
-)
-def test_a_channel_of_a_file_has_a_bounded_size(channel):
-    with pytest.raises(ValueError, match=limits.CHANNEL_NUMBERS.variable):
-        from_json(channel)
+    ):
+        with pytest.raises(ValueError, match=limits.CHANNEL_NUMBERS.variable):
+            from_json(channel)
 
 
 # Expressions
@@ -494,14 +485,6 @@ def test_the_unit_behind_an_expression(text, body, unit):
 
 
 # ARFF
-
-
-def test_a_long_row_of_arff_takes_linear_time():
-    values = ", ".join(f"v{k}" for k in range(9000))
-    head = f"@relation r\n@attribute a {{{values}}}\n@attribute label {{x, y}}\n@data\n"
-    assert len(parse_arff(head + "v1, x\nv8999, y\n").labels) == 2
-    with pytest.raises(ArffError, match="values"):
-        parse_arff(head + "v1, " * 20_000 + "x\n")
 
 
 @every_case(

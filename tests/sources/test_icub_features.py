@@ -76,13 +76,10 @@ def test_features_are_relative_to_the_first_frame_and_the_variant_adds_it_back(f
     assert np.isnan(relative.values[3:]).all()
     assert any("3 of 6 grasps have no contact as the feature set needs it" in note for note in trials.notes)
     assert relative.units == ("m", "m", "N", "frame", "m/frame", "N/frame")
-
-
-def test_the_first_frame_as_it_stands(folder):
-    control = read(folder).before_contact
-
-    assert control.table.values.shape == (6, 74)
-    assert control.table.values[0].tolist() == [20.0, 80.0, *[11.0] * 6, 2.0, *[15.0] * 5, *[240.0] * 60]
+    # The first frame as it stands.
+    first_frames = trials.before_contact.table.values
+    assert first_frames.shape == (6, 74)
+    assert first_frames[0].tolist() == [20.0, 80.0, *[11.0] * 6, 2.0, *[15.0] * 5, *[240.0] * 60]
 
 
 def test_a_folder_without_grasps_and_a_damaged_file(folder, tmp_path):
@@ -113,30 +110,10 @@ def evaluation():
 
 @pytest.mark.slow
 @real_data
-def test_the_first_frame_alone_gives_the_class_away_before_any_touch(evaluation):
-    leak = evaluation.controls["before_contact"]
-
-    assert leak.rate.n == 203
-    assert leak.rate.rate >= 0.9
-    assert any("from before contact" in warning for warning in evaluation.warnings)
-
-
-@pytest.mark.slow
-@real_data
-def test_features_relative_to_it_are_a_tenth_below_the_absolute_ones(evaluation):
-    assert evaluation.protocol == "stratified_10_fold"
-    assert evaluation.headline.rate <= evaluation.controls["absolute"].rate.rate - 0.1
-    assert evaluation.headline.rate > evaluation.controls["majority_class"].rate.rate + 0.2
-
-
-@pytest.mark.slow
-@real_data
 def test_rates_are_split_by_contact_and_do_not_pretend_to_generalise(evaluation):
     """Every class there is one object in one session, so no number of grasps tells of another object."""
-    touched, untouched = (
-        evaluation.by_features["with features"],
-        evaluation.by_features["without any feature"],
-    )
+    names = ("with features", "without any feature")
+    touched, untouched = (evaluation.by_features[name] for name in names)
 
     assert (touched.n, untouched.n) == (133, 70)
     assert touched.correct + untouched.correct == evaluation.headline.correct
@@ -160,8 +137,15 @@ def test_blocks_of_recording_order_are_reported_with_their_interval(evaluation):
 
 @pytest.mark.slow
 @real_data
-def test_no_instance_can_be_held_out_there(evaluation):
+def test_the_first_frame_alone_gives_the_class_away_before_any_touch(evaluation):
+    leak = evaluation.controls["before_contact"]
+    assert leak.rate.n == 203
+    assert leak.rate.rate >= 0.9
+    assert any("from before contact" in warning for warning in evaluation.warnings)
+    # Features relative to it are a tenth below the absolute ones.
+    assert evaluation.protocol == "stratified_10_fold"
+    assert evaluation.headline.rate <= evaluation.controls["absolute"].rate.rate - 0.1
+    assert evaluation.headline.rate > evaluation.controls["majority_class"].rate.rate + 0.2
     held = evaluation.controls["instance_held_out"]
-
     assert held.rate is None
     assert held.reason == "every class of this data set is a single object, so none can be held out"

@@ -56,27 +56,19 @@ def test_nor_where_the_lines_are_shuffled(seed, counter):
     assert identifies("x", "", np.array(COUNTERS[counter])[order], [LABELS[i] for i in order])
 
 
-@every_case("name", ["trial_id", "runNumber", "No", "index", "file"])
-def test_a_number_with_gaps_is_known_by_its_name_where_the_lines_are_shuffled(name):
+def test_where_the_lines_are_shuffled_numbers_are_known_by_their_name_their_order_or_as_objects():
     order = np.random.default_rng(1).permutation(N)
+    labels = [LABELS[i] for i in order]
     values = np.array(COUNTERS["with large gaps"])[order]
-    labels = [LABELS[i] for i in order]
-    assert identifies(name, "", values, labels)
+    for name in ("trial_id", "runNumber", "No", "index", "file"):
+        assert identifies(name, "", values, labels)
     assert not identifies("force", "", values, labels)
-
-
-def test_numbers_of_objects_are_instances_and_no_features():
+    # A clock follows the order of recording.
+    assert identifies("x", "", np.array(COUNTERS["a clock in seconds"])[order], labels, order.tolist())
+    # Numbers of objects are instances.
     objects = np.repeat(np.arange(12), 5)
-    order = np.random.default_rng(1).permutation(N)
     assert "--instance" in identifies("x", "", objects, LABELS)
-    assert "--instance" in identifies("x", "", objects[order], [LABELS[i] for i in order])
-
-
-def test_what_follows_the_order_of_recording_is_no_feature_where_the_lines_are_sorted_otherwise():
-    order = np.random.default_rng(1).permutation(N)
-    clock = np.array(COUNTERS["a clock in seconds"])[order]
-    labels = [LABELS[i] for i in order]
-    assert identifies("x", "", clock, labels, order.tolist())
+    assert "--instance" in identifies("x", "", objects[order], labels)
 
 
 @given(seed=st.integers(0, 10_000), scale=st.sampled_from([1e-6, 1e-3, 1.0, 50.0]))
@@ -122,9 +114,6 @@ def test_an_identifier_is_said_and_used_only_where_it_is_named(tmp_path):
     chosen = read_labelled(path, "object", features=["trial_id", "s"])
     assert chosen.table.names == ("trial_id", "s")
     assert any("trial_id" in note and "reveal" in note for note in chosen.notes)
-
-
-def test_a_table_of_identifiers_alone_says_why_nothing_is_left(tmp_path):
     with pytest.raises(ConfigError, match=r"trial_id.*to include them"):
         read_labelled(table(tmp_path / "t.csv", "trial_id", range(N), measured=False), "object")
 

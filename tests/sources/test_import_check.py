@@ -1,6 +1,5 @@
 """`import --check` on files without a manifest, and `--suggest`, which writes one from the files of a folder."""
 
-import json
 import shutil
 import tomllib
 
@@ -28,6 +27,16 @@ def table(path, columns):
     path.write_text("\n".join(lines) + "\n")
 
 
+def checked(place):
+    """Return what a check of this file says as JSON, and draw into a picture beside it."""
+    done = graspsense("import", place, "--check", "--json", "--plot", place.with_name("x.png"))
+    assert done.returncode == 0, done.stderr
+    return done.json
+
+
+PLAIN = 'files = "{label}_{order:d}.csv"\ntime = "t"\ngap = "pos [mm]"\nforce = "F"\n'
+
+
 def test_the_facts_of_a_channel_are_those_of_its_samples():
     t_s = np.array([0.0, 0.1, 0.2, 0.7, 0.8])
     facts = channel_facts("x", "N", np.array([1.0, 1.5, 1.5, 1.5, np.nan]), t_s, end_s=2.0)
@@ -39,11 +48,7 @@ def test_the_facts_of_a_channel_are_those_of_its_samples():
 def test_check_on_a_table_tells_each_channel_and_draws_its_squeezes(tmp_path):
     pytest.importorskip("matplotlib", reason="needs the extra plot")
     table(tmp_path / "jar.csv", TABLE)
-    code, out, err = graspsense(
-        "import", tmp_path / "jar.csv", "--check", "--json", "--plot", tmp_path / "x.png"
-    )
-    assert code == 0, err
-    (load,) = json.loads(out)
+    (load,) = checked(tmp_path / "jar.csv")
     by_name = {channel["name"]: channel for channel in load["channels"]}
     assert by_name["pos (mm)"]["unit"] == "mm"
     assert by_name["F (N)"]["rate_hz"] == pytest.approx(100.0)
@@ -80,11 +85,7 @@ def test_check_on_a_bag_shows_a_topic_that_died(tmp_path):
                 if k % every == 0 and (name == "/hand/gap" or t_s < 1.2):
                     message = store.serialize_ros1(store.types[kind](float(value)), kind)
                     writer.write(topics[name], 10**18 + round(t_s * 1e9), message)
-    code, out, err = graspsense(
-        "import", tmp_path / "jar.bag", "--check", "--json", "--plot", tmp_path / "x.png"
-    )
-    assert code == 0, err
-    by_name = {channel["name"]: channel for channel in json.loads(out)[0]["channels"]}
+    by_name = {channel["name"]: channel for channel in checked(tmp_path / "jar.bag")[0]["channels"]}
     assert by_name["/hand/gap.data"]["rate_hz"] == pytest.approx(100.0)
     assert by_name["/hand/force.data"]["rate_hz"] == pytest.approx(50.0)
     assert by_name["/hand/force.data"]["age_s"] > 1.5
@@ -93,14 +94,8 @@ def test_check_on_a_bag_shows_a_topic_that_died(tmp_path):
 @pytest.mark.slow
 def test_check_of_a_manifest_tells_each_channel(tmp_path):
     table(tmp_path / "jar_1.csv", {"t": T_S, "pos": GAP_MM, "F": FORCE_N})
-    (tmp_path / "m.toml").write_text(
-        'files = "{label}_{order:d}.csv"\ntime = "t"\ngap = "pos [mm]"\nforce = "F"\n'
-    )
-    code, out, err = graspsense(
-        "import", tmp_path / "m.toml", "--check", "--json", "--plot", tmp_path / "x.png"
-    )
-    assert code == 0, err
-    by_name = {channel["name"]: channel for channel in json.loads(out)["measured"]}
+    (tmp_path / "m.toml").write_text(PLAIN)
+    by_name = {channel["name"]: channel for channel in checked(tmp_path / "m.toml")["measured"]}
     assert by_name["gap"]["resolution"] == pytest.approx(1e-4)
     assert by_name["gap"]["age_s"] == pytest.approx(1.99)
     assert by_name["force_left"]["unit"] == "N"
@@ -111,11 +106,8 @@ def rests_of(folder, *points):
     t_s = np.arange(800) * 0.01
     gap_mm = np.interp(t_s, *zip(*points, strict=True))
     table(folder / "jar_1.csv", {"t": t_s, "pos": gap_mm, "F": np.maximum(2.0 * (50.0 - gap_mm), 0.0)})
-    manifest = folder / "m.toml"
-    manifest.write_text('files = "{label}_{order:d}.csv"\ntime = "t"\ngap = "pos [mm]"\nforce = "F"\n')
-    code, out, err = graspsense("import", manifest, "--check", "--json", "--plot", folder / "x.png")
-    assert code == 0, err
-    told = json.loads(out)
+    (folder / "m.toml").write_text(PLAIN)
+    told = checked(folder / "m.toml")
     assert told["outcomes"] == {"steady": 1}
     return told["rests"]
 

@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from cases import every_case
+from commands import graspsense, printed
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.cli.main import main
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.events import GraspEvent, event_as_json, event_from_json
 from graspsense.core.values.signals import Phase
@@ -54,18 +54,19 @@ def manifest(folder, events='events = { slip = "slip" }', more=""):
     return path
 
 
-def run(capsys, *arguments):
-    with pytest.raises(SystemExit) as ended:
-        main([str(argument) for argument in arguments])
-    out, err = capsys.readouterr()
-    return ended.value.code, out, err
+def recording_in(path):
+    (recording,) = readable_or_not("manifest", str(path))
+    if isinstance(recording, UnreadableRecording):
+        raise recording.error
+    return recording.recording
+
+
+def spans(events):
+    return [(event.t_s, event.until_s) for event in events]
 
 
 def events_in(folder, **keys):
-    (recording,) = readable_or_not("manifest", str(manifest(folder, **keys)))
-    if isinstance(recording, UnreadableRecording):
-        raise recording.error
-    return {name: [(e.t_s, e.until_s) for e in events] for name, events in recording.recording.events.items()}
+    return {name: spans(events) for name, events in recording_in(manifest(folder, **keys)).events.items()}
 
 
 # What a manifest reads.
@@ -143,11 +144,9 @@ def test_labels_and_times_beside_a_recording_and_cells_that_are_lists(tmp_path):
     (tmp_path / "labels.csv").write_text("\n".join(["pads,slips", *cells]) + "\n")
     beside = "beside = 'labels.csv'\nchannels = { taxels = \"'labels.pads'\" }"
     events = "events = { slip = \"'labels.slips'[0]\" }"
-    (recording,) = readable_or_not("manifest", str(manifest(tmp_path, events=events, more=beside)))
-    if isinstance(recording, UnreadableRecording):
-        raise recording.error
-    assert [(e.t_s, e.until_s) for e in recording.recording.events["slip"]] == [(3.0, T_S[-1])]
-    assert list(recording.recording.readings[5].signals.taxels.cells) == [5.0, 10.0]
+    recording = recording_in(manifest(tmp_path, events=events, more=beside))
+    assert spans(recording.events["slip"]) == [(3.0, T_S[-1])]
+    assert list(recording.readings[5].signals.taxels.cells) == [5.0, 10.0]
     (tmp_path / "labels.csv").write_text("slips\n0\n1\n")
     with pytest.raises(DataDamaged, match="1200, 2 rows"):
         events_in(tmp_path, events="events = { slip = \"'labels.slips'\" }", more=beside)
@@ -162,21 +161,18 @@ def test_lists_in_cells_count_as_cells_of_the_table(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_an_imported_trial_keeps_the_labels_among_its_events(tmp_path, capsys):
+def test_an_imported_trial_keeps_the_labels_among_its_events(tmp_path):
     write(tmp_path, "box_1", force(), flags((1.0, 1.5)))
     write(tmp_path, "box_2", force(Kick(2.0, 0.3)), flags())
     path = manifest(tmp_path)
-    code, _, err = run(
-        capsys, "import", path, "--save", tmp_path / "trials", "-o", "controller.contact_force_n=1"
-    )
-    assert code == 0, err
+    printed("import", path, "--save", tmp_path / "trials", "-o", "controller.contact_force_n=1")
     with Store.read(tmp_path / "trials") as store:
         events = store.trial(1).result.details["events"]
     assert {"t_s": 1.0, "phase": "approach", "what": "slip", "source": "label", "until_s": 1.5} in events
     assert [event["t_s"] for event in events] == sorted(event["t_s"] for event in events)
     # The second was looked at as well, so its detections count.
-    score = scored(capsys, f"store:{tmp_path / 'trials'}")
-    assert score == scored(capsys, f"manifest:{path}")
+    score = scored(f"store:{tmp_path / 'trials'}")
+    assert score == scored(f"manifest:{path}")
     assert (score["recordings"], score["kinds"]["slip"]["given"]["labelled"]) == (2, 1)
 
 
@@ -221,10 +217,10 @@ def test_every_label_and_every_detection_has_one_outcome(labels, told, tolerance
 # The score.
 
 
-def scored(capsys, *arguments):
-    code, out, err = run(capsys, "evaluate", *arguments, "--events", "--json")
-    assert code == 0, err
-    scores = json.loads(out)
+def scored(*arguments):
+    done = graspsense("evaluate", *arguments, "--events", "--json")
+    assert done.returncode == 0, done.stderr
+    scores = done.json
     del scores["source"]
     return scores
 
@@ -292,11 +288,11 @@ def boxes(folder, newtons=0.15):
             write(folder, f"{label}_{order}", force(*kicks, level=level)[:lasting], slips[:lasting])
 
 
-def test_slips_of_a_force_are_found_and_what_cannot_be_told_is_said(tmp_path, capsys):
+def test_slips_of_a_force_are_found_and_what_cannot_be_told_is_said(tmp_path):
     boxes(tmp_path)
     path = manifest(tmp_path, events='events = { slip = "slip", jump = "slip" }')
     source = f"manifest:{path}"
-    scores = scored(capsys, source)
+    scores = scored(source)
     slip = scores["kinds"]["slip"]["given"]
     assert (slip["labelled"], slip["found"]) == (8, 8)
     assert 0.0 <= slip["delay"]["median_s"] <= 0.05  # the pads are sampled each 41 ms
@@ -306,39 +302,35 @@ def test_slips_of_a_force_are_found_and_what_cannot_be_told_is_said(tmp_path, ca
 
 
 @pytest.mark.slow
-def test_the_score_in_words_has_what_cannot_be_told(tmp_path, capsys):
+def test_the_score_in_words_has_what_cannot_be_told(tmp_path):
     boxes(tmp_path)
     path = manifest(tmp_path, events='events = { slip = "slip", jump = "slip" }')
-    source = f"manifest:{path}"
-    code, out, err = run(capsys, "evaluate", source, "--events", "--tolerance", "0.1")
-    assert code == 0, err
-    assert "8 of 8" in out
-    assert "at most 0.1 s" in out
-    assert "jump is labelled" in out
-    assert "2 instances, at least 6 are needed" in out
+    out = printed("evaluate", f"manifest:{path}", "--events", "--tolerance", "0.1")
+    for words in ("8 of 8", "at most 0.1 s", "jump is labelled", "2 instances, at least 6 are needed"):
+        assert words in out
 
 
 @pytest.mark.slow
-def test_a_force_in_another_unit_is_scored_by_fitted_thresholds(tmp_path, capsys):
+def test_a_force_in_another_unit_is_scored_by_fitted_thresholds(tmp_path):
     boxes(tmp_path, newtons=150.0)
     path = manifest(tmp_path)
     path.write_text(path.read_text().replace('"F"', '"F [counts]"'))
-    scores = scored(capsys, f"manifest:{path}")
+    scores = scored(f"manifest:{path}")
     assert scores["kinds"]["slip"]["fitted"]["found"] == 8
     assert any("counts" in note for note in scores["notes"])
 
 
 @pytest.mark.slow
-def test_an_acceleration_of_one_axis_is_told_and_its_threshold_can_be_set(tmp_path, capsys):
+def test_an_acceleration_of_one_axis_is_told_and_its_threshold_can_be_set(tmp_path):
     shock = 30.0 * ((T_S >= 2.0) & (T_S < 2.01))
     write(tmp_path, "box_1", 9.8 + shock, flags((2.0, 2.1)))
     text = 'channels = { acceleration = "F [m/s2]" }\nfast = "acceleration"\n'
     path = manifest(tmp_path, events='events = { acceleration = "slip" }', more=text)
     path.write_text(path.read_text().replace('force = "F"', 'force = "0"'))
     source = f"manifest:{path}"
-    assert scored(capsys, source)["kinds"]["acceleration"]["given"]["found"] == 1
+    assert scored(source)["kinds"]["acceleration"]["given"]["found"] == 1
     high = ("-o", "controller.acceleration_m_s2=90")
-    assert scored(capsys, source, *high)["kinds"]["acceleration"]["given"]["found"] == 0
+    assert scored(source, *high)["kinds"]["acceleration"]["given"]["found"] == 0
 
 
 @every_case(
@@ -353,18 +345,18 @@ def test_an_acceleration_of_one_axis_is_told_and_its_threshold_can_be_set(tmp_pa
         (("--events", "-o", "features.type=curve"), 2, "[controller]"),
     ],
 )
-def test_wrong_uses_are_told(arguments, code, says, tmp_path, capsys):
+def test_wrong_uses_are_told(arguments, code, says, tmp_path):
     boxes(tmp_path)
-    ended, _, err = run(capsys, "evaluate", f"manifest:{manifest(tmp_path)}", *arguments)
+    ended, _, err = graspsense("evaluate", f"manifest:{manifest(tmp_path)}", *arguments)
     assert ended == code
     assert says in err
 
 
 @pytest.mark.slow
-def test_a_copy_of_a_recording_counts_once(tmp_path, capsys):
+def test_a_copy_of_a_recording_counts_once(tmp_path):
     boxes(tmp_path)
     (tmp_path / "can_3.csv").write_text((tmp_path / "can_1.csv").read_text())
-    scores = scored(capsys, f"manifest:{manifest(tmp_path)}")
+    scores = scored(f"manifest:{manifest(tmp_path)}")
     assert (scores["recordings"], scores["kinds"]["slip"]["given"]["labelled"]) == (4, 8)
     assert any("same content" in note for note in scores["notes"])
 
@@ -372,23 +364,20 @@ def test_a_copy_of_a_recording_counts_once(tmp_path, capsys):
 def test_the_squeezes_of_a_file_get_the_labels_of_their_own_time(tmp_path):
     held = ((T_S > 1.0) & (T_S < 2.5)) | ((T_S > 3.5) & (T_S < 5.0))
     write(tmp_path, "box_1", 5.0 * held, flags((1.5, 1.6), (4.0, 4.2), (4.5, 4.6)))
-    path = manifest(tmp_path, more='split = "force"')
-    squeeze, next_squeeze = (
-        recording.recording.events["slip"] for recording in readable_or_not("manifest", str(path))
-    )
-    assert [event.t_s for event in squeeze] == [1.5]
-    assert [(event.t_s, event.until_s) for event in next_squeeze] == [(4.0, 4.2), (4.5, 4.6)]
+    squeezes = readable_or_not("manifest", str(manifest(tmp_path, more='split = "force"')))
+    events = [spans(squeeze.recording.events["slip"]) for squeeze in squeezes]
+    assert events == [[(1.5, 1.6)], [(4.0, 4.2), (4.5, 4.6)]]
 
 
-def test_recordings_without_labels_are_an_error_or_a_note(tmp_path, capsys):
+def test_recordings_without_labels_are_an_error_or_a_note(tmp_path):
     write(tmp_path, "box_1", force(), flags())
-    code, _, err = run(capsys, "evaluate", f"manifest:{manifest(tmp_path, events='')}", "--events")
+    code, _, err = graspsense("evaluate", f"manifest:{manifest(tmp_path, events='')}", "--events")
     assert code == 2
     assert "no event is labelled" in err
     write(tmp_path, "box_2", force(level=6.0), np.full(len(T_S), math.nan))
-    scores = scored(capsys, f"manifest:{manifest(tmp_path)}")
+    scores = scored(f"manifest:{manifest(tmp_path)}")
     assert scores["recordings"] == 1
     assert any("1 of 2 recordings left out" in note for note in scores["notes"])
     for source in ("simulated", "icub", str(tmp_path / "box_1.csv")):
-        code, _, err = run(capsys, "evaluate", source, "--events")
+        code, _, err = graspsense("evaluate", source, "--events")
         assert (code, "recordings" in err) == (2, True), err

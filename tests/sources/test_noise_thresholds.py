@@ -88,22 +88,34 @@ def test_forces_that_are_no_more_than_noise_are_doubted():
     assert "check the unit and the zero" in chosen.words
 
 
-def in_units(recording, units, force=1.0, gap=1.0, time=1.0, offset=0.0):
-    """The recording with its numbers in other units; `offset` is the force of a sensor without a load."""
-    names = {"force": ("force_left", "force_right"), "gap": ("gap",), "t": ("t",)}
+def reframed(recording, change, **more):
+    """Return the recording with other fields in its frames: those that `change` makes of each frame."""
     readings = tuple(
-        reading._replace(
-            frame=reading.frame._replace(
-                t_s=reading.frame.t_s * time,
-                gap_m=reading.frame.gap_m * gap,
-                force_left_n=reading.frame.force_left_n * force + offset,
-                force_right_n=reading.frame.force_right_n * force + offset,
-            )
-        )
+        reading._replace(frame=reading.frame._replace(**change(reading.frame)))
         for reading in recording.readings
     )
+    return evolve(recording, readings=readings, **more)
+
+
+def series(recording, *names):
+    return (np.array([getattr(reading.frame, name) for reading in recording.readings]) for name in names)
+
+
+def in_units(recording, units, force=1.0, gap=1.0, time=1.0, offset=0.0):
+    """The recording with its numbers in other units; `offset` is the force of a sensor without a load."""
+
+    def change(frame):
+        left_n, right_n = (n * force + offset for n in (frame.force_left_n, frame.force_right_n))
+        return {
+            "t_s": frame.t_s * time,
+            "gap_m": frame.gap_m * gap,
+            "force_left_n": left_n,
+            "force_right_n": right_n,
+        }
+
+    names = {"force": ("force_left", "force_right"), "gap": ("gap",), "t": ("t",)}
     renamed = {name: unit for quantity, unit in units.items() for name in names[quantity]}
-    return evolve(recording, readings=readings, units=renamed)
+    return reframed(recording, change, units=renamed)
 
 
 @every_case(
@@ -122,10 +134,7 @@ def test_thresholds_follow_from_recordings_in_any_unit(factors, units):
     speed = settings.get("rest_speed_m_s", REST_SPEED_M_S)
     window = settings.get("rest_window_s", REST_WINDOW_S)
     for recording in recordings:
-        times, gap, left, right = (
-            np.array([getattr(reading.frame, name) for reading in recording.readings])
-            for name in ("t_s", "gap_m", "force_left_n", "force_right_n")
-        )
+        times, gap, left, right = series(recording, "t_s", "gap_m", "force_left_n", "force_right_n")
         onset = int((np.minimum(left, right) >= settings.get("contact_force_n", CONTACT_FORCE_N)).argmax())
         assert 1.0 < onset * 0.01 < 1.1
         since, _ = first_rest(
@@ -144,10 +153,7 @@ def test_a_data_set_that_counts_frames_keeps_the_defaults():
 
 
 def coarse(recording, step_m):
-    return evolve(recording, readings=tuple(
-        reading._replace(frame=reading.frame._replace(gap_m=round(reading.frame.gap_m / step_m) * step_m))
-        for reading in recording.readings
-    ))  # fmt: skip
+    return reframed(recording, lambda frame: {"gap_m": round(frame.gap_m / step_m) * step_m})
 
 
 def slow_squeeze(hold_s, step_s=0.0222, seed=0):
@@ -176,10 +182,7 @@ def test_the_window_of_rest_is_that_of_a_step_of_the_gap(step_s, step_m, hold_s)
         assert speed * window >= step_m
         assert "steps of" in chosen.words
     for recording in recordings:
-        times, gap, force = (
-            np.array([getattr(reading.frame, name) for reading in recording.readings])
-            for name in ("t_s", "gap_m", "force_left_n")
-        )
+        times, gap, force = series(recording, "t_s", "gap_m", "force_left_n")
         k = int((force > 0.625).argmax())
         _, shown = first_rest(times[k:], gap[k:], np.ones(len(times) - k, dtype=bool), speed, window)
         assert force[k + shown] == pytest.approx(8.0, rel=0.05)
@@ -201,12 +204,7 @@ def test_the_contact_force_at_a_low_rate_is_not_that_of_a_steep_rise(step_s):
 
 
 def test_an_object_of_two_millimetres_is_not_nothing():
-    whole = squeeze()
-    readings = tuple(
-        reading._replace(frame=reading.frame._replace(gap_m=reading.frame.gap_m - 0.0535))
-        for reading in whole.readings
-    )
-    chosen = thresholds_for([evolve(whole, readings=readings)])
+    chosen = thresholds_for([reframed(squeeze(), lambda frame: {"gap_m": frame.gap_m - 0.0535})])
     assert chosen.settings["controller.closed_gap_m"] < 0.0015
     assert "closed_gap_m" in chosen.words
 
@@ -214,18 +212,10 @@ def test_an_object_of_two_millimetres_is_not_nothing():
 def test_slow_recordings_whose_gap_is_still_at_rest_keep_the_thresholds_of_rest():
     """Coarse steps while the fingers move are not noise: with these thresholds rest is where the gap stays."""
     slow = [squeeze(step_s=0.05, seed=k) for k in range(5)]
-    coarse = [
-        evolve(slow_recording, readings=tuple(
-            reading._replace(frame=reading.frame._replace(gap_m=round(reading.frame.gap_m / 2e-4) * 2e-4))
-            for reading in slow_recording.readings
-        ))
-        for slow_recording in slow
-    ]  # fmt: skip
-    for recordings in (slow, coarse):
+    for recordings in (slow, [coarse(recording, 2e-4) for recording in slow]):
         assert thresholds_for(recordings).settings == {}
         for recording in recordings:
-            times = np.array([reading.frame.t_s for reading in recording.readings])
-            gap = np.array([reading.frame.gap_m for reading in recording.readings])
+            times, gap = series(recording, "t_s", "gap_m")
             since, _ = first_rest(times, gap, np.ones(len(times), dtype=bool), REST_SPEED_M_S, REST_WINDOW_S)
             assert times[since] == pytest.approx(1.5, abs=0.051)
 
@@ -247,12 +237,12 @@ def test_recordings_that_begin_in_contact_with_different_forces_are_in_contact_f
     held = []
     for k, offset in enumerate((950.0, 1000.0, 1050.0, 1200.0, 1400.0)):
         recording = squeeze(seed=k, units={"force_left": "counts", "force_right": "counts"})
-        noise = np.random.default_rng(k).normal(size=len(recording.readings))
-        readings = tuple(
-            reading._replace(frame=reading.frame._replace(force_left_n=offset + n, force_right_n=offset + n))
-            for reading, n in zip(recording.readings, noise.tolist(), strict=True)
-        )
-        held.append(evolve(recording, readings=readings))
+        noise = iter(np.random.default_rng(k).normal(size=len(recording.readings)).tolist())
+
+        def change(frame, offset=offset, noise=noise):
+            return dict.fromkeys(("force_left_n", "force_right_n"), offset + next(noise))
+
+        held.append(reframed(recording, change))
     thresholds = thresholds_for(held)
     assert 0.0 < thresholds.settings["controller.contact_force_n"] <= 950.0
     assert "from the beginning" in thresholds.words

@@ -42,8 +42,8 @@ COLUMNS = {
 }
 
 
-@pytest.mark.parametrize("rows_of_a_group", [1, 3])
-def test_columns(tmp_path, rows_of_a_group):
+@every_case("rows_of_a_group", [1, 2, 3])
+def test_columns_and_the_footer_are_what_pyarrow_says(tmp_path, rows_of_a_group):
     path = tmp_path / "a.parquet"
     table = pyarrow.table({name: column for name, (column, _) in COLUMNS.items()})
     pq.write_table(table, path, row_group_size=rows_of_a_group)
@@ -56,21 +56,12 @@ def test_columns(tmp_path, rows_of_a_group):
             np.testing.assert_array_equal(columns.numbers[name], expected)
     assert columns.shapes == {"image": (2, 2)}
 
-
-def test_the_footer_is_what_pyarrow_says(tmp_path):
-    path = tmp_path / "a.parquet"
-    table = pyarrow.table({name: column for name, (column, _) in COLUMNS.items()})
-    pq.write_table(table, path, row_group_size=2)
-    metadata = pq.read_metadata(path)
-    columns = [
-        metadata.row_group(i).column(k)
-        for i in range(metadata.num_row_groups)
-        for k in range(metadata.num_columns)
-    ]
-    size = parquet_size(path)
+    metadata, size = pq.read_metadata(path), parquet_size(path)
+    groups = [metadata.row_group(i) for i in range(metadata.num_row_groups)]
+    chunks = [group.column(k) for group in groups for k in range(metadata.num_columns)]
     assert size.rows == 3
-    assert size.values == sum(column.num_values for column in columns)
-    assert size.unpacked_bytes == sum(column.total_uncompressed_size for column in columns)
+    assert size.values == sum(chunk.num_values for chunk in chunks)
+    assert size.unpacked_bytes == sum(chunk.total_uncompressed_size for chunk in chunks)
 
 
 @every_case("position", range(20, 400, 7))

@@ -75,14 +75,8 @@ def test_a_glove_without_a_gap_and_without_names_of_columns(tmp_path):
 
 
 def test_a_slide_with_electrodes_and_a_fast_vibration_and_a_comma_at_the_end_of_each_row(tmp_path):
-    names = [
-        "timestamp",
-        "tdc",
-        "tac",
-        "pdc",
-        *(f"pac{k}" for k in range(1, 23)),
-        *(f"ele{k}" for k in range(1, 20)),
-    ]
+    names = ["timestamp", "tdc", "tac", "pdc", *(f"pac{k}" for k in range(1, 23))]
+    names += [f"ele{k}" for k in range(1, 20)]
     rows = [
         [f"{1581073084.69 + 0.01 * k:.9f}", 3, 100, 90 + k, *range(22 * k, 22 * k + 22), *range(19)]
         for k in range(30)
@@ -138,8 +132,6 @@ def test_shocks_of_a_fingertip_with_lists_in_its_cells(tmp_path):
     samples = signals_of([reading.signals for reading in recording.recording.readings])["acceleration"]
     assert samples.values[:5, 0].tolist() == [5.0] * 5
     assert samples.values[-1, 0] == pytest.approx(np.hypot(3.0, 23.0))
-    spans = {
-        name: [(e.t_s, e.until_s) for e in events] for name, events in recording.recording.events.items()
-    }
-    assert spans["acceleration"] == [pytest.approx((2.7, 3.5))]
-    assert spans["acceleration not known"] == [pytest.approx((3.7, 4.5))]
+    for name, span in (("acceleration", (2.7, 3.5)), ("acceleration not known", (3.7, 4.5))):
+        (event,) = recording.recording.events[name]
+        assert (event.t_s, event.until_s) == pytest.approx(span)

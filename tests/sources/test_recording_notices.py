@@ -20,12 +20,11 @@ NOISE_N = np.random.default_rng(0).normal(0.0, 0.01, (2, len(T_S)))
 
 def noticed(left: Any, right: Any, gap: Any = None, rate_hz: float = 100.0) -> tuple[str, ...]:
     gaps = np.full(len(left), 0.05) if gap is None else gap
-    readings = tuple(
-        Reading(
-            Frame(k / rate_hz, 1.0 / rate_hz, float(gap), 0.0, nan, float(a), float(b), nan, nan, 0), NO_PADS
-        )
+    frames = (
+        Frame(k / rate_hz, 1.0 / rate_hz, float(gap), 0.0, nan, float(a), float(b), nan, nan, 0)
         for k, (gap, a, b) in enumerate(zip(gaps, left, right, strict=True))
     )
+    readings = tuple(Reading(frame, NO_PADS) for frame in frames)
     recording = Recording(name="squeeze", readings=readings, rate_hz=rate_hz)
     return with_notices(LabelledRecording(recording=recording, source="squeeze")).notices
 

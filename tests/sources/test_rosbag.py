@@ -99,6 +99,15 @@ def pressure(bag: Bag, t_s: float, left: Any, right: Any, kind: tuple[str, str],
     bag.add(f"/pressure/{side}_gripper_motor", kind, t_s + 0.002, header=bag.header(t_s), **fields)
 
 
+def controller_state(
+    bag: Bag, t_s: float, gap_m: float = 0.05, velocity_m_s: float = 0.0, effort_n: float = 0.0
+):
+    """Add a state of the controller that was recorded at this time; ROS: a positive effort opens."""
+    others = dict.fromkeys(("set_point", "error", "time_step", "p", "i", "d", "i_clamp"), 0.0)
+    bag.add("/r_gripper_controller/state", CONTROLLER_STATE, t_s, header=bag.header(t_s), process_value=gap_m,
+            process_value_dot=velocity_m_s, command=effort_n, **others)  # fmt: skip
+
+
 def write(
     path: Path, grasp: Any, *, ros: int, source: str, kind: tuple[str, str], definitions: bool = True
 ) -> None:
@@ -117,9 +126,7 @@ def write(
                       "velocity": np.array([9.0, velocity]), "effort": np.array([9.0, effort])}  # fmt: skip
             bag.add(source, kind_, t_s + 0.001, header=bag.header(t_s), **fields)
         elif source == "/r_gripper_controller/state":
-            others = dict.fromkeys(("set_point", "error", "time_step", "p", "i", "d", "i_clamp"), 0.0)
-            bag.add(source, CONTROLLER_STATE, t_s + 0.001, header=bag.header(t_s), process_value=gap,
-                    process_value_dot=velocity, command=effort, **others)  # fmt: skip
+            controller_state(bag, t_s, gap, velocity, effort)
         else:
             bag.add(source, STATE_2009, t_s, joint_commanded_effort=0.0, joint_applied_effort=effort,
                     joint_name="r_gripper_joint", joint_position=gap, joint_velocity=velocity)  # fmt: skip
@@ -144,15 +151,13 @@ def test_the_accelerometer_of_a_bag_is_a_fast_channel_with_every_sample(ros, def
     path = tmp_path / ("grasp.bag" if ros == 1 else "grasp")
     bag = Bag(path, ros, definitions)
     kind = "pr2_msgs/msg/AccelerometerState", "std_msgs/Header header\ngeometry_msgs/Vector3[] samples\n"
-    others = dict.fromkeys(("set_point", "error", "time_step", "p", "i", "d", "i_clamp"), 0.0)
     sampled = 0
     for tick in range(100):
         t_s = BEGAN_S + 0.001 * tick
         if tick % 40 == 0:
             pressure(bag, t_s, np.full(22, ZERO), np.full(22, ZERO), PRESSURE_NOW)
         if tick % 10 == 0:
-            bag.add("/r_gripper_controller/state", CONTROLLER_STATE, t_s, header=bag.header(t_s),
-                    process_value=0.05, process_value_dot=0.0, command=0.0, **others)  # fmt: skip
+            controller_state(bag, t_s)
         vector = bag.store.types["geometry_msgs/msg/Vector3"]
         new = 2 if tick % 4 == 3 else 3
         samples = [vector(float(sampled + k), -1.0, 9.81) for k in range(new)]
@@ -220,10 +225,7 @@ def test_loads_beyond_the_sign_bit_do_not_wrap(tmp_path: Path) -> None:
         # Cell 0 tells one image from the next, as noise does on the robot.
         cells = [ZERO + (load if cell >= 7 else i if cell == 0 else 0) for cell in range(22)]
         pressure(bag, BEGAN_S + 0.041 * i, cells, cells, PRESSURE_NOW)
-        t_s = BEGAN_S + 0.041 * i
-        bag.add("/r_gripper_controller/state", CONTROLLER_STATE, t_s, header=bag.header(t_s),
-                set_point=0.0, process_value=0.05, process_value_dot=0.0, error=0.0, time_step=0.0, command=-20.0,
-                p=0.0, i=0.0, d=0.0, i_clamp=0.0)  # fmt: skip
+        controller_state(bag, BEGAN_S + 0.041 * i, effort_n=-20.0)
     bag.close()
     frames = [reading.frame for reading in read_bag(str(tmp_path / "a.bag")).readings]
     assert [f.force_left_n for f in frames] == pytest.approx(
@@ -269,14 +271,16 @@ def test_bag_of_both_grippers_must_be_told_which(tmp_path: Path) -> None:
 def test_what_is_no_bag_is_told_apart(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="no bag"):
         read_bag(str(tmp_path / "missing.bag"))
-    text = tmp_path / "text.bag"
-    text.write_text("this is no bag\n")
-    with pytest.raises(DataDamaged, match="cannot be read as a ROS bag"):
-        read_bag(str(text))
-    empty = tmp_path / "empty"
-    empty.mkdir()
-    with pytest.raises(DataDamaged, match="cannot be read as a ROS bag"):
-        read_bag(str(empty))
+    (tmp_path / "text.bag").write_text("this is no bag\n")
+    (tmp_path / "empty").mkdir()
+    for name in ("text.bag", "empty"):
+        with pytest.raises(DataDamaged, match="cannot be read as a ROS bag"):
+            read_bag(str(tmp_path / name))
+    bag = Bag(tmp_path / "a.bag", 1)
+    motion(bag, BEGAN_S)
+    bag.close()
+    with pytest.raises(DataDamaged, match=r"no fingertips.*It has: /pr2_gripper_controller/state"):
+        read_bag(str(tmp_path / "a.bag"))
 
 
 def test_bag_that_is_cut_short_or_changed_raises_nothing_but_our_own(grasp: Any, tmp_path: Path) -> None:
@@ -297,11 +301,3 @@ def test_bag_that_is_cut_short_or_changed_raises_nothing_but_our_own(grasp: Any,
         except (DataDamaged, ConfigError):
             damaged += 1
     assert damaged >= 6, "at least those that are cut short"
-
-
-def test_bag_without_fingertips_says_what_it_has(tmp_path: Path) -> None:
-    bag = Bag(tmp_path / "a.bag", 1)
-    motion(bag, BEGAN_S)
-    bag.close()
-    with pytest.raises(DataDamaged, match=r"no fingertips.*It has: /pr2_gripper_controller/state"):
-        read_bag(str(tmp_path / "a.bag"))

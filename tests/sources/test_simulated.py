@@ -6,7 +6,7 @@ import sys
 
 import pytest
 from attrs import evolve, frozen
-from parts import CHANNELS_OF_HAND, Hand, HandConfig, channels
+from parts import CHANNELS_OF_HAND, Hand, HandConfig, channels, offering
 
 from graspsense import load_pipeline
 from graspsense.core.components.registry import IsolatedPlugins
@@ -16,7 +16,6 @@ from graspsense.plugin_api import (
     ObjectKind,
     SensorBackend,
     SensorBackendEntry,
-    hookimpl,
     setting,
 )
 from graspsense.sources.simulated import Group, plan_trials, simulated
@@ -46,12 +45,9 @@ class TcpHand(Hand, SensorBackend[TcpHandConfig]):
         return evolve(super().open(seed), simulated=self.config.emulated)
 
 
-@hookimpl
-def graspsense_sensor_backends():
-    return [SensorBackendEntry(name="tcp-hand", target=f"{__name__}:TcpHand", summary="a hand on a socket")]
-
-
-GRASPSENSE_API = (2, 0)
+LAB_HAND = offering(
+    SensorBackendEntry(name="tcp-hand", target=f"{__name__}:TcpHand", summary="a hand on a socket")
+)
 
 
 @pytest.mark.slow
@@ -63,7 +59,7 @@ def test_a_trial_is_simulated_where_the_gripper_says_so_and_not_by_its_settings(
     hand = ["gripper.type=tcp-hand", f"gripper.emulated={str(emulated).lower()}", "run.hold_s=0.01"]
     options = [*hand, "controller.closing_speed_m_s=0.04", "run.first_speed_m_s=0.1", "classifier.type=none"]
     with IsolatedPlugins() as plugins, Store.open(tmp_path / "trials") as store:
-        plugins.add(HERE, "lab-hand")
+        plugins.add(LAB_HAND, "lab-hand")
         settings = load_pipeline(options=options, plugins=plugins).settings
         record_grasp(store, settings, plugins, labels=labels_of("cup:full"), origin="run")
 

@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import re
 from datetime import UTC, datetime
 
 import numpy as np
@@ -148,7 +149,7 @@ def test_what_is_left_out_is_told_and_the_recording_is_kept(lines, end, left, no
     path.write_text("\n".join(lines) + end)
     recording = read(path)
     assert len(recording.readings) == left
-    assert any(__import__("re").search(note, told) for told in recording.notes) or not note
+    assert any(re.search(note, told) for told in recording.notes) or not note
 
 
 def recordings(folder, lines, text=""):
@@ -200,27 +201,6 @@ def test_advice_on_repeated_times_is_tried_first(tmp_path):
     assert 'duplicates = "drop"' in str(repeated.error)
 
 
-def test_a_column_in_two_notations_is_refused_with_its_row(tmp_path):
-    mixed = [row if k != 150 else '1.500,48.5,"8,5",8.6' for k, row in enumerate(ROWS)]
-    (refused,) = recordings(tmp_path, [HEADER, *mixed])
-    assert all(word in str(refused.error) for word in ("jar.csv", "line 152", "f1", "8,5"))
-
-
-@pytest.mark.parametrize("heading", ["load (g)", "load_grams", "Weight"])
-def test_gram_force_is_proposed(heading, tmp_path):
-    lines = [f"t,pos,{heading}", *(row.rpartition(",")[0] for row in ROWS)]
-    keys = f"""files = "{{label}}.csv"\ntime = "t"\ngap = "pos [mm]"\nforce = "'{heading}'"\n"""
-    (recording,) = recordings(tmp_path, lines, keys)
-    assert [notice for notice in recording.notices if "[gf]" in notice]
-
-
-def test_units_that_the_file_states_are_used_or_compared(tmp_path):
-    keys = 'files = "{label}.csv"\ntime = "t"\ngap = "pos"\nforce = "f1 [mN]"\n'
-    (recording,) = recordings(tmp_path, [HEADER, "s,mm,N,N", *ROWS], keys)
-    assert recording.recording.readings[0].frame.gap_m == pytest.approx(0.08)
-    assert [notice for notice in recording.notices if "[mN]" in notice and "states N" in notice]
-
-
 @every_case(
     ("units", "keys", "si"),
     [
@@ -265,15 +245,40 @@ def test_a_unit_that_contradicts_the_file_is_told_and_the_unit_of_the_file_is_su
     assert any(guess.value == "f1 [mA]" and "no unit" not in guess.check for guess in guesses(table))
 
 
-def test_an_effort_in_another_unit_is_told(tmp_path):
-    keys = 'files = "{label}.csv"\ntime = "t"\ngap = "pos"\nforce = "f1"\neffort = "f2"\n'
-    (recording,) = recordings(tmp_path, [HEADER, "s,mm,N,mA", *ROWS], keys)
-    assert [notice for notice in recording.notices if "states mA" in notice]
+@every_case(
+    ("header", "units", "keys", "says"),
+    [
+        *(
+            (f"t,pos,{name},f2", "", f"force = \"'{name}'\"", "[gf]")
+            for name in ("load (g)", "load_grams", "Weight")
+        ),
+        (HEADER, "s,mm,N,mA", 'force = "f1"\neffort = "f2"', "states mA"),
+        (HEADER, "s,mm,N,N", 'force = "f1 [mN]"', "states N"),
+    ],
+)
+def test_a_unit_that_the_file_states_is_used_or_told(tmp_path, header, units, keys, says):
+    lines = [header, *([units] if units else []), *ROWS]
+    gap = "pos" if units else "pos [mm]"
+    (recording,) = recordings(
+        tmp_path, lines, f'files = "{{label}}.csv"\ntime = "t"\ngap = "{gap}"\n{keys}\n'
+    )
+    assert recording.recording.readings[0].frame.gap_m == pytest.approx(0.08)
+    assert [notice for notice in recording.notices if says in notice]
 
 
-def test_numbers_without_a_header_in_reach_ask_for_the_line(tmp_path):
-    (refused,) = recordings(tmp_path, ["a,b", "a,b", "a,b", *ROWS])
-    assert 'start = "' in str(refused.error)
+@every_case(
+    ("lines", "words"),
+    [
+        (
+            [HEADER, *(row if k != 150 else '1.500,48.5,"8,5",8.6' for k, row in enumerate(ROWS))],
+            ("jar.csv", "line 152", "f1", "8,5"),
+        ),
+        (["a,b", "a,b", "a,b", *ROWS], ('start = "',)),
+    ],
+)
+def test_a_column_in_two_notations_and_numbers_without_a_header_are_refused(tmp_path, lines, words):
+    (refused,) = recordings(tmp_path, lines)
+    assert all(word in str(refused.error) for word in words)
 
 
 # Tables of trials.
@@ -319,6 +324,9 @@ def test_words_for_a_missing_number_are_labels(tmp_path):
     assert trials(tmp_path, lines).labels == ("none", "NA") * 6
     with pytest.raises(DataDamaged, match="line 2"):
         trials(tmp_path, ["what,p,q", *(trial.replace("a,", ",") for trial in TRIALS)])
+    lines = [f"{HEADER},what", *(f"{row},{'NA' if k < 100 else 'none'}" for k, row in enumerate(ROWS))]
+    keys = 'files = "jar.csv"\nsplit = "what"\nlabel = "{what}"\ntime = "t"\ngap = "pos [mm]"\nforce = "f1"\n'
+    assert [recording.label for recording in recordings(tmp_path, lines, keys)] == ["NA", "none"]
 
 
 def test_labels_that_look_the_same_are_the_same(tmp_path):
@@ -337,12 +345,6 @@ def test_evaluate_and_train_read_what_pandas_wrote(tmp_path):
     for command in (("evaluate", path), ("train", path, "--out", tmp_path / "m.json")):
         printed(*command, "--label", "what")
     assert "index" not in json.dumps(json.loads((tmp_path / "m.json").read_text())["features"])
-
-
-def test_words_for_a_missing_number_are_labels_of_recordings_too(tmp_path):
-    lines = [f"{HEADER},what", *(f"{row},{'NA' if k < 100 else 'none'}" for k, row in enumerate(ROWS))]
-    keys = 'files = "*.csv"\nsplit = "what"\nlabel = "{what}"\ntime = "t"\ngap = "pos [mm]"\nforce = "f1"\n'
-    assert [recording.label for recording in recordings(tmp_path, lines, keys)] == ["NA", "none"]
 
 
 def test_rows_without_a_value_of_the_column_that_splits_are_left_out_and_told(tmp_path):

@@ -98,6 +98,15 @@ def test_a_header_without_a_time_has_that_of_its_recording_on_the_clock_of_its_t
     assert np.array_equal(common.topics["/tip"].ns, common.topics["/hand"].ns)
 
 
+def test_topics_that_never_overlap_are_refused_and_a_single_message_is_a_constant() -> None:
+    with pytest.raises(DataDamaged, match="no time at which all topics"):
+        common_clock("bag", {"/hand": HEALTHY, "/tip": messages(T_S + 5.0)})
+    common = common_clock("bag", {"/hand": HEALTHY, "/width": messages([1.5])})
+    hand = common.topics["/hand"]
+    assert (common.begin_ns, common.end_ns) == (hand.ns[0], hand.until_ns)
+    assert not common.topics["/width"].latest(hand.ns)[1].any()
+
+
 def test_a_recorder_that_was_late_once_changes_nothing() -> None:
     topics = messages(T_S)
     held_up = BEGAN_NS + round(1.8 * S)
@@ -105,20 +114,6 @@ def test_a_recorder_that_was_late_once_changes_nothing() -> None:
     common = common_clock("bag", {"/hand": HEALTHY, "/tip": topics})
     assert common.notices == ()
     assert np.array_equal(common.topics["/tip"].ns, common.topics["/hand"].ns)
-
-
-def test_topics_that_never_overlap_are_refused() -> None:
-    with pytest.raises(DataDamaged, match="no time at which all topics"):
-        common_clock("bag", {"/hand": HEALTHY, "/tip": messages(T_S + 5.0)})
-
-
-def test_a_single_message_is_a_constant() -> None:
-    common = common_clock("bag", {"/hand": HEALTHY, "/width": messages([1.5])})
-    assert (common.begin_ns, common.end_ns) == (
-        common.topics["/hand"].ns[0],
-        common.topics["/hand"].until_ns,
-    )
-    assert not common.topics["/width"].latest(common.topics["/hand"].ns)[1].any()
 
 
 # The same through the readers, on bags of a hand with a fingertip.
@@ -152,20 +147,16 @@ def written(tmp_path: Path) -> Any:
             hand = writer.add_connection("/joint_states" if pr2 else "/hand", joint, typestore=store)
             force = writer.add_connection(topic, cells if pr2 else tip, typestore=store)
             for k, (t_s, gap) in enumerate(zip(T_S, GAP_M, strict=True)):
-                state = store.types[joint](
-                    header(t_s), ["r_gripper_joint"], np.array([gap]), np.zeros(1), np.zeros(1)
-                )
+                names, still = ["r_gripper_joint"], np.zeros(1)
+                state = store.types[joint](header(t_s), names, np.array([gap]), still, still)
                 stamp_ns = BEGAN_NS + round(t_s * S) + 10**6
                 writer.write(hand, stamp_ns, store.serialize_cdr(state, joint))
                 if not kept[k]:
                     continue
-                if pr2:
-                    load = np.full(22, 3000 + round(FORCE_N[k] * 100) + k % 3, dtype=np.int16)
-                    message = store.types[cells](header(stamped_s[k]), load, load)
-                    writer.write(force, stamp_ns, store.serialize_cdr(message, cells))
-                else:
-                    message = store.types[tip](header(stamped_s[k]), np.array([FORCE_N[k], 0.0]))
-                    writer.write(force, stamp_ns, store.serialize_cdr(message, tip))
+                load = np.full(22, 3000 + round(FORCE_N[k] * 100) + k % 3, dtype=np.int16)
+                kind, felt = (cells, (load, load)) if pr2 else (tip, (np.array([FORCE_N[k], 0.0]),))
+                message = store.types[kind](header(stamped_s[k]), *felt)
+                writer.write(force, stamp_ns, store.serialize_cdr(message, kind))
         if pr2:
             (imported,), _ = recordings_to_import([f"rosbag:{tmp_path / 'jar'}"], {}, None)
             return imported.labelled

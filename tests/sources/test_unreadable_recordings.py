@@ -8,6 +8,7 @@ import os
 import re
 import struct
 import zipfile
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -181,26 +182,20 @@ def tick(k=0, phase=3, **values):
     return (*frame(k)._replace(**values), phase, EFFORT, 1.0, 2.0, 3.0)
 
 
+EVENT = '{{"events": [{{"t_s": {t_s}, "phase": "{phase}", "what": "x", "source": "controller"}}]}}'
+DETAILS = {
+    "events no table": '{"events": [1, "a", null]}',
+    "events a number": '{"events": 7}',
+    "event of no phase": EVENT.format(t_s=1, phase="flight"),
+    "event at no time": EVENT.format(t_s="[]", phase="hold"),
+}
 CRAFTED = {
     "phase 100": {"ticks": [tick(0), tick(1, phase=100)]},
     "phase -1": {"ticks": [tick(0, phase=-1)]},
     "time NaN": {"ticks": [tick(0), tick(1, t_s=float("nan"))]},
     "time inf": {"ticks": [tick(0), tick(1, t_s=float("inf"))]},
     "outcome 99": {"ticks": [tick()], "result": {"outcome": "99"}},
-    "events no table": {"ticks": [tick()], "result": {"details": '{"events": [1, "a", null]}'}},
-    "events a number": {"ticks": [tick()], "result": {"details": '{"events": 7}'}},
-    "event of no phase": {
-        "ticks": [tick()],
-        "result": {
-            "details": '{"events": [{"t_s": 1, "phase": "flight", "what": "x", "source": "controller"}]}'
-        },
-    },
-    "event at no time": {
-        "ticks": [tick()],
-        "result": {
-            "details": '{"events": [{"t_s": [], "phase": "hold", "what": "x", "source": "controller"}]}'
-        },
-    },
+    **{name: {"ticks": [tick()], "result": {"details": text}} for name, text in DETAILS.items()},
     "overflow": {
         "ticks": [tick()],
         "result": {"features": f'{{"features": [["a", "m"]], "values": [1{"0" * 400}], "reasons": {{}}}}'},
@@ -317,19 +312,9 @@ def test_what_is_ours_passes_through_and_what_is_not_is_named():
 
 def dataset_of(reader, monkeypatch):
     """Install a data set `lab` whose reader is this function."""
-
-    class Dataset:
-        qualified = "lab-data/lab"
-
-        def recordings(self):
-            return reader
-
-    class Plugins:
-        def resource(self, kind, name):
-            assert name == "lab"
-            return Dataset()
-
-    monkeypatch.setattr("graspsense.sources.recordings.dataset_recordings.installed", Plugins)
+    dataset = SimpleNamespace(qualified="lab-data/lab", recordings=lambda: reader)
+    plugins = SimpleNamespace(resource=lambda kind, name: {"lab": dataset}[name])
+    monkeypatch.setattr("graspsense.sources.recordings.dataset_recordings.installed", lambda: plugins)
 
 
 def grasps(number):

@@ -1,15 +1,14 @@
 """`graspsense collect` with an operator whose answers are written down."""
 
 import json
-import subprocess
-import sys
 from collections import Counter
+from types import SimpleNamespace
 
 import pytest
 from attrs import evolve
 from cases import every_case
 from commands import graspsense
-from grippers import Scripted, bottle, squeezing
+from grippers import Scripted, bottle, settings_with, squeezing
 from kept import BENCH, keep
 
 from graspsense.core.components.registry import installed
@@ -149,13 +148,7 @@ def test_another_gripper_is_refused_before_it_moves(tmp_path):
             super().apply(command)
 
     def settings_for(word, seed):
-        settings = resolve("default", options=["classifier.type=none", f"run.seed={seed}"])
-
-        class Choice(type(settings.gripper)):
-            def create(self):
-                return Serial(squeezing, bottle)
-
-        return evolve(settings, gripper=Choice(settings.gripper.component, settings.gripper.config))
+        return settings_with(lambda: Serial(squeezing, bottle), f"run.seed={seed}")
 
     answers = iter(["", "", "q"])
     with Store.open(tmp_path / "t") as store:
@@ -179,22 +172,9 @@ def test_another_gripper_is_refused_before_it_moves(tmp_path):
 
 
 @pytest.mark.slow
-def test_it_takes_its_answers_from_a_pipe(tmp_path):
-    command = [
-        sys.executable,
-        "-m",
-        "graspsense",
-        "collect",
-        "--labels",
-        "block",
-        "--each",
-        "1",
-        *PLAIN,
-        *COARSE,
-    ]
-    done = subprocess.run(
-        command, input="\n", capture_output=True, text=True, cwd=tmp_path, timeout=300, check=False
-    )
+def test_without_a_folder_it_is_trials_and_what_is_there_is_printed(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = graspsense("collect", "--labels", "block", "--each", "1", *PLAIN, *COARSE, answers="\n")
     assert done.returncode == 0, done.stderr
     assert "next: block  (1 of 1)" in done.stderr
     counts, sets = done.stdout.splitlines()[:2]
@@ -203,14 +183,11 @@ def test_it_takes_its_answers_from_a_pipe(tmp_path):
     assert trials_in(tmp_path / "trials") == [(1, "block", None)]
 
 
-@pytest.mark.parametrize(
-    ("labels", "says"),
-    [("", "nothing to collect"), ("block,block", "named twice")],
-)
-def test_labels_that_make_no_sense_are_told(tmp_path, labels, says):
-    done = collect(tmp_path / "t", "", labels=labels)
-    assert done.returncode == 2
-    assert says in done.stderr
+def test_labels_that_make_no_sense_are_told(tmp_path):
+    for labels, says in (("", "nothing to collect"), ("block,block", "named twice")):
+        done = collect(tmp_path / "t", "", labels=labels)
+        assert done.returncode == 2
+        assert says in done.stderr
 
 
 def test_nothing_there_counts_since_it_is_an_answer_of_the_gripper(tmp_path):
@@ -286,18 +263,12 @@ def test_an_object_from_a_file_can_have_any_label(tmp_path):
     assert held(tmp_path / "t") == [("sponge:dry", str(scene), True)]
 
 
-def test_a_gripper_that_cannot_be_told_takes_the_word_of_the_operator(tmp_path):
+def test_a_gripper_that_cannot_be_told_takes_the_word_of_the_operator():
     from graspsense.cli.collect import _label_selects_object
 
-    class Choice:
-        def create(self):
-            return Scripted(squeezing, bottle)
-
-    class Asked:
-        gripper = Choice()
-        values = resolve("default").values
-
-    assert not _label_selects_object(Asked(), ["jar:full"], object_is_named=False)
+    choice = SimpleNamespace(create=lambda: Scripted(squeezing, bottle))
+    asked = SimpleNamespace(gripper=choice, values=resolve("default").values)
+    assert not _label_selects_object(asked, ["jar:full"], object_is_named=False)
 
 
 @pytest.mark.slow
@@ -334,23 +305,28 @@ def test_a_store_and_files_with_spaces_in_their_names_work_everywhere(tmp_path, 
     monkeypatch.chdir(tmp_path)
     (tmp_path / "my lab.toml").write_text('extends = "default"\n[classifier]\ntype = "none"\n')
     pipeline, store = ("--pipeline", "my lab.toml"), "my trials"
+    # Other tests name the folder of a store; its database names it as well.
+    named = f"{store}/store.sqlite"
 
     command = ("collect", *pipeline, *COARSE, "--labels", "block,none", "--each", "2")
     command += ("--operator", "A B", "--save", store)
     assert graspsense(*command, answers="\n" * 4).returncode == 0
     for command in (
-        ("trials", "list", store),
+        ("trials", "list", named),
         ("trials", "aside", f"{store}#1", "--why", "moved by hand"),
         ("replay", f"{store}#2"),
-        ("verify", store),
-        ("recover", store),
-        ("export", store, "--to", "my table.csv"),
+        ("verify", named),
+        ("recover", named),
+        ("export", named, "--to", "my table.csv"),
         ("export", f"{store}#2", "--to", "one grasp.csv"),
+        ("evaluate", named, "--folds", "2"),
+        ("compare", named, "--folds", "2", "--classifiers", "c45,tree"),
         ("train", f"store:{store}", "--out", "my model.json"),
-        ("predict", "my model.json", f"store:{store}"),
+        ("train", named, "--out", "model.json"),
+        ("predict", "my model.json", named),
         ("predict", "my model.json", "my table.csv"),
         ("run", "-o", "classifier.type=c45", "-o", "classifier.model=my model.json"),
-        ("report", store, "--folds", "2"),
+        ("report", named, "--folds", "2"),
     ):
         done = graspsense(*command)
         assert done.returncode == 0, (command, done.stderr)

@@ -67,11 +67,8 @@ def test_every_text_is_read_back_and_none_is_a_formula(text):
 def test_numbers_stay_numbers_of_the_same_bits(value):
     (row,) = csv.reader(io.StringIO(csv_text([[value, "x"]])))
     assert row[0] == ("" if math.isnan(value) else repr(value))
-
-
-@every_case("text", ["-3", "+1.5e-3", "-.5", "7."])
-def test_a_text_that_is_a_number_stays_as_it_is(text):
-    assert cells_of(csv_text([[text]])) == [text]
+    for text in ("-3", "+1.5e-3", "-.5", "7."):  # so do texts that are numbers
+        assert cells_of(csv_text([[text]])) == [text]
 
 
 def labelled(labels):
@@ -94,15 +91,9 @@ def test_a_table_of_features_is_harmless_and_is_read_back_as_it_was(tmp_path):
 @pytest.fixture
 def store(tmp_path):
     """Return a store with hostile labels, as an import of others' files can make one."""
-
     with Store.open(tmp_path / "t") as store:
         for label, value in itertools.product(FORMULAS[:4], (0.06, 0.07, 0.065)):
-            keep(
-                store,
-                label,
-                instance=f"{label}#1",
-                values=(value, -5.5),
-            )
+            keep(store, label, instance=f"{label}#1", values=(value, -5.5))
     return tmp_path / "t"
 
 

@@ -45,16 +45,22 @@ def folder(stored, tmp_path):
     return shutil.copytree(stored, tmp_path / "trials")
 
 
-def export(source, target):
-    code, _, err = graspsense("export", source, "--to", target)
-    assert "Traceback" not in err
-    return code, err
+def export(source, target, code=0):
+    """Export and demand how it ends; return what is said of it."""
+    done = graspsense("export", source, "--to", target)
+    assert done.returncode == code, done.stderr
+    assert "Traceback" not in done.stderr
+    return done.stderr
+
+
+def rows_of(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
 
 
 def test_the_table_as_csv(folder, tmp_path):
-    assert export(folder, tmp_path / "t.csv")[0] == 0
-    with (tmp_path / "t.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
+    export(folder, tmp_path / "t.csv")
+    rows = rows_of(tmp_path / "t.csv")
     assert [row["trial"] for row in rows] == ["1", "2", "3", "5"]
     assert float(rows[1]["p_first [m]"]) == 0.1 + 0.2
     assert (rows[1]["f_steady [N]"], rows[2]["label"], rows[3]["outcome"]) == ("", "", "aborted")
@@ -85,7 +91,7 @@ def test_an_empty_column_of_an_export_is_not_a_feature(tmp_path):
 def test_the_table_as_arff_is_read_by_scipy(folder, tmp_path):
     with Store.open(folder) as store:
         set_aside(store, [3], "no label")
-    assert export(folder, tmp_path / "t.arff")[0] == 0
+    export(folder, tmp_path / "t.arff")
     data, about = scipy.io.arff.loadarff(tmp_path / "t.arff")
     assert about.names() == ["p_first", "f_steady", "label"]
     assert data["p_first"][:2].tolist() == [0.066, 0.1 + 0.2]
@@ -94,7 +100,7 @@ def test_the_table_as_arff_is_read_by_scipy(folder, tmp_path):
 
 
 def test_the_table_as_npz(folder, tmp_path):
-    assert export(folder, tmp_path / "t.npz")[0] == 0
+    export(folder, tmp_path / "t.npz")
     with np.load(tmp_path / "t.npz", allow_pickle=False) as arrays:
         assert arrays["features"].tolist() == ["p_first", "f_steady"]
         assert arrays["units"].tolist() == ["m", "N"]
@@ -107,12 +113,10 @@ def test_one_grasp_tick_by_tick(folder, tmp_path):
         code, out, _ = graspsense("export", f"{folder}#1", "--to", tmp_path / f"one.{ending}")
         assert code == 0
         assert ("the settings of" if ending == "toml" else "120 ticks, ") in out
-    with (tmp_path / "one.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = rows_of(tmp_path / "one.csv")
     assert [float(row["gap_m"]) for row in rows] == [frame(k).gap_m for k in range(120)]
     assert {row["edge_left_n"] for row in rows} == {""}
-    with (tmp_path / "one-pads.csv").open(newline="") as file:
-        assert float(next(csv.DictReader(file))["right_00"]) == pads(0).right[0]
+    assert float(rows_of(tmp_path / "one-pads.csv")[0]["right_00"]) == pads(0).right[0]
     with np.load(tmp_path / "one.npz", allow_pickle=False) as arrays:
         assert arrays["pad_left"].shape == (3, 22)
     (recording,) = [
@@ -123,22 +127,17 @@ def test_one_grasp_tick_by_tick(folder, tmp_path):
     assert recording.is_file()
     assert tomllib.loads((tmp_path / "one.toml").read_text())["controller"]["probing_force_n"] == 20.0
     # A recording without a store, as well.
-    assert export(recording, tmp_path / "again.npz")[0] == 0
+    export(recording, tmp_path / "again.npz")
 
 
-def test_nothing_is_ever_overwritten(folder, tmp_path):
-    (tmp_path / "t.csv").write_text("mine")
-    code, err = export(folder, tmp_path / "t.csv")
-    assert (code, (tmp_path / "t.csv").read_text()) == (2, "mine")
-    assert "already exists" in err
-
-
-@every_case(("source", "target"), [("", "t.xlsx"), ("", "t.mcap"), ("#1", "t.arff"), ("#9", "t.csv")])
-def test_what_cannot_be_written_is_told(folder, tmp_path, source, target):
-    code, err = export(f"{folder}{source}", tmp_path / target)
-    assert code == 2
-    assert "can be written as" in err or "has no trial 9" in err
-    assert not (tmp_path / target).exists()
+def test_nothing_is_ever_overwritten_and_what_cannot_be_written_is_told(folder, tmp_path):
+    (tmp_path / "mine.csv").write_text("mine")
+    assert "already exists" in export(folder, tmp_path / "mine.csv", code=2)
+    assert (tmp_path / "mine.csv").read_text() == "mine"
+    for source, target in (("", "t.xlsx"), ("", "t.mcap"), ("#1", "t.arff"), ("#9", "t.csv")):
+        told = export(f"{folder}{source}", tmp_path / target, code=2)
+        assert "can be written as" in told or "has no trial 9" in told
+        assert not (tmp_path / target).exists()
 
 
 def test_without_pyarrow_parquet_says_what_to_install(folder, tmp_path, monkeypatch):
@@ -151,11 +150,11 @@ def test_without_pyarrow_parquet_says_what_to_install(folder, tmp_path, monkeypa
 
 def test_parquet_is_read_by_pyarrow(folder, tmp_path):
     parquet = pytest.importorskip("pyarrow.parquet", reason="needs the extra parquet")
-    assert export(folder, tmp_path / "t.parquet")[0] == 0
+    export(folder, tmp_path / "t.parquet")
     table = parquet.read_table(tmp_path / "t.parquet")
     assert table["f_steady"].to_pylist() == [5.5, None, 1.0, None]
     assert table.schema.field("p_first").metadata == {b"unit": b"m"}
-    assert export(f"{folder}#1", tmp_path / "one.parquet")[0] == 0
+    export(f"{folder}#1", tmp_path / "one.parquet")
     assert parquet.read_table(tmp_path / "one.parquet")["gap_m"].to_pylist()[5] == frame(5).gap_m
     assert parquet.read_table(tmp_path / "one-pads.parquet").num_rows == 3
 
@@ -202,7 +201,7 @@ def a_store_of_everything(folder):
 def test_evaluate_gives_the_same_figures_for_a_store_and_its_export(tmp_path):
     folder = tmp_path / "trials"
     a_store_of_everything(folder)
-    assert export(folder, tmp_path / "t.csv")[0] == 0
+    export(folder, tmp_path / "t.csv")
     component = select_component("classifier", "c45")
     stored, from_export = (
         to_json(evaluate(component, trials, classifier="c45", folds=3, permutations=1, learning_curve=False))
@@ -218,8 +217,7 @@ def test_evaluate_gives_the_same_figures_for_a_store_and_its_export(tmp_path):
 
 def test_an_export_of_an_earlier_version_still_opens(folder, tmp_path):
     export(folder, tmp_path / "t.csv")
-    with (tmp_path / "t.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = rows_of(tmp_path / "t.csv")
     names = [*ABOUT_BEFORE, "p_first [m]", "f_steady [N]"]
     with (tmp_path / "old.csv").open("w", newline="") as file:
         writer = csv.DictWriter(file, names, extrasaction="ignore")
@@ -231,11 +229,11 @@ def test_an_export_of_an_earlier_version_still_opens(folder, tmp_path):
     assert trials.before_contact is None
 
 
-@pytest.mark.parametrize("ending", ["csv", "npz", "parquet"])
-def test_the_table_of_a_store_is_no_grasp_to_import(folder, tmp_path, ending):
+@every_case("ending", ["csv", "npz", "parquet"])
+def test_the_table_of_a_store_is_no_grasp_to_import(stored, tmp_path, ending):
     if ending == "parquet":
         pytest.importorskip("pyarrow.parquet", reason="needs the extra parquet")
-    export(folder, tmp_path / f"t.{ending}")
+    export(stored, tmp_path / f"t.{ending}")
     code, _, err = graspsense("import", tmp_path / f"t.{ending}", "--save", tmp_path / "other")
     assert code == 2
     assert f"t.{ending} is the table of a store, with one row for each grasp" in err
@@ -243,7 +241,7 @@ def test_the_table_of_a_store_is_no_grasp_to_import(folder, tmp_path, ending):
 
 
 def test_the_table_of_a_store_is_learned_from_as_the_message_says(folder, tmp_path):
-    assert export(folder, tmp_path / "t.csv")[0] == 0
+    export(folder, tmp_path / "t.csv")
     refused = graspsense("import", tmp_path / "t.csv", "--save", tmp_path / "other")
     command = refused.stderr.partition("graspsense train ")[2].partition(". ")[0]
     model = tmp_path / "model.json"
@@ -252,20 +250,20 @@ def test_the_table_of_a_store_is_learned_from_as_the_message_says(folder, tmp_pa
     assert model.exists()
 
 
-@every_case("command", ["train", "evaluate"])
-def test_a_table_of_arrays_is_refused_as_trials(folder, tmp_path, command):
+def test_a_table_of_arrays_is_refused_as_trials(folder, tmp_path):
     table = tmp_path / "t.npz"
-    assert export(folder, table)[0] == 0
-    done = graspsense(command, table, *(["--out", tmp_path / "m.json"] if command == "train" else []))
-    assert done.returncode == 2
-    assert "write the table as FILE.csv. If it is of a store, name the store as store:DIR" in done.stderr
+    export(folder, table)
+    for command, *more in (("train", "--out", tmp_path / "m.json"), ("evaluate",)):
+        done = graspsense(command, table, *more)
+        assert done.returncode == 2
+        assert "write the table as FILE.csv. If it is of a store, name the store as store:DIR" in done.stderr
 
 
 @pytest.mark.parametrize("ending", ["npz", "PARQUET"])
 def test_an_exported_grasp_is_imported_without_a_kind_before_its_name(folder, tmp_path, ending):
     if ending.lower() == "parquet":
         pytest.importorskip("pyarrow.parquet", reason="needs the extra parquet")
-    assert export(f"{folder}#1", tmp_path / f"one.{ending.lower()}")[0] == 0
+    export(f"{folder}#1", tmp_path / f"one.{ending.lower()}")
     for file in list(tmp_path.glob(f"one*.{ending.lower()}*")):
         file.rename(file.with_name(file.name.replace(ending.lower(), ending)))
     (imported,), refused = recordings_to_import([str(tmp_path / f"one.{ending}")], {}, None)

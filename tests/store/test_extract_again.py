@@ -8,7 +8,7 @@ import shutil
 
 import pytest
 from cases import every_case
-from commands import graspsense
+from commands import graspsense, printed
 from kept import frame, keep
 
 from graspsense.core.values.errors import ConfigError, DataDamaged
@@ -103,45 +103,27 @@ def test_a_lost_recording_is_told(folder, tmp_path):
 def test_the_command_compares_and_keeps(folder, tmp_path):
     kept = tmp_path / "again.csv"
     arguments = ("features", f"store:{folder}", "-o", "controller.contact_force_n=2", "--keep", kept)
-    code, out, err = graspsense(*arguments, "--json")
-    assert code == 0, err
-    told = json.loads(out)
+    told = json.loads(printed(*arguments, "--json"))
     # The left pad reaches 1.19 N at most.
-    assert [row for row in told["features"] if row["name"] == "p_first"] == [
-        {
-            "name": "p_first",
-            "unit": "m",
-            "trials_before": 6,
-            "trials": 0,
-            "median_before": 0.066,
-            "median": None,
-        }
-    ]
+    (row,) = [row for row in told["features"] if row["name"] == "p_first"]
+    assert (row["unit"], row["trials_before"], row["median_before"]) == ("m", 6, 0.066)
+    assert (row["trials"], row["median"]) == (0, None)
     assert kept.read_text().startswith("label,instance,order,p_first [m]")
     code, _, err = graspsense(*arguments)
     assert (code, "already exists" in err) == (2, True)
-    code, out, _ = graspsense(
-        *arguments[:4], "--overwrite", "--keep", kept, "-o", "controller.contact_force_n=0.2"
-    )
-    assert code == 0
-    assert "6 of 6" in out
+    other = ("-o", "controller.contact_force_n=0.2")
+    assert "6 of 6" in printed("features", folder, "--overwrite", "--keep", kept, *other)
     assert read_labelled(kept, "label").table.columns(["p_first"]).values[0, 0] == gap_at(0.2)
-
-
-def test_a_store_is_asked_for(folder, tmp_path):
-    code, _, err = graspsense("features", tmp_path / "none", "-o", "features.force=left")
+    code, _, err = graspsense("features", tmp_path / "none", *other)
     assert (code, "there is no store" in err) == (2, True)
-    assert graspsense("features", folder, "-o", "features.force=left")[0] == 0
 
 
 def test_train_uses_the_features_of_its_options(folder, tmp_path):
     out = tmp_path / "m.json"
+    train = ("train", f"store:{folder}", "--out", out)
     options = ("-o", "features.contact_force_n=0.2", "-o", "classifier.min_leaf=1", "--classifier", "tree")
-    code, _, err = graspsense("train", f"store:{folder}", "--out", out, *options)
-    assert code == 0, err
+    printed(*train, *options)
     assert json.loads(out.read_text())["provenance"]["settings"]["features"]["contact_force_n"] == 0.2
-    code, _, err = graspsense(
-        "train", f"store:{folder}", "--out", out, "--overwrite", "-o", "gripper.object=can:full"
-    )
+    code, _, err = graspsense(*train, "--overwrite", "-o", "gripper.object=can:full")
     assert code == 2
     assert "only keys of [classifier], [features], [controller] and [run] have a meaning" in err

@@ -10,14 +10,13 @@ import sys
 import pytest
 from attrs import evolve
 from commands import graspsense, printed
-from grippers import Scripted, bottle, squeezing
+from grippers import Scripted, bottle, settings_with, squeezing
 
 from graspsense import GraspInterrupted, load_pipeline
 from graspsense.core.components.registry import installed
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_uninterrupted
 from graspsense.core.pipeline.pipeline import grasp_with
-from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.signals import Outcome
 from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
 from graspsense.store.changes import relabel
@@ -70,19 +69,11 @@ class Signalled(Scripted):
 @pytest.fixture
 def signalled():
     """Return settings of a gripper that is interrupted, and the class of this gripper."""
-    number = signal.SIGINT
 
     class Gripper(Signalled):
         pass
 
-    settings = resolve("default", plugins=installed(), options=["classifier.type=none"])
-
-    class Choice(type(settings.gripper)):
-        def create(self):
-            return Gripper()
-
-    Gripper.number = number
-    return evolve(settings, gripper=Choice(settings.gripper.component, settings.gripper.config)), Gripper
+    return settings_with(Gripper), Gripper
 
 
 @pytest.fixture(autouse=True)
@@ -182,14 +173,12 @@ def test_an_interrupted_grasp_raises_so_that_a_loop_over_grasps_ends_and_keeps_i
     assert len(ended.value.trial.trace) > 900
     with pytest.raises(KeyboardInterrupt):
         grasp_with(settings, installed())
-
-
-def test_a_grasp_of_many_raises_after_the_release():
-    gripper = Signalled()
+    # A grasp of many raises after the release.
+    interrupted = Signalled()
     with pytest.raises(KeyboardInterrupt):
-        run_uninterrupted(gripper, HybridController(HybridConfig()), RunConfig())
-    assert gripper.closed == 1
-    assert gripper.commands[-1].value == 0.0
+        run_uninterrupted(interrupted, HybridController(HybridConfig()), RunConfig())
+    assert interrupted.closed == 1
+    assert interrupted.commands[-1].value == 0.0
 
 
 def interrupting(monkeypatch, after):

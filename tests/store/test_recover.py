@@ -37,29 +37,19 @@ def test_a_cut_recording_becomes_a_trial_that_does_not_count(store):
     # Of 200 ticks, those of the last chunk that was closed are there: 50 ms of 1 kHz at most are missing.
     assert 150 <= recovered.ticks <= 200
     kept = store.trial(1)
-    assert (kept.summary.outcome, kept.summary.complete, kept.summary.label) == (
-        "aborted",
-        False,
-        "can:full_open",
-    )
+    summary = kept.summary
+    assert (summary.outcome, summary.complete, summary.label) == ("aborted", False, "can:full_open")
     assert "were recovered" in kept.result.reason
-    assert kept.result.features.features[0] == (
-        "p_first",
-        "m",
-    )  # extracted with the settings in the recording
+    # Extracted with the settings in the recording.
+    assert kept.result.features.features[0] == ("p_first", "m")
     assert len(read_recorded(kept.recording)) == recovered.ticks
     with kept.recording.open("rb") as file:  # complete for other readers: it has a summary again
         assert make_reader(file).get_summary().statistics.channel_message_counts[1] == recovered.ticks
     names = sorted(file.name for file in store.recordings.iterdir())
     assert "20261121-103015-0001.mcap.cut" in names
     assert store.counts() == {}
-    assert verify_store(store.folder).as_json() == {
-        "intact": True,
-        "trials": 1,
-        "recordings": 1,
-        "problems": [],
-        "unfinished": [],
-    }
+    found_intact = {"intact": True, "trials": 1, "recordings": 1, "problems": [], "unfinished": []}
+    assert verify_store(store.folder).as_json() == found_intact
     # To recover twice changes nothing.
     assert recover_store(store) == []
     assert sorted(file.name for file in store.recordings.iterdir()) == names
@@ -138,22 +128,20 @@ def test_a_feature_set_that_is_not_installed_does_not_lose_the_trial(store):
     assert "elsewhere/mine" in json.loads(store.query("SELECT missing FROM detail")[0][0])[""]
 
 
+def contents(store):
+    """Return label, outcome and features of each trial."""
+    return sorted((s.label, s.outcome, store.trial(s.id).result.features.values) for s in store.page())
+
+
 def test_a_lost_database_is_made_again_from_the_recordings(store):
     numbers = [keep(store, label) for label in ("can:full_open", "can:empty_open", "toy")]
-    trials = [
-        (summary.label, summary.outcome, store.trial(summary.id).result.features.values)
-        for summary in store.page()
-    ]
+    trials = contents(store)
     store.close()
     for path in store.folder.glob("store.sqlite*"):
         path.rename(path.with_name("old-" + path.name))
     with Store.open(store.folder) as new:
         assert [recovered.what for recovered in recover_store(new)] == ["added"] * len(numbers)
-        after = [
-            (summary.label, summary.outcome, new.trial(summary.id).result.features.values)
-            for summary in new.page()
-        ]
-    assert sorted(after) == sorted(trials)
+        assert contents(new) == trials
 
 
 def test_recordings_without_a_database_get_their_numbers_in_the_order_of_recording(store):

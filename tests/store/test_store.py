@@ -6,10 +6,9 @@ import struct
 import subprocess
 import sys
 import threading
-from contextlib import suppress
+from contextlib import closing, suppress
 
 import pytest
-from cases import every_case
 from kept import ended, keep, write_recording
 
 from graspsense.core.values.errors import ConfigError, DataDamaged
@@ -29,28 +28,36 @@ def store(tmp_path):
         yield store
 
 
+def edited(store, *statements):
+    """Close a store and change its file as another program would."""
+    store.close()
+    with closing(sqlite3.connect(store.folder / "store.sqlite")) as connection:
+        for statement in statements:
+            connection.execute(statement)
+        connection.commit()
+
+
+def assert_refused(store, error, says):
+    for opened in (Store.open, Store.read):
+        with pytest.raises(error, match=says):
+            opened(store.folder)
+
+
 def test_a_trial_comes_back_as_it_was_kept(store):
-    number = keep(store, "can:full_open", "can#2", values=(0.066, None))
+    values = (0.1 + 0.2, None)  # a number is kept to the last bit
+    number = keep(store, "can:full_open", "can#2", values=values)
     with Store.read(store.folder) as reader:
         kept = reader.trial(number)
     assert kept.result.features.features == (("p_first", "m"), ("f_steady", "N"))
-    assert kept.result.features.values == (0.066, None)
-    assert (kept.summary.label, kept.summary.instance, kept.summary.outcome) == (
-        "can:full_open",
-        "can#2",
-        "steady",
-    )
-    assert kept.record == ended(values=(0.066, None), label="can:full_open", instance="can#2")
-    assert kept.summary.simulated
-    assert kept.summary.device == "S1"
+    assert kept.result.features.values == values
+    summary = kept.summary
+    assert (summary.label, summary.instance, summary.outcome) == ("can:full_open", "can#2", "steady")
+    assert kept.record == ended(values=values, label="can:full_open", instance="can#2")
+    assert summary.simulated
+    assert summary.device == "S1"
     assert kept.recipe["controller"] == {"type": "graspsense/hybrid", "probing_force_n": 20.0}
     assert "object" not in kept.recipe["gripper"]
     assert kept.recording.is_file()
-
-
-def test_numbers_are_kept_to_the_last_bit(store):
-    values = (0.1 + 0.2, 5e-324)
-    assert store.trial(keep(store, values=values)).result.features.values == values
 
 
 def test_a_page_holds_the_newest_that_fit_newest_first(store):
@@ -130,32 +137,24 @@ def bytes_in(folder):
 
 def test_a_newer_store_is_refused_and_not_a_byte_of_it_changes(store):
     keep(store)
-    store.close()
-    path = store.folder / "store.sqlite"
-    connection = sqlite3.connect(path)
-    connection.execute(f"PRAGMA user_version = {schema.NEWEST + 1}")
-    connection.execute("ALTER TABLE trial ADD COLUMN mood TEXT")
-    connection.commit()
-    connection.close()
+    edited(
+        store,
+        f"PRAGMA user_version = {schema.NEWEST + 1}",
+        "ALTER TABLE trial ADD COLUMN mood TEXT",
+    )
     contents = bytes_in(store.folder)
-    for opened in (Store.open, Store.read):
-        with pytest.raises(ConfigError, match=f"version {schema.NEWEST + 1}.*Update graspsense") as told:
-            opened(store.folder)
-        assert told.value.exit_code == 2
+    assert_refused(store, ConfigError, f"version {schema.NEWEST + 1}.*Update graspsense")
     assert bytes_in(store.folder) == contents
 
 
 def test_a_newer_version_that_only_the_log_knows_is_refused(store):
     """Another program has just migrated it and is still open: the main file has the old number."""
     store.close()
-    writer = sqlite3.connect(store.folder / "store.sqlite")
-    writer.execute("PRAGMA wal_autocheckpoint = 0")
-    writer.execute(f"PRAGMA user_version = {schema.NEWEST + 1}")
-    writer.commit()
-    for opened in (Store.open, Store.read):
-        with pytest.raises(ConfigError, match="Update graspsense"):
-            opened(store.folder)
-    writer.close()
+    with closing(sqlite3.connect(store.folder / "store.sqlite")) as writer:
+        writer.execute("PRAGMA wal_autocheckpoint = 0")
+        writer.execute(f"PRAGMA user_version = {schema.NEWEST + 1}")
+        writer.commit()
+        assert_refused(store, ConfigError, "Update graspsense")
 
 
 def test_an_older_store_is_brought_up_to_date_with_all_that_is_in_it(tmp_path, monkeypatch):
@@ -201,37 +200,26 @@ def test_a_migration_that_fails_leaves_the_store_as_it_was(tmp_path, monkeypatch
 )
 def test_a_store_that_holds_more_or_less_than_ours_do_is_refused(store, statement):
     """A trigger would run at the next trial; nothing that a store brings along is run."""
-    store.close()
-    connection = sqlite3.connect(store.folder / "store.sqlite")
-    connection.execute(statement)
-    connection.commit()
-    connection.close()
-    for opened in (Store.open, Store.read):
-        with pytest.raises(DataDamaged, match="its tables are not those of version"):
-            opened(store.folder)
+    edited(store, statement)
+    assert_refused(store, DataDamaged, "its tables are not those of version")
 
 
-@pytest.mark.parametrize("content", [b"", b"a table of trials", b"SQLite format 3\0" + bytes(200)])
+def of_somebody_else():
+    with closing(sqlite3.connect(":memory:")) as connection:
+        connection.execute("CREATE TABLE trial (id)")
+        return connection.serialize()
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"a table of trials", b"SQLite format 3\0" + bytes(200), of_somebody_else()]
+)
 def test_what_is_no_store_is_told_and_left_alone(store, content):
     keep(store)
     store.close()
     path = store.folder / "store.sqlite"
     path.write_bytes(content)
-    for opened in (Store.open, Store.read):
-        with pytest.raises(DataDamaged, match=r"recover|not a store of graspsense"):
-            opened(store.folder)
+    assert_refused(store, DataDamaged, r"recover|not a store of graspsense")
     assert path.read_bytes() == content
-
-
-def test_somebody_else_s_sqlite_file_is_left_alone(tmp_path):
-    connection = sqlite3.connect(tmp_path / "store.sqlite")
-    connection.execute("CREATE TABLE trial (id)")
-    connection.commit()
-    connection.close()
-    original = (tmp_path / "store.sqlite").read_bytes()
-    with pytest.raises(DataDamaged, match="is not a store of graspsense"):
-        Store.open(tmp_path)
-    assert (tmp_path / "store.sqlite").read_bytes() == original
 
 
 def test_reading_makes_no_store(tmp_path):
@@ -347,22 +335,13 @@ def test_a_grasp_ends_as_it_would_have_when_the_disk_fills_up_under_it(mounted):
         assert recovered.ticks > 500
 
 
-@pytest.mark.parametrize(
-    ("word", "labels"),
-    [
-        ("can:full_open#2", {"label": "can:full_open", "instance": "can#2"}),
-        ("can:full_open", {"label": "can:full_open"}),
-        ("ball", {"label": "ball"}),
-    ],
-)
-def test_a_word_says_class_state_and_thing(word, labels):
-    assert labels_of(word) == labels
-
-
-@every_case("word", ["", "a b", "can:", "can:full:open", "unknown", "unknown:x", "#2"])
-def test_a_word_that_is_no_label_is_refused(word):
-    with pytest.raises(ConfigError, match="is not a label"):
-        labels_of(word)
+def test_a_word_says_class_state_and_thing():
+    assert labels_of("can:full_open#2") == {"label": "can:full_open", "instance": "can#2"}
+    assert labels_of("can:full_open") == {"label": "can:full_open"}
+    assert labels_of("ball") == {"label": "ball"}
+    for word in ("", "a b", "can:", "can:full:open", "unknown", "unknown:x", "#2"):
+        with pytest.raises(ConfigError, match="is not a label"):
+            labels_of(word)
 
 
 def test_the_file_is_readable_without_us(store):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 from cases import every_case
 from kept import frame, keep
 
@@ -12,13 +14,30 @@ from graspsense.store.time_recorded import order_recorded
 MADE = "2026-11-21T10:00:00+00:00"
 
 
-def test_imported_trials_are_ordered_by_the_time_of_their_recording():
-    stated = [
-        '{"recorded_at": "2020-05-02T12:00:00"}',
-        '{"recorded_at": "2020-05-02T11:00:00Z"}',
-        '{"recorded_at": "2020-05-03"}',
-    ]
-    assert order_recorded([MADE] * 3, ["import"] * 3, stated) == ((1, 0, 2), "")
+@every_case(
+    ("made", "origins", "stated", "order"),
+    [
+        # Imported trials have the order of their recording, or that by which a manifest numbers them.
+        (
+            [MADE] * 3,
+            ["import"] * 3,
+            ["2020-05-02T12:00:00", "2020-05-02T11:00:00Z", "2020-05-03"],
+            (1, 0, 2),
+        ),
+        ([MADE] * 2, ["import"] * 2, [{"order": "10"}, {"order": "9"}], (1, 0)),
+        *(([MADE], ["import"], [text], None) for text in ("yesterday", 5, "[]")),
+        # Other grasps have that of the time when they were made.
+        ([f"2026-11-21T10:00:0{s}+00:00" for s in (2, 1, 1)], ["run", "collect", "run"], [{}] * 3, (2, 0, 1)),
+    ],
+)
+def test_trials_are_ordered_by_the_time_of_their_recording(made, origins, stated, order):
+    labels = [json.dumps(label if isinstance(label, dict) else {"recorded_at": label}) for label in stated]
+    assert order_recorded(made, origins, labels)[0] == order
+
+
+@every_case("text", ["not JSON", "[]"])
+def test_labels_that_cannot_be_read_give_no_order(text):
+    assert order_recorded([MADE], ["import"], [text])[0] is None
 
 
 def test_the_order_of_an_import_is_not_that_of_recording():
@@ -26,21 +45,6 @@ def test_the_order_of_an_import_is_not_that_of_recording():
     assert order is None
     assert why.startswith("2 of 3 trials were imported without the time at which they were recorded")
     assert why.endswith("(the key recorded of a manifest)")
-
-
-def test_a_manifest_may_number_its_trials_instead():
-    stated = ['{"order": "10"}', '{"order": "9"}']
-    assert order_recorded([MADE] * 2, ["import"] * 2, stated) == ((1, 0), "")
-
-
-@every_case("text", ["not JSON", '{"recorded_at": "yesterday"}', '{"recorded_at": 5}', "[]"])
-def test_a_time_that_cannot_be_read_is_none(text):
-    assert order_recorded([MADE], ["import"], [text])[0] is None
-
-
-def test_grasps_are_ordered_by_the_time_they_were_made():
-    made = ["2026-11-21T10:00:02+00:00", "2026-11-21T10:00:01+00:00", "2026-11-21T10:00:01+00:00"]
-    assert order_recorded(made, ["run", "collect", "run"], ["{}"] * 3) == ((2, 0, 1), "")
 
 
 def test_a_store_of_imports_has_a_first_line_and_no_order(tmp_path):

@@ -6,19 +6,19 @@ import sys
 
 import pytest
 from attrs import frozen
+from cases import every_case
 from commands import graspsense
-from parts import ACCELERATION, CHANNELS_OF_HAND, Hand, HandConfig, channels
+from parts import ACCELERATION, CHANNELS_OF_HAND, Hand, HandConfig, channels, offering
 
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.settings.resolved import resolve
-from graspsense.plugin_api import Reading, SensorBackend, SensorBackendEntry, hookimpl, setting
+from graspsense.plugin_api import Reading, SensorBackend, SensorBackendEntry, setting
 from graspsense.recording.reader import read_recorded
 from graspsense.store.record_grasp import record_grasp
 from graspsense.store.store import Store
 
 HERE = sys.modules[__name__]
 PLAIN = ("classifier.type=none", "features.type=chitta")
-GRASPSENSE_API = (2, 0)
 
 
 @frozen(kw_only=True)
@@ -58,14 +58,15 @@ class Shortening(Hand, SensorBackend[ShorteningConfig]):
         return Reading(frame, pads, signals)
 
 
+def short(signals):
+    """Return samples of the acceleration with one number instead of three."""
+    return signals.acceleration._replace(values=((0.0,),) * 3)
+
+
 SPOILT = {
     "image": lambda frame, pads, signals: (frame, pads._replace(left=pads.left[:5]), signals),
     "cell": lambda frame, pads, signals: (frame, pads._replace(right=(None,) * 22), signals),
-    "rows": lambda frame, pads, signals: (
-        frame,
-        pads,
-        signals._replace(acceleration=signals.acceleration._replace(values=((0.0,),) * 3)),
-    ),
+    "rows": lambda frame, pads, signals: (frame, pads, signals._replace(acceleration=short(signals))),
     "frame": lambda frame, pads, signals: (frame._replace(edge_left_n=None), pads, signals),
     "status": lambda frame, pads, signals: (frame._replace(status=1 << 70), pads, signals),
     "signals": lambda frame, pads, signals: (frame, pads, ()),
@@ -89,19 +90,19 @@ class Thingless(Uncountable):
         super().apply(command)
 
 
-@hookimpl
-def graspsense_sensor_backends():
-    for cls in (Uncountable, Thingless, Shortening):
-        yield SensorBackendEntry(
-            name=cls.__name__.lower(), target=f"{__name__}:{cls.__name__}", summary="a hand"
-        )
+LAB_HAND = offering(
+    *(
+        SensorBackendEntry(name=cls.__name__.lower(), target=f"{__name__}:{cls.__name__}", summary="a hand")
+        for cls in (Uncountable, Thingless, Shortening)
+    )
+)
 
 
 @pytest.fixture(autouse=True)
 def plugins(monkeypatch):
     monkeypatch.setitem(sys.modules, __name__, HERE)
     with IsolatedPlugins() as plugins:
-        plugins.add(HERE, "lab-hand")
+        plugins.add(LAB_HAND, "lab-hand")
         yield plugins
 
 
@@ -149,13 +150,12 @@ def test_collect_neither_counts_it_nor_goes_on(tmp_path):
     assert numbers_in(folder) == []
 
 
-@pytest.mark.parametrize(
+@every_case(
     "command",
     [
         ("collect", "--labels", "cup:full,cup:empty", "--each", "1", "--save"),
         ("run", "--label", "cup:full", "--save"),
     ],
-    ids=["collect", "run"],
 )
 def test_a_simulated_gripper_that_cannot_be_told_what_it_holds_grasps_nothing_under_a_label(
     tmp_path, command
