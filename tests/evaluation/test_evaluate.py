@@ -1,7 +1,5 @@
 """What evaluate measures, on trials of which the truth is known."""
 
-from __future__ import annotations
-
 import json
 import re
 import warnings

@@ -1,7 +1,5 @@
 """`graspsense train --choose`, as a user types it, on a store of recordings of another program."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

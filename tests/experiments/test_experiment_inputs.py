@@ -1,7 +1,5 @@
 """Results are of the content of their inputs: what was replaced since is computed again, and nothing else."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

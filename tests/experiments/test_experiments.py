@@ -1,7 +1,5 @@
 """Experiments from a file: what it means, what is kept, what is done again."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """`plugins new`: what it makes, and what it refuses. `.ci/scaffolds` installs and tests every one of them."""
 
-from __future__ import annotations
-
 import importlib
 import itertools
 import re

@@ -1,7 +1,5 @@
 """The kit's checks of a whole distribution: each catches one that is broken in just that way."""
 
-from __future__ import annotations
-
 import json
 import zipfile
 from functools import partial

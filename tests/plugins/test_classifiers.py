@@ -3,8 +3,6 @@
 What the role itself asks for, such as valid probabilities and reasons that fit them, `test_our_parts` checks.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import subprocess

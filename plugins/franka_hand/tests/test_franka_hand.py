@@ -1,7 +1,5 @@
 """The driver with the emulated hand in the same process, the features of width and time, and the calibration."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The driver through pylibfranka against the emulated hand on the network of this machine, in real time."""
 
-from __future__ import annotations
-
 import socket
 import subprocess
 import sys

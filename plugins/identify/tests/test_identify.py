@@ -1,7 +1,5 @@
 """Identifying an object: a law that made the forces is found again, and what a recording cannot show is refused."""
 
-from __future__ import annotations
-
 import tomllib
 
 import numpy as np

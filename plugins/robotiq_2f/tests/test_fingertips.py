@@ -1,7 +1,5 @@
 """The protocol of the TSF-85 fingertips, and their emulator."""
 
-from __future__ import annotations
-
 import json
 import select
 import subprocess

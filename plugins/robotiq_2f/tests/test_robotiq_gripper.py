@@ -1,7 +1,5 @@
 """The driver against the emulated gripper, over every connection."""
 
-from __future__ import annotations
-
 import asyncio
 import subprocess
 import sys

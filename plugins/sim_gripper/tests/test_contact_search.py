@@ -1,7 +1,5 @@
 """The search for the balance of forces at the contact: it ends where a law is awkward, and says so where it cannot."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

@@ -1,7 +1,5 @@
 """Scenes of one's own: read strictly, held fast or free, explained, and with terms of somebody else's."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

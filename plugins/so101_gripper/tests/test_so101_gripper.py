@@ -1,7 +1,5 @@
 """The driver of the gripper's motor against the emulated arm."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
