@@ -74,11 +74,6 @@ def test_nothing_there_is_unknown(pipeline):
     ]
 
 
-def test_its_sets_are_calibrated_for_each_label():
-    assert KEPT["sets"]["unit"] == "instances"
-    assert {threshold_set["units"] for threshold_set in KEPT["sets"]["thresholds"].values()} == {1000}
-
-
 def test_a_grasp_has_predictions_while_it_goes_on_and_the_answer_of_the_whole_grasp(pipeline):
     events = []
     trial = pipeline.grasp(object="odwalla:full_closed", seed=5, on_event=events.append)
@@ -94,7 +89,9 @@ def test_a_grasp_has_predictions_while_it_goes_on_and_the_answer_of_the_whole_gr
     assert trial.prediction.model == trial.checkpoints[0].prediction.model.partition(", 0.")[0]
 
 
-def test_its_sets_at_the_checkpoints_are_calibrated():
+def test_its_sets_are_calibrated_for_each_label_and_at_the_checkpoints():
+    assert KEPT["sets"]["unit"] == "instances"
+    assert {threshold_set["units"] for threshold_set in KEPT["sets"]["thresholds"].values()} == {1000}
     for part in KEPT["checkpoints"]:
         assert part["sets"]["unit"] == "instances"
         assert part["trials"] > 100

@@ -93,14 +93,6 @@ def test_every_object_and_law_gives_one_trace_plain_and_compiled(number, control
         assert_same(run.trace, fast[seed].trace)
 
 
-@pytest.mark.slow
-def test_the_backend_gives_the_same_whatever_stands_beside_a_grasp():
-    backend = SimBackend(SimConfig(**TICK_BY_TICK))
-    alone = backend.run_many(HYBRID, ["toy"], [3], traces=True)[0].trace
-    among = backend.run_many(HYBRID, ["block", "toy"], [3, 3], traces=True)[1].trace
-    assert_same(alone, among)
-
-
 def test_as_many_seeds_as_scenes():
     with pytest.raises(ValueError, match="2 scenes and 1 seeds"):
         run_many(SimConfig(), HYBRID, ["block", "toy"], [1])

@@ -17,7 +17,7 @@ from graspsense_sim_gripper.scene.terms.loss import Loss
 from graspsense_sim_gripper.scene.terms.maxwell import Maxwell, MaxwellState, maxwell
 from graspsense_sim_gripper.scene.terms.oscillator import Forcing, OscillatorState, moved
 from graspsense_sim_gripper.scene.terms.registry import TERMS
-from graspsense_sim_gripper.scene.terms.rigid import Rigid, RigidState, rigid
+from graspsense_sim_gripper.scene.terms.rigid import Rigid
 from graspsense_sim_gripper.scene.terms.slosh import Slosh, slosh
 from graspsense_sim_gripper.scene.terms.snap import Snap
 from graspsense_sim_gripper.scene.terms.surface import Surface, surface
@@ -53,17 +53,6 @@ def test_a_softening_shell_is_the_cubic_first_and_always_rises(k1, end_mm, d_mm)
     assert shell_force(k1, k3, -d) == -force
     # A worn shell that has not worn has the same law.
     assert worn(Worn(k1, k3, 1.0, 0.0, 0.0), WornState(0.0, 0.0), d, d, 1e-3, 0.0)[0] == force
-
-
-def test_rigid_is_hertz_until_it_breaks_and_stays_broken():
-    shell = Rigid(8e6, 30.0, 100.0)
-    force, state = rigid(shell, RigidState(0), 0.0, 2e-4, 1e-3, 2e-4 / 1e-3)
-    assert (force, state.broken) == (pytest.approx(8e6 * (2e-4) ** 1.5), 0)
-    _, state = rigid(shell, state, 2e-4, 3e-4, 1e-3, (3e-4 - 2e-4) / 1e-3)
-    assert state.broken == 1
-    force, state = rigid(shell, state, 3e-4, 1e-2, 1e-3, (1e-2 - 3e-4) / 1e-3)
-    assert force == pytest.approx(1.0)
-    assert rigid(shell, state, 1e-2, 1e-5, 1e-3, (1e-5 - 1e-2) / 1e-3)[1].broken == 1
 
 
 def test_maxwell_follows_its_exact_solution_whatever_the_step():
