@@ -81,12 +81,6 @@ def test_fingers_that_close_on_nothing_have_no_features_and_say_why():
     assert set(trial.features.reasons) == set(trial.features.names)
 
 
-def test_features_that_need_a_force_are_refused_with_that_reason():
-    with pytest.raises(WiringError, match="force_left") as refused:
-        load_pipeline("franka", options=["features.type=chitta"])
-    assert "which gripper graspsense-franka-hand/franka does not have" in str(refused.value)
-
-
 def test_less_than_the_least_force_is_refused_before_anything_moves():
     with pytest.raises(WiringError, match="30 N"):
         load_pipeline("franka", options=["controller.approach_force_n=10"])
