@@ -158,18 +158,13 @@ def test_trees_and_answers(name):
 @pytest.mark.parametrize("sets", [SMALL, pytest.param(SETS, marks=pytest.mark.slow)], ids=["small", "all"])
 def test_text_is_j48s(sets):
     for name in sets:
-        assert_same_texts(name)
-
-
-def assert_same_texts(name):
-    question = asked(name)
-    dumps = [(variant, question.answer(variant, "text")) for variant in VARIANTS]
-    dumps = [(variant, dump) for variant, dump in dumps if dump is not None]
-    assert dumps
-    for variant, dump in dumps:
-        body = dump.split("------------------\n", 1)[1]
-        if isinstance(question.table.schema.classes[0], str):
-            assert to_text(fitted(name, variant)) == body, (name, variant)
+        question = asked(name)
+        texts = {variant: question.answer(variant, "text") for variant in VARIANTS}
+        assert any(texts.values())
+        for variant, text in texts.items():
+            if text is not None and isinstance(question.table.schema.classes[0], str):
+                body = text.split("------------------\n", 1)[1]
+                assert to_text(fitted(name, variant)) == body, (name, variant)
 
 
 @every_case("name", SETS)
@@ -211,20 +206,17 @@ def test_folds_are_wekas(name):
         assert [fold.train.tolist() for fold in folds] == question.oracle["folds"]["train_order"]
 
 
-@every_case("name", SMALL)
-def test_cross_validation_on_small_sets(name):
-    assert check_cross_validation(name, ["default", "rep"]) >= 1
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(
-    "variants",
-    [FOR_CV, pytest.param(list(VARIANTS), marks=pytest.mark.long)],
-    ids=["one of each pruning", "all"],
+    ("names", "variants"),
+    [
+        pytest.param(SMALL, ["default", "rep"], id="small sets"),
+        pytest.param(WITH_CV, FOR_CV, id="one of each pruning", marks=pytest.mark.slow),
+        pytest.param(WITH_CV, list(VARIANTS), id="all", marks=pytest.mark.long),
+    ],
 )
-@pytest.mark.parametrize("name", WITH_CV)
-def test_cross_validation(name, variants):
-    assert check_cross_validation(name, variants) >= 1
+def test_cross_validation(names, variants):
+    for name in names:
+        assert check_cross_validation(name, variants) >= 1
 
 
 def test_where_j48_never_ends_ours_does():
