@@ -112,11 +112,6 @@ def test_of_many_recordings_thirty_of_as_many_objects_as_possible_are_used():
     assert len(notes) == 1
 
 
-def test_a_recording_without_contact_is_refused():
-    with pytest.raises(ConfigError, match="nothing was touched"):
-        prepared(recorded(lambda closure: 0.0 * closure), 0.0)
-
-
 @every_case("seed", range(5))
 def test_the_noise_of_pads_that_touch_nothing_is_no_squeeze(seed):
     noisy = recorded(lambda closure: 0.01 * np.random.default_rng(seed).standard_normal(len(closure)))

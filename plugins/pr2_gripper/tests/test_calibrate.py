@@ -69,18 +69,14 @@ def opened(**settings):
     return info
 
 
-def test_file_of_another_serial_is_refused(shell, tmp_path):
+def test_changed_file_and_that_of_another_serial_are_refused(shell, tmp_path):
     shell("calibrate tare", "-o", 'gripper.serial="R2"')
     (tmp_path / "EMULATED").mkdir()
-    (tmp_path / "R2" / "tare.json").rename(tmp_path / "EMULATED" / "tare.json")
+    path = (tmp_path / "R2" / "tare.json").rename(tmp_path / "EMULATED" / "tare.json")
     code, _, err = shell("run")
     assert code == 2
     assert "serial was 'R2' and is 'EMULATED'" in err
 
-
-def test_changed_file_is_damaged(shell, tmp_path):
-    shell("calibrate tare")
-    path = tmp_path / "EMULATED" / "tare.json"
     content = json.loads(path.read_text())
     content["data"]["left"][8] += 1.0
     path.write_text(json.dumps(content))

@@ -157,12 +157,9 @@ def host_times(rate, seconds, jump_s=0.0):
     return float("inf")
 
 
-@pytest.mark.parametrize(("rate", "within_s"), [(1.3, 4.01), (2.0, 2.6), (100.0, 2.01)])
-def test_fast_clock_is_found_in_a_few_seconds(rate, within_s):
-    assert host_times(rate, 5.0) < within_s
-
-
-def test_jump_of_more_than_half_a_second_is_found_at_once():
+def test_fast_clock_is_found_in_a_few_seconds_and_a_jump_of_half_a_second_at_once():
+    for rate, within_s in ((1.3, 4.01), (2.0, 2.6), (100.0, 2.01)):
+        assert host_times(rate, 5.0) < within_s, rate
     assert host_times(1.0, 5.0, jump_s=0.51) == pytest.approx(3.501)
     assert host_times(1.0, 5.0, jump_s=0.49) == float("inf")
 

@@ -2,11 +2,9 @@
 
 import gc
 import threading
-from collections.abc import Callable
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
 from cases import every_case
@@ -25,8 +23,6 @@ from graspsense_pr2_gripper.emulator.board import emulate
 from graspsense_pr2_gripper.protocol import EFFORT_KIND, OWN_LIMIT, OutputReport, encode_output
 from graspsense_pr2_gripper.udev import hidraw_rule
 
-Doctor = Callable[..., tuple[int, dict[str, dict[str, Any]]]]
-
 
 @pytest.fixture
 def doctor(monkeypatch):
@@ -44,9 +40,6 @@ def doctor(monkeypatch):
         return done.returncode, {finding["subject"]: finding for finding in ours["findings"]}
 
     return run
-
-
-Powered = Callable[[Any], AbstractContextManager[None]]
 
 
 @pytest.fixture

@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from cases import every_case
 
 from graspsense.gripper_api import LoadTable, TareRefused, gap_and_rate, revolutions_at
 from graspsense.plugin_api import Pads
@@ -82,7 +83,7 @@ def test_counts_per_newton_are_the_devices_own(device_identity):
     assert (frame.force_left_n, frame.edge_left_n, frame.edge_right_n) == pytest.approx((1.0, 1.0, 0.5))
 
 
-@pytest.mark.parametrize("dead", [0x0000, 0xFFFF])
+@every_case("dead", [0x0000, 0xFFFF])
 def test_cell_that_does_not_answer_adds_no_force_and_is_flagged(dead, device_identity):
     measure = tared(device_identity())
     frame = measure.reading(report(), raw(image(9, left={7: 1600}), 12, dead)).frame
@@ -91,17 +92,12 @@ def test_cell_that_does_not_answer_adds_no_force_and_is_flagged(dead, device_ide
     assert measure.bad_cells == 1
 
 
-def test_whole_tip_that_does_not_answer_has_no_force(device_identity):
-    measure = tared(device_identity())
+def test_whole_tip_that_does_not_answer_or_that_the_board_misses_has_no_force(device_identity):
     dead = RawImage(9, 0, (0.0,) * 22 + tuple(TIP))
-    frame = measure.reading(report(), dead).frame
-    assert math.isnan(frame.force_left_n)
-    assert frame.force_right_n == pytest.approx(0.0)
-
-
-def test_board_that_misses_a_fingertip_gives_it_no_force(device_identity):
-    frame = tared(device_identity()).reading(report(status=LEFT_ABSENT), image(9)).frame
-    assert math.isnan(frame.force_left_n)
+    for told, cells in ((report(), dead), (report(status=LEFT_ABSENT), image(9))):
+        frame = tared(device_identity()).reading(told, cells).frame
+        assert math.isnan(frame.force_left_n)
+        assert frame.force_right_n == pytest.approx(0.0)
     swapped = tared(device_identity(), Pr2Config(swap_fingers=True))
     frame = swapped.reading(report(status=LEFT_ABSENT), image(9)).frame
     assert math.isnan(frame.force_right_n)
