@@ -484,7 +484,7 @@ def test_an_experiment_does_not_write_into_a_store(file, tmp_path):
 
 
 def test_more_folds_than_recorded_trials_are_refused_before_any_task(file):
-    with pytest.raises(ConfigError, match="judge.folds: 1000 folds of 40 trials"):
+    with pytest.raises(ConfigError, match=r"judge\.folds: 1000 folds of 40 trials"):
         read_experiment(str(file), ['sweep={"judge.folds"=[1000]}'])
 
 

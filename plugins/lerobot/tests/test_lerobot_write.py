@@ -1,10 +1,7 @@
 """A store written as a LeRobot data set v3.0: what others read of it, and that it is the same trials when read back."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -33,17 +30,17 @@ def written(tmp_path_factory):
     return folder / "out", folder / "s"
 
 
-def table_of(path: Path) -> Any:
+def table_of(path):
     import pandas as pd
 
     return pd.read_parquet(path)
 
 
-def frames(folder: Path) -> Any:
+def frames(folder):
     return table_of(folder / "data/chunk-000/file-000.parquet")
 
 
-def info(folder: Path) -> dict:
+def info(folder):
     return json.loads((folder / "meta/info.json").read_text())
 
 
@@ -214,11 +211,11 @@ def annotated(request, tmp_path_factory):
     return request.param, folder
 
 
-def contents(folder: Path) -> dict[str, bytes]:
+def contents(folder):
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def all_frames(folder: Path) -> Any:
+def all_frames(folder):
     import pandas as pd
 
     return pd.concat([table_of(path) for path in sorted((folder / "data").rglob("*.parquet"))])

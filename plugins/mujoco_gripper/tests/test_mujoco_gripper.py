@@ -1,7 +1,5 @@
 """Grasps with grippers that MuJoCo models describe, checked against what the mechanics give by hand. Simulated."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

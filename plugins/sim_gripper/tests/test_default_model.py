@@ -1,7 +1,5 @@
 """The models that come with the simulator: what they say, and that their commands make them again."""
 
-from __future__ import annotations
-
 import json
 import shlex
 import subprocess
@@ -171,7 +169,7 @@ def test_what_is_printed_holds_on_a_thousand_new_grasps(name):
 
 
 @pytest.mark.slow
-def test_its_command_makes_it_again(tmp_path: Path) -> None:
+def test_its_command_makes_it_again(tmp_path):
     """All but its prediction sets and what is said at checkpoints: these need ten times as many grasps."""
     again = tmp_path / "default.json"
     words = shlex.split(KEPT["provenance"]["command"])
