@@ -78,6 +78,7 @@ class TestEvery:
         classifier.from_json(json.loads(json.dumps(learned_with_gaps.to_json(), allow_nan=False)))
 
         assert (classifier.probabilities(table) == learned_with_gaps.probabilities(table)).all()
+        assert classifier.explain(table.row(0)) == learned_with_gaps.explain(table.row(0))
         assert classifier.to_json() == learned_with_gaps.to_json()
         assert rate(classifier, table, labels) > 0.75
         row = Features(

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from attrs import evolve, frozen
-from random_scenes import error_of, record_of
+from random_scenes import record_of
 
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.learn.checkpoints import with_checkpoints
@@ -30,7 +30,6 @@ from graspsense_sim_gripper.run.accuracy.probe import grip_of
 from graspsense_sim_gripper.run.accuracy.propose import propose
 from graspsense_sim_gripper.run.accuracy.select import select
 from graspsense_sim_gripper.run.backend import SimBackend, default_controller
-from graspsense_sim_gripper.run.batch import run_many
 from graspsense_sim_gripper.run.batch.job import Job, grasp_plain
 from graspsense_sim_gripper.run.build import Problem, instantiate
 from graspsense_sim_gripper.run.problem import GraspController
@@ -168,18 +167,6 @@ def test_features_at_checkpoints_are_verified_as_those_of_the_whole_grasp():
     model = selected(NEAR, thing(SHELL), evolve(hybrid(), features=features))
     assert model.verification is not None
     assert model.not_verified == ()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["toy", "can:empty_open"])
-def test_the_model_of_a_single_instance_is_as_accurate_as_requested(name):
-    config, law = SimConfig(object=name, spread=False, sensor="ideal"), create("controller", "hybrid")
-    model, other = (
-        run_many(evolve(config, fidelity=fidelity), law, [name], [0], compiled=False)[0]
-        for fidelity in ("scene", "reference")
-    )
-    error, quantity = error_of(model, other)
-    assert error <= config.accuracy, quantity
 
 
 @pytest.mark.slow

@@ -37,19 +37,6 @@ def assert_same(trace, other):
         np.testing.assert_allclose(columns(other)[name], column, rtol=1e-9, atol=1e-15, err_msg=name)
 
 
-# Slow where nothing is kept yet: the loop is compiled, which takes half a minute of processor.
-@pytest.mark.slow
-@pytest.mark.parametrize(("scene", "sensor"), [("can:empty_open", "ideal"), ("none", "pads")])
-def test_runner_plain_loop_and_compiled_loop_give_one_trace(scene, sensor):
-    config = SimConfig(object=scene, sensor=sensor, **TICK_BY_TICK)
-    run = run_grasp(SimBackend(config), HYBRID, RunConfig(seed=5))
-    plain = run_many(config, HYBRID, [scene], [5], compiled=False)[0]
-    fast = run_many(config, HYBRID, [scene], [5], compiled=True)[0]
-    assert run.outcome == plain.outcome == fast.outcome
-    assert_same(run.trace, plain.trace)
-    assert_same(run.trace, fast.trace)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("sensor", ["pads", "ideal"])
 def test_with_steps_over_several_ticks_the_plain_loop_and_the_compiled_loop_give_one_trace(sensor):

@@ -8,7 +8,6 @@ from textwrap import dedent
 
 import numpy as np
 import pytest
-from attrs import evolve
 from cases import every_case
 from click.testing import CliRunner
 from unverified import sample, unverified_setup
@@ -189,61 +188,6 @@ def test_a_file_that_is_not_there_and_a_name_that_nothing_has(tmp_path):
         find(str(tmp_path / "nope.toml"))
     with pytest.raises(UnknownName, match=r"no object named 'spong'.*sponge.*Did you mean 'sponge'\?"):
         find("spong")
-
-
-def pressed(config, effort_n, seconds, **changes):
-    """Press with this effort for so long; return the setup and the plant at each millisecond."""
-    setup = unverified_setup(config, changes.pop("scene"), 0)
-    move, body, bodies = plant_move(laws_of(setup.kinds)), setup.state, []
-    for _ in range(round(seconds / setup.dt_s)):
-        body = move(setup.plant, body, effort_n, setup.dt_s)
-        bodies.append(body)
-    return setup, bodies
-
-
-@pytest.mark.slow
-def test_an_object_held_fast_is_pressed_by_the_finger_that_meets_it_first(scene):
-    text = "width_m = 0.06\noffset_m = 0.002\n{}[[terms]]\ntype = 'elastic'\nk1_n_m = 2000.0\n"
-    config = SimConfig(
-        spread=False, coulomb_n=0.0, breakaway_n=0.0, load_friction_coefficient=0.0, damping_n_s_m=1000.0
-    )
-    _, fast = pressed(config, 10.0, 6.0, scene=scene(text.format("held = true\n")))
-    end = fast[-1]
-    # Each half is twice as stiff as the whole; effort is the mean of the two pads.
-    difference_n = end.contact.right_n - end.contact.left_n
-    assert difference_n == pytest.approx(2000.0 * 4 * 0.002 / (1 + 2000.0 / 1.5e4), rel=1e-3)
-    assert 0.5 * (end.contact.left_n + end.contact.right_n) == pytest.approx(10.0, rel=1e-2)
-    assert end.contact.offset_m == pytest.approx(0.002)
-    _, free = pressed(config, 10.0, 6.0, scene=scene(text.format("")))
-    assert free[-1].contact.left_n == free[-1].contact.right_n == pytest.approx(10.0, rel=1e-2)
-    assert free[-1].contact.offset_m == 0.0
-
-
-def test_a_drive_that_lags_gives_its_effort_as_a_first_order_rise(scene):
-    quick = SimConfig(spread=False, coulomb_n=0.0, breakaway_n=0.0, damping_n_s_m=0.0)
-    lagging = evolve(quick, drive_lag_s=0.05, rate_hz=100.0)
-    _, at_once = pressed(quick, 2.0, 0.2, scene=scene(BOTTLE))
-    _, later = pressed(lagging, 2.0, 0.2, scene=scene(BOTTLE))
-    # Impulse of 1 - exp(-t / tau) over 0.2 s: 0.2 - 0.05 (1 - exp(-4)).
-    ratio = later[-1].motion.speed_rev_s / at_once[-1].motion.speed_rev_s
-    assert ratio == pytest.approx((0.2 - 0.05 * 0.9817) / 0.2, rel=2e-3)
-    assert later[-1].effort_n == pytest.approx(2.0 * 0.9817, rel=1e-3)
-
-
-@pytest.mark.slow
-def test_covers_that_creep_give_way_and_covers_that_damp_lower_no_force_at_rest(scene):
-    hard = scene("width_m = 0.03\n[[terms]]\ntype = 'rigid'\nhertz_n_m15 = 1e10\n")
-    plain = SimConfig(
-        spread=False, coulomb_n=0.0, breakaway_n=0.0, load_friction_coefficient=0.0, damping_n_s_m=2000.0
-    )
-    creeping = evolve(plain, pad_creep_n_m=1e5, pad_creep_s=0.5, pad_damping_n_s_m=500.0)
-    _, stiff = pressed(plain, 20.0, 8.0, scene=hard)
-    _, soft = pressed(creeping, 20.0, 20.0, scene=hard)
-    assert soft[-1].contact.left.force_n == pytest.approx(20.0, rel=1e-2)
-    # The arm has let go: the gap is where the spring alone leaves it, and got there later.
-    assert soft[-1].motion.gap_m == pytest.approx(stiff[-1].motion.gap_m, abs=2e-5)
-    touched_from = next(k for k, b in enumerate(soft) if b.contact.touched)
-    assert soft[touched_from + 300].motion.gap_m > stiff[touched_from + 300].motion.gap_m + 1e-4
 
 
 def test_a_bottle_with_a_deep_snap_stays_dented(scene):

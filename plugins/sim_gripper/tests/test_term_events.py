@@ -119,16 +119,6 @@ def test_a_body_that_breaks_has_the_accuracy_that_is_asked_for(scene):
     assert rms_error(*grasps) <= 0.01
 
 
-def test_a_shell_snaps_at_its_critical_compression():
-    # Pads softer than the falling part of 20 kN/m, so that the shell jumps across it.
-    shell = {"snap": {"k1_n_m": 5e3, "critical_m": 2e-3, "drop_n": 8.0, "fall_m": 4e-4, "k2_n_m": 100.0}}
-    state, forces = pressed(shell, seconds=0.3, effort_n=40.0)
-    assert state.peak_n == pytest.approx(10.0, rel=1e-5)
-    assert state.contact.left.states[0].part == 2
-    assert state.step.unresolved + state.contact.unbalanced == 0
-    assert forces[-1] < 5.0
-
-
 @pytest.mark.parametrize(
     "event", ["parting", *(pytest.param(event, marks=pytest.mark.slow) for event in ("breaking", "snapping"))]
 )
