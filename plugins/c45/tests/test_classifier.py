@@ -90,13 +90,6 @@ def test_labels_come_back_as_they_were(names):
     ]
 
 
-def test_integer_labels_are_classes_not_quantities():
-    classifier = graspsense_c45.C45Classifier().fit([[0.0], [1.0], [2.0]] * 4, [1, 5, 9] * 4)
-    assert classifier.predict([[1.0]]).tolist() == [5]
-    with pytest.raises(ValueError, match="continuous"):
-        classifier.fit([[0.0], [1.0]], [0.5, 1.25])
-
-
 def test_declared_classes_enter_the_tree():
     x, y = np.arange(20.0)[:, None], np.array(["b"] * 10 + ["a"] * 10)
     classifier = graspsense_c45.C45Classifier(classes=["c", "b", "a"]).fit(x, y)

@@ -150,10 +150,17 @@ def test_simulated_trials_are_written(tmp_path):
     assert ":" in table_of(tmp_path / "out/meta/tasks.parquet").index[0]
 
 
-def test_an_existing_folder_is_not_written_to(written):
-    done = graspsense("export", written[1], "--to", f"lerobot:{written[0]}")
+def assert_refused(source, target, word):
+    """Assert that the export of a store to this data set is wrong use, told with this word."""
+    done = graspsense("export", source, "--to", f"lerobot:{target}")
     assert done.returncode == 2
-    assert "already exists" in done.stderr
+    assert word in done.stderr
+
+
+def test_an_existing_folder_and_a_single_trial_are_no_data_set(written, tmp_path):
+    assert_refused(written[1], written[0], "already exists")
+    for trial in ("#1", "#2"):
+        assert_refused(f"{written[1]}{trial}", tmp_path / "out", "folder of a store")
 
 
 def test_nothing_is_left_of_an_export_that_fails(written, tmp_path):
@@ -164,13 +171,6 @@ def test_nothing_is_left_of_an_export_that_fails(written, tmp_path):
     next((store / "recordings").glob("*.mcap")).write_bytes(b"damaged")
     assert graspsense("export", store, "--to", f"lerobot:{tmp_path / 'out'}").returncode in (2, 5)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["s"]
-
-
-@pytest.mark.parametrize("source", ["#1", "#2"])
-def test_a_single_trial_is_no_data_set(written, tmp_path, source):
-    done = graspsense("export", f"{written[1]}{source}", "--to", f"lerobot:{tmp_path / 'out'}")
-    assert done.returncode == 2
-    assert "folder of a store" in done.stderr
 
 
 def test_an_episode_of_an_array_feature_is_read(tmp_path):
@@ -267,9 +267,7 @@ def test_an_annotated_copy_reads_as_the_original(annotated):
 
 def test_trials_of_another_origin_annotate_nothing(tmp_path):
     original = write_set(tmp_path / "set", 3)
-    done = graspsense("export", SAMPLES, "--to", f"lerobot:{tmp_path / 'copy'}?annotate={original}")
-    assert done.returncode == 2
-    assert "imported" in done.stderr
+    assert_refused(SAMPLES, f"{tmp_path / 'copy'}?annotate={original}", "imported")
     assert not (tmp_path / "copy").exists()
 
 
@@ -285,9 +283,7 @@ def test_an_annotation_takes_the_place_of_an_earlier_one(annotated, tmp_path):
 def test_the_trials_of_another_data_set_annotate_nothing(annotated, tmp_path):
     version, folder = annotated
     other = write_set(tmp_path / "other", version, [episode(), episode(2, peak=3.5), episode() * 0.9])
-    done = graspsense("export", folder / "s", "--to", f"lerobot:{tmp_path / 'wrong'}?annotate={other}")
-    assert done.returncode == 2
-    assert "data sets differ" in done.stderr
+    assert_refused(folder / "s", f"{tmp_path / 'wrong'}?annotate={other}", "data sets differ")
     assert not (tmp_path / "wrong").exists()
 
 
@@ -295,9 +291,7 @@ def test_a_copy_within_the_original_is_refused(annotated):
     _, folder = annotated
     original = folder / "set"
     unchanged = contents(original)
-    done = graspsense("export", folder / "s", "--to", f"lerobot:{original / 'copy'}?annotate={original}")
-    assert done.returncode == 2
-    assert "not changed" in done.stderr
+    assert_refused(folder / "s", f"{original / 'copy'}?annotate={original}", "not changed")
     assert contents(original) == unchanged
 
 
