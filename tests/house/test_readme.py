@@ -41,12 +41,6 @@ def test_python_example_runs_on_the_pipeline_example(pipeline_file):
     assert done.stdout.startswith("steady {'p_first': 0.0")
 
 
-def test_every_command_that_the_readme_names_exists():
-    named = {line.split()[1] for line in re.findall(r"`(graspsense [^`]+)`", README)}
-    assert {"run", "plugins", "config", "devices"} <= named
-    assert named - {"--help"} <= set(COMMANDS)
-
-
 SAMPLES = ROOT / "samples"
 ENDED_BY_A_FAULT = 4
 MINUTES = ("experiment ", "tradeoff ", "compare simulated", "evaluate simulated", "train simulated", "hold ")
