@@ -1,7 +1,5 @@
 """Choosing a classifier with its features: the right one where it is known, and a rate that is not raised by it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy

@@ -1,7 +1,5 @@
 """The best of several candidates: who is called worse, and the rate of the chosen one, where the truth is known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy

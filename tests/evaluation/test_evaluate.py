@@ -1,7 +1,5 @@
 """What evaluate measures, on trials of which the truth is known."""
 
-from __future__ import annotations
-
 import json
 import re
 import warnings
@@ -9,6 +7,7 @@ import warnings
 import numpy as np
 import pytest
 from attrs import evolve
+from cases import every_case
 from repository import ROOT
 
 from graspsense.core.components.registry import installed
@@ -178,17 +177,24 @@ def test_instances_that_are_no_other_objects_are_noted():
         )
 
 
-@pytest.mark.parametrize("leak", [True, False])
-def test_what_is_known_before_the_contact_is_a_warning_only_where_it_tells(leak):
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("before_contact", "from before contact"),
+        pytest.param("first_line", "from the first line of the recording", marks=pytest.mark.slow),
+    ],
+)
+@every_case("leak", [True, False])
+def test_what_is_known_before_the_contact_is_a_warning_only_where_it_tells(name, says, leak):
     labels, width, force = four_states()
-    rng = np.random.default_rng(2)
-    posture = (width if leak else rng.normal(size=120)) + 0.0
+    posture = width if leak else np.random.default_rng(2).normal(size=120)
     control = ControlFeatures(table=table(posture, names=("posture",)), what="posture before the grasp")
-    evaluation = judged(labelled(labels, width, force, before_contact=control), folds=10)
+    evaluation = judged(labelled(labels, width, force, **{name: control}), folds=10)
 
-    assert any("before contact" in warning for warning in evaluation.warnings) is leak
-    assert evaluation.controls["before_contact"].what == "posture before the grasp"
-    assert (evaluation.controls["before_contact"].rate.rate > 0.4) is leak
+    assert any(says in warning for warning in evaluation.warnings) is leak
+    assert evaluation.controls[name].what == "posture before the grasp"
+    assert (evaluation.controls[name].rate.rate > 0.4) is leak
+    assert ("The first line of the recording alone" in verdict(evaluation)) is (leak and name == "first_line")
 
 
 def control_of(values, **more):
@@ -232,18 +238,6 @@ def test_too_few_trials_with_a_feature_are_not_measured():
     assert control.reason == "1 of 120 trials have such features; these are too few to learn from"
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("leak", [True, False])
-def test_the_first_line_of_imported_recordings_is_a_control_of_its_own(leak):
-    labels, width, force = four_states()
-    gap = width if leak else np.random.default_rng(3).normal(size=120)
-    control = ControlFeatures(table=table(gap, names=("gap_first",)), what="the first frame")
-    evaluation = judged(labelled(labels, width, force, first_line=control))
-    assert any("from the first line of the recording" in warning for warning in evaluation.warnings) is leak
-    assert ("The first line of the recording alone" in verdict(evaluation)) is leak
-    assert "first_line" not in judged(labelled(labels, width, force)).controls
-
-
 @pytest.mark.parametrize("squeeze_adds", [True, False])
 def test_a_width_that_is_as_good_as_all_features_is_a_warning(squeeze_adds):
     rng = np.random.default_rng(4)
@@ -260,6 +254,7 @@ def test_what_cannot_be_measured_is_null_with_a_reason():
     evaluation = to_json(judged(labelled(labels, width, force, no_instances="one thing a class")))
 
     assert evaluation["protocol"] == "stratified_4_fold"
+    assert "first_line" not in evaluation["controls"]
     assert evaluation["controls"]["instance_held_out"]["rate"] is None
     assert evaluation["controls"]["instance_held_out"]["reason"] == "one thing a class"
     for name in ("before_contact", "width_only", "recording_order"):

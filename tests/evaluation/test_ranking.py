@@ -1,7 +1,5 @@
 """Classifiers and feature sets on the same folds: who is best, equivalent, undecided or worse."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Numbers to predict: a force at break, a fill level. Training, prediction and evaluation with controls."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math

@@ -1,9 +1,5 @@
 """`graspsense train --choose`, as a user types it, on a store of recordings of another program."""
 
-from __future__ import annotations
-
-import json
-
 import numpy as np
 import pytest
 from commands import graspsense
@@ -48,6 +44,13 @@ def store(tmp_path_factory):
     return folder / "store"
 
 
+def choice_of(trials, folder, *given):
+    """Train the best candidate on the trials, and return what is said of the choice."""
+    done = graspsense("train", trials, "--choose", *given, "--out", folder / "own.json", "--json")
+    assert done.returncode == 0, done.stderr
+    return done.json["choice"]
+
+
 def runs(store, pipeline):
     code, out, err = graspsense(
         "run", "--pipeline", pipeline, "--gripper", "replay", "-o", f"gripper.recording=store:{store}#1"
@@ -72,9 +75,7 @@ def runs(store, pipeline):
     ],
 )
 def test_among_all_candidates_one_that_knows_the_hold_is_chosen(store, tmp_path, given, least):
-    code, out, err = graspsense("train", store, "--choose", *given, "--out", tmp_path / "own.json", "--json")
-    assert code == 0, err
-    choice = json.loads(out)["choice"]
+    choice = choice_of(store, tmp_path, *given)
 
     assert choice["rate"]["rate"] >= 0.9
     assert choice["rate"]["instances"] == 8
@@ -97,15 +98,13 @@ def test_the_text_names_the_pipeline_and_the_procedure(store, tmp_path):
 
 @pytest.mark.slow
 def test_components_that_are_given_stay_run_on_a_recording_and_are_not_replaced(store, tmp_path):
-    given = ("train", store, "--choose", "-o", "features.type=curve", "--classifier", "knn")
-    code, out, err = graspsense(*given, "--out", tmp_path / "own.json", "--json")
-    assert code == 0, err
-    (candidate,) = json.loads(out)["choice"]["ranking"]["candidates"]
+    given = ("-o", "features.type=curve", "--classifier", "knn")
+    (candidate,) = choice_of(store, tmp_path, *given)["ranking"]["candidates"]
 
     assert (candidate["classifier"], candidate["features"]) == ("knn", "curve")
     runs(store, tmp_path / "own.toml")
     (tmp_path / "own.json").unlink()
-    code, _, err = graspsense(*given, "--out", tmp_path / "own.json")
+    code, _, err = graspsense("train", store, "--choose", *given, "--out", tmp_path / "own.json")
     assert code == 2
     assert "own.toml" in err
 
@@ -124,13 +123,9 @@ def test_a_table_has_its_features_and_gets_no_pipeline(tmp_path):
     lines = ["what,thing,f [N]"]
     lines += [f"l{k % 2},l{k % 2}#{k % 12},{k % 2 + 0.1 * rng.normal():.4f}" for k in range(48)]
     (tmp_path / "t.csv").write_text("\n".join(lines) + "\n")
-    code, out, err = graspsense(
-        "train", tmp_path / "t.csv", "--label", "what", "--instance", "thing", "--choose", "--classifier", "c45",
-        "--out", tmp_path / "own.json", "--json",
-    )  # fmt: skip
-    assert code == 0, err
-
-    assert json.loads(out)["choice"]["rate"]["correct"] >= 46
+    columns = ("--label", "what", "--instance", "thing")
+    choice = choice_of(tmp_path / "t.csv", tmp_path, *columns, "--classifier", "c45")
+    assert choice["rate"]["correct"] >= 46
     assert not (tmp_path / "own.toml").exists()
 
 
@@ -158,9 +153,7 @@ def test_options_that_do_not_go_with_it(store, tmp_path, option):
 @pytest.mark.slow
 def test_recordings_without_contact_are_told_apart_by_the_features_that_need_none(store, tmp_path):
     given = ("-o", "features.contact_force_n=15", "--classifier", "extra-trees", "-o", "classifier.trees=10")
-    code, told, err = graspsense("train", store, "--choose", *given, "--out", tmp_path / "own.json", "--json")
-    assert code == 0, err
-    choice = json.loads(told)["choice"]
+    choice = choice_of(store, tmp_path, *given)
 
     assert {candidate["features"] for candidate in choice["ranking"]["candidates"]} == {"quant"}
     assert choice["rate"]["rate"] >= 0.9
@@ -170,11 +163,7 @@ def test_recordings_without_contact_are_told_apart_by_the_features_that_need_non
 
 @pytest.mark.slow
 def test_sets_of_many_features_are_left_to_classifiers_that_take_them_quickly(store, tmp_path):
-    code, told, err = graspsense(
-        "train", store, "--choose", "--classifier", "knn", "--out", tmp_path / "own.json", "--json"
-    )
-    assert code == 0, err
-    ranking = json.loads(told)["choice"]["ranking"]
+    ranking = choice_of(store, tmp_path, "--classifier", "knn")["ranking"]
 
     assert not {"quant", "union of all"} & {candidate["features"] for candidate in ranking["candidates"]}
     assert any("quant" in note and "knn" in note for note in ranking["notes"])

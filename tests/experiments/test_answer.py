@@ -1,7 +1,5 @@
 """The answer of an experiment and the headline above it say the same, and of how many grasps."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What recognition costs: the front, paired tests, and when to squeeze again."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

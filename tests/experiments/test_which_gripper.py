@@ -1,7 +1,5 @@
 """The shipped experiment with every gripper: each entry grasps, and the pages have the tables of all of them."""
 
-from __future__ import annotations
-
 import pytest
 from cases import every_case
 from repository import ROOT

@@ -11,7 +11,7 @@ from repository import ROOT
 from source_code import parsed, statements
 
 
-def repeated_public_classes() -> dict[str, list[str]]:
+def repeated_public_classes():
     """Return the files that define a public class, once for each definition, by the names that have several."""
     folders = (ROOT / "src", *(ROOT / "plugins").glob("*/src"), *(ROOT / "examples").glob("*/src"))
     paths = [path for folder in folders for path in sorted(folder.rglob("*.py"))]

@@ -1,7 +1,5 @@
 """The generated pages and the drawing are current, and the commands and examples of the other pages are valid."""
 
-from __future__ import annotations
-
 import doctest
 import importlib.util
 import os
@@ -246,7 +244,7 @@ def test_the_navigation_has_every_page_and_no_other():
     assert named == there, "each page has its place in the nav of mkdocs.yml"
 
 
-def documents() -> list[Path]:
+def documents():
     """Return the pages and the messages that tell users which command to type."""
     folders = [ROOT / "docs", ROOT / "src", ROOT / "plugins", ROOT / "examples"]
     files = [

@@ -1,7 +1,5 @@
 """A data folder is data: no command runs what it contains, and the commit is recorded without its configuration."""
 
-from __future__ import annotations
-
 import ast
 import os
 import shutil

@@ -1,14 +1,11 @@
 """The import rules of the house, held on the source text and in a fresh interpreter."""
 
-from __future__ import annotations
-
 import ast
 import importlib
 import json
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -92,7 +89,7 @@ HEAVY = {
 }
 
 
-def imported(tree: ast.AST, package: str) -> Iterator[str]:
+def imported(tree, package):
     """Yield every module that this source imports, at whatever depth; `package` is what holds it."""
     for node in statements(tree):
         if isinstance(node, ast.Import):
@@ -106,7 +103,7 @@ def imported(tree: ast.AST, package: str) -> Iterator[str]:
             )
 
 
-def subpackages_known(path: Path, package: str) -> set[str]:
+def subpackages_known(path, package):
     """Return the subpackages of graspsense that a file imports from."""
     names = imported(parsed(path), package)
     within = (name.split(".")[1] for name in names if name.startswith("graspsense."))
@@ -117,11 +114,11 @@ def subpackages_known(path: Path, package: str) -> set[str]:
     }
 
 
-def files(folder: Path) -> list[Path]:
+def files(folder):
     return sorted(path for path in folder.rglob("*.py") if "tests" not in path.relative_to(folder).parts)
 
 
-def distributions() -> list[Path]:
+def distributions():
     return sorted(path.parent for path in (ROOT / "plugins").glob("*/pyproject.toml"))
 
 
@@ -132,14 +129,14 @@ def test_a_subpackage_knows_only_the_subpackages_it_may():
         assert subpackages_known(path, package) <= MAY_KNOW[parts[0]], path.relative_to(SOURCE)
 
 
-def package_of(distribution: Path) -> Path:
+def package_of(distribution):
     (package,) = [
         path for path in (distribution / "src").iterdir() if path.is_dir() and path.name != "__pycache__"
     ]
     return package
 
 
-def modules(package: Path = SOURCE) -> dict[str, Path]:
+def modules(package=SOURCE):
     """Return the path of each module of a package."""
     names = {}
     for path in files(package):
@@ -148,7 +145,7 @@ def modules(package: Path = SOURCE) -> dict[str, Path]:
     return names
 
 
-def imports_of(name: str, known: dict[str, Path]) -> set[str]:
+def imports_of(name, known):
     """Return the modules that a module imports in any way: at its beginning, late, or for types alone."""
     imported = set()
     for node in statements(parsed(known[name])):
@@ -251,7 +248,7 @@ def test_a_distribution_knows_no_other(folder):
         assert not known, f"{path.relative_to(folder)} imports {sorted(known)}"
 
 
-def loaded_after(code: str, *arguments: str) -> set[str]:
+def loaded_after(code, *arguments):
     """Run code in a fresh interpreter; return the top-level names of the modules it loaded."""
     code += "\nimport sys; print('loaded:', *{name.split('.')[0] for name in sys.modules}, file=sys.stderr)"
     ran = subprocess.run(
@@ -262,7 +259,7 @@ def loaded_after(code: str, *arguments: str) -> set[str]:
     return set(line.split()[1:])
 
 
-def name_of(node: ast.expr) -> str:
+def name_of(node):
     """Return the name, or the name in a module, that this is; nothing where it is neither."""
     if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
         return f"{node.value.id}.{node.attr}"

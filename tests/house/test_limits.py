@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterator
 from functools import cache
-from pathlib import Path
 from typing import Final
 
 from repository import ROOT
@@ -55,7 +53,7 @@ LARGE_TUPLES: dict[str, str] = {}
 
 
 @cache
-def files() -> list[tuple[str, Path]]:
+def files():
     return [
         (path.relative_to(source).as_posix(), path)
         for source in SOURCES
@@ -63,13 +61,13 @@ def files() -> list[tuple[str, Path]]:
     ]
 
 
-def modules() -> Iterator[tuple[str, ast.Module]]:
+def modules():
     for name, path in files():
         yield name, parsed(path)
 
 
 @cache
-def functions() -> list[tuple[str, ast.FunctionDef | ast.AsyncFunctionDef]]:
+def functions():
     return [
         (f"{name}:{node.name}", node)
         for name, tree in modules()
@@ -78,23 +76,23 @@ def functions() -> list[tuple[str, ast.FunctionDef | ast.AsyncFunctionDef]]:
     ]
 
 
-def lines(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+def lines(function):
     assert function.end_lineno is not None
     return function.end_lineno - function.lineno + 1
 
 
-def parameters(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+def parameters(function):
     arguments = function.args
     names = [value.arg for value in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs)]
     return len(names) - (names[:1] in (["self"], ["cls"]))
 
 
-def fields(node: ast.ClassDef) -> int:
+def fields(node):
     return sum(isinstance(statement, ast.AnnAssign) for statement in node.body)
 
 
 @cache
-def named_tuples() -> dict[str, int]:
+def named_tuples():
     """Return the number of fields of each NamedTuple, by `path:name`."""
     return {
         f"{name}:{node.name}": fields(node)
@@ -105,7 +103,7 @@ def named_tuples() -> dict[str, int]:
     }
 
 
-def compare(over: dict[str, int], exceptions: dict[str, str], limit: str) -> None:
+def compare(over, exceptions, limit):
     new = {name: count for name, count in over.items() if name not in exceptions}
     assert not new, f"more than {limit}: divide them, or add an exception with its reason"
     stale = sorted(set(exceptions) - set(over))

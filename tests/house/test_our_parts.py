@@ -1,7 +1,5 @@
 """Our components conform, the PR2's in emulation, and so do our distributions; some have tests of their own for it."""
 
-from __future__ import annotations
-
 import pytest
 from grippers import bottle, squeezing
 

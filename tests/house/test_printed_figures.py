@@ -1,7 +1,5 @@
 """The figures that the pages print are those of the stored results, and those that their commands print today."""
 
-from __future__ import annotations
-
 import json
 import re
 
@@ -25,20 +23,20 @@ SAME_ON_ANY_PROCESSOR = 0.006
 """Kernels of the linear algebra round differently, which can change the answer to a few of 900 trials."""
 
 
-def page(name: str) -> str:
+def page(name):
     return (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
 
 
-def results(name: str) -> str:
+def results(name):
     return (RESULTS / f"{name}.md").read_text(encoding="utf-8")
 
 
-def rates(text: str) -> list[float]:
+def rates(text):
     """Return the percentages of a text as shares."""
     return [float(share.removesuffix(" %")) / 100.0 for share in PERCENTAGE.findall(text)]
 
 
-def row(text: str, *begin: str) -> str:
+def row(text, *begin):
     """Return the first row of a table, of a page or printed, whose first cells are these."""
     cells = r"[ |`]+".join(map(re.escape, begin))
     return re.search(rf"^[ |`]*{cells}[ |`].*$", text, flags=re.MULTILINE)[0]

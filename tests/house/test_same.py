@@ -1,9 +1,6 @@
 """What `benchmarks/same.py` calls the same: every bit, with NaN equal to NaN."""
 
-from __future__ import annotations
-
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,7 +24,7 @@ def test_what_differs_is_named_with_its_size():
     assert difference("a", np.array([1.0, 2.0]), np.array([1.0, 2.5])).largest == 0.5
 
 
-def test_recordings_are_compared_by_name(tmp_path: Path):
+def test_recordings_are_compared_by_name(tmp_path):
     np.savez(tmp_path / "before.npz", **{"hybrid|gap": ONE, "hybrid|outcome": np.array([1])})
     np.savez(tmp_path / "after.npz", **{"hybrid|gap": ONE, "hybrid|outcome": np.array([2])})
 

@@ -1,7 +1,5 @@
 """`plugins new`: what it makes, and what it refuses. `.ci/scaffolds` installs and tests every one of them."""
 
-from __future__ import annotations
-
 import importlib
 import itertools
 import re
@@ -46,18 +44,10 @@ def test_a_package_is_whole(roles, tmp_path):
 @every_case(
     ("name", "role", "says"),
     [
-        (
-            "lab-thing",
-            "features",
-            r"no role 'features'. Did you mean 'feature-set'\? There are:\n  sensor-backend .*how each grasp ended$",
-        ),
+        ("lab-thing", "features", r"Did you mean 'feature-set'\?.*sensor-backend .*how each grasp ended$"),
         ("Lab_Thing", "feature-set", "small letters, digits and single hyphens"),
         ("graspsense-chitta", "feature-set", "name 'chitta' is taken by graspsense/chitta: choose another"),
-        (
-            "numpy",
-            "feature-set",
-            "name 'numpy' is taken: numpy has a package numpy, which this one would hide",
-        ),
+        ("numpy", "feature-set", "numpy has a package numpy, which this one would hide"),
         ("json", "feature-set", "Python itself has a module json"),
         ("graspsense", "controller", "graspsense itself has it"),
         ("graspsense-c45", "classifier", "graspsense itself has it"),

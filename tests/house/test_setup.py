@@ -1,12 +1,8 @@
 """What an installation rests on: every part is installed, every version is pinned, our own versions agree."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from importlib.metadata import PackageNotFoundError, requires
-from pathlib import Path
-from typing import Any
 
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
@@ -15,7 +11,7 @@ from repository import ROOT
 FOLDERS = sorted(path.parent for path in (ROOT / "plugins").glob("*/pyproject.toml"))
 
 
-def toml(path: Path) -> dict[str, Any]:
+def toml(path):
     return tomllib.loads(path.read_text())
 
 
@@ -23,29 +19,29 @@ PROJECT = toml(ROOT / "pyproject.toml")
 PLUGINS = {toml(folder / "pyproject.toml")["project"]["name"]: folder.name for folder in FOLDERS}
 
 
-def requirement_lines() -> list[str]:
+def requirement_lines():
     lines = (ROOT / "requirements-dev.txt").read_text().splitlines()
     return [line for line in lines if line and not line.startswith("#")]
 
 
-def pinned() -> dict[str, str]:
+def pinned():
     lines = (ROOT / "constraints.txt").read_text().splitlines()
     return dict(line.split("==") for line in lines if not line.startswith("#"))
 
 
-def test_every_folder_under_plugins_is_a_distribution() -> None:
+def test_every_folder_under_plugins_is_a_distribution():
     assert sorted(path.name for path in (ROOT / "plugins").iterdir() if (path / "src").is_dir()) == [
         folder.name for folder in FOLDERS
     ]
     assert set(PLUGINS.values()) >= {"c45", "pr2_gripper", "sim_gripper"}
 
 
-def test_requirements_install_every_distribution_in_editable_form() -> None:
+def test_requirements_install_every_distribution_in_editable_form():
     editable = [line.removeprefix("-e ") for line in requirement_lines() if line.startswith("-e ")]
     assert editable == [".", *(f"./plugins/{folder.name}" for folder in FOLDERS)]
 
 
-def test_an_installation_for_use_has_every_distribution_with_the_same_versions() -> None:
+def test_an_installation_for_use_has_every_distribution_with_the_same_versions():
     default, added = (
         [line for line in (ROOT / name).read_text().splitlines() if line[:1] != "#"]
         for name in ("requirements.txt", "requirements-all.txt")
@@ -62,34 +58,34 @@ def test_an_installation_for_use_has_every_distribution_with_the_same_versions()
     ]
 
 
-def test_uv_knows_every_plugin() -> None:
+def test_uv_knows_every_plugin():
     names = sorted(PLUGINS)
     assert sorted(PROJECT["dependency-groups"]["plugins"]) == names
     assert sorted(PROJECT["tool"]["uv"]["sources"]) == ["graspsense", *names]
 
 
-def test_pip_and_uv_install_the_same_tools() -> None:
+def test_pip_and_uv_install_the_same_tools():
     tools = [line for line in requirement_lines() if not line.startswith("-")]
     assert tools == PROJECT["dependency-groups"]["dev"]
 
 
-def test_requirements_apply_the_constraints() -> None:
+def test_requirements_apply_the_constraints():
     assert "-c constraints.txt" in requirement_lines()
 
 
-def test_extra_of_each_plugin_and_of_all() -> None:
+def test_extra_of_each_plugin_and_of_all():
     extras = PROJECT["project"]["optional-dependencies"]
     of_plugins = {name: extra for extra, (name, *_) in extras.items() if name in PLUGINS}
     assert set(of_plugins) == set(PLUGINS)
     assert extras["all"] == [f"graspsense[{','.join(sorted(of_plugins.values()))}]"]
 
 
-def test_constraints_are_plain_versions() -> None:
+def test_constraints_are_plain_versions():
     for line in (ROOT / "constraints.txt").read_text().splitlines():
         assert re.fullmatch(r"#.*|[a-z0-9-]+==[0-9][0-9a-z.]*", line), line
 
 
-def test_constraints_pin_everything_that_is_installed_with_us() -> None:
+def test_constraints_pin_everything_that_is_installed_with_us():
     """From our own requirements on, through the metadata of what is installed, whatever applies here."""
     todo = [Requirement(line) for line in requirement_lines() if not line.startswith("-")]
     for folder in [ROOT, *FOLDERS]:
@@ -116,7 +112,7 @@ def test_constraints_pin_everything_that_is_installed_with_us() -> None:
     assert len(seen) > len(requirement_lines())
 
 
-def test_versions_of_the_project_agree() -> None:
+def test_versions_of_the_project_agree():
     version = PROJECT["project"]["version"]
     for folder in FOLDERS:
         project = toml(folder / "pyproject.toml")["project"]
@@ -126,7 +122,7 @@ def test_versions_of_the_project_agree() -> None:
                 assert version in ours.specifier
 
 
-def test_every_distribution_carries_licence_and_type_marker() -> None:
+def test_every_distribution_carries_licence_and_type_marker():
     licence = (ROOT / "LICENSE").read_text()
     for folder in [ROOT, *FOLDERS]:
         assert (folder / "LICENSE").read_text() == licence

@@ -1,7 +1,5 @@
 """The conformance kit: sound parts pass it, and each check catches a part that is broken in just that way."""
 
-from __future__ import annotations
-
 import mutants
 import numpy as np
 import parts

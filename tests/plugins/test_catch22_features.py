@@ -1,7 +1,5 @@
 """The characteristics of pycatch22 as a feature set."""
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np

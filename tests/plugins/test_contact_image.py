@@ -1,7 +1,5 @@
 """The feature set `contact-image`: known contacts on an array, with three forces a cell, and before a camera."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

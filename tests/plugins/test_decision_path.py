@@ -1,7 +1,5 @@
 """The path through a tree as reasons: one range a feature, which accepts exactly what all the tests accept."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np
@@ -42,7 +40,7 @@ def test_different_values_read_differently_and_in_order(values):
 
 
 def test_the_tightest_bound_is_told_with_the_unit_for_people():
-    def test(threshold: float, above: bool) -> SplitTest:
+    def test(threshold, above):
         return SplitTest(feature="p_first", unit="m", value=0.0579, threshold=threshold, above=above)
 
     (above,) = path_reasons([test(0.0569, True), test(0.057, True)])

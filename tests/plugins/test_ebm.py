@@ -1,7 +1,5 @@
 """Explainable boosting: our prediction is that of interpret, and a model needs interpret for training only."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

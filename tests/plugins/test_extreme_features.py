@@ -1,7 +1,5 @@
 """Features of any size: an answer with probabilities, or a refusal that names the feature; no warning, no bug."""
 
-from __future__ import annotations
-
 import json
 import math
 import warnings

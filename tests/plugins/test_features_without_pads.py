@@ -1,7 +1,5 @@
 """The features of grippers without pads."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from graspsense.plugins.features.without_pads import _without_start

@@ -1,7 +1,5 @@
 """The example of docs/tcp_gripper.md runs, conforms, and does with one force sensor what the page says."""
 
-from __future__ import annotations
-
 import inspect
 import re
 import sys

@@ -1,7 +1,5 @@
 """Quantiles on intervals of the whole recording: known curves, grasps without contact, missing channels, many names."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

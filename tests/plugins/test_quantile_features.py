@@ -1,7 +1,5 @@
 """Quantiles of gap and forces over the contact: known curves, uneven samples, units, grasps without contact."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The law for a gripper that closes by itself, on a body that does: it keeps going to its target between commands."""
 
-from __future__ import annotations
-
 import sys
 from math import inf
 

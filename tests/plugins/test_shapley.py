@@ -1,7 +1,5 @@
 """Shapley values: those of the definition, that add up to the probability, for classifiers without a structure."""
 
-from __future__ import annotations
-
 import math
 from itertools import permutations
 

@@ -1,7 +1,5 @@
 """The union of feature sets: its values are those of the sets, its names are distinct, and it refuses wrong lists."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """Pictures of tactile images in an exported recording, as another program's reader of ROS 2 messages sees them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from kept import write_recording

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections import namedtuple
+from contextlib import contextmanager
 from itertools import pairwise
 
 import pytest
@@ -129,17 +130,23 @@ def test_a_recording_is_never_written_over_another(tmp_path):
     assert (tmp_path / "g.mcap").read_bytes() == content
 
 
-def test_a_writer_that_does_not_follow_holds_nobody_up_and_loses_nothing(tmp_path):
-    """Its process is stopped, so that the pipe fills; every message is kept and written once it goes on."""
-    recorder = Recorder(tmp_path / "g.mcap")
+@contextmanager
+def stopped(recorder):
+    """Stop the process of the writer meanwhile, so that the pipe fills."""
     recorder.metadata(START, begun().section(START))
-    pid = recorder._process.pid
-    os.kill(pid, signal.SIGSTOP)
+    os.kill(recorder._process.pid, signal.SIGSTOP)
     try:
+        yield
+    finally:
+        os.kill(recorder._process.pid, signal.SIGCONT)
+
+
+def test_a_writer_that_does_not_follow_holds_nobody_up_and_loses_nothing(tmp_path):
+    """Every message is kept and written once it goes on."""
+    recorder = Recorder(tmp_path / "g.mcap")
+    with stopped(recorder):
         for k in range(9_000):
             recorder.take(Reading(frame(k), pads(k)), 3, command(k))
-    finally:
-        os.kill(pid, signal.SIGCONT)
     recorded = recorder.finish()
     assert recorded.ticks == 9_000
     assert recorded.deferred > 1000
@@ -152,19 +159,14 @@ def test_a_writer_that_does_not_follow_holds_nobody_up_and_loses_nothing(tmp_pat
 def test_messages_of_a_tick_that_the_pipe_takes_in_part_only_are_whole(tmp_path):
     """Samples and an image of 2000 cells are 16 kB a tick, four times what a pipe takes at once or not at all."""
     signals = namedtuple("Signals", ("acceleration", "palm"))
-    recorder = Recorder(tmp_path / "g.mcap")
-    recorder.metadata(START, begun().section(START))
-    pid, ticks = recorder._process.pid, 120
-    os.kill(pid, signal.SIGSTOP)
-    try:
+    recorder, ticks = Recorder(tmp_path / "g.mcap"), 120
+    with stopped(recorder):
         for k in range(ticks):
             samples = Samples(
                 k * 1e-3, 3 * k + 3, 2, ((k + 0.1, -1.0), (k + 0.2, -1.0), (math.nan, math.nan))
             )
             palm = Image(k * 1e-3, k + 1, tuple(k + 0.5 * i for i in range(2000)))
             recorder.take(Reading(frame(k), pads(k), signals(samples, palm)), 3, command(k))
-    finally:
-        os.kill(pid, signal.SIGCONT)
     recorded = recorder.finish()
     assert (recorded.ticks, recorded.dropped) == (ticks, 0)
     assert recorded.deferred > 0

@@ -1,9 +1,5 @@
 """ARFF files in."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 from cases import every_case
@@ -13,7 +9,7 @@ from graspsense_c45 import ArffError, fit, parse_arff, read_arff
 HEAD = "@relation r\n@attribute 'a b' numeric\n@attribute c {x, 'y z', \"w,\\'v\"}\n@attribute class {no, yes}\n@data\n"
 
 
-def test_dense_rows_with_quotes_missing_values_weights_and_comments() -> None:
+def test_dense_rows_with_quotes_missing_values_weights_and_comments():
     table = parse_arff("% top\n\n" + HEAD + "1.5,'y z',yes\n% between\n?, x , no, {2.5}\n-1e3,\"w,'v\",?\n")
     assert [a.name for a in table.schema.attributes] == ["a b", "c"]
     assert table.schema.attributes[1].values == ("x", "y z", "w,'v")
@@ -23,20 +19,20 @@ def test_dense_rows_with_quotes_missing_values_weights_and_comments() -> None:
     assert table.weights.tolist() == [1.0, 2.5, 1.0]
 
 
-def test_sparse_rows_fill_in_zeros_and_first_values() -> None:
+def test_sparse_rows_fill_in_zeros_and_first_values():
     table = parse_arff(HEAD + "{0 2.5, 2 yes}\n{1 'y z'}, {3}\n{}\n")
     assert table.values.tolist() == [[2.5, 0.0], [0.0, 1.0], [0.0, 0.0]]
     assert table.labels.tolist() == [1, 0, 0]
     assert table.weights.tolist() == [1.0, 3.0, 1.0]
 
 
-def test_the_class_may_be_any_nominal_attribute() -> None:
+def test_the_class_may_be_any_nominal_attribute():
     table = parse_arff(HEAD + "1,x,yes\n", class_attribute="c")
     assert [a.name for a in table.schema.attributes] == ["a b", "class"]
     assert table.schema.classes == ("x", "y z", "w,'v")
 
 
-def test_rows_without_a_class_are_not_learned_from_but_seen() -> None:
+def test_rows_without_a_class_are_not_learned_from_but_seen():
     # The midpoint is 2.5; the largest value below it is that of the row without a class.
     rows = "0,x,no\n1,x,no\n4,x,yes\n5,x,yes\n2.25,x,?\n"
     tree = fit(parse_arff(HEAD + rows))
@@ -65,13 +61,13 @@ def test_rows_without_a_class_are_not_learned_from_but_seen() -> None:
         (HEAD + "1,,yes\n", "cannot read"),
     ],
 )
-def test_what_cannot_be_read_is_named(text: str, words: str) -> None:
+def test_what_cannot_be_read_is_named(text, words):
     with pytest.raises(ArffError) as caught:
         parse_arff(text)
     assert words in str(caught.value)
 
 
-def test_files(tmp_path: Path) -> None:
+def test_files(tmp_path):
     path = tmp_path / "rows.arff"
     path.write_text("\ufeff" + HEAD + "1,x,yes\n", encoding="utf-8")
     assert read_arff(path).labels.tolist() == [1]

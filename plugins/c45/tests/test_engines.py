@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from graspsense_c45 import Attribute, Options, Schema, Table, class_indices, engines, fit, fitting, make_table
+from graspsense_c45 import Attribute, Options, Schema, class_indices, engines, fit, fitting, make_table
 from graspsense_c45.engines import Fits, choose_fast
 
 pytest.importorskip("numba", reason="the extra 'fast' (numba) is not installed: there is one engine only")
@@ -27,7 +27,7 @@ OPTIONS: list[dict[str, Any]] = [
 ]
 
 
-def grasps(seed: int, n: int, decimals: int | None, weights: str) -> Table:
+def grasps(seed, n, decimals, weights):
     rng = np.random.default_rng(seed)
     n_classes = int(rng.integers(2, 12))
     labels = rng.integers(0, n_classes, n)
@@ -48,7 +48,7 @@ def grasps(seed: int, n: int, decimals: int | None, weights: str) -> Table:
 @pytest.mark.slow
 @pytest.mark.parametrize("weights", ["one", "whole", "any"])
 @pytest.mark.parametrize("decimals", [None, 0, 2])
-def test_same_tree_and_predictions(weights: str, decimals: int | None) -> None:
+def test_same_tree_and_predictions(weights, decimals):
     sizes = []
     for seed, options in enumerate(OPTIONS):
         table = grasps(seed, [40, 300, 1_500][seed % 3], decimals, weights)
@@ -62,7 +62,7 @@ def test_same_tree_and_predictions(weights: str, decimals: int | None) -> None:
 
 
 @pytest.mark.slow
-def test_same_tree_where_branches_are_raised_and_pruned_again() -> None:
+def test_same_tree_where_branches_are_raised_and_pruned_again():
     raised = 0
     for seed in range(8):
         table = grasps(seed, 2_000, 1, "one")
@@ -74,7 +74,7 @@ def test_same_tree_where_branches_are_raised_and_pruned_again() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("factor", [1e-300, 1e-12, 1e-10, 1e-9, 1e-7, 1e-3, 0.1, 1e9, 1e140])
-def test_same_tree_for_weights_of_any_size(factor: float) -> None:
+def test_same_tree_for_weights_of_any_size(factor):
     table = grasps(3, 60, 1, "any")
     weighted = make_table(table.schema, table.values, table.labels, table.weights * factor)
     for options in ({}, {"min_objects": 1}, {"criterion": "info_gain", "pruning": "reduced_error"}):
@@ -82,13 +82,13 @@ def test_same_tree_for_weights_of_any_size(factor: float) -> None:
         assert trees[0] == trees[1], options
 
 
-def oracle_tables() -> list[Path]:
+def oracle_tables():
     return sorted((Path(__file__).parent / "weka" / "data").glob("*.csv"))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", oracle_tables(), ids=lambda path: path.stem)
-def test_same_tree_on_the_awkward_sets(path: Path) -> None:
+def test_same_tree_on_the_awkward_sets(path):
     lines = [line.split(",") for line in path.read_text().splitlines()[1:] if line.startswith("train")]
     values = np.array([[float(cell.replace("?", "nan")) for cell in row[1:-2]] for row in lines])
     labels = np.array([int(row[-2]) for row in lines])
@@ -100,14 +100,14 @@ def test_same_tree_on_the_awkward_sets(path: Path) -> None:
         assert trees[0] == trees[1], options
 
 
-def test_auto_compiles_only_what_pays() -> None:
+def test_auto_compiles_only_what_pays():
     assert not choose_fast("numpy", 10**9)
     assert not choose_fast("auto", 6_000)
     assert choose_fast("auto", 6_000_000)
     assert choose_fast("fast", 1)
 
 
-def test_many_small_fits_use_compiled_code_once_numpy_took_as_long(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_many_small_fits_use_compiled_code_once_numpy_took_as_long(monkeypatch):
     pytest.importorskip("graspsense")
     from graspsense_c45.depthfirst import compiled
 
@@ -122,7 +122,7 @@ def test_many_small_fits_use_compiled_code_once_numpy_took_as_long(monkeypatch: 
     assert chosen == {True: [False] + 4 * [True], False: 3 * [False] + 2 * [True]}
 
 
-def test_a_tree_that_numpy_grows_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_tree_that_numpy_grows_counts(monkeypatch):
     fits = Fits()
     monkeypatch.setattr(fitting, "_FITS", fits)
     monkeypatch.setattr(engines, "LOADING_S", 1e-9)

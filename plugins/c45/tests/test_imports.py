@@ -1,7 +1,5 @@
 """What importing costs: measured in fresh interpreters."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
@@ -11,7 +9,7 @@ import pytest
 from graspsense_c45 import Attribute, Schema, fit, make_table, to_json
 
 
-def modules_after(code: str, *arguments: str) -> set[str]:
+def modules_after(code, *arguments):
     listed = code + "\nimport json, sys\nprint(json.dumps(sorted(m.split('.')[0] for m in sys.modules)))"
     done = subprocess.run(
         [sys.executable, "-c", listed, *arguments], capture_output=True, text=True, check=True
@@ -19,13 +17,13 @@ def modules_after(code: str, *arguments: str) -> set[str]:
     return set(json.loads(done.stdout.splitlines()[-1]))
 
 
-def test_importing_the_package_imports_nothing_heavy() -> None:
+def test_importing_the_package_imports_nothing_heavy():
     loaded = modules_after("import graspsense_c45; dir(graspsense_c45)")
     assert "graspsense_c45" in loaded
     assert not loaded & {"numpy", "sklearn", "numba", "pandas", "matplotlib", "graspsense"}
 
 
-def test_a_stored_tree_predicts_with_numpy_alone() -> None:
+def test_a_stored_tree_predicts_with_numpy_alone():
     table = make_table(Schema((Attribute("x"),), ("a", "b")), [[0.0]] * 3 + [[1.0]] * 3, [0] * 3 + [1] * 3)
     code = (
         "import sys\nfrom graspsense_c45 import class_indices, explain, fit, from_json, to_text\n"
@@ -40,7 +38,7 @@ def test_a_stored_tree_predicts_with_numpy_alone() -> None:
 
 
 @pytest.mark.parametrize("missing", ["numba", "graspsense"])
-def test_where_the_compiled_engine_is_not_installed_numpy_answers(missing: str) -> None:
+def test_where_the_compiled_engine_is_not_installed_numpy_answers(missing):
     code = (
         "import sys, importlib.util\n"
         "found = importlib.util.find_spec\n"
@@ -58,7 +56,7 @@ def test_where_the_compiled_engine_is_not_installed_numpy_answers(missing: str) 
     assert not modules_after(code, missing) & {"numba", "graspsense"}
 
 
-def test_every_public_name_loads_and_others_do_not() -> None:
+def test_every_public_name_loads_and_others_do_not():
     import graspsense_c45
 
     for name in graspsense_c45.__all__:

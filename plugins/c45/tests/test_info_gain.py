@@ -11,23 +11,21 @@ from typing import Any
 import numpy as np
 from cases import every_case
 
-from graspsense_c45 import PAPER, Attribute, Options, Schema, Table, fit, make_table
+from graspsense_c45 import PAPER, Attribute, Options, Schema, fit, make_table
 
 EPSILON = 1e-6
 
 
-def entropy(counts: list[int]) -> float:
+def entropy(counts):
     total = sum(counts)
     return -sum(c / total * log2(c / total) for c in counts if c)
 
 
-def count(labels: list[int], n_classes: int) -> list[int]:
+def count(labels, n_classes):
     return [labels.count(k) for k in range(n_classes)]
 
 
-def best_cut(
-    pairs: list[tuple[float, int]], n_classes: int, min_objects: int, mdl: bool
-) -> tuple[float, float] | None:
+def best_cut(pairs, n_classes, min_objects, mdl):
     """Gain and midpoint of the best cut of one column."""
     pairs = sorted(pairs)
     n = len(pairs)
@@ -52,9 +50,7 @@ def best_cut(
     return (best, (pairs[place - 1][0] + pairs[place][0]) / 2) if best >= EPSILON else None
 
 
-def grow(
-    rows: list[tuple[list[float], int]], every: list[list[float]], options: Options, n_classes: int
-) -> dict[str, Any]:
+def grow(rows, every, options, n_classes):
     labels = [k for _, k in rows]
     counts = count(labels, n_classes)
     node: dict[str, Any] = {"class_weights": counts}
@@ -79,7 +75,7 @@ def grow(
     }
 
 
-def prune(node: dict[str, Any], held: list[tuple[list[float], int]]) -> int:
+def prune(node, held):
     """Reduced-error pruning in place; returns the held-out errors of what is left."""
     label = node["class_weights"].index(max(node["class_weights"]))
     as_leaf = sum(k != label for _, k in held)
@@ -97,7 +93,7 @@ def prune(node: dict[str, Any], held: list[tuple[list[float], int]]) -> int:
     return as_tree
 
 
-def shape(node: dict[str, Any]) -> dict[str, Any]:
+def shape(node):
     kept = {"class_weights": [int(c) for c in node["class_weights"]]}
     if "feature" in node:
         kept |= {
@@ -108,7 +104,7 @@ def shape(node: dict[str, Any]) -> dict[str, Any]:
     return kept
 
 
-def table(seed: int) -> Table:
+def table(seed):
     rng = np.random.default_rng(seed)
     n, n_classes = int(rng.integers(6, 140)), int(rng.integers(2, 5))
     labels = rng.integers(0, n_classes, n)
@@ -119,12 +115,12 @@ def table(seed: int) -> Table:
     return make_table(schema, values, labels)
 
 
-def as_rows(given: Table, rows: list[int]) -> list[tuple[list[float], int]]:
+def as_rows(given, rows):
     return [(given.values[i].tolist(), int(given.labels[i])) for i in rows]
 
 
 @every_case("seed", range(20))
-def test_tree_is_the_brute_force_one(seed: int) -> None:
+def test_tree_is_the_brute_force_one(seed):
     given = table(seed)
     mdl = bool(seed % 2)
     options = Options(
@@ -136,7 +132,7 @@ def test_tree_is_the_brute_force_one(seed: int) -> None:
 
 
 @every_case("seed", range(100, 115))
-def test_paper_preset_prunes_on_the_held_out_rows(seed: int) -> None:
+def test_paper_preset_prunes_on_the_held_out_rows(seed):
     given = table(seed)
     n = len(given.labels)
     held = sorted(np.random.default_rng(seed).choice(n, n // 3, replace=False).tolist())
@@ -146,7 +142,7 @@ def test_paper_preset_prunes_on_the_held_out_rows(seed: int) -> None:
     assert shape(fit(given, PAPER, np.array(held)).to_dict()) == shape(expected)
 
 
-def test_gain_and_ratio_differ_where_c45_says_so() -> None:
+def test_gain_and_ratio_differ_where_c45_says_so():
     # x0 cuts one row off a class cleanly (large ratio, small gain); x1 nearly halves the rows (large gain).
     labels = [0] * 10 + [1] * 10
     x0 = [0.0] * 18 + [1.0] * 2

@@ -1,7 +1,5 @@
 """The tree to be read: text, rules, path, dot, drawing, JSON, importances."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -14,7 +12,6 @@ from graspsense_c45 import (
     Attribute,
     Schema,
     StoredTreeError,
-    Tree,
     draw,
     explain,
     feature_importances,
@@ -30,7 +27,7 @@ from graspsense_c45 import (
 from graspsense_c45.numbers_as_text import short, weka_number, weka_weight
 
 
-def grasp_tree() -> Tree:
+def grasp_tree():
     """delta_t (s) tells full from empty; among the full ones the material (nominal) tells open from closed."""
     delta_t = [0.2, 0.25, 0.3, 0.542] * 3 + [0.61, 0.7, 0.75, 0.8] * 4
     material = [0.0, 1.0, 2.0] * 4 + [0.0] * 8 + [1.0] * 6 + [2.0] * 2
@@ -42,7 +39,7 @@ def grasp_tree() -> Tree:
     return fit(make_table(schema, np.column_stack((delta_t, material)), labels))
 
 
-def test_text() -> None:
+def test_text():
     assert to_text(grasp_tree()) == (
         "\ndelta_t <= 0.542: empty (12.0)\ndelta_t > 0.542\n|   material = can: full_open (8.0)\n"
         "|   material = carton: full_closed (6.0)\n|   material = glass: full_closed (2.0)\n"
@@ -50,27 +47,27 @@ def test_text() -> None:
     )
 
 
-def test_path_in_words_and_units() -> None:
+def test_path_in_words_and_units():
     path = explain(grasp_tree(), [0.61, 0.0])
     assert path.steps == ("delta_t 0.61 s > 0.542 s", "material = can")
     assert (path.label, path.probability, path.support) == ("full_open", 1.0, 8.0)
     assert str(path) == "full_open (1.00) because delta_t 0.61 s > 0.542 s and material = can"
 
 
-def test_the_unit_of_a_ratio_is_not_printed() -> None:
+def test_the_unit_of_a_ratio_is_not_printed():
     x, labels = np.arange(40.0)[:, None] / 40.0, (np.arange(40) >= 20) * 1
     tree = fit(make_table(Schema((Attribute("slope", unit="1"),), ("a", "b")), x, labels))
     assert explain(tree, [0.9]).steps == ("slope 0.9 > 0.475",)
 
 
-def test_path_tells_close_numbers_apart_and_says_what_is_missing() -> None:
+def test_path_tells_close_numbers_apart_and_says_what_is_missing():
     assert explain(grasp_tree(), [0.5421, 0.0]).steps[0] == "delta_t 0.5421 s > 0.542 s"
     missing = explain(grasp_tree(), [math.nan, 2.0])
     assert missing.steps[0] == "delta_t missing (delta_t > 0.542 s in 57% of training)"
     assert missing.probability == pytest.approx(16 / 28)
 
 
-def test_rules_cover_every_leaf_with_support_and_probability() -> None:
+def test_rules_cover_every_leaf_with_support_and_probability():
     rules = to_rules(grasp_tree())
     assert [rule.label for rule in rules] == ["empty", "full_open", "full_closed", "full_closed"]
     assert rules[1].conditions == ("delta_t > 0.542 s", "material = can")
@@ -78,7 +75,7 @@ def test_rules_cover_every_leaf_with_support_and_probability() -> None:
     assert sum(rule.support for rule in rules) == 28.0
 
 
-def test_rules_keep_the_tightest_bounds_only() -> None:
+def test_rules_keep_the_tightest_bounds_only():
     x = np.arange(40.0)[:, None]
     labels = ((x[:, 0] >= 10) & (x[:, 0] < 20)) * 1 + ((x[:, 0] >= 20) & (x[:, 0] < 30)) * 2
     rules = to_rules(fit(make_table(Schema((Attribute("x"),), ("a", "b", "c")), x, labels)))
@@ -88,7 +85,7 @@ def test_rules_keep_the_tightest_bounds_only() -> None:
     assert all(len(rule.conditions) <= 2 for rule in rules)
 
 
-def test_dot_has_every_node_and_edge_and_quotes() -> None:
+def test_dot_has_every_node_and_edge_and_quotes():
     tree = grasp_tree()
     dot = to_dot(tree)
     assert len(re.findall(r"^  n\d+ \[", dot, re.MULTILINE)) == tree.node_count
@@ -101,7 +98,7 @@ def test_dot_has_every_node_and_edge_and_quotes() -> None:
 
 
 @pytest.mark.slow
-def test_drawing_names_every_node() -> None:
+def test_drawing_names_every_node():
     import matplotlib as mpl
 
     mpl.use("Agg")
@@ -114,7 +111,7 @@ def test_drawing_names_every_node() -> None:
     mpl.pyplot.close("all")
 
 
-def test_importances_share_the_information() -> None:
+def test_importances_share_the_information():
     # 28 rows: 1.557 bits in all, delta_t tells 0.985 (12 against 16), the material 16/28.
     importances = feature_importances(grasp_tree())
     gained = -(12 / 28 * math.log2(12 / 28) + 16 / 28 * math.log2(16 / 28))
@@ -123,7 +120,7 @@ def test_importances_share_the_information() -> None:
     assert feature_importances(leaf).tolist() == [0.0]
 
 
-def test_json_is_exact_and_says_its_version() -> None:
+def test_json_is_exact_and_says_its_version():
     tree = grasp_tree()
     document = to_document(tree)
     assert (document["format"], document["version"]) == ("graspsense-c45-tree", 1)
@@ -142,13 +139,13 @@ def test_json_is_exact_and_says_its_version() -> None:
         ({"attributes": []}, "does not fit its attribute"),
     ],
 )
-def test_damaged_json_is_refused(change: dict[str, object], words: str) -> None:
+def test_damaged_json_is_refused(change, words):
     with pytest.raises(StoredTreeError, match=words):
         from_json(json.dumps(to_document(grasp_tree()) | change))
 
 
 @every_case("key", ["feature", "n_children", "category", "threshold", "class_weights"])
-def test_damaged_nodes_are_refused(key: str) -> None:
+def test_damaged_nodes_are_refused(key):
     # Another number is a threshold too.
     for wrong in ("x", None) if key == "threshold" else (99, "x", -5, None):
         document = to_document(grasp_tree())
@@ -159,14 +156,14 @@ def test_damaged_nodes_are_refused(key: str) -> None:
         from_json(to_json(grasp_tree())[:-3])
 
 
-def test_children_that_point_upwards_are_refused() -> None:
+def test_children_that_point_upwards_are_refused():
     document = to_document(grasp_tree())
     document["nodes"]["n_children"] = [0, 2, 0, 3, 0, 0]
     with pytest.raises(StoredTreeError, match="do not form a tree"):
         from_json(json.dumps(document))
 
 
-def test_numbers_as_weka_prints_them() -> None:
+def test_numbers_as_weka_prints_them():
     assert [weka_number(x) for x in (1.0, -0.25, 1e-9, 80282423097.21323, 2.5e15)] == [
         "1",
         "-0.25",
@@ -182,7 +179,7 @@ def test_numbers_as_weka_prints_them() -> None:
     ]
 
 
-def test_short_numbers() -> None:
+def test_short_numbers():
     assert short(0.61234) == "0.612"
     assert short(0.54200001, 0.542) == "0.54200001"
     assert short(2.0, 2.0) == "2"

@@ -1,7 +1,5 @@
 """A unit does not decide what the classifier can tell apart; as a library, the tree is J48's, with its 1e-5."""
 
-from __future__ import annotations
-
 import numpy as np
 from cases import every_case
 

@@ -34,7 +34,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
 }
 
 
-def random_arff(rng: np.random.Generator) -> str:
+def random_arff(rng):
     n, n_classes, n_columns = (int(rng.integers(low, high)) for low, high in ((10, 250), (2, 6), (1, 6)))
     labels = rng.integers(0, n_classes, n)
     missing = rng.choice([0.0, 0.02, 0.3])
@@ -59,7 +59,7 @@ def random_arff(rng: np.random.Generator) -> str:
     return "\n".join(lines) + "\n"
 
 
-def assert_same(ours: dict[str, Any], theirs: dict[str, Any]) -> None:
+def assert_same(ours, theirs):
     pairs = [(ours, theirs)]
     while pairs:
         mine, given = pairs.pop()
@@ -73,7 +73,7 @@ def assert_same(ours: dict[str, Any], theirs: dict[str, Any]) -> None:
 
 
 @pytest.mark.slow
-def test_random_tables(tmp_path: Path) -> None:
+def test_random_tables(tmp_path):
     jar = os.environ.get("WEKA_JAR")
     if not jar or not shutil.which("java"):
         pytest.skip("WEKA_JAR does not name Weka's jar, or there is no java: J48 cannot be asked")

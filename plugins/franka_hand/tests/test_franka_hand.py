@@ -1,7 +1,5 @@
 """The driver with the emulated hand in the same process, the features of width and time, and the calibration."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 
 import numpy as np
@@ -81,12 +79,6 @@ def test_fingers_that_close_on_nothing_have_no_features_and_say_why():
     trial = load_pipeline("franka", options=EMULATED).grasp(object="none")
     assert trial.outcome.words == "nothing there"
     assert set(trial.features.reasons) == set(trial.features.names)
-
-
-def test_features_that_need_a_force_are_refused_with_that_reason():
-    with pytest.raises(WiringError, match="force_left") as refused:
-        load_pipeline("franka", options=["features.type=chitta"])
-    assert "which gripper graspsense-franka-hand/franka does not have" in str(refused.value)
 
 
 def test_less_than_the_least_force_is_refused_before_anything_moves():

@@ -1,15 +1,12 @@
 """The driver through pylibfranka against the emulated hand on the network of this machine, in real time."""
 
-from __future__ import annotations
-
 import socket
-import subprocess
-import sys
 import time
 from contextlib import nullcontext
 from threading import Thread
 
 import pytest
+from emulated_grippers import PATIENT_S, assert_a_killed_program_lets_go
 
 from graspsense import load_pipeline
 from graspsense.plugin_api import POSITION, Command, DeviceLost, NoDevice, create
@@ -22,8 +19,6 @@ pytest.importorskip("pylibfranka", reason="its wheels are for Linux on x86_64 an
 
 pytestmark = pytest.mark.slow
 
-PATIENT_S = 60.0
-"""For what comes: when it does is this machine's business."""
 CLOSING = Command(POSITION, 0.0, 40.0, 0.02)
 OPENING = Command(POSITION, 0.08, 40.0, 0.05)
 
@@ -193,27 +188,7 @@ def test_another_version_is_listed_as_not_ready_and_another_device_is_not(emulat
     assert list(found_devices(1.0, "127.0.0.77")) == []
 
 
-HOLDS_ON = """
-import sys, time
-from graspsense.plugin_api import POSITION, Command, create
-driver = create("sensor-backend", "franka", host=sys.argv[1], calibration="none")
-driver.open(0)
-while True:
-    if driver.read(10.0).signals.grasped:
-        print("holds", flush=True)
-    driver.apply(Command(POSITION, 0.0, 40.0, 0.05))
-"""
-
-
 def test_a_program_that_is_killed_leaves_no_hand_that_presses(emulated):
     hand = emulated()
-    with subprocess.Popen(
-        [sys.executable, "-c", HOLDS_ON, hand.where], stdout=subprocess.PIPE, text=True
-    ) as program:
-        assert program.stdout.readline() == "holds\n"
-        assert hand.state()["pressing"]
-        program.kill()
-    until_s = time.monotonic() + PATIENT_S
-    while hand.state()["pressing"] and time.monotonic() < until_s:
-        time.sleep(0.01)
-    assert not hand.state()["pressing"]
+    settings = {"host": hand.where, "calibration": "none", "told": "reading.signals.grasped"}
+    assert_a_killed_program_lets_go("franka", lambda: hand.state()["pressing"], 40.0, **settings)

@@ -1,7 +1,5 @@
 """Recordings of squeezes whose forces are known."""
 
-from __future__ import annotations
-
 import numpy as np
 from attrs import evolve
 
@@ -14,7 +12,7 @@ WIDTH_M = 0.05
 DEPTH_M = 0.008
 
 
-def recorded(force_of=None, *, hold_s=1.0, speed_m_s=0.02, period_s=0.0) -> RecordedSqueeze:
+def recorded(force_of=None, *, hold_s=1.0, speed_m_s=0.02, period_s=0.0):
     """Return a squeeze at constant speed with a hold, whose force is `force_of(closure)`."""
     load_s = DEPTH_M / speed_m_s
     t = np.arange(0.0, 0.3 + load_s + hold_s, 0.002)
@@ -43,7 +41,7 @@ def recorded(force_of=None, *, hold_s=1.0, speed_m_s=0.02, period_s=0.0) -> Reco
     return RecordedSqueeze(name="one", sha256="0" * 64, trace=trace)
 
 
-def grasped(scenes, gripper, *, hold_s=1.0) -> list[RecordedSqueeze]:
+def grasped(scenes, gripper, *, hold_s=1.0):
     """Return a simulated grasp of each scene with these settings of the gripper; their seeds are 1, 2 and so on."""
     backend, seeds = create("sensor-backend", "sim", **gripper), range(1, 1 + len(scenes))
     run = RunConfig(hold_s=hold_s)
@@ -54,7 +52,7 @@ def grasped(scenes, gripper, *, hold_s=1.0) -> list[RecordedSqueeze]:
     ]
 
 
-def delayed(squeeze: RecordedSqueeze, late_s: float) -> RecordedSqueeze:
+def delayed(squeeze, late_s):
     """Return the recording of a sensor whose forces, and times of images, are late by a number of ticks."""
     trace = squeeze.trace
     ticks = round(late_s / float(np.median(np.diff(trace.t_s))))

@@ -1,7 +1,5 @@
 """Errors that all squeezes have in common, which no scatter shows: of the nodes of a path, and of the share."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from attrs import evolve

@@ -1,7 +1,5 @@
 """Fingertips from squeezes of a rigid block."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -1,7 +1,5 @@
 """The delay of the sensor: a lag of the force comes back, and does not bias what relaxes."""
 
-from __future__ import annotations
-
 import tomllib
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Held-out recordings: they are predicted with nothing fitted to them, and refuse a scene that none confirms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from attrs import evolve

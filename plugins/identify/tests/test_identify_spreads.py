@@ -1,7 +1,5 @@
 """Spreads of single parameters between objects: claimed where there are some, and not claimed where there are none."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 

@@ -1,11 +1,6 @@
 """Small LeRobot data sets of both versions, written with pyarrow as LeRobot's documentation describes them."""
 
-from __future__ import annotations
-
 import json
-from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -16,7 +11,7 @@ CELLS = [f"f{finger}.p{cell:02d}.f{axis}" for finger in range(2) for cell in ran
 NAMES = ["shoulder.pos", "gripper.pos", "gripper.load", *CELLS]
 
 
-def episode(squeezes: int = 1, frames: int = 90, peak: float = 4.0) -> np.ndarray:
+def episode(squeezes=1, frames=90, peak=4.0):
     """Return the observations of an episode: a gripper in percent that closes and opens this often, two fingertips."""
     parts = []
     for k in range(squeezes):
@@ -32,7 +27,7 @@ def episode(squeezes: int = 1, frames: int = 90, peak: float = 4.0) -> np.ndarra
     return np.concatenate(parts)
 
 
-def features(names: Sequence[str], version: int) -> dict[str, Any]:
+def features(names, version):
     scalar = {
         "timestamp": "float32", "frame_index": "int64", "episode_index": "int64", "index": "int64",
         "task_index": "int64",
@@ -51,7 +46,7 @@ def features(names: Sequence[str], version: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def table(states: Sequence[np.ndarray], numbers: Sequence[int], tasks: Sequence[int], start: int) -> pa.Table:
+def table(states, numbers, tasks, start):
     lengths = [len(state) for state in states]
     state = np.concatenate(states).astype(np.float32)
     frame = np.concatenate([np.arange(n) for n in lengths])
@@ -68,9 +63,7 @@ def table(states: Sequence[np.ndarray], numbers: Sequence[int], tasks: Sequence[
     )
 
 
-def info(
-    version: int, states: Sequence[np.ndarray], names: Sequence[str], changed: Mapping[str, Any]
-) -> dict[str, Any]:
+def info(version, states, names, changed):
     paths = {
         2: (
             "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet",
@@ -98,12 +91,12 @@ def info(
 
 
 def write_set(
-    folder: Path,
-    version: int,
-    states: Sequence[np.ndarray] | None = None,
-    names: Sequence[str] = NAMES,
-    **changed: Any,
-) -> Path:
+    folder,
+    version,
+    states=None,
+    names=NAMES,
+    **changed,
+):
     """Write a data set of these episodes, whose tasks alternate; `changed` are keys of `meta/info.json`."""
     states = [episode(), episode(2, peak=3.0), episode(peak=5.0)] if states is None else states
     tasks = ["pick the red cup", "squeeze: sponge"]
@@ -148,5 +141,5 @@ def write_set(
     return folder
 
 
-def write_lines(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+def write_lines(path, rows):
     path.write_text("".join(json.dumps(row) + "\n" for row in rows))

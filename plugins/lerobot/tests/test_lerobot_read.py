@@ -1,7 +1,5 @@
 """LeRobot data sets of both versions become labelled trials, and what is wrong with them is told."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -23,13 +21,13 @@ from graspsense_lerobot.names import meaning_of
 from graspsense_lerobot.reader import recordings
 
 
-def read(place: object) -> list[LabelledRecording]:
+def read(place):
     records = list(recordings(str(place)))
     assert all(isinstance(recording, LabelledRecording) for recording in records)
     return records  # type: ignore[return-value]
 
 
-def column(recording: LabelledRecording, name: str) -> np.ndarray:
+def column(recording, name):
     return np.array([getattr(reading.frame, name) for reading in recording.recording.readings])
 
 
@@ -299,7 +297,7 @@ def test_a_video_that_is_missing_is_told(tmp_path):
     assert any("missing" in line for line in read(folder)[0].recording.notes if "video" in line)
 
 
-def damage_info(folder: Path, **changed: object) -> None:
+def damage_info(folder, **changed):
     path = folder / "meta/info.json"
     path.write_text(json.dumps({**json.loads(path.read_text()), **changed}))
 
@@ -384,7 +382,7 @@ def test_a_check_of_a_damaged_data_set_ends_with_an_error_of_ours(tmp_path, dama
     assert done.exit_code
 
 
-def _refusal(folder: Path) -> None:
+def _refusal(folder):
     """Raise the error of a data set, or of its first episode that cannot be read."""
     raise next(
         recording.error for recording in recordings(str(folder)) if isinstance(recording, UnreadableRecording)

@@ -1,7 +1,5 @@
 """A robot of LeRobot as a gripper: one motor is commanded alone, gently, and stopped on every way out."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory

@@ -1,7 +1,5 @@
 """graspsense as a step of a LeRobot processor: it follows the grasps in observations and adds what it knows."""
 
-from __future__ import annotations
-
 import json
 import math
 import sys

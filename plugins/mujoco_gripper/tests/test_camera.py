@@ -1,7 +1,5 @@
 """Pictures of a grasp without a screen: made where the libraries are, else refused before the grasp."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

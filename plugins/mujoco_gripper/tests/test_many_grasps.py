@@ -1,7 +1,5 @@
 """Many grasps at once: each follows from its thing and its seed alone, whoever runs it and in whatever order."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import pytest

@@ -1,9 +1,6 @@
 """Grasps with grippers that MuJoCo models describe, checked against what the mechanics give by hand. Simulated."""
 
-from __future__ import annotations
-
 import os
-from pathlib import Path
 
 import pytest
 from cases import every_case
@@ -40,7 +37,7 @@ HINGED = """<mujoco>
 """Two fingers that turn, each with an actuator of its own."""
 
 
-def hinged_file(folder: Path, **changed: str) -> Path:
+def hinged_file(folder, **changed):
     """Write the file of the gripper with two fingers that turn."""
     return gripper_file(
         folder,
@@ -75,7 +72,7 @@ def grasped(*options, thing="can", seed=0):
     return pipeline.grasp(object=thing, seed=seed)
 
 
-def gripper_file(folder: Path, model: Path = PARALLEL, **changed: str) -> Path:
+def gripper_file(folder, model=PARALLEL, **changed):
     """Write the file of the parallel gripper with some lines changed."""
     lines = {
         "model": f"'{model}'",
@@ -92,8 +89,7 @@ def gripper_file(folder: Path, model: Path = PARALLEL, **changed: str) -> Path:
     return path
 
 
-@pytest.mark.slow
-def opened(file: Path | str = "", thing: str = "block") -> None:
+def opened(file="", thing="block"):
     """Open a gripper of this file around a thing."""
     create("sensor-backend", "mujoco", file=str(file), object=thing).open(0)
 

@@ -1,7 +1,5 @@
 """Scenes: things on a table that are lifted, put down and pulled, against what statics gives by hand. Simulated."""
 
-from __future__ import annotations
-
 from importlib.resources import files
 
 import mujoco

@@ -1,7 +1,5 @@
 """A scene that shakes the gripper, and bottles with a wave in them. Simulated."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The gripper with soft pads, its accelerometer, and scenes that are filled and put down. Simulated."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 import pytest

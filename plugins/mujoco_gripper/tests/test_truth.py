@@ -1,7 +1,5 @@
 """MuJoCo against graspsense's simulator where both express the same grasp, and grasps at the ends of every range."""
 
-from __future__ import annotations
-
 import importlib.util
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Weighted samples, priors with their sources, and calibration."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -18,20 +16,20 @@ from graspsense_paper.inference import (
 WIDE = Prior(name="a", unit="N", law="norm", args=(0.0, 2.0), origin="assumed", reason="a test")
 
 
-def test_the_effective_sample_size_counts_equal_weights() -> None:
+def test_the_effective_sample_size_counts_equal_weights():
     assert effective_sample_size([2.0] * 7) == pytest.approx(7.0)
     assert effective_sample_size([1.0, 0.0, 0.0]) == pytest.approx(1.0)
     with pytest.raises(ValueError, match="all weights are zero"):
         effective_sample_size([0.0, 0.0])
 
 
-def test_quantiles_follow_the_weights() -> None:
+def test_quantiles_follow_the_weights():
     values = [3.0, 1.0, 2.0]
     assert weighted_quantiles(values, [1.0, 1.0, 1.0], (0.0, 0.5, 1.0)) == (1.0, 2.0, 3.0)
     assert weighted_quantiles(values, [8.0, 1.0, 1.0], (0.1, 0.5)) == (1.0, 3.0)
 
 
-def test_contraction_compares_with_the_prior() -> None:
+def test_contraction_compares_with_the_prior():
     sample = np.random.default_rng(1).normal(0.5, 0.5, 4000)
     contracted = contraction(WIDE, sample, np.ones(4000))
     assert contracted.contraction == pytest.approx(1.0 - 0.25 / 4.0, abs=0.01)
@@ -39,7 +37,7 @@ def test_contraction_compares_with_the_prior() -> None:
     assert contracted.posterior[1] == pytest.approx(0.5, abs=0.05)
 
 
-def test_a_prior_needs_a_source() -> None:
+def test_a_prior_needs_a_source():
     with pytest.raises(ValueError, match="origin"):
         Prior(name="a", unit="", law="norm", args=(), origin="guess", reason="a test")
     with pytest.raises(ValueError, match="reason"):
@@ -47,9 +45,7 @@ def test_a_prior_needs_a_source() -> None:
 
 
 @pytest.mark.parametrize(("width", "calibrated"), [(1.0, True), (0.4, False), (3.0, False)])
-def test_calibration_detects_posteriors_that_are_too_narrow_or_too_wide(
-    width: float, calibrated: bool
-) -> None:
+def test_calibration_detects_posteriors_that_are_too_narrow_or_too_wide(width, calibrated):
     # One observation with noise 1 of a parameter with prior N(0, 1): the posterior is N(y / 2, 1 / 2).
     rng = np.random.default_rng(2)
     ranks = []

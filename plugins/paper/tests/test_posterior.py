@@ -1,7 +1,5 @@
 """The posterior of the simulator's uncertain figures: the model of the paper's trials, and the published page."""
 
-from __future__ import annotations
-
 import sys
 import tomllib
 from functools import cache

@@ -7,7 +7,6 @@ import queue
 import sys
 import threading
 from collections import deque
-from collections.abc import Iterator
 from types import ModuleType
 from typing import Any
 
@@ -25,9 +24,9 @@ from graspsense_pr2_gripper.transports import emulated
 from graspsense_pr2_gripper.transports.interface import Transport
 
 
-def identity(**changes: Any) -> Identity:
+def identity(**changes):
     """The PR2 as published: 1600/400/600 counts/N, 100 N, 0.2 m/s, 1 kHz, 41 ms, 1200 ticks a revolution."""
-    numbers: dict[str, Any] = {
+    numbers = {
         "firmware": (1, 2, 3), "serial": "L7", "transmission": "pr2", "pad_counts_per_n": 1600,
         "side_counts_per_n": 400, "edge_counts_per_n": 600, "effort_limit_un": 100_000_000,
         "speed_limit_um_s": 200_000, "report_rate_hz": 1000, "image_period_us": 41_000, "watchdog_ms": 100,
@@ -37,17 +36,15 @@ def identity(**changes: Any) -> Identity:
 
 
 @pytest.fixture(scope="session")
-def device_identity() -> Any:
+def device_identity():
     return identity
 
 
 @pytest.fixture(scope="session")
-def board() -> Any:
+def board():
     """Makes a board over a simulated gripper: `board(object="block", faults=..., serial=...)`."""
 
-    def make(
-        *, object: str = "block", seed: int = 0, faults: FaultConfig | None = None, **changes: Any
-    ) -> Wire:
+    def make(*, object="block", seed=0, faults=None, **changes):
         body = create("sensor-backend", "sim", object=object)
         body.open(seed)
         return Wire(Firmware(body, identity(**changes)), faults or FaultConfig(), seed)
@@ -56,21 +53,21 @@ def board() -> Any:
 
 
 @pytest.fixture(autouse=True)
-def no_thread_is_left() -> Iterator[None]:
+def no_thread_is_left():
     running = set(threading.enumerate())
     yield
     assert set(threading.enumerate()) - running == set()
 
 
 @pytest.fixture(autouse=True)
-def threads_have_time_to_end(monkeypatch: pytest.MonkeyPatch) -> None:
+def threads_have_time_to_end(monkeypatch):
     """Where closing waits for a thread, a busy machine gets a minute; how closing is bounded has a test of its own."""
     for module in (link, opening, emulated_boards):
         monkeypatch.setattr(module, "JOIN_S", 60.0)
 
 
 @pytest.fixture
-def answered(monkeypatch: pytest.MonkeyPatch) -> None:
+def answered(monkeypatch):
     """A paced board goes on once its last report was answered by a command, however late: no machine is too slow.
 
     Neither its watchdog nor the driver's bounds on the times of reports can then tell the machine's load.
@@ -79,19 +76,19 @@ def answered(monkeypatch: pytest.MonkeyPatch) -> None:
     on_time, transport = emulated.on_time, emulated.PacedTransport
     write, close = transport.write, transport.close
 
-    def periods(period_s: float) -> Iterator[float]:
+    def periods(period_s):
         for late_s in on_time(period_s):
             yield late_s
             answer.wait()
             answer.clear()
 
-    def writes(self: Any, report: bytes) -> None:
+    def writes(self, report):
         try:
             write(self, report)
         finally:
             answer.set()
 
-    def closes(self: Any) -> None:
+    def closes(self):
         self._stop = True
         answer.set()
         close(self)
@@ -104,7 +101,7 @@ def answered(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(autouse=True)
-def calibrations_apart(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
+def calibrations_apart(monkeypatch, tmp_path):
     """No test reads or writes the calibrations of whoever runs it."""
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
 
@@ -112,7 +109,7 @@ def calibrations_apart(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
 class Fed(Transport):
     """A wire that hands over what a test puts in, when it puts it in."""
 
-    def __init__(self, *reports: bytes) -> None:
+    def __init__(self, *reports):
         self.reports: queue.SimpleQueue[bytes | Exception] = queue.SimpleQueue()
         for report in reports:
             self.reports.put(report)
@@ -120,7 +117,7 @@ class Fed(Transport):
         self.closed, self.freed = threading.Event(), threading.Event()
         self.stuck_in_read = self.stuck_in_close = False
 
-    def read(self, timeout_s: float) -> bytes:
+    def read(self, timeout_s):
         if self.stuck_in_read:
             self.freed.wait()
         try:
@@ -131,20 +128,20 @@ class Fed(Transport):
             raise got
         return got
 
-    def write(self, report: bytes) -> None:
+    def write(self, report):
         raise NotImplementedError
 
-    def feature(self, report_id: int) -> bytes:
+    def feature(self, report_id):
         raise NotImplementedError
 
-    def close(self) -> None:
+    def close(self):
         if self.stuck_in_close:
             self.freed.wait()
         self.closed.set()
 
 
 @pytest.fixture
-def fed() -> Any:
+def fed():
     """Makes a wire that hands over these reports."""
     return Fed
 
@@ -152,7 +149,7 @@ def fed() -> Any:
 class Machine:
     """A computer with HID sockets: a board in one of them reports when `tick` is called, or by the clock."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.plugged: dict[str, tuple[Wire, str]] = {}
         self.open_handles: list[Any] = []
         self.changed = threading.Condition()
@@ -163,15 +160,15 @@ class Machine:
         self.now_s = 100.0
         """The time of this machine alone: a millisecond passes with each tick."""
 
-    def plug(self, path: str, wire: Wire, serial: str = "L7") -> None:
+    def plug(self, path, wire, serial="L7"):
         self.plugged[path] = (wire, serial)
 
-    def unplug(self, path: str) -> None:
+    def unplug(self, path):
         with self.changed:
             del self.plugged[path]
             self.changed.notify_all()
 
-    def enumerate(self) -> list[dict[str, Any]]:
+    def enumerate(self):
         self.listings += 1
         for listing, path, wire, serial in list(self.appear):
             if self.listings >= listing:
@@ -181,7 +178,7 @@ class Machine:
             for path, (_, serial) in self.plugged.items()
         ]
 
-    def tick(self, count: int = 1) -> None:
+    def tick(self, count=1):
         with self.changed:
             for _ in range(count):
                 self.now_s += 0.001
@@ -196,19 +193,19 @@ class Machine:
 class Device:
     """`hidraw.device()`."""
 
-    def __init__(self, machine: Machine) -> None:
+    def __init__(self, machine):
         self.machine = machine
         self.queue: deque[bytes] = deque()
         self.path = ""
 
-    def open_path(self, path: bytes) -> None:
+    def open_path(self, path):
         if path.decode() not in self.machine.plugged:
             raise OSError("open failed")
         self.path = path.decode()
         self.queue.extend(self.machine.at_endpoint)
         self.machine.open_handles.append(self)
 
-    def read(self, size: int, timeout_ms: int = 0) -> list[int]:
+    def read(self, size, timeout_ms=0):
         if timeout_ms == 0:
             self.machine.zero_timeouts += 1  # this one blocks for good
         with self.machine.changed:
@@ -221,29 +218,29 @@ class Device:
                 raise OSError("read error")
             return []
 
-    def write(self, data: bytes) -> int:
+    def write(self, data):
         with self.machine.changed:
             if self.path not in self.machine.plugged:
                 return -1
             self.machine.plugged[self.path][0].output(bytes(data))
             return len(data)
 
-    def get_feature_report(self, report_id: int, size: int) -> list[int]:
+    def get_feature_report(self, report_id, size):
         if self.path not in self.machine.plugged:
             raise OSError("read error")
         return list(self.machine.plugged[self.path][0].firmware.feature()[:size])
 
-    def close(self) -> None:
+    def close(self):
         if self in self.machine.open_handles:
             self.machine.open_handles.remove(self)
 
 
 @pytest.fixture
-def machine(monkeypatch: pytest.MonkeyPatch) -> Machine:
+def machine(monkeypatch):
     made = Machine()
     module = ModuleType(LIBRARY)
-    module.enumerate = made.enumerate  # type: ignore[attr-defined]
-    module.device = lambda: Device(made)  # type: ignore[attr-defined]
+    module.enumerate = made.enumerate
+    module.device = lambda: Device(made)
     monkeypatch.setitem(sys.modules, LIBRARY, module)
     monkeypatch.setattr(opening, "POLL_S", 0.001)
     # Its time stands still between two ticks, so on a machine that is busy every report looks old, and many ticks at

@@ -7,8 +7,7 @@ import math
 import signal
 import subprocess
 import sys
-from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -16,7 +15,7 @@ from attrs import evolve
 
 from graspsense import load_pipeline
 from graspsense.core.grasp.runner import run_grasp
-from graspsense.plugin_api import DeviceInfo, Reading, Samples, create
+from graspsense.plugin_api import Samples, create
 from graspsense.recording.export_trace import write_npz
 from graspsense.recording.reader import read_recorded
 from graspsense.simulator_api import RunConfig
@@ -35,22 +34,22 @@ from graspsense_pr2_gripper.protocol import (
 )
 from graspsense_pr2_gripper.stream import Stream
 
-NEAR: dict[str, Any] = {"object": "can:empty_open", "body_config": {"open_gap_m": 0.075}}
+NEAR = {"object": "can:empty_open", "body_config": {"open_gap_m": 0.075}}
 """A can, and fingers that stand near it: a grasp of half the ticks."""
 EMULATED = Pr2Config(transport="emulated", calibration="none", **NEAR)
 
 
-def report(sequence: int, words: tuple[int, ...], status: int = 0) -> bytes:
+def report(sequence, words, status=0):
     return encode_input(
         InputReport(sequence, 1000 * sequence, 0, 0, 0, status, 0, words, 0, 0, (0, 0, 0, 0), 1, 0)
     )
 
 
-def values(samples: Samples) -> list[tuple[float, ...]]:
+def values(samples):
     return list(samples.values[: samples.new])
 
 
-def of_words(words: list[int]) -> np.ndarray:
+def of_words(words):
     """The accelerations that these words stand for, by the definition of the protocol."""
     return np.array([[count * (8 * 9.81 / 512) for count in axes(word)] for word in words])
 
@@ -60,7 +59,7 @@ class Sent(Wire):
 
     words: ClassVar[list[tuple[int, tuple[int, ...]]]] = []
 
-    def step(self) -> list[bytes]:
+    def step(self):
         arriving = super().step()
         for data in arriving:
             decoded = decode_input(data)
@@ -68,8 +67,8 @@ class Sent(Wire):
         return arriving
 
 
-def test_a_word_holds_three_signed_axes_and_is_limited_to_the_full_scale() -> None:
-    def back(sample: tuple[float, ...]) -> tuple[float, ...]:
+def test_a_word_holds_three_signed_axes_and_is_limited_to_the_full_scale():
+    def back(sample):
         read: Samples = Accelerometer(8).signals(0.0, (word_of(sample, 8),), 1).acceleration
         return read.values[0]
 
@@ -79,7 +78,7 @@ def test_a_word_holds_three_signed_axes_and_is_limited_to_the_full_scale() -> No
     assert back((1e3, -1e3, 0.0)) == (511 * step, -512 * step, 0.0)
 
 
-def test_a_tick_has_the_declared_shape_and_nan_behind_what_is_new() -> None:
+def test_a_tick_has_the_declared_shape_and_nan_behind_what_is_new():
     for words in ((), (1,), (1, 2, 3), (1, 2, 3, 4)):
         block: Samples = Accelerometer(2).signals(1.5, words, 10).acceleration
         assert (block.t_s, block.counter, block.new) == (1.5, 10, len(words))
@@ -87,7 +86,7 @@ def test_a_tick_has_the_declared_shape_and_nan_behind_what_is_new() -> None:
         assert all(math.isnan(number) for row in block.values[block.new :] for number in row)
 
 
-def test_lost_reports_and_samples_that_the_board_missed_are_counted() -> None:
+def test_lost_reports_and_samples_that_the_board_missed_are_counted():
     stream = Stream()
     stream.take(report(7, (1, 2, 3)))
     stream.take(report(10, (4, 5, 6)))
@@ -96,14 +95,14 @@ def test_lost_reports_and_samples_that_the_board_missed_are_counted() -> None:
     assert stream.sampled == 17, "at least one more than the report holds"
 
 
-def test_samples_of_a_report_that_was_skipped_come_with_the_next_one(fed: Any) -> None:
+def test_samples_of_a_report_that_was_skipped_come_with_the_next_one(fed):
     link = LockStepLink(fed(report(1, (1, 2)), report(2, (3, 4))), 1e-3)
     arrival = link.next(1e-3)
     assert arrival is not None
     assert (arrival.words, arrival.sampled) == ((1, 2, 3, 4), 4)
 
 
-def test_samples_before_a_gap_are_not_joined_to_those_after_it(fed: Any) -> None:
+def test_samples_before_a_gap_are_not_joined_to_those_after_it(fed):
     link = LockStepLink(fed(report(1, (1, 2)), report(3, (5, 6))), 1e-3)
     arrival = link.next(1e-3)
     assert arrival is not None
@@ -111,7 +110,7 @@ def test_samples_before_a_gap_are_not_joined_to_those_after_it(fed: Any) -> None
 
 
 @pytest.mark.slow
-def test_every_sample_that_the_board_sends_reaches_the_trace(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_sample_that_the_board_sends_reaches_the_trace(monkeypatch):
     monkeypatch.setattr(Sent, "words", [])
     monkeypatch.setattr(emulation, "Wire", Sent)
     trace = run_grasp(Pr2Backend(EMULATED), create("controller", "hybrid"), RunConfig(seed=1)).trace
@@ -127,7 +126,7 @@ def test_every_sample_that_the_board_sends_reaches_the_trace(monkeypatch: pytest
     assert sent[start : start + len(acceleration.values)].tobytes() == acceleration.values.tobytes()
 
 
-def opened_and_read(**settings: Any) -> tuple[DeviceInfo, list[Reading]]:
+def opened_and_read(**settings):
     """Return what the emulated gripper with these settings says, and half a second of its readings."""
     backend = Pr2Backend(evolve(EMULATED, **settings))
     info = backend.open(1)
@@ -136,7 +135,7 @@ def opened_and_read(**settings: Any) -> tuple[DeviceInfo, list[Reading]]:
     return info, [reading for reading in readings if reading is not None]
 
 
-def test_reports_that_are_dropped_show_as_lost_samples() -> None:
+def test_reports_that_are_dropped_show_as_lost_samples():
     _, readings = opened_and_read(faults=FaultConfig(drop=0.05))
     samples = [reading.signals.acceleration for reading in readings]
     arrived = sum(block.new for block in samples)
@@ -145,7 +144,7 @@ def test_reports_that_are_dropped_show_as_lost_samples() -> None:
     assert (np.diff([block.t_s for block in samples]) > 0.0).all()
 
 
-def test_a_board_without_an_accelerometer_reads_as_before_and_says_so() -> None:
+def test_a_board_without_an_accelerometer_reads_as_before_and_says_so():
     _, with_it = opened_and_read()
     info, without = opened_and_read(faults=FaultConfig(identity={"accelerometer_g": 0}))
     assert "the board has no accelerometer" in " ".join(info.notes)
@@ -153,7 +152,7 @@ def test_a_board_without_an_accelerometer_reads_as_before_and_says_so() -> None:
     assert repr([reading.frame for reading in without]) == repr([reading.frame for reading in with_it])
 
 
-def test_the_channel_can_be_left_out_by_the_settings() -> None:
+def test_the_channel_can_be_left_out_by_the_settings():
     assert CHANNEL not in Pr2Backend(evolve(EMULATED, accelerometer=False)).channels
     _, readings = opened_and_read(accelerometer=False)
     assert {reading.signals for reading in readings} == {()}
@@ -186,7 +185,7 @@ pipeline.grasp(seed=1, sinks=[recorder, Killing()])
 
 
 @pytest.mark.slow
-def test_samples_survive_a_killed_program_a_replay_and_an_export_to_the_last_bit(tmp_path: Path) -> None:
+def test_samples_survive_a_killed_program_a_replay_and_an_export_to_the_last_bit(tmp_path):
     options = [
         *("gripper.type=pr2", "gripper.transport=emulated", "gripper.calibration=none"),
         *("gripper.object='can:empty_open'", "gripper.body_config.open_gap_m=0.075", "classifier.type=none"),

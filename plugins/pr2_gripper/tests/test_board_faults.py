@@ -1,9 +1,5 @@
 """The faults of the emulated board: each does from its time on what its setting says, and nothing before."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import pytest
 from cases import every_case
 
@@ -12,14 +8,12 @@ from graspsense.plugin_api import EFFORT, Command, ConfigError
 from graspsense_pr2_gripper.backend import Pr2Backend
 from graspsense_pr2_gripper.config import IDENTITY_NUMBERS, FaultConfig, Pr2Config
 from graspsense_pr2_gripper.emulation import emulated_board
-from graspsense_pr2_gripper.faults import Wire
 from graspsense_pr2_gripper.protocol import (
     EFFORT_KIND,
     LEFT_ABSENT,
     OWN_LIMIT,
     RIGHT_ABSENT,
     SLICE_CELLS,
-    InputReport,
     OutputReport,
     decode_identity,
     decode_input,
@@ -31,11 +25,11 @@ AT_S = 0.2
 """Device time from which on the faults act: after four cell images."""
 
 
-def reports(wire: Wire, count: int = 600) -> list[InputReport]:
+def reports(wire, count=600):
     return [decode_input(data) for _ in range(count) for data in wire.step()]
 
 
-def commanded(wire: Wire, newtons: float, count: int = 20) -> list[InputReport]:
+def commanded(wire, newtons, count=20):
     """Return the reports of a board that is commanded this effort before each."""
     sent = []
     for counter in range(count):
@@ -46,9 +40,9 @@ def commanded(wire: Wire, newtons: float, count: int = 20) -> list[InputReport]:
     return sent
 
 
-def by_cell(sent: list[InputReport]) -> dict[int, list[tuple[int, int]]]:
+def by_cell(sent):
     """Return device time and value of each cell, as they come."""
-    values: dict[int, list[tuple[int, int]]] = {cell: [] for cell in range(44)}
+    values = {cell: [] for cell in range(44)}
     for report in sent:
         if report.image:
             for i, value in enumerate(report.cells):
@@ -57,19 +51,17 @@ def by_cell(sent: list[InputReport]) -> dict[int, list[tuple[int, int]]]:
 
 
 @pytest.fixture(scope="module")
-def healthy(board: Any) -> list[InputReport]:
+def healthy(board):
     """What a healthy board sends."""
     return reports(board())
 
 
-def faulty_reports(board: Any, **faults: Any) -> list[InputReport]:
+def faulty_reports(board, **faults):
     return reports(board(faults=FaultConfig(**faults)))
 
 
 @every_case(("kind", "side"), [("stuck", "left"), ("numb", "right"), ("zero", "both")])
-def test_cells_of_a_fingertip_go_wrong_from_a_time_on(
-    board: Any, healthy: list[InputReport], kind: Any, side: Any
-) -> None:
+def test_cells_of_a_fingertip_go_wrong_from_a_time_on(board, healthy, kind, side):
     faulty = faulty_reports(board, pad_fault=kind, pad_side=side, pad_at_s=AT_S)
     good, bad = by_cell(healthy), by_cell(faulty)
     assert {report.status for report in faulty} == {0}
@@ -93,9 +85,7 @@ def test_cells_of_a_fingertip_go_wrong_from_a_time_on(
 @every_case(
     ("side", "bits"), [("left", LEFT_ABSENT), ("right", RIGHT_ABSENT), ("both", LEFT_ABSENT | RIGHT_ABSENT)]
 )
-def test_absent_fingertip_sets_its_bit_and_changes_no_cell(
-    board: Any, healthy: list[InputReport], side: Any, bits: int
-) -> None:
+def test_absent_fingertip_sets_its_bit_and_changes_no_cell(board, healthy, side, bits):
     faulty = faulty_reports(board, pad_fault="absent", pad_side=side, pad_at_s=AT_S)
     assert by_cell(faulty) == by_cell(healthy)
     assert {report.status for report in faulty if report.time_us < AT_S * 1e6} == {0}
@@ -103,9 +93,7 @@ def test_absent_fingertip_sets_its_bit_and_changes_no_cell(
 
 
 @every_case("side", SIDES)
-def test_cells_drift_on_the_side_and_from_the_time_that_are_set(
-    board: Any, healthy: list[InputReport], side: Any
-) -> None:
+def test_cells_drift_on_the_side_and_from_the_time_that_are_set(board, healthy, side):
     faulty = faulty_reports(board, drift_counts_s=500.0, pad_side=side, pad_at_s=AT_S)
     good, bad = by_cell(healthy), by_cell(faulty)
     for cell in range(44):
@@ -114,9 +102,7 @@ def test_cells_drift_on_the_side_and_from_the_time_that_are_set(
             assert drifted - value == (round(500.0 * (time_us * 1e-6 - AT_S)) if drifts else 0)
 
 
-def test_image_counter_stands_still_and_only_a_stale_image_tells_its_age(
-    board: Any, healthy: list[InputReport]
-) -> None:
+def test_image_counter_stands_still_and_only_a_stale_image_tells_its_age(board, healthy):
     frozen, stale = (
         faulty_reports(board, image_fault=fault, image_at_s=AT_S) for fault in ("frozen", "stale")
     )
@@ -130,16 +116,14 @@ def test_image_counter_stands_still_and_only_a_stale_image_tells_its_age(
     assert ages[-1] == 0xFFFF
 
 
-def test_status_bits_are_set_from_a_time_on(board: Any) -> None:
+def test_status_bits_are_set_from_a_time_on(board):
     faulty = faulty_reports(board, status_bits=0x8005, status_at_s=AT_S)
     assert {report.status for report in faulty[:200]} == {0}
     assert {report.status for report in faulty[200:]} == {0x8005}
 
 
 @every_case("gain", [5.0, 0.5, 0.0, -1.0])
-def test_motor_applies_a_multiple_of_the_command_and_the_board_reports_what_it_applies(
-    board: Any, gain: float
-) -> None:
+def test_motor_applies_a_multiple_of_the_command_and_the_board_reports_what_it_applies(board, gain):
     wire = board(faults=FaultConfig(motor_gain=gain, motor_at_s=0.01))
     sent = commanded(wire, 15.0)
     assert {report.effort_un for report in sent[1:10]} == {15_000_000}
@@ -148,7 +132,7 @@ def test_motor_applies_a_multiple_of_the_command_and_the_board_reports_what_it_a
     assert wire.firmware.strong_s == pytest.approx(0.009 if gain == 5.0 else 0.0)
 
 
-def test_effort_is_reported_wrongly_while_the_motor_is_right(board: Any) -> None:
+def test_effort_is_reported_wrongly_while_the_motor_is_right(board):
     wire = board(faults=FaultConfig(effort_report_gain=0.2, effort_report_at_s=0.01))
     sent = commanded(wire, 15.0)
     assert {report.effort_un for report in sent[1:10]} == {15_000_000}
@@ -157,7 +141,7 @@ def test_effort_is_reported_wrongly_while_the_motor_is_right(board: Any) -> None
 
 
 @every_case("rate", [0.0, 2.0])
-def test_clock_of_the_device_runs_at_another_rate(board: Any, rate: float) -> None:
+def test_clock_of_the_device_runs_at_another_rate(board, rate):
     faulty = faulty_reports(board, clock_rate=rate, clock_at_s=AT_S)
     assert [report.time_us for report in faulty[:201]] == list(range(0, 201_000, 1000))
     assert [report.time_us - 200_000 for report in faulty[200:]] == [
@@ -167,7 +151,7 @@ def test_clock_of_the_device_runs_at_another_rate(board: Any, rate: float) -> No
 
 
 @every_case("number", IDENTITY_NUMBERS)
-def test_feature_report_has_the_numbers_that_are_set(number: str) -> None:
+def test_feature_report_has_the_numbers_that_are_set(number):
     body = {"accelerometer_g": 4}.get(number, 77)
     config = Pr2Config(transport="emulated", faults=FaultConfig(identity={number: body}))
     assert getattr(decode_identity(emulated_board(config, 0).wire.feature()), number) == body
@@ -188,13 +172,13 @@ def test_feature_report_has_the_numbers_that_are_set(number: str) -> None:
         ("identity.watchdog_ms=70000", "65535"),
     ],
 )
-def test_fault_that_cannot_act_is_a_users_mistake(key: str, needed: str) -> None:
+def test_fault_that_cannot_act_is_a_users_mistake(key, needed):
     options = ["gripper.type=pr2", "gripper.transport=emulated", "classifier.type=none"]
     with pytest.raises(ConfigError, match=needed):
         load_pipeline(options=[*options, f"gripper.faults.{key}"]).grasp()
 
 
-def test_report_of_a_grasp_tells_what_the_body_felt_whatever_the_board_reported() -> None:
+def test_report_of_a_grasp_tells_what_the_body_felt_whatever_the_board_reported():
     """40 N for 100 ms and 20 N for 100 ms, of which the board reports a tenth; the fingers do not reach the object."""
     faults = FaultConfig(effort_report_gain=0.1)
     backend = Pr2Backend(Pr2Config(transport="emulated", faults=faults))

@@ -1,11 +1,7 @@
 """`graspsense calibrate` and what its files do to a run: kept by serial, hashed, and refused where they do not fit."""
 
-from __future__ import annotations
-
 import json
 import pwd
-from pathlib import Path
-from typing import Any
 
 import pytest
 from cases import every_case
@@ -19,7 +15,6 @@ from graspsense.core.grasp.calibration_files import (
     write_calibration,
 )
 from graspsense.core.values.errors import ConfigError, DataDamaged
-from graspsense.plugin_api import DeviceInfo
 from graspsense_pr2_gripper.backend import Pr2Backend
 from graspsense_pr2_gripper.config import Pr2Config
 
@@ -28,10 +23,10 @@ GRIPPER = ("--gripper", "pr2", "-o", "gripper.transport=emulated", "--object", "
 
 
 @pytest.fixture
-def shell(tmp_path: Path) -> Any:
+def shell(tmp_path):
     """Run `graspsense`, with calibrations below this test's own folder; return exit code, JSON, stderr."""
 
-    def call(command: str, *arguments: str) -> tuple[int, Any, str]:
+    def call(command, *arguments):
         options = (*GRIPPER, "-o", f"gripper.calibration={tmp_path}", "--json")
         done = graspsense(*command.split(), *options, *arguments)
         return done.returncode, done.json, done.stderr
@@ -39,7 +34,7 @@ def shell(tmp_path: Path) -> Any:
     return call
 
 
-def test_stored_tare_has_its_time_and_its_hash_stands_in_the_trial(shell: Any, tmp_path: Path) -> None:
+def test_stored_tare_has_its_time_and_its_hash_stands_in_the_trial(shell, tmp_path):
     code, tare, _ = shell("calibrate tare", "--images", "12")
     assert code == 0
     stored = read_calibration(tmp_path / "EMULATED" / "tare.json")
@@ -52,7 +47,7 @@ def test_stored_tare_has_its_time_and_its_hash_stands_in_the_trial(shell: Any, t
     assert trial["device"]["calibration"] == {"tare": stored.sha256}
 
 
-def test_calibration_of_another_linkage_is_an_error_with_two_choices(shell: Any, tmp_path: Path) -> None:
+def test_calibration_of_another_linkage_is_an_error_with_two_choices(shell, tmp_path):
     shell("calibrate tare")
     other = ("-o", "gripper.transmission=pr2_paper")
     code, _, err = shell("run", *other)
@@ -66,7 +61,7 @@ def test_calibration_of_another_linkage_is_an_error_with_two_choices(shell: Any,
     assert opened(transmission="pr2_paper", calibration=str(tmp_path)).calibration.keys() == {"tare"}
 
 
-def opened(**settings: Any) -> DeviceInfo:
+def opened(**settings):
     """Return what an emulated gripper with these settings says when it is opened."""
     backend = Pr2Backend(Pr2Config(transport="emulated", **settings))
     info = backend.open(0)
@@ -74,18 +69,14 @@ def opened(**settings: Any) -> DeviceInfo:
     return info
 
 
-def test_file_of_another_serial_is_refused(shell: Any, tmp_path: Path) -> None:
+def test_changed_file_and_that_of_another_serial_are_refused(shell, tmp_path):
     shell("calibrate tare", "-o", 'gripper.serial="R2"')
     (tmp_path / "EMULATED").mkdir()
-    (tmp_path / "R2" / "tare.json").rename(tmp_path / "EMULATED" / "tare.json")
+    path = (tmp_path / "R2" / "tare.json").rename(tmp_path / "EMULATED" / "tare.json")
     code, _, err = shell("run")
     assert code == 2
     assert "serial was 'R2' and is 'EMULATED'" in err
 
-
-def test_changed_file_is_damaged(shell: Any, tmp_path: Path) -> None:
-    shell("calibrate tare")
-    path = tmp_path / "EMULATED" / "tare.json"
     content = json.loads(path.read_text())
     content["data"]["left"][8] += 1.0
     path.write_text(json.dumps(content))
@@ -95,7 +86,7 @@ def test_changed_file_is_damaged(shell: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_load_cell_table_changes_the_forces_and_flags_its_end(shell: Any, tmp_path: Path) -> None:
+def test_load_cell_table_changes_the_forces_and_flags_its_end(shell, tmp_path):
     readings = tmp_path / "readings.csv"
     readings.write_text("side,pad_counts,load_n\n" + "".join(
         f"{side},{counts},{2.0 * counts / 1600.0}\n" for side in ("left", "right") for counts in (1600, 8000)
@@ -111,7 +102,7 @@ def test_load_cell_table_changes_the_forces_and_flags_its_end(shell: Any, tmp_pa
     assert "load-cell" in doubled["device"]["calibration"]
 
 
-def test_unreadable_readings_name_their_line(shell: Any, tmp_path: Path) -> None:
+def test_unreadable_readings_name_their_line(shell, tmp_path):
     readings = tmp_path / "readings.csv"
     readings.write_text("side,pad_counts,load_n\nleft,1600,1\nmiddle,1600,1\n")
     code, _, err = shell("calibrate load-cell", str(readings))
@@ -120,7 +111,7 @@ def test_unreadable_readings_name_their_line(shell: Any, tmp_path: Path) -> None
 
 
 @pytest.mark.slow
-def test_friction_comes_out_near_the_models_own(shell: Any) -> None:
+def test_friction_comes_out_near_the_models_own(shell):
     """Breakaway in the model is 8 N or its sliding friction, 7 N with a spread of 0.4 N, if that is more."""
     code, friction, _ = shell("calibrate friction", "--gaps", "2", "--narrowest", "0.07")
     assert code == 0
@@ -128,16 +119,14 @@ def test_friction_comes_out_near_the_models_own(shell: Any) -> None:
         assert 8.0 <= effort <= 8.5
 
 
-def test_gripper_without_calibrations_says_so() -> None:
+def test_gripper_without_calibrations_says_so():
     done = graspsense("calibrate", "tare")
     assert done.returncode == 2
     assert "keeps no calibrations" in done.stderr
 
 
-def test_without_a_home_a_calibration_is_refused_before_it_is_made(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    def unknown(uid: int) -> None:
+def test_without_a_home_a_calibration_is_refused_before_it_is_made(monkeypatch, tmp_path):
+    def unknown(uid):
         raise KeyError(f"getpwuid(): uid not found: {uid}")
 
     monkeypatch.delenv("XDG_DATA_HOME")
@@ -151,7 +140,7 @@ def test_without_a_home_a_calibration_is_refused_before_it_is_made(
     assert (tmp_path / "EMULATED" / "tare.json").exists()
 
 
-def test_load_table_rises_and_goes_on_beyond_its_end() -> None:
+def test_load_table_rises_and_goes_on_beyond_its_end():
     table = load_table([(1.0, 1.5), (2.0, 3.5), (2.0, 2.5), (4.0, 4.0), (5.0, 3.8)])
     assert table.load_n == pytest.approx((0.0, 1.5, 3.0, 3.9, 3.9)), "a mean of 2, and a fall pooled"
     assert load_of(table, 0.5) == (0.75, True)
@@ -162,13 +151,13 @@ def test_load_table_rises_and_goes_on_beyond_its_end() -> None:
 
 
 @every_case("readings", [[], [(1.0, 1.0)], [(1.0, 1.0), (float("nan"), 2.0)], [(-1.0, 1.0), (2.0, 2.0)]])
-def test_table_that_means_nothing_is_refused(readings: list[tuple[float, float]]) -> None:
+def test_table_that_means_nothing_is_refused(readings):
     with pytest.raises(ConfigError):
         load_table(readings)
 
 
 @every_case("text", ["", "[]", "{}", '{"format": "graspsense-calibration", "version": 2}', "\0"])
-def test_what_is_no_calibration_is_damaged(text: str, tmp_path: Path) -> None:
+def test_what_is_no_calibration_is_damaged(text, tmp_path):
     path = tmp_path / "tare.json"
     path.write_text(text)
     with pytest.raises(DataDamaged, match=r"tare\.json"):
@@ -177,8 +166,8 @@ def test_what_is_no_calibration_is_damaged(text: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("closing_n", "expected_n"), [((8.1, 9.4, 7.7), 9.4), ((), 7.0)])
 def test_greatest_closing_effort_of_a_stored_friction_is_the_friction_of_the_drive(
-    closing_n: tuple[float, ...], expected_n: float, tmp_path: Path
-) -> None:
+    closing_n, expected_n, tmp_path
+):
     """Opening takes more here, which is of no concern to a squeeze. An empty table is as good as none."""
     numbers = opened(calibration=str(tmp_path)).numbers
     count = len(closing_n)

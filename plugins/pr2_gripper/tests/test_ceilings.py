@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import re
 import sys
+from contextlib import closing
 from pathlib import Path
-from typing import Any
 
 import pytest
 from cases import every_case
@@ -21,7 +21,7 @@ from graspsense_pr2_gripper.discovery import LIBRARY
 from graspsense_pr2_gripper.protocol import EFFORT_KIND, OutputReport, decode_output
 
 
-def emulated(**faults: Any) -> Pr2Backend:
+def emulated(**faults):
     return Pr2Backend(Pr2Config(transport="emulated", object="none", faults=FaultConfig(**faults)))
 
 
@@ -49,7 +49,7 @@ IMPLAUSIBLE = [
 
 
 @every_case(("number", "value"), IMPLAUSIBLE)
-def test_number_that_no_pr2_gripper_has_is_refused_with_what_is_allowed(number: str, value: int) -> None:
+def test_number_that_no_pr2_gripper_has_is_refused_with_what_is_allowed(number, value):
     with pytest.raises(NoDevice) as refused:
         emulated(identity={number: value}).open(0)
     text = str(refused.value)
@@ -60,20 +60,17 @@ def test_number_that_no_pr2_gripper_has_is_refused_with_what_is_allowed(number: 
 
 @every_case("end", ["least", "most"])
 @every_case("number", [ceiling.number for ceiling in RANGES])
-def test_both_ends_of_a_range_are_allowed(number: str, end: str) -> None:
+def test_both_ends_of_a_range_are_allowed(number, end):
     (allowed,) = [ceiling for ceiling in RANGES if ceiling.number == number]
-    backend = emulated(identity={number: round(getattr(allowed, end))})
-    info = backend.open(0)
-    try:
+    with closing(emulated(identity={number: round(getattr(allowed, end))})) as backend:
+        info = backend.open(0)
         # It is a gripper that gives frames, with the host's ceilings at most.
         assert backend.read(1.0) is not None
         assert 0.0 < info.effort_limit_n <= 100.0
-    finally:
-        backend.close()
 
 
 @pytest.mark.parametrize("numbers", [{"watchdog_ms": 65535}, {"effort_limit_un": 2_147_000_000}])
-def test_real_board_is_refused_too_and_closed(machine: Any, board: Any, numbers: dict[str, int]) -> None:
+def test_real_board_is_refused_too_and_closed(machine, board, numbers):
     machine.plug("/dev/hidraw3", board(**numbers))
     with pytest.raises(NoDevice, match=next(iter(numbers))):
         Pr2Backend(Pr2Config()).open(0)
@@ -81,9 +78,7 @@ def test_real_board_is_refused_too_and_closed(machine: Any, board: Any, numbers:
 
 
 @every_case("answer", [None, [], b"", bytes(10), b"\3GSPR", 0, "GSPR", [999] * 64, bytes(64)])
-def test_feature_report_that_is_none_is_no_gripper(
-    machine: Any, board: Any, monkeypatch: pytest.MonkeyPatch, answer: Any
-) -> None:
+def test_feature_report_that_is_none_is_no_gripper(machine, board, monkeypatch, answer):
     machine.plug("/dev/hidraw3", board())
     device = type(sys.modules[LIBRARY].device())
     monkeypatch.setattr(device, "get_feature_report", lambda *given: answer)
@@ -94,7 +89,7 @@ def test_feature_report_that_is_none_is_no_gripper(
 
 @every_case("pace", ["lock-step", "device"])
 @every_case("count", [0, 1, 63])
-def test_emulated_feature_report_that_is_cut_short_is_no_gripper(pace: Any, count: int) -> None:
+def test_emulated_feature_report_that_is_cut_short_is_no_gripper(pace, count):
     backend = Pr2Backend(Pr2Config(transport="emulated", pace=pace, faults=FaultConfig(feature_bytes=count)))
     with pytest.raises(NoDevice, match=f"64 bytes, this one {count}"):
         backend.open(0)
@@ -104,23 +99,21 @@ NUMBERS = st.floats(allow_nan=True, allow_infinity=True) | st.floats(-300.0, 300
 OPENED: list[tuple[Pr2Backend, list[OutputReport]]] = []
 
 
-def strong() -> tuple[Pr2Backend, list[OutputReport]]:
+def strong():
     """Return an open gripper whose board allows 200 N and 0.5 m/s, and the list of what reaches the board."""
     if not OPENED:
         backend = emulated(identity={"effort_limit_un": 200_000_000, "speed_limit_um_s": 500_000})
         info = backend.open(0)
         assert (info.effort_limit_n, info.speed_limit_m_s) == (100.0, 0.2)
-        sent: list[OutputReport] = []
-        wire = backend._open().emulation.wire  # type: ignore[union-attr]
-        wire.output = lambda data: sent.append(decode_output(data))  # type: ignore[method-assign]
+        sent = []
+        wire = backend._open().emulation.wire
+        wire.output = lambda data: sent.append(decode_output(data))
         OPENED.append((backend, sent))
     return OPENED[0]
 
 
 @given(value=NUMBERS, effort_limit=NUMBERS, speed_limit=NUMBERS)
-def test_no_command_is_above_the_ceilings_whatever_the_board_allows(
-    value: float, effort_limit: float, speed_limit: float
-) -> None:
+def test_no_command_is_above_the_ceilings_whatever_the_board_allows(value, effort_limit, speed_limit):
     backend, sent = strong()
     backend.apply(Command(EFFORT, value, effort_limit, speed_limit))
     command = sent[-1]
@@ -135,7 +128,7 @@ def test_no_command_is_above_the_ceilings_whatever_the_board_allows(
         assert command.effort_un == pytest.approx(min(max(value, -most), most) * 1e6, abs=1.0)
 
 
-def test_effort_at_its_limit_is_not_clamped_by_the_board() -> None:
+def test_effort_at_its_limit_is_not_clamped_by_the_board():
     """20.0000006 N is 20 000 001 µN, and its limit is rounded down."""
     backend = emulated()
     backend.open(0)
@@ -149,7 +142,7 @@ def test_effort_at_its_limit_is_not_clamped_by_the_board() -> None:
     assert statuses == [0, 0, 0]
 
 
-def test_specification_has_the_ranges_of_the_code() -> None:
+def test_specification_has_the_ranges_of_the_code():
     rows = re.findall(r"^\| (\w+) \| (\d+) to (\d+) \| ([^|]+) \|", SPECIFICATION.read_text(), re.M)
     ranges = {(number, int(least), int(most), unit) for number, least, most, unit in rows}
     assert ranges == {

@@ -1,12 +1,9 @@
 """The device is lost at a random moment of a grasp: the motor is off within 0.1 s of the device's time, every time."""
 
-from __future__ import annotations
-
 import math
 import os
 import random
 from collections import Counter
-from typing import Any
 
 import pytest
 
@@ -20,7 +17,7 @@ from graspsense_pr2_gripper.faults import Wire
 
 FAULTS = int(os.environ.get("GRASPSENSE_DEVICE_FAULTS", "120"))
 CONTROLLERS = ("hybrid", "force", "velocity")
-NEAR: dict[str, Any] = {"object": "can:empty_open", "body_config": {"open_gap_m": 0.075}}
+NEAR = {"object": "can:empty_open", "body_config": {"open_gap_m": 0.075}}
 OFF_WITHIN_S = 0.1
 PHASES = (Phase.OPENING, Phase.TARING, Phase.APPROACH, Phase.SQUEEZE, Phase.HOLD, Phase.RELEASE)
 
@@ -30,7 +27,7 @@ class Witness(Wire):
 
     lost_s = driven_s = math.nan
 
-    def step(self) -> list[bytes]:
+    def step(self):
         arriving = super().step()
         now_us = self.firmware.time_us
         if (self.unplugged or self._stalled(now_us)) and math.isnan(self.lost_s):
@@ -41,11 +38,11 @@ class Witness(Wire):
 
 
 @pytest.fixture
-def witnesses(monkeypatch: pytest.MonkeyPatch) -> list[Witness]:
+def witnesses(monkeypatch):
     """The wires of the grasps so far, the newest last."""
-    made: list[Witness] = []
+    made = []
 
-    def wire(*given: Any) -> Witness:
+    def wire(*given):
         made.append(Witness(*given))
         return made[-1]
 
@@ -53,16 +50,16 @@ def witnesses(monkeypatch: pytest.MonkeyPatch) -> list[Witness]:
     return made
 
 
-def grasp(controller: str, faults: FaultConfig) -> Any:
+def grasp(controller, faults):
     backend = Pr2Backend(Pr2Config(transport="emulated", faults=faults, **NEAR))
     return run_grasp(backend, create("controller", controller), RunConfig(seed=1))
 
 
 @pytest.mark.slow
-def test_the_motor_is_off_within_a_tenth_of_a_second_of_losing_the_device(witnesses: list[Witness]) -> None:
+def test_the_motor_is_off_within_a_tenth_of_a_second_of_losing_the_device(witnesses):
     """Pulled or stalled for good, in every phase, under each controller; as many faults as are asked for."""
     chance = random.Random(5)
-    lost: Counter[Phase] = Counter()
+    lost = Counter()
     driven = 0
     last_s = {}
     for controller in CONTROLLERS:

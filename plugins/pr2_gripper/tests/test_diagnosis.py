@@ -1,14 +1,10 @@
 """What the doctor says of a gripper, with hidapi's module at the outermost edge and the emulated board behind it."""
 
-from __future__ import annotations
-
 import gc
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
 from cases import every_case
@@ -27,15 +23,13 @@ from graspsense_pr2_gripper.emulator.board import emulate
 from graspsense_pr2_gripper.protocol import EFFORT_KIND, OWN_LIMIT, OutputReport, encode_output
 from graspsense_pr2_gripper.udev import hidraw_rule
 
-Doctor = Callable[..., tuple[int, dict[str, dict[str, Any]]]]
-
 
 @pytest.fixture
-def doctor(monkeypatch: pytest.MonkeyPatch) -> Doctor:
+def doctor(monkeypatch):
     """Runs `graspsense doctor --json`; returns the exit code and the PR2 plugin's findings by subject."""
     monkeypatch.setattr(diagnosis, "TRANSPORTS", ("hidraw",))
 
-    def run(*arguments: str) -> tuple[int, dict[str, dict[str, Any]]]:
+    def run(*arguments):
         done = graspsense("doctor", "--json", "--timeout", "0.2", *arguments)
         (ours,) = (
             diagnosis
@@ -48,23 +42,20 @@ def doctor(monkeypatch: pytest.MonkeyPatch) -> Doctor:
     return run
 
 
-Powered = Callable[[Any], AbstractContextManager[None]]
-
-
 @pytest.fixture
-def powered(monkeypatch: pytest.MonkeyPatch) -> Powered:
+def powered(monkeypatch):
     """The boards of a machine report once a millisecond of its own time, by which the doctor measures too.
 
     It passes no faster than their reports are read, so that nothing that the doctor finds tells how busy this one is.
     """
 
     @contextmanager
-    def on(machine: Any) -> Iterator[None]:
+    def on(machine):
         for module in (link, watching):
             monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: machine.now_s))
         stop = threading.Event()
 
-        def tick() -> None:
+        def tick():
             while not stop.wait(0.0002):
                 if not any(handle.queue for handle in machine.open_handles):
                     machine.tick()
@@ -80,12 +71,10 @@ def powered(monkeypatch: pytest.MonkeyPatch) -> Powered:
     return on
 
 
-def test_no_garbage_is_collected_within_a_measurement(
-    doctor: Doctor, machine: Any, board: Any, powered: Powered, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_garbage_is_collected_within_a_measurement(doctor, machine, board, powered, monkeypatch):
     measure, collects = diagnosis.watch_link, []
 
-    def watch_link(measured: link.Link, seconds: float) -> watching.Watched:
+    def watch_link(measured, seconds):
         collects.append(gc.isenabled())
         return measure(measured, seconds)
 
@@ -97,7 +86,7 @@ def test_no_garbage_is_collected_within_a_measurement(
     assert gc.isenabled()
 
 
-def test_no_gripper_is_a_problem_only_where_one_was_asked_for(doctor: Doctor, machine: Any) -> None:
+def test_no_gripper_is_a_problem_only_where_one_was_asked_for(doctor, machine):
     assert doctor()[1]["device"]["state"] == "note"
     code, said = doctor("--gripper", "pr2", "-o", "gripper.serial=R2")
     assert (code, said["device"]["state"]) == (1, "problem")
@@ -105,17 +94,13 @@ def test_no_gripper_is_a_problem_only_where_one_was_asked_for(doctor: Doctor, ma
     assert "transport hidraw" not in said
 
 
-def test_the_doctor_comes_also_where_a_part_of_the_pipeline_is_missing(
-    doctor: Doctor, machine: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_doctor_comes_also_where_a_part_of_the_pipeline_is_missing(doctor, machine, monkeypatch):
     alone = IsolatedPlugins(graspsense_pr2_gripper.plugin)  # without the default pipeline's classifier
     monkeypatch.setattr(loader, "_current", alone)
     assert graspsense("doctor", "--json", "--gripper", "pr2").returncode == 1, "there is no gripper"
 
 
-def test_a_gripper_is_measured_and_not_moved(
-    doctor: Doctor, machine: Any, board: Any, powered: Powered
-) -> None:
+def test_a_gripper_is_measured_and_not_moved(doctor, machine, board, powered):
     wire = board()
     machine.plug("/dev/hidraw3", wire)
     with powered(machine):
@@ -132,9 +117,7 @@ def test_a_gripper_is_measured_and_not_moved(
     assert said["calibration tare"]["state"] == "note"
 
 
-def test_lost_and_damaged_reports_are_a_problem_with_a_remedy(
-    doctor: Doctor, machine: Any, board: Any, powered: Powered
-) -> None:
+def test_lost_and_damaged_reports_are_a_problem_with_a_remedy(doctor, machine, board, powered):
     machine.plug("/dev/hidraw3", board(faults=FaultConfig(drop=0.2, corrupt=0.2)))
     with powered(machine):
         code, said = doctor("--gripper", "pr2")
@@ -146,9 +129,7 @@ def test_lost_and_damaged_reports_are_a_problem_with_a_remedy(
     assert "firmware is faulty" in finding["advice"]
 
 
-def test_board_with_implausible_numbers_is_a_problem_with_each_of_them(
-    doctor: Doctor, machine: Any, board: Any
-) -> None:
+def test_board_with_implausible_numbers_is_a_problem_with_each_of_them(doctor, machine, board):
     machine.plug("/dev/hidraw3", board(watchdog_ms=65535, effort_limit_un=2_147_000_000))
     code, said = doctor("--gripper", "pr2")
     finding = said["transport hidraw"]
@@ -157,23 +138,21 @@ def test_board_with_implausible_numbers_is_a_problem_with_each_of_them(
     assert "effort_limit_un is 2147000000" in finding["advice"]
 
 
-def test_a_silent_gripper_is_a_problem(doctor: Doctor, machine: Any, board: Any) -> None:
+def test_a_silent_gripper_is_a_problem(doctor, machine, board):
     machine.plug("/dev/hidraw3", board())
     code, said = doctor("--gripper", "pr2")
     assert (code, said["transport hidraw"]["state"]) == (1, "problem")
     assert "it sends no reports" in said["transport hidraw"]["advice"]
 
 
-def test_a_gripper_that_somebody_else_commands_is_left_alone(
-    doctor: Doctor, machine: Any, board: Any, powered: Powered
-) -> None:
+def test_a_gripper_that_somebody_else_commands_is_left_alone(doctor, machine, board, powered):
     """A hidraw node is open to two programs at once: letting go here would drop what the other one holds."""
     wire = board()
     machine.plug("/dev/hidraw3", wire)
     counter = 0
     plain = machine.tick
 
-    def tick() -> None:
+    def tick():
         nonlocal counter
         counter += 1
         wire.output(
@@ -190,9 +169,7 @@ def test_a_gripper_that_somebody_else_commands_is_left_alone(
 
 
 @pytest.mark.slow
-def test_who_may_not_open_it_is_given_the_rule(
-    doctor: Doctor, machine: Any, board: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_who_may_not_open_it_is_given_the_rule(doctor, machine, board, monkeypatch):
     machine.plug("/dev/hidraw3", board())
     monkeypatch.setattr("graspsense_pr2_gripper.discovery.sys.platform", "linux")
     monkeypatch.setattr("graspsense_pr2_gripper.discovery.os.access", lambda path, mode: False)
@@ -203,9 +180,7 @@ def test_who_may_not_open_it_is_given_the_rule(
     assert rule == 'KERNEL=="hidraw*", KERNELS=="0003:1209:0001.*", TAG+="uaccess"'
 
 
-def test_calibrations_are_told_with_their_age(
-    doctor: Doctor, machine: Any, board: Any, device_identity: Any, powered: Powered
-) -> None:
+def test_calibrations_are_told_with_their_age(doctor, machine, board, device_identity, powered):
     machine.plug("/dev/hidraw3", board())
     made = datetime.now(UTC) - timedelta(days=3)
     zero = {"left": [3000.0] * 22, "right": [3000.0] * 22, "images": 24}
@@ -229,8 +204,8 @@ def test_calibrations_are_told_with_their_age(
     ],
 )
 def test_where_no_device_can_be_emulated_it_says_why_and_offers_another(
-    monkeypatch: pytest.MonkeyPatch, platform: str, container: str, says: str, tmp_path: Any
-) -> None:
+    monkeypatch, platform, container, says, tmp_path
+):
     monkeypatch.setattr(reasons.sys, "platform", platform)
     monkeypatch.setattr(reasons, "UHID_NODE", str(tmp_path / "uhid"))
     monkeypatch.setattr(reasons, "VHCI", tmp_path / "vhci")

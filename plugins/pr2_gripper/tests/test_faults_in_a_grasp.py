@@ -2,7 +2,7 @@
 
 import gripper_faults
 import pytest
-from gripper_faults import FAULTS, FaultyGrasp
+from gripper_faults import FAULTS
 
 from graspsense_pr2_gripper.config import FaultConfig
 
@@ -16,7 +16,7 @@ TICK_S = 0.001 + 1e-9
 """A fault is seen in the tick in which it comes; durations are counted in ticks."""
 
 
-def check(row: FaultyGrasp, healthy: FaultyGrasp) -> None:
+def check(row, healthy):
     """The invariants of one grasp: effort, true force on the object, and time until the release."""
     name = f"{row.fault}, {row.side}, {row.phase}, {row.controller}: {row.outcome} ({row.words})"
     motor = "motor" in row.fault
@@ -124,7 +124,7 @@ def test_a_pad_that_is_known_to_be_bad_refuses_the_grasp():
 
 
 @pytest.mark.slow
-def test_a_picture_and_a_notebook_show_the_reason_and_the_warnings() -> None:
+def test_a_picture_and_a_notebook_show_the_reason_and_the_warnings():
     from graspsense import load_pipeline
     from graspsense.report.grasp_picture import _words
 

@@ -1,9 +1,5 @@
 """The emulated board: what it does with commands, and that it lets go when they stop."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import pytest
 
 from graspsense.gripper_api import gap_and_rate
@@ -24,12 +20,12 @@ from graspsense_pr2_gripper.protocol import (
 )
 
 
-def effort(counter: int, newtons: float, **limits: int) -> bytes:
+def effort(counter, newtons, **limits):
     limits = {"effort_limit_un": OWN_LIMIT, "speed_limit_um_s": OWN_LIMIT, **limits}
     return encode_output(OutputReport(counter, EFFORT_KIND, round(newtons * 1e6), **limits))
 
 
-def test_a_report_a_millisecond_from_power_on(board: Any) -> None:
+def test_a_report_a_millisecond_from_power_on(board):
     wire = board()
     reports = [decode_input(wire.firmware.step()) for _ in range(50)]
     assert [report.sequence for report in reports] == list(range(50))
@@ -39,13 +35,13 @@ def test_a_report_a_millisecond_from_power_on(board: Any) -> None:
 
 
 @pytest.mark.parametrize("transmission", sorted(LINKAGES))
-def test_encoder_tells_the_bodys_gap_through_each_linkage(board: Any, transmission: str) -> None:
+def test_encoder_tells_the_bodys_gap_through_each_linkage(board, transmission):
     report = decode_input(board(transmission=transmission).firmware.step())
     gap, rate = gap_and_rate(LINKAGES[transmission], report.encoder_ticks / 1200)
     assert gap == pytest.approx(0.086, abs=rate / 1200), "the simulated gripper stands open at 86 mm"
 
 
-def test_command_is_applied_echoed_and_answered(board: Any) -> None:
+def test_command_is_applied_echoed_and_answered(board):
     firmware = board().firmware
     firmware.step()
     firmware.output(effort(4711, 20.0))
@@ -54,7 +50,7 @@ def test_command_is_applied_echoed_and_answered(board: Any) -> None:
     assert report.effort_un == 20_000_000
 
 
-def test_effort_is_clamped_to_the_commands_limit_and_to_the_devices(board: Any) -> None:
+def test_effort_is_clamped_to_the_commands_limit_and_to_the_devices(board):
     firmware = board().firmware
     firmware.step()
     firmware.output(effort(1, -30.0, effort_limit_un=12_000_000))
@@ -64,7 +60,7 @@ def test_effort_is_clamped_to_the_commands_limit_and_to_the_devices(board: Any) 
     assert firmware.effort_un == 100_000_000
 
 
-def test_damaged_command_leaves_the_one_before_in_force(board: Any) -> None:
+def test_damaged_command_leaves_the_one_before_in_force(board):
     firmware = board().firmware
     firmware.step()
     firmware.output(effort(1, 20.0))
@@ -75,7 +71,7 @@ def test_damaged_command_leaves_the_one_before_in_force(board: Any) -> None:
     assert (report.echo, report.command_result, report.effort_un) == (1, REFUSED, 20_000_000)
 
 
-def test_watchdog_lets_go_after_its_time_and_not_before(board: Any) -> None:
+def test_watchdog_lets_go_after_its_time_and_not_before(board):
     firmware = board(watchdog_ms=100).firmware
     firmware.step()
     firmware.output(effort(1, 20.0))
@@ -92,7 +88,7 @@ def test_watchdog_lets_go_after_its_time_and_not_before(board: Any) -> None:
     assert not again.status & LET_GO
 
 
-def test_let_go_is_a_command_of_its_own(board: Any) -> None:
+def test_let_go_is_a_command_of_its_own(board):
     firmware = board().firmware
     firmware.step()
     firmware.output(effort(1, 20.0))
@@ -100,7 +96,7 @@ def test_let_go_is_a_command_of_its_own(board: Any) -> None:
     assert decode_input(firmware.step()).effort_un == 0
 
 
-def test_speed_limit_takes_the_effort_away_while_it_is_exceeded(board: Any) -> None:
+def test_speed_limit_takes_the_effort_away_while_it_is_exceeded(board):
     firmware = board(object="none").firmware
     firmware.step()
     speeds = []

@@ -4,11 +4,9 @@ What it does was observed on a Linux kernel with hidapi 0.15: see the table "Obs
 in benchmarks/results/pr2.md.
 """
 
-from __future__ import annotations
-
 import threading
 import time
-from typing import Any
+from contextlib import closing
 
 import pytest
 
@@ -19,7 +17,7 @@ from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
 RELAX = Command(EFFORT, 0.0, float("inf"), float("inf"))
 
 
-def plugged_in(machine: Any, wire: Any, **settings: Any) -> Pr2Backend:
+def plugged_in(machine, wire, **settings):
     """Plug a board into a socket and open it."""
     machine.plug("/dev/hidraw3", wire)
     backend = Pr2Backend(Pr2Config(**settings))
@@ -28,19 +26,19 @@ def plugged_in(machine: Any, wire: Any, **settings: Any) -> Pr2Backend:
 
 
 @pytest.fixture
-def opened(machine: Any, board: Any) -> Any:
+def opened(machine, board):
     backend = plugged_in(machine, board())
     yield backend
     backend.close()
 
 
-def following(backend: Pr2Backend, machine: Any) -> Any:
+def following(backend, machine):
     """Let a millisecond pass, and wait for what the reader makes of it."""
     machine.tick()
     return backend.read(60.0)
 
 
-def test_device_says_who_it_is(machine: Any, board: Any) -> None:
+def test_device_says_who_it_is(machine, board):
     machine.plug("/dev/hidraw3", board(effort_limit_un=50_000_000, speed_limit_um_s=100_000))
     backend = Pr2Backend(Pr2Config())
     info = backend.open(0)
@@ -50,37 +48,31 @@ def test_device_says_who_it_is(machine: Any, board: Any) -> None:
     assert any("private tests" in note for note in info.notes)
 
 
-def test_frames_come_and_commands_arrive(opened: Pr2Backend, machine: Any) -> None:
+def test_frames_come_and_commands_arrive(opened, machine):
     opening = following(opened, machine)
     assert opening.frame.t_s == 0.0
     assert opening.frame.gap_m == pytest.approx(0.086, abs=1e-6)
     opened.apply(Command(EFFORT, 12.5, float("inf"), float("inf")))
-    assert following(opened, machine).frame.effort_n == 12.5
+    assert [following(opened, machine).frame.effort_n for _ in range(20)] == [12.5] * 20
+    assert machine.zero_timeouts == 0, "a read with a time-out of zero would block"
 
 
-def test_no_read_has_a_timeout_of_zero_which_would_block(opened: Pr2Backend, machine: Any) -> None:
-    for _ in range(20):
-        following(opened, machine)
-    assert machine.zero_timeouts == 0
-
-
-def test_pulled_cable_ends_a_read_at_once(opened: Pr2Backend, machine: Any) -> None:
+@pytest.mark.parametrize(
+    ("use", "says"),
+    [
+        (lambda opened: opened.read(60.0), "read error"),
+        (lambda opened: opened.apply(RELAX), "-1 of 64 bytes"),
+    ],
+    ids=["read", "write"],
+)
+def test_pulled_cable_is_a_loss_at_once(opened, machine, use, says):
     following(opened, machine)
     machine.unplug("/dev/hidraw3")
-    with pytest.raises(DeviceLost, match="read error"):
-        opened.read(60.0)
+    with pytest.raises(DeviceLost, match=says):
+        use(opened)
 
 
-def test_write_that_returns_minus_one_is_a_loss(opened: Pr2Backend, machine: Any) -> None:
-    following(opened, machine)
-    machine.unplug("/dev/hidraw3")
-    with pytest.raises(DeviceLost, match="-1 of 64 bytes"):
-        opened.apply(RELAX)
-
-
-def test_a_stalled_write_is_a_loss_within_a_second(
-    opened: Pr2Backend, machine: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_stalled_write_is_a_loss_within_a_second(opened, machine, monkeypatch):
     """The kernel waits for 5 s where an endpoint is stalled, and nothing interrupts it."""
     following(opened, machine)
     stalled = threading.Event()
@@ -92,16 +84,16 @@ def test_a_stalled_write_is_a_loss_within_a_second(
     stalled.set()
 
 
-def test_silence_is_no_frame_but_no_loss_yet(opened: Pr2Backend, machine: Any) -> None:
+def test_silence_is_no_frame_but_no_loss_yet(opened, machine):
     assert opened.read(0.01) is None
     assert following(opened, machine) is not None
 
 
-def test_writes_that_never_arrive_are_noticed_by_their_echo(machine: Any, board: Any) -> None:
+def test_writes_that_never_arrive_are_noticed_by_their_echo(machine, board):
     """uhid took 200 writes and dropped up to 76 of them in silence."""
     backend = plugged_in(machine, board(faults=FaultConfig(drop_command=1.0)))
 
-    def commanding() -> None:
+    def commanding():
         for _ in range(200):
             following(backend, machine)
             backend.apply(RELAX)
@@ -111,7 +103,7 @@ def test_writes_that_never_arrive_are_noticed_by_their_echo(machine: Any, board:
     backend.close()
 
 
-def test_a_host_that_stood_still_is_no_loss(machine: Any, board: Any) -> None:
+def test_a_host_that_stood_still_is_no_loss(machine, board):
     """One command without an echo, and 0.2 s of the device's time until the host reads again."""
     backend = plugged_in(machine, board(faults=FaultConfig(drop_command=1.0)))
     following(backend, machine)
@@ -120,7 +112,7 @@ def test_a_host_that_stood_still_is_no_loss(machine: Any, board: Any) -> None:
     backend.close()
 
 
-def test_closing_tells_the_gripper_to_let_go(machine: Any, board: Any) -> None:
+def test_closing_tells_the_gripper_to_let_go(machine, board):
     wire = board()
     backend = plugged_in(machine, wire)
     following(backend, machine)
@@ -131,7 +123,7 @@ def test_closing_tells_the_gripper_to_let_go(machine: Any, board: Any) -> None:
     assert machine.open_handles == []
 
 
-def test_same_gripper_is_found_again_by_its_serial_at_another_path(machine: Any, board: Any) -> None:
+def test_same_gripper_is_found_again_by_its_serial_at_another_path(machine, board):
     backend = plugged_in(machine, board(), reconnect_s=60.0)
     following(backend, machine)
     machine.unplug("/dev/hidraw3")
@@ -148,7 +140,7 @@ def test_same_gripper_is_found_again_by_its_serial_at_another_path(machine: Any,
     backend.close()
 
 
-def test_waiting_for_a_lost_gripper_ends(machine: Any, board: Any) -> None:
+def test_waiting_for_a_lost_gripper_ends(machine, board):
     backend = plugged_in(machine, board(), reconnect_s=0.01)
     machine.unplug("/dev/hidraw3")
     with pytest.raises(DeviceLost):
@@ -157,32 +149,26 @@ def test_waiting_for_a_lost_gripper_ends(machine: Any, board: Any) -> None:
         backend.open(0)
 
 
-def test_first_opening_does_not_wait(machine: Any) -> None:
+def test_first_opening_does_not_wait(machine):
     with pytest.raises(NoDevice):
         Pr2Backend(Pr2Config(reconnect_s=3600.0)).open(0)
     assert machine.listings == 1, "nobody looked again"
 
 
-def test_serial_of_the_usb_string_must_be_the_boards_own(machine: Any, board: Any) -> None:
+def test_serial_of_the_usb_string_must_be_the_boards_own(machine, board):
     machine.plug("/dev/hidraw3", board(serial="R2"), "L7")
     with pytest.raises(NoDevice, match="'R2', but the settings ask for 'L7'"):
         Pr2Backend(Pr2Config(serial="L7")).open(0)
 
 
-def test_a_report_that_waited_in_the_device_is_no_loss_of_all_that_came_after(
-    machine: Any, board: Any
-) -> None:
+def test_a_report_that_waited_in_the_device_is_no_loss_of_all_that_came_after(machine, board):
     """An endpoint keeps a report until somebody asks: it may be hours old when the device is opened."""
     wire = board()
     waiting = wire.step()[0]
     for _ in range(500):
         wire.step()
     machine.at_endpoint.append(waiting)
-    backend = plugged_in(machine, wire)
-    try:
-        for _ in range(3):
-            assert following(backend, machine) is not None
+    with closing(plugged_in(machine, wire)) as backend:
+        assert all(following(backend, machine) is not None for _ in range(3))
         assert backend.report()["lost"] == 0
         assert backend.report()["reports"] == 3
-    finally:
-        backend.close()

@@ -1,7 +1,5 @@
 """The board's periods on a clock of the test's own."""
 
-from __future__ import annotations
-
 from itertools import islice
 from types import SimpleNamespace
 
@@ -11,18 +9,18 @@ from graspsense_pr2_gripper import pacing
 
 
 def test_what_is_late_is_made_up_for_so_that_the_devices_clock_stays_with_the_hosts(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    monkeypatch,
+):
     now = [5.0]
-    slept: list[float] = []
+    slept = []
 
-    def sleep(seconds: float) -> None:
+    def sleep(seconds):
         slept.append(seconds)
         now[0] += seconds
 
     monkeypatch.setattr(pacing, "time", SimpleNamespace(monotonic=lambda: now[0], sleep=sleep))
-    began: list[float] = []
-    late: list[float] = []
+    began = []
+    late = []
     for late_s in islice(pacing.on_time(0.001), 400):
         began.append(now[0])
         late.append(late_s)

@@ -1,13 +1,10 @@
 """The codec and the document that defines it: bytes to numbers and back, and nothing wrong let through."""
 
-from __future__ import annotations
-
 import math
 import random
 import re
 import struct
 from pathlib import Path
-from typing import Any
 from zlib import crc32
 
 import pytest
@@ -17,7 +14,6 @@ from hypothesis import strategies as st
 
 from graspsense_pr2_gripper import protocol
 from graspsense_pr2_gripper.protocol import (
-    Identity,
     InputReport,
     OutputReport,
     ProtocolError,
@@ -62,9 +58,9 @@ OUTPUTS = st.builds(
 )
 
 
-def tables() -> dict[str, list[tuple[int, str, str]]]:
+def tables():
     """The document's layouts: heading to (offset, type, field)."""
-    layouts: dict[str, list[tuple[int, str, str]]] = {}
+    layouts = {}
     heading = ""
     for line in DOCUMENT.read_text().splitlines():
         if line.startswith("## "):
@@ -75,21 +71,19 @@ def tables() -> dict[str, list[tuple[int, str, str]]]:
     return layouts
 
 
-def width(kind: str) -> int:
+def width(kind):
     size, _, count = kind.partition("[")
     return int(size[1:]) // 8 * int(count.rstrip("]") or 1)
 
 
 TABLES = tables()
-LAYOUTS = {
-    "Report 1, input: every millisecond": protocol.INPUT_LAYOUT,
-    "Report 2, output: a command": protocol.OUTPUT_LAYOUT,
-    "Report 3, feature: who the device is": protocol.FEATURE_LAYOUT,
-}
+INPUT = "Report 1, input: every millisecond"
+OUTPUT = "Report 2, output: a command"
+FEATURE = "Report 3, feature: who the device is"
 
 
-@pytest.mark.parametrize("heading", LAYOUTS)
-def test_document_has_no_gap_and_ends_with_the_crc_at_64_bytes(heading: str) -> None:
+@every_case("heading", [INPUT, OUTPUT, FEATURE])
+def test_document_has_no_gap_and_ends_with_the_crc_at_64_bytes(heading):
     position = 0
     for offset, kind, _ in TABLES[heading]:
         assert offset == position
@@ -99,20 +93,7 @@ def test_document_has_no_gap_and_ends_with_the_crc_at_64_bytes(heading: str) -> 
     assert position == protocol.REPORT_SIZE
 
 
-@pytest.mark.parametrize("heading", LAYOUTS)
-def test_codec_has_the_documents_types_in_the_documents_order(heading: str) -> None:
-    codes = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q", "i32": "i"}
-    expected = ""
-    for _, kind, field in TABLES[heading][:-1]:
-        size, _, count = kind.partition("[")
-        repeated = int(count.rstrip("]") or 1)
-        text = field in ("magic", "serial", "reserved")
-        expected += f"{repeated}s" if text else codes[size] * repeated
-    written = re.sub(r"(\d+)([BHIQi])", lambda m: m[2] * int(m[1]), LAYOUTS[heading].format.lstrip("<"))
-    assert written == expected
-
-
-def value_at(data: bytes, heading: str, field: str) -> Any:
+def value_at(data, heading, field):
     offset, kind, _ = next(row for row in TABLES[heading] if row[2] == field)
     size, _, count = kind.partition("[")
     code = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q", "i32": "i"}[size]
@@ -121,8 +102,8 @@ def value_at(data: bytes, heading: str, field: str) -> Any:
 
 
 @given(INPUTS)
-def test_input_fields_lie_where_the_document_says(report: InputReport) -> None:
-    data, heading = encode_input(report), "Report 1, input: every millisecond"
+def test_input_fields_lie_where_the_document_says(report):
+    data, heading = encode_input(report), INPUT
     for field in InputReport._fields:
         if field == "samples":
             assert value_at(data, heading, "sample_count") == len(report.samples)
@@ -134,17 +115,17 @@ def test_input_fields_lie_where_the_document_says(report: InputReport) -> None:
 
 
 @given(OUTPUTS)
-def test_output_fields_lie_where_the_document_says(report: OutputReport) -> None:
-    data, heading = encode_output(report), "Report 2, output: a command"
+def test_output_fields_lie_where_the_document_says(report):
+    data, heading = encode_output(report), OUTPUT
     for field in OutputReport._fields:
         assert value_at(data, heading, field) == getattr(report, field)
     assert value_at(data, heading, "crc") == crc32(data[:60])
     assert decode_output(data) == report
 
 
-def test_feature_fields_lie_where_the_document_says(device_identity: Any) -> None:
+def test_feature_fields_lie_where_the_document_says(device_identity):
     identity = device_identity()
-    data, heading = encode_identity(identity), "Report 3, feature: who the device is"
+    data, heading = encode_identity(identity), FEATURE
     assert bytes(value_at(data, heading, "magic")) == b"GSPR"
     assert value_at(data, heading, "protocol") == 1
     assert value_at(data, heading, "firmware") == (1, 2, 3)
@@ -155,14 +136,14 @@ def test_feature_fields_lie_where_the_document_says(device_identity: Any) -> Non
     assert decode_identity(data) == identity
 
 
-@pytest.mark.parametrize("name", ["pr2", "pr2_2009", "pr2_paper"])
-def test_document_numbers_the_transmissions_as_the_codec_does(name: str, device_identity: Any) -> None:
+@every_case("name", ["pr2", "pr2_2009", "pr2_paper"])
+def test_document_numbers_the_transmissions_as_the_codec_does(name, device_identity):
     number = protocol.TRANSMISSIONS.index(name)
     assert f"{number} {name}" in DOCUMENT.read_text()
     assert decode_identity(encode_identity(device_identity(transmission=name))).transmission == name
 
 
-def test_document_numbers_bits_results_and_kinds_as_the_codec_does() -> None:
+def test_document_numbers_bits_results_and_kinds_as_the_codec_does():
     text = DOCUMENT.read_text()
     bits = re.search(r"\| status bit .*?\n\n", text, re.S)
     results = re.search(r"\| command result .*?\n\n", text, re.S)
@@ -182,7 +163,7 @@ def test_document_numbers_bits_results_and_kinds_as_the_codec_does() -> None:
     assert (protocol.RELEASE_KIND, protocol.EFFORT_KIND) == (0, 1)
 
 
-def test_documents_report_descriptor_is_the_codecs_and_declares_63_byte_reports() -> None:
+def test_documents_report_descriptor_is_the_codecs_and_declares_63_byte_reports():
     block = DOCUMENT.read_text().split("## Report descriptor")[1]
     descriptor = bytes.fromhex("".join(re.findall(r"\b[0-9A-F]{2}\b", block)))
     assert descriptor == protocol.REPORT_DESCRIPTOR
@@ -203,12 +184,12 @@ def test_documents_report_descriptor_is_the_codecs_and_declares_63_byte_reports(
 
 
 @every_case("value", [math.nan, math.inf, -math.inf, 3000.0])
-def test_what_no_report_can_hold_is_refused_before_it_is_sent(value: float) -> None:
+def test_what_no_report_can_hold_is_refused_before_it_is_sent(value):
     with pytest.raises(ProtocolError):
         micro(value)
 
 
-def test_limits_are_rounded_down_and_infinity_is_the_devices_own() -> None:
+def test_limits_are_rounded_down_and_infinity_is_the_devices_own():
     assert limit(math.inf) == limit(1e9) == protocol.OWN_LIMIT
     assert limit(0.0109999999) == 10_999
     for wrong in (math.nan, -1.0):
@@ -216,7 +197,7 @@ def test_limits_are_rounded_down_and_infinity_is_the_devices_own() -> None:
             limit(wrong)
 
 
-def test_accelerometer_words_hold_three_signed_axes() -> None:
+def test_accelerometer_words_hold_three_signed_axes():
     assert axes(0) == (0, 0, 0)
     assert axes(511 | (1024 - 512) << 10 | (1024 - 1) << 20) == (511, -512, -1)
 
@@ -233,14 +214,12 @@ def test_accelerometer_words_hold_three_signed_axes() -> None:
         ({"pad_counts_per_n": 0}, "pad_counts_per_n"),
     ],
 )
-def test_identity_that_means_nothing_is_refused(
-    changes: dict[str, Any], what: str, device_identity: Any
-) -> None:
+def test_identity_that_means_nothing_is_refused(changes, what, device_identity):
     with pytest.raises(ProtocolError, match=what):
         encode_identity(device_identity(**changes))
 
 
-def test_another_protocol_says_which(device_identity: Any) -> None:
+def test_another_protocol_says_which(device_identity):
     body = bytearray(encode_identity(device_identity())[:60])
     body[5] = 2
     with pytest.raises(ProtocolError, match="protocol version 2, this driver version 1"):
@@ -250,7 +229,7 @@ def test_another_protocol_says_which(device_identity: Any) -> None:
         decode_identity(bytes(body) + struct.pack("<I", crc32(body)))
 
 
-def mutated(chance: random.Random, good: bytes) -> bytes:
+def mutated(chance, good):
     kind = chance.randrange(6)
     if kind == 0:
         return chance.randbytes(chance.randrange(130))
@@ -272,14 +251,14 @@ def mutated(chance: random.Random, good: bytes) -> bytes:
     return bytes(data)
 
 
-def attack(count: int, seed: int, identity: Identity) -> tuple[int, int]:
-    """Decode `count` random and mutated reports; return how many were accepted and how many were refused."""
+@pytest.mark.parametrize(("count", "seed"), [(20_000, 7), pytest.param(1_000_000, 8, marks=pytest.mark.long)])
+def test_random_and_mutated_reports_are_refused_unless_they_are_whole(count, seed, device_identity):
     chance = random.Random(seed)
     accepted = refused = 0
     good = {
         decode_input: encode_input(InputReport(7, 8, 9, 10, 11, 0, 1, (5,), 3, 2, (1, 2, 3, 4), 1, 6)),
         decode_output: encode_output(OutputReport(3, 1, -20_000_000, 100, 200)),
-        decode_identity: encode_identity(identity),
+        decode_identity: encode_identity(device_identity()),
     }
     decoders = list(good)
     for _ in range(count):
@@ -293,17 +272,5 @@ def attack(count: int, seed: int, identity: Identity) -> tuple[int, int]:
         accepted += 1
         assert len(data) == 64
         assert crc32(data[:60]) == int.from_bytes(data[60:], "little")
-    return accepted, refused
-
-
-def test_twenty_thousand_random_and_mutated_reports(device_identity: Any) -> None:
-    accepted, refused = attack(20_000, 7, device_identity())
-    assert accepted > 100, "else nothing with a right CRC was tried"
-    assert refused > 10_000
-
-
-@pytest.mark.long
-def test_one_million_random_and_mutated_reports(device_identity: Any) -> None:
-    accepted, refused = attack(1_000_000, 8, device_identity())
-    print(f"accepted {accepted}, refused {refused}")  # noqa: T201  for the dated result, with -s
-    assert accepted + refused == 1_000_000
+    assert accepted > count / 200, "else nothing with a right CRC was tried"
+    assert refused > count / 2

@@ -12,7 +12,6 @@ import math
 import threading
 from collections import deque
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
 import usb.backend
@@ -23,35 +22,34 @@ from graspsense.plugin_api import EFFORT, Command, DeviceLost, NoDevice, PluginU
 from graspsense_pr2_gripper import device_time, link
 from graspsense_pr2_gripper.backend import Pr2Backend
 from graspsense_pr2_gripper.config import Pr2Config
-from graspsense_pr2_gripper.faults import Wire
 
 SERIAL_STRING = 3
 
 
-class Libusb(usb.backend.IBackend):  # type: ignore[misc]
+class Libusb(usb.backend.IBackend):
     """One board on a USB port. `usbhid` has claimed it, as the kernel does with every HID device."""
 
-    def __init__(self, wire: Wire, serial: str = "L7") -> None:
+    def __init__(self, wire, serial="L7"):
         self.wire, self.serial = wire, serial
         self.plugged, self.stalled, self.naks = True, False, False
         self.driver_active, self.claimed, self.resets, self.reattached = True, False, 0, False
         self.reports: deque[bytes] = deque()
         self.changed = threading.Condition()
 
-    def tick(self) -> None:
+    def tick(self):
         with self.changed:
             self.reports.clear()  # nothing is queued between transfers: only the fresh one
             self.reports.extend(self.wire.step())
             self.changed.notify_all()
 
-    def _there(self) -> None:
+    def _there(self):
         if not self.plugged:
             raise usb.core.USBError("No such device (it may have been disconnected)", -4, errno.ENODEV)
 
-    def enumerate_devices(self) -> Any:
+    def enumerate_devices(self):
         return iter(["port"] if self.plugged else [])
 
-    def get_device_descriptor(self, dev: Any) -> Any:
+    def get_device_descriptor(self, dev):
         return SimpleNamespace(
             bLength=18, bDescriptorType=1, bcdUSB=0x200, bDeviceClass=0, bDeviceSubClass=0, bDeviceProtocol=0,
             bMaxPacketSize0=64, idVendor=0x1209, idProduct=1, bcdDevice=0x100, iManufacturer=1, iProduct=2,
@@ -59,13 +57,13 @@ class Libusb(usb.backend.IBackend):  # type: ignore[misc]
             port_numbers=(1,), speed=2,
         )  # fmt: skip
 
-    def get_configuration_descriptor(self, dev: Any, config: int) -> Any:
+    def get_configuration_descriptor(self, dev, config):
         return SimpleNamespace(
             bLength=9, bDescriptorType=2, wTotalLength=41, bNumInterfaces=1, bConfigurationValue=1,
             iConfiguration=0, bmAttributes=0x80, bMaxPower=50, extra_descriptors=[],
         )  # fmt: skip
 
-    def get_interface_descriptor(self, dev: Any, intf: int, alt: int, config: int) -> Any:
+    def get_interface_descriptor(self, dev, intf, alt, config):
         if intf or alt:
             raise IndexError
         return SimpleNamespace(
@@ -73,53 +71,53 @@ class Libusb(usb.backend.IBackend):  # type: ignore[misc]
             bInterfaceClass=3, bInterfaceSubClass=0, bInterfaceProtocol=0, iInterface=0, extra_descriptors=[],
         )  # fmt: skip
 
-    def get_endpoint_descriptor(self, dev: Any, ep: int, intf: int, alt: int, config: int) -> Any:
+    def get_endpoint_descriptor(self, dev, ep, intf, alt, config):
         return SimpleNamespace(
             bLength=7, bDescriptorType=5, bEndpointAddress=(0x83, 0x04)[ep], bmAttributes=3, wMaxPacketSize=64,
             bInterval=1, bRefresh=0, bSynchAddress=0, extra_descriptors=[],
         )  # fmt: skip
 
-    def open_device(self, dev: Any) -> Any:
+    def open_device(self, dev):
         self._there()
         return "handle"
 
-    def close_device(self, handle: Any) -> None:
+    def close_device(self, handle):
         pass
 
-    def get_configuration(self, handle: Any) -> int:
+    def get_configuration(self, handle):
         return 1
 
-    def set_configuration(self, handle: Any, value: int) -> None:
+    def set_configuration(self, handle, value):
         raise AssertionError("setting the configuration of a device in use disturbs its other users")
 
-    def reset_device(self, handle: Any) -> None:
+    def reset_device(self, handle):
         self.resets += 1
 
-    def is_kernel_driver_active(self, handle: Any, intf: int) -> bool:
+    def is_kernel_driver_active(self, handle, intf):
         self._there()
         return self.driver_active
 
-    def detach_kernel_driver(self, handle: Any, intf: int) -> None:
+    def detach_kernel_driver(self, handle, intf):
         self.driver_active = False
 
-    def attach_kernel_driver(self, handle: Any, intf: int) -> None:
+    def attach_kernel_driver(self, handle, intf):
         self._there()
         self.driver_active = self.reattached = True
 
-    def claim_interface(self, handle: Any, intf: int) -> None:
+    def claim_interface(self, handle, intf):
         if self.driver_active:
             raise usb.core.USBError("Resource busy", -6, errno.EBUSY)
         self.claimed = True
 
-    def release_interface(self, handle: Any, intf: int) -> None:
+    def release_interface(self, handle, intf):
         self._there()
         self.claimed = False
 
-    def clear_halt(self, handle: Any, ep: int) -> None:
+    def clear_halt(self, handle, ep):
         self._there()
         self.stalled = False
 
-    def intr_read(self, handle: Any, ep: int, intf: int, buff: Any, timeout: int) -> int:
+    def intr_read(self, handle, ep, intf, buff, timeout):
         assert ep == 0x83, "the descriptors' own endpoint"
         assert timeout > 0
         with self.changed:
@@ -133,7 +131,7 @@ class Libusb(usb.backend.IBackend):  # type: ignore[misc]
         buff[: len(report)] = array.array("B", report)
         return len(report)
 
-    def intr_write(self, handle: Any, ep: int, intf: int, data: Any, timeout: int) -> int:
+    def intr_write(self, handle, ep, intf, data, timeout):
         assert ep == 0x04
         self._there()
         if self.naks:
@@ -142,9 +140,7 @@ class Libusb(usb.backend.IBackend):  # type: ignore[misc]
             self.wire.output(data.tobytes())
         return len(data)
 
-    def ctrl_transfer(
-        self, handle: Any, kind: int, request: int, value: int, index: int, data: Any, timeout: int
-    ) -> int:
+    def ctrl_transfer(self, handle, kind, request, value, index, data, timeout):
         self._there()
         if (kind, request) == (0xA1, 1) and value == 0x0303:
             answer = self.wire.firmware.feature()
@@ -158,7 +154,7 @@ class Libusb(usb.backend.IBackend):  # type: ignore[misc]
 
 
 @pytest.fixture
-def port(monkeypatch: pytest.MonkeyPatch, board: Any) -> Libusb:
+def port(monkeypatch, board):
     backend = Libusb(board())
     monkeypatch.setattr(usb.backend.libusb1, "get_backend", lambda *a, **k: backend)
     # Its time stands still between two ticks, so on a machine that is busy every report looks old, and many ticks at
@@ -169,14 +165,14 @@ def port(monkeypatch: pytest.MonkeyPatch, board: Any) -> Libusb:
 
 
 @pytest.fixture
-def opened(port: Libusb) -> Any:
+def opened(port):
     backend = Pr2Backend(Pr2Config(transport="pyusb"))
     backend.open(0)
     yield backend
     backend.close()
 
 
-def following(backend: Pr2Backend, port: Libusb) -> Any:
+def following(backend, port):
     """Tick until the reader, which may be between two transfers, has caught one."""
     while True:
         port.tick()
@@ -185,7 +181,7 @@ def following(backend: Pr2Backend, port: Libusb) -> Any:
             return reading
 
 
-def test_device_is_taken_from_the_kernel_and_given_back(port: Libusb) -> None:
+def test_device_is_taken_from_the_kernel_and_given_back(port):
     backend = Pr2Backend(Pr2Config(transport="pyusb", serial="L7"))
     info = backend.open(0)
     assert (info.serial, info.clock) == ("L7", "device")
@@ -197,18 +193,14 @@ def test_device_is_taken_from_the_kernel_and_given_back(port: Libusb) -> None:
     assert port.resets == 0, "a reset enumerates the device anew"
 
 
-def test_frames_come_and_commands_arrive(opened: Pr2Backend, port: Libusb) -> None:
+def test_frames_come_and_commands_arrive_and_an_idle_timeout_is_no_loss(opened, port):
+    assert opened.read(0.12) is None
     assert following(opened, port).frame.gap_m == pytest.approx(0.086, abs=1e-6)
     opened.apply(Command(EFFORT, 7.0, float("inf"), float("inf")))
     assert following(opened, port).frame.effort_n == 7.0
 
 
-def test_idle_timeout_is_no_loss(opened: Pr2Backend, port: Libusb) -> None:
-    assert opened.read(0.12) is None
-    assert following(opened, port) is not None
-
-
-def test_pulled_cable_ends_a_read_and_closing_survives_it(opened: Pr2Backend, port: Libusb) -> None:
+def test_pulled_cable_ends_a_read_and_closing_survives_it(opened, port):
     """attach_kernel_driver raises errno 19 after an unplug."""
     following(opened, port)
     with port.changed:
@@ -220,7 +212,7 @@ def test_pulled_cable_ends_a_read_and_closing_survives_it(opened: Pr2Backend, po
     assert opened.report()["closed_cleanly"] is True
 
 
-def test_stalled_endpoint_is_cleared(opened: Pr2Backend, port: Libusb) -> None:
+def test_stalled_endpoint_is_cleared(opened, port):
     following(opened, port)
     with port.changed:
         port.stalled = True
@@ -229,19 +221,19 @@ def test_stalled_endpoint_is_cleared(opened: Pr2Backend, port: Libusb) -> None:
     assert not port.stalled
 
 
-def test_device_that_takes_no_command_in_time_is_lost(opened: Pr2Backend, port: Libusb) -> None:
+def test_device_that_takes_no_command_in_time_is_lost(opened, port):
     following(opened, port)
     port.naks = True
     with pytest.raises(DeviceLost, match="timed out"):
         opened.apply(Command(EFFORT, 7.0, float("inf"), float("inf")))
 
 
-def test_another_serial_is_another_device(port: Libusb) -> None:
+def test_another_serial_is_another_device(port):
     with pytest.raises(NoDevice, match="with serial number 'R2' with libusb"):
         Pr2Backend(Pr2Config(transport="pyusb", serial="R2")).open(0)
 
 
-def test_missing_libusb_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_libusb_says_how_to_get_it(monkeypatch):
     for name in ("libusb1", "libusb0", "openusb"):
         module = __import__(f"usb.backend.{name}", fromlist=["get_backend"])
         monkeypatch.setattr(module, "get_backend", lambda *a, **k: None)

@@ -1,10 +1,7 @@
 """Looking for the gripper: what is said when it is not there, and which devices count as it."""
 
-from __future__ import annotations
-
 import sys
 from types import ModuleType
-from typing import Any
 
 import pytest
 
@@ -17,19 +14,19 @@ from graspsense_pr2_gripper.discovery import LIBRARY, found_devices, search
 NOBODYS = Pr2Config(vendor_id=0x1209, product_id=0xFFFF)
 
 
-def listing(*devices: dict[str, Any]) -> ModuleType:
+def listing(*devices):
     """The library at its outermost edge: a listing in the form that hidapi 0.15 gives."""
     module = ModuleType(LIBRARY)
-    module.enumerate = lambda: list(devices)  # type: ignore[attr-defined]
+    module.enumerate = lambda: list(devices)
     return module
 
 
-def device(vendor_id: int, product_id: int, serial: str, path: str) -> dict[str, Any]:
+def device(vendor_id, product_id, serial, path):
     return {"vendor_id": vendor_id, "product_id": product_id, "serial_number": serial, "path": path.encode()}
 
 
 @pytest.fixture
-def two_grippers_and_a_mouse(monkeypatch: pytest.MonkeyPatch) -> None:
+def two_grippers_and_a_mouse(monkeypatch):
     listed = listing(
         device(0x1209, 0x0001, "L7", "/dev/hidraw0"),
         device(0x046D, 0xC077, "", "/dev/hidraw1"),
@@ -38,7 +35,7 @@ def two_grippers_and_a_mouse(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, LIBRARY, listed)
 
 
-def test_absent_device_says_what_was_looked_for_and_what_to_try() -> None:
+def test_absent_device_says_what_was_looked_for_and_what_to_try():
     with pytest.raises(NoDevice) as caught:
         Pr2Backend(NOBODYS).open(seed=0)
     said = str(caught.value)
@@ -50,7 +47,7 @@ def test_absent_device_says_what_was_looked_for_and_what_to_try() -> None:
 
 
 @pytest.mark.usefixtures("two_grippers_and_a_mouse")
-def test_device_is_known_by_its_numbers_and_serial() -> None:
+def test_device_is_known_by_its_numbers_and_serial():
     assert [node.path for node in search(Pr2Config()).matching] == ["/dev/hidraw0", "/dev/hidraw2"]
     assert [node.path for node in search(Pr2Config(serial="R2")).matching] == ["/dev/hidraw2"]
     assert search(Pr2Config(serial="X")).matching == ()
@@ -58,25 +55,25 @@ def test_device_is_known_by_its_numbers_and_serial() -> None:
 
 
 @pytest.mark.usefixtures("two_grippers_and_a_mouse")
-def test_two_grippers_and_no_serial_is_a_question_back() -> None:
+def test_two_grippers_and_no_serial_is_a_question_back():
     with pytest.raises(NoDevice, match=r"there are 2 devices 1209:0001\n.*gripper.serial"):
         Pr2Backend(Pr2Config()).open(seed=0)
 
 
 @pytest.mark.usefixtures("two_grippers_and_a_mouse")
-def test_device_that_may_not_be_opened_is_not_passed_off_as_ready() -> None:
+def test_device_that_may_not_be_opened_is_not_passed_off_as_ready():
     """The nodes of this listing do not exist, so nobody may open them."""
     assert [(device.serial, device.ready) for device in found_devices()] == [("L7", False), ("R2", False)]
     assert "no permission on /dev/hidraw0" in found_devices()[0].advice
 
 
-def test_missing_library_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_library_is_told(monkeypatch):
     monkeypatch.setitem(sys.modules, LIBRARY, None)
     with pytest.raises(PluginUnavailable, match="pip install hidapi"):
         search(Pr2Config())
 
 
-def test_nothing_moves_before_it_is_open() -> None:
+def test_nothing_moves_before_it_is_open():
     backend = Pr2Backend(NOBODYS)
     backend.close()
     backend.close()
@@ -85,6 +82,6 @@ def test_nothing_moves_before_it_is_open() -> None:
 
 
 @pytest.mark.parametrize("number", [-1, 0x10000])
-def test_ids_are_sixteen_bits(number: int) -> None:
+def test_ids_are_sixteen_bits(number):
     with pytest.raises(ValueError):
         Pr2Config(vendor_id=number)

@@ -1,10 +1,5 @@
 """Reports as they come: what is lost, late, repeated or damaged is counted, and images come together all the same."""
 
-from __future__ import annotations
-
-import random
-from typing import Any
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -15,19 +10,19 @@ from graspsense_pr2_gripper.stream import RESTARTED, Restarted, Stream
 IMAGE = tuple(range(3000, 3044))
 
 
-def report(sequence: int, *, image: int = 1, slice: int = 0, cells: Any = None, age_us: int = 0) -> bytes:
+def report(sequence, *, image=1, slice=0, cells=None, age_us=0):
     part = cells if cells is not None else IMAGE[4 * slice : 4 * slice + 4]
     return encode_input(
         InputReport(sequence & 0xFFFFFFFF, 1000 * sequence, 0, 0, 0, 0, 0, (), image, slice, part, 1, age_us)
     )
 
 
-def reports(start: int, count: int, image: int = 1) -> list[bytes]:
+def reports(start, count, image=1):
     """A board's stream: the image's slices over and over."""
     return [report(start + i, image=image, slice=i % 11, age_us=1000 * i) for i in range(count)]
 
 
-def test_image_is_whole_after_eleven_reports_and_bears_the_time_it_was_taken() -> None:
+def test_image_is_whole_after_eleven_reports_and_bears_the_time_it_was_taken():
     stream = Stream()
     for data in reports(100, 10):
         stream.take(data)
@@ -36,7 +31,7 @@ def test_image_is_whole_after_eleven_reports_and_bears_the_time_it_was_taken() -
     assert stream.image == (1, 100_000, IMAGE)
 
 
-def test_lost_report_delays_an_image_by_one_round_and_no_more() -> None:
+def test_lost_report_delays_an_image_by_one_round_and_no_more():
     stream = Stream()
     sent = reports(0, 41)
     del sent[4]
@@ -46,7 +41,7 @@ def test_lost_report_delays_an_image_by_one_round_and_no_more() -> None:
     assert stream.image == (1, 0, IMAGE)
 
 
-def test_image_that_never_came_whole_is_counted_and_not_made_up() -> None:
+def test_image_that_never_came_whole_is_counted_and_not_made_up():
     stream = Stream()
     for data in [*reports(0, 41, image=1), *reports(41, 5, image=2), *reports(46, 41, image=4)]:
         stream.take(data)
@@ -56,7 +51,7 @@ def test_image_that_never_came_whole_is_counted_and_not_made_up() -> None:
     assert stream.counts.images_lost == 2, "number 2 was cut short, number 3 never came"
 
 
-def test_counters_wrap() -> None:
+def test_counters_wrap():
     stream = Stream()
     start = 2**32 - 20
     sent = [
@@ -67,7 +62,7 @@ def test_counters_wrap() -> None:
     assert (stream.counts.lost, stream.counts.images, stream.counts.images_lost) == (0, 2, 0)
 
 
-def test_late_report_is_not_handed_on_but_its_cells_count() -> None:
+def test_late_report_is_not_handed_on_but_its_cells_count():
     stream = Stream()
     sent = reports(0, 11)
     sent[4], sent[5] = sent[5], sent[4]
@@ -77,7 +72,7 @@ def test_late_report_is_not_handed_on_but_its_cells_count() -> None:
     assert stream.image is not None
 
 
-def test_device_that_begins_anew_is_noticed() -> None:
+def test_device_that_begins_anew_is_noticed():
     stream = Stream()
     stream.take(report(5000))
     for i in range(RESTARTED - 1):
@@ -91,11 +86,11 @@ def test_device_that_begins_anew_is_noticed() -> None:
     st.lists(st.sampled_from(["pass", "drop", "repeat", "swap", "damage"]), min_size=1, max_size=80),
     st.randoms(use_true_random=False),
 )
-def test_what_is_counted_adds_up(start: int, fates: list[str], chance: random.Random) -> None:
+def test_what_is_counted_adds_up(start, fates, chance):
     """The first and last report pass, so that both ends are known; then every report is accounted for."""
     stream = Stream()
-    arriving: list[bytes] = [report(start)]
-    held: list[bytes] = []
+    arriving = [report(start)]
+    held = []
     expected = {"drop": 0, "repeat": 0, "swap": 0, "damage": 0}
     for i, fate in enumerate(fates, 1):
         data = report(start + i)

@@ -10,7 +10,6 @@ import socket
 import struct
 import sys
 import threading
-from collections.abc import Iterator
 
 import pytest
 from hypothesis import given, settings
@@ -49,28 +48,26 @@ CLEAR_HALT = struct.pack("<BBHHH", 0x02, 1, 0, 0x81, 0)
 class Taken:
     """A device that keeps what it is sent."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.stalled = False
         self.outputs: list[bytes] = []
 
-    def output(self, report: bytes) -> None:
+    def output(self, report):
         self.outputs.append(report)
 
-    def feature(self, report_id: int) -> bytes | None:
+    def feature(self, report_id):
         return bytes([report_id]) * 64 if report_id == 3 else None
 
 
 class Host:
     """The other end of the socket: what the kernel's vhci_tx and vhci_rx do."""
 
-    def __init__(self, connection: socket.socket) -> None:
+    def __init__(self, connection):
         self.connection = connection
         connection.settimeout(60.0)
         self.number = 0
 
-    def submit(
-        self, endpoint: int, into: bool, length: int, setup: bytes = bytes(8), data: bytes = b""
-    ) -> int:
+    def submit(self, endpoint, into, length, setup=bytes(8), data=b""):
         self.number += 1
         asked = SUBMITTED.pack(0, length, 0, 0, 0, setup)
         self.connection.sendall(
@@ -79,20 +76,20 @@ class Host:
 
         return self.number
 
-    def unlink(self, victim: int) -> int:
+    def unlink(self, victim):
         self.number += 1
         asked = struct.pack(">I24x", victim)
         self.connection.sendall(HEADER.pack(UNLINK, self.number, 1 << 16 | 2, 0, 0, asked))
         return self.number
 
-    def answer(self, reads: bool = True) -> tuple[int, int, int, bytes]:
+    def answer(self, reads=True):
         """Return what came: kind, number, status, data."""
         head = self.exactly(48)
         kind, number, _, _, _, status, length, *_ = RETURN.unpack(head)
         data = self.exactly(length) if kind == RET_SUBMIT and reads and status == 0 else b""
         return kind, number, status, data
 
-    def exactly(self, size: int) -> bytes:
+    def exactly(self, size):
         data = b""
         while len(data) < size:
             more = self.connection.recv(size - len(data))
@@ -100,7 +97,7 @@ class Host:
             data += more
         return data
 
-    def control(self, kind: int, request: int, value: int, index: int, length: int) -> tuple[int, bytes]:
+    def control(self, kind, request, value, index, length):
         setup = struct.pack("<BBHHH", kind, request, value, index, length)
         self.submit(0, bool(kind & 0x80), length, setup)
         _, _, status, data = self.answer(reads=bool(kind & 0x80))
@@ -110,7 +107,7 @@ class Host:
 class Served:
     """A server with its thread, and the host at the other end."""
 
-    def __init__(self, server: UsbipServer) -> None:
+    def __init__(self, server):
         ours, theirs = socket.socketpair()
         self.server = server
         self.server.connect(ours)
@@ -118,7 +115,7 @@ class Served:
         self.thread.start()
         self.ours, self.host = ours, Host(theirs)
 
-    def close(self) -> None:
+    def close(self):
         self.server.hang_up()
         self.thread.join(60.0)
         assert not self.thread.is_alive()
@@ -127,18 +124,18 @@ class Served:
 
 
 @pytest.fixture
-def device() -> Taken:
+def device():
     return Taken()
 
 
 @pytest.fixture
-def served(device: Taken) -> Iterator[Served]:
+def served(device):
     server = Served(UsbipServer(device, PLUG))
     yield server
     server.close()
 
 
-def test_a_host_finds_the_device_that_the_document_describes(served: Served) -> None:
+def test_a_host_finds_the_device_that_the_document_describes(served):
     host = served.host
     status, about = host.control(0x80, 6, 1 << 8, 0, 18)
     assert status == 0
@@ -170,18 +167,18 @@ def test_a_host_finds_the_device_that_the_document_describes(served: Served) -> 
         )
     )
 )
-def test_every_unlink_is_answered_and_every_transfer_ends_once(does: list[str | int]) -> None:
+def test_every_unlink_is_answered_and_every_transfer_ends_once(does):
     """Whatever the device's mood. A host whose unlink is not answered hangs for good."""
     device = Taken()
     served = Served(UsbipServer(device, PLUG))
     host = served.host
     try:
-        submitted: set[int] = set()
-        unlinks: dict[int, int] = {}
-        ended: list[int] = []
-        reading: dict[int, bool] = {}
+        submitted = set()
+        unlinks = {}
+        ended = []
+        reading = {}
 
-        def hear() -> None:
+        def hear():
             head = host.exactly(48)
             kind, number, _, _, _, status, length, *_ = RETURN.unpack(head)
             if kind == RET_SUBMIT:
@@ -226,7 +223,7 @@ def test_every_unlink_is_answered_and_every_transfer_ends_once(does: list[str | 
         served.close()
 
 
-def test_a_halted_endpoint_stalls_until_it_is_cleared(served: Served) -> None:
+def test_a_halted_endpoint_stalls_until_it_is_cleared(served):
     host, server = served.host, served.server
     server.send(b"\1" * 64)
     host.submit(1, True, 64)
@@ -241,7 +238,7 @@ def test_a_halted_endpoint_stalls_until_it_is_cleared(served: Served) -> None:
     assert host.answer()[3] == b"\2" * 64
 
 
-def test_the_endpoint_holds_one_report_and_what_comes_meanwhile_is_lost(served: Served) -> None:
+def test_the_endpoint_holds_one_report_and_what_comes_meanwhile_is_lost(served):
     host, server = served.host, served.server
     assert [server.send(bytes([n]) * 64) for n in range(3)] == [False, True, True]
     host.submit(1, True, 64)
@@ -254,36 +251,36 @@ def test_the_endpoint_holds_one_report_and_what_comes_meanwhile_is_lost(served: 
 class SocketPort(Port):
     """A socket where vhci-hcd would be."""
 
-    def __init__(self, board: EmulatedBoard, plug: Plug) -> None:
+    def __init__(self, board, plug):
         self.server = UsbipServer(board, plug)
         self.served: Served | None = None
 
     @property
-    def host(self) -> Host:
+    def host(self):
         assert self.served is not None, "it is plugged in"
         return self.served.host
 
-    def plug(self) -> None:
+    def plug(self):
         self.served = Served(self.server)
 
-    def unplug(self) -> None:
+    def unplug(self):
         if self.served is not None:
             self.served.close()
             self.served = None
 
-    def send(self, report: bytes) -> bool:
+    def send(self, report):
         return self.server.send(report)
 
-    def close(self) -> None:
+    def close(self):
         self.unplug()
 
 
 @pytest.fixture
-def ports(monkeypatch: pytest.MonkeyPatch) -> list[SocketPort]:
+def ports(monkeypatch):
     """The ports that boards were plugged into; a node is the kernel's matter, so there is one."""
-    made: list[SocketPort] = []
+    made = []
 
-    def make(board: EmulatedBoard, plug: Plug) -> Port:
+    def make(board, plug):
         made.append(SocketPort(board, plug))
         return made[-1]
 
@@ -296,31 +293,31 @@ def ports(monkeypatch: pytest.MonkeyPatch) -> list[SocketPort]:
 class HandClock:
     """In place of `on_time`: a period passes when the test says so, and freely once it is over."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self._due, self._past = threading.Semaphore(0), threading.Semaphore(0)
         self._free = False
 
-    def __call__(self, period_s: float) -> Iterator[float]:
+    def __call__(self, period_s):
         while self._free or self._due.acquire():
             yield 0.0
             self._past.release()
 
-    def let_pass(self, periods: int) -> None:
+    def let_pass(self, periods):
         """Return when they are over."""
         self.begin(periods)
         for _ in range(periods):
             assert self._past.acquire(timeout=60.0)
 
-    def begin(self, periods: int = 1) -> None:
+    def begin(self, periods=1):
         self._due.release(periods)
 
-    def free(self) -> None:
+    def free(self):
         self._free = True
         self.begin()
 
 
 @pytest.fixture
-def clock(monkeypatch: pytest.MonkeyPatch) -> HandClock:
+def clock(monkeypatch):
     """The time of an emulated board."""
     made = HandClock()
     monkeypatch.setattr(boards, "on_time", made)
@@ -328,7 +325,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> HandClock:
 
 
 @pytest.fixture
-def emulated(ports: list[SocketPort], clock: HandClock) -> Iterator[tuple[EmulatedBoard, SocketPort]]:
+def emulated(ports, clock):
     """The whole emulator over a socket, its jaws at a block."""
     config = Pr2Config(transport="emulated", serial="L7", object="block")
     board = EmulatedBoard(config, "usb", 0)
@@ -342,15 +339,13 @@ SQUEEZE = encode_output(OutputReport(1, EFFORT_KIND, 20_000_000, OWN_LIMIT, OWN_
 WATCHDOG_PERIODS = 100
 
 
-def test_the_command_does_what_it_is_told_until_it_is_told_to_quit(
-    ports: list[SocketPort], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_does_what_it_is_told_until_it_is_told_to_quit(ports, monkeypatch, capsys):
     read, write = os.pipe()
     os.write(write, b"unplug\nstate\nunplugg\nplug\nhelp\nquit\n")  # at once, as a script writes them
     os.close(write)
     told, kept = EmulatedBoard.tell, []
 
-    def tell(board: EmulatedBoard, word: str) -> None:
+    def tell(board, word):
         kept.append(gc.get_freeze_count())
         told(board, word)
 
@@ -376,9 +371,7 @@ def test_the_command_does_what_it_is_told_until_it_is_told_to_quit(
     assert ports[0].served is None, "it is gone with the command"
 
 
-def test_a_pulled_plug_leaves_nothing_squeezing(
-    emulated: tuple[EmulatedBoard, SocketPort], clock: HandClock
-) -> None:
+def test_a_pulled_plug_leaves_nothing_squeezing(emulated, clock):
     board, port = emulated
     host = port.host
     status, feature = host.control(0xA1, 1, 3 << 8 | 3, 0, 64)
@@ -400,9 +393,7 @@ def test_a_pulled_plug_leaves_nothing_squeezing(
 
 
 @pytest.mark.parametrize("word", ["silent", "stalled"])
-def test_a_mood_stops_the_reports_and_the_watchdog_lets_go(
-    emulated: tuple[EmulatedBoard, SocketPort], clock: HandClock, word: str
-) -> None:
+def test_a_mood_stops_the_reports_and_the_watchdog_lets_go(emulated, clock, word):
     board, port = emulated
     port.host.submit(1, False, 64, data=SQUEEZE)
     port.host.answer(reads=False)
@@ -419,9 +410,7 @@ def test_a_mood_stops_the_reports_and_the_watchdog_lets_go(
     assert answer == (RET_UNLINK, unlink)
 
 
-def test_a_body_that_fails_is_a_device_that_goes_away(
-    emulated: tuple[EmulatedBoard, SocketPort], clock: HandClock, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_body_that_fails_is_a_device_that_goes_away(emulated, clock, monkeypatch):
     board, _ = emulated
     body = create("sensor-backend", "sim")
     monkeypatch.setattr(type(body), "read", lambda self, timeout_s: 1 / 0)

@@ -1,7 +1,5 @@
 """The protocol of the TSF-85 fingertips, and their emulator."""
 
-from __future__ import annotations
-
 import json
 import select
 import subprocess
@@ -12,6 +10,7 @@ from types import SimpleNamespace
 
 import pytest
 from cases import every_case
+from emulated_grippers import PATIENT_S
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -48,7 +47,6 @@ from graspsense_robotiq_2f.tactile_protocol import (
     packet,
 )
 
-PATIENT_S = 60.0
 CELL = st.integers(0, 0xFFFF)
 NOISE_OF_SUM = 6.0 * NOISE_COUNTS * CELLS**0.5
 """Six standard deviations."""

@@ -1,24 +1,23 @@
 """The driver against the emulated gripper, over every connection."""
 
-from __future__ import annotations
-
 import asyncio
-import subprocess
-import sys
 import threading
-import time
 from contextlib import suppress
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from cases import every_case
+from emulated_grippers import (
+    PATIENT_S,
+    assert_a_killed_program_lets_go,
+    assert_lost_in_a_grasp,
+    give_own_time,
+)
 from pymodbus import FramerType
 from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from graspsense import WiringError, load_pipeline
-from graspsense.core.drivers import emulated_serial
 from graspsense.gripper_api import SerialFaults
 from graspsense.plugin_api import POSITION, VELOCITY, Command, DeviceLost, NoDevice, create
 from graspsense.testing_api import parametrize_checks
@@ -32,25 +31,10 @@ from graspsense_robotiq_2f.link import ModbusLink
 from graspsense_robotiq_2f.registers import INPUT, MODELS, OUTPUT, byte_of
 from graspsense_robotiq_2f.ur_cap import opened_link
 
-PATIENT_S = 60.0
-"""For a reply that comes: when it does is this machine's business."""
-
 
 @pytest.fixture
 def own_time(monkeypatch):
-    """Driver and emulator have a time of their own, which passes while the driver sleeps or looks at it."""
-    now_s = 0.0
-
-    def sleep(seconds):
-        nonlocal now_s
-        now_s += seconds
-
-    def look():
-        sleep(0.001)
-        return now_s
-
-    monkeypatch.setattr(backend, "time", SimpleNamespace(monotonic=look, sleep=sleep))
-    monkeypatch.setattr(emulated_serial, "time", SimpleNamespace(monotonic=lambda: now_s))
+    give_own_time(monkeypatch, backend)
 
 
 @pytest.fixture
@@ -120,20 +104,10 @@ def test_every_model_closes_with_its_own_limits(model):
     assert gripper.report()["true_peak_force_n"] < 40.0
 
 
-@every_case("at_s", [0.02, 0.5, 2.0])
+@every_case("at_s", [0.22, 0.7, 2.2])
 @every_case("fault", ["unplug", "silent"])
 def test_a_gripper_lost_in_a_grasp_ends_it_and_is_told(fault, at_s):
-    faults = (
-        [f"gripper.faults.unplug_at_s={0.2 + at_s}"]
-        if fault == "unplug"
-        else ["gripper.faults.mood=silent", f"gripper.faults.mood_at_s={0.2 + at_s}"]
-    )
-    pipeline = load_pipeline(
-        "robotiq", options=["gripper.port=emulated", "gripper.reply_timeout_s=0.5", *faults]
-    )
-    trial = pipeline.grasp()
-    assert trial.outcome.words == "device lost"
-    assert "cable and power" in trial.reason
+    assert_lost_in_a_grasp("robotiq", fault, at_s, "gripper.reply_timeout_s=0.5")
 
 
 @pytest.mark.slow
@@ -298,31 +272,11 @@ def test_fingers_that_do_not_move_end_the_grasp():
     assert trial.trace.t_s[-1] < 5.0
 
 
-HOLDS_ON = """
-import sys, time
-from graspsense.plugin_api import POSITION, Command, create
-driver = create("sensor-backend", "robotiq", port=sys.argv[1], reply_timeout_s=10.0)
-driver.open(0)
-for number in range(10**9):
-    driver.read(10.0)
-    driver.apply(Command(POSITION, 0.0, 25.0, 0.05))
-    if number == 10:
-        print("closes", flush=True)
-"""
-
-
 def test_a_program_that_is_killed_leaves_no_gripper_that_presses(emulated):
     gripper = emulated()
-    with subprocess.Popen(
-        [sys.executable, "-c", HOLDS_ON, gripper.where], stdout=subprocess.PIPE, text=True
-    ) as program:
-        assert program.stdout.readline() == "closes\n"
-        assert gripper.state()["going"]
-        program.kill()
-    until_s = time.monotonic() + PATIENT_S
-    while gripper.state()["going"] and time.monotonic() < until_s:
-        time.sleep(0.01)
-    assert not gripper.state()["going"]
+    assert_a_killed_program_lets_go(
+        "robotiq", lambda: gripper.state()["going"], 25.0, port=gripper.where, reply_timeout_s=10.0
+    )
 
 
 def test_a_late_reply_is_not_taken_for_that_of_the_next_request(emulated):
@@ -369,11 +323,6 @@ def test_a_slow_velocity_is_a_target_that_moves():
 def test_no_gripper_is_said_with_what_to_look_at(port):
     with pytest.raises(NoDevice, match=r"no Robotiq 2F-85 at .*gripper\.port"):
         create("sensor-backend", "robotiq", port=port).open(0)
-
-
-def test_the_six_features_need_pads_and_the_user_is_told():
-    with pytest.raises(WiringError, match="force_left"):
-        load_pipeline("robotiq", options=["features.type=chitta"])
 
 
 @pytest.mark.parametrize("setting", ["controller.approach_force_n=5", "run.first_effort_n=12"])

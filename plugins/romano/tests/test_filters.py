@@ -1,7 +1,5 @@
 """The filters against scipy's designs and the printed coefficients of pr2_gripper_sensor (2010)."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

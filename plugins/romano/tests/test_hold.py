@@ -1,7 +1,5 @@
 """`graspsense hold` as a user runs it, and the laws compiled together with the simulator. Simulated."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys

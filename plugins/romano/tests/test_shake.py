@@ -1,7 +1,5 @@
 """The features of a shake, against signals whose bands, peak, decay and mass are known, and on simulated bottles."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

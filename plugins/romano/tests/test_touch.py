@@ -1,7 +1,5 @@
 """The scenes of the experiments, and the trade of a threshold."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """What the tests of ROS 2 share."""
 
-from __future__ import annotations
-
 import pytest
 from robots import Robot
 

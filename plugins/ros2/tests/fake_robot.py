@@ -4,8 +4,6 @@ python fake_robot.py KIND: KIND is GripperCommand or ParallelGripperCommand. A l
 silent (no wrenches), nan, wrong (bytes that are no wrench), late (stamps that fall behind), refuse (goals).
 """
 
-from __future__ import annotations
-
 import json
 import sys
 import threading

@@ -1,7 +1,5 @@
 """The fake robot as a process, and the settings of its gripper."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

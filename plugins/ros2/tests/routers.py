@@ -1,7 +1,5 @@
 """A router of zenoh in this process, as rmw_zenohd is one."""
 
-from __future__ import annotations
-
 import json
 import socket
 

@@ -1,7 +1,5 @@
 """Types of ROS 2: hashes that others computed, and messages that are damaged."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 
 import pytest

@@ -1,7 +1,5 @@
 """`graspsense ros2`: other nodes ask for grasps and move the gripper."""
 
-from __future__ import annotations
-
 import json
 import signal
 import subprocess

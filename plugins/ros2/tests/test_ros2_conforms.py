@@ -1,7 +1,5 @@
 """The gripper behind ROS 2 passes the conformance checks, with the fake robot behind it."""
 
-from __future__ import annotations
-
 import pytest
 from robots import OPTIONS
 

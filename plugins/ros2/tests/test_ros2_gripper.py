@@ -1,7 +1,5 @@
 """A gripper behind ROS 2, against a robot in another process, sound and with faults."""
 
-from __future__ import annotations
-
 import pytest
 from robots import OPTIONS
 

@@ -1,7 +1,5 @@
 """Settings of a gripper behind ROS 2: what is written in the documentation, and what is refused."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Grasps as topics: what a node of others receives."""
 
-from __future__ import annotations
-
 import json
 import math
 import threading

@@ -1,7 +1,5 @@
 """A node through zenoh: its router, and what others ask of it that is no request."""
 
-from __future__ import annotations
-
 import json
 import threading
 

@@ -808,11 +808,17 @@ def every(count):
             yield name, *pairs[(7 * i + 5 * k) % len(pairs)]
 
 
+QUICK = ("snap, gradual", "heavy, pushed back", "pr2, smooth, rigid pads, lag")
+"""The scene of the quick run."""
+
+
 def marked(most, few):
-    """Return the scenes of `every(most)`: those of `every(few)` for CI, the others among the long tests."""
+    """Return the scenes of `every(most)`: those of `every(few)` for CI, the others but one among the long tests."""
     ci = set(every(few))
     return [
-        pytest.param(*scene, marks=pytest.mark.slow if scene in ci else pytest.mark.long)
+        pytest.param(
+            *scene, marks=() if scene == QUICK else pytest.mark.slow if scene in ci else pytest.mark.long
+        )
         for scene in every(most)
     ]
 

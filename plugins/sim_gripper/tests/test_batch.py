@@ -169,9 +169,12 @@ def test_grasps_that_compiled_code_draws_are_those_of_their_setups(sensor, monke
 
     def told(workers):
         done = run_many(config, HYBRID, names, range(len(names)), workers=workers, **options)
+        for grasp, name in zip(done, names, strict=True):
+            of_state = model_report(grasp.state, kinds_in(name))
+            assert {key: grasp.report()[key] for key in of_state} == of_state
         return [
             (grasp.outcome, grasp.reason, repr(grasp.extracted), repr(grasp.state), grasp.report())
-            for grasp, name in zip(done, names, strict=True)
+            for grasp in done
         ]
 
     drawn = told(1)
@@ -182,19 +185,6 @@ def test_grasps_that_compiled_code_draws_are_those_of_their_setups(sensor, monke
     monkeypatch.setattr(buffers, "TICKS", 700)
     assert told(1) == drawn
     assert any(report["broken"] for *_, report in drawn)
-
-
-@pytest.mark.slow
-def test_a_report_is_that_of_the_state():
-    pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
-    names = [*sorted(catalogue()), "none"]
-    for grasp, name in zip(
-        run_many(SimConfig(), HYBRID, names, range(len(names)), traces=False, compiled=True),
-        names,
-        strict=True,
-    ):
-        of_state = model_report(grasp.state, kinds_in(name))
-        assert {key: grasp.report()[key] for key in of_state} == of_state
 
 
 BREAKS = """
@@ -330,26 +320,6 @@ def test_a_compiled_form_that_raises_is_not_hidden_and_hides_no_events():
     assert extracted("measure") == len(traced.trace.events) > 0
     with pytest.raises(RuntimeError, match="not these numbers"):
         extracted("result")
-
-
-@pytest.mark.slow
-def test_where_numba_cannot_be_imported_grasps_run_in_the_interpreter(tmp_path):
-    (tmp_path / "numba").mkdir()
-    (tmp_path / "numba" / "__init__.py").write_text("raise ImportError('Numba needs another numpy')")
-    script = """
-import warnings
-from graspsense.plugin_api import create
-from graspsense_sim_gripper.run.batch.threads import run_many
-from graspsense_sim_gripper.config import SimConfig
-with warnings.catch_warnings(record=True) as told:
-    warnings.simplefilter("always")
-    run_many(SimConfig(fidelity="scene"), create("controller", "hybrid"), ["toy"], [0], compiled=True, traces=False)
-print([str(one.message).partition(":")[0] for one in told])
-"""
-    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
-    done = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert "these grasps run in plain Python" in done.stdout
 
 
 def test_a_seed_is_a_whole_number():
@@ -579,8 +549,14 @@ def test_what_fails_in_another_process_is_said():
         process.run("blok", 0)
 
 
-def test_without_numba_the_plain_loop_runs_and_says_so(monkeypatch):
-    monkeypatch.setitem(sys.modules, "numba", None)
+@pytest.mark.parametrize("numba", ["missing", "broken"])
+def test_without_numba_the_plain_loop_runs_and_says_so(numba, monkeypatch, tmp_path):
+    if numba == "missing":
+        monkeypatch.setitem(sys.modules, "numba", None)
+    else:
+        (tmp_path / "numba.py").write_text("raise ImportError('Numba needs another numpy')")
+        monkeypatch.syspath_prepend(tmp_path)
+        monkeypatch.delitem(sys.modules, "numba", raising=False)
     # What this process has compiled before it would use without numba as well.
     loop_code._compiled.cache_clear()
     monkeypatch.setattr(threads, "WORTH_COMPILING", 2)
@@ -612,10 +588,14 @@ def test_few_grasps_are_compiled_only_if_their_code_is_on_disk_or_others_came_be
 
 
 def test_room_is_made_on_the_way_without_beginning_again(monkeypatch):
-    whole = run_many(SimConfig(), HYBRID, ["toy"], [3])[0].trace
-    monkeypatch.setattr(buffers, "TICKS", 100)
-    monkeypatch.setattr(buffers, "IMAGES", 64)
-    assert bits(run_many(SimConfig(), HYBRID, ["toy"], [3])[0].trace) == bits(whole)
+    whole = run_many(SimConfig(), HYBRID, ["toy"], [3])[0]
+    assert whole.model.chosen.steps.macro_tolerance > 0.0
+    for ticks, images in ((100, 64), (700, buffers.IMAGES)):
+        monkeypatch.setattr(buffers, "TICKS", ticks)
+        monkeypatch.setattr(buffers, "IMAGES", images)
+        parts = run_many(SimConfig(), HYBRID, ["toy"], [3])[0]
+        assert bits(parts.trace) == bits(whole.trace)
+        assert parts.state == whole.state
 
 
 @pytest.mark.slow

@@ -1,42 +1,22 @@
 """The search for the balance of forces at the contact: it ends where a law is awkward, and says so where it cannot."""
 
-from __future__ import annotations
-
 import itertools
 import math
 
 import pytest
 from cases import every_case
-from unverified import unverified_setup
 
-from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.balance import solve_contact
 from graspsense_sim_gripper.plant.object_model import ObjectModel
 from graspsense_sim_gripper.plant.pads import PadCompliance
 from graspsense_sim_gripper.plant.state import ContactState
 from graspsense_sim_gripper.run.accuracy.levels import balance_rtol
 from graspsense_sim_gripper.run.compiled.compose import bind_reachable, sum_of, uncompressed
-from graspsense_sim_gripper.scene.library import find
 from graspsense_sim_gripper.scene.terms.elastic import Elastic, elastic
 from graspsense_sim_gripper.scene.terms.foam import Foam, foam
 from graspsense_sim_gripper.scene.terms.loss import Loss, loss
 from graspsense_sim_gripper.scene.terms.term import NoState
 from graspsense_sim_gripper.scene.terms.worn import Worn, WornState, worn
-
-SCENE = """
-summary = "a shell that earlier squeezes have dented by 12 mm"
-width_m = 0.06
-mass_kg = 0.03
-share = 0.42
-[[terms]]
-type = "worn"
-k1_n_m = 2200.0
-k3_n_m3 = 0.0
-wear_j = 0.1
-softening = 0.9
-set_m = 0.014
-earlier_j = 0.2
-"""
 
 
 def solver(law):
@@ -87,14 +67,6 @@ def test_the_rate_that_a_damper_needs_is_of_third_order_where_steps_grow_slowly(
     errors = [rate_error((h, ratio * h)) for h in (2e-3, 1e-3, 5e-4)]
     for coarse, fine in itertools.pairwise(errors):
         assert coarse / fine == pytest.approx(2.0**order, rel=0.25)
-
-
-def test_a_dented_object_is_thinner_by_its_dent(tmp_path):
-    file = tmp_path / "dented.toml"
-    file.write_text(SCENE)
-    spec = find(str(file))
-    setup = unverified_setup(SimConfig(object=str(file), spread=False, sensor="ideal"), spec, 0)
-    assert setup.plant.object.width_m == pytest.approx(0.06 - 0.014 * (1.0 - math.exp(-2.0)))
 
 
 @pytest.mark.parametrize("exponent", [0.3, 8.0])

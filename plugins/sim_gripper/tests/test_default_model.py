@@ -1,7 +1,5 @@
 """The models that come with the simulator: what they say, and that their commands make them again."""
 
-from __future__ import annotations
-
 import json
 import shlex
 import subprocess
@@ -74,11 +72,6 @@ def test_nothing_there_is_unknown(pipeline):
     ]
 
 
-def test_its_sets_are_calibrated_for_each_label():
-    assert KEPT["sets"]["unit"] == "instances"
-    assert {threshold_set["units"] for threshold_set in KEPT["sets"]["thresholds"].values()} == {1000}
-
-
 def test_a_grasp_has_predictions_while_it_goes_on_and_the_answer_of_the_whole_grasp(pipeline):
     events = []
     trial = pipeline.grasp(object="odwalla:full_closed", seed=5, on_event=events.append)
@@ -94,7 +87,9 @@ def test_a_grasp_has_predictions_while_it_goes_on_and_the_answer_of_the_whole_gr
     assert trial.prediction.model == trial.checkpoints[0].prediction.model.partition(", 0.")[0]
 
 
-def test_its_sets_at_the_checkpoints_are_calibrated():
+def test_its_sets_are_calibrated_for_each_label_and_at_the_checkpoints():
+    assert KEPT["sets"]["unit"] == "instances"
+    assert {threshold_set["units"] for threshold_set in KEPT["sets"]["thresholds"].values()} == {1000}
     for part in KEPT["checkpoints"]:
         assert part["sets"]["unit"] == "instances"
         assert part["trials"] > 100
@@ -174,7 +169,7 @@ def test_what_is_printed_holds_on_a_thousand_new_grasps(name):
 
 
 @pytest.mark.slow
-def test_its_command_makes_it_again(tmp_path: Path) -> None:
+def test_its_command_makes_it_again(tmp_path):
     """All but its prediction sets and what is said at checkpoints: these need ten times as many grasps."""
     again = tmp_path / "default.json"
     words = shlex.split(KEPT["provenance"]["command"])

@@ -9,19 +9,19 @@ from graspsense.plugin_api import ConfigError
 from graspsense_sim_gripper.config import SimConfig
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize(
+    "short",
+    [
+        pytest.param(True, id="short", marks=pytest.mark.slow),
+        pytest.param(False, id="whole", marks=pytest.mark.long),
+    ],
+)
 @pytest.mark.parametrize("case", extremes.CASES, ids=lambda case: case.__name__)
-def test_what_must_hold_holds(case):
-    rows = list(case(short=True))
+def test_what_must_hold_holds(case, short):
+    rows = list(case(short=short))
     assert rows
     assert [row for row in rows if not row["holds"]] == []
     assert all(row.get("finite", True) for row in rows)
-
-
-@pytest.mark.long
-def test_every_row_holds():
-    rows = [row for case in extremes.CASES for row in case(short=False)]
-    assert [row for row in rows if not row["holds"]] == []
 
 
 def test_what_no_gripper_and_no_object_has_is_refused_by_name():

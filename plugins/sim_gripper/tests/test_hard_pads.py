@@ -1,7 +1,5 @@
 """Nonlinear fingertips: their law, in series with an object, in grasps of every kind."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import pytest
 from attrs import evolve
 from cases import every_case

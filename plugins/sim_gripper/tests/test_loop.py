@@ -37,19 +37,6 @@ def assert_same(trace, other):
         np.testing.assert_allclose(columns(other)[name], column, rtol=1e-9, atol=1e-15, err_msg=name)
 
 
-# Slow where nothing is kept yet: the loop is compiled, which takes half a minute of processor.
-@pytest.mark.slow
-@pytest.mark.parametrize(("scene", "sensor"), [("can:empty_open", "ideal"), ("none", "pads")])
-def test_runner_plain_loop_and_compiled_loop_give_one_trace(scene, sensor):
-    config = SimConfig(object=scene, sensor=sensor, **TICK_BY_TICK)
-    run = run_grasp(SimBackend(config), HYBRID, RunConfig(seed=5))
-    plain = run_many(config, HYBRID, [scene], [5], compiled=False)[0]
-    fast = run_many(config, HYBRID, [scene], [5], compiled=True)[0]
-    assert run.outcome == plain.outcome == fast.outcome
-    assert_same(run.trace, plain.trace)
-    assert_same(run.trace, fast.trace)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("sensor", ["pads", "ideal"])
 def test_with_steps_over_several_ticks_the_plain_loop_and_the_compiled_loop_give_one_trace(sensor):
@@ -91,14 +78,6 @@ def test_every_object_and_law_gives_one_trace_plain_and_compiled(number, control
         run = run_grasp(SimBackend(evolve(config, object=name)), law, RunConfig(seed=seed))
         assert (run.outcome, name) == (fast[seed].outcome, name)
         assert_same(run.trace, fast[seed].trace)
-
-
-@pytest.mark.slow
-def test_the_backend_gives_the_same_whatever_stands_beside_a_grasp():
-    backend = SimBackend(SimConfig(**TICK_BY_TICK))
-    alone = backend.run_many(HYBRID, ["toy"], [3], traces=True)[0].trace
-    among = backend.run_many(HYBRID, ["block", "toy"], [3, 3], traces=True)[1].trace
-    assert_same(alone, among)
 
 
 def test_as_many_seeds_as_scenes():

@@ -13,7 +13,7 @@ from graspsense.gripper_api import gap_and_rate, revolutions_at
 from graspsense.plugin_api import EFFORT, RELEASE, Command, create
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.state import Contact, Motion
-from graspsense_sim_gripper.run.batch import buffers, run_many
+from graspsense_sim_gripper.run.batch import run_many
 from graspsense_sim_gripper.run.binding import bind_reachable
 from graspsense_sim_gripper.run.compiled.compose import plant_move, step_parts, uncompressed
 from graspsense_sim_gripper.run.compiled.padding import composition_of
@@ -174,16 +174,6 @@ def test_a_step_that_is_repeated_ends_shortly_before_an_event_whose_place_is_kno
     assert plant.after(start, (n + 2) * TICK, -20.0).motion.gap_m == pytest.approx(
         CONFIG.open_gap_m, abs=1e-12
     )
-
-
-def test_a_grasp_does_not_depend_on_the_length_of_its_buffers(monkeypatch):
-    law = create("controller", "hybrid")
-    whole = run_many(SimConfig(), law, ["toy"], [3])[0]
-    monkeypatch.setattr(buffers, "TICKS", 700)
-    parts = run_many(SimConfig(), law, ["toy"], [3])[0]
-    assert whole.model.chosen.steps.macro_tolerance > 0.0
-    assert parts.state == whole.state
-    np.testing.assert_array_equal(parts.trace.gap_m, whole.trace.gap_m)
 
 
 def test_the_forces_of_a_release_are_those_of_single_ticks():

@@ -1,7 +1,5 @@
 """Scenes of one's own: read strictly, held fast or free, explained, and with terms of somebody else's."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
@@ -29,6 +27,7 @@ HYBRID = create("controller", "hybrid")
 NEAR = SimConfig(fidelity="fixed", open_gap_m=0.062)
 """The fingers close from 2 mm away, in steps that no trial grasp has to verify."""
 
+FIRST_TERM = "width_m = 0.05\n[[terms]]\ntype"
 BOTTLE = """
     width_m = 0.06
     [[terms]]
@@ -133,19 +132,10 @@ def test_a_parameter_with_a_spread_varies_between_instances_and_alone():
         ('type = "fracture"\nforce_n = 5.0\nleft = 2', "left = 2 must be at most 1"),
         ('type = "elastic"\nk1_n_m = 0\nk3_n_m3 = -1e6', "the shell would pull"),
         ('type = "elastic"\nk1_n_m = 100\nk3_n_m3 = -1e12', r"has to be at least -1.48e\+07"),
-        (
-            'type = "elastic"\nk1_n_m = 1e308',
-            r"k1_n_m: 1e\+308 is too large for a computation: at most 1e\+20",
-        ),
+        ('type = "elastic"\nk1_n_m = 1e308', r"k1_n_m: 1e\+308 is too large .*at most 1e\+20"),
         ('type = "maxwell"\nk_n_m = 1.0\ntau_s = 1e-200', "tau_s: 1e-200 is too small .*at least 1e-30"),
-        (
-            'type = "foam"\nforce_n = 1.0\nat_m = 0.01\nexponent = 50',
-            "exponent = 50 is too large.*at most 20",
-        ),
-        (
-            'type = "foam"\nforce_n = 1.0\nat_m = 0.01\nexponent = 0.05',
-            "exponent = 0.05 is too small.*at least 0.2",
-        ),
+        ('type = "foam"\nforce_n = 1\nat_m = 0.01\nexponent = 50', "exponent = 50 is .*at most 20"),
+        ('type = "foam"\nforce_n = 1\nat_m = 0.01\nexponent = 0.05', "exponent = 0.05 is .*at least 0.2"),
         ('type = "elastic"\nk1_n_m = -100', "k1_n_m: -100 is negative"),
         ('type = "elastic"\nk1_n_m = 100\nspread = { k = 1 }', "no such parameter 'k'"),
         ('type = "elastic"\nk1_n_m = 100\nspread = { k1_n_m = 5 }', "spread.k1_n_m: 5 is too large"),
@@ -169,36 +159,27 @@ def test_every_shipped_scene_is_grasped_and_stays_steady(name):
 @every_case(
     ("text", "says"),
     [
-        ("width_m = 0.2", r"bottle.toml: width_m: 0.2 m wide .* fingers open to 0.086 m"),
-        ("width_m = 0.08\noffset_m = -0.02", r"bottle.toml: offset_m: .* needs 0.12 m"),
-        ("width_m = -0.01", r"bottle.toml: width_m: -0.01 is negative"),
-        ("width_m = 0.0", r"bottle.toml: 'width_m' must be > 0"),
-        ("width_m = nan", r"bottle.toml: width_m: nan is not a finite number"),
-        ("width_m = inf", r"bottle.toml: width_m: inf is not a finite number"),
-        ("width_m = '5 cm'", r"bottle.toml: width_m: '5 cm' is not a number"),
-        ("width_m = true", r"bottle.toml: width_m: True is not a number"),
-        ("patch = 'face'", r"bottle.toml: width_m: is missing"),
-        ("width_m = 0.05\nheld = 1", r"bottle.toml: held: 1 is not true or false"),
-        ("width_m = 0.05\nwidht_m = 0.05", r"bottle.toml: widht_m: no such key.*Did you mean 'width_m'\?"),
-        ("width_m = 0.05\nterms = 3", r"bottle.toml: terms: write a table \[\[terms\]\] for each"),
-        (
-            "width_m = 0.05\n[[terms]]\ntype='spring'",
-            r"bottle.toml: \[\[terms\]\] 1 \(spring\): no term 'spring'",
-        ),
-        ("width_m = 0.05\n[[terms]]\ntype='maxwell'\nk_n_m=1", r"\[\[terms\]\] 1 \(maxwell\): missing tau_s"),
-        (
-            "width_m = 0.05\n[[terms]]\ntype='maxwell'\nk_n_m=1\ntau_s=0",
-            r"bottle.toml: \[\[terms\]\] 1 \(maxwell\) tau_s: must be greater than 0",
-        ),
-        (
-            "width_m = 0.05\n[[terms]]\ntype='loss'\ndamping_n_s_m=-1",
-            r"bottle.toml: \[\[terms\]\] 1 \(loss\) damping_n_s_m: -1 is negative",
-        ),
-        ("width_m = ", r"bottle.toml: is not valid TOML"),
+        ("width_m = 0.2", "width_m: 0.2 m wide .* fingers open to 0.086 m"),
+        ("width_m = 0.08\noffset_m = -0.02", "offset_m: .* needs 0.12 m"),
+        ("width_m = -0.01", "width_m: -0.01 is negative"),
+        ("width_m = 0.0", "'width_m' must be > 0"),
+        ("width_m = nan", "width_m: nan is not a finite number"),
+        ("width_m = inf", "width_m: inf is not a finite number"),
+        ("width_m = '5 cm'", "width_m: '5 cm' is not a number"),
+        ("width_m = true", "width_m: True is not a number"),
+        ("patch = 'face'", "width_m: is missing"),
+        ("width_m = 0.05\nheld = 1", "held: 1 is not true or false"),
+        ("width_m = 0.05\nwidht_m = 0.05", r"widht_m: no such key.*Did you mean 'width_m'\?"),
+        ("width_m = 0.05\nterms = 3", r"terms: write a table \[\[terms\]\] for each"),
+        (f"{FIRST_TERM}='spring'", r"\[\[terms\]\] 1 \(spring\): no term 'spring'"),
+        (f"{FIRST_TERM}='maxwell'\nk_n_m=1", r"\[\[terms\]\] 1 \(maxwell\): missing tau_s"),
+        (f"{FIRST_TERM}='maxwell'\nk_n_m=1\ntau_s=0", r"\(maxwell\) tau_s: must be greater than 0"),
+        (f"{FIRST_TERM}='loss'\ndamping_n_s_m=-1", r"\(loss\) damping_n_s_m: -1 is negative"),
+        ("width_m = ", "is not valid TOML"),
     ],
 )
 def test_a_file_that_makes_no_sense_is_refused_by_file_table_and_field(scene, text, says):
-    with pytest.raises(ConfigError, match=says):
+    with pytest.raises(ConfigError, match=f"bottle.toml: .*{says}"):
         unverified_setup(SimConfig(), scene(text), 0)
 
 
@@ -207,66 +188,6 @@ def test_a_file_that_is_not_there_and_a_name_that_nothing_has(tmp_path):
         find(str(tmp_path / "nope.toml"))
     with pytest.raises(UnknownName, match=r"no object named 'spong'.*sponge.*Did you mean 'sponge'\?"):
         find("spong")
-
-
-def pressed(config, effort_n, seconds, **changes):
-    """Press with this effort for so long; return the setup and the plant at each millisecond."""
-    setup = unverified_setup(config, changes.pop("scene"), 0)
-    move, body, bodies = plant_move(laws_of(setup.kinds)), setup.state, []
-    for _ in range(round(seconds / setup.dt_s)):
-        body = move(setup.plant, body, effort_n, setup.dt_s)
-        bodies.append(body)
-    return setup, bodies
-
-
-@pytest.mark.slow
-def test_an_object_held_fast_is_pressed_by_the_finger_that_meets_it_first(scene):
-    text = "width_m = 0.06\noffset_m = 0.002\n{}[[terms]]\ntype = 'elastic'\nk1_n_m = 2000.0\n"
-    config = SimConfig(
-        spread=False, coulomb_n=0.0, breakaway_n=0.0, load_friction_coefficient=0.0, damping_n_s_m=1000.0
-    )
-    _, fast = pressed(config, 10.0, 6.0, scene=scene(text.format("held = true\n")))
-    end = fast[-1]
-    # Each half is twice as stiff as the whole; effort is the mean of the two pads.
-    difference_n = end.contact.right_n - end.contact.left_n
-    assert difference_n == pytest.approx(2000.0 * 4 * 0.002 / (1 + 2000.0 / 1.5e4), rel=1e-3)
-    assert 0.5 * (end.contact.left_n + end.contact.right_n) == pytest.approx(10.0, rel=1e-2)
-    assert end.contact.offset_m == pytest.approx(0.002)
-    _, free = pressed(config, 10.0, 6.0, scene=scene(text.format("")))
-    assert free[-1].contact.left_n == free[-1].contact.right_n == pytest.approx(10.0, rel=1e-2)
-    assert free[-1].contact.offset_m == 0.0
-
-
-def test_a_drive_that_lags_gives_its_effort_as_a_first_order_rise(scene):
-    quick = SimConfig(spread=False, coulomb_n=0.0, breakaway_n=0.0, damping_n_s_m=0.0)
-    lagging = SimConfig(
-        spread=False, coulomb_n=0.0, breakaway_n=0.0, damping_n_s_m=0.0, drive_lag_s=0.05, rate_hz=100.0
-    )
-    _, at_once = pressed(quick, 2.0, 0.2, scene=scene(BOTTLE))
-    _, later = pressed(lagging, 2.0, 0.2, scene=scene(BOTTLE))
-    # Impulse of 1 - exp(-t / tau) over 0.2 s: 0.2 - 0.05 (1 - exp(-4)).
-    ratio = later[-1].motion.speed_rev_s / at_once[-1].motion.speed_rev_s
-    assert ratio == pytest.approx((0.2 - 0.05 * 0.9817) / 0.2, rel=2e-3)
-    assert later[-1].effort_n == pytest.approx(2.0 * 0.9817, rel=1e-3)
-
-
-@pytest.mark.slow
-def test_covers_that_creep_give_way_and_covers_that_damp_lower_no_force_at_rest(scene):
-    hard = scene("width_m = 0.03\n[[terms]]\ntype = 'rigid'\nhertz_n_m15 = 1e10\n")
-    plain = SimConfig(
-        spread=False, coulomb_n=0.0, breakaway_n=0.0, load_friction_coefficient=0.0, damping_n_s_m=2000.0
-    )
-    creeping = SimConfig(
-        spread=False, coulomb_n=0.0, breakaway_n=0.0, load_friction_coefficient=0.0, damping_n_s_m=2000.0,
-        pad_creep_n_m=1e5, pad_creep_s=0.5, pad_damping_n_s_m=500.0,
-    )  # fmt: skip
-    _, stiff = pressed(plain, 20.0, 8.0, scene=hard)
-    _, soft = pressed(creeping, 20.0, 20.0, scene=hard)
-    assert soft[-1].contact.left.force_n == pytest.approx(20.0, rel=1e-2)
-    # The arm has let go: the gap is where the spring alone leaves it, and got there later.
-    assert soft[-1].motion.gap_m == pytest.approx(stiff[-1].motion.gap_m, abs=2e-5)
-    touched_from = next(k for k, b in enumerate(soft) if b.contact.touched)
-    assert soft[touched_from + 300].motion.gap_m > stiff[touched_from + 300].motion.gap_m + 1e-4
 
 
 def test_a_bottle_with_a_deep_snap_stays_dented(scene):
@@ -280,8 +201,7 @@ def test_a_bottle_with_a_deep_snap_stays_dented(scene):
         fall_m = 0.003
         k2_n_m = 3000.0
     """
-    config = SimConfig(spread=False)
-    setup = unverified_setup(config, scene(text), 0)
+    setup = unverified_setup(SimConfig(spread=False), scene(text), 0)
     move, body = plant_move(laws_of(setup.kinds)), setup.state
     for _ in range(3000):
         body = move(setup.plant, body, 25.0, 1e-3)

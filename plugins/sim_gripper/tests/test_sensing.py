@@ -117,14 +117,6 @@ def test_other_tick_rates_feel_the_same_bottle(rate_hz):
     assert result.report["true_peak_force_n"] == pytest.approx(expected.report["true_peak_force_n"], rel=0.05)
 
 
-def test_the_same_seed_is_the_same_grasp_to_the_bit():
-    grasped, again, other = grasp(), grasp_anew(), grasp(seed=5)
-    assert np.array_equal(grasped.trace.force_left_n, again.trace.force_left_n)
-    assert not np.array_equal(grasped.trace.gap_m[:100], other.trace.gap_m[:100]) or (
-        not np.array_equal(grasped.trace.pad_left[0], other.trace.pad_left[0])
-    )
-
-
 def test_cells_that_are_not_there_read_their_offset_and_the_others_as_before():
     whole, middle = (
         grasp(object="odwalla:full_closed", spread=False, pad_cells=cells).trace for cells in (15, 3)

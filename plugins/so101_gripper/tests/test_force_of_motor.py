@@ -1,7 +1,5 @@
 """From a load cell to the force of the gripper: calibrated on the command line, then tried on other loads."""
 
-from __future__ import annotations
-
 import pytest
 from cases import every_case
 from commands import graspsense

@@ -1,7 +1,5 @@
 """Registers, packets and geometry of the gripper's motor."""
 
-from __future__ import annotations
-
 from math import pi
 
 import pytest

@@ -1,19 +1,18 @@
 """The driver of the gripper's motor against the emulated arm."""
 
-from __future__ import annotations
-
 import json
-import subprocess
-import sys
-import time
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from cases import every_case
+from emulated_grippers import (
+    PATIENT_S,
+    assert_a_killed_program_lets_go,
+    assert_lost_in_a_grasp,
+    give_own_time,
+)
 
 from graspsense import WiringError, load_pipeline
-from graspsense.core.drivers import emulated_serial
 from graspsense.plugin_api import (
     POSITION,
     VELOCITY,
@@ -32,26 +31,12 @@ from graspsense_so101_gripper.discovery import diagnose
 from graspsense_so101_gripper.emulator.arm import EmulatedArm
 from graspsense_so101_gripper.registers import STATE, MotorRequest, motor_state
 
-PATIENT_S = 60.0
-"""For a reply that comes: when it does is this machine's business."""
 FAST = Command(POSITION, 0.0, 8.0, 0.05)
 
 
 @pytest.fixture
 def own_time(monkeypatch):
-    """Driver and emulator have a time of their own, which passes while the driver sleeps or looks at it."""
-    now_s = 0.0
-
-    def sleep(seconds):
-        nonlocal now_s
-        now_s += seconds
-
-    def look():
-        sleep(0.001)
-        return now_s
-
-    monkeypatch.setattr(backend, "time", SimpleNamespace(monotonic=look, sleep=sleep))
-    monkeypatch.setattr(emulated_serial, "time", SimpleNamespace(monotonic=lambda: now_s))
+    give_own_time(monkeypatch, backend)
 
 
 @pytest.fixture
@@ -153,14 +138,7 @@ def test_it_closes_with_the_torque_limit_of_the_force_and_tells_load_current_and
 @every_case("at_s", [0.02, 0.5, 2.0])
 @every_case("fault", ["unplug", "silent"])
 def test_a_gripper_lost_in_a_grasp_ends_it_and_is_told(fault, at_s):
-    faults = (
-        [f"gripper.faults.unplug_at_s={at_s}"]
-        if fault == "unplug"
-        else ["gripper.faults.mood=silent", f"gripper.faults.mood_at_s={at_s}"]
-    )
-    trial = load_pipeline("so101", options=["gripper.port=emulated", *faults]).grasp()
-    assert trial.outcome.words == "device lost"
-    assert "cable and power" in trial.reason
+    assert_lost_in_a_grasp("so101", fault, at_s)
 
 
 @pytest.mark.slow
@@ -234,31 +212,10 @@ def test_a_motor_that_is_not_asked_what_was_written_ends_the_grasp(emulated, wor
     assert not arm.state()["torque"]
 
 
-HOLDS_ON = """
-import sys, time
-from graspsense.plugin_api import POSITION, Command, create
-driver = create("sensor-backend", "so101", port=sys.argv[1], reply_timeout_s=10.0, calibration="none")
-driver.open(0)
-for number in range(10**9):
-    driver.read(10.0)
-    driver.apply(Command(POSITION, 0.0, 8.0, 0.05))
-    if number == 10:
-        print("closes", flush=True)
-"""
-
-
 def test_a_program_that_is_killed_leaves_no_gripper_that_presses(emulated):
     arm = emulated()
-    with subprocess.Popen(
-        [sys.executable, "-c", HOLDS_ON, arm.where], stdout=subprocess.PIPE, text=True
-    ) as program:
-        assert program.stdout.readline() == "closes\n"
-        assert arm.state()["torque"]
-        program.kill()
-    until_s = time.monotonic() + PATIENT_S
-    while arm.state()["torque"] and time.monotonic() < until_s:
-        time.sleep(0.01)
-    assert not arm.state()["torque"]
+    settings = {"port": arm.where, "reply_timeout_s": 10.0, "calibration": "none"}
+    assert_a_killed_program_lets_go("so101", lambda: arm.state()["torque"], 8.0, **settings)
 
 
 def test_a_second_host_is_refused_the_port(emulated):
