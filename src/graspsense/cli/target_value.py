@@ -93,11 +93,14 @@ def train_value(
         return
     echo(f"{out}: {model.in_a_line}", indent=2)
     unit = model.target.unit
+    widths = model.intervals.half_widths
+    least, most = (_with_unit(end(widths), unit) if widths else "" for end in (min, max))
     echo_entry(
         "interval",
-        f"none: {model.no_interval}"
-        if model.half_width is None
-        else f"{100 * COVERAGE:.0f} %, prediction plus or minus {_with_unit(model.half_width, unit)}",
+        f"none: {model.intervals.reason}"
+        if not widths
+        else f"{100 * COVERAGE:.0f} %, prediction plus or minus {least}"
+        + ("" if most == least else f" to {most}, by its size"),
     )
     # In one line, so that it can be copied.
     echo_as_it_is(f"how good    {command_line(('out', 'keep', 'overwrite', 'as_json'), 'evaluate')}")
@@ -138,6 +141,7 @@ def predict_value(model_name: str, source: str, as_json: bool, given: Mapping[st
                     {
                         "value": prediction.value,
                         "interval": None if prediction.low is None else [prediction.low, prediction.high],
+                        "no_interval": prediction.no_interval,
                         "unlike": prediction.unlike,
                         **({} if truth is None else {"truth": truth[i]}),
                     }
@@ -202,7 +206,7 @@ def _print_predictions(
     for i, prediction in enumerate(predictions):
         interval = "" if prediction.low is None else f"{prediction.low:.4g} to {prediction.high:.4g}"
         true = () if truth is None else (f"{truth[i]:.4g}", f"{prediction.value - truth[i]:+.3g}")
-        rows.append((str(i + 1), f"{prediction.value:.4g}", interval, *true, prediction.unlike))
+        rows.append((str(i + 1), f"{prediction.value:.4g}", interval, *true, prediction.no_interval))
     echo_table(header, rows)
 
 
