@@ -196,10 +196,10 @@ def _steps(
     all_of = np.bincount(bins[value_of], weights)
     right_of = np.bincount(bins[value_of], weights * right)
     level_of = np.unique(isotonic_regression(right_of / all_of, sample_weight=all_of), return_inverse=True)[1]
-    units = np.bincount(level_of, all_of)
-    rates = (units * _drawn_together(np.bincount(level_of, right_of), units, len(all_of)) + 1.0) / (
-        units + 2.0
+    right_in, units = (
+        np.asarray(np.bincount(level_of, counts), dtype=np.float64) for counts in (right_of, all_of)
     )
+    rates = (units * _drawn_together(right_in, units, len(all_of)) + 1.0) / (units + 2.0)
     begins = [float(values[np.flatnonzero(level_of[bins] == level)[0]]) for level in range(len(rates))]
     return tuple(begins), tuple(np.maximum.accumulate(rates).tolist())
 
