@@ -243,7 +243,11 @@ def _say_trained(out: str, model: Model) -> None:
         echo_entry("sets", model.sets.in_words)
         if model.sets.trials:
             share = f"{100 * model.sets.unknown / model.sets.trials:.1f} %"
-            echo_entry("unknown", f"{share} of the held-out trials are called unknown (false alarms)")
+            echo_entry(
+                "unknown",
+                f"{share} of the held-out trials are called unknown (false alarms); of new ones at most about as many, "
+                "since the model knows more trials than those of the folds",
+            )
     for after_s, part in model.checkpoints:
         sets = "" if part.sets is None else f", sets {part.sets.in_words}"
         echo_entry(

@@ -27,7 +27,7 @@ _AREAS_AND_VOLUMES: Final = {
 
 _SI: Final = frozenset((
     "1", "s", "m", "kg", "A", "K", "mol", "cd", "rad", "sr", "Hz", "N", "Pa", "J", "W", "C", "V", "F", "Ω", "ohm",
-    "S", "Wb", "T", "H", "lm", "lx", "counts", "dB",
+    "S", "Wb", "T", "H", "lm", "lx", "counts", "cells", "rows", "dB",
 ))  # fmt: skip
 """The factors of a unit: those of the SI without a prefix, and what sensors give that have no unit."""
 
