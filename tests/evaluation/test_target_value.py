@@ -168,6 +168,20 @@ def test_a_trial_without_a_feature_that_all_training_trials_had_has_no_interval(
     assert lacking.no_interval
 
 
+def test_trials_under_other_settings_have_no_interval():
+    def at_force(force_n):
+        return {"settings": {"controller": {"type": "graspsense/velocity", "probing_force_n": force_n}}}
+
+    model = train_regression("ridge", bottles(provenance=at_force(20.0)), name="m")
+    trial = table([0.06], [5.0])
+    (same,), (other,) = (model.predict(trial, at_force(force_n)) for force_n in (20.0, 15.0))
+    assert same.low is not None
+    assert (other.value, other.low) == (same.value, None)
+    assert other.no_interval
+    (difference,) = model.differences(at_force(15.0))
+    assert "controller.probing_force_n" in difference
+
+
 def test_an_interval_holds_for_large_predictions_too():
     """Where errors grow with the number, one width for all is right on average, and too small for the large ones."""
 

@@ -118,9 +118,10 @@ def predict_value(model_name: str, source: str, as_json: bool, given: Mapping[st
 
     model = load_regression(model_name)
     table, labelled, notes = _to_predict(model, source, given)
-    predictions = model.predict(table)
+    provenance = None if labelled is None else labelled.provenance
+    predictions = model.predict(table, provenance)
     notes = (*notes, *assumed_units(model.table.names, model.table.units, table))
-    warnings, error, truth = list(model.warnings), None, None
+    warnings, error, truth = [*model.warnings, *model.differences(provenance)], None, None
     learned = learned_from(row_hashes(model.table), table.columns(model.table.names))
     if learned:
         warnings.append(f"{learned}: their predictions say nothing of other trials")
@@ -175,7 +176,7 @@ def _trials(source: str, estimator: str | None, progress: ProgressLine, given: M
 def _to_predict(
     model: RegressionModel, source: str, given: Mapping[str, Any]
 ) -> tuple[FeatureTable, Labelled | None, tuple[str, ...]]:
-    """Return the features of the trials, the trials with true numbers (None if they are not named), and notes."""
+    """Return the features of the trials, the trials (None if only their features are known), and notes."""
     from graspsense.cli.progress import ProgressLine
     from graspsense.core.values.errors import ConfigError
 
@@ -187,12 +188,11 @@ def _to_predict(
     with ProgressLine() as progress:
         named = given["features"] or (model.table.names if is_csv(source) else None)
         labelled = trials_of(source, progress, {**given, "features": named}, copies=True)
-    if labelled.value is None:
-        return labelled.table, None, labelled.notes
-    if model.target.unit and labelled.value.unit and model.target.unit != labelled.value.unit:
+    value = labelled.value
+    if value is not None and model.target.unit and value.unit and model.target.unit != value.unit:
         raise ConfigError(
-            f"model {model.name!r} predicts {model.target.name} in {model.target.unit}; {labelled.value.name} of "
-            f"{source} is in {labelled.value.unit}"
+            f"model {model.name!r} predicts {model.target.name} in {model.target.unit}; {value.name} of {source} is "
+            f"in {value.unit}"
         )
     return labelled.table, labelled, labelled.notes
 

@@ -17,6 +17,7 @@ import numpy as np
 from attrs import frozen
 
 from graspsense import __version__
+from graspsense.core.learn.model import differences_from
 from graspsense.core.learn.model_content import (
     REGRESSION_FORMAT,
     digest,
@@ -87,18 +88,28 @@ class RegressionModel:
             return ()
         return (f"this model was made with {self.made_with} and made again with {_sklearn()}: it may differ",)
 
-    def predict(self, table: FeatureTable) -> list[PredictedValue]:
-        """Return the prediction of each trial. Raises ConfigError if a feature is missing, or has another unit."""
+    def differences(self, provenance: Mapping[str, Any] | None) -> tuple[str, ...]:
+        """Return, in words, how trials with this provenance differ from those of the training."""
+        return tuple(differences_from(self.provenance, provenance=provenance))
+
+    def predict(
+        self, table: FeatureTable, provenance: Mapping[str, Any] | None = None
+    ) -> list[PredictedValue]:
+        """Return the prediction of each trial. Raises ConfigError if a feature is missing, or has another unit.
+
+        Trials under other settings than those of the training have no interval; `provenance` says how they were made.
+        """
         if why := misfit(f"model {self.name!r}", self.table.names, self.table.units, table):
             raise ConfigError(why)
         chosen = table.columns(self.table.names)
         values = self.fitted.predict(chosen.values)
         halves = self.intervals.half_width(values)
         lacking = self.novelty.lacking(chosen)
+        elsewhere = "it was not measured under these settings" if self.differences(provenance) else ""
         made = []
         for i, (value, half) in enumerate(zip(values.tolist(), halves.tolist(), strict=True)):
             unlike = str(getattr(self.novelty.unlike(chosen.row(i)), "words", ""))
-            why = self.intervals.reason or unlike
+            why = self.intervals.reason or unlike or elsewhere
             if not why and lacking[i]:
                 why = f"it was measured with trials that have {lacking[i]}"
             made.append(
