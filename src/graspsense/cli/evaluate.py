@@ -225,7 +225,7 @@ def _print(evaluation: Evaluation) -> None:
     echo_entry(
         "unknown",
         f"{evaluation.unknown.words} would be called unknown (false alarms: their labels are known); "
-        "by a model of all trials at most about as many",
+        "hardly more by a model of all trials",
     )
     _print_doubt(evaluation)
     for note in evaluation.notes:
