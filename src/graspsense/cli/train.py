@@ -245,8 +245,8 @@ def _say_trained(out: str, model: Model) -> None:
             unknown, trials = model.sets.unknown, model.sets.trials
             echo_entry(
                 "unknown",
-                f"{100 * unknown / trials:.1f} % ({unknown} of {trials}) of the held-out trials are called unknown (false "
-                "alarms), hardly more of new ones: the model knows more trials than those of the folds",
+                f"{100 * unknown / trials:.1f} % ({unknown} of {trials}) of the held-out trials are called unknown "
+                "(false alarms), hardly more of new ones: the model knows more trials than those of the folds",
             )
     for after_s, part in model.checkpoints:
         sets = "" if part.sets is None else f", sets {part.sets.in_words}"
