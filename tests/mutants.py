@@ -39,6 +39,7 @@ from graspsense.plugin_api import (
     Channel,
     ClassifierConfig,
     Command,
+    Feature,
     Features,
     Image,
     ObjectKind,
@@ -182,6 +183,13 @@ def _(features, trace):
 @featuring("returns-the-declared-features", "peak in mN")
 def _(features, trace):
     return evolve(features, units=("mN",))
+
+
+@featuring(
+    "units-are-of-the-si", "'newton'", features=(Feature("peak", "newton", "the largest force of the pads"),)
+)
+def _(features, trace):
+    return evolve(features, units=("newton",))
 
 
 @featuring("values-are-floats", "write float(...)")

@@ -105,6 +105,21 @@ def test_the_nearest_path_is_one_that_there_is_and_a_known_path_is_its_own(neare
     assert nearest_path(known[0], known).rpartition(".")[2] == known[0].rpartition(".")[2]
 
 
+@every_case(
+    ("typed", "allowed"),
+    [
+        ("hold --seconds abc", "--seconds 'abc': give a number above 0, at most 3500"),
+        ("hold --seconds 0", "--seconds 0.0: give a number above 0, at most 3500"),
+        ("evaluate simulated --folds x", "--folds 'x': give a whole number of at least 2"),
+        ("run --seed 1.5", "--seed '1.5': give a whole number"),
+        ("calibrate tare --images 1", "--images 1: give a whole number from 2 to 1000"),
+    ],
+)
+def test_a_number_that_an_option_does_not_take_is_answered_with_those_it_takes(run, typed, allowed):
+    code, _, err = run(*typed.split())
+    assert (code, allowed in " ".join(err.split())) == (2, True), err
+
+
 def test_a_kind_of_file_is_recognised_by_keys_that_it_has():
     assert KINDS["experiment"].marks <= {field.name for field in fields(Experiment)}
     assert KINDS["manifest"].marks <= {field.name for field in fields(Manifest)}

@@ -423,5 +423,5 @@ def test_a_probability_that_tells_nothing_gives_hardly_more_certainty(n):
         probability, right = rng.uniform(0.3, 1.0, n), rng.uniform(size=n) < 0.6
         certainty = certainty_of(probability, np.full(n, np.nan), right.tolist(), [str(i) for i in range(n)])
         highest.append(certainty.rate(np.array([1.0]), np.array([np.nan]))[0])
-    # Of 60 %; chance alone makes the highest of several rates higher.
-    assert np.mean(highest) < 0.665
+    # Of 60 %; chance alone makes the highest of several rates higher, by 6 points if they were not drawn together.
+    assert np.mean(highest) < 0.63

@@ -8,9 +8,11 @@ from parts import Nearest
 from test_evaluate import learner
 
 from graspsense.core.learn.labelled import Labelled
+from graspsense.core.learn.training import train
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import FeatureTable
 from graspsense.evaluation.choosing import choose
+from graspsense.evaluation.doubt import calibrated, calibrated_with
 from graspsense.plugin_api import ClassifierConfig
 
 
@@ -112,6 +114,29 @@ def test_the_rate_of_labels_without_information_is_that_of_guessing():
     assert right <= high
     assert right >= low - 0.05 * total  # labels that are held out are rarer in training: below one half
     assert best > high
+
+
+def test_the_certainty_of_a_chosen_model_is_not_raised_by_the_choice():
+    """Among features that tell nothing, the chosen one had the most luck: its own held-out answers are too good."""
+    rng = np.random.default_rng(7)
+    own, procedure = [], []
+    for repeat in range(4):
+        labels = [f"l{k}" for k in rng.permutation(np.repeat(np.arange(2), 20))]
+        sets = {f"set{k}": trials(rng.normal(size=(40, 1)), labels) for k in range(12)}
+        learners = {"knn": learner("knn")}
+        choice = choose(learners, sets, seed=repeat)
+        chosen = sets[choice.best.features]
+        model = train(learners["knn"].component, learners["knn"].config, chosen, name="m", seed=repeat)
+        fresh = evolve(chosen.table, values=rng.normal(size=(200, 1)))
+        for certainties, made in (
+            (own, calibrated(model, learners["knn"], chosen, repeat)),
+            (procedure, calibrated_with(model, choice.answers, chosen)),
+        ):
+            certainties += [prediction.certainty for prediction in made.predictions(fresh)]
+
+    # Every answer to a fresh trial is right in one half of cases.
+    assert np.mean(own) > 0.6
+    assert np.mean(procedure) == pytest.approx(0.5, abs=0.07)
 
 
 class Failing(Nearest):

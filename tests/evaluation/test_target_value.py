@@ -20,6 +20,7 @@ from graspsense.core.values.features import FeatureTable
 from graspsense.evaluation.json_codec import to_json
 from graspsense.regression.estimators import ESTIMATORS
 from graspsense.regression.evaluate import evaluate_regression
+from graspsense.regression.intervals import intervals_of
 from graspsense.regression.model import load_regression, train_regression, write_regression
 from graspsense.store.store import Store
 
@@ -144,8 +145,8 @@ def test_a_model_predicts_the_same_after_loading(tmp_path, estimator):
     write_regression(tmp_path / "m.json", model)
     again = load_regression(str(tmp_path / "m.json"))
     assert again.predict(trials.table) == model.predict(trials.table)
-    assert (again.target, again.half_width) == (model.target, model.half_width)
-    assert model.half_width is not None
+    assert (again.target, again.intervals) == (model.target, model.intervals)
+    assert model.intervals.half_widths
 
 
 def test_a_trial_unlike_all_training_trials_is_marked():
@@ -154,6 +155,47 @@ def test_a_trial_unlike_all_training_trials_is_marked():
     assert usual.unlike == ""
     assert "p_first" in wide.unlike
     assert usual.low < usual.value < usual.high
+    assert (wide.low, wide.high, wide.no_interval) == (None, None, wide.unlike)
+
+
+def test_a_trial_without_a_feature_that_all_training_trials_had_has_no_interval():
+    """The error of a prediction from a feature that was filled in was never measured."""
+    model = train_regression("ridge", bottles(), name="m")
+    (lacking,) = model.predict(table([0.06], [np.nan]))
+    assert (lacking.low, lacking.high, lacking.unlike) == (None, None, "")
+    assert lacking.no_interval
+
+
+def test_trials_under_other_settings_have_no_interval():
+    def at_force(force_n):
+        return {"settings": {"controller": {"type": "graspsense/velocity", "probing_force_n": force_n}}}
+
+    model = train_regression("ridge", bottles(provenance=at_force(20.0)), name="m")
+    trial = table([0.06], [5.0])
+    (same,), (other,) = (model.predict(trial, at_force(force_n)) for force_n in (20.0, 15.0))
+    assert same.low is not None
+    assert (other.value, other.low) == (same.value, None)
+    assert other.no_interval
+    (difference,) = model.differences(at_force(15.0))
+    assert "controller.probing_force_n" in difference
+
+
+def test_an_interval_holds_for_large_predictions_too():
+    """Where errors grow with the number, one width for all is right on average, and too small for the large ones."""
+
+    def drawn(n):
+        size = rng.uniform(0.0, 1.0, n)
+        return size, 0.4 * size**2 * rng.normal(size=n)
+
+    rng = np.random.default_rng(3)
+    covered = []
+    for _ in range(30):
+        intervals = intervals_of(*drawn(200), None)
+        predicted, errors = drawn(1000)
+        inside = np.abs(errors) <= intervals.half_width(predicted)
+        covered.append([inside[predicted < 0.2].mean(), inside[predicted > 0.8].mean()])
+    # A band of 20 units covers 90 % with a standard deviation of 7 points: that of 30 means is 1.2 points.
+    assert np.mean(covered, axis=0) == pytest.approx([0.91, 0.91], abs=0.04)
 
 
 @pytest.mark.parametrize(

@@ -140,6 +140,23 @@ def test_a_part_of_which_most_was_skipped_does_not_conform():
     )
 
 
+class Raising(parts.Peak):
+    def extract(self, trace):
+        raise ZeroDivisionError("it broke")
+
+
+def test_one_cause_that_fails_several_checks_is_told_once():
+    """An `extract` that always raises fails nearly every check, each on another trace."""
+    entry = evolve(parts.ENTRIES["feature-set"], target=f"{__name__}:Raising")
+    report = Examined((subject("feature-set", entry),)).report()
+    failed = [result for result in report.results if result.state == "failed"]
+    told = [failure for failure in report.failures if "it broke" in failure]
+
+    assert len(failed) > 5
+    assert len(told) == 1
+    assert all(result.check in "".join(report.failures) for result in failed)
+
+
 def test_an_expected_failure_is_no_failure_and_an_unexpected_pass_is_one():
     peak = subject("feature-set", parts.ENTRIES["feature-set"])
     checks = {check.id: check for check in CHECKS["feature-set"]}

@@ -248,3 +248,21 @@ def test_packed_numbers_of_netcdf_are_unpacked(tmp_path):
     arrays = hdf5_arrays(tmp_path / "a.nc")
     assert arrays["F"] == pytest.approx(FORCE, abs=0.006)
     assert np.flatnonzero(np.isnan(arrays["pos"])).tolist() == [3]
+
+
+def test_numbers_without_a_sign_and_outside_of_their_valid_range_are_those_of_netcdf(tmp_path):
+    """60000 is stored as -5536 in 16 bits with a sign; so is the largest valid number, and the filling 65535 as -1."""
+    stored = np.array([0, 40000, 60000, 60001, 65535], dtype="u2").view("i2")
+    with h5py.File(tmp_path / "a.nc", "w") as file:
+        unsigned = file.create_dataset("F", data=stored)
+        unsigned.attrs.update(
+            _Unsigned="true", _FillValue=np.int16(-1), valid_max=np.int16(-5536), scale_factor=0.001
+        )
+        ranged = file.create_dataset("pos", data=np.array([-9.0, 0.0, 0.05, 9.0]))
+        ranged.attrs["valid_range"] = np.array([0.0, 0.1])
+        signed = file.create_dataset("x", data=np.array([-5, 3], dtype="i2"))
+        signed.attrs.update(_Unsigned="false", valid_min=np.int16(0))
+    arrays = hdf5_arrays(tmp_path / "a.nc")
+    assert arrays["F"] == pytest.approx([0.0, 40.0, 60.0, np.nan, np.nan], nan_ok=True)
+    assert arrays["pos"] == pytest.approx([np.nan, 0.0, 0.05, np.nan], nan_ok=True)
+    assert arrays["x"] == pytest.approx([np.nan, 3.0], nan_ok=True)

@@ -297,6 +297,23 @@ def test_at_least_half_of_a_suggested_manifest_is_right_and_nothing_is_wrong_in_
     assert not [recording.error for recording in recordings if hasattr(recording, "error")]
 
 
+@pytest.mark.parametrize(
+    ("numbers", "keys"),
+    [
+        pytest.param(FORCE_N, {"left", "right"}, id="zero until the fingers touch"),
+        pytest.param(60.0 - GAP_MM, set(), id="moving before that, as positions do"),
+    ],
+)
+def test_columns_named_after_both_fingers_are_forces_if_their_numbers_look_like_one(tmp_path, numbers, keys):
+    for name in ("jar_1", "jar_2"):
+        columns = {"t (ms)": T_S * 1e3, "gap (mm)": GAP_MM, "left finger": numbers, "right finger": numbers}
+        table(tmp_path / f"{name}.csv", columns)
+    code, _, err = graspsense("import", tmp_path, "--suggest", tmp_path / "m.toml")
+    assert code == 0, err
+    suggested = tomllib.loads((tmp_path / "m.toml").read_text())
+    assert {"force", "left", "right"} & suggested.keys() == keys
+
+
 def test_what_the_file_states_is_not_questioned(tmp_path):
     for name in ("jar_1", "jar_2", "can_1"):
         table(

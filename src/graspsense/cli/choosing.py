@@ -46,7 +46,8 @@ class Chosen:
         from graspsense.evaluation.json_codec import to_json
 
         best = self.choice.best
-        values: dict[str, Any] = to_json(self.choice)
+        shown = ("rate", "right", "chosen_in", "ranking")
+        values = {name: to_json(getattr(self.choice, name)) for name in shown}
         return {"classifier": best.classifier, "features": best.features, **values}
 
 

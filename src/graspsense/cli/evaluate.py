@@ -224,7 +224,8 @@ def _print(evaluation: Evaluation) -> None:
     echo_entry("features", ", ".join(name for name, _ in evaluation.features))
     echo_entry(
         "unknown",
-        f"{evaluation.unknown.words} would be called unknown (false alarms: their labels are known)",
+        f"{evaluation.unknown.words} would be called unknown (false alarms: their labels are known); "
+        "hardly more by a model of all trials",
     )
     _print_doubt(evaluation)
     for note in evaluation.notes:

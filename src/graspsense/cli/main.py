@@ -205,7 +205,9 @@ def _report(error: Exception, arguments: Sequence[str]) -> int:
     if isinstance(error, GraspsenseError):
         message, code = str(error), error.exit_code
     elif isinstance(error, click.ClickException):
-        message, code = error.format_message(), ExitCode.WRONG_USE
+        from graspsense.cli.wrong_use import message_of
+
+        message, code = message_of(error), ExitCode.WRONG_USE
         if isinstance(error, click.UsageError) and error.ctx is not None:
             message += f"\n  {error.ctx.command_path} --help shows what there is"
     elif isinstance(error, OSError):

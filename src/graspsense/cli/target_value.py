@@ -93,11 +93,14 @@ def train_value(
         return
     echo(f"{out}: {model.in_a_line}", indent=2)
     unit = model.target.unit
+    widths = model.intervals.half_widths
+    least, most = (_with_unit(end(widths), unit) if widths else "" for end in (min, max))
     echo_entry(
         "interval",
-        f"none: {model.no_interval}"
-        if model.half_width is None
-        else f"{100 * COVERAGE:.0f} %, prediction plus or minus {_with_unit(model.half_width, unit)}",
+        f"none: {model.intervals.reason}"
+        if not widths
+        else f"{100 * COVERAGE:.0f} %, prediction plus or minus {least}"
+        + ("" if most == least else f" to {most}, by its size"),
     )
     # In one line, so that it can be copied.
     echo_as_it_is(f"how good    {command_line(('out', 'keep', 'overwrite', 'as_json'), 'evaluate')}")
@@ -115,9 +118,10 @@ def predict_value(model_name: str, source: str, as_json: bool, given: Mapping[st
 
     model = load_regression(model_name)
     table, labelled, notes = _to_predict(model, source, given)
-    predictions = model.predict(table)
+    provenance = None if labelled is None else labelled.provenance
+    predictions = model.predict(table, provenance)
     notes = (*notes, *assumed_units(model.table.names, model.table.units, table))
-    warnings, error, truth = list(model.warnings), None, None
+    warnings, error, truth = [*model.warnings, *model.differences(provenance)], None, None
     learned = learned_from(row_hashes(model.table), table.columns(model.table.names))
     if learned:
         warnings.append(f"{learned}: their predictions say nothing of other trials")
@@ -138,6 +142,7 @@ def predict_value(model_name: str, source: str, as_json: bool, given: Mapping[st
                     {
                         "value": prediction.value,
                         "interval": None if prediction.low is None else [prediction.low, prediction.high],
+                        "no_interval": prediction.no_interval,
                         "unlike": prediction.unlike,
                         **({} if truth is None else {"truth": truth[i]}),
                     }
@@ -171,7 +176,7 @@ def _trials(source: str, estimator: str | None, progress: ProgressLine, given: M
 def _to_predict(
     model: RegressionModel, source: str, given: Mapping[str, Any]
 ) -> tuple[FeatureTable, Labelled | None, tuple[str, ...]]:
-    """Return the features of the trials, the trials with true numbers (None if they are not named), and notes."""
+    """Return the features of the trials, the trials (None if only their features are known), and notes."""
     from graspsense.cli.progress import ProgressLine
     from graspsense.core.values.errors import ConfigError
 
@@ -183,12 +188,11 @@ def _to_predict(
     with ProgressLine() as progress:
         named = given["features"] or (model.table.names if is_csv(source) else None)
         labelled = trials_of(source, progress, {**given, "features": named}, copies=True)
-    if labelled.value is None:
-        return labelled.table, None, labelled.notes
-    if model.target.unit and labelled.value.unit and model.target.unit != labelled.value.unit:
+    value = labelled.value
+    if value is not None and model.target.unit and value.unit and model.target.unit != value.unit:
         raise ConfigError(
-            f"model {model.name!r} predicts {model.target.name} in {model.target.unit}; {labelled.value.name} of "
-            f"{source} is in {labelled.value.unit}"
+            f"model {model.name!r} predicts {model.target.name} in {model.target.unit}; {value.name} of {source} is "
+            f"in {value.unit}"
         )
     return labelled.table, labelled, labelled.notes
 
@@ -202,7 +206,7 @@ def _print_predictions(
     for i, prediction in enumerate(predictions):
         interval = "" if prediction.low is None else f"{prediction.low:.4g} to {prediction.high:.4g}"
         true = () if truth is None else (f"{truth[i]:.4g}", f"{prediction.value - truth[i]:+.3g}")
-        rows.append((str(i + 1), f"{prediction.value:.4g}", interval, *true, prediction.unlike))
+        rows.append((str(i + 1), f"{prediction.value:.4g}", interval, *true, prediction.no_interval))
     echo_table(header, rows)
 
 

@@ -29,6 +29,7 @@ from graspsense.core.values.errors import counted
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from graspsense.cli.choosing import Chosen
     from graspsense.core.learn.checkpoints import CheckpointTrials
     from graspsense.core.learn.labelled import Labelled
     from graspsense.core.learn.model import Model
@@ -116,7 +117,7 @@ def train(
     notes = list(labelled.notes) if trained is None else []  # those of a choice are printed with it
     with gathered_warnings(notes):
         made = _maker(learner, Path(out).stem, target, given["seed"])
-        labelled, model = _made(made, learner, labelled, held_out, times, given["seed"])
+        labelled, model = _made(made, learner, labelled, held_out, trained, times, given["seed"])
     write_model(Path(out), model)
     if trained is not None and pipeline is not None:
         write_whole(Path(pipeline), pipeline_text(trained, out).encode())
@@ -166,16 +167,22 @@ def _made(
     learner: SelectedComponent,
     labelled: Labelled,
     held_out: Labelled | None,
+    trained: Chosen | None,
     times: Sequence[float],
     seed: int,
 ) -> tuple[Labelled, Model]:
-    """Return the trials of whole grasps, and their model, calibrated, with those of the checkpoints."""
+    """Return the trials of whole grasps, and their model, calibrated, with those of the checkpoints.
+
+    That of a choice, `trained`, is calibrated with the answers of the whole procedure.
+    """
     from attrs import evolve
 
     from graspsense.core.learn.checkpoints import split_checkpoints
     from graspsense.evaluation.checkpoints import checkpoint_models
-    from graspsense.evaluation.doubt import calibrated, calibrated_by
+    from graspsense.evaluation.doubt import calibrated, calibrated_by, calibrated_with
 
+    if trained is not None:
+        return labelled, calibrated_with(made(labelled), trained.choice.answers, labelled)
     parts = split_checkpoints(labelled, times) if times else ()
     further: Sequence[CheckpointTrials] = ()
     if parts:
@@ -235,8 +242,12 @@ def _say_trained(out: str, model: Model) -> None:
     if model.sets is not None:
         echo_entry("sets", model.sets.in_words)
         if model.sets.trials:
-            share = f"{100 * model.sets.unknown / model.sets.trials:.1f} %"
-            echo_entry("unknown", f"{share} of the held-out trials are called unknown (false alarms)")
+            unknown, trials = model.sets.unknown, model.sets.trials
+            echo_entry(
+                "unknown",
+                f"{100 * unknown / trials:.1f} % ({unknown} of {trials}) of the held-out trials are called unknown "
+                "(false alarms), hardly more of new ones: the model knows more trials than those of the folds",
+            )
     for after_s, part in model.checkpoints:
         sets = "" if part.sets is None else f", sets {part.sets.in_words}"
         echo_entry(

@@ -20,6 +20,30 @@ def advice(error: Exception, arguments: Sequence[str]) -> list[str]:
     return advised
 
 
+def message_of(error: click.ClickException) -> str:
+    """Return the message of an error; of a number that an option does not take, what it takes."""
+    kind = getattr(getattr(error, "param", None), "type", None)
+    typed, refused, _ = error.message.partition(" is not ")
+    if (
+        isinstance(error, click.BadParameter)
+        and error.param is not None
+        and isinstance(kind, type(click.INT) | type(click.FLOAT))
+        and refused
+    ):
+        return f"{error.param.opts[0]} {typed}: give {_allowed(kind)}"
+    return error.format_message()
+
+
+def _allowed(kind: click.types.IntParamType | click.types.FloatParamType) -> str:
+    """Return the numbers that an option takes, in words: `a whole number from 2 to 1000`."""
+    words = "a whole number" if isinstance(kind, type(click.INT)) else "a number"
+    least, most, above = (getattr(kind, name, None) for name in ("min", "max", "min_open"))
+    if least is not None and most is not None and not above:
+        return f"{words} from {least:.10g} to {most:.10g}"
+    words += "" if least is None else f" {'above' if above else 'of at least'} {least:.10g}"
+    return words if most is None else f"{words}, at most {most:.10g}"
+
+
 def _split_options(arguments: Sequence[str]) -> Iterator[str]:
     """Yield the option for each `-o KEY VALUE` and `-o KEY= VALUE`, whose value belongs behind a `=`."""
     for place, word in enumerate(arguments[:-2]):

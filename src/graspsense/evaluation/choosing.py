@@ -5,6 +5,9 @@ predicted by models of the remaining ones, and the candidate with the most right
 trial takes part in the choice that it is predicted by, and the rate over all outer folds is not raised by the choice.
 A model without the folds i and j serves both the choice for i and that for j. The choice that is used in the end is
 made in the same way, among all folds.
+
+The certainty of the chosen model comes from the same answers of the outer folds. Its own cross-validated answers are
+too good: among candidates that know nothing, the chosen one had the most luck on these very trials.
 """
 
 from __future__ import annotations
@@ -20,7 +23,7 @@ from attrs import frozen
 
 from graspsense.core.values.errors import FAILURES, ConfigError, counted, named
 from graspsense.evaluation.chosen import ChosenRate
-from graspsense.evaluation.crossval import ClassifierFactory, fit_and_predict, refuse_without_features
+from graspsense.evaluation.crossval import ClassifierFactory, Pooled, cross_validate, fit_and_predict
 from graspsense.evaluation.folds import INSTANCE_HELD_OUT
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.evaluation.intervals import RecognitionRate, rate_of
@@ -28,6 +31,7 @@ from graspsense.evaluation.ranking import (
     Candidate,
     CandidateResult,
     Ranking,
+    no_candidate,
     protocols_of,
     ranking_of,
 )
@@ -48,12 +52,13 @@ LEAST_FOLDS: Final = 3
 class ChosenPipeline:
     """The candidate that was chosen, and what its choice is worth.
 
-    `rate` is that of the whole procedure: choice and training on trials that are not predicted. `right` says which
-    trials it recognises. `chosen_in` counts in how many outer folds each candidate was chosen. `ranking` compares all
-    candidates; the first is the chosen one.
+    `rate` is that of the whole procedure: choice and training on trials that are not predicted. `answers` are those of
+    the procedure, `right` says which of them are correct. `chosen_in` counts in how many outer folds each candidate was
+    chosen. `ranking` compares all candidates; the first is the chosen one.
     """
 
     rate: RecognitionRate
+    answers: Pooled
     right: tuple[bool, ...]
     chosen_in: Mapping[str, int]
     ranking: Ranking
@@ -66,14 +71,14 @@ class ChosenPipeline:
 
 @frozen(kw_only=True, eq=False)
 class _Answers:
-    """Which trials a candidate recognises.
+    """What a candidate answers.
 
-    `inner` has shape (folds, trials): the row of a fold says it for models that know neither this fold nor that of the
-    trial. `outer` says it for models that only do not know the fold of the trial.
+    `inner` has shape (folds, trials): the row of a fold says which trials are recognised by models that know neither
+    this fold nor that of the trial. `outer` are the answers of models that only do not know the fold of the trial.
     """
 
     inner: NDArray[np.bool_]
-    outer: NDArray[np.bool_]
+    outer: Pooled
     training_s: float
 
 
@@ -108,11 +113,17 @@ def choose(
                 answers[learner, name] = _answers(learners[learner], trials[name], folds, seed)
             except FAILURES as error:
                 notes.append(f"{learner} with {name} is left out: {named(error)}")
-    right, chosen_in = _nested(answers, folds)
-    rate = rate_of(right, known.instances, known.no_interval)
+    if not answers:
+        raise no_candidate(tuple(dict.fromkeys(notes)))
+    nested, chosen_in = _nested(answers, folds)
+    right = nested.right(known.labels)
+    # It is the rate of any of the candidates that a fold chose: where these differ, one of them may have been lucky.
+    rate = rate_of(right, known.instances, known.no_interval, float(len(chosen_in)))
     ranking = ranking_of(
         {
-            key: CandidateResult(right={protocol: answer.outer.tolist()}, training_s=answer.training_s)
+            key: CandidateResult(
+                right={protocol: answer.outer.right(known.labels)}, training_s=answer.training_s
+            )
             for key, answer in answers.items()
         },
         protocol,
@@ -120,7 +131,7 @@ def choose(
         tuple(dict.fromkeys(notes)),
         ChosenRate(rate=rate.rate, interval=rate.interval, of=len(answers)),
     )
-    return ChosenPipeline(rate=rate, right=tuple(right), chosen_in=chosen_in, ranking=ranking)
+    return ChosenPipeline(rate=rate, answers=nested, right=tuple(right), chosen_in=chosen_in, ranking=ranking)
 
 
 def _folds(trials: Labelled, seed: int) -> tuple[str, Folds]:
@@ -142,27 +153,37 @@ def _folds(trials: Labelled, seed: int) -> tuple[str, Folds]:
     return protocol, folds
 
 
-def _nested(answers: Mapping[tuple[str, str], _Answers], folds: Folds) -> tuple[list[bool], dict[str, int]]:
-    """Return which trials the procedure recognises, and how often it chose each candidate."""
-    right = np.zeros(len(folds), dtype=np.bool_)
-    chosen: Counter[str] = Counter()
-    for fold in range(int(folds.max()) + 1) if answers else ():
-        name, best = max(answers.items(), key=lambda item: int(item[1].inner[fold].sum()))
-        right[folds == fold] = best.outer[folds == fold]
-        chosen[" with ".join(name)] += 1
-    return right.tolist(), dict(chosen.most_common())
+def _nested(answers: Mapping[tuple[str, str], _Answers], folds: Folds) -> tuple[Pooled, dict[str, int]]:
+    """Return the answers of the procedure, and how often it chose each candidate.
+
+    Support counts only where every answer is by the same candidate: of others, it is the support of something else.
+    """
+    chosen = [
+        max(answers, key=lambda key: int(answers[key].inner[fold].sum()))
+        for fold in range(int(folds.max()) + 1)
+    ]
+    outer = [answers[key].outer for key in chosen]
+    rows = np.arange(len(folds))
+    alike = len(set(chosen)) == 1
+    nested = Pooled(
+        predicted=tuple(outer[fold].predicted[i] for i, fold in enumerate(folds.tolist())),
+        classes=outer[0].classes,
+        probabilities=np.array([pooled.probabilities for pooled in outer])[folds, rows],
+        scores=np.array([pooled.scores for pooled in outer])[folds, rows],
+        support=outer[0].support if alike else np.full(len(folds), np.nan),
+        unlike=np.array([pooled.unlike for pooled in outer])[folds, rows],
+        trained_on=outer[0].trained_on,
+    )
+    return nested, dict(Counter(" with ".join(key) for key in chosen).most_common())
 
 
 def _answers(learner: ClassifierFactory, trials: Labelled, folds: Folds, seed: int) -> _Answers:
     """Return the answers of a candidate. Raises what its classifier raises."""
-    refuse_without_features(trials.table)
     count = int(folds.max()) + 1
     inner = np.zeros((count, len(folds)), dtype=np.bool_)
-    outer = np.zeros(len(folds), dtype=np.bool_)
     began = time.perf_counter()
-    for fold in range(count):
-        test = np.flatnonzero(folds == fold)
-        outer[test] = _right(learner, trials.table, trials.labels, np.flatnonzero(folds != fold), test, seed)
+    every = [np.arange(len(folds))]
+    outer = cross_validate(learner, trials.table, trials.labels, every, [folds], seed=seed)
     training_s = (time.perf_counter() - began) / count
     for fold, other in combinations(range(count), 2):
         away = (folds == fold) | (folds == other)

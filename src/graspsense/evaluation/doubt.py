@@ -124,7 +124,7 @@ def calibrated(model: Model, learner: ClassifierFactory, labelled: Labelled, see
         pooled = cross_validate(learner, labelled.table, labels, [np.arange(len(labels))], [folds], seed=seed)
     except (FitRefused, ConfigError) as refusal:
         return evolve(model, sets=_no_sets(instances, str(refusal)))
-    return _with_calibration(model, pooled, labels, instances)
+    return calibrated_with(model, pooled, labelled)
 
 
 def calibrated_by(model: Model, labelled: Labelled) -> Model:
@@ -146,7 +146,12 @@ def calibrated_by(model: Model, labelled: Labelled) -> Model:
         unlike=np.array([answer == UNKNOWN for answer in answers]),
         trained_on=float(model.provenance.get("trials", 0)),
     )
-    return _with_calibration(model, pooled, known.labels, exchangeable_instances(known))
+    return calibrated_with(model, pooled, known)
+
+
+def calibrated_with(model: Model, answers: Pooled, labelled: Labelled) -> Model:
+    """Return a model with certainty and prediction sets from answers for its trials, made without their instances."""
+    return _with_calibration(model, answers, labelled.labels, exchangeable_instances(labelled))
 
 
 def _with_calibration(

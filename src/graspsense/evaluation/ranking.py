@@ -198,9 +198,7 @@ def ranking_of(
     """
     judged = [key for key in measured if key[1] != BEFORE_CONTACT]
     if not judged:
-        raise ConfigError(
-            "no classifier could be trained on these trials" + "".join(f"\n{note}" for note in notes)
-        )
+        raise no_candidate(notes)
     right_of = np.array([measured[key].right[headline] for key in judged])
     if chosen is None and len(judged) > 1:
         chosen = rate_of_chosen(right_of, trials.instances, trials.no_interval)
@@ -212,6 +210,13 @@ def ranking_of(
         notes=tuple(notes),
         chosen=chosen,
         guessing=trials.labels.count(commonest(trials.labels)) / len(trials),
+    )
+
+
+def no_candidate(notes: Sequence[str]) -> ConfigError:
+    """Return the error that no classifier could be trained, with the reasons in `notes`."""
+    return ConfigError(
+        "no classifier could be trained on these trials" + "".join(f"\n{note}" for note in notes)
     )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from attrs import frozen
 
 from graspsense.core.components.caller import option
-from graspsense.core.learn.conformal import COVERAGE, calibrated_threshold, units_needed
+from graspsense.core.learn.conformal import COVERAGE
 from graspsense.core.values.errors import ConfigError, counted
 from graspsense.evaluation.controls import PERMUTATIONS
 from graspsense.evaluation.evaluator import Progress
@@ -21,6 +21,7 @@ from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.evaluation.intervals import MIN_INSTANCES, rate_of
 from graspsense.regression.error import RegressionError, difference_of_errors, error_of
 from graspsense.regression.estimators import FittedRegression, check_estimator
+from graspsense.regression.intervals import intervals_of
 from graspsense.regression.results import IntervalCoverage, RegressionEvaluation, RegressionMeasurement
 
 if TYPE_CHECKING:
@@ -83,19 +84,6 @@ def evaluate_regression(
         warnings=tuple(evaluator.warnings()),
         notes=tuple(notes),
     )
-
-
-def interval_radius(errors: NDArray[np.float64], instances: Sequence[str] | None) -> tuple[float | None, str]:
-    """Return half the width of a prediction interval that held-out errors calibrate, or None with the reason.
-
-    The unit of exchangeability is the instance, as in the prediction sets of labels (`core.learn.conformal`).
-    """
-    unit = "trials" if instances is None else "instances"
-    units = np.array([str(i) for i in range(len(errors))] if instances is None else instances)
-    count, needed = len(np.unique(units)), units_needed(COVERAGE)
-    if count < needed:
-        return None, f"{count} calibration {unit}, {100 * COVERAGE:.0f} % needs {needed}"
-    return -calibrated_threshold(-np.abs(errors), units, COVERAGE), ""
 
 
 def held_out_predictions(
@@ -229,10 +217,12 @@ class _Evaluator:
         for fold in np.unique(self.headline.folds).tolist():
             test = self.headline.folds == fold
             others = np.flatnonzero(~test)
-            radius, reason = interval_radius(errors[others], self._instances_of(others.tolist()))
-            if radius is None:
-                return IntervalCoverage(asked=COVERAGE, unit=unit, reason=reason)
-            radii[test], inside[test] = radius, np.abs(errors[test]) <= radius
+            predicted = self.headline.predicted
+            calibrated = intervals_of(predicted[others], errors[others], self._instances_of(others.tolist()))
+            if calibrated.reason:
+                return IntervalCoverage(asked=COVERAGE, unit=unit, reason=calibrated.reason)
+            radii[test] = calibrated.half_width(predicted[test])
+            inside[test] = np.abs(errors[test]) <= radii[test]
         return IntervalCoverage(
             asked=COVERAGE,
             unit=unit,

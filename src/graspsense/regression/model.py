@@ -17,7 +17,7 @@ import numpy as np
 from attrs import frozen
 
 from graspsense import __version__
-from graspsense.core.learn.conformal import COVERAGE
+from graspsense.core.learn.model import differences_from
 from graspsense.core.learn.model_content import (
     REGRESSION_FORMAT,
     digest,
@@ -33,31 +33,33 @@ from graspsense.core.values.errors import ConfigError, DataDamaged, counted
 from graspsense.core.values.features import FeatureTable, misfit
 from graspsense.core.values.json_values import json_ready
 from graspsense.regression.estimators import ESTIMATORS, FittedRegression
-from graspsense.regression.evaluate import held_out_folds, held_out_predictions, interval_radius
+from graspsense.regression.evaluate import held_out_folds, held_out_predictions
+from graspsense.regression.intervals import PredictionIntervals, intervals_from, intervals_of
 
 if TYPE_CHECKING:
     from graspsense.core.learn.labelled import Labelled
 
-VERSION: Final = 1
+VERSION: Final = 2
 FOLDS: Final = 10
 
 
 @frozen(kw_only=True)
 class PredictedValue:
-    """A predicted number with its interval, of which both ends are None if there was too little to calibrate it.
+    """A predicted number with its interval, of which both ends are None where nothing was measured that holds for it.
 
-    `unlike` says why the trial is unlike all training trials; empty if it is like them.
+    `no_interval` then says why. `unlike` says why the trial is unlike all training trials; empty if it is like them.
     """
 
     value: float
     low: float | None
     high: float | None
+    no_interval: str = ""
     unlike: str = ""
 
 
 @frozen(kw_only=True, eq=False)
 class RegressionModel:
-    """A fitted estimator with its training trials. `half_width` is that of a 90 % prediction interval, or None."""
+    """A fitted estimator with its training trials, and the prediction intervals that held-out trials calibrate."""
 
     name: str
     estimator: str
@@ -66,8 +68,7 @@ class RegressionModel:
     target: TargetValue
     seed: int
     novelty: Novelty
-    half_width: float | None
-    no_interval: str
+    intervals: PredictionIntervals
     made_with: str
     provenance: Mapping[str, Any]
 
@@ -87,21 +88,40 @@ class RegressionModel:
             return ()
         return (f"this model was made with {self.made_with} and made again with {_sklearn()}: it may differ",)
 
-    def predict(self, table: FeatureTable) -> list[PredictedValue]:
-        """Return the prediction of each trial. Raises ConfigError if a feature is missing, or has another unit."""
+    def differences(self, provenance: Mapping[str, Any] | None) -> tuple[str, ...]:
+        """Return, in words, how trials with this provenance differ from those of the training."""
+        return tuple(differences_from(self.provenance, provenance=provenance))
+
+    def predict(
+        self, table: FeatureTable, provenance: Mapping[str, Any] | None = None
+    ) -> list[PredictedValue]:
+        """Return the prediction of each trial. Raises ConfigError if a feature is missing, or has another unit.
+
+        Trials under other settings than those of the training have no interval; `provenance` says how they were made.
+        """
         if why := misfit(f"model {self.name!r}", self.table.names, self.table.units, table):
             raise ConfigError(why)
         chosen = table.columns(self.table.names)
-        half = self.half_width
-        return [
-            PredictedValue(
-                value=value,
-                low=None if half is None else value - half,
-                high=None if half is None else value + half,
-                unlike=str(getattr(self.novelty.unlike(chosen.row(i)), "words", "")),
+        values = self.fitted.predict(chosen.values)
+        halves = self.intervals.half_width(values)
+        lacking = self.novelty.lacking(chosen)
+        elsewhere = "it was not measured under these settings" if self.differences(provenance) else ""
+        made = []
+        for i, (value, half) in enumerate(zip(values.tolist(), halves.tolist(), strict=True)):
+            unlike = str(getattr(self.novelty.unlike(chosen.row(i)), "words", ""))
+            why = self.intervals.reason or unlike or elsewhere
+            if not why and lacking[i]:
+                why = f"it was measured with trials that have {lacking[i]}"
+            made.append(
+                PredictedValue(
+                    value=value,
+                    low=None if why else value - half,
+                    high=None if why else value + half,
+                    no_interval=why,
+                    unlike=unlike,
+                )
             )
-            for i, value in enumerate(self.fitted.predict(chosen.values).tolist())
-        ]
+        return made
 
     def as_json(self) -> dict[str, Any]:
         """Return the content of the file of the model."""
@@ -112,11 +132,7 @@ class RegressionModel:
             "target_value": [self.target.name, self.target.unit],
             "features": [list(column) for column in zip(self.table.names, self.table.units, strict=True)],
             "provenance": json_ready(self.provenance),
-            "interval": {
-                "coverage": COVERAGE,
-                "half_width": self.half_width,
-                "reason": self.no_interval,
-            },
+            "interval": self.intervals.to_json(),
             "made_with": self.made_with,
             "seed": self.seed,
             "values": list(self.target.values),
@@ -143,13 +159,12 @@ def train_regression(
     if target is None or len(set(target.values)) < 2:
         raise ConfigError(f"{labelled.source} has fewer than two different numbers to learn from")
     values = np.array(target.values)
-    half_width, reason = None, ""
     try:
         folds = held_out_folds(labelled, min(FOLDS, len(values)), seed)
         predicted = held_out_predictions(estimator, labelled.table.values, values, folds, seed)
-        half_width, reason = interval_radius(predicted - values, labelled.instances)
+        intervals = intervals_of(predicted, predicted - values, labelled.instances)
     except ConfigError as error:
-        reason = str(error)
+        intervals = PredictionIntervals(reason=str(error))
     return RegressionModel(
         name=name,
         estimator=estimator,
@@ -158,8 +173,7 @@ def train_regression(
         target=target,
         seed=seed,
         novelty=_novelty(labelled.table),
-        half_width=half_width,
-        no_interval=reason,
+        intervals=intervals,
         made_with=_sklearn(),
         provenance={
             "source": labelled.source,
@@ -211,8 +225,6 @@ def _restored(name: str, stored: StoredValues) -> RegressionModel:
     target = stored.texts("target_value")
     if len(target) != 2:
         raise stored.refusal("target_value", "expected a name and a unit")
-    interval = stored.table("interval")
-    no_width = interval.value("half_width") is None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # The training told of them.
         fitted = FittedRegression(estimator, trials, values, seed)
@@ -224,8 +236,7 @@ def _restored(name: str, stored: StoredValues) -> RegressionModel:
         target=TargetValue(name=target[0], unit=target[1], values=tuple(values.tolist())),
         seed=seed,
         novelty=_novelty(table),
-        half_width=None if no_width else interval.number("half_width", least=0.0),
-        no_interval=interval.text("reason"),
+        intervals=intervals_from(stored.table("interval")),
         made_with=stored.text("made_with"),
         provenance=stored.table("provenance").as_dict(),
     )

@@ -14,7 +14,14 @@ State = Literal["passed", "failed", "skipped", "expected failure"]
 
 
 class CheckFailed(AssertionError):
-    """A defect of a component: what was found, what is allowed, what to do."""
+    """A defect of a component: what was found, what is allowed, what to do.
+
+    Several checks can fail for one `cause`, such as an exception from one line.
+    """
+
+    def __init__(self, text: str, cause: str = "") -> None:
+        super().__init__(text)
+        self.cause = cause or text
 
 
 class CheckSkipped(Exception):
@@ -52,6 +59,8 @@ class Result:
     title: str
     state: State
     text: str = ""
+    cause: str = ""
+    """Equal for failures of a component that have one cause."""
 
 
 MINIMUM_CHECKS: Final[Mapping[str, int]] = {
@@ -90,7 +99,8 @@ def raises_nothing(what: str, advice: str) -> Iterator[None]:
     except CheckFailed:
         raise
     except Exception as error:
-        raise CheckFailed(f"{what} raised {named(error)}{place_of(error)}{advice}") from error
+        cause = f"{what} raised {named(error)}{place_of(error)}"
+        raise CheckFailed(f"{cause}{advice}", cause) from error
 
 
 def outcome_of(check: Check, subject: Named, expected: Mapping[str, str]) -> Result:
@@ -99,13 +109,13 @@ def outcome_of(check: Check, subject: Named, expected: Mapping[str, str]) -> Res
     Any exception of the component is a failure. A check that was expected to fail and passes is a failure too.
     """
     state: State = "passed"
-    text = ""
+    text = cause = ""
     try:
         check.test(subject)
     except CheckSkipped as skipped:
         state, text = "skipped", str(skipped)
     except CheckFailed as failed:
-        state, text = "failed", str(failed)
+        state, text, cause = "failed", str(failed), failed.cause
     except GraspsenseError as error:  # its message says what to do
         state, text = "failed", str(error)
     except FAILURES as error:
@@ -117,7 +127,7 @@ def outcome_of(check: Check, subject: Named, expected: Mapping[str, str]) -> Res
         elif state == "passed":
             state = "failed"
             text = f"it was expected to fail ({expected[check.id]}) and passes: take it out of the expected failures"
-    return Result(subject.name, subject.role, check.id, check.title, state, text)
+    return Result(subject.name, subject.role, check.id, check.title, state, text, cause or text)
 
 
 @define
@@ -128,11 +138,14 @@ class ConformanceReport:
 
     @property
     def failures(self) -> list[str]:
-        """Return the reasons why the components do not conform."""
+        """Return the reasons why the components do not conform, each cause once with the checks that it fails."""
+        causes: dict[tuple[str, str], list[Result]] = {}
+        for result in self.results:
+            if result.state == "failed":
+                causes.setdefault((result.subject, result.cause), []).append(result)
         failures = [
-            f"{result.subject}: {result.check}: {result.text}"
-            for result in self.results
-            if result.state == "failed"
+            f"{subject}: {', '.join(result.check for result in failed)}: {failed[0].text}"
+            for (subject, _), failed in causes.items()
         ]
         for subject, role in dict.fromkeys((result.subject, result.role) for result in self.results):
             text = self.too_few_ran(subject, role)

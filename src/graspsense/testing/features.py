@@ -14,6 +14,7 @@ from graspsense.core.components.roles import FeatureSet
 from graspsense.core.values.features import Features
 from graspsense.core.values.signals import Phase
 from graspsense.core.values.trace import Trace
+from graspsense.core.values.units import is_si
 from graspsense.testing import component
 from graspsense.testing.checks import checks_of, demand, raises_nothing
 from graspsense.testing.samples import (
@@ -80,6 +81,16 @@ def returns_the_declared_features(subject: Subject) -> None:
             given == declared,
             f"on {which} it gives {_listed(given)}; `features` declares {_listed(declared)}: make `features` "
             "and what extract returns the same",
+        )
+
+
+def units_are_of_the_si(subject: Subject) -> None:
+    """Declared units are of the SI, without a prefix."""
+    for feature in subject.entry.features:
+        demand(
+            is_si(feature.unit),
+            f"feature {feature.name!r} has the unit {feature.unit!r}, which is none of the SI without a prefix: write "
+            "it as in N, m/s2 or N s/m, counts for a sensor without a unit, and 1 for a ratio",
         )
 
 
@@ -240,6 +251,7 @@ CHECKS: Final = (
     *component.CHECKS,
     *checks_of(
         returns_the_declared_features,
+        units_are_of_the_si,
         values_are_floats,
         a_whole_grasp_has_features,
         handles_every_trace,

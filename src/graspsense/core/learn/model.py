@@ -264,33 +264,7 @@ class Model:
 
         The arguments are those of `predict`.
         """
-        real = device is not None and device.clock == "device" and not device.simulated
-        if self.simulated and real:
-            yield (
-                "trained on simulated grasps, but this gripper is real: expect wrong answers until a model is "
-                "trained on grasps of its own"
-            )
-        elif self.simulated and provenance is not None and provenance.get("simulated") is False:
-            yield "trained on simulated grasps, but these trials are real: expect wrong answers"
-        recipes = int((provenance or {}).get("recipes", 1))
-        if recipes > 1 and self.provenance.get("recipes", 1) == 1:
-            yield f"these trials were recorded with {recipes} different settings of gripper, controller or features"
-        trained = dict(self.provenance.get("settings", {}))
-        kind = "simulated grasps" if self.simulated else "grasps"
-        for table, now, ignored in _compared(settings, provenance):
-            then = trained.get(table)
-            if then is None:
-                continue
-            if then.get("type") != now.get("type"):
-                yield f"trained on {kind} with {table} {then.get('type')}, this one was with {now.get('type')}"
-                continue
-            for key in sorted((then.keys() & now.keys()) - ignored):
-                if json_ready(then[key]) != json_ready(now[key]):
-                    what, value = worded(key, then[key])
-                    yield (
-                        f"trained on {kind} with {what} {value}, this one was with {worded(key, now[key])[1]} "
-                        f"({table}.{key})"
-                    )
+        return differences_from(self.provenance, settings, device, provenance)
 
     def _kind_warnings(self, differences: Sequence[str]) -> Iterator[str]:
         """Yield what holds for all predictions of this model, unless a difference says more."""
@@ -311,6 +285,46 @@ class Model:
             difference.startswith("trained on simulated grasps, but") for difference in differences
         ):
             yield "trained on simulated grasps: valid for the simulator, untested on real objects"
+
+
+def differences_from(
+    trained_with: Mapping[str, Any],
+    settings: Settings | None = None,
+    device: DeviceInfo | None = None,
+    provenance: Mapping[str, Any] | None = None,
+) -> Iterator[str]:
+    """Yield, in words, how trials differ from those of the training, whose provenance is `trained_with`.
+
+    The other arguments are those of `Model.predict`.
+    """
+    simulated = bool(trained_with.get("simulated", False))
+    real = device is not None and device.clock == "device" and not device.simulated
+    if simulated and real:
+        yield (
+            "trained on simulated grasps, but this gripper is real: expect wrong answers until a model is "
+            "trained on grasps of its own"
+        )
+    elif simulated and provenance is not None and provenance.get("simulated") is False:
+        yield "trained on simulated grasps, but these trials are real: expect wrong answers"
+    recipes = int((provenance or {}).get("recipes", 1))
+    if recipes > 1 and trained_with.get("recipes", 1) == 1:
+        yield f"these trials were recorded with {recipes} different settings of gripper, controller or features"
+    trained = dict(trained_with.get("settings", {}))
+    kind = "simulated grasps" if simulated else "grasps"
+    for table, now, ignored in _compared(settings, provenance):
+        then = trained.get(table)
+        if then is None:
+            continue
+        if then.get("type") != now.get("type"):
+            yield f"trained on {kind} with {table} {then.get('type')}, this one was with {now.get('type')}"
+            continue
+        for key in sorted((then.keys() & now.keys()) - ignored):
+            if json_ready(then[key]) != json_ready(now[key]):
+                what, value = worded(key, then[key])
+                yield (
+                    f"trained on {kind} with {what} {value}, this one was with {worded(key, now[key])[1]} "
+                    f"({table}.{key})"
+                )
 
 
 def checkpoint_model(whole: Model, after_s: float, part: Model) -> Model:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from typing import Final
 
@@ -22,6 +23,23 @@ _AREAS_AND_VOLUMES: Final = {
     **{unit: (f"m{unit}", 1e6) for unit in ("m2", "m^2", "m²")},
     **{unit: (f"c{unit}", 1e6) for unit in ("m3", "m^3", "m³")},
 }
+
+
+_SI: Final = frozenset((
+    "1", "s", "m", "kg", "A", "K", "mol", "cd", "rad", "sr", "Hz", "N", "Pa", "J", "W", "C", "V", "F", "Ω", "ohm",
+    "S", "Wb", "T", "H", "lm", "lx", "counts", "cells", "rows", "dB",
+))  # fmt: skip
+"""The factors of a unit: those of the SI without a prefix, and what sensors give that have no unit."""
+
+
+def is_si(unit: str) -> bool:
+    """Return whether a unit is a product or a quotient of those of the SI without a prefix, or counts.
+
+    >>> is_si("N s/m"), is_si("kg m2"), is_si("1"), is_si("newton"), is_si("mm"), is_si("")
+    (True, True, True, False, False, False)
+    """
+    factors = re.split(r"[ /*\u00b7]", unit)
+    return all(re.sub(r"(?<=\D)\^?-?[\d\u00b2\u00b3]$", "", factor) in _SI for factor in factors)
 
 
 def in_column(value: float) -> str:

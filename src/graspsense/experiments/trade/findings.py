@@ -106,19 +106,22 @@ def _answer(reports: dict[str, Report]) -> str:
 
 def _headline(advice: Sequence[Advice]) -> str:
     """Return the recommendations as a person would say them."""
-    parts = [
-        f"to recognise {piece.recognises}, "
-        + (
-            "it cannot be told which case to take"
-            if piece.recommended is None
-            else f"no difference is shown; take the cheapest, {piece.recommended.name}"
-            if piece.best_is_cheapest or (piece.loss is not None and not piece.shown)
-            else f"{piece.recommended.name} {'is best' if piece.recommended is piece.best else 'is enough'}"
-        )
-        for piece in advice
-    ]
-    text = "; ".join(parts)
+    text = "; ".join(f"to recognise {piece.recognises}, {_in_short(piece)}" for piece in advice)
     return text[:1].upper() + text[1:]
+
+
+def _in_short(piece: Advice) -> str:
+    """Return the recommendation; what the seeds do not show is not said."""
+    if piece.recommended is None:
+        return "it cannot be told which case to take"
+    name = piece.recommended.name
+    if piece.best_is_cheapest:
+        return f"no difference is shown; take the cheapest, {name}"
+    if piece.recommended is piece.best:
+        return f"{name} {'is best' if piece.shown else 'has the highest rate'}"
+    if piece.loss is None or piece.shown:
+        return f"{name} is enough"
+    return f"no difference is shown; the cheapest, {name}, loses at most {100 * piece.loss.interval[1]:.1f} points"
 
 
 def _advice_table(advice: Sequence[Advice]) -> FoundTable:

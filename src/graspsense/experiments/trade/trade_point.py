@@ -98,7 +98,8 @@ class Advice:
         chosen = f"{self.recommended.name} at {self.recommended.cost:.3g} {self.axis}"
         if not self.shown:
             return (
-                f"{aim}, no difference to the best is shown; take the cheapest, {chosen}. It has "
+                f"{aim}, no difference to the best is shown: the cheapest such case, {chosen}, loses at most "
+                f"{100 * high:.1f} points. It has "
                 f"{self.recommended.rate_text}, and the best, {best}, {self.best.rate_text}. The loss is "
                 f"{100 * value:.1f} points ({100 * low:.1f} to {100 * high:.1f}){caution}."
             )
@@ -115,6 +116,8 @@ class Advice:
         if self.recommended is None:
             return (self.title, self.recognises, "cannot be told", "", "", best, "")
         loss = "0" if self.loss is None else f"{100 * self.loss.value:.1f}"
+        if self.loss is not None and not self.shown:
+            loss += f" (at most {100 * self.loss.interval[1]:.1f})"
         return (
             self.title,
             self.recognises,

@@ -39,6 +39,10 @@ _LONGEST_STEP_S: Final = 0.25
 _EVEN, _MOSTLY = 0.2, 0.9
 """Deviation of a step from the median, as a share of it, and the share of the steps that are within, for a time."""
 EFFORT_WORDS: Final = frozenset(("effort", "eff", "torque", "current"))
+FINGER_WORDS: Final = frozenset(("finger", "fingertip", "tip", "pad", "jaw"))
+"""A column that is named after a finger alone is its force or its position; its numbers tell which."""
+_FREE: Final = 0.1
+"""Largest share of its peak that a force has in the first quarter of a recording, before the fingers touch."""
 _SIDES: Final = (("left", "right"), ("l", "r"))
 _FEWEST_CELLS: Final = 4
 """Numbered columns from which they are the cells of a sensor."""
@@ -119,7 +123,24 @@ def force_columns(table: ColumnTable, time: str | None) -> tuple[str, ...]:
         if FORCE_WORDS & set(words_of(name)) and not (GAP_WORDS | {"torque"}) & set(words_of(name))
     ]
     strong = [name for name in named if len(set(words_of(name)) & (FORCE_WORDS - {"f", "n", "g"}))]
-    return tuple(stated or strong or named)
+    return tuple(stated or strong or named or _forces_of_fingers(table, columns))
+
+
+def _forces_of_fingers(table: ColumnTable, columns: Sequence[str]) -> list[str]:
+    """Return the columns of both fingers if these are named by nothing else, and none moves before it is pressed."""
+    fingers = [
+        name
+        for name in columns
+        if FINGER_WORDS & set(words_of(name)) and not known_unit(table.units.get(name, ""), "gap")
+    ]
+    sided = any(_sided(fingers, pair) for pair in _SIDES)
+    return fingers if sided and all(map(_rises_late, (table.numbers[name] for name in fingers))) else []
+
+
+def _rises_late(values: Numbers) -> bool:
+    """Return whether numbers are nearly zero in the first quarter and not later, as a force is."""
+    known = np.abs(values[np.isfinite(values)])
+    return len(known) >= 4 and float(known[: len(known) // 4].max()) < _FREE * float(known.max())
 
 
 def numbered_groups(names: Sequence[str]) -> dict[str, list[str]]:

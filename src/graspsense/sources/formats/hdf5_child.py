@@ -74,15 +74,37 @@ def arrays(path: str, name: str, dataset: Any, left: int) -> Iterator[tuple[str,
 def unpacked(values: Any, attributes: Any) -> Any:
     """Return the numbers that the stored ones stand for, by the attributes of netCDF; NaN where one is missing.
 
-    A number is `add_offset` + `scale_factor` * the stored one, unless that is `_FillValue` or a `missing_value`.
+    A number is `add_offset` + `scale_factor` * the stored one, unless that is `_FillValue` or a `missing_value`, or
+    outside of `valid_range`, or of `valid_min` and `valid_max`. Whole numbers are without a sign if `_Unsigned` is
+    "true". The attributes are of the type that is stored.
     """
-    missing = [attributes[key] for key in ("_FillValue", "missing_value") if key in attributes]
-    absent = np.isin(values, np.concatenate([np.ravel(value) for value in missing])) if missing else None
+    stored = values.dtype
+    sign = attributes.get("_Unsigned", b"")
+    if stored.kind == "i" and (sign.decode() if isinstance(sign, bytes) else str(sign)).lower() == "true":
+        values = values.view(f"u{stored.itemsize}")
+
+    def given(key: str) -> Any:
+        known = np.ravel(attributes[key])
+        # A bound or a filling of an unsigned number is written with the sign of the stored type.
+        return (
+            known.astype(stored).view(values.dtype) if known.dtype.kind == "i" != values.dtype.kind else known
+        )
+
+    absent = np.zeros(values.shape, dtype=np.bool_)
+    for key in ("_FillValue", "missing_value"):
+        if key in attributes:
+            absent |= np.isin(values, given(key))
+    for key, outside in (("valid_min", np.less), ("valid_max", np.greater)):
+        if key in attributes:
+            absent |= outside(values, given(key)[0])
+    if "valid_range" in attributes:
+        low, high = given("valid_range")[:2]
+        absent |= (values < low) | (values > high)
     scale, offset = attributes.get("scale_factor"), attributes.get("add_offset")
     if scale is not None or offset is not None:
         values = values * np.float64(1.0 if scale is None else np.ravel(scale)[0])
         values = values + np.float64(0.0 if offset is None else np.ravel(offset)[0])
-    return values if absent is None or not absent.any() else np.where(absent, np.nan, values)
+    return np.where(absent, np.nan, values) if absent.any() else values
 
 
 def main(path: str, out: str, most: int) -> None:
