@@ -13,7 +13,7 @@ import click
 import pytest
 from cases import every_case
 from commands import graspsense
-from parts import implementing
+from parts import implementing, offering
 from repository import ROOT
 
 from graspsense import __version__
@@ -22,6 +22,7 @@ from graspsense.core.components.entries import CommandEntry, FoundDevice
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.components.registry import plugins as loader
 from graspsense.core.values.errors import DeviceLost, NoDevice
+from graspsense.plugin_api import ClassifierEntry, SensorBackendEntry
 
 REPLAY = ["--gripper", "replay", "-o", "gripper.recording=icub:some/file.txt", "-o", "classifier.type=none"]
 """What is here without any other distribution; the default pipeline's classifier is not."""
@@ -80,10 +81,7 @@ def test_version_is_that_of_the_distribution(run):
             ["plugin"],
             f"graspsense: no command named 'plugin'. Known: {', '.join(sorted(COMMANDS))}. Did you mean 'plugins'?\n",
         ),
-        (
-            ["--jsn"],
-            "graspsense: No such option '--jsn'.\n  graspsense --help shows what there is\n",
-        ),
+        (["--jsn"], "graspsense: No such option '--jsn'.\n  graspsense --help shows what there is\n"),
         (
             ["config", "shwo"],
             "graspsense: No such command 'shwo'. Did you mean 'show'?\n"
@@ -286,54 +284,37 @@ def test_a_broken_and_an_observing_plugin_are_listed_and_shown(run, site, monkey
     assert status["state"] == "broken"
 
 
-class TestPluginsShow:
-    def test_a_component_with_its_keys(self, run):
-        ran = run("plugins", "show", "hybrid")
+def test_a_component_is_shown_with_its_keys(run):
+    ran = run("plugins", "show", "hybrid")
 
-        assert "controller graspsense/hybrid" in ran.stdout
-        assert "requires     gap in m, velocity in m/s, force_left in N, force_right in N\n" in ran.stdout
-        assert "    loop: 'open' | 'closed'; default \"open\"\n" in ran.stdout
-        assert (
-            "    closing_speed_m_s: float; m/s; above 0; plausible 0.0001 to 0.2 m/s; default 0.01\n"
-            "        Closing speed of the gap.\n"
-        ) in ran.stdout
-        assert "recording: str; must be given" in run("plugins", "show", "graspsense/replay").stdout
-        assert "p_first in m: gap at the first contact" in run("plugins", "show", "chitta").stdout
+    assert "controller graspsense/hybrid" in ran.stdout
+    assert "requires     gap in m, velocity in m/s, force_left in N, force_right in N\n" in ran.stdout
+    assert "    loop: 'open' | 'closed'; default \"open\"\n" in ran.stdout
+    assert (
+        "    closing_speed_m_s: float; m/s; above 0; plausible 0.0001 to 0.2 m/s; default 0.01\n"
+        "        Closing speed of the gap.\n"
+    ) in ran.stdout
+    assert "recording: str; must be given" in run("plugins", "show", "graspsense/replay").stdout
+    assert "p_first in m: gap at the first contact" in run("plugins", "show", "chitta").stdout
 
-    def test_json(self, run):
-        (component,) = run("plugins", "show", "hybrid", "--json").json["components"]
+    (component,) = run("plugins", "show", "hybrid", "--json").json["components"]
+    assert component["qualified"] == "graspsense/hybrid"
+    ramp = component["keys"]["ramp_s"]
+    assert ramp.pop("meaning").startswith("Time over which the effort changes")
+    assert (ramp["type"], ramp["required"], ramp["default"], ramp["unit"]) == ("float", False, 0.0, "s")
+    assert (ramp["allowed"], ramp["plausible"]) == ("at least 0", "0 to 10 s")
+    assert component["entry"]["commands"] == ["effort"]
 
-        assert component["qualified"] == "graspsense/hybrid"
-        ramp = component["keys"]["ramp_s"]
-        assert ramp.pop("meaning").startswith("Time over which the effort changes")
-        assert ramp == {
-            "type": "float",
-            "required": False,
-            "default": 0.0,
-            "unit": "s",
-            "allowed": "at least 0",
-            "plausible": "0 to 10 s",
-        }
-        assert component["entry"]["commands"] == ["effort"]
 
-    def test_a_component_whose_config_cannot_be_imported_is_shown_with_the_reason(
-        self, run, site, monkeypatch
-    ):
-        plugin = """
-            from graspsense.plugin_api import ClassifierEntry, hookimpl
-            GRASPSENSE_API = (2, 0)
-            @hookimpl
-            def graspsense_classifiers():
-                yield ClassifierEntry("odd", "no_lab:A", "odd", "pip install lab")
-            """
-        site.install("lab-odd", plugin)
-        monkeypatch.setattr(loader, "_current", site.discover())
+def test_a_component_whose_config_cannot_be_imported_is_shown_with_the_reason(run):
+    odd = ClassifierEntry("odd", "no_lab:A", "odd", "pip install lab")
+    loader.installed().add(implementing("graspsense_classifiers", lambda self: [odd]), "lab-odd")
 
-        ran = run("plugins", "show", "odd")
+    ran = run("plugins", "show", "odd")
 
-        assert ran.returncode == 0
-        assert "not usable here: classifier 'odd' of lab-odd 0.2" in ran.stdout
-        assert "needs: pip install lab" in ran.stdout
+    assert ran.returncode == 0
+    assert "not usable here: classifier 'odd' of lab-odd 0.1" in ran.stdout
+    assert "needs: pip install lab" in ran.stdout
 
 
 class TestConfig:
@@ -367,21 +348,9 @@ class TestConfig:
         )
         assert run("config", "validate", *REPLAY, "--json").json["valid"] is True
 
-    def test_validate_checks_the_wiring(self, run, site, monkeypatch):
-        plugin = """
-            from attrs import frozen
-            from graspsense.plugin_api import SensorBackendEntry, hookimpl
-            GRASPSENSE_API = (2, 0)
-            @frozen
-            class Config: pass
-            @hookimpl
-            def graspsense_sensor_backends():
-                yield SensorBackendEntry(
-                    "deaf", "x:Y", "", config="lab_deaf_plugin:Config", channels=(), accepts=("effort",)
-                )
-            """
-        site.install("lab-deaf", plugin)
-        monkeypatch.setattr(loader, "_current", site.discover())
+    def test_validate_checks_the_wiring(self, run, monkeypatch):
+        deaf = SensorBackendEntry("deaf", "x:Y", "", config="parts:NoKeys", channels=(), accepts=("effort",))
+        loader.installed().add(offering(deaf), "lab-deaf")
 
         ran = run("config", "validate", "--gripper", "deaf", "-o", "classifier.type=none", "--json")
 

@@ -31,10 +31,7 @@ def rows():
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["c45", "knn", "tree", "svm"])
 def test_all_at_once_is_one_by_one(rows, name):
-    labels = tuple(np.repeat(["a:x", "b:y", "c:z"], 80).tolist())
-    labelled = Labelled(source="made up", table=table(rows), labels=labels)
-    component = installed().find("classifier", name)
-    model = train(component, create("classifier", name).config, labelled, name="m")
+    model = trained(rows, name, tuple(np.repeat(["a:x", "b:y", "c:z"], 80).tolist()))
     far = np.array([[50.0, 0.0, 0.0], [np.nan, np.nan, np.nan], [0.0, np.nan, -70.0]])
     asked = table(np.concatenate((rows, rows + 2.0, far)))
     predicted, shares = model.answers(asked)
@@ -46,13 +43,15 @@ def test_all_at_once_is_one_by_one(rows, name):
     np.testing.assert_allclose(shares, expected, atol=1e-12)
 
 
+def trained(rows, name, labels):
+    labelled = Labelled(source="made up", table=table(rows), labels=labels)
+    component = installed().find("classifier", name)
+    return train(component, create("classifier", name).config, labelled, name="m")
+
+
 def test_a_table_without_a_feature_of_the_model_is_refused(rows):
-    labelled = Labelled(source="made up", table=table(rows), labels=("a", "b", "c") * 80)
-    model = train(
-        installed().find("classifier", "knn"), create("classifier", "knn").config, labelled, name="m"
-    )
     with pytest.raises(ConfigError, match="there is no f_steady"):
-        model.answers(labelled.table.columns(["p_first", "dp_dt"]))
+        trained(rows, "knn", ("a", "b", "c") * 80).answers(table(rows).columns(["p_first", "dp_dt"]))
 
 
 def test_predict_answers_many_without_reasons_and_says_so(rows, tmp_path):

@@ -10,7 +10,7 @@ from math import inf
 import pytest
 from attrs import evolve
 from cases import every_case
-from commands import graspsense
+from commands import graspsense, printed
 from grippers import Scripted, bottle, squeezing
 
 from graspsense import load_pipeline
@@ -55,11 +55,10 @@ def test_json_has_the_promised_keys_and_says_nothing_else_on_stdout():
 @pytest.mark.slow
 def test_nothing_there_is_an_outcome_with_reasons_and_exit_code_0():
     done = graspsense("run", "--json", "--object", "none")
-    result = json.loads(done.stdout)
     assert done.returncode == 0
-    assert result["outcome"] == "nothing there"
-    assert result["features"]["p_first"] is None
-    assert "no pad felt" in result["reasons"]["p_first"]
+    assert done.json["outcome"] == "nothing there"
+    assert done.json["features"]["p_first"] is None
+    assert "no pad felt" in done.json["reasons"]["p_first"]
 
 
 @every_case(
@@ -93,36 +92,31 @@ def test_a_mistake_says_what_was_found_and_what_to_do(arguments, code, says):
 @pytest.mark.slow
 def test_a_dry_run_opens_nothing_and_says_what_would_be_done():
     # The PR2 is not there, so anything opened would end with 3.
-    done = graspsense("run", "--gripper", "pr2", "--dry-run")
-    assert done.returncode == 0
-    assert "nothing was opened" in done.stdout
-    assert "controller.probing_force_n = 20.0" in done.stdout
+    told = printed("run", "--gripper", "pr2", "--dry-run")
+    assert "nothing was opened" in told
+    assert "controller.probing_force_n = 20.0" in told
 
 
 @pytest.mark.slow
 def test_a_trial_that_is_kept_runs_again_from_its_recording_and_from_its_settings(tmp_path):
-    store = tmp_path / "kept"
-    run = graspsense(
-        "run", "--json", "--seed", "5", "--object", "toy", "--save", str(store), "--label", "toy#1"
+    store, settings = tmp_path / "kept", tmp_path / "settings.toml"
+    kept = json.loads(
+        printed("run", "--json", "--seed", 5, "--object", "toy", "--save", store, "--label", "toy#1")
     )
-    assert run.returncode == 0, run.stderr
-    kept = json.loads(run.stdout)
     assert kept["kept"]["trial"] == 1
     assert kept["kept"]["recorder"]["dropped"] == 0
     assert kept["kept"]["recorder"]["ticks"] == kept["counts"]["ticks"]
-    again = graspsense("run", "--json", "--gripper", "replay", "-o", f"gripper.recording=store:{store}#1")
-    assert json.loads(again.stdout)["features"] == kept["features"]
-    settings = tmp_path / "settings.toml"
     with Store.read(store) as opened:
         settings.write_text(opened.trial(1).record.settings_text)
-    again = graspsense("run", "--json", "--pipeline", str(settings))
-    assert json.loads(again.stdout)["features"] == kept["features"]
-    graspsense("run", "--save", str(store))
+    for again in (
+        ("--gripper", "replay", "-o", f"gripper.recording=store:{store}#1"),
+        ("--pipeline", settings),
+    ):
+        assert json.loads(printed("run", "--json", *again))["features"] == kept["features"]
+    graspsense("run", "--save", store)
     with Store.read(store) as opened:
-        assert [(summary.id, summary.label, summary.instance) for summary in opened.page()] == [
-            (2, None, None),
-            (1, "toy", "toy#1"),
-        ]
+        stored = [(summary.id, summary.label, summary.instance) for summary in opened.page()]
+    assert stored == [(2, None, None), (1, "toy", "toy#1")]
 
 
 @pytest.mark.slow
@@ -256,18 +250,15 @@ def test_the_effort_of_a_dry_run_is_told_as_a_limit_where_velocities_are_command
 
 def test_a_note_says_how_many_ticks_the_guard_limited_and_why_on_a_real_gripper(capsys):
     trial = load_pipeline(options=["gripper.object=block", "classifier.type=none"]).grasp()
-
-    def note(limited, clock):
-        guarded = evolve(
-            trial, counts={"ticks": 1000, "guarded": limited}, device=evolve(trial.device, clock=clock)
-        )
-        print_trial(guarded)
-        return [line for line in capsys.readouterr().out.splitlines() if "guard" in line]
-
-    settings = "run.first_speed_m_s and run.first_effort_n limit this gripper"
-    assert note(0, "device") == []
-    assert note(50, "virtual") == ["note        the guard limited 50 of 1000 ticks"]
-    assert note(50, "device") == ["note        the guard limited 50 of 1000 ticks"]
-    assert note(500, "virtual") == ["note        the guard limited 500 of 1000 ticks"]
-    (line,) = note(500, "device")
-    assert line == f"note        the guard limited 500 of 1000 ticks: until a contact, {settings}"
+    limited = "note        the guard limited {} of 1000 ticks"
+    why = ": until a contact, run.first_speed_m_s and run.first_effort_n limit this gripper"
+    for guarded, clock, notes in (
+        (0, "device", []),
+        (50, "virtual", [limited.format(50)]),
+        (50, "device", [limited.format(50)]),
+        (500, "virtual", [limited.format(500)]),
+        (500, "device", [limited.format(500) + why]),
+    ):
+        counts = {"ticks": 1000, "guarded": guarded}
+        print_trial(evolve(trial, counts=counts, device=evolve(trial.device, clock=clock)))
+        assert [line for line in capsys.readouterr().out.splitlines() if "guard" in line] == notes

@@ -29,12 +29,17 @@ echo_table(
 """
 
 
+def assert_fits(shown, width, unbroken=None):
+    """Demand that a command ended well and that its lines fit, but those with the name of this file or folder."""
+    assert shown.code == 0
+    assert all(len(line) <= width for line in shown.lines if unbroken is None or str(unbroken) not in line)
+
+
 @every_case("width", [40, 140])
 def test_a_table_fits_the_terminal_and_keeps_every_word(width):
     shown = in_terminal([TABLE], width, program=[sys.executable, "-c"])
 
-    assert shown.code == 0
-    assert max(map(len, shown.lines)) <= width
+    assert_fits(shown, width)
     assert "graspsense-sim-gripper/sim" in shown.text
     assert shown.text.split().count("wrapped") == 2
     assert shown.coloured
@@ -51,14 +56,10 @@ def test_a_piped_table_keeps_whole_values_on_one_line_each():
     assert "\x1b" not in ran.stdout
 
 
-@pytest.mark.parametrize("environment", [{"NO_COLOR": "1"}, {"TERM": "dumb"}])
-def test_no_colour_where_it_is_not_wanted_or_not_understood(environment):
-    assert not in_terminal([TABLE], 80, program=[sys.executable, "-c"], **environment).coloured
-
-
-def test_columns_override_the_width_of_the_terminal():
+def test_no_colour_where_it_is_not_wanted_or_not_understood_and_columns_override_the_width():
+    for environment in ({"NO_COLOR": "1"}, {"TERM": "dumb"}):
+        assert not in_terminal([TABLE], 80, program=[sys.executable, "-c"], **environment).coloured
     shown = in_terminal([TABLE], 140, program=[sys.executable, "-c"], COLUMNS="60")
-
     assert 40 < max(map(len, shown.lines)) <= 60
 
 
@@ -68,8 +69,7 @@ def test_columns_override_the_width_of_the_terminal():
 def test_the_list_of_plugins_fits_the_terminal(width, lang):
     shown = in_terminal(["plugins", "list"], width, LANG=lang)
 
-    assert shown.code == 0
-    assert max(map(len, shown.lines)) <= width
+    assert_fits(shown, width)
     assert "hybrid" in shown.text
 
 
@@ -109,22 +109,14 @@ def test_json_is_the_same_in_a_terminal_and_in_a_pipe():
     assert not shown.coloured
 
 
-def outcome_colours(shown):
-    """Return the colour codes before each of these words in what the terminal received."""
-    return {
-        word: re.search(r"((?:\x1b\[[0-9;]*m)+)" + word, shown.raw) is not None
-        for word in ("steady", "odwalla:full_closed", "trained on simulated")
-    }
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("width", WIDTHS)
 def test_a_grasp_fits_the_terminal_with_outcome_prediction_and_warning_in_colour(width):
     shown = in_terminal(["run", "-o", "gripper.explain=true"], width)
 
-    assert shown.code == 0
-    assert max(map(len, shown.lines)) <= width
-    assert all(outcome_colours(shown).values())
+    assert_fits(shown, width)
+    for word in ("steady", "odwalla:full_closed", "trained on simulated"):
+        assert re.search(r"(\x1b\[[0-9;]*m)+" + word, shown.raw), word
     assert not re.search(r"[0-9] m(/s)?\b(?! )", shown.text), "lengths are in mm"
     assert "100%" not in shown.text
     assert re.search(r"about \d\d %: \d+ of \d+ training", " ".join(shown.text.split()))
@@ -145,13 +137,11 @@ def test_one_unit_for_lengths_and_results_on_stdout_when_piped():
 @pytest.fixture
 def csv(tmp_path):
     path = tmp_path / "grasps.csv"
+    widths, forces = {"can": 0.066, "jar": 0.055}, {"full": 9.0, "empty": 4.0}
     lines = ["what,thing,p_first [m],f_steady [N]"]
     for i in range(48):
         kind, state = ("can", "jar")[i % 2], ("full", "empty")[(i // 2) % 2]
-        width, force = (
-            (0.066 if kind == "can" else 0.055) + 1e-5 * i,
-            (9.0 if state == "full" else 4.0) + 0.01 * i,
-        )
+        width, force = widths[kind] + 1e-5 * i, forces[state] + 0.01 * i
         lines.append(f"{kind}:{state},{kind}{i % 6},{width:.5f},{force:.3f}")
     path.write_text("\n".join(lines) + "\n")
     return path
@@ -162,7 +152,6 @@ def csv(tmp_path):
 def test_evaluate_says_its_verdict_first_and_fits_the_terminal(csv, width):
     shown = in_terminal(["evaluate", str(csv), "--label", "what", "--instance", "thing"], width)
 
-    assert shown.code == 0
     said = " ".join(shown.text.split())
     assert re.match(
         r"c45 recognises the object and its state in 97.9 % of 48 trials of \S+grasps.csv \(95 %: ", said
@@ -172,7 +161,7 @@ def test_evaluate_says_its_verdict_first_and_fits_the_terminal(csv, width):
     assert "before contact was not measured" in said
     assert said.index("The width alone") < said.index("PROTOCOL") if width == 140 else True
     # The name of the file is one word, which is not broken.
-    assert all(len(line) <= width for line in shown.lines if str(csv) not in line)
+    assert_fits(shown, width, unbroken=csv)
 
 
 @pytest.mark.slow
@@ -182,8 +171,7 @@ def test_predictions_fit_the_terminal_and_count_their_training_trials(csv, tmp_p
     printed("train", csv, "--label", "what", "--instance", "thing", "--out", model)
     shown = in_terminal(["predict", str(model), str(csv)], width)
 
-    assert shown.code == 0
-    assert all(len(line) <= width for line in shown.lines if str(tmp_path) not in line)
+    assert_fits(shown, width, unbroken=tmp_path)
     assert "can:full" in shown.text
     assert "no certainty" in shown.text or "not calibrated" in shown.text  # by so few instances
     assert "100 %" not in shown.text
@@ -196,8 +184,7 @@ def test_predictions_fit_the_terminal_and_count_their_training_trials(csv, tmp_p
 def test_the_list_of_experiments_says_how_long_each_takes(width):
     shown = in_terminal(["experiment"], width)
 
-    assert shown.code == 0
-    assert max(map(len, shown.lines)) <= width
+    assert_fits(shown, width)
     rows = printed("experiment").partition("\n\n")[0].splitlines()[1:]
     assert len(rows) > 30
     for row in rows:
@@ -210,14 +197,13 @@ def test_a_dry_run_of_an_experiment_is_a_summary(tmp_path, width):
     options = ["experiment", "probing_force", "-o", "seeds=10000", "--dry-run", "--out", str(tmp_path / "e")]
     shown = in_terminal(options, width)
 
-    assert shown.code == 0
     assert len(shown.lines) < 20
     said = " ".join(shown.text.split())
     assert "30000: 3 cases with 10000 seeds" in said
     assert "2880000 simulated grasps" in said
     assert re.search(r"time about [\d.]+ h with \d+ processes", said)
     assert not (tmp_path / "e").exists()
-    assert all(len(line) <= width for line in shown.lines if str(tmp_path) not in line)
+    assert_fits(shown, width, unbroken=tmp_path)
 
 
 @pytest.mark.slow
@@ -225,9 +211,8 @@ def test_collect_shows_keys_then_what_was_felt_and_what_the_model_takes_it_for(t
     arguments = ["collect", "--labels", "can:full_open", "--each", "1", "--save", str(tmp_path / "t")]
     shown = in_terminal(arguments, 60, typed="\n")
 
-    assert shown.code == 0
     said = " ".join(shown.text.split())
-    assert max(map(len, shown.lines)) <= 60
+    assert_fits(shown, 60)
     keys, felt, prediction = said.index("keys: Enter"), said.index("felt p_first"), said.index("prediction ")
     assert keys < felt < prediction
     assert re.search(r"felt p_first [\d.]+ mm, p_steady [\d.]+ mm, f_steady [\d.]+ N,", said)

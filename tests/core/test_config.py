@@ -362,13 +362,11 @@ contact-image, curve, none-at-all, quant, quantiles, union.
     )
 
 
-def test_a_misspelt_type_of_a_table_is_proposed(plugins, write):
+def test_a_misspelt_type_of_a_table_is_proposed_and_a_validator_keeps_its_words(plugins, write):
     assert "has no key 'typ'. Did you mean 'gripper.type'?" in complaint(
         write(BASE), options=["gripper.typ=pr2"]
     )
-
-
-def test_a_validator_that_looks_at_other_keys_keeps_its_words(plugins, write):
+    # One that looks at other keys.
     assert complaint(write(BASE), options=["controller.low_n=13"]) == (
         "-o controller.low_n=13: low_n 13.0 is above force_n 12.0"
     )
@@ -451,16 +449,11 @@ class TestFiles:
         assert complaint("gentel.toml").endswith("Did you mean 'gentle.toml'?")
         assert complaint("z/y.toml") == f"no pipeline file 'z/y.toml': there is no folder '{Path.cwd()}/z'"
 
-    def test_a_folder(self, plugins, write):
+    def test_a_folder_or_a_file_that_is_not_utf8(self, plugins, write):
         write("", "folder.toml/inside")
         assert complaint("folder.toml") == "cannot read the pipeline file 'folder.toml': Is a directory"
-
-    def test_not_utf8(self, plugins, write):
-        name = write("")
-        Path(name).write_bytes(b"[gripper]\nname = \xff\xfe\n")
-        assert complaint(name) == (
-            "lab.toml:2: not UTF-8 text (byte 0xff): TOML files are UTF-8; is this the right file?"
-        )
+        Path(write("")).write_bytes(b"[gripper]\nname = \xff\xfe\n")
+        assert complaint("lab.toml").startswith("lab.toml:2: not UTF-8 text (byte 0xff)")
 
     @every_case(
         ("text", "said"),
@@ -491,17 +484,13 @@ def test_a_layer_can_be_read_by_itself(plugins, write):
     assert layer.where(("sweep", "seeds", 1)) == "lab.toml:4"
 
 
-def test_create_makes_a_component_as_strictly_as_a_file():
-    with IsolatedPlugins():
-        controller = create("controller", "hybrid", probing_force_n=17)
-        assert controller.config.probing_force_n == 17.0
-        with pytest.raises(ConfigError, match=r"^controller\.probing_forse_n: graspsense/hybrid has no key"):
-            create("controller", "hybrid", probing_forse_n=17)
-        with pytest.raises(UnknownName, match="no controller named 'hybird'"):
-            create("controller", "hybird")
-
-
-def test_build_tells_every_error(plugins):
+def test_create_makes_a_component_as_strictly_as_a_file(plugins):
+    controller = create("controller", "hybrid", probing_force_n=17)
+    assert controller.config.probing_force_n == 17.0
+    with pytest.raises(ConfigError, match=r"^controller\.probing_forse_n: graspsense/hybrid has no key"):
+        create("controller", "hybrid", probing_forse_n=17)
+    with pytest.raises(UnknownName, match="no controller named 'hybird'"):
+        create("controller", "hybird")
     with pytest.raises(ConfigError, match="2 errors"):
         build(plugins.find("controller", "law"), {"force_n": -1, "speed_m_s": "x"})
 

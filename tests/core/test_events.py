@@ -7,14 +7,15 @@ import sys
 import textwrap
 
 import pytest
-from attrs import frozen
+from cases import every_case
 from grippers import Scripted, bottle, squeezing
+from parts import NoKeys
 
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.control.tick import events_of
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.values.errors import DeviceLost
-from graspsense.core.values.signals import Outcome, Phase
+from graspsense.core.values.signals import Phase
 from graspsense.plugin_api import Feature, FeatureSet
 from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
 from graspsense.recording.reader import read_recorded
@@ -39,24 +40,22 @@ class Inheriting(Untold):
     events = ("touched",)
 
 
+def grasped(controller, gripper=Scripted):
+    return run_grasp(gripper(squeezing, bottle), controller(HybridConfig()), RunConfig())
+
+
 def test_a_class_that_inherits_its_step_tells_its_events():
-    grasp = run_grasp(Scripted(squeezing, bottle), Inheriting(HybridConfig()), RunConfig())
-    (event,) = grasp.trace.events
-    assert (event.what, event.phase) == ("touched", Phase.SQUEEZE)
-    # The class that it inherits from still tells none.
-    assert run_grasp(Scripted(squeezing, bottle), Untold(HybridConfig()), RunConfig()).trace.events == ()
-    assert events_of(Inheriting.step) is not events_of(Untold.step)
-
-
-def test_a_class_without_events_of_its_own_inherits_step_and_events():
     class Renamed(HybridController):
         pass
 
+    (event,) = grasped(Inheriting).trace.events
+    assert (event.what, event.phase) == ("touched", Phase.SQUEEZE)
+    # The class that it inherits from still tells none.
+    assert grasped(Untold).trace.events == ()
+    assert events_of(Inheriting.step) is not events_of(Untold.step)
+    # One without events of its own inherits step and events.
     assert Renamed.step is HybridController.step
-    assert [
-        e.what
-        for e in run_grasp(Scripted(squeezing, bottle), Renamed(HybridConfig()), RunConfig()).trace.events
-    ] == ["contact"]
+    assert [event.what for event in grasped(Renamed).trace.events] == ["contact"]
 
 
 class Lost(Scripted):
@@ -72,14 +71,11 @@ class Lost(Scripted):
         return reading
 
 
-@pytest.mark.parametrize(("how", "outcome"), [(DeviceLost, "device lost"), (KeyboardInterrupt, "aborted")])
+@every_case(("how", "outcome"), [(DeviceLost, "device lost"), (KeyboardInterrupt, "aborted")])
 def test_a_grasp_that_is_cut_off_keeps_its_events(how, outcome):
-    gripper = Lost(squeezing, bottle)
-    gripper.how = how
-    grasp = run_grasp(gripper, HybridController(HybridConfig()), RunConfig())
+    grasp = grasped(HybridController, type("Lost", (Lost,), {"how": how}))
     assert grasp.outcome.words == outcome
     assert [event.what for event in grasp.trace.events] == ["contact"]
-    assert grasp.outcome is not Outcome.STEADY
 
 
 KILLED = """
@@ -120,11 +116,6 @@ def test_a_killed_grasp_keeps_its_events(tmp_path):
     assert event.t_s == trace.t_s[trace.phase == Phase.SQUEEZE][0]
 
 
-@frozen(kw_only=True)
-class NoKeys:
-    pass
-
-
 class Delay(FeatureSet[NoKeys]):
     """The time from the first tick to the first contact that the controller told."""
 
@@ -139,7 +130,7 @@ class Delay(FeatureSet[NoKeys]):
 
 
 def test_a_feature_set_reads_events():
-    trace = run_grasp(Scripted(squeezing, bottle), HybridController(HybridConfig()), RunConfig()).trace
+    trace = grasped(HybridController).trace
     touched = trace.t_s[trace.phase == Phase.SQUEEZE][0]
     assert Delay(NoKeys()).extract(trace)["contact_at"] == pytest.approx(touched - trace.t_s[0])
 

@@ -459,10 +459,10 @@ def test_the_state_of_a_law_holds_images_that_nobody_changes(seen, monkeypatch):
 def test_a_law_keeps_a_reference_image():
     ended = run_grasp(Eyes(Held()), Watching(NoKeys()), RunConfig())
     assert ended.outcome is Outcome.STEADY
-    cells = ended.trace.signals["eye"].cells.astype(float)
-    changes = abs(cells - cells[0]).mean(axis=(1, 2, 3))
+    eye = ended.trace.signals["eye"]
+    changes = abs(eye.cells.astype(float) - eye.cells[0].astype(float)).mean(axis=(1, 2, 3))
     held_s = ended.trace.t_s[np.flatnonzero(ended.trace.phase == 4)[0]]
-    seen_until_then = changes[: np.searchsorted(ended.trace.signals["eye"].t_s, held_s, "right")]
+    seen_until_then = changes[: np.searchsorted(eye.t_s, held_s, "right")]
     assert seen_until_then[-1] > 40.0 > seen_until_then[:-1].max()
 
 
@@ -514,8 +514,7 @@ def test_a_plot_and_a_notebook_show_cameras():
     from graspsense.testing.samples import squeeze, with_signals
 
     arrays = (TactileArray("eye", "counts", 30.0, rows=240, columns=320, components=3, dtype="uint8"), FORCES)
-    trace = with_signals(squeeze(), arrays)
-    page = trace_html(trace)
+    page = trace_html(with_signals(squeeze(), arrays))
     assert "eye" in page
     assert "forces" in page
     assert len(page) < 300_000

@@ -66,27 +66,15 @@ def test_a_model_is_trained_on_a_store_that_was_collected_with_infinite_settings
     assert tomllib.loads(settings)["gripper"]["faults"]["stall_at_s"] == inf
     with Store.open(tmp_path / "trials") as store:
         for k in range(6):
-            label = ("can:full_open", "can:empty_open")[k % 2]
-            keep(
-                store,
-                label,
-                values=(0.06 + 0.002 * (k % 2), 5.0 + k),
-                ticks=2,
-                settings=settings,
-                device=REAL,
-            )
+            label, values = ("can:full_open", "can:empty_open")[k % 2], (0.06 + 0.002 * (k % 2), 5.0 + k)
+            keep(store, label, values=values, ticks=2, settings=settings, device=REAL)
     component = installed().find("classifier", "tree")
 
     model = train(component, component.config_class()(), labelled_store(str(tmp_path / "trials")), name="m")
     write_model(tmp_path / "m.json", model)
     again = load_model(str(tmp_path / "m.json"), installed())
 
-    text = (tmp_path / "m.json").read_text()
-    assert (
-        json.loads(text, parse_constant=pytest.fail)["provenance"]["settings"]["gripper"]["faults"][
-            "stall_at_s"
-        ]
-        == "inf"
-    )
+    content = json.loads((tmp_path / "m.json").read_text(), parse_constant=pytest.fail)
+    assert content["provenance"]["settings"]["gripper"]["faults"]["stall_at_s"] == "inf"
     features = labelled_store(str(tmp_path / "trials")).table.row(0)
     assert again.predict(features, emulated).warnings == model.predict(features, emulated).warnings == ()

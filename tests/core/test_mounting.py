@@ -88,6 +88,5 @@ def test_another_mounting_is_no_other_experiment(tmp_path):
         record_grasp(store, settings(), installed(), labels={}, origin="run")
         grasp = newest_grasp(store)
 
-        check_settings(
-            store, grasp, settings(f'run.mounting.tool="{TOOL}"')
-        )  # raises ConfigError if they differ
+        # It raises ConfigError if they differ.
+        check_settings(store, grasp, settings(f'run.mounting.tool="{TOOL}"'))

@@ -8,10 +8,9 @@ from types import SimpleNamespace
 import pytest
 from attrs import evolve
 from cases import every_case
-from click.testing import CliRunner
+from commands import graspsense, printed
 from grippers import Scripted, bottle, squeezing
 
-from graspsense.cli.main import cli
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.pair import run_pair
 from graspsense.core.grasp.runner import run_grasp
@@ -159,28 +158,24 @@ def test_a_gripper_that_is_not_there_is_told_and_the_other_is_closed():
 
 @pytest.mark.slow
 def test_the_trials_of_a_pair_are_kept_and_name_each_other(tmp_path):
-    plain = tmp_path / "second.toml"
+    plain, store = tmp_path / "second.toml", tmp_path / "trials"
     plain.write_text(
         '[gripper]\ntype = "sim"\nobject = "block"\nrate_hz = 250.0\n'
         '[controller]\ntype = "hybrid"\n[features]\ntype = "chitta"\n'
     )
-    store = tmp_path / "trials"
-    simple = ["--object", "block", "-o", "classifier.type=none", "-o", "gripper.rate_hz=250"]
-    options = ["--beside", str(plain), *simple, "--save", str(store)]
+    simple = ("--object", "block", "-o", "classifier.type=none", "-o", "gripper.rate_hz=250")
+    told = printed("run", "--beside", plain, *simple, "--save", store, "--json")
 
-    result = CliRunner().invoke(cli, ["run", *options, "--json"])
-
-    assert result.exit_code == 0, result.output
-    left, right = json.loads(result.stdout)["grippers"]
+    left, right = json.loads(told)["grippers"]
     assert {left["kept"]["trial"], right["kept"]["trial"]} == {1, 2}
     named = {left["labels"]["beside"], right["labels"]["beside"]}
-    assert named == {path.name for path in (store / "recordings").glob("*.mcap")}
-    for path in (store / "recordings").glob("*.mcap"):
+    paths = list((store / "recordings").glob("*.mcap"))
+    assert named == {path.name for path in paths}
+    for path in paths:
         assert named - {read_recorded(path).record().labels["beside"]} == {path.name}
 
 
-def test_what_is_of_one_grasp_does_not_go_with_a_pair(tmp_path):
-    result = CliRunner().invoke(cli, ["run", "--beside", "default", "--dry-run"])
-
-    assert result.exit_code == 2
-    assert "--beside" in result.output
+def test_what_is_of_one_grasp_does_not_go_with_a_pair():
+    done = graspsense("run", "--beside", "default", "--dry-run")
+    assert done.returncode == 2
+    assert "--beside" in done.stderr

@@ -251,11 +251,18 @@ def test_fingers_that_a_spring_pushes_open_in_the_squeeze_are_not_reversed():
     assert answered(20.0, 20.0, phase=SQUEEZE, gap=lambda t: 0.05 + 0.01 * t) == []
 
 
-def test_commands_of_a_velocity_are_not_compared():
-    motor = Motor(reports_effort=True, rate_hz=1000.0)
-    for k in range(1000):
-        assert motor.see(frame(0.001 * k, effort=50.0), APPROACH) is None
-        motor.apply(frame(0.001 * k), Command(VELOCITY, -0.01, inf, inf))
+def test_commands_of_a_velocity_are_not_compared_but_fingers_that_open_on_one_that_closes_are_reversed():
+    for reports, gap_m, reversed_ in (
+        (True, lambda k: 0.05, False),
+        (False, lambda k: 0.05 + 0.00001 * k, True),
+    ):
+        motor, faults = Motor(reports_effort=reports, rate_hz=1000.0), []
+        for k in range(1000):
+            now = frame(0.001 * k, gap=gap_m(k), effort=50.0 if reports else 8.0)
+            faults.append(motor.see(now, APPROACH))
+            motor.apply(now, Command(VELOCITY, -0.01, inf, inf))
+        assert any(fault is not None and fault.relaxes for fault in faults) == reversed_
+        assert reversed_ or faults == [None] * 1000
 
 
 # ------------------------------------------------------------------------------------------------------- the status
@@ -264,20 +271,14 @@ HOT = StatusBit(mask=1, name="hot", meaning="it is too hot")
 BROKEN = StatusBit(mask=4, name="encoder fault", meaning="the gap is not known", limit_s=0.01)
 
 
-def test_a_bit_without_a_limit_warns_and_one_beyond_its_limit_ends_the_grasp():
-    status = StatusWatch((HOT, BROKEN))
-    faults = [status.see(frame(0.001 * k, status=5), SQUEEZE) for k in range(20)]
-    assert [(fault.name, fault.ends) for fault in faults[0]] == [("hot", False), ("encoder fault", False)]
-    assert [(fault.name, fault.ends) for fault in faults[-1]] == [("hot", False), ("encoder fault", True)]
-
-
-def test_only_a_bit_with_a_limit_refuses_the_grasp():
+def test_a_bit_without_a_limit_warns_and_one_beyond_its_limit_refuses_or_ends_the_grasp():
     status = StatusWatch((HOT, BROKEN))
     assert [fault.name for fault in status.before_closing(frame(0.0, status=5))] == ["encoder fault"]
     assert status.before_closing(frame(0.0, status=1)) == []
-
-
-def test_a_bit_that_nobody_declared_is_told():
+    faults = [status.see(frame(0.001 * k, status=5), SQUEEZE) for k in range(20)]
+    assert [(fault.name, fault.ends) for fault in faults[0]] == [("hot", False), ("encoder fault", False)]
+    assert [(fault.name, fault.ends) for fault in faults[-1]] == [("hot", False), ("encoder fault", True)]
+    # A bit that nobody declared is told.
     assert StatusWatch((HOT,)).see(frame(0.0, status=8), SQUEEZE)[0].name == "status 0x8"
 
 
@@ -455,15 +456,6 @@ def test_a_slow_gripper_may_answer_a_frame_late():
         motor.apply(now, Command(EFFORT, value, inf, inf))
 
 
-def test_a_motor_that_opens_on_a_velocity_that_closes_is_reversed():
-    motor, faults = Motor(reports_effort=False, rate_hz=1000.0), []
-    for k in range(1000):
-        now = frame(0.001 * k, gap=0.05 + 0.00001 * k)
-        faults.append(motor.see(now, APPROACH))
-        motor.apply(now, Command(VELOCITY, -0.01, inf, inf))
-    assert any(fault is not None and fault.relaxes for fault in faults)
-
-
 @every_case("share", [0.5, 0.8])
 @every_case("seed", range(3))
 def test_cells_that_change_now_and_then_are_not_frozen(share, seed):
@@ -474,19 +466,18 @@ def test_cells_that_change_now_and_then_are_not_frozen(share, seed):
         assert tips.see(Pads(0.04 * k, k + 1, tuple(cells[0]), tuple(cells[1])), True) == []
 
 
-def test_cells_at_the_end_of_their_range_are_not_stuck():
+def test_cells_at_the_end_of_their_range_or_without_noise_are_not_stuck():
     tips = Fingertips()
     for image in images(20):
         tips.see(image, True)
     pressed = [image._replace(left=(4095.0,) * 7 + image.left[7:]) for image in images(40)[20:]]
     assert [tips.see(image, False) for image in pressed] == [[]] * 20
 
-
-def test_an_array_without_noise_may_read_the_same_everywhere_and_a_fingertip_may_have_no_cells():
     tips = Fingertips()
     for k in range(20):
         left = (0.0,) * 15 + (float(k == 5),)
         assert tips.see(Pads(0.04 * k, k + 1, left, (0.0,) * 16), True) == []
+    # A fingertip may have no cells.
     assert Fingertips().see(Pads(0.0, 1, (), (1.0, 2.0)), True) == []
 
 

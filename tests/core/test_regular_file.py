@@ -23,12 +23,12 @@ def pipe(tmp_path):
     return path
 
 
-def test_a_pipe_is_no_file(pipe):
+def test_a_pipe_is_no_file_and_no_more_is_read_than_asked(pipe, tmp_path):
     with pytest.raises(NotAFile, match="pipe"):
         first_bytes(pipe, 100)
-
-
-def test_no_more_is_read_than_asked(tmp_path):
+    for read in (read_grasp, read_calibration):
+        with pytest.raises(ConfigError, match="pipe"):
+            read(pipe)
     path = tmp_path / "long"
     path.write_bytes(b"x" * 1000)
     assert len(first_bytes(path, 100)) == 101
@@ -52,15 +52,6 @@ def test_a_pipe_for_settings_a_scene_or_a_model_is_refused(pipe, command):
     done = graspsense(*[word.format(pipe) for word in command])
     assert done.returncode == 2
     assert "Traceback" not in done.stderr
-
-
-def test_a_pipe_for_a_recorded_grasp_or_a_calibration_is_refused(tmp_path):
-    os.mkfifo(tmp_path / "can_1.txt")
-    with pytest.raises(ConfigError, match="pipe"):
-        read_grasp(tmp_path / "can_1.txt")
-    os.mkfifo(tmp_path / "tare.json")
-    with pytest.raises(ConfigError, match="pipe"):
-        read_calibration(tmp_path / "tare.json")
 
 
 @pytest.mark.skipif(not ZERO.exists(), reason="needs /dev/zero")

@@ -11,13 +11,12 @@ import numpy as np
 import pytest
 from attrs import evolve
 from cases import every_case
-from click.testing import CliRunner
+from commands import printed
 from kept import begun
 from lab_grasp import recorded_grasp
 from parts import NoKeys, channels, offering
 
 from graspsense import load_pipeline
-from graspsense.cli.main import cli
 from graspsense.core.pipeline.pipeline import grasp_with
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.trace import ImageTrace, SampleTrace
@@ -293,9 +292,8 @@ def test_an_array_that_no_recording_holds_is_refused_where_it_is_declared():
 
 def test_the_images_of_every_array_are_counted(recorded, tmp_path):
     trial, path, _ = recorded
-    done = CliRunner().invoke(cli, ["export", str(path), "--to", str(tmp_path / "g.npz"), "--json"])
-    assert done.exit_code == 0, done.output
-    assert json.loads(done.stdout)["images"] == len(trial.trace.signals["palm"].t_s) > 20
+    told = json.loads(printed("export", path, "--to", tmp_path / "g.npz", "--json"))
+    assert told["images"] == len(trial.trace.signals["palm"].t_s) > 20
 
 
 @every_case("cells", [0, 300])

@@ -3,24 +3,34 @@
 from __future__ import annotations
 
 import json
+import re
+import sys
+from contextlib import contextmanager
 from importlib import import_module
 
+import numpy as np
 import pytest
-from click.testing import CliRunner
-from identifiers import SCENE
+from commands import graspsense, printed
+from parts import implementing
 
-from graspsense.cli.main import cli
-from graspsense.core.components.identification import RecordedSqueeze
+from graspsense.core.components.identification import (
+    CandidateScore,
+    Identification,
+    RecordedSqueeze,
+    SqueezeFit,
+    Undetermined,
+)
 from graspsense.core.components.registry import IsolatedPlugins
-from graspsense.core.values.errors import ConfigError, UnknownName
+from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.trace import trace_of
-from graspsense.plugin_api import hookimpl
 from graspsense.simulator_api import IdentifierEntry
 from graspsense.sources import squeezes as module
 from graspsense.sources.identified import gripper_flags, identified_scenes
 from graspsense.sources.squeezes import recorded_squeezes
 from graspsense.sources.trial_source import TrialSource, groups_of, kind_of
 
+HERE = sys.modules[__name__]
+SCENE = "width_m = 0.05\n"
 CUP = 'width_m = 0.05\n[identified]\nlabel = "cup:full"\n[identified.gripper]\npad_stiffness_n_m = 8000.0\n'
 
 
@@ -29,11 +39,8 @@ def store(tmp_path_factory):
     """Return a store with one simulated squeeze of each of two objects."""
     folder = tmp_path_factory.mktemp("store")
     for name in ("sponge", "block"):
-        arguments = ["run", "--object", name, "--save", str(folder), "--label", name]
-        done = CliRunner().invoke(
-            cli, [*arguments, "-o", "classifier.type=none", "-o", "gripper.rate_hz=250"]
-        )
-        assert done.exit_code == 0, done.output
+        quick = ("-o", "classifier.type=none", "-o", "gripper.rate_hz=250")
+        printed("run", "--object", name, "--save", folder, "--label", name, *quick)
     return f"store:{folder}"
 
 
@@ -104,57 +111,72 @@ def test_scenes_that_cannot_be_trained_on_together_are_refused(tmp_path):
 
 
 def test_the_command_refuses_what_is_not_a_scene_before_it_reads(tmp_path):
-    done = CliRunner().invoke(cli, ["identify", "none.mcap", "--out", str(tmp_path / "cup.json")])
-    assert done.exit_code == 2
-    assert "cup.json: the name of the file must end in .toml" in done.output
+    done = graspsense("identify", "none.mcap", "--out", tmp_path / "cup.json")
+    assert done.returncode == 2
+    assert "cup.json: the name of the file must end in .toml" in done.stderr
 
 
-class Undecided:
-    GRASPSENSE_API = (2, 0)
+def undecided(config, squeezes, progress, block) -> Identification:
+    """Return a scene with a number that the squeezes do not determine."""
+    del config, progress, block
+    times = np.linspace(0.0, 1.0, 5)
+    series = dict.fromkeys(("t_s", "compression_m", "measured_n", "fitted_n"), times)
+    chosen = CandidateScore(
+        terms="elastic (k1)", parameters=1, error=0.1, fit_error=0.1, verdict="chosen", chosen=True
+    )
+    return Identification(
+        label="",
+        scene=SCENE,
+        parameters=(),
+        candidates=(chosen,),
+        undetermined=(Undetermined(what="k2", reason="too wide", remedy="squeeze deeper", in_scene=True),),
+        fits=(SqueezeFit(name=squeezes[0].name, **series, rms_n=0.1, peak_n=1.0),),
+        refusals=("k2 is not determined: too wide; squeeze deeper",),
+    )
 
-    @hookimpl
-    def graspsense_identifiers(self):
-        yield IdentifierEntry("sim", "identifiers:undecided", "a scene that is not to be used")
+
+@contextmanager
+def with_simulator(*plugins):
+    """Use these plugins, our decision trees and our simulator alone."""
+    with IsolatedPlugins(*plugins) as isolated:
+        for name in ("c45", "sim-gripper"):
+            plugin = import_module(f"graspsense_{name.replace('-', '_')}.plugin")
+            isolated.add(plugin, f"graspsense-{name}")
+        yield
 
 
 @pytest.mark.slow
-def test_a_scene_with_a_number_that_is_not_determined_is_written_with_force_only(store, tmp_path):
+def test_a_scene_with_a_number_that_is_not_determined_is_written_with_force_only(
+    store, tmp_path, monkeypatch
+):
+    monkeypatch.setitem(sys.modules, __name__, HERE)
     scene, page = tmp_path / "cup.toml", tmp_path / "cup.html"
-    command = ["graspsense", "identify", store, "--class", "block", "--out", str(scene)]
-    with IsolatedPlugins(Undecided()) as plugins:
-        for name in ("c45", "sim-gripper"):
-            module = import_module(f"graspsense_{name.replace('-', '_')}.plugin")
-            plugins.add(module, f"graspsense-{name}")
-        with pytest.raises(
-            ConfigError, match=r"cup.toml is not written:\n  k2 is not determined.*\n  --force"
-        ):
-            CliRunner().invoke(cli, [*command[1:], "--page", str(page)], catch_exceptions=False)
+    command = ("identify", store, "--class", "block", "--out", scene)
+    entry = IdentifierEntry("sim", f"{__name__}:undecided", "a scene that is not to be used")
+    with with_simulator(implementing("graspsense_identifiers", lambda self: [entry])):
+        code, _, said = graspsense(*command, "--page", page)
+        assert code == 2
+        assert re.search(r"cup.toml is not written:\n  k2 is not determined.*\n  --force", said)
         assert not scene.exists()
         assert "k2 is not determined" in page.read_text()
-        forced = CliRunner().invoke(cli, [*command[1:], "--force", "--json"], catch_exceptions=False)
-    assert forced.exit_code == 0
+        forced = printed(*command, "--force", "--json")
     assert scene.read_text() == SCENE
-    assert json.loads(forced.stdout)["refusals"] == ["k2 is not determined: too wide; squeeze deeper"]
+    assert json.loads(forced)["refusals"] == ["k2 is not determined: too wide; squeeze deeper"]
 
 
 def test_without_the_distribution_that_identifies_the_command_says_what_to_install(tmp_path):
-    plugins = IsolatedPlugins()
-    for name in ("c45", "sim-gripper"):
-        module = import_module(f"graspsense_{name.replace('-', '_')}.plugin")
-        plugins.add(module, f"graspsense-{name}")
-    with plugins, pytest.raises(UnknownName, match=r"graspsense-identify:\n.*graspsense\[identify\]"):
-        CliRunner().invoke(
-            cli, ["identify", "none.mcap", "--out", str(tmp_path / "cup.toml")], catch_exceptions=False
-        )
+    with with_simulator():
+        code, _, said = graspsense("identify", "none.mcap", "--out", tmp_path / "cup.toml")
+    assert code == 2
+    assert re.search(r"graspsense-identify:\n.*graspsense\[identify\]", said)
 
 
 def test_a_single_scene_is_refused_before_anything_is_simulated(tmp_path):
     path = tmp_path / "cup.toml"
     path.write_text(CUP)
-    done = CliRunner().invoke(cli, ["train", f"identified:{path}", "--out", str(tmp_path / "model.json")])
-    assert done.exit_code != 0
-    assert isinstance(done.exception, SystemExit | ConfigError)
-    assert "a classifier needs two" in f"{done.output}{done.exception}"
+    done = graspsense("train", f"identified:{path}", "--out", tmp_path / "model.json")
+    assert done.returncode == 2
+    assert "a classifier needs two" in done.stderr
 
 
 def test_a_scene_in_the_place_of_a_recording_is_named_as_such(tmp_path):

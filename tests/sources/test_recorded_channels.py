@@ -14,6 +14,7 @@ from graspsense.core.values.errors import WiringError
 from graspsense.plugin_api import create
 from graspsense.store.store import Store
 
+OTHERS = ("evaluate", "check", "train", "compare")
 CHOSEN = ("features.array=palm", "features.rows=2", "features.columns=3", "features.unit=N")
 
 
@@ -55,14 +56,7 @@ def proposed(words):
 
 
 @pytest.mark.parametrize(
-    "command",
-    [
-        "import",
-        *(
-            pytest.param(command, marks=pytest.mark.slow)
-            for command in ("evaluate", "check", "train", "compare")
-        ),
-    ],
+    "command", ["import", *(pytest.param(name, marks=pytest.mark.slow) for name in OTHERS)]
 )
 def test_an_array_that_the_features_do_not_name_is_told_with_the_options_that_choose_it(tmp_path, command):
     source = manifest(tmp_path, "set")
@@ -119,13 +113,8 @@ def test_a_replay_says_which_channels_the_recording_has(tmp_path):
     source = manifest(tmp_path, "set")
     backend = create("sensor-backend", "replay", recording=f"manifest:{source}#1")
 
-    assert [channel.name for channel in backend.channels] == [
-        "gap",
-        "velocity",
-        "force_left",
-        "force_right",
-        "palm",
-    ]
+    names = [channel.name for channel in backend.channels]
+    assert names == ["gap", "velocity", "force_left", "force_right", "palm"]
     refused, words = ran("replay", f"manifest:{source}#1", *options("features.type=chitta-without-pads"))
     assert refused.exit_code == WiringError.exit_code or "effort" in words
     assert "'effort'" in words

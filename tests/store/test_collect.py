@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 from attrs import evolve
 from cases import every_case
-from commands import graspsense
+from commands import graspsense, printed
 from grippers import Scripted, bottle, settings_with, squeezing
 from kept import BENCH, keep
 
@@ -201,30 +201,23 @@ def test_the_first_trials_are_collected_for_a_model_that_does_not_exist_yet(tmp_
     (tmp_path / "mine.toml").write_text(
         'extends = "default"\n[classifier]\ntype = "knn"\nmodel = "mine.json"\n'
     )
-    kinds = "can:full_open,can:empty_open"
+    collect_both = ("collect", "--pipeline", "mine.toml", "--labels", "can:full_open,can:empty_open")
 
-    valid = graspsense("config", "validate", "mine.toml")
-    assert (
-        "note: `collect` works with it, `run` does not yet: there is no model mine.json yet" in valid.stdout
-    )
-    done = graspsense(
-        *("collect", "--pipeline", "mine.toml", "--labels", kinds, "--each", "2", "--save", "t", *COARSE),
-        answers="\n" * 4,
-    )
+    note = "note: `collect` works with it, `run` does not yet: there is no model mine.json yet"
+    assert note in printed("config", "validate", "mine.toml")
+    done = graspsense(*collect_both, "--each", "2", "--save", "t", *COARSE, answers="\n" * 4)
     assert done.returncode == 0
     assert "note: collecting without predictions: there is no model mine.json yet" in done.stderr
     with Store.read(tmp_path / "t") as store:
         assert sum(store.counts("collect").values()) == 4
 
-    trained = graspsense("train", "store:t", "--classifier", "knn", "--out", "mine.json")
-    assert trained.returncode == 0
-    assert "note" not in graspsense("config", "validate", "mine.toml").stdout
+    printed("train", "store:t", "--classifier", "knn", "--out", "mine.json")
+    assert "note" not in printed("config", "validate", "mine.toml")
 
 
-def test_the_advice_on_a_missing_model_fits_the_gripper(tmp_path):
-    real = graspsense(
-        "run", "--gripper", "pr2", "-o", "classifier.type=knn", "-o", "classifier.model=mine.json"
-    )
+def test_the_advice_on_a_missing_model_fits_the_gripper():
+    model = ("-o", "classifier.type=knn", "-o", "classifier.model=mine.json")
+    real = graspsense("run", "--gripper", "pr2", *model)
 
     assert real.returncode == 2
     assert "graspsense collect --gripper pr2 --labels" in real.stderr
@@ -236,10 +229,8 @@ def held(folder):
     """Return label, object and whether it is simulated of each trial, in their order."""
     with Store.read(folder) as store:
         trials = [store.trial(summary.id) for summary in reversed(store.page())]
-    return [
-        (trial.summary.label, trial.record.settings["gripper"]["object"], trial.summary.simulated)
-        for trial in trials
-    ]
+    objects = [trial.record.settings["gripper"]["object"] for trial in trials]
+    return [(t.summary.label, held, t.summary.simulated) for t, held in zip(trials, objects, strict=True)]
 
 
 @every_case("gripper", [(), EMULATED])
@@ -287,7 +278,7 @@ def test_a_setting_that_is_newer_than_the_trial_had_its_default(grasped):
             check_settings(store, default_grasp, resolve("default", options=["controller.ramp_s=0.1"]))
 
 
-@pytest.mark.parametrize("label", ["my can:full", "can:full open", "can#2 b"])
+@every_case("label", ["my can:full", "can:full open", "can#2 b"])
 def test_a_label_with_a_space_is_refused_with_the_reason(tmp_path, label):
     folder = str(tmp_path / "my store")
     for done in (
@@ -298,6 +289,15 @@ def test_a_label_with_a_space_is_refused_with_the_reason(tmp_path, label):
         assert done.returncode == 2
         assert f"{label!r} is not a label" in done.stderr
         assert "without spaces" in done.stderr
+
+
+@every_case("label", ["nonsense:full", "can", "can:full_opn"])
+def test_an_object_that_the_gripper_does_not_know_is_refused_before_the_store_exists(tmp_path, label):
+    done = collect(tmp_path / "t", "\n\n", labels=f"block,{label}")
+    assert done.returncode == 2
+    assert f"object {label.partition(':')[0]!r}" in done.stderr or "no object named 'nonsense'" in done.stderr
+    assert "next:" not in done.stderr
+    assert not (tmp_path / "t").exists()
 
 
 @pytest.mark.slow
@@ -330,12 +330,3 @@ def test_a_store_and_files_with_spaces_in_their_names_work_everywhere(tmp_path, 
     ):
         done = graspsense(*command)
         assert done.returncode == 0, (command, done.stderr)
-
-
-@pytest.mark.parametrize("label", ["nonsense:full", "can", "can:full_opn"])
-def test_an_object_that_the_gripper_does_not_know_is_refused_before_the_store_exists(tmp_path, label):
-    done = collect(tmp_path / "t", "\n\n", labels=f"block,{label}")
-    assert done.returncode == 2
-    assert f"object {label.partition(':')[0]!r}" in done.stderr or "no object named 'nonsense'" in done.stderr
-    assert "next:" not in done.stderr
-    assert not (tmp_path / "t").exists()

@@ -9,6 +9,7 @@ import time
 from datetime import UTC, datetime
 from pathlib import Path
 
+import numpy as np
 import pytest
 from cases import every_case
 from commands import graspsense
@@ -141,8 +142,7 @@ def test_a_grasp_recorded_in_any_year_is_read_and_recovered(tmp_path, monkeypatc
 def test_pictures_of_a_late_grasp_are_exported():
     from graspsense.recording.foxglove import raw_image_message
 
-    import_numpy = pytest.importorskip("numpy")
-    picture = import_numpy.zeros((2, 3), dtype="uint8")
+    picture = np.zeros((2, 3), dtype="uint8")
     late = raw_image_message(2**63 + 5, "pads", picture)
     assert struct.unpack_from("<iI", late, 4) == (2**31 - 1, (2**63 + 5) % 10**9)
     assert struct.unpack_from("<iI", raw_image_message(3_000_000_007, "pads", picture), 4) == (3, 7)
@@ -198,15 +198,13 @@ def test_a_local_dask_cluster_without_shared_memory_is_refused_with_the_other_ch
         DaskCluster(None, 1)
 
 
-def test_a_folder_of_calibrations_that_is_not_there_is_told(tmp_path):
-    assert calibrations_of("", "NONE", {}) == {}
-    assert calibrations_of("none", "NONE", {}) == {}
-    assert calibrations_of(tmp_path, "NONE", {}) == {}
+def test_a_folder_of_calibrations_is_found_below_the_home_and_told_where_it_is_not_there(
+    tmp_path, monkeypatch
+):
+    for folder in ("", "none", tmp_path):
+        assert calibrations_of(folder, "NONE", {}) == {}
     with pytest.raises(ConfigError, match="no such folder"):
         calibrations_of(tmp_path / "mistyped", "NONE", {})
-
-
-def test_a_calibration_folder_below_the_home_is_found(tmp_path, monkeypatch):
     monkeypatch.setenv("HOME", str(tmp_path))
     data = {"left": [1.0, 2.0], "right": [1.0, 2.0]}
     tare = Calibration(kind="tare", serial="L7", device={}, made="2300-01-01T00:00:00", data=data)
