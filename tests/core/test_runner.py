@@ -317,6 +317,20 @@ def test_late_frames_are_counted_on_a_device_clock_only():
     assert late(Jerky, "virtual") == late(JustInTime, "device") == 0
 
 
+def test_a_fault_that_ends_the_grasp_relaxes_the_gripper_before_it_opens():
+    class Sparse(Scripted):
+        def read(self, timeout_s):
+            frame, pads, _ = super().read(timeout_s)
+            return Reading(frame._replace(dt_s=0.005), pads)  # five times what the gripper says of its frames
+
+    sparse = Sparse(squeezing, bottle, clock="device", lose_at=700)
+    grasp = run_grasp(sparse, HYBRID, RUN)
+    assert (grasp.outcome, "80 % of the frames are missing" in grasp.reason) == (Outcome.ABORTED, True)
+    values = [command.value for command in sparse.commands]
+    closing = max(k for k, value in enumerate(values) if value > 0.0)
+    assert values[closing + 1 : closing + 3] == [0.0, -20.0]
+
+
 def test_a_real_gripper_is_held_weak_until_first_contact():
     gripper = Scripted(squeezing, bottle, clock="device")
     grasp = run_grasp(gripper, HYBRID, RUN)

@@ -113,6 +113,7 @@ def test_the_command_compares_and_keeps(folder, tmp_path):
     assert (code, "already exists" in err) == (2, True)
     other = ("-o", "controller.contact_force_n=0.2")
     assert "6 of 6" in printed("features", folder, "--overwrite", "--keep", kept, *other)
+    assert "6 of 6" in printed("features", folder, *other)
     assert read_labelled(kept, "label").table.columns(["p_first"]).values[0, 0] == gap_at(0.2)
     code, _, err = graspsense("features", tmp_path / "none", *other)
     assert (code, "there is no store" in err) == (2, True)
