@@ -273,6 +273,12 @@ def test_a_number_too_large_to_learn_from_is_refused_by_its_name(tmp_path):
         read_labelled(table(tmp_path / "t.csv", "x", [1e308] * 30 + [-1e308] * 30), "object")
 
 
+def test_ratios_of_values_may_exceed_every_number(tmp_path):
+    values = [1e-300 * k for k in range(1, 31)] + [1e29 * k for k in range(1, 31)]
+    (note,) = [note for note in notes_on(tmp_path / "t.csv", "width", values) if "width" in note]
+    assert "two groups" not in note
+
+
 def test_the_number_to_predict_in_another_unit_is_told(tmp_path):
     forces = np.random.default_rng(8).normal(12.0, 3.0, N).round(3)
     widths = np.random.default_rng(9).normal(60.0, 3.0, N).round(3)

@@ -264,6 +264,7 @@ def _is_named_as_time(name: str) -> bool:
     return bool(_TIME_NAMES & words) and words <= _TIME_NAMES | _OF_TIMES
 
 
+@np.errstate(over="ignore")  # of differences and ratios of numbers that no sensor gives
 def _mixed(numbers: dict[str, Numbers]) -> list[str]:
     """Return notes on columns in which a number stands for something else, or whose unit changes."""
     notes = []
