@@ -401,6 +401,9 @@ def repeated(*factors):
         ((1.0, 1.0, 1.0, 1.0), lambda force, _: np.where((np.arange(2400) // 5) == 180, 0.0, force)),
         # One sample in a hold is a glitch.
         ((1.0, 1.0, 1.0, 1.0), lambda force, _: np.where(np.arange(2400) == 900, 900.0, force)),
+        # The code of an error, in an approach and in a hold.
+        ((1.0, 1.0, 1.0, 1.0), lambda force, _: np.where(np.arange(2400) // 5 == 244, -999.0, force)),
+        ((1.0, 1.0, 1.0, 1.0), lambda force, _: np.where(np.arange(2400) // 5 == 180, -999.0, force)),
     ],
 )
 def test_squeezes_of_any_force_are_found_with_drift_and_faults(factors, change, tmp_path):

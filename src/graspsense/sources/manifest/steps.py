@@ -36,6 +36,8 @@ UNLOADED: Final = 0.02
 """Share of the range of the force up to which nothing is held."""
 NOISE: Final = 6.0
 """A force whose range is at most so many usual second differences is noise alone."""
+BELOW: Final = 0.5
+"""Share of its range by which a force is below all others in a glitch."""
 SHORTEST_RELEASE_S: Final = 0.1
 """Fingers need this time (s) at least to open and to close again."""
 FEWEST: Final = 3
@@ -117,6 +119,7 @@ def _held_runs(
     low, high = np.percentile(force, [5.0, 99.5])
     if not high - low > noise:
         return []
+    force = np.where(force < low - BELOW * (high - low), low, force)
     loaded = force[force > low + max(noise, UNLOADED * (high - low))]
     usual = float(np.median(loaded)) - float(low) if len(loaded) else float(high - low)
     rise = max(noise, weakest * usual)
