@@ -423,6 +423,21 @@ def test_a_squeeze_that_is_too_weak_to_be_found_is_told(tmp_path):
         assert len(notes) == told
 
 
+def test_a_force_that_drops_out_while_the_gap_stays_is_told(tmp_path):
+    """For 0.3 s of a hold of 0.5 s; between squeezes the fingers open."""
+    gap, force = squeezing()
+    hold = np.full(50, gap[-1]), np.full(50, force[-1])
+    gaps = np.concatenate([gap, hold[0], gap[::-1]] * 2)
+    forces = np.concatenate([force, hold[1], force[::-1]] * 2)
+    dropped = np.where(np.abs(np.arange(len(forces)) - len(force) - 25) < 15, 0.0, forces)
+    for values, told in (forces, 0), (dropped, 1):
+        squeezes = plain(
+            tmp_path, 'split = "force"', force=values, gap=gaps, time=np.arange(len(gaps)) / RATE_HZ
+        )
+        notes = [note for squeeze in squeezes for note in squeeze.notices if "force is gone and" in note]
+        assert len(notes) == told
+
+
 def test_a_clock_that_begins_anew_between_two_squeezes_costs_neither(tmp_path):
     gaps, forces, time = repeated(1.0, 1.0)
     anew = np.where(time < 5.3, time, time - 5.3)
