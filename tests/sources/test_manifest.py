@@ -381,6 +381,9 @@ def repeated(*factors):
         ((1.0, 1.0, 1.0, 1.0), lambda force, _: np.where((np.arange(2400) // 5) == 180, 0.0, force)),
         # One sample in a hold is a glitch.
         ((1.0, 1.0, 1.0, 1.0), lambda force, _: np.where(np.arange(2400) == 900, 900.0, force)),
+        # The code of an error, in an approach and in a hold.
+        ((1.0, 1.0, 1.0, 1.0), lambda force, _: np.where(np.arange(2400) // 5 == 244, -999.0, force)),
+        ((1.0, 1.0, 1.0, 1.0), lambda force, _: np.where(np.arange(2400) // 5 == 180, -999.0, force)),
     ],
 )
 def test_squeezes_of_any_force_are_found_with_drift_and_faults(factors, change, tmp_path):
@@ -397,6 +400,21 @@ def test_a_squeeze_that_is_too_weak_to_be_found_is_told(tmp_path):
         gaps, force, time = repeated(*factors)
         squeezes = plain(tmp_path, 'split = "force"', force=force, gap=gaps, time=time)
         notes = [note for squeeze in squeezes for note in squeeze.notices if "taken for no squeeze" in note]
+        assert len(notes) == told
+
+
+def test_a_force_that_drops_out_while_the_gap_stays_is_told(tmp_path):
+    """For 0.3 s of a hold of 0.5 s; between squeezes the fingers open."""
+    gap, force = squeezing()
+    hold = np.full(50, gap[-1]), np.full(50, force[-1])
+    gaps = np.concatenate([gap, hold[0], gap[::-1]] * 2)
+    forces = np.concatenate([force, hold[1], force[::-1]] * 2)
+    dropped = np.where(np.abs(np.arange(len(forces)) - len(force) - 25) < 15, 0.0, forces)
+    for values, told in (forces, 0), (dropped, 1):
+        squeezes = plain(
+            tmp_path, 'split = "force"', force=values, gap=gaps, time=np.arange(len(gaps)) / RATE_HZ
+        )
+        notes = [note for squeeze in squeezes for note in squeeze.notices if "force is gone and" in note]
         assert len(notes) == told
 
 

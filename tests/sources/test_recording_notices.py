@@ -74,6 +74,18 @@ def test_healthy_forces_give_no_notice() -> None:
     assert noticed(LEFT[held], RIGHT[held]) == ()
 
 
+def test_a_force_that_is_measured_more_rarely_than_the_gap_is_noticed() -> None:
+    """At 5 Hz, a contact and a squeeze of 0.3 s can be one new value."""
+    fast = np.clip((T_S - 1.0) / 0.3, 0.0, 1.0) * 6.0 + NOISE_N[0]
+    held = np.arange(300) // 20 * 20
+    (notice,) = noticed(fast[held], fast[held])
+    assert "every 0.2 s only" in notice
+    # The same rows, if the gap is measured as rarely; and a force that grows for as long as ten values.
+    assert noticed(fast[::20], fast[::20], rate_hz=5.0) == ()
+    tenth = np.arange(300) // 10 * 10
+    assert noticed(LEFT[tenth], RIGHT[tenth]) == ()
+
+
 OPEN_AGAIN_M = np.where(T_S < 2.6, np.maximum(0.08 - 0.03 * T_S, 0.05), 0.05 + 0.1 * (T_S - 2.6))
 RELEASED_N = np.where(T_S < 2.7, LOAD_N, 0.0) + NOISE_N[0]
 

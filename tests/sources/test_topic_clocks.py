@@ -46,6 +46,8 @@ CLOCKS = {
     "2 % fast": T_S * 1.02,
     "2 % slow": T_S * 0.98,
     "set back": np.where(T_S > 1.3, T_S - 0.5, T_S),
+    "set back a little": np.where(T_S > 1.3, T_S - 0.1, T_S),
+    "set back and forth": np.where((T_S > 1.0) & (T_S < 1.3), T_S - 0.2, T_S),
     "set forward": np.where(T_S > 1.3, T_S + 3600.0, T_S),
 }
 
@@ -112,6 +114,13 @@ def test_a_recorder_that_was_late_once_changes_nothing() -> None:
     held_up = BEGAN_NS + round(1.8 * S)
     topics.recorded_ns[100:170] = [max(ns, held_up + k) for k, ns in enumerate(topics.recorded_ns[100:170])]
     common = common_clock("bag", {"/hand": HEALTHY, "/tip": topics})
+    assert common.notices == ()
+    assert np.array_equal(common.topics["/tip"].ns, common.topics["/hand"].ns)
+
+
+def test_messages_that_are_recorded_in_another_order_keep_their_headers() -> None:
+    late_s = np.abs(np.random.default_rng(5).normal(0.0, 0.03, len(T_S)))
+    common = common_clock("bag", {"/hand": HEALTHY, "/tip": messages(T_S + late_s, T_S)})
     assert common.notices == ()
     assert np.array_equal(common.topics["/tip"].ns, common.topics["/hand"].ns)
 

@@ -54,6 +54,14 @@ JUMP: Final = 3.0
 """and how many times farther than the third largest step of the gap a jump goes, since a glitch is two steps."""
 STOPPED_STEPS: Final = 5.0
 """Least steps of a gap that one goes on by, at least, when its sensor had stopped."""
+SELDOM_S: Final = 0.05
+SELDOM_ROWS: Final = 5
+"""A force that keeps each value for so long, and so many samples, is measured more rarely than the gap."""
+LARGE_CHANGE: Final = 0.2
+"""Share of its range by which such a force changes at once where contact and rest are seen too late."""
+FEWEST_CHANGES: Final = 5
+SELDOM_SHARE: Final = 0.1
+"""Share of the changes of such a force that may be closer to the one before."""
 FREE: Final = 0.2
 """Share of its range up to which a force is that of free fingers."""
 
@@ -84,6 +92,7 @@ def signal_notices(recording: Recording) -> Iterator[str]:
         if int(known.sum()) >= FEWEST:
             if "t" not in recording.units:
                 yield from _glitches(what, times[known], force[known], recording.units)
+                yield from _seldom(what, times[known], force[known])
             yield from _drift(what, gap[known], force[known], recording.units)
     if not {"gap", "t"} & recording.units.keys() and len(gap) >= FEWEST:
         yield from _jump(times, gap)
@@ -136,6 +145,21 @@ def _glitches(what: str, times: Numbers, force: Numbers, units: Mapping[str, str
         f"{sampled_times[k]:.4g} s{others}): if that is a glitch, take it out, since it can "
         "pass for a contact"
     )
+
+
+def _seldom(what: str, times: Numbers, force: Numbers) -> Iterator[str]:
+    """Yield that a force has a new value so rarely (s) that it changes by much of its range at once."""
+    changes = np.flatnonzero(np.diff(force)) + 1
+    if len(changes) < FEWEST_CHANGES:
+        return
+    every_s = float(np.quantile(np.diff(times[changes]), SELDOM_SHARE))
+    rows = float(np.quantile(np.diff(changes), SELDOM_SHARE))
+    largest = float(np.abs(np.diff(force)).max())
+    if every_s >= SELDOM_S and rows >= SELDOM_ROWS and largest > LARGE_CHANGE * np.ptp(force):
+        yield (
+            f"{what} has a new value every {every_s:.2g} s only, and the gap has more: a contact is seen up to so much "
+            "too late, and a rest with an older force"
+        )
 
 
 def _drift(what: str, gap: Numbers, force: Numbers, units: Mapping[str, str]) -> Iterator[str]:

@@ -27,6 +27,10 @@ DELAYS_APART_NS: Final = 50_000_000
 """Delays of two topics that differ by more can be from different clocks, or one topic is slow: nothing tells which."""
 PARTS: Final = 5
 """Parts of a recording whose delays are compared."""
+MOST_SET: Final = 3
+"""Most times that a clock is set back in a recording,"""
+FEWEST_AFTER: Final = 5
+"""and fewest messages after it: fewer can be late."""
 RATES_APART: Final = 0.01
 RATES_APART_NS: Final = 20_000_000
 """Share of the recording, and time, by which one clock gets ahead of another that runs at another rate."""
@@ -196,7 +200,8 @@ def _apart(stamped: Mapping[str, Nanoseconds], recorded: Mapping[str, Nanosecond
     changed = [
         topic
         for topic, delays in least.items()
-        if max(delays) - min(delays) > CLOCKS_APART_NS and _jumps(recorded[topic] - stamped[topic])
+        if _set_back(recorded[topic], stamped[topic])
+        or (max(delays) - min(delays) > CLOCKS_APART_NS and _jumps(recorded[topic] - stamped[topic]))
     ]
     lowest = min(min(delays) for delays in least.values())
     behind = max(least, key=lambda topic: min(least[topic]))
@@ -257,6 +262,23 @@ def _drifting(recorded: Mapping[str, Nanoseconds], least: Mapping[str, list[int]
         if abs(int(steps.sum())) > much and even.all():
             return topic
     return ""
+
+
+def _set_back(recorded: Nanoseconds, stamped: Nanoseconds) -> bool:
+    """Return whether headers are older than those before them for several messages, as after a clock was set back.
+
+    Messages that overtake others do so many times, and those that were held up come all at once.
+    """
+    order = np.argsort(recorded, kind="stable")
+    written, stamps = recorded[order], stamped[order]
+    steps = np.diff(stamps)
+    if not len(steps) or int((steps < 0).sum()) > MOST_SET or steps.min() > -DELAYS_APART_NS:
+        return False
+    k = int(np.argmin(steps)) + 1
+    after = slice(k, k + FEWEST_AFTER)
+    later = (written - stamps)[after].min() - (written - stamps)[:k].min() > DELAYS_APART_NS
+    apart = np.ptp(written[after]) > EVEN * np.ptp(stamps[after])
+    return bool(later and apart and len(stamps) - k >= FEWEST_AFTER)
 
 
 def _jumps(delays: Nanoseconds) -> bool:

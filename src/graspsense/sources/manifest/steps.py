@@ -36,6 +36,10 @@ UNLOADED: Final = 0.02
 """Share of the range of the force up to which nothing is held."""
 NOISE: Final = 6.0
 """A force whose range is at most so many usual second differences is noise alone."""
+STAYS: Final = 0.01
+"""Share of its range by which the gap of fingers that do not open changes."""
+BELOW: Final = 0.5
+"""Share of its range by which a force is below all others in a glitch."""
 SHORTEST_RELEASE_S: Final = 0.1
 """Fingers need this time (s) at least to open and to close again."""
 FEWEST: Final = 3
@@ -69,6 +73,13 @@ def squeezes(columns: GraspColumns) -> list[GraspColumns]:
     parts = [
         columns.rows(slice(start, end), f"squeeze {k}") for k, (start, end) in enumerate(pairwise(bounds), 1)
     ]
+    for k, ((_, end), (begin, _)) in enumerate(pairwise(runs), 1):
+        if _stays_closed(columns.gap_m, end, begin):
+            told = (
+                f"the gap stays from {columns.t_s[end]:.4g} to {columns.t_s[begin]:.4g} s, while the force is gone and "
+                "comes back: did its sensor fail for a moment? Then both parts are of one squeeze: split by a column"
+            )
+            parts[k] = evolve(parts[k], warnings=(*parts[k].warnings, told))
     weak = _weak_runs(columns, force, runs)
     if weak:
         strongest = max(float(np.ptp(force[begin - 1 : end])) for begin, end in weak)
@@ -101,6 +112,15 @@ def _weak_runs(
     ]
 
 
+def _stays_closed(gap: NDArray[np.float64], end: int, begin: int) -> bool:
+    """Return whether a gap that is recorded does not open between the end of a squeeze and the begin of the next."""
+    known, between = gap[np.isfinite(gap)], gap[end:begin]
+    span = float(np.ptp(known)) if len(known) else 0.0
+    return bool(
+        span > 0.0 and np.nanmax(between, initial=-np.inf) - np.nanmin(between, initial=np.inf) < STAYS * span
+    )
+
+
 def _middle(t_s: NDArray[np.float64], end: int, begin: int) -> int:
     """Return the sample with which the next squeeze begins: the middle, or where the clock begins anew."""
     back = np.flatnonzero(np.diff(t_s[end - 1 : begin + 1]) < 0.0)
@@ -117,6 +137,7 @@ def _held_runs(
     low, high = np.percentile(force, [5.0, 99.5])
     if not high - low > noise:
         return []
+    force = np.where(force < low - BELOW * (high - low), low, force)
     loaded = force[force > low + max(noise, UNLOADED * (high - low))]
     usual = float(np.median(loaded)) - float(low) if len(loaded) else float(high - low)
     rise = max(noise, weakest * usual)

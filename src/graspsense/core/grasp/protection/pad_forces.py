@@ -5,9 +5,10 @@ from __future__ import annotations
 from math import nan
 from typing import Final
 
+from graspsense.core.grasp.protection.motor import lasting
 from graspsense.core.grasp.protection.recent_mean import RecentMean
 from graspsense.core.values.faults import Fault
-from graspsense.core.values.signals import Frame
+from graspsense.core.values.signals import Frame, Phase
 
 MEAN_S: Final = 0.1
 """Time over which the forces are averaged, and after which they are compared."""
@@ -21,6 +22,10 @@ IMAGES: Final = 5.0
 """Periods of the pads for which it stands still at least."""
 CHANGE_N: Final = 1.0
 """Change of the other pad's force in that time that a sound pad would have felt too."""
+
+OPENED_M: Final = 0.005
+EMPTY_S: Final = 0.1
+"""So much wider than at the contact, and for so long, no object touches both fingers any more."""
 
 
 class PadBalance:
@@ -79,3 +84,32 @@ class StuckForce:
                 )
         self._forces = forces
         return None
+
+
+class EmptyForce:
+    """Sees that both pads feel a contact although the fingers are wider open than where they first felt it.
+
+    No object touches both fingers then: the pads stopped, or their zero has drifted, since the contact.
+    """
+
+    def __init__(self, contact_n: float) -> None:
+        self._contact_n = contact_n
+        self._contact_gap_m = nan
+        self._lasts_s = 0.0
+
+    def see(self, frame: Frame, phase: int) -> Fault | None:
+        """Take the frame of a tick; return the fault once it has lasted."""
+        felt_n = min(frame.force_left_n, frame.force_right_n)
+        if phase != Phase.RELEASE:
+            if not self._contact_gap_m > 0.0 and felt_n > self._contact_n:
+                self._contact_gap_m = frame.gap_m
+            return None
+        empty = felt_n > self._contact_n and frame.gap_m > self._contact_gap_m + OPENED_M
+        self._lasts_s = lasting(self._lasts_s, empty, frame.dt_s)
+        if self._lasts_s <= EMPTY_S:
+            return None
+        return Fault(
+            "pads feel nothing there",
+            f"both pads feel {felt_n:.1f} N or more although the fingers have let go: they stopped, or their zero "
+            "drifted, in the squeeze, so its forces are wrong; check the fingertips",
+        )

@@ -18,7 +18,7 @@ from graspsense.core.grasp.protection.cells import Fingertips
 from graspsense.core.grasp.protection.drift import Drift
 from graspsense.core.grasp.protection.effort_ceiling import asked_effort_n, effort_ceiling_n, limited
 from graspsense.core.grasp.protection.motor import FeltForce, FreeEffort, Motor
-from graspsense.core.grasp.protection.pad_forces import PadBalance, StuckForce
+from graspsense.core.grasp.protection.pad_forces import EmptyForce, PadBalance, StuckForce
 from graspsense.core.grasp.protection.reports import Reports
 from graspsense.core.grasp.protection.speed import GapSpeed, Rush, Standstill
 from graspsense.core.grasp.protection.status import StatusWatch
@@ -74,6 +74,7 @@ class Protection:
         pads_hz = min(rates.get("force_left", 0.0), rates.get("force_right", 0.0))
         self._touch, self._drift = Touch(contact_n, run.first_effort_n, pads_hz), Drift(contact_n)
         self._stuck, self._balance = StuckForce(pads_hz), PadBalance()
+        self._empty = EmptyForce(contact_n)
         self._felt, self._gap_speed = (
             FeltForce(info.rate_hz, pads_hz, info.friction_n),
             GapSpeed(info.rate_hz),
@@ -143,6 +144,7 @@ class Protection:
         frame = reading.frame
         closing = phase in (APPROACH, SQUEEZE, HOLD)
         self._see(self._touch.see(frame, phase, command))
+        self._see(self._empty.see(frame, phase))
         if closing:
             self._see(self._felt.see(frame))
         free = self._touch.free()
