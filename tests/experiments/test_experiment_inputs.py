@@ -167,9 +167,22 @@ def test_files_that_a_manifest_describes_count_wherever_they_are(tmp_path):
     manifest.write_text(
         'folder = "../there"\nfiles = "{label}.csv"\ntime = "t [s]"\ngap = "gap [m]"\nforce = "F [N]"\n'
     )
-    data = tmp_path / "there" / "can.csv"
-    data.write_text("t,gap,F\n0,0.1,0\n")
-    assert_counts(data, [f"manifest:{manifest}"])
+    there = tmp_path / "there"
+    (there / "can.csv").write_text("t,gap,F\n0,0.1,0\n")
+    assert_counts(there / "can.csv", [f"manifest:{manifest}"])
+    manifest.write_text(
+        manifest.read_text() + 'beside = "labels.csv"\nvalues = { mass = "mass_{label}.txt" }\n'
+    )
+    for name in ("labels.csv", "mass_can.txt"):
+        (there / name).write_text("1\n")
+        assert_counts(there / name, [f"manifest:{manifest}"])
+
+
+@every_case("beside", ["can.csv.json", "can-pads.csv", "can-camera.csv.npz"])
+def test_what_was_exported_beside_a_grasp_counts(tmp_path, beside):
+    for name in ("can.csv", "can.csv.json", beside):
+        (tmp_path / name).write_text("1\n")
+    assert_counts(tmp_path / beside, {"recording": f"csv:{tmp_path / 'can.csv'}"})
 
 
 def test_the_calibrations_of_a_gripper_count_with_and_without_their_setting(tmp_path, monkeypatch):

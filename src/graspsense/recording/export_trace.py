@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from glob import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -183,6 +184,12 @@ def _write_declared(path: Path, grasp: RecordedGrasp, tables: Sequence[str]) -> 
 def declared_beside(path: Path) -> Path:
     """Return the file beside an exported grasp that says what its gripper declared."""
     return path.with_name(f"{path.name}.json")
+
+
+def all_beside(path: Path) -> list[Path]:
+    """Return the files that were exported beside a grasp; none if this is no exported grasp."""
+    declared = declared_beside(path)
+    return [declared, *sorted(path.parent.glob(f"{escape(path.stem)}-*"))] if declared.is_file() else []
 
 
 def images_beside(path: Path, topic: str) -> Path:

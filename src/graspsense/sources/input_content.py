@@ -20,6 +20,7 @@ from graspsense.core.components.registry import installed
 from graspsense.core.grasp.calibration_files import calibration_folder
 from graspsense.core.values.errors import GraspsenseError
 from graspsense.core.values.json_values import json_text
+from graspsense.recording.export_trace import all_beside
 from graspsense.store.naming import STORE, as_source
 
 FRAMEWORK: Final = "graspsense"
@@ -143,9 +144,14 @@ def _hash_of_store(folder: str) -> str:
 
 
 def _hash_of_files(path: str, kind: str) -> str:
-    """Return the hash of a file or a folder, and of the files that it names or, as a manifest, describes."""
+    """Return the hash of a file or a folder, and of the files that belong to it.
+
+    Those are what it names, what was exported with it, or what it describes as a manifest.
+    """
     if kind != "manifest":
-        return _hash([_hash_of_tree(path), *map(_hash_of_tree, sorted(_named_files(path, (), set())))])
+        exported = map(str, all_beside(Path(path)))
+        further = [*sorted(_named_files(path, (), set())), *exported]
+        return _hash(_hash_of_tree(file) for file in (path, *further))
     from graspsense.sources.manifest.reader import manifest_files
 
     try:

@@ -21,7 +21,8 @@ from graspsense.sources.manifest.available import AvailableColumns
 from graspsense.sources.manifest.description import ReadManifest
 from graspsense.sources.manifest.files import NamedFile
 
-_FIELD: Final = re.compile(r"\{(\w+)\}")
+FIELD: Final = re.compile(r"\{(\w+)\}")
+"""A field in a text of a manifest: `{fruit}`."""
 _NOT_IN_LABELS: Final = re.compile(r"[\s#,]+")
 _STAMP: Final = re.compile(r"(\d{4})-?(\d\d)-?(\d\d)[T _-]?(\d\d):?(\d\d):?(\d\d)(?:\.\d+)?")
 
@@ -38,7 +39,7 @@ def _filled(manifest: ReadManifest, key: str, template: str, table: ColumnTable)
             )
         return text
 
-    return _FIELD.sub(value, template)
+    return FIELD.sub(value, template)
 
 
 def _given(manifest: ReadManifest, key: str, table: ColumnTable) -> str:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import glob
 import math
+import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -24,7 +26,14 @@ from graspsense.sources.formats.raw_tables import BAG_SUFFIXES, PARQUET_SUFFIXES
 from graspsense.sources.formats.table import ColumnTable
 from graspsense.sources.formats.text_table import text_suffix
 from graspsense.sources.manifest.description import ReadManifest, axes_of, read_manifest, texts_of
-from graspsense.sources.manifest.facts import instance_of, label_of, order_of, recorded_at_of, values_of
+from graspsense.sources.manifest.facts import (
+    FIELD,
+    instance_of,
+    label_of,
+    order_of,
+    recorded_at_of,
+    values_of,
+)
 from graspsense.sources.manifest.files import NamedFile, files_of
 from graspsense.sources.manifest.notices import notices_of
 from graspsense.sources.manifest.samples import samples
@@ -46,10 +55,22 @@ def read_recordings(place: str) -> Iterator[LabelledRecording | UnreadableRecord
 
 
 def manifest_files(place: str) -> list[Path]:
-    """Return the files that a manifest describes, and its list if it has one. Raises ConfigError, DataDamaged."""
+    """Return the files that a manifest describes, those beside them, and its list if it has one.
+
+    Raises ConfigError, DataDamaged.
+    """
     manifest = read_manifest(Path(place).expanduser())
     listed_in = [manifest.place.parent / manifest.keys.list] if manifest.keys.list else []
-    return [*listed_in, *(file.path for file in files_of(manifest))]
+    files = [file.path for file in files_of(manifest)]
+    return [*listed_in, *files, *sorted(_beside(manifest, {file.parent for file in files}))]
+
+
+def _beside(manifest: ReadManifest, folders: Iterable[Path]) -> set[Path]:
+    """Return the files in these folders that hold further columns, or values; a field in a name may be any text."""
+    names = (*texts_of(manifest.keys.beside), *manifest.value_files.values())
+    patterns = ["*".join(map(glob.escape, FIELD.split(name)[::2])) for name in names]
+    places = (os.path.join(glob.escape(str(folder)), pattern) for folder in folders for pattern in patterns)
+    return {Path(path) for place in places for path in glob.glob(place)}
 
 
 def tables_of(manifest: ReadManifest, file: NamedFile) -> list[ColumnTable]:
