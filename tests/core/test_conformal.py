@@ -425,3 +425,46 @@ def test_a_probability_that_tells_nothing_gives_hardly_more_certainty(n):
         highest.append(certainty.rate(np.array([1.0]), np.array([np.nan]))[0])
     # Of 60 %; chance alone makes the highest of several rates higher, by 6 points if they were not drawn together.
     assert np.mean(highest) < 0.63
+
+
+def equal_rate(probability):
+    """Return the rate of right answers of probabilities that tell nothing."""
+    return np.full_like(probability, 0.6)
+
+
+def own_rate(probability):
+    """Return that of exact probabilities."""
+    return probability
+
+
+@every_case("n", [20, 60, 200])
+@every_case("rate_of", [equal_rate, own_rate])
+def test_the_interval_of_a_certainty_holds_for_new_answers(rate_of, n):
+    rng, held = np.random.default_rng(1), []
+    fresh, no_support = np.linspace(0.4, 1.0, 200), np.full(200, np.nan)
+    for _ in range(100):
+        probability = rng.uniform(0.4, 1.0, n)
+        right = rng.uniform(size=n) < rate_of(probability)
+        certainty = certainty_of(probability, np.full(n, np.nan), right.tolist(), [str(i) for i in range(n)])
+        intervals = np.array(certainty.intervals(fresh, no_support))
+        for low, high in np.unique(intervals, axis=0):
+            rests_on_as_much = intervals[:, 0] == low
+            held += [low <= rate_of(fresh[rests_on_as_much]).mean() <= high] * int(rests_on_as_much.sum())
+    # 95 % are asked for.
+    assert np.mean(held) > 0.92
+
+
+def test_a_certainty_from_few_trials_is_printed_with_its_interval_and_kept(tmp_path):
+    model = model_of(bottles(10), "tree")
+    path = tmp_path / "m.json"
+    write_model(path, model)
+    for known in (model, load_model(str(path), installed())):
+        (prediction, *_) = known.predictions(bottles(10).table)
+        low, high = prediction.certainty_interval
+        assert low < prediction.certainty < high
+        figure = f"({100 * low:.0f} to {100 * high:.0f} %)"
+        assert figure in prediction.certainty_figure
+        assert figure in prediction.certainty_in_words
+        assert prediction.as_json()["certainty_interval"] == [low, high]
+    sure = evolve(prediction, certainty_interval=(prediction.certainty - 0.01, prediction.certainty + 0.01))
+    assert "(" not in sure.certainty_figure

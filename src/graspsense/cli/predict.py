@@ -148,8 +148,6 @@ def _rate(predictions: Sequence[Prediction], labelled: Labelled, learned: str) -
 
 
 def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) -> None:
-    from graspsense.core.values.features import certainty_words
-
     coverage = next(
         (prediction.coverage for prediction in predictions if prediction.coverage is not None), None
     )
@@ -157,11 +155,10 @@ def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) ->
     header = ("TRIAL", "PREDICTION", "CERTAINTY", *sets, *(("LABEL", "CORRECT") if labels else ()), "BECAUSE")
     rows = []
     for i, prediction in enumerate(predictions):
-        certainty = certainty_words(prediction.certainty) if prediction.certainty is not None else ""
         of_set = () if coverage is None else (" or ".join(prediction.prediction_set),)
         label = (labels[i], "yes" if prediction.label == labels[i] else "no") if labels else ()
         because = "; ".join(reason.words for reason in prediction.because)
-        rows.append((str(i + 1), prediction.label, certainty, *of_set, *label, because))
+        rows.append((str(i + 1), prediction.label, prediction.certainty_figure, *of_set, *label, because))
     echo_table(header, rows, {"PREDICTION": prediction_style, "CORRECT": correct_style})
     reasons = Counter(prediction.no_certainty for prediction in predictions if prediction.no_certainty)
     for reason, count in reasons.items():

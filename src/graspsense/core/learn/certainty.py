@@ -5,7 +5,8 @@ was chosen for its trials, so that 4 of 4 means less than 57 of 57, by how much 
 divided into classes of support, each with enough of them. Within a class the rate of right answers rises with the
 probability (isotonic regression, R. E. Barlow et al., Statistical Inference under Order Restrictions, 1972). Each step
 of it has enough units. The rates are drawn together by what chance spreads them, and each is (right + 1) / (all + 2),
-so that no answer is certain.
+so that no answer is certain. Its 95 % interval is that of a beta distribution with this mean: from few units a rate is
+known as badly as that, whatever the luck of these trials.
 """
 
 from __future__ import annotations
@@ -42,13 +43,15 @@ class SupportClass:
     """Answers that rest on at least `least` training trials, and fewer than those of the next class.
 
     `rates` rise; each holds for probabilities from the number in `probabilities` at its place on, the first for all
-    smaller ones too. `units` is the number of units that they were computed from.
+    smaller ones too. `units` is the number of units that they were computed from. `intervals` has the 95 % interval of
+    each rate; it is empty in a model that was measured before these were kept.
     """
 
     least: float
     probabilities: tuple[float, ...]
     rates: tuple[float, ...]
     units: float
+    intervals: tuple[tuple[float, float], ...] = ()
 
 
 @frozen(kw_only=True)
@@ -65,15 +68,34 @@ class Certainty:
 
     def rate(self, probability: NDArray[np.float64], support: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the rate of right answers among those with this probability and support."""
-        chosen = self.class_of(support)
+        chosen, steps = self._places(probability, support)
         result = np.empty(len(probability))
         for k, support_class in enumerate(self.classes):
-            rows = np.flatnonzero(chosen == k)
-            steps = np.array(support_class.probabilities[1:]) - _ROUNDING
-            result[rows] = np.array(support_class.rates)[
-                np.searchsorted(steps, probability[rows], side="right")
-            ]
+            rows = chosen == k
+            result[rows] = np.array(support_class.rates)[steps[rows]]
         return result
+
+    def intervals(
+        self, probability: NDArray[np.float64], support: NDArray[np.float64]
+    ) -> list[tuple[float, float] | None]:
+        """Return the 95 % interval of the rate of each answer; None where it was not kept."""
+        chosen, steps = self._places(probability, support)
+        kept = [
+            support_class.intervals or (None,) * len(support_class.rates) for support_class in self.classes
+        ]
+        return [kept[k][step] for k, step in zip(chosen.tolist(), steps.tolist(), strict=True)]
+
+    def _places(
+        self, probability: NDArray[np.float64], support: NDArray[np.float64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the class of support of each answer, and the place of its rate there."""
+        chosen = self.class_of(support)
+        steps = np.empty(len(probability), dtype=np.int64)
+        for k, support_class in enumerate(self.classes):
+            rows = chosen == k
+            begins = np.array(support_class.probabilities[1:]) - _ROUNDING
+            steps[rows] = np.searchsorted(begins, probability[rows], side="right")
+        return chosen, steps
 
     def to_json(self) -> list[dict[str, Any]]:
         """Return the rates as values that JSON represents exactly."""
@@ -83,6 +105,7 @@ class Certainty:
                 "units": support_class.units,
                 "probabilities": list(support_class.probabilities),
                 "rates": list(support_class.rates),
+                "intervals": [list(interval) for interval in support_class.intervals],
             }
             for support_class in self.classes
         ]
@@ -98,6 +121,13 @@ def certainty_from(kept: Sequence[StoredValues]) -> Certainty:
             raise values.refusal("rates", "there is none, or one is above 1")
         if (np.diff(probabilities) <= 0.0).any():
             raise values.refusal("probabilities", "they do not rise")
+        intervals = (
+            values.numbers("intervals", (len(rates), 2), least=0.0)
+            if "intervals" in values and len(values.items("intervals"))
+            else np.empty((0, 2))
+        )
+        if len(intervals) and not ((intervals[:, 0] <= rates) & (rates <= intervals[:, 1])).all():
+            raise values.refusal("intervals", "one does not hold its rate")
         least = values.number("support", least=0.0)
         if classes and least <= classes[-1].least:
             raise values.refusal("support", "the classes of support do not rise")
@@ -107,6 +137,7 @@ def certainty_from(kept: Sequence[StoredValues]) -> Certainty:
                 probabilities=tuple(probabilities.tolist()),
                 rates=tuple(rates.tolist()),
                 units=values.number("units", least=0.0),
+                intervals=tuple((low, high) for low, high in intervals.tolist()),
             )
         )
     return Certainty(classes=tuple(classes))
@@ -131,9 +162,15 @@ def certainty_of(
     classes = []
     for least, end in pairwise(edges):
         rows = (known >= least) & (known < end)
-        begins, rates = _steps(probability[rows], answers[rows], weights[rows], least_units)
+        begins, rates, intervals = _steps(probability[rows], answers[rows], weights[rows], least_units)
         classes.append(
-            SupportClass(least=least, probabilities=begins, rates=rates, units=float(weights[rows].sum()))
+            SupportClass(
+                least=least,
+                probabilities=begins,
+                rates=rates,
+                units=float(weights[rows].sum()),
+                intervals=intervals,
+            )
         )
     return Certainty(classes=tuple(classes))
 
@@ -180,8 +217,9 @@ def _steps(
     right: NDArray[np.float64],
     weights: NDArray[np.float64],
     least_units: float,
-) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return where the steps of the isotonic regression begin, and their rates."""
+) -> tuple[tuple[float, ...], tuple[float, ...], tuple[tuple[float, float], ...]]:
+    """Return where the steps of the isotonic regression begin, their rates, and the intervals of these."""
+    from scipy.special import betaincinv
     from sklearn.isotonic import isotonic_regression
 
     values, value_of = np.unique(np.round(probability, 9), return_inverse=True)
@@ -200,8 +238,10 @@ def _steps(
         np.asarray(np.bincount(level_of, counts), dtype=np.float64) for counts in (right_of, all_of)
     )
     rates = (units * _drawn_together(right_in, units, len(all_of)) + 1.0) / (units + 2.0)
+    rates = np.maximum.accumulate(rates)
+    ends = (betaincinv(rates * (units + 2.0), (1.0 - rates) * (units + 2.0), end) for end in (0.025, 0.975))
     begins = [float(values[np.flatnonzero(level_of[bins] == level)[0]]) for level in range(len(rates))]
-    return tuple(begins), tuple(np.maximum.accumulate(rates).tolist())
+    return tuple(begins), tuple(rates.tolist()), tuple(zip(*(end.tolist() for end in ends), strict=True))
 
 
 def _drawn_together(right: NDArray[np.float64], units: NDArray[np.float64], bins: int) -> NDArray[np.float64]:

@@ -178,11 +178,14 @@ class Model:
         no_certainty = "it was not measured under these settings" if elsewhere else self.no_certainty
         lacking = self.novelty.lacking(table)
         probabilities, members = shares, np.zeros(shares.shape, dtype=np.bool_)
+        intervals: Sequence[tuple[float, float] | None] = [None] * len(table)
         if self.certainty is not None and not no_certainty:
             support = self.classifier.support(table)
             if support is None:
                 support = np.full(len(table), np.nan)
-            certainty = self.certainty.rate(shares[np.arange(len(table)), predicted], support)
+            share = shares[np.arange(len(table)), predicted]
+            certainty = self.certainty.rate(share, support)
+            intervals = self.certainty.intervals(share, support)
             measured = np.array([not names for names in lacking])
             known &= measured
             calibrated = with_certainty(at_temperature(shares, self.temperature), predicted, certainty)
@@ -208,6 +211,7 @@ class Model:
                     prediction_set=tuple(classes[k] for k in order),
                     coverage=self.sets.coverage if self.sets is not None and order else None,
                     calibrated=not without,
+                    certainty_interval=None if without else intervals[i],
                     no_certainty=without,
                 )
             )

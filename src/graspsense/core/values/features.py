@@ -194,6 +194,10 @@ def _reasons(items: Iterable[Reason | str]) -> tuple[Reason, ...]:
     return tuple(item if isinstance(item, Reason) else Reason(words=item) for item in items)
 
 
+WIDE: Final = 0.1
+"""Width of the interval of a certainty from which on it is printed."""
+
+
 @frozen(kw_only=True)
 class Prediction:
     """The prediction of a classifier for one trial.
@@ -206,6 +210,7 @@ class Prediction:
     the most probable first: it contains the true label of a new object with the probability `coverage`. It is empty,
     and `coverage` None, if the model is not calibrated or the trial is unknown. `calibrated` says whether the
     probabilities agree with rates in held-out trials (`graspsense.core.learn.certainty`); `no_certainty` says why not.
+    `certainty_interval` is the 95 % interval of the certainty, None if it was not measured.
     """
 
     label: str
@@ -218,6 +223,7 @@ class Prediction:
     coverage: float | None = None
     calibrated: bool = False
     no_certainty: str = ""
+    certainty_interval: tuple[float, float] | None = None
 
     @property
     def set_in_words(self) -> str:
@@ -232,12 +238,21 @@ class Prediction:
         return self.probabilities.get(self.label) if self.calibrated else None
 
     @property
+    def certainty_figure(self) -> str:
+        """The certainty in per cent, with its interval if that is wide: `92 % (72 to 98 %)`; empty without one."""
+        if self.certainty is None:
+            return ""
+        low, high = self.certainty_interval or (self.certainty, self.certainty)
+        interval = f" ({100 * low:.0f} to {100 * high:.0f} %)" if high - low > WIDE else ""
+        return certainty_words(self.certainty) + interval
+
+    @property
     def certainty_in_words(self) -> str:
         """The certainty with what it rests on, such as `about 88 %: 6 of 6 training trials`; empty without either."""
         with_label, trials = self.support or (0.0, 0.0)
         rests = f"{with_label:.4g} of {trials:.4g} training trials" if self.support is not None else ""
         if self.certainty is not None:
-            about = certainty_words(self.certainty)
+            about = self.certainty_figure
             return (about if about.startswith("over") else f"about {about}") + (f": {rests}" if rests else "")
         why = f"no certainty: {self.no_certainty}" if self.no_certainty else ""
         return "; ".join(part for part in (rests, why) if part)
@@ -251,6 +266,7 @@ class Prediction:
             "prediction_set": list(self.prediction_set),
             "coverage": self.coverage,
             "certainty": self.certainty,
+            "certainty_interval": None if self.certainty_interval is None else list(self.certainty_interval),
             "calibrated": self.calibrated,
             "no_certainty": self.no_certainty,
             "because": [reason.as_json() for reason in self.because],
