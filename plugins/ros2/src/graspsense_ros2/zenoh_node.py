@@ -74,7 +74,9 @@ class ZenohNode:
                 self._session, key, encoding=_ENCODING, cache=cache, publisher_detection=True
             )
         else:
-            publisher = self._session.declare_publisher(key, encoding=_ENCODING)
+            # A grasp is published from a process of its own, which may wait: zenoh drops what comes too fast.
+            block = zenoh.CongestionControl.BLOCK
+            publisher = self._session.declare_publisher(key, encoding=_ENCODING, congestion_control=block)
         self._declared.append(publisher)
         sequence = 0
 
