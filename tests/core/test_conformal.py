@@ -12,7 +12,7 @@ from commands import printed
 from test_evaluate import judged, labelled, learner
 
 from graspsense.core.components.registry import installed
-from graspsense.core.learn.certainty import certainty_of
+from graspsense.core.learn.certainty import Certainty, SupportClass, certainty_of
 from graspsense.core.learn.conformal import Answers, sets_of, units_lacking, units_needed
 from graspsense.core.learn.model_file import load_model, write_model
 from graspsense.core.learn.training import train
@@ -468,3 +468,12 @@ def test_a_certainty_from_few_trials_is_printed_with_its_interval_and_kept(tmp_p
         assert prediction.as_json()["certainty_interval"] == [low, high]
     sure = evolve(prediction, certainty_interval=(prediction.certainty - 0.01, prediction.certainty + 0.01))
     assert "(" not in sure.certainty_figure
+
+
+def test_the_interval_of_a_certainty_holds_it_where_answers_are_right_less_often_than_by_chance():
+    trials = bottles(10)
+    seldom = SupportClass(least=0.0, probabilities=(0.0,), rates=(0.1,), units=20.0, intervals=((0.02, 0.3),))
+    model = evolve(model_of(trials, "tree"), certainty=Certainty(classes=(seldom,)))
+    for prediction in model.predictions(trials.table):
+        assert prediction.certainty == 0.5
+        assert prediction.certainty_interval == (0.02, 0.5)

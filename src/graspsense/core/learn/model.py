@@ -185,11 +185,17 @@ class Model:
                 support = np.full(len(table), np.nan)
             share = shares[np.arange(len(table)), predicted]
             certainty = self.certainty.rate(share, support)
-            intervals = self.certainty.intervals(share, support)
+            kept = self.certainty.intervals(share, support)
             measured = np.array([not names for names in lacking])
             known &= measured
             calibrated = with_certainty(at_temperature(shares, self.temperature), predicted, certainty)
             probabilities = np.where(measured[:, np.newaxis], calibrated, shares)
+            # No answer counts as less certain than chance, however seldom such answers were right.
+            own = calibrated[np.arange(len(table)), predicted].tolist()
+            intervals = [
+                interval and (min(interval[0], sure), max(interval[1], sure))
+                for interval, sure in zip(kept, own, strict=True)
+            ]
             if self.sets is not None and self.sets.thresholds:
                 scores = scores_of(shares, self.novelty.closeness(table, classes))
                 answers = Answers(
