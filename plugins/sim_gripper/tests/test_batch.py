@@ -38,6 +38,7 @@ from graspsense.simulator_api import CompiledExtraction
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.backend import SimBackend
 from graspsense_sim_gripper.run.batch import buffers, threads, worker
+from graspsense_sim_gripper.run.batch.drawn import draw_numbers
 from graspsense_sim_gripper.run.batch.job import Job, grasp_plain
 from graspsense_sim_gripper.run.batch.scenes import Scenes
 from graspsense_sim_gripper.run.batch.threads import SLICE, run_many, slices_of
@@ -585,6 +586,22 @@ def test_few_grasps_are_compiled_only_if_their_code_is_on_disk_or_others_came_be
     assert not is_compiled(2, kept=False)
     assert not is_compiled(2, kept=False)
     assert is_compiled(2, kept=False)
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_drawing_and_measuring_are_compiled_for_many_grasps_or_if_their_code_is_on_disk(monkeypatch, kept):
+    monkeypatch.setattr(threads, "WORTH_COMPILING", 1)
+    monkeypatch.setattr(threads, "WORTH_COMPILING_AROUND", 4)
+    monkeypatch.setattr(threads, "_interpreted_around", Counter())
+    monkeypatch.setattr(threads, "is_drawing_kept", lambda: kept)
+    monkeypatch.setattr(threads, "is_measure_kept", lambda form: kept)
+    job = threads.job_of(SimConfig(), HYBRID, {"extract": create("feature-set", "chitta").extract})
+    results = []
+    for n, are_compiled in ((2, kept), (2, True)):
+        batch = threads._Batch(job, ["none"] * n, range(n), 1, None)
+        results.append([grasp.extracted for grasp in batch.grasps(None)])
+        assert (batch.measure is not None, batch.drawing is not draw_numbers) == (are_compiled, are_compiled)
+    assert results[0] == results[1]
 
 
 def test_room_is_made_on_the_way_without_beginning_again(monkeypatch):

@@ -2,6 +2,7 @@
 
 import re
 from functools import cache
+from itertools import product
 
 import pytest
 from cases import every_case
@@ -14,7 +15,7 @@ from graspsense.plugin_api import create
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.probe import grip_of
 from graspsense_sim_gripper.run.accuracy.propose import propose
-from graspsense_sim_gripper.run.batch.drawn import compiled_drawing
+from graspsense_sim_gripper.run.batch.drawn import compiled_drawing, draw_numbers
 from graspsense_sim_gripper.run.batch.job import Job, started
 from graspsense_sim_gripper.run.batch.scenes import Scenes, number_in, scene_key
 from graspsense_sim_gripper.run.build import build
@@ -102,10 +103,10 @@ def scenes_with(name):
 @given(st.sampled_from([name for name in NAMES if name != WIDE]), st.lists(SEEDS, min_size=1, max_size=3))
 @settings(max_examples=20)
 def test_a_drawn_grasp_is_that_of_the_seed(config, name, seeds):
-    scenes, drawing = scenes_with(config), compiled_drawing()
+    scenes = scenes_with(config)
     drawn = scenes.find(name).drawn
     memory = drawn.memory()
-    for seed in seeds:
+    for drawing, seed in product((compiled_drawing(), draw_numbers), seeds):
         setup = padded(scenes.setup(name, seed))
         expected = loop_start(*started(scenes.job, setup))
         start = drawn.drawn(drawing, key_of(seed), number_in(name), memory)

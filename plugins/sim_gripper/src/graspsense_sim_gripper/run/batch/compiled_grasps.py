@@ -1,4 +1,4 @@
-"""The compiled grasps of a batch in one thread, drawn in compiled code."""
+"""The compiled grasps of a batch in one thread."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import NamedTuple
 from attrs import field, frozen
 
 from graspsense_sim_gripper.run.batch.buffers import Storage, begin_images, first_images, longer
-from graspsense_sim_gripper.run.batch.drawn import DrawMemory, compiled_drawing
+from graspsense_sim_gripper.run.batch.drawn import Drawing, DrawMemory, draw_numbers
 from graspsense_sim_gripper.run.batch.job import (
     FinishedGrasp,
     Job,
@@ -56,6 +56,8 @@ class CompiledGrasps:
     loops: CompiledLoops
     is_compiled: Callable[[tuple[str, ...]], bool]
     """Whether loops with these kinds of terms are compiled."""
+    drawing: Drawing = draw_numbers
+    """What draws a grasp, compiled or not."""
     measure: Measure | None = None
     """The compiled form of `Job.extraction`; None: `Job.extract` is called with a trace."""
     storage: Storage = field(factory=Storage, init=False)
@@ -73,7 +75,7 @@ class CompiledGrasps:
         if scene not in self._memory:
             self._memory[scene] = drawn.memory()
         key = key_of(seed)
-        start = drawn.drawn(compiled_drawing(), key, number, self._memory[scene])
+        start = drawn.drawn(self.drawing, key, number, self._memory[scene])
         prepared = CompiledStart(
             start=start,
             setup=partial(scene.setup, seed, number),

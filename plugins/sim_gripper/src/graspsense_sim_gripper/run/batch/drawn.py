@@ -1,20 +1,20 @@
-"""The grasps of a scene that compiled code draws, without a `GraspSetup` for each.
+"""The grasps of a scene that start a compiled loop, drawn without a `GraspSetup` for each.
 
 A grasp is an array of numbers, in which those that its seed decides are overwritten. The results are the same to the
-bit as by `build.instantiate` (`test_a_drawn_grasp_is_that_of_the_seed`).
+bit as by `build.instantiate` (`test_a_drawn_grasp_is_that_of_the_seed`), drawn in compiled code or in the interpreter.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache, lru_cache
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from graspsense.simulator_api import CompileOptions, compile_function, entry_point
+from graspsense.simulator_api import CompileOptions, compile_function, entry_point, is_on_disk
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.sensing import PadCells
 from graspsense_sim_gripper.run.binding import bind_reachable
@@ -58,7 +58,7 @@ class Places(NamedTuple):
 
 
 Drawing = Callable[[SceneNumbers, Places, Word, Any, DrawBuffers, Any], None]
-"""`draw_numbers`, compiled."""
+"""`draw_numbers`, compiled or not."""
 
 
 def draw_numbers(
@@ -74,15 +74,23 @@ def draw_numbers(
         numbers[places.share], numbers[places.image_phase_s] = drawn.placement.share, drawn.image_phase_s
 
 
+_OPTIONS: Final = CompileOptions(
+    # Drawing takes less time than getting the lock of the interpreter back from another thread.
+    releases_lock=False
+)
+
+
+def is_drawing_kept() -> bool:
+    """Return whether an earlier process has kept the machine code of `draw_numbers` on disk."""
+    return is_on_disk(_drawing_to_compile(), _OPTIONS)
+
+
 @cache
 def compiled_drawing() -> Drawing:
     """Return `draw_numbers` in compiled code. Raises NotCompilable."""
     none, no_places = np.zeros(0), np.zeros(0, np.int64)
     scene = _with_arrays(scene_numbers(SimConfig(), None))
-    # It takes less time than getting the lock of the interpreter back from another thread.
-    compiled = compile_function(
-        bind_reachable(draw_numbers, IN_COMPILED_CODE), CompileOptions(releases_lock=False)
-    )
+    compiled = compile_function(_drawing_to_compile(), _OPTIONS)
     with generating():
         compiled(
             scene,
@@ -95,6 +103,11 @@ def compiled_drawing() -> Drawing:
             np.zeros(1),
         )
     return entry_point(compiled)
+
+
+@cache
+def _drawing_to_compile() -> Drawing:
+    return bind_reachable(draw_numbers, IN_COMPILED_CODE)
 
 
 def _with_arrays(scene: SceneNumbers) -> SceneNumbers:

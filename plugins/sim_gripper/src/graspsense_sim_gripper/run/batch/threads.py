@@ -12,10 +12,10 @@ import os
 import threading
 import warnings
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack
-from importlib.util import find_spec
+from functools import partial
 from operator import index
 from typing import Any, Final, Unpack
 
@@ -25,7 +25,7 @@ from graspsense.plugin_api import Controller, FeatureSet
 from graspsense.simulator_api import BatchOptions, NotCompilable, RunConfig
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.batch.compiled_grasps import CompiledGrasps
-from graspsense_sim_gripper.run.batch.drawn import compiled_drawing
+from graspsense_sim_gripper.run.batch.drawn import Drawing, compiled_drawing, draw_numbers, is_drawing_kept
 from graspsense_sim_gripper.run.batch.job import (
     FinishedGrasp,
     Job,
@@ -35,7 +35,7 @@ from graspsense_sim_gripper.run.batch.job import (
 from graspsense_sim_gripper.run.batch.scenes import Scenes, SelectedScene, scene_key
 from graspsense_sim_gripper.run.batch.worker import NotHandedOver, PlainProcess
 from graspsense_sim_gripper.run.build import build
-from graspsense_sim_gripper.run.compiled.extraction import compiled_measure
+from graspsense_sim_gripper.run.compiled.extraction import compiled_measure, is_measure_kept
 from graspsense_sim_gripper.run.compiled.loop_code import CompiledLoops, is_kept
 from graspsense_sim_gripper.run.compiled.padding import compiled_kinds
 from graspsense_sim_gripper.scene.library import kinds_in
@@ -46,6 +46,9 @@ WORTH_COMPILING: Final = 350
 half a minute, in which the interpreter runs about so many grasps."""
 WORTH_LOADING: Final = 16
 """The same where an earlier process has kept the compiled loop on disk."""
+WORTH_COMPILING_AROUND: Final = 10_000
+"""Number of compiled grasps of this process from which it saves time to compile their drawing (a second, against 0.1 ms
+a grasp) or what measures their features (1.4 s, against 0.15 ms)."""
 WORTH_A_PROCESS: Final = 16
 """Number of grasps per worker in the interpreter from which a process, which starts in half a second, saves time."""
 WORTH_A_WORKER: Final = 16
@@ -62,6 +65,8 @@ PROGRESS_S: Final = 0.2
 
 _interpreted: Final[Counter[tuple[str, ...]]] = Counter()
 """Number of grasps of this process that were not worth compiling, by the kinds of their terms."""
+_interpreted_around: Final[Counter[Hashable]] = Counter()
+"""Number of compiled grasps of this process for which a part around the loop was not worth compiling, by the part."""
 
 
 def run_many(
@@ -138,6 +143,8 @@ class _Batch:
     compiled: bool | None
     notes: dict[str, None] = field(factory=dict, init=False)
     """Remarks on how the grasps ran, as keys, so that each is given once."""
+    drawing: Drawing = field(default=draw_numbers, init=False)
+    """What draws the compiled grasps, compiled or not."""
     measure: Measure | None = field(default=None, init=False)
     """The compiled form of `Job.extraction`."""
     models: Scenes = field(init=False)
@@ -222,20 +229,28 @@ class _Batch:
         return False
 
     def _compile_around_the_loop(self) -> None:
-        """Compile what each compiled grasp does before and after its loop."""
-        if find_spec("numba") is None:
-            return
+        """Compile what each compiled grasp does before and after its loop, where that saves time."""
         try:
-            # Here, so that the threads find the code of the drawing.
-            compiled_drawing()
+            if self._is_worth_compiling_around(draw_numbers, is_drawing_kept):
+                self.drawing = compiled_drawing()
         except NotCompilable:
             # The loop cannot be compiled either, and says why.
             return
-        if self.job.extraction is not None:
+        form = self.job.extraction
+        if form is not None:
             try:
-                self.measure = compiled_measure(self.job.extraction)
+                if self._is_worth_compiling_around(form.measure, partial(is_measure_kept, form)):
+                    self.measure = compiled_measure(form)
             except NotCompilable as error:
                 self.notes[f"features are extracted from traces, which takes longer: {error}"] = None
+
+    def _is_worth_compiling_around(self, part: Hashable, is_kept: Callable[[], bool]) -> bool:
+        """Return whether it saves time to compile a part around the loop. Raises NotCompilable as `is_kept` does."""
+        n = sum(count for kinds, count in self.counts.items() if self.is_compiled[kinds])
+        if self.compiled or n + _interpreted_around[part] >= WORTH_COMPILING_AROUND or is_kept():
+            return True
+        _interpreted_around[part] += n
+        return False
 
     def _slice(self, which: range) -> list[FinishedGrasp]:
         """Run the grasps with these indices."""
@@ -252,7 +267,7 @@ class _Batch:
         try:
             if not hasattr(self.local, "grasps"):
                 self.local.grasps = CompiledGrasps(
-                    self.models, self.loops, self.is_compiled.__getitem__, self.measure
+                    self.models, self.loops, self.is_compiled.__getitem__, self.drawing, self.measure
                 )
             grasps: CompiledGrasps = self.local.grasps
             return grasps.grasp(scene, seed)

@@ -14,6 +14,7 @@ from graspsense.simulator_api import (
     bind,
     compile_function,
     entry_point,
+    is_on_disk,
 )
 from graspsense_sim_gripper.run.compiled.jit import generating
 from graspsense_sim_gripper.run.loop import COLUMNS, EVENT_SHIFT, Table
@@ -48,6 +49,11 @@ def measure_buffers(params: Any, columns: Table, phases: Any, n: int) -> Any:
     return measure(params, ticks)
 
 
+def is_measure_kept(form: CompiledExtraction) -> bool:
+    """Return whether an earlier process has kept the machine code of an extraction on disk. Raises NotCompilable."""
+    return is_on_disk(_measuring(form.measure))
+
+
 def compiled_measure(form: CompiledExtraction) -> Callable[[Any, Any, Any, int], Any]:
     """Return `measure_buffers` of an extraction, compiled. Raises NotCompilable."""
     return _compiled_measure(form.measure, form.params)
@@ -57,7 +63,7 @@ def compiled_measure(form: CompiledExtraction) -> Callable[[Any, Any, Any, int],
 def _compiled_measure(
     what: Callable[[Any, TickColumns], Any], params: Any
 ) -> Callable[[Any, Any, Any, int], Any]:
-    compiled = compile_function(bind(measure_buffers, measure=what))
+    compiled = compile_function(_measuring(what))
     with generating():
         try:
             compiled(params, np.zeros((len(COLUMNS), 1)), np.zeros(1, np.int64), 0)
@@ -66,3 +72,7 @@ def _compiled_measure(
             if not getattr(compiled, "overloads", {}):
                 raise
     return entry_point(compiled)
+
+
+def _measuring(what: Callable[[Any, TickColumns], Any]) -> Callable[..., Any]:
+    return bind(measure_buffers, measure=what)
