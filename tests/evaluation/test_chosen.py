@@ -76,6 +76,16 @@ def test_a_candidate_that_is_far_worse_is_told_and_the_rate_of_a_clear_best_stay
     chosen = rate_of_chosen(right, None)
     assert chosen.rate == pytest.approx(right[0].mean(), abs=0.01)
     assert chosen.candidates == 4
+    assert "(95 %: " in chosen.words
+
+
+def test_a_rate_without_an_interval_has_no_level_of_confidence():
+    right = np.random.default_rng(2).random((3, 40)) < 0.7
+
+    chosen = rate_of_chosen(right, None, no_interval="class and object are the same")
+
+    assert chosen.interval is None
+    assert "95 %" not in chosen.words
 
 
 def test_candidates_with_the_same_answers_are_one_comparison():

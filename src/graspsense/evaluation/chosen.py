@@ -45,7 +45,8 @@ class ChosenRate:
     @property
     def words(self) -> str:
         """The rate with its interval."""
-        return f"{percent(self.rate)} (95 %: {percentages(self.interval)})"
+        interval = "no interval" if self.interval is None else f"95 %: {percentages(self.interval)}"
+        return f"{percent(self.rate)} ({interval})"
 
 
 def comparisons_of(right: NDArray[np.bool_], instances: Sequence[str] | None) -> float:
