@@ -512,3 +512,26 @@ def test_a_certainty_knows_the_drift_between_the_sessions_of_its_trials_and_no_o
         assert any("drifted" in warning for warning in made[0].warnings) != held_out
     # Of forces that do not drift, certainty and rate differ by 3 points at most.
     assert np.mean(differences) > 0.06 if too_sure else np.mean(differences) < 0.03
+
+
+def test_the_coverage_of_sets_is_that_of_all_sizes_together():
+    covered: dict[int, list[bool]] = {}
+    for seed in range(15):
+        rng = np.random.default_rng(seed)
+        means = 0.6 * rng.normal(size=(3, 3))
+
+        def hard(each, rng=rng, means=means):
+            numbers = np.repeat(np.arange(3), each)
+            return labelled(
+                [f"thing {k}" for k in numbers], *(means[numbers] + rng.normal(size=(3 * each, 3))).T
+            )
+
+        model, new = model_of(hard(30), "svm"), hard(100)
+        for prediction, label in zip(model.predictions(new.table), new.labels, strict=True):
+            if prediction.prediction_set:
+                size = len(prediction.prediction_set)
+                covered.setdefault(size, []).append(label in prediction.prediction_set)
+    # Sets of every label always hold. So with 90 % of all sets, those of two hold less often.
+    assert all(covered[3])
+    assert 0.88 < np.mean([*covered.get(1, ()), *covered[2], *covered[3]]) < 0.96
+    assert 0.8 < np.mean(covered[2]) < 0.9
