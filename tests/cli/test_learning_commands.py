@@ -76,6 +76,9 @@ def test_train_then_predict(csv, tmp_path):
     code, out, _ = graspsense("train", csv, "--label", "what", "--instance", "thing", "--out", model)
     assert code == 0
     assert "labels      can:empty, can:full, jar:empty, jar:full" in out
+    by_trials = printed("train", csv, "--label", "what", "--out", tmp_path / "by_trials.json")
+    assert "\ndrift " in by_trials
+    assert "\ndrift " not in out  # of six things no certainty is measured
     assert f"how good    graspsense evaluate {csv} --label what --instance thing" in out
     assert json.loads(model.read_text())["provenance"]["command"] == (
         f"graspsense train {csv} --out {model} --label what --instance thing"

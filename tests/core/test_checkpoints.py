@@ -165,8 +165,8 @@ def test_predictions_in_the_loop_are_those_of_the_same_part_afterwards(model, tm
 @every_case(
     ("labels", "said"),
     [
-        (("soft", "stiff", "hard"), "soft or stiff or hard, 90 %"),
-        (("soft", "stiff", "hard", "empty"), "soft or one of 3 others, 90 %"),
+        (("soft", "stiff", "hard"), "soft or stiff or hard, 90 % of all sets"),
+        (("soft", "stiff", "hard", "empty"), "soft or one of 3 others, 90 % of all sets"),
     ],
 )
 def test_a_large_set_stays_one_line(labels, said):
@@ -174,6 +174,23 @@ def test_a_large_set_stays_one_line(labels, said):
     prediction = Prediction(label="soft", probabilities={}, because=(), prediction_set=labels, coverage=0.9)
     made = CheckpointPrediction(after_s=0.2, t_s=1.0, features=features, prediction=prediction)
     assert made.words == f"0.2 s after the contact: {said}"
+
+
+def test_an_answer_that_is_sure_has_its_certainty_and_the_interval():
+    # Which answers are sure depends on luck, too: of few trials, the interval says how much.
+    features = Features(names=(), values=(), units=())
+    prediction = Prediction(
+        label="soft",
+        probabilities={"soft": 0.92, "stiff": 0.08},
+        because=(),
+        prediction_set=("soft",),
+        coverage=0.9,
+        calibrated=True,
+        certainty_interval=(0.75, 0.98),
+    )
+    made = CheckpointPrediction(after_s=0.2, t_s=1.0, features=features, prediction=prediction)
+    assert made.sure
+    assert made.words == "0.2 s after the contact: soft, 92 % (75 to 98 %)"
 
 
 @pytest.mark.parametrize("clock", ["virtual", "device"])
@@ -189,7 +206,7 @@ def test_a_sure_prediction_ends_the_squeeze_and_the_release_is_the_usual_one(mod
     anytime.end()
 
     assert grasp.outcome == Outcome.RECOGNISED
-    assert "after the contact: stiff, 90 %" in grasp.reason
+    assert f"after the contact: stiff, {anytime.predictions[-1].prediction.certainty_figure}" in grasp.reason
     assert anytime.predictions[-1].prediction.prediction_set == ("stiff",)
     contact = contact_of(grasp.trace)
     stopped_s = anytime.predictions[-1].t_s

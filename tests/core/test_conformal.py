@@ -266,7 +266,7 @@ def test_every_classifier_has_sets_that_loading_keeps_exactly(name, tmp_path):
         assert said.prediction_set == again.prediction_set
         assert said.label in said.prediction_set
         assert said.coverage == 0.9
-        assert said.set_in_words.endswith(", 90 %")
+        assert said.set_in_words.endswith(", 90 % of all sets")
     model.classifier.to_json = lambda: {"means": np.zeros(2)}
     with pytest.raises(ComponentFailed, match="Its to_json gives lists"):
         write_model(tmp_path / "m.json", model)
@@ -477,3 +477,61 @@ def test_the_interval_of_a_certainty_holds_it_where_answers_are_right_less_often
     for prediction in model.predictions(trials.table):
         assert prediction.certainty == 0.5
         assert prediction.certainty_interval == (0.02, 0.5)
+
+
+def squeezed_in(sessions, each, rng, means):
+    """Squeezes of three things whose forces have a gain of their own in each session, by 10 % (standard deviation)."""
+    labels, forces, names = [], [], []
+    for session in range(sessions):
+        gain = 1.0 + 0.1 * rng.normal()
+        for k, mean in enumerate(means):
+            labels += [f"thing {k}"] * each
+            names += [f"session {session}"] * each
+            forces.append(gain * mean * (1.0 + 0.08 * rng.normal(size=(each, 3))))
+    return labels, np.concatenate(forces).T, tuple(names)
+
+
+@every_case(
+    ("sessions", "each", "held_out", "too_sure"),
+    [(1, 40, False, True), (10, 6, False, False), (10, 6, True, False)],
+)
+def test_a_certainty_knows_the_drift_between_the_sessions_of_its_trials_and_no_other(
+    sessions, each, held_out, too_sure
+):
+    differences = []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        means = 5.0 * np.exp(0.13 * rng.normal(size=(3, 3)))
+        labels, forces, names = squeezed_in(sessions, each, rng, means)
+        model = model_of(labelled(labels, *forces, instances=names if held_out else None), "svm")
+        labels, forces, _ = squeezed_in(30, 3, rng, means)
+        made = model.predictions(labelled(labels, *forces).table)
+        said = [prediction for prediction in made if prediction.certainty is not None]
+        right = [prediction.label == label for prediction, label in zip(made, labels, strict=True)]
+        differences.append(np.mean([prediction.certainty for prediction in said]) - np.mean(right))
+        assert any("drifted" in warning for warning in made[0].warnings) != held_out
+    # Of forces that do not drift, certainty and rate differ by 3 points at most.
+    assert np.mean(differences) > 0.06 if too_sure else np.mean(differences) < 0.03
+
+
+def test_the_coverage_of_sets_is_that_of_all_sizes_together():
+    covered: dict[int, list[bool]] = {}
+    for seed in range(15):
+        rng = np.random.default_rng(seed)
+        means = 0.6 * rng.normal(size=(3, 3))
+
+        def hard(each, rng=rng, means=means):
+            numbers = np.repeat(np.arange(3), each)
+            return labelled(
+                [f"thing {k}" for k in numbers], *(means[numbers] + rng.normal(size=(3 * each, 3))).T
+            )
+
+        model, new = model_of(hard(30), "svm"), hard(100)
+        for prediction, label in zip(model.predictions(new.table), new.labels, strict=True):
+            if prediction.prediction_set:
+                size = len(prediction.prediction_set)
+                covered.setdefault(size, []).append(label in prediction.prediction_set)
+    # Sets of every label always hold. So with 90 % of all sets, those of two hold less often.
+    assert all(covered[3])
+    assert 0.88 < np.mean([*covered.get(1, ()), *covered[2], *covered[3]]) < 0.96
+    assert 0.8 < np.mean(covered[2]) < 0.9

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import browser as browsers
 import pytest
+from attrs import evolve
 from live_grasp import COMMAND, device
 
 from graspsense.core.pipeline.pipeline import load_pipeline
@@ -83,11 +84,16 @@ def test_the_page_shows_what_was_sent(browser, feed, tmp_path, dark, width):
     last = f"{trace.gap_m[-1] * 1e3:.3f} mm"
     shown(browser, "document.querySelector('[data-name=gap_m]').textContent", last)
     assert browser.run("$('label').textContent") == trial.prediction.label
+    assert browser.run("$('certainty').textContent") == trial.prediction.certainty_in_words
     assert browser.run("$('set').textContent") == (
         f"set: {trial.prediction.set_in_words}" if trial.prediction.set_in_words else ""
     )
     because = browser.run("[...document.querySelectorAll('#because li')].map((one) => one.textContent)")
     assert because == [reason.words for reason in trial.prediction.because]
+    vague = evolve(trial.prediction, calibrated=True, certainty_interval=(0.21, 0.69))
+    feed.told("prediction", vague.in_words)
+    shown(browser, "$('certainty').textContent", vague.certainty_in_words)
+    assert "(21 to 69 %)" in vague.certainty_in_words
     events = browser.run("[...document.querySelectorAll('#events li')].map((one) => one.textContent)")
     assert events == [f"{event.t_s:.3f} s  {event.what}" for event in trial.events]
     browser.screenshot(tmp_path / "page.png")

@@ -97,6 +97,8 @@ def test_a_trial_shows_outcome_curve_features_and_prediction():
     assert repr(trial).startswith("<Trial: steady, ")
     assert repr(trial).endswith("predicted cup:<full>>")
     assert repr(prediction) == "<Prediction: cup:<full>, about 98 %>"
+    vague = shown(evolve(trial, prediction=evolve(prediction, certainty_interval=(0.79, 0.99))))
+    assert vague.count("98 % (79 to 99 %)") == 2  # beside the label, and among the classes
     unmeasured = shown(evolve(trial, prediction=elsewhere))
     assert "98 %" not in unmeasured
     assert "no certainty: another force" in unmeasured

@@ -76,7 +76,26 @@ def test_a_model_predicts_at_the_end_of_the_grasp(tmp_path, monkeypatch):
 
     assert step.grasp.classes == ("can:empty_open", "can:full_open")
     assert end["graspsense.prediction"] in (1, 2)
-    assert 0.5 <= end["graspsense.probability"] <= 1.0
+    # Four trials measure no certainty, whatever the probability in the leaf.
+    assert all(math.isnan(end[f"graspsense.certainty{bound}"]) for bound in ("", "_low", "_high"))
+
+
+def test_a_certainty_that_was_measured_comes_with_its_interval(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["graspsense"])
+    widths = [("jar", 50.0 + 0.1 * k) if k % 2 else ("can", 66.0 + 0.1 * k) for k in range(-20, 20)]
+    Path("widths.csv").write_text(
+        "\n".join(["what,p_first [m]", *(f"{what},{mm / 1e3:g}" for what, mm in widths)])
+    )
+    printed("train", "widths.csv", "--label", "what", "--classifier", "tree", "--out", "model.json")
+    step = processor_step()("default", ["classifier.type=tree", "classifier.model=model.json"], READING)
+    (end,) = [told for told in processed(step, grasp()) if told["graspsense.event"] == EVENTS.index("end")]
+
+    assert step.grasp.classes[int(end["graspsense.prediction"]) - 1] == "jar"
+    low, certainty, high = (end[f"graspsense.certainty{bound}"] for bound in ("_low", "", "_high"))
+    # All 40 held-out answers are right, of which (40 + 1) / (40 + 2) are counted.
+    assert certainty == pytest.approx(41 / 42)
+    assert 0.8 < low < certainty < high < 1.0
 
 
 def test_reset_begins_anew_and_a_missing_number_is_counted():

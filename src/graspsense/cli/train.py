@@ -237,6 +237,8 @@ def _as_values(model: Model) -> dict[str, Any]:
 
 def _say_trained(out: str, model: Model) -> None:
     """Print what was trained."""
+    from graspsense.core.learn.conformal import units_needed
+
     echo(f"{out}: {model.in_a_line}", indent=2)
     echo_entry("labels", ", ".join(model.classifier.classes()))
     if model.sets is not None:
@@ -248,6 +250,12 @@ def _say_trained(out: str, model: Model) -> None:
                 f"{100 * unknown / trials:.1f} % ({unknown} of {trials}) of the held-out trials are called unknown "
                 "(false alarms), hardly more of new ones: the model knows more trials than those of the folds",
             )
+    if model.certainty is not None and not model.simulated:
+        echo_entry(
+            "drift",
+            "certainty and sets know the drift of the forces between held-out instances only: where sessions differ, "
+            f"let the instance of a trial be its session ({units_needed()} or more), or they are too sure",
+        )
     for after_s, part in model.checkpoints:
         sets = "" if part.sets is None else f", sets {part.sets.in_words}"
         echo_entry(

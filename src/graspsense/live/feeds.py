@@ -13,7 +13,6 @@ from graspsense.core.values.channel import FastChannel, TactileArray
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.events import GraspEvent, event_as_json
-from graspsense.core.values.features import Prediction
 from graspsense.core.values.json_values import json_ready
 from graspsense.core.values.trial import Trial
 from graspsense.recording.atomic_file import SaveFailed
@@ -69,12 +68,12 @@ class LiveFeed(Feed):
         """Pass on an event, and the prediction if it is one."""
         self._told("event", event_as_json(event))
         if event.prediction is not None:
-            self._told("prediction", prediction_values(event.prediction))
+            self._told("prediction", event.prediction.in_words)
 
     def finished(self, trial: Trial) -> None:
         """Pass on how a grasp ended. Do not call this during control."""
         if trial.prediction is not None:
-            self._told("prediction", prediction_values(trial.prediction))
+            self._told("prediction", trial.prediction.in_words)
         self.told("outcome", {"outcome": trial.outcome.words, "reason": trial.reason})
 
     def told(self, name: str, values: Any) -> None:
@@ -111,13 +110,3 @@ def grasp_values(device: DeviceInfo) -> dict[str, Any]:
     values = {"device": device.name, "rate_hz": device.rate_hz, "clock": device.clock, "channels": channels}
     ready: dict[str, Any] = json_ready({**values, "units": dict(device.units)})
     return ready
-
-
-def prediction_values(prediction: Prediction) -> dict[str, Any]:
-    """Return a prediction in words, as JSON values."""
-    return {
-        "label": prediction.label,
-        "certainty": prediction.certainty_in_words,
-        "set": prediction.set_in_words,
-        "because": [reason.words for reason in prediction.because],
-    }

@@ -67,9 +67,9 @@ def prediction_html(prediction: Prediction) -> str:
     if prediction.set_in_words:
         parts.append(sentence(f"set: {prediction.set_in_words}"))
     if likely and prediction.calibrated:
-        parts.append(
-            table(("class", "probability"), [(label, certainty_words(share)) for label, share in likely])
-        )
+        figures = {prediction.label: prediction.certainty_figure}
+        rows = [(label, figures.get(label) or certainty_words(share)) for label, share in likely]
+        parts.append(table(("class", "probability"), rows))
     parts += [sentence(reason.words) for reason in prediction.because]
     parts += [sentence(f"warning: {warning}") for warning in prediction.warnings]
     if prediction.model:

@@ -35,7 +35,7 @@ def processor_step() -> Any:
 
     @ProcessorStepRegistry.register("graspsense")
     class GraspsenseStep(ObservationProcessorStep):  # type: ignore[misc]
-        """Adds phase, event, outcome, prediction and its probability to each observation."""
+        """Adds phase, event, outcome, prediction and its certainty to each observation."""
 
         def __init__(self, pipeline: str = "default", options: Sequence[str] = (), reading: str = "") -> None:
             self._given = {"pipeline": pipeline, "options": list(options), "reading": reading}

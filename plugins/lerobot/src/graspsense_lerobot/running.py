@@ -37,14 +37,17 @@ class Running(NamedTuple):
     """A grasp after an observation, in numbers.
 
     `phase` and `outcome` are those of `Phase` and `Outcome`, `event` is one of `EVENTS`. `prediction` is the number of
-    the class, counted from 1, and 0 for none; `probability` is NaN without one.
+    the class, counted from 1, and 0 for none. `certainty` is how often such answers are right, from `certainty_low` to
+    `certainty_high` at 95 %; they are NaN where that was not measured.
     """
 
     phase: int
     event: int
     outcome: int
     prediction: int
-    probability: float
+    certainty: float
+    certainty_low: float
+    certainty_high: float
 
 
 @final
@@ -80,9 +83,7 @@ class FollowedGrasp:
         self._meaning: Meaning | None = None
         self._frames = 0
         self._last: Frame | None = None
-        self._now = Running(
-            phase=int(self._law.init().phase), event=0, outcome=RUNNING, prediction=0, probability=nan
-        )
+        self._now = Running(int(self._law.init().phase), 0, RUNNING, prediction=0, **_certainty(None))
         self._begin()
 
     def add(self, numbers: Mapping[str, float]) -> Running:
@@ -137,16 +138,9 @@ class FollowedGrasp:
                 self.prediction = self._model.predict(
                     self._features.extract(self._recorder.trace()), None, None
                 )
-        prediction, probability = self._predicted()
-        self._now = Running(
-            phase=phase, event=event, outcome=outcome, prediction=prediction, probability=probability
-        )
-
-    def _predicted(self) -> tuple[int, float]:
         made = self.prediction
-        if made is None or made.label not in self.classes:
-            return 0, nan
-        return self.classes.index(made.label) + 1, float(made.probabilities[made.label])
+        number = self.classes.index(made.label) + 1 if made is not None and made.label in self.classes else 0
+        self._now = Running(phase, event, outcome, prediction=number, **_certainty(made))
 
     def _frame(self, t_s: float, numbers: Mapping[str, float]) -> Frame | None:
         """Return the frame of these numbers, None if one of them is missing. Raises ConfigError."""
@@ -217,6 +211,15 @@ def _observations(rate_hz: float) -> DeviceInfo:
         opening=None,
         relaxed=Command(VELOCITY, 0.0, inf, inf),
     )
+
+
+def _certainty(made: Prediction | None) -> dict[str, float]:
+    """Return the certainty of a prediction and the ends of its interval, NaN where they were not measured."""
+    certainty = None if made is None else made.certainty
+    if made is None or certainty is None:
+        return dict.fromkeys(("certainty", "certainty_low", "certainty_high"), nan)
+    low, high = made.certainty_interval or (nan, nan)
+    return {"certainty": certainty, "certainty_low": low, "certainty_high": high}
 
 
 def _nobody(t_s: float, phase: int, words: str, prediction: Prediction | None) -> None:

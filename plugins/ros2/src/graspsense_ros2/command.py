@@ -207,21 +207,13 @@ class GripperServer:
 def _told(trial: Trial) -> dict[str, Any]:
     """Return what a caller is told of a grasp, as JSON values."""
     features: Sequence[float] = trial.features.values
-    told: dict[str, Any] = {
+    return {
         "outcome": trial.outcome.words,
         "reason": trial.reason,
         "features": {
             name: value if isfinite(value) else None
             for name, value in zip(trial.features.names, features, strict=True)
         },
-        "prediction": None,
+        "prediction": None if trial.prediction is None else trial.prediction.in_words,
         "counts": dict(trial.counts),
     }
-    if trial.prediction is not None:
-        told["prediction"] = {
-            "label": trial.prediction.label,
-            "certainty": trial.prediction.certainty_in_words,
-            "set": trial.prediction.set_in_words,
-            "because": [reason.words for reason in trial.prediction.because],
-        }
-    return told

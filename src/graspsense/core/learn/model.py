@@ -286,7 +286,7 @@ class Model:
         ):
             yield (
                 "certainty and sets were measured with grasps of the objects that it was trained on: of other objects "
-                "it knows less"
+                "it knows less, and less once the forces have drifted"
             )
         if self.sets is not None and self.sets.uncalibrated and not differences:
             names = ", ".join(self.sets.uncalibrated)

@@ -227,10 +227,15 @@ class Prediction:
 
     @property
     def set_in_words(self) -> str:
-        """The set with its coverage, such as `full_open or empty_open, 90 %`; empty without a set."""
-        if self.coverage is None:
-            return ""
-        return f"{' or '.join(self.prediction_set)}, {certainty_words(self.coverage)}"
+        """The set with its coverage, such as `full_open or empty_open, 90 % of all sets`; empty without a set."""
+        return self.coverage_in_words(" or ".join(self.prediction_set))
+
+    def coverage_in_words(self, labels: str) -> str:
+        """The labels of a set, as said here, with the coverage; empty without a set.
+
+        The coverage is that of sets of all sizes together: those of many labels hold more often, those of few less.
+        """
+        return "" if self.coverage is None else f"{labels}, {certainty_words(self.coverage)} of all sets"
 
     @property
     def certainty(self) -> float | None:
@@ -256,6 +261,16 @@ class Prediction:
             return (about if about.startswith("over") else f"about {about}") + (f": {rests}" if rests else "")
         why = f"no certainty: {self.no_certainty}" if self.no_certainty else ""
         return "; ".join(part for part in (rests, why) if part)
+
+    @property
+    def in_words(self) -> dict[str, Any]:
+        """What a page or a message shows of it: label, certainty with its interval, set and reasons."""
+        return {
+            "label": self.label,
+            "certainty": self.certainty_in_words,
+            "set": self.set_in_words,
+            "because": [reason.words for reason in self.because],
+        }
 
     def as_json(self) -> dict[str, Any]:
         """Return label, probabilities, set and reasons as `--json` prints them."""
@@ -299,16 +314,20 @@ class CheckpointPrediction:
 
     @property
     def words(self) -> str:
-        """The checkpoint with the prediction: `0.2 s after the contact: can:full or can:empty, 90 %`.
+        """The checkpoint with the prediction: `0.2 s after the contact: can:full or can:empty, 90 % of all sets`.
 
-        Of a set with more than three labels, only the first is named, so that it stays one line in a terminal.
+        A set with one label has the certainty of the answer in place of that of the sets. Of a set with more than three
+        labels, only the first is named, so that it stays one line in a terminal.
         """
-        likeliest, *others = self.prediction.prediction_set or (self.prediction.label,)
-        if len(others) > 2 and self.prediction.coverage is not None:
-            said = f"{likeliest} or one of {len(others)} others, {certainty_words(self.prediction.coverage)}"
+        made = self.prediction
+        likeliest, *others = made.prediction_set or (made.label,)
+        if self.sure and made.certainty is not None:
+            said = f"{likeliest}, {made.certainty_figure}"
+        elif len(others) > 2:
+            said = made.coverage_in_words(f"{likeliest} or one of {len(others)} others")
         else:
-            said = self.prediction.set_in_words or self.prediction.label
-        return f"{self.after_s:g} s after the contact: {said}"
+            said = made.set_in_words
+        return f"{self.after_s:g} s after the contact: {said or made.label}"
 
 
 def certainty_words(probability: float) -> str:
