@@ -52,6 +52,8 @@ JUMP_SPEED_M_S: Final = 1.0
 """Speed beyond which no finger moves,"""
 JUMP: Final = 3.0
 """and how many times farther than the third largest step of the gap a jump goes, since a glitch is two steps."""
+USUAL_HOLDS: Final = 3.0
+"""A gap stays for so many times as long as it usually has a value, at least, when its sensor has stopped."""
 STOPPED_STEPS: Final = 5.0
 """Least steps of a gap that one goes on by, at least, when its sensor had stopped."""
 SELDOM_S: Final = 0.05
@@ -201,7 +203,10 @@ def _stopped_gap(times: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
     It jumps to another value at once, and the force does not. Or it does not open, and the force is gone.
     """
     begins = np.concatenate(([0], np.flatnonzero(np.diff(gap)) + 1, [len(gap)])).tolist()
-    lasting = [(begin, end) for begin, end in pairwise(begins) if end - begin >= FEWEST]
+    longest = max(
+        FEWEST, USUAL_HOLDS * float(np.median(np.diff(begins)))
+    )  # a gap that has fewer values than rows
+    lasting = [(begin, end) for begin, end in pairwise(begins) if end - begin >= longest]
     span = float(np.ptp(force))
     for begin, end in lasting:
         stays = (
