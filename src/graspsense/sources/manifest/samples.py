@@ -19,6 +19,7 @@ from graspsense.sources.columns.force_and_gap import doubtful_delay
 from graspsense.sources.columns.grasp_columns import GraspColumns, finger_sides, without_missing
 from graspsense.sources.formats.table import ColumnTable, Numbers
 from graspsense.sources.manifest.available import AvailableColumns
+from graspsense.sources.manifest.closings import without_number
 from graspsense.sources.manifest.description import ReadManifest, hand_of, samples_of
 from graspsense.sources.manifest.events import labelled_events
 from graspsense.sources.manifest.expression import Expression
@@ -142,6 +143,8 @@ def _doubts(
     """Yield a sentence for each unit that is most likely another one, and for topics that may be apart in time."""
     yield from _doubtful_units(manifest, columns)
     yield from _counted_time(manifest, columns)
+    if manifest.keys.split == "force":
+        yield from without_number(t_s, gap, force)
     later_s = _later_s(manifest, columns)
     if told := doubtful_delay(t_s, gap, force, later_s):
         yield told
