@@ -36,6 +36,8 @@ MOST_SET: Final = 3
 FEWEST_AROUND: Final = 5
 MOST_AROUND: Final = 10
 """and fewest and most messages before and after it whose delays are compared: fewer can be late,"""
+AROUND_NS: Final = 200_000_000
+"""those within so much time, so that a clock that is set back and forth is seen,"""
 EVEN: Final = 0.5
 """and least share of their usual time within which they were recorded: others were held up,"""
 SPREADS: Final = 2.0
@@ -301,12 +303,13 @@ def _was_set(recorded: Nanoseconds, stamped: Nanoseconds) -> bool:
     if len(stamps) < 2 * FEWEST_AROUND:
         return False
     usual = np.median(np.diff(written))
+    around_k = int(np.clip(AROUND_NS / max(usual, 1.0), FEWEST_AROUND, MOST_AROUND))
     jumps = np.abs(np.diff(delays))
     stamps_jump = np.abs(np.diff(stamps) - usual) > 0.5 * jumps
     goes_on = np.abs(np.diff(written) - usual) < 0.5 * jumps
     jumped = np.flatnonzero((jumps > SET_NS) & stamps_jump & goes_on) + 1
     for k in jumped.tolist() if len(jumped) <= 2 * MOST_SET else []:
-        around = slice(max(k - MOST_AROUND, 0), k), slice(k, k + MOST_AROUND)
+        around = slice(max(k - around_k, 0), k), slice(k, k + around_k)
         earlier, later = (delays[part] for part in around)
         held_up = any(np.ptp(written[part]) < EVEN * usual * (len(delays[part]) - 1) for part in around)
         if min(len(earlier), len(later)) >= FEWEST_AROUND and not held_up:

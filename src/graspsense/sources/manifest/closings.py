@@ -58,7 +58,7 @@ def without_rise(columns: GraspColumns, squeezes: Sequence[tuple[int, int]]) -> 
     missed = [
         (begin, end)
         for begin, end in closings(columns.gap_m)
-        if not any(first < end and last > begin for first, last in squeezes)
+        if not any(rise < end and fall > begin for rise, fall in squeezes)
     ]
     if missed:
         yield (
