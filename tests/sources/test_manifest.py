@@ -418,6 +418,31 @@ def test_a_force_that_drops_out_while_the_gap_stays_is_told(tmp_path):
         assert len(notes) == told
 
 
+@every_case(("value", "says"), [(np.nan, "has no number"), (0.0, "without a squeeze"), (None, "")])
+def test_a_closing_whose_force_was_not_measured_is_told(tmp_path, value, says):
+    gaps, force, time = repeated(1.0, 1.0, 1.0, 1.0)
+    if value is not None:
+        force[1200:1800] = value
+    squeezes = plain(tmp_path, 'split = "force"', force=force, gap=gaps, time=time)
+    assert len(squeezes) == (4 if value is None else 3)
+    told = [note for note in squeezes[0].notices if "the fingers close 1 time" in note]
+    assert len(told) == bool(says)
+    assert all(says in note for note in told)
+
+
+@every_case("height_n", [2.0, 10.0, 30.0])
+def test_a_bump_in_the_approach_is_no_squeeze_of_its_own_and_is_told(tmp_path, height_n):
+    gaps, force, time = repeated(1.0, 1.0, 1.0)
+    bumped = 600 + int(np.argmax(force[600:] > 0.1)) - 60  # the second approach, 0.6 s before its contact
+    force[bumped : bumped + 15] += height_n
+    squeezes = plain(tmp_path, 'split = "force"', force=force, gap=gaps, time=time)
+    assert [any("comes back" in note for note in squeeze.notices) for squeeze in squeezes] == [
+        False,
+        True,
+        False,
+    ]
+
+
 def test_a_clock_that_begins_anew_between_two_squeezes_costs_neither(tmp_path):
     gaps, forces, time = repeated(1.0, 1.0)
     anew = np.where(time < 5.3, time, time - 5.3)

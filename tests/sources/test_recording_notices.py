@@ -97,7 +97,8 @@ def test_a_glitch_that_could_pass_for_a_contact_is_noticed(samples: int) -> None
     (notice,) = noticed(spoilt, spoilt, OPEN_AGAIN_M)
     assert "at 0.3 s" in notice
     # A tap of three samples is a glitch where it takes 30 ms, and none where it takes 300 ms.
-    assert noticed(spoilt, spoilt, OPEN_AGAIN_M, rate_hz=10.0) == ()
+    tapped = noticed(spoilt, spoilt, OPEN_AGAIN_M, rate_hz=10.0)
+    assert not any("leaves its course" in notice for notice in tapped)
 
 
 def test_the_code_of_an_error_in_the_force_is_noticed() -> None:
@@ -125,6 +126,26 @@ def test_a_gap_that_jumps_is_noticed() -> None:
     coarse = np.round(np.repeat(OPEN_AGAIN_M, 10) * 200) / 200
     forces = np.repeat(RELEASED_N, 10)
     assert noticed(forces, forces, coarse, rate_hz=1000.0) == ()
+
+
+def test_a_force_that_goes_while_the_fingers_close_further_is_noticed() -> None:
+    """As of fingers that touch something on their way; those that bounce off, or open, are another matter."""
+    closing = 0.08 - 0.02 * T_S
+    bump = np.where((T_S > 0.3) & (T_S < 0.45), 2.0, 0.0)
+    (notice,) = noticed(LEFT + bump, RIGHT + bump, closing)
+    assert "comes at 0.31 s" in notice
+    assert noticed(LEFT, RIGHT, closing) == ()
+    assert noticed(LEFT + bump, RIGHT + bump) == ()
+    assert noticed(LEFT + 0.2 * bump, RIGHT + 0.2 * bump, closing) == ()  # below the force of a contact
+
+
+def test_a_gap_that_is_slower_than_the_samples_has_not_stopped() -> None:
+    """50 Hz in a recording of 1000 Hz: each gap of fingers that creep holds for 20 samples."""
+    t_s = np.arange(3000) * 0.001
+    gap = np.where(t_s < 2.46, 0.05 - 0.001 * np.maximum(t_s - 1.0, 0.0), 0.05 + 0.05 * (t_s - 2.46))
+    load = np.where((t_s > 1.0) & (t_s < 2.45), np.minimum(t_s - 1.0, 0.5) * 12.0, 0.0)
+    load += np.random.default_rng(1).normal(0.0, 0.01, len(t_s))
+    assert noticed(load, load, gap[np.arange(3000) // 20 * 20], rate_hz=1000.0) == ()
 
 
 def test_a_gap_that_stops_in_the_squeeze_is_noticed() -> None:

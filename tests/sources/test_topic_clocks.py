@@ -49,6 +49,12 @@ CLOCKS = {
     "set back a little": np.where(T_S > 1.3, T_S - 0.1, T_S),
     "set back and forth": np.where((T_S > 1.0) & (T_S < 1.3), T_S - 0.2, T_S),
     "set forward": np.where(T_S > 1.3, T_S + 3600.0, T_S),
+    "set back by 30 ms": np.where(T_S > 1.3, T_S - 0.03, T_S),
+    "set forward by 60 ms": np.where(T_S > 1.05, T_S + 0.06, T_S),
+    "set by 40 ms for a moment": np.where((T_S > 0.9) & (T_S < 1.2), T_S + 0.04, T_S),
+    "0.5 % fast": T_S * 1.005,
+    "1 % slow": T_S * 0.99,
+    "coarse": np.floor(T_S / 0.05 + 1e-6) * 0.05,
 }
 
 
@@ -98,6 +104,28 @@ def test_a_header_without_a_time_has_that_of_its_recording_on_the_clock_of_its_t
     topics.stamped_ns[0] = topics.stamped_ns[150] = 0
     common = common_clock("bag", {"/hand": messages(T_S, delay_s=3600.0), "/tip": topics})
     assert np.array_equal(common.topics["/tip"].ns, common.topics["/hand"].ns)
+
+
+def test_messages_that_are_stamped_when_they_come_in_bursts_are_told() -> None:
+    """As of a serial port whose driver reads five lines at once: the first is 40 ms older than its time."""
+    came_s = np.floor(T_S / 0.05 + 1e-6) * 0.05 + 0.05 + 1e-5 * (np.arange(len(T_S)) % 5)
+    (told,) = common_clock("bag", {"/hand": HEALTHY, "/tip": messages(came_s)}).notices
+    assert "/tip has 5 messages at a time, every 50 ms" in told
+
+
+@pytest.mark.parametrize("seeds", [40, pytest.param(400, marks=pytest.mark.slow)])
+def test_noise_of_time_and_lost_messages_are_no_fault(seeds: int) -> None:
+    for seed in range(seeds):
+        rng = np.random.default_rng(seed)
+        topics = {}
+        for topic in ("/hand", "/tip"):
+            hz = float(rng.choice([25.0, 50.0, 100.0, 250.0, 1000.0]))
+            t_s = np.arange(0.0, 3.0, 1.0 / hz)
+            t_s = t_s[rng.random(len(t_s)) > rng.choice([0.0, 0.02])]
+            stamped_s = t_s + np.abs(rng.normal(0.0, rng.choice([0.0, 2e-4, 1e-3]), len(t_s)))
+            late_s = rng.exponential(rng.choice([1e-4, 1e-3, 1e-2]), len(t_s))
+            topics[topic] = messages(np.maximum.accumulate(stamped_s + late_s), stamped_s)
+        assert common_clock("bag", topics).notices == (), seed
 
 
 def test_topics_that_never_overlap_are_refused_and_a_single_message_is_a_constant() -> None:
@@ -206,6 +234,14 @@ def test_the_force_of_a_tip_on_another_clock_is_that_of_its_time(written: Any, p
     assert len(force) >= 299
     scale = 15 * 100 / 1600 if pr2 else 1.0
     assert force[-1] == pytest.approx(scale * FORCE_N[-1], abs=0.1)
+
+
+@pytest.mark.parametrize("pr2", [False, True], ids=["manifest", "pr2"])
+def test_a_clock_that_is_off_by_a_little_is_told_with_fingers_that_do_not_slow_down(
+    written: Any, pr2: bool
+) -> None:
+    (told,) = written(ALL, T_S - 0.03, pr2=pr2).notices
+    assert "headers of the force are 30 ms older" in told
 
 
 def test_a_silence_while_the_force_rises_is_told(written: Any) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import evolve
 
+from graspsense.core.control.contact import CONTACT_FORCE_N
 from graspsense.recording.labelled_recording import LabelledRecording
 from graspsense.recording.replayable import Recording
 
@@ -52,6 +53,8 @@ JUMP_SPEED_M_S: Final = 1.0
 """Speed beyond which no finger moves,"""
 JUMP: Final = 3.0
 """and how many times farther than the third largest step of the gap a jump goes, since a glitch is two steps."""
+USUAL_HOLDS: Final = 3.0
+"""A gap stays for so many times as long as it usually has a value, at least, when its sensor has stopped."""
 STOPPED_STEPS: Final = 5.0
 """Least steps of a gap that one goes on by, at least, when its sensor had stopped."""
 SELDOM_S: Final = 0.05
@@ -64,6 +67,8 @@ SELDOM_SHARE: Final = 0.1
 """Share of the changes of such a force that may be closer to the one before."""
 FREE: Final = 0.2
 """Share of its range up to which a force is that of free fingers."""
+BUMP_TRAVEL: Final = 0.05
+"""Share of its range by which the gap closes after a bump."""
 
 
 def with_notices(labelled: LabelledRecording) -> LabelledRecording:
@@ -95,6 +100,7 @@ def signal_notices(recording: Recording) -> Iterator[str]:
                 yield from _seldom(what, times[known], force[known])
             yield from _drift(what, gap[known], force[known], recording.units)
     if not {"gap", "t"} & recording.units.keys() and len(gap) >= FEWEST:
+        yield from _bump(times, gap, np.mean(list(pads.values()), axis=0), recording.units)
         yield from _jump(times, gap)
         yield from _stopped_gap(times, gap, np.mean(list(pads.values()), axis=0))
 
@@ -180,6 +186,37 @@ def _drift(what: str, gap: Numbers, force: Numbers, units: Mapping[str, str]) ->
         )
 
 
+def _bump(times: Numbers, gap: Numbers, force: Numbers, units: Mapping[str, str]) -> Iterator[str]:
+    """Yield that a force comes, is gone while the gap (m) closes further, and comes back, by time (s)."""
+    known = np.isfinite(force) & np.isfinite(gap)
+    t_s, gap, force = times[known], gap[known], force[known]
+    if len(force) < FEWEST_IN_COURSE:
+        return
+    around = np.pad(force, 1, mode="edge")
+    course = np.median(np.lib.stride_tricks.sliding_window_view(around, 3), axis=1)
+    low, span = float(np.quantile(course, 0.01)), float(np.ptp(course))
+    contact = FREE_GLITCH * span if "force_left" in units else min(FREE_GLITCH * span, CONTACT_FORCE_N)
+    contact = max(contact, GLITCH_NOISE * float(np.median(np.abs(np.diff(force, 2)))))
+    felt = course - low > contact
+    begin = int(felt.argmax())
+    gone = np.flatnonzero(course[begin:] - low < 0.5 * contact)
+    if not felt.any() or not len(gone):
+        return
+    end = begin + int(gone[0])
+    back = np.flatnonzero(felt[end:])
+    if not len(back):
+        return
+    again = end + int(back[0])
+    closes = float(gap[end] - gap[again])
+    glitch = end - begin <= GLITCH_SAMPLES and t_s[end] - t_s[begin] <= GLITCH_S
+    if closes > BUMP_TRAVEL * np.ptp(gap) and gap[end:again].max() < gap[begin] and not glitch:
+        yield (
+            f"a force comes at {t_s[begin]:.4g} s and is gone at {t_s[end]:.4g} s, the fingers close by "
+            f"{closes * 1e3:.3g} mm more, and it comes back at {t_s[again]:.4g} s: the contact is the first of these. "
+            "If the fingers touched something on their way, cut that out; or the object broke"
+        )
+
+
 def _jump(times: Numbers, gap: Numbers) -> Iterator[str]:
     """Yield that a gap (m) jumps faster (s) than fingers move, and farther than it does elsewhere."""
     known = np.isfinite(gap)
@@ -201,7 +238,9 @@ def _stopped_gap(times: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
     It jumps to another value at once, and the force does not. Or it does not open, and the force is gone.
     """
     begins = np.concatenate(([0], np.flatnonzero(np.diff(gap)) + 1, [len(gap)])).tolist()
-    lasting = [(begin, end) for begin, end in pairwise(begins) if end - begin >= FEWEST]
+    # The gap can have fewer values than rows.
+    longest = max(FEWEST, USUAL_HOLDS * float(np.median(np.diff(begins))))
+    lasting = [(begin, end) for begin, end in pairwise(begins) if end - begin >= longest]
     span = float(np.ptp(force))
     for begin, end in lasting:
         stays = (

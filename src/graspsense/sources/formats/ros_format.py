@@ -59,6 +59,7 @@ def read_bag(path: Path, topics: Collection[str] = ()) -> list[ColumnTable]:
             t_s=np.array([clock.began_ns + ns for ns in rows_ns.tolist()], dtype=np.float64) * 1e-9,
             notes=clock.notes,
             warnings=clock.notices,
+            delays_s={topic: ns * 1e-9 for topic, ns in clock.delays_ns.items()},
         )
     ]
 

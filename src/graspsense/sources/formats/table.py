@@ -47,6 +47,9 @@ class ColumnTable:
 
     damage: str = ""
     """Why this part of a file cannot be read, where the others can."""
+    delays_s: Mapping[str, float] = field(factory=dict)
+    """For each topic of a bag, the least time from the header of a message to its recording (s); empty where the times
+    of headers are not used."""
 
     def __len__(self) -> int:
         """Return the number of rows."""

@@ -2,7 +2,9 @@
 
 The time of a message is that of its header. A header can be from another clock than that of the other topics, or from
 one that was set in between. The bag tells: the delay from the header to the recording of a message is small and does
-not change. Where it differs between topics, or within one, the times of the recording are used for all topics.
+not change. Where it differs between topics, or within one, the times of the recording are used for all topics. So they
+are where the times in the headers have coarse steps. Nothing in a bag tells a topic without headers, or one that is
+stamped late, from one that is recorded at once.
 
 A value holds until the next message, but not longer than a few usual periods of its topic: a sensor that died has no
 value. Only the interval in which all topics have messages is used.
@@ -25,17 +27,36 @@ CLOCKS_APART_NS: Final = 300_000_000
 """Delays of two topics, or of two parts of a topic, that differ by more are from different clocks."""
 DELAYS_APART_NS: Final = 50_000_000
 """Delays of two topics that differ by more can be from different clocks, or one topic is slow: nothing tells which."""
-PARTS: Final = 5
+PARTS: Final = 10
 """Parts of a recording whose delays are compared."""
+SET_NS: Final = 20_000_000
+"""Least time by which a clock that is set is told from one that is read late."""
 MOST_SET: Final = 3
-"""Most times that a clock is set back in a recording,"""
-FEWEST_AFTER: Final = 5
-"""and fewest messages after it: fewer can be late."""
-RATES_APART: Final = 0.01
-RATES_APART_NS: Final = 20_000_000
-"""Share of the recording, and time, by which one clock gets ahead of another that runs at another rate."""
+"""Most times that a clock is set in a recording,"""
+FEWEST_AROUND: Final = 5
+MOST_AROUND: Final = 10
+"""and fewest and most messages before and after it whose delays are compared: fewer can be late,"""
+AROUND_NS: Final = 200_000_000
+"""those within so much time, so that a clock that is set back and forth is seen,"""
 EVEN: Final = 0.5
-"""Least share of the mean by which it gets ahead in each part of the recording."""
+"""and least share of their usual time within which they were recorded: others were held up,"""
+SPREADS: Final = 2.0
+"""and by so many times what the usual delay there is above the least, the least one changes."""
+RATES_APART: Final = 0.002
+RATES_APART_NS: Final = 10_000_000
+"""Share of the recording, and time, by which one clock gets ahead of another that runs at another rate."""
+EVENLY: Final = 0.95
+"""Least correlation with time of the delays of such a clock."""
+COARSE_NS: Final = 5_000_000
+COARSE_SHARE: Final = 0.2
+"""Least step of the times in headers, and share of the messages that share their time with the one before, where these
+times are coarse."""
+BURST: Final = 5.0
+"""Messages with so many times the usual step between them are of different bursts,"""
+BURST_NS: Final = 20_000_000
+"""which are told if they are so far apart,"""
+LONGEST_BURST: Final = 20
+"""and have at most so many messages."""
 PERIODS: Final = 5.0
 """A value holds for so many usual periods of its topic at most,"""
 LEAST_HOLD_NS: Final = 100_000_000
@@ -106,6 +127,9 @@ class CommonClock:
     end_ns: int
     notes: tuple[str, ...]
     notices: tuple[str, ...]
+    delays_ns: Mapping[str, int]
+    """The least delay from the header of a message to its recording in each needed topic whose headers have times;
+    empty where the times of the recording are used."""
 
 
 def on_one_clock(
@@ -137,8 +161,8 @@ def common_clock(
     Raises DataDamaged if there is no time at which all topics have messages, or if times do not fit into 64 bits.
     """
     began_ns, times, notices = on_one_clock(source, topics)
-    if not notices:
-        notices = tuple(_doubtful_delays({topic: topics[topic] for topic in needed or topics}))
+    delays = {} if notices else _delays({topic: topics[topic] for topic in needed or topics})
+    notices += tuple(_doubtful_delays(delays))
     wanted = {topic: times[topic] for topic in needed or times}
     lasting = {topic: stamps for topic, stamps in wanted.items() if stamps.usual_ns} or wanted
     begin = max(int(stamps.ns[0]) for stamps in lasting.values())
@@ -158,6 +182,7 @@ def common_clock(
             f"{', '.join(silent)} was silent for more than {PERIODS:g} of its usual periods: a value that then changed "
             "is missing",
         )
+    notices += tuple(_in_bursts(inside))
     return CommonClock(
         began_ns=began_ns,
         topics=times,
@@ -165,6 +190,7 @@ def common_clock(
         end_ns=end,
         notes=notes,
         notices=(*notices, *_trimmed(lasting, begin, end)),
+        delays_ns=delays,
     )
 
 
@@ -197,12 +223,7 @@ def _apart(stamped: Mapping[str, Nanoseconds], recorded: Mapping[str, Nanosecond
     if any(len(ns) > 1 and ns.min() == ns.max() for ns in recorded.values()):
         return  # a bag that was written at once, by a program that did not record
     least = {topic: _least_delays(recorded[topic], stamped[topic]) for topic in stamped}
-    changed = [
-        topic
-        for topic, delays in least.items()
-        if _set_back(recorded[topic], stamped[topic])
-        or (max(delays) - min(delays) > CLOCKS_APART_NS and _jumps(recorded[topic] - stamped[topic]))
-    ]
+    changed = [topic for topic in stamped if _was_set(recorded[topic], stamped[topic])]
     lowest = min(min(delays) for delays in least.values())
     behind = max(least, key=lambda topic: min(least[topic]))
     apart = min(least[behind]) - lowest
@@ -211,15 +232,17 @@ def _apart(stamped: Mapping[str, Nanoseconds], recorded: Mapping[str, Nanosecond
         yield f"the clock in the headers of {', '.join(changed)} was set during the recording: {used}"
     elif drifting := _drifting(recorded, least):
         yield f"the clock in the headers of {drifting} runs at another rate than that of another topic: {used}"
+    elif coarse := [topic for topic in stamped if _coarse(recorded[topic], stamped[topic])]:
+        yield f"the times in the headers of {', '.join(coarse)} have coarse steps: {used}"
     elif apart > CLOCKS_APART_NS:
         yield (
             f"the times in the headers of {behind} are behind those of another topic, from another clock: {used}"
         )
 
 
-def _doubtful_delays(topics: Mapping[str, Messages]) -> Iterator[str]:
-    """Yield a sentence if the delays of these topics differ, so that one of their clocks may be off."""
-    delays = {
+def _delays(topics: Mapping[str, Messages]) -> dict[str, int]:
+    """Return the least delay from header to recording of each topic whose headers have times (ns)."""
+    return {
         topic: min(delays)
         for topic, messages in topics.items()
         if (
@@ -230,6 +253,10 @@ def _doubtful_delays(topics: Mapping[str, Messages]) -> Iterator[str]:
             ]
         )
     }
+
+
+def _doubtful_delays(delays: Mapping[str, int]) -> Iterator[str]:
+    """Yield a sentence if the delays of topics differ, so that one of their clocks may be off."""
     behind, ahead = (
         max(delays, key=delays.__getitem__, default=""),
         min(delays, key=delays.__getitem__, default=""),
@@ -251,39 +278,73 @@ def _least_delays(recorded: Nanoseconds, stamped: Nanoseconds) -> list[int]:
 
 def _drifting(recorded: Mapping[str, Nanoseconds], least: Mapping[str, list[int]]) -> str:
     """Return the topic whose delays grow, or shrink, evenly against those of another topic; empty if none does."""
-    parts = {topic: np.array(delays) for topic, delays in least.items() if len(delays) == PARTS}
+    parts = {topic: np.array(delays, dtype=float) for topic, delays in least.items() if len(delays) == PARTS}
     if not parts:
         return ""
-    steady = min(parts.values(), key=lambda delays: abs(int(delays[-1] - delays[0])))
+    steady = min(parts.values(), key=lambda delays: float(abs(delays[-1] - delays[0])))
     for topic, delays in parts.items():
-        steps = np.diff(delays - steady)
+        apart = delays - steady
         much = max(RATES_APART * int(np.ptp(recorded[topic])), RATES_APART_NS)
-        even = steps * np.sign(steps.sum()) > EVEN * np.abs(steps).mean()
-        if abs(int(steps.sum())) > much and even.all():
-            return topic
+        if abs(apart[-1] - apart[0]) > (1.0 - 1.0 / PARTS) * much:
+            correlation = np.corrcoef(apart, np.arange(PARTS))[0, 1]
+            if abs(float(correlation)) > EVENLY:
+                return topic
     return ""
 
 
-def _set_back(recorded: Nanoseconds, stamped: Nanoseconds) -> bool:
-    """Return whether headers are older than those before them for several messages, as after a clock was set back.
+def _was_set(recorded: Nanoseconds, stamped: Nanoseconds) -> bool:
+    """Return whether the times in headers jump, the recording goes on, and the delay stays what it then is.
 
-    Messages that overtake others do so many times, and those that were held up come all at once.
+    Messages that overtake others jump many times, and those that were held up have even times in their headers.
     """
     order = np.argsort(recorded, kind="stable")
     written, stamps = recorded[order], stamped[order]
-    steps = np.diff(stamps)
-    if not len(steps) or int((steps < 0).sum()) > MOST_SET or steps.min() > -DELAYS_APART_NS:
+    delays = written - stamps
+    if len(stamps) < 2 * FEWEST_AROUND:
         return False
-    k = int(np.argmin(steps)) + 1
-    after = slice(k, k + FEWEST_AFTER)
-    later = (written - stamps)[after].min() - (written - stamps)[:k].min() > DELAYS_APART_NS
-    apart = np.ptp(written[after]) > EVEN * np.ptp(stamps[after])
-    return bool(later and apart and len(stamps) - k >= FEWEST_AFTER)
+    usual = np.median(np.diff(written))
+    around_k = int(np.clip(AROUND_NS / max(usual, 1.0), FEWEST_AROUND, MOST_AROUND))
+    jumps = np.abs(np.diff(delays))
+    stamps_jump = np.abs(np.diff(stamps) - usual) > 0.5 * jumps
+    goes_on = np.abs(np.diff(written) - usual) < 0.5 * jumps
+    jumped = np.flatnonzero((jumps > SET_NS) & stamps_jump & goes_on) + 1
+    for k in jumped.tolist() if len(jumped) <= 2 * MOST_SET else []:
+        around = slice(max(k - around_k, 0), k), slice(k, k + around_k)
+        earlier, later = (delays[part] for part in around)
+        held_up = any(np.ptp(written[part]) < EVEN * usual * (len(delays[part]) - 1) for part in around)
+        if min(len(earlier), len(later)) >= FEWEST_AROUND and not held_up:
+            change = int(later.min() - earlier.min()) * int(np.sign(delays[k] - delays[k - 1]))
+            spread = max(float(np.median(part) - part.min()) for part in (earlier, later))
+            if change > max(0.5 * jumps[k - 1], 0.5 * SET_NS, SPREADS * spread):
+                return True
+    return False
 
 
-def _jumps(delays: Nanoseconds) -> bool:
-    """Return whether the delay jumps from one message to the next: a program that writes all at once has no jump."""
-    return bool((np.abs(np.diff(delays)) > CLOCKS_APART_NS).any())
+def _coarse(recorded: Nanoseconds, stamped: Nanoseconds) -> bool:
+    """Return whether the times in headers are multiples of a step, and many messages have that of the one before."""
+    order = np.argsort(recorded, kind="stable")
+    steps, stamp_steps = np.diff(recorded[order]), np.diff(stamped[order])
+    if not len(steps) or int(np.gcd.reduce(stamp_steps)) < COARSE_NS:
+        return False
+    same = (stamp_steps == 0) & (steps > 0.5 * np.median(steps))
+    return bool(same.mean() > COARSE_SHARE)
+
+
+def _in_bursts(topics: Mapping[str, Nanoseconds]) -> Iterator[str]:
+    """Yield a sentence for each topic of which several messages at a time have nearly the same time."""
+    for topic, ns in topics.items():
+        steps = np.diff(ns)
+        far = np.flatnonzero(steps > BURST * np.median(steps)) if len(steps) else steps
+        lengths = np.diff(far)
+        if len(lengths) < FEWEST_AROUND or not 1.5 < np.median(lengths) <= LONGEST_BURST:
+            continue
+        every = np.diff(ns[far + 1])
+        least, usual = np.quantile(every, 0.1), np.median(every)
+        if usual > BURST_NS and least > 0.5 * usual:
+            yield (
+                f"{topic} has {int(np.median(lengths))} messages at a time, every {usual * 1e-6:.3g} ms: they were "
+                "stamped when they came, so that their values are older than their times"
+            )
 
 
 def _longest(times_ns: Nanoseconds) -> int:

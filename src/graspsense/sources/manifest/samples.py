@@ -15,9 +15,11 @@ from graspsense.core.values.errors import ConfigError, DataDamaged, listed
 from graspsense.core.values.fingers import PREFIX, FingerForce
 from graspsense.core.values.signals import CHANNELS, NO_GAP
 from graspsense.sources.columns.column_guess import unit_in_name
+from graspsense.sources.columns.force_and_gap import doubtful_delay
 from graspsense.sources.columns.grasp_columns import GraspColumns, finger_sides, without_missing
 from graspsense.sources.formats.table import ColumnTable, Numbers
 from graspsense.sources.manifest.available import AvailableColumns
+from graspsense.sources.manifest.closings import without_number
 from graspsense.sources.manifest.description import ReadManifest, hand_of, samples_of
 from graspsense.sources.manifest.events import labelled_events
 from graspsense.sources.manifest.expression import Expression
@@ -89,7 +91,7 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
             "t": "" if _has_time(manifest, table, available) else "sample",
         },
         notes=tuple(notes),
-        warnings=(*table.warnings, *_doubts(manifest, available)),
+        warnings=(*table.warnings, *_doubts(manifest, available, t_s, gap[0], left_n + right_n)),
         lines=table.lines,
         events=events,
     )
@@ -135,10 +137,30 @@ def _fingers(
     return hand_of(manifest.keys, next(iter(units.values()), "N")), forces
 
 
-def _doubts(manifest: ReadManifest, columns: AvailableColumns) -> Iterator[str]:
-    """Yield a sentence for each unit that is most likely another one."""
+def _doubts(
+    manifest: ReadManifest, columns: AvailableColumns, t_s: Numbers, gap: Numbers, force: Numbers
+) -> Iterator[str]:
+    """Yield a sentence for each unit that is most likely another one, and for topics that may be apart in time."""
     yield from _doubtful_units(manifest, columns)
     yield from _counted_time(manifest, columns)
+    if manifest.keys.split == "force":
+        yield from without_number(t_s, gap, force)
+    later_s = _later_s(manifest, columns)
+    if told := doubtful_delay(t_s, gap, force, later_s):
+        yield told
+
+
+def _later_s(manifest: ReadManifest, columns: AvailableColumns) -> float:
+    """Return how much later the topics of the force are recorded, after their headers, than those of the gap (s)."""
+    delays: dict[str, set[float]] = {"gap": set(), "force": set()}
+    for key, parts in manifest.expressions.items():
+        quantity = "force" if key in ("left", "right") or key.startswith(PREFIX) else key
+        chosen = columns.chosen(parts) if parts and quantity in delays else None
+        for name in chosen.names if chosen is not None else ():
+            delays[quantity] |= {
+                delay for topic, delay in columns.table.delays_s.items() if name.startswith(f"{topic}.")
+            }
+    return max((force - gap for force in delays["force"] for gap in delays["gap"]), key=abs, default=0.0)
 
 
 def _doubtful_units(manifest: ReadManifest, columns: AvailableColumns) -> Iterator[str]:

@@ -20,6 +20,7 @@ from graspsense.sources.columns.grasp_columns import (
     finger_sides,
     only,
 )
+from graspsense.sources.manifest.closings import without_rise
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -62,10 +63,11 @@ def squeezes(columns: GraspColumns) -> list[GraspColumns]:
     A squeeze rises above the force before it by a tenth of the usual force, and ends where it has lost four fifths of
     what it rose by, so squeezes of different forces and a zero that drifts are told apart. The next one begins halfway
     after the end, where both fingers are free. A force that is missing, or that no gripper has, is of its own
-    squeeze: there the last force before it counts. A glitch of two samples does not end a squeeze.
+    squeeze: there the last force before it counts. A glitch of two samples does not end a squeeze, nor does a force
+    that goes and comes back while the fingers close further.
     """
     force = _known_force(columns)
-    runs = _held_runs(force, np.diff(columns.t_s))
+    runs = _of_one_closing(columns.gap_m, _held_runs(force, np.diff(columns.t_s)))
     if not runs:
         raise DataDamaged(f"{columns.source}: no squeeze was found, because its force never rises")
     between = (_middle(columns.t_s, end, begin) for (_, end), (begin, _) in pairwise(runs))
@@ -81,6 +83,8 @@ def squeezes(columns: GraspColumns) -> list[GraspColumns]:
             )
             parts[k] = evolve(parts[k], warnings=(*parts[k].warnings, told))
     weak = _weak_runs(columns, force, runs)
+    missed = without_rise(columns, [*runs, *weak])
+    parts[0] = evolve(parts[0], warnings=(*parts[0].warnings, *missed))
     if weak:
         strongest = max(float(np.ptp(force[begin - 1 : end])) for begin, end in weak)
         unit = columns.units.get("force") or "N"
@@ -110,6 +114,21 @@ def _weak_runs(
         and not held[begin:end].any()
         and gap[begin:end].mean() < half_closed
     ]
+
+
+def _of_one_closing(gap: NDArray[np.float64], runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Return the squeezes; those between which the fingers only close further are one, with a bump before it."""
+    known = gap[np.isfinite(gap)]
+    least = STAYS * float(np.ptp(known)) if len(known) else 0.0
+    joined: list[tuple[int, int]] = []
+    for begin, end in runs:
+        if joined:
+            earlier = joined[-1][1]
+            between = gap[earlier - 1 : begin + 1]
+            if between[0] - between[-1] > least and np.nanmax(between) < between[0] + least:
+                begin = joined.pop()[0]
+        joined.append((begin, end))
+    return joined
 
 
 def _stays_closed(gap: NDArray[np.float64], end: int, begin: int) -> bool:

@@ -35,6 +35,7 @@ from graspsense.recording.readable import readable
 from graspsense.recording.replayable import Recording
 from graspsense.recording.unpacked import Unpacked
 from graspsense.sources.columns.fast_samples import most_in_a_tick, sample_blocks
+from graspsense.sources.columns.force_and_gap import doubtful_delay
 from graspsense.sources.formats.ros_bags import opened_bag, stamp_ns
 from graspsense.sources.formats.topic_clocks import Messages, TopicTimes, common_clock
 
@@ -174,8 +175,21 @@ def _recording(path: Path, content: _Content) -> Recording:
         channels=channels,
         rate_hz=(len(motions) - 1) / duration_s,
         notes=tuple(notes),
-        notices=clock.notices,
+        notices=(*clock.notices, *_doubts(readings, clock.delays_ns, content)),
     )
+
+
+def _doubts(readings: Sequence[Reading], delays_ns: Mapping[str, int], content: _Content) -> Iterator[str]:
+    """Yield a sentence if pads and gap may be apart in time."""
+    if delays_ns.keys() >= {content.pressure, content.source}:
+        columns = [
+            (frame.t_s, frame.gap_m, 0.5 * (frame.force_left_n + frame.force_right_n))
+            for frame in (reading.frame for reading in readings)
+        ]
+        later_s = (delays_ns[content.pressure] - delays_ns[content.source]) * 1e-9
+        t_s, gap, force = np.array(columns).T
+        if told := doubtful_delay(t_s, gap, force, later_s):
+            yield told
 
 
 def _timed(messages: Sequence[T], times: TopicTimes) -> list[T]:

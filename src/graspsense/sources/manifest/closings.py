@@ -1,0 +1,67 @@
+"""Where the fingers of a recording close, and whether a force was measured there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from graspsense.core.values.errors import counted
+
+if TYPE_CHECKING:
+    from graspsense.sources.columns.grasp_columns import GraspColumns, Numbers
+
+GLITCHES: Final = 0.01
+"""Share of the samples that can be glitches, at each end of the range of the gap."""
+CLOSED: Final = 0.4
+OPEN: Final = 0.6
+"""Shares of its range below which the gap is closed, and above which it is open."""
+FEWEST: Final = 3
+"""Fewest samples of a closing."""
+KNOWN: Final = 0.1
+"""Share of the samples of a closing up to which its force is not known."""
+
+
+def closings(gap: Numbers) -> list[tuple[int, int]]:
+    """Return the first sample of each time at which the fingers are closed, and the one after its last."""
+    known = np.flatnonzero(np.isfinite(gap))
+    if not len(known):
+        return []
+    low, high = np.quantile(gap[known], [GLITCHES, 1.0 - GLITCHES])
+    spans: list[tuple[int, int]] = []
+    begin: int | None = None
+    for k in known.tolist() if high > low else ():
+        if begin is None and gap[k] < low + CLOSED * (high - low):
+            begin = k
+        elif begin is not None and gap[k] > low + OPEN * (high - low):
+            spans.append((begin, k))
+            begin = None
+    if begin is not None:
+        spans.append((begin, len(gap)))
+    return [(begin, end) for begin, end in spans if end - begin >= FEWEST]
+
+
+def without_number(t_s: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
+    """Yield a sentence if the force has no number in a closing."""
+    known = np.isfinite(force)
+    missed = [begin for begin, end in closings(gap) if known[begin:end].mean() < KNOWN]
+    if missed:
+        yield (
+            f"the fingers close {counted(len(missed), 'time')} while the force has no number (the first at "
+            f"{t_s[missed[0]]:.4g} s): these squeezes are missing"
+        )
+
+
+def without_rise(columns: GraspColumns, squeezes: Sequence[tuple[int, int]]) -> Iterator[str]:
+    """Yield a sentence if the force does not rise in a closing; `squeezes` are the samples in which it does."""
+    missed = [
+        (begin, end)
+        for begin, end in closings(columns.gap_m)
+        if not any(rise < end and fall > begin for rise, fall in squeezes)
+    ]
+    if missed:
+        yield (
+            f"the fingers close {counted(len(missed), 'time')} without a squeeze (the first at "
+            f"{columns.t_s[missed[0][0]]:.4g} s): was nothing between them, or did the force fail?"
+        )
