@@ -37,6 +37,7 @@ from attrs import asdict, frozen
 from graspsense import load_pipeline
 from graspsense.classifier_api import table_of
 from graspsense.core.components.identification import RecordedSqueeze
+from graspsense.core.files.toml_values import toml_value
 from graspsense.evaluation.intervals import clustered, wilson
 from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import create
@@ -141,11 +142,9 @@ def drawn(terms: Sequence[Mapping[str, Any]], repeat: int) -> list[dict[str, Any
 
 def scene_text(terms: Sequence[Mapping[str, Any]], spread: float) -> str:
     """Return the text of a scene with these terms."""
-    lines = [f"width_m = {WIDTH_M}", f"stiffness_spread = {spread}", "share = 0.6", "share_spread = 0.01"]
-    for term in terms:
-        lines.append("[[terms]]")
-        lines += [f"{key} = {json.dumps(value)}" for key, value in term.items()]
-    return "\n".join(lines) + "\n"
+    numbers = {"width_m": WIDTH_M, "stiffness_spread": spread, "share": 0.6, "share_spread": 0.01}
+    values = {**numbers, "terms": list(terms)}
+    return "".join(f"{key} = {toml_value(value)}\n" for key, value in values.items())
 
 
 def squeezes_of(
