@@ -133,18 +133,16 @@ def measured(bench: Bench, scene: Scene) -> Row:
     row |= {"outcome": reference.outcome.name, "stable": controller_is_stable(setup, chosen)}
     row["reference_resolved"] = reference.state.step.unresolved + reference.state.contact.unbalanced == 0
     for accuracy in ACCURACIES:
-        row[f"{accuracy:g}"] = _case(bench, scene, accuracy, "scene", reference, dt)
+        row[f"{accuracy:g}"] = _case(bench, scene, accuracy, reference, dt)
     if not row["reference_resolved"] or any(row[f"{a:g}"]["error"] > a for a in ACCURACIES):
         even = evolve(scene, config=evolve(scene.config, step_s=EVEN_S))
-        row["even"] = _case(bench, even, 0.01, "scene", reference, dt)["error"]
+        row["even"] = _case(bench, even, 0.01, reference, dt)["error"]
     return row
 
 
-def _case(
-    bench: Bench, scene: Scene, accuracy: float, fidelity: str, reference: FinishedGrasp, dt_s: float
-) -> Row:
+def _case(bench: Bench, scene: Scene, accuracy: float, reference: FinishedGrasp, dt_s: float) -> Row:
     try:
-        done, _, chosen, job = bench.grasp(scene, accuracy, fidelity)
+        done, _, chosen, job = bench.grasp(scene, accuracy, "scene")
     except ConfigError as error:
         return {"error": math.inf, "refused": str(error)[:200]}
     except ArithmeticError as error:
