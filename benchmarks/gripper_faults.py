@@ -53,8 +53,6 @@ class Injected:
     settings: Mapping[str, Any]
     time_key: str
     sided: bool = False
-    strong_s: float = 0.0
-    """Time for which the motor may apply more than the ceiling before the fault is certain."""
 
 
 FAULTS: Final = (
@@ -67,7 +65,7 @@ FAULTS: Final = (
     Injected("both fingertips stuck", {"pad_fault": "stuck"}, "pad_at_s"),
     Injected("cell images stop", {"image_fault": "frozen"}, "image_at_s"),
     Injected("encoder fault bit", {"status_bits": 4}, "status_at_s"),
-    Injected("motor applies twice the command", {"motor_gain": 2.0}, "motor_at_s", strong_s=0.1),
+    Injected("motor applies twice the command", {"motor_gain": 2.0}, "motor_at_s"),
     Injected("motor applies a third of the command", {"motor_gain": 0.33}, "motor_at_s"),
     Injected("motor turns the wrong way", {"motor_gain": -1.0}, "motor_at_s"),
     Injected("reports five times the effort", {"effort_report_gain": 5.0}, "effort_report_at_s"),

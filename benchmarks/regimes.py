@@ -29,6 +29,7 @@ from random_scenes import Bench, Scene, controller_is_stable, flags_of, record_o
 from graspsense.evaluation.intervals import wilson
 from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import ConfigError
+from graspsense.report.simulation import markdown_table
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.error import deviation
 from graspsense_sim_gripper.run.batch.job import FinishedGrasp
@@ -133,18 +134,16 @@ def measured(bench: Bench, scene: Scene) -> Row:
     row |= {"outcome": reference.outcome.name, "stable": controller_is_stable(setup, chosen)}
     row["reference_resolved"] = reference.state.step.unresolved + reference.state.contact.unbalanced == 0
     for accuracy in ACCURACIES:
-        row[f"{accuracy:g}"] = _case(bench, scene, accuracy, "scene", reference, dt)
+        row[f"{accuracy:g}"] = _case(bench, scene, accuracy, reference, dt)
     if not row["reference_resolved"] or any(row[f"{a:g}"]["error"] > a for a in ACCURACIES):
         even = evolve(scene, config=evolve(scene.config, step_s=EVEN_S))
-        row["even"] = _case(bench, even, 0.01, "scene", reference, dt)["error"]
+        row["even"] = _case(bench, even, 0.01, reference, dt)["error"]
     return row
 
 
-def _case(
-    bench: Bench, scene: Scene, accuracy: float, fidelity: str, reference: FinishedGrasp, dt_s: float
-) -> Row:
+def _case(bench: Bench, scene: Scene, accuracy: float, reference: FinishedGrasp, dt_s: float) -> Row:
     try:
-        done, _, chosen, job = bench.grasp(scene, accuracy, fidelity)
+        done, _, chosen, job = bench.grasp(scene, accuracy, "scene")
     except ConfigError as error:
         return {"error": math.inf, "refused": str(error)[:200]}
     except ArithmeticError as error:
@@ -272,11 +271,8 @@ def _confirmed(rows: Sequence[Row], what: str) -> str:
     return f"{what}: of {len(mine)} references that have not converged, fixed steps of 10 µs agree with {counts}."
 
 
-def _within(rows: Sequence[Row]) -> Iterator[str]:
-    yield (
-        "| steps | within | within, flagged or refused | flagged | refused | worst without a flag / accuracy |"
-    )
-    yield "|---|---|---|---|---|---|"
+def _within(rows: Sequence[Row]) -> list[str]:
+    cells = []
     for accuracy in ACCURACIES if rows else ():
         mine = [row[f"{accuracy:g}"] for row in rows]
         within = sum(case["error"] <= accuracy for case in mine)
@@ -284,10 +280,11 @@ def _within(rows: Sequence[Row]) -> Iterator[str]:
         flagged = sum(bool(case.get("flags")) for case in mine)
         silent = [case["error"] / accuracy for case in mine if "refused" not in case and not case["flags"]]
         kept = sum(_is_kept(case, accuracy) for case in mine)
-        yield (
-            f"| selected for {accuracy:.1%} | {share_words(within, len(mine))} | {share_words(kept, len(mine))} "
-            f"| {flagged} | {refused} | {max(silent, default=math.nan):.3g} |"
-        )
+        shares = share_words(within, len(mine)), share_words(kept, len(mine))
+        worst = f"{max(silent, default=math.nan):.3g}"
+        cells.append((f"selected for {accuracy:.1%}", *shares, str(flagged), str(refused), worst))
+    heads = ("steps", "within", "within, flagged or refused", "flagged", "refused")
+    return markdown_table((*heads, "worst without a flag / accuracy"), cells)
 
 
 def _misses(rows: Sequence[Row]) -> Iterator[str]:
@@ -300,14 +297,15 @@ def _misses(rows: Sequence[Row]) -> Iterator[str]:
     if not missed:
         yield "None: every grasp with ideal sensors and a stable loop is within the accuracy, flagged or refused."
         return
-    yield "| scene | accuracy | error | of | outcome of the reference | steps | error of fixed steps of 10 µs |"
-    yield "|---|---|---|---|---|---|---|"
+    cells = []
     for _, accuracy, row in sorted(missed, key=lambda miss: -miss[0])[:20]:
         case = row[f"{accuracy:g}"]
-        yield (
-            f"| {row['scene']} | {accuracy:g} | {case['error']:.3g} | {case['of']} | {row['outcome']} "
-            f"| {case['chosen']} | {row['even']:.2g} |"
+        error = f"{case['error']:.3g}", case["of"]
+        cells.append(
+            (str(row["scene"]), f"{accuracy:g}", *error, row["outcome"], case["chosen"], f"{row['even']:.2g}")
         )
+    heads = ("scene", "accuracy", "error", "of", "outcome of the reference", "steps")
+    yield from markdown_table((*heads, "error of fixed steps of 10 µs"), cells)
     yield ""
     yield (
         "Where fixed steps of 10 µs differ from the reference by as much as the selected model, these two agree: it is "

@@ -192,20 +192,16 @@ def scene_files(count: int, folder: Path) -> list[dict[str, Any]]:
     """Write random scenes of `random_scenes.py` as files; return each with its gripper settings and speed."""
     from random_scenes import scene_of
 
+    from graspsense.core.files.toml_values import toml_value
+
     scenes = []
     for number in range(count):
         scene = scene_of(number)
         path = folder / f"scene{number}.toml"
-        lines = [
-            f"width_m = {scene.spec.width_m!r}",
-            f"offset_m = {scene.spec.offset_m!r}",
-            f"mass_kg = {scene.spec.mass_kg!r}",
-            f"held = {str(scene.spec.held).lower()}",
-        ]
-        for kind, parameters in scene.spec.terms:
-            lines += ["", "[[terms]]", f'type = "{kind}"']
-            lines += [f"{key} = {float(value)!r}" for key, value in parameters.items()]
-        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        values = {key: getattr(scene.spec, key) for key in ("width_m", "offset_m", "mass_kg", "held")}
+        values["terms"] = [{"type": kind, **numbers} for kind, numbers in scene.spec.terms]
+        lines = (f"{key} = {toml_value(value)}\n" for key, value in values.items())
+        path.write_text("".join(lines), encoding="utf-8")
         keys = (
             "open_gap_m",
             "damping_n_s_m",

@@ -96,38 +96,31 @@ def cells(traces: list, names: list[str]) -> np.ndarray:
 
 
 def image_features(traces: list, names: list[str]) -> np.ndarray:
-    from graspsense.plugin_api import create
-
     parts = []
     for name in names:
         columns = int(np.prod(traces[0].signals[name].cells.shape[1:]))
-        extract = create("feature-set", "contact-image", array=name, rows=1, columns=columns).extract
-        parts.append(np.array([extract(trace).values for trace in traces], dtype=float))
+        parts.append(features_of(traces, "contact-image", array=name, rows=1, columns=columns))
     return np.concatenate(parts, axis=1)
 
 
-def features_of(traces: list, name: str) -> np.ndarray:
+def features_of(traces: list, name: str, **settings: object) -> np.ndarray:
     from graspsense.plugin_api import create
 
-    extract = create("feature-set", name).extract
+    extract = create("feature-set", name, **settings).extract
     return np.array([extract(trace).values for trace in traces], dtype=float)
 
 
 def answered(features: np.ndarray, labels: np.ndarray, folds: np.ndarray) -> np.ndarray:
-    from graspsense.plugin_api import FeatureTable, create
+    from graspsense.core.settings.selected import select_component
+    from graspsense.evaluation.crossval import cross_validate
+    from graspsense.plugin_api import FeatureTable
 
     names = tuple(f"f{k}" for k in range(features.shape[1]))
-    answers = labels.copy()
-    for fold in np.unique(folds):
-        test = folds == fold
-        model = create("classifier", CLASSIFIER)
-
-        def table(rows: np.ndarray) -> FeatureTable:
-            return FeatureTable(names=names, units=("1",) * len(names), values=features[rows])
-
-        model.fit(table(~test), labels[~test].tolist(), 0)
-        answers[test] = np.array(model.classes())[model.probabilities(table(test)).argmax(axis=1)]
-    return answers
+    table = FeatureTable(names=names, units=("1",) * len(names), values=features)
+    learner = select_component("classifier", CLASSIFIER)
+    return np.array(
+        cross_validate(learner, table, labels.tolist(), [np.arange(len(labels))], [folds]).predicted
+    )
 
 
 def asked(python: str, series: np.ndarray, labels: np.ndarray, folds: np.ndarray) -> list[str]:

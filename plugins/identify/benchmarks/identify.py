@@ -37,6 +37,7 @@ from attrs import asdict, frozen
 from graspsense import load_pipeline
 from graspsense.classifier_api import table_of
 from graspsense.core.components.identification import RecordedSqueeze
+from graspsense.core.files.toml_values import toml_value
 from graspsense.evaluation.intervals import clustered, wilson
 from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import create
@@ -105,6 +106,7 @@ FORCE_N: Final = 18.0
 CONTAINERS: Final = ("odwalla:empty_open", "naked:empty_open", "can:empty_open", "water:empty_open")
 TRANSFER_COUNTS: Final = (1, 3, 10, 30)
 TESTED: Final = 40
+FIRST_SIMULATED: Final = 10_000
 SIMULATED: Final = 40
 """Simulated squeezes of each scene, each of another object: with fewer objects, their spreads show less."""
 
@@ -141,11 +143,9 @@ def drawn(terms: Sequence[Mapping[str, Any]], repeat: int) -> list[dict[str, Any
 
 def scene_text(terms: Sequence[Mapping[str, Any]], spread: float) -> str:
     """Return the text of a scene with these terms."""
-    lines = [f"width_m = {WIDTH_M}", f"stiffness_spread = {spread}", "share = 0.6", "share_spread = 0.01"]
-    for term in terms:
-        lines.append("[[terms]]")
-        lines += [f"{key} = {json.dumps(value)}" for key, value in term.items()]
-    return "\n".join(lines) + "\n"
+    numbers = {"width_m": WIDTH_M, "stiffness_spread": spread, "share": 0.6, "share_spread": 0.01}
+    values = {**numbers, "terms": list(terms)}
+    return "".join(f"{key} = {toml_value(value)}\n" for key, value in values.items())
 
 
 def squeezes_of(
@@ -308,17 +308,17 @@ def grouped(
         yield group_values, list(group)
 
 
-def transfer(counts: Sequence[int], tested: int, classifier: str = "forest") -> Iterator[dict[str, float]]:
+def transfer(counts: Sequence[int]) -> Iterator[dict[str, float]]:
     """Yield the recognition rates of classifiers trained on recordings, and on the scenes identified from them."""
-    settings = load_pipeline("default", options=[f"classifier.type={classifier}"]).settings
+    settings = load_pipeline("default", options=["classifier.type=forest"]).settings
     extract = settings.features.create().extract
     pads = SENSORS["PR2 pads"]
     recorded = {
         name: squeezes_of(name, name, pads, [str(i // 3) for i in seeds], seeds)
         for name in CONTAINERS
-        for seeds in [range(max(TRANSFER_COUNTS) + tested)]
+        for seeds in [range(max(TRANSFER_COUNTS) + TESTED)]
     }
-    test = [(extract(squeeze.trace), name) for name in CONTAINERS for squeeze in recorded[name][-tested:]]
+    test = [(extract(squeeze.trace), name) for name in CONTAINERS for squeeze in recorded[name][-TESTED:]]
     true = [(extract(squeeze.trace), name) for name in CONTAINERS for squeeze in simulated_of(name, name)]
     on_true = _right(settings, true, test)
     with tempfile.TemporaryDirectory() as folder:
@@ -344,9 +344,9 @@ def transfer(counts: Sequence[int], tested: int, classifier: str = "forest") -> 
             }
 
 
-def simulated_of(scene: str, label: str, first_seed: int = 10_000) -> list[RecordedSqueeze]:
+def simulated_of(scene: str, label: str) -> list[RecordedSqueeze]:
     """Return the simulated squeezes of a scene that a classifier is trained on."""
-    seeds = [first_seed + i for i in range(SIMULATED)]
+    seeds = [FIRST_SIMULATED + i for i in range(SIMULATED)]
     return squeezes_of(scene, label, SENSORS["PR2 pads"], [str(seed) for seed in seeds], seeds)
 
 
@@ -398,7 +398,7 @@ def main() -> None:
     repeats = range(asked.first, asked.first + asked.repeats)
     cases = product(repeats, counts, asked.sensors, asked.only)
     known = (asdict(measured(name, sensor, count, repeat)) for repeat, count, sensor, name in cases)
-    for row in transfer(counts if asked.repeats else (), TESTED) if asked.transfer else known:
+    for row in transfer(counts if asked.repeats else ()) if asked.transfer else known:
         print(json.dumps(row), file=sys.stderr, flush=True)
         rows.append(row)
         # A run that is stopped has all scenes in its rows.

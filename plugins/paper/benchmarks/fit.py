@@ -38,6 +38,7 @@ import numpy as np
 from attrs import evolve, frozen
 
 from graspsense.classifier_api import table_of
+from graspsense.core.files.toml_values import toml_value
 from graspsense.core.values.trace import Trace
 from graspsense.evaluation.crossval import cross_validate
 from graspsense.evaluation.folds import stratified
@@ -110,15 +111,11 @@ def with_figures(spec: ObjectSpec, share: float, damping_n_s_m: float, stiffness
 
 def as_toml(spec: ObjectSpec) -> str:
     """Return the object as a scene file."""
-    lines = [f'patch = "{spec.patch}"', f"held = {str(spec.held).lower()}"]
-    numbers = ("width_m", "width_spread_m", "stiffness_spread", "offset_m", "offset_spread_m")
-    lines += [
-        f"{key} = {getattr(spec, key)!r}"
-        for key in (*numbers, "share", "share_spread", "friction", "mass_kg")
-    ]
-    for kind, values in spec.terms:
-        lines += ["[[terms]]", f'type = "{kind}"', *(f"{key} = {value!r}" for key, value in values.items())]
-    return "\n".join(lines) + "\n"
+    keys = ("patch", "held", "width_m", "width_spread_m", "stiffness_spread", "offset_m", "offset_spread_m")
+    keys += ("share", "share_spread", "friction", "mass_kg")
+    values = {key: getattr(spec, key) for key in keys}
+    values["terms"] = [{"type": kind, **numbers} for kind, numbers in spec.terms]
+    return "".join(f"{key} = {toml_value(value)}\n" for key, value in values.items())
 
 
 class Squeeze(NamedTuple):

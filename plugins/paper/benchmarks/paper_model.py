@@ -454,7 +454,7 @@ def gain(values: Values, seed: int) -> float:
 
 
 def predictions(values: Values, seed: int) -> dict[str, float]:
-    """Return one replicate of the predictions: Tables IV and V, section III.F, Figs. 4 to 6, the tree's splits."""
+    """Return one replicate of the predictions: Tables IV and V, section III.F, Fig. 6, the tree's splits."""
     feature_set = create("feature-set", "chitta")
 
     def extract(trace: Trace) -> tuple[Features, Squeeze]:
@@ -474,12 +474,11 @@ def predictions(values: Values, seed: int) -> dict[str, float]:
     figures["eleven_classes"] = rate_of(eleven.extracted, eleven.labels, seed)
     states = [state_of(label) for label in trials.labels]
     tree = C45Classifier().fit(matrix_of(trials.extracted), states)
-    for name, kind in (("worn_bottles", "odwalla_worn"), ("other_new_bottles", "odwalla")):
-        tested = squeeze({kind: TABLE_IV}, values, seed, 23.0, feature_set.extract, first_instance=500)
-        figures[name] = rate(
-            tree.predict(matrix_of(tested.extracted)).tolist(), [state_of(label) for label in tested.labels]
-        )
-    return {**figures, **_figures(values, seed)}
+    worn = {"odwalla_worn": TABLE_IV}
+    tested = squeeze(worn, values, seed, 23.0, feature_set.extract, first_instance=500)
+    told = tree.predict(matrix_of(tested.extracted)).tolist()
+    figures["worn_bottles"] = rate(told, [state_of(label) for label in tested.labels])
+    return {**figures, **_fig_6(values, seed)}
 
 
 def state_of(label: str) -> str:
@@ -510,37 +509,25 @@ def _squeezes(trials: Trials, squeezes: Sequence[Squeeze]) -> dict[str, float]:
     return figures
 
 
-def _figures(values: Values, seed: int) -> dict[str, float]:
-    """Return what Figs. 4 to 6 show: a wooden block under force and hybrid control."""
+def _fig_6(values: Values, seed: int) -> dict[str, float]:
+    """Return what Fig. 6 shows: a wooden block under hybrid control."""
     feature_set = create("feature-set", "chitta")
 
     def extract(trace: Trace) -> tuple[dict[str, float], Features]:
         return measures(trace), feature_set.extract(trace)
 
-    figures: dict[str, float] = {}
-    cases = {
-        "fig_4_20": ("hybrid", 20.0),
-        "fig_4_100": ("hybrid", 100.0),
-        "fig_5": ("force", 23.0),
-        "fig_6": ("hybrid", 23.0),
+    (done,) = run_many(
+        evolve(config_of(values), fidelity="scene"),
+        create("controller", "hybrid", probing_force_n=23.0),
+        ["block"],
+        [TRIALS_PER_SEED * seed + 900],
+        extract=extract,
+        traces=False,
+        compiled=True,
+        workers=1,
+    )
+    measured, features = done.extracted
+    return {
+        "fig_6_peak_n": measured.get("measured_peak_force_n", float("nan")),
+        "fig_6_rest_s": features.as_dict()["delta_t"] or float("nan"),
     }
-    for name, (controller, force_n) in cases.items():
-        (done,) = run_many(
-            evolve(config_of(values), fidelity="scene"),
-            create("controller", controller, probing_force_n=force_n),
-            ["block"],
-            [TRIALS_PER_SEED * seed + 900],
-            extract=extract,
-            traces=False,
-            compiled=True,
-            workers=1,
-        )
-        measured, features = done.extracted
-        if name.startswith("fig_4"):
-            figures[f"{name}_counts"] = measured.get("left_counts", float("nan"))
-        elif name == "fig_5":
-            figures["fig_5_peak_n"] = float(done.state.peak_n)
-        else:
-            figures["fig_6_peak_n"] = measured.get("measured_peak_force_n", float("nan"))
-            figures["fig_6_rest_s"] = features.as_dict()["delta_t"] or float("nan")
-    return figures

@@ -96,20 +96,7 @@ def choose(
     The order of the squeezes changes nothing: folds and fits take them in the order of their forces.
     """
     order = sorted(range(len(squeezes)), key=lambda i: squeezes[i].force_n.tobytes())
-    choice = _chosen(model, [squeezes[i] for i in order], scale, has_memory, progress)
-    given = np.argsort(order).tolist()
-    refined = tuple(fitted.part(given) for fitted in choice.refined)
-    return evolve(choice, fitted=choice.fitted.part(given), refined=refined)
-
-
-def _chosen(
-    model: ForwardModel,
-    squeezes: Sequence[Squeeze],
-    scale: DataScale,
-    has_memory: bool,
-    progress: Callable[[int, int], None],
-) -> Choice:
-    """Return what `choose` returns, with the squeezes in this order."""
+    squeezes, given = [squeezes[i] for i in order], np.argsort(order).tolist()
     laws, with_memory = static_candidates(scale), memories(scale) if has_memory else []
     total = (3 if has_memory else 1) * len(laws) + STATIC_KEPT * len(with_memory) + MANY
     numbers = count(1)
@@ -138,8 +125,8 @@ def _chosen(
     dropped = [fitted for k, fitted in enumerate(rough) if k not in kept]
     scores = [_score(fitted, best, judged, fits) for fitted in [*fits, *dropped]]
     return Choice(
-        fitted=best.fitted.refitted(max_evaluations=MANY_EVALUATIONS),
-        refined=tuple(fitted for fitted in fits if fitted.rms <= WORTH_KEEPING * least),
+        fitted=best.fitted.refitted(max_evaluations=MANY_EVALUATIONS).part(given),
+        refined=tuple(fitted.part(given) for fitted in fits if fitted.rms <= WORTH_KEEPING * least),
         scores=tuple(sorted(scores, key=_rank)),
     )
 
