@@ -196,6 +196,12 @@ def test_without_pylibfranka_the_user_is_told_what_to_install(monkeypatch):
     assert "pip install pylibfranka" in finding.advice
 
 
+def test_without_an_address_a_note_says_how_a_hand_is_asked():
+    [finding] = diagnose(None, 1.0)
+    assert finding.state == "note"
+    assert "gripper.host=" in finding.advice
+
+
 def _hand():
     hand = FrankaHand(FrankaConfig(host="emulated"), 1)
     hand.look(0.1)

@@ -51,7 +51,10 @@ def diagnose(config: object, timeout_s: float) -> Iterator[Finding]:
     """Return the findings about the hand of these settings; without settings there is no address to ask."""
     if config is None:
         yield Finding(
-            "franka", "note", "a Franka Hand is on the network: --gripper franka -o gripper.host=... asks it"
+            "franka",
+            "note",
+            "no hand was searched: it would be on the network, at an address that only you know",
+            "graspsense doctor --gripper franka -o gripper.host=ADDRESS asks the one at this address",
         )
     elif isinstance(config, FrankaConfig):
         yield from _asked(config, timeout_s)
