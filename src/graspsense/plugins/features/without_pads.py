@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import evolve, frozen
 
-from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, create, setting
+from graspsense.plugin_api import APPROACH, Channel, Feature, Features, FeatureSet, create, setting
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -16,6 +16,14 @@ if TYPE_CHECKING:
 
 START_M: Final = 1e-3
 """Travel before which the fingers are only set in motion."""
+TRAVEL_M: Final = 3e-3
+"""Travel from the contact on after which the effort must have shown that there is one."""
+FLAT_SHARE: Final = 0.05
+"""Share of its rise over the contact effort that the effort makes at least between two quarters of the travel."""
+LIMIT_SHARE: Final = 0.85
+"""Share of the largest effort of the approach from which on it cannot rise before the squeeze allows more."""
+SLOWED_SHARE: Final = 0.7
+"""Share of their speed before the contact below which the fingers have met a resistance."""
 
 
 @frozen(kw_only=True)
@@ -69,10 +77,11 @@ class WithoutPads(FeatureSet[WithoutPadsConfig]):
             rest_window_s=config.rest_window_s,
         ).extract(evolve(trace, force_left_n=effort_n, force_right_n=effort_n))
         names = [feature.name for feature in self.features]
-        return self.result(
-            {name: six[name] for name in names},
-            {name: six.reasons[name] for name in names if name in six.reasons},
-        )
+        reasons = {name: six.reasons[name] for name in names if name in six.reasons}
+        doubt = _doubt(trace, effort_n, config.contact_effort_n)
+        if doubt:
+            reasons |= {name: doubt for name in names if name != "p_steady"}
+        return self.result({name: six[name] for name in names if name not in reasons}, reasons)
 
 
 def _without_start(
@@ -90,3 +99,39 @@ def _without_start(
         return effort_n
     end = above[0] + below[0]
     return np.concatenate([np.minimum(effort_n[:end], 0.0), effort_n[end:]])
+
+
+def _doubt(trace: Trace, effort_n: NDArray[np.float64], contact_n: float) -> str:
+    """Return why the effort does not tell the contact: the fingers moved on without a resistance; empty if it does.
+
+    From a contact on the effort stays above the threshold and rises, or the fingers slow down.
+    """
+    contact = int(np.argmax(trace.closing & (effort_n >= contact_n)))
+    squeezed = np.flatnonzero(trace.phase > APPROACH)
+    stop = int(squeezed[0]) if len(squeezed) else len(trace) - 1
+    if stop <= contact or not effort_n[contact] >= contact_n:
+        return ""
+    gaps, efforts, times = (values[contact : stop + 1] for values in (trace.gap_m, effort_n, trace.t_s))
+    travels = gaps[0] - gaps
+    where = f"the effort is {efforts[0]:.1f} N at {gaps[0] * 1e3:.1f} mm"
+    below = np.flatnonzero(~(efforts >= contact_n))
+    if len(below) and travels[below[-1]] >= TRAVEL_M:
+        moved_m = travels[below[-1]]
+        return f"contact not certain: {where} and falls again, while the fingers move on by {moved_m * 1e3:.1f} mm"
+    quarter, half = (int(np.argmax(travels >= share * travels[-1])) for share in (0.25, 0.5))
+    if not travels[-1] >= TRAVEL_M or not 0 < quarter < half:
+        return ""
+    free_n, top_n = float(np.mean(efforts[:quarter])), float(np.max(efforts))
+    if free_n >= LIMIT_SHARE * top_n and np.max(effort_n[stop:]) * LIMIT_SHARE >= top_n:
+        # The effort is at the limit of the approach, and higher in the squeeze.
+        return ""
+    rise_n = float(np.mean(efforts[quarter:half])) - free_n
+    earlier = trace.closing[:contact] & (trace.gap_m[:contact] <= gaps[0] + TRAVEL_M)
+    begin = int(np.argmax(earlier)) if earlier.any() else contact
+    if begin < contact and trace.gap_m[begin] - gaps[0] > START_M:
+        usual_m_s = (trace.gap_m[begin] - gaps[0]) / (times[0] - trace.t_s[begin])
+        if travels[half] < SLOWED_SHARE * usual_m_s * (times[half] - times[0]):
+            return ""
+    if rise_n > FLAT_SHARE * (top_n - contact_n):
+        return ""
+    return f"contact not certain: {where} and does not rise, while the fingers move on by {travels[half] * 1e3:.1f} mm"

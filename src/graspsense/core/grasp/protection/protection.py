@@ -18,9 +18,10 @@ from graspsense.core.grasp.protection.cells import Fingertips
 from graspsense.core.grasp.protection.drift import Drift
 from graspsense.core.grasp.protection.effort_ceiling import asked_effort_n, effort_ceiling_n, limited
 from graspsense.core.grasp.protection.motor import FeltForce, FreeEffort, Motor
+from graspsense.core.grasp.protection.opening import Opening
 from graspsense.core.grasp.protection.pad_forces import EmptyForce, PadBalance, StuckForce
 from graspsense.core.grasp.protection.reports import Reports
-from graspsense.core.grasp.protection.speed import GapSpeed, Rush, Standstill
+from graspsense.core.grasp.protection.speed import GapAbsent, GapJump, GapSpeed, Rush, Standstill
 from graspsense.core.grasp.protection.status import StatusWatch
 from graspsense.core.grasp.protection.touch import Touch
 from graspsense.core.values.device import DeviceInfo
@@ -53,6 +54,7 @@ class Protection:
         controller: Controller[object],
         run: RunConfig,
         tell: Callable[[Fault], None],
+        command_delay_s: float = 0.0,
     ) -> None:
         self._tell = tell
         self._told: dict[str, Fault] = {}
@@ -84,7 +86,8 @@ class Protection:
         self._motor = Motor("effort" in rates, info.rate_hz)
         self._status = StatusWatch(info.status_bits)
         first_m_s = run.first_speed_m_s if info.clock == "device" else inf
-        self._standstill = Standstill()
+        self._standstill, self._jump, self._absent = Standstill(), GapJump(), GapAbsent(info.rate_hz)
+        self.opening = Opening(info.rate_hz, command_delay_s)
         self._rush = Rush(min(first_m_s, info.speed_limit_m_s), info.rate_hz)
         self._reports = Reports(info.rate_hz, rates.get("pads", 0.0))
 
@@ -109,8 +112,12 @@ class Protection:
         if not self._declared and frame.force_left_n == frame.force_left_n:
             self._has_pads = True
         closing = phase in (APPROACH, SQUEEZE, HOLD)
+        jump = self._jump.see(frame)
         if closing:
             self._see(self._gap_speed.see(frame))
+            self._see(jump)
+            self._see(self._absent.see(frame))
+        self._see(self.opening.see(frame, phase), phase)
         if self._has_pads:
             self._see_pads(reading, phase, command)
         allowed = self._limited(phase, command)
@@ -122,6 +129,7 @@ class Protection:
             self._see(self._standstill.see(frame, allowed))
         self.acted += allowed.value != command.value or self._gives(command) > asked_effort_n(allowed)
         self._motor.apply(frame, allowed)
+        self._jump.apply(allowed)
         return allowed
 
     def before_closing(self, frame: Frame) -> Fault | None:
