@@ -7,6 +7,7 @@ from cases import every_case
 from grippers import REST_S, Scripted, bottle, squeezing
 
 from graspsense.core.components.run_config import RunConfig
+from graspsense.core.grasp.protection.motor import Motor
 from graspsense.core.grasp.protection.opening import Opening
 from graspsense.core.grasp.protection.speed import GapAbsent, GapJump
 from graspsense.core.grasp.runner import run_grasp
@@ -32,11 +33,11 @@ def frame(k, gap_m):
 
 def jumps(command, gap_of, frames=100):
     """Return in which frames the gap jumps under this command."""
-    watch, seen = GapJump(), []
+    watch, seen = GapJump(0.2), []
     for k in range(frames):
         if watch.see(frame(k, gap_of(k))) is not None:
             seen.append(k)
-        watch.apply(command)
+        watch.apply(frame(k, gap_of(k)), command)
     return seen
 
 
@@ -75,6 +76,19 @@ def test_a_gap_that_was_known_and_is_none_for_a_tenth_of_a_second_ends_the_grasp
     watch = GapAbsent(RATE_HZ)
     faults = [watch.see(frame(k, nan if absent_from <= k < absent_to else 0.05)) for k in range(100)]
     assert any(fault is not None and fault.ends for fault in faults) is ends
+
+
+def test_a_gap_that_jumps_is_no_motor_that_turns_the_wrong_way():
+    """Against the command and back, as a spike does: the motor is judged by the motion without the jumps."""
+    jump, motor = GapJump(0.2), Motor(False, RATE_HZ)
+    for k in range(100):
+        now = frame(k, closing(k) + 0.004 * (k == 30) + 0.004 * (k >= 60))
+        jump.see(now)
+        motor.shift(jump.step_m)
+        assert motor.see(now, Phase.APPROACH) is None
+        motor.apply(now, CLOSES)
+        jump.apply(now, CLOSES)
+    assert jump.jumps == 3
 
 
 def opened(gap_of, start_m=0.08, delay_s=0.02):

@@ -8,6 +8,7 @@ from __future__ import annotations
 from math import exp, inf, nan
 from typing import Final
 
+from graspsense.core.grasp.protection.motor import direction_of
 from graspsense.core.grasp.protection.touch import CLOSED_M
 from graspsense.core.values.faults import Fault
 from graspsense.core.values.signals import EFFORT, FORCE, POSITION, VELOCITY, Command, Frame
@@ -121,24 +122,38 @@ class Standstill:
 
 
 class GapJump:
-    """Watches for a gap that changes faster than any finger moves under a command that says the speed."""
+    """Watches for a gap that changes faster than fingers with this limit of the speed move under their commands."""
 
-    def __init__(self) -> None:
+    def __init__(self, speed_limit_m_s: float) -> None:
+        self._limit_m_s = speed_limit_m_s
         self._gap_m, self._dt_s = nan, 0.0
-        self._told_m_s = [inf, inf]
+        self._told_m_s = [speed_limit_m_s, speed_limit_m_s]
+        self._direction = 0
+        self.step_m = 0.0
+        """The jump of the last frame (m), 0 without one."""
+        self.jumps = 0
+        """The number of jumps."""
 
-    def apply(self, command: Command) -> None:
-        """Take the command that is applied after this frame; that of an effort leaves the speed open."""
+    def apply(self, frame: Frame, command: Command) -> None:
+        """Take the command that is applied after this frame; that of an effort leaves the speed to the gripper."""
         kind, value, _, speed_limit_m_s = command
-        speed_m_s = inf if kind == EFFORT else speed_limit_m_s
+        speed_m_s = min(inf if kind == EFFORT else speed_limit_m_s, self._limit_m_s)
         self._told_m_s = [self._told_m_s[1], min(abs(value), speed_m_s) if kind == VELOCITY else speed_m_s]
+        # An object can push fingers open that press with an effort.
+        self._direction = 0 if kind == EFFORT else direction_of(command, frame.gap_m)
 
     def see(self, frame: Frame) -> Fault | None:
         """Take the frame of a tick; return the jump that it shows."""
         step_m, elapsed_s = frame.gap_m - self._gap_m, frame.dt_s + self._dt_s
         self._gap_m, self._dt_s = frame.gap_m, frame.dt_s
-        if not abs(step_m) > JUMP_M + JUMP * max(self._told_m_s) * elapsed_s:
+        told_m_s = max(self._told_m_s)
+        against = step_m * self._direction > 0.0
+        allowed_m = JUMP_M + (told_m_s * frame.dt_s if against else JUMP * told_m_s * elapsed_s)
+        if not abs(step_m) > allowed_m:
+            self.step_m = 0.0
             return None
+        self.step_m = step_m
+        self.jumps += 1
         return Fault(
             "gap jumps",
             f"it changed by {step_m * 1e3:+.1f} mm within {frame.dt_s * 1e3:.0f} ms, faster than the fingers were told "
