@@ -10,11 +10,13 @@ from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import DeviceLost
 from graspsense.core.values.signals import EFFORT, Command, Frame, Pads, Reading
-from graspsense.testing.model_gripper import CELLS
+from graspsense.testing.model_gripper import CELLS, OPEN_M
 
 
 class Scripted(SensorBackend):
     """A gripper whose fingers go where `path(t)` says from the approach on, with the forces `felt(t)` gives.
+
+    From there they open at 50 mm/s when they are told to, and feel nothing any more.
 
     It keeps every command with the phase-free facts a test wants: what was asked for, in which order.
     """
@@ -25,6 +27,7 @@ class Scripted(SensorBackend):
         self.lose_at, self.silent_from = lose_at, silent_from
         self.commands, self.tares, self.closed, self.opened = [], [], 0, 0
         self.k = -1
+        self.closes, self.opens_from_s = False, inf
 
     def open(self, seed):
         self.opened += 1
@@ -46,15 +49,23 @@ class Scripted(SensorBackend):
         if self.silent_from is not None and self.k >= self.silent_from:
             return None
         t = self.k * 0.001
-        left, right = self.felt(t)
+        left, right = self.felt(t) if t < self.opens_from_s + 0.02 else (0.0, 0.0)
         cells = (3000.0,) * CELLS
         return Reading(
-            Frame(t, 0.001, self.path(t), 0.0, 0.0, left, right, 0.0, 0.0, 0),
+            Frame(t, 0.001, self.gap_m(t), 0.0, 0.0, left, right, 0.0, 0.0, 0),
             Pads(t, 1 + self.k // 41, cells, cells),
         )
 
+    def gap_m(self, t):
+        opened_m = 0.05 * max(t - self.opens_from_s, 0.0)
+        return self.path(t) if opened_m == 0.0 else max(self.path(t), min(self.path(t) + opened_m, OPEN_M))
+
     def apply(self, command):
         self.commands.append(command)
+        is_effort = command.kind == EFFORT
+        self.closes = self.closes or (is_effort and command.value > 0.0)
+        if self.closes and is_effort and command.value < 0.0:
+            self.opens_from_s = min(self.opens_from_s, self.k * 0.001)
 
     def tare(self, images):
         self.tares.append(list(images))

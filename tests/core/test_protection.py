@@ -13,7 +13,7 @@ from graspsense.core.grasp.protection.cells import Fingertips
 from graspsense.core.grasp.protection.drift import PadDrift
 from graspsense.core.grasp.protection.effort_ceiling import effort_ceiling_n, limited
 from graspsense.core.grasp.protection.motor import FeltForce, FreeEffort, Motor
-from graspsense.core.grasp.protection.pad_forces import EmptyForce, StuckForce
+from graspsense.core.grasp.protection.pad_forces import EmptyForce, EmptyHold, StuckForce
 from graspsense.core.grasp.protection.reports import Reports
 from graspsense.core.grasp.protection.speed import GapSpeed, Standstill
 from graspsense.core.grasp.protection.status import StatusWatch
@@ -628,3 +628,26 @@ def test_pads_that_feel_a_contact_when_the_fingers_have_opened_are_told(gap_m, l
     faults = [fault for tick in opening if (fault := watch.see(tick, int(Phase.RELEASE)))]
     assert bool(faults) == told
     assert not any(fault.ends for fault in faults)
+
+
+@every_case(
+    ("left_n", "right_n", "told"),
+    [(0.0, 0.0, True), (-20.0, -20.0, True), (0.0, 5.0, False), (0.4, 0.4, False)],
+)
+def test_pads_that_both_feel_nothing_in_the_hold_are_told(left_n, right_n, told):
+    watch = EmptyHold(CONTACT_N)
+    faults = [watch.see(frame(0.001 * k, left=left_n, right=right_n)) for k in range(200)]
+    assert any(fault is not None and not fault.ends for fault in faults) is told
+
+
+@every_case(("rises_n", "ends"), [(0.0, True), (5.0, False)])
+def test_a_force_that_is_there_before_the_fingers_close_is_a_contact_only_if_it_rises(rises_n, ends):
+    """Both pads feel 3 N from the beginning, while the fingers close by 10 mm."""
+    touch = Touch(CONTACT_N)
+    seen = [
+        touch.see(
+            frame(0.001 * k, 0.08 - 1e-5 * k, left=3.0 + rises_n * k / 1e3, right=3.0), APPROACH, CLOSING
+        )
+        for k in range(1000)
+    ]
+    assert any(fault is not None and fault.ends for fault in seen) is ends

@@ -77,7 +77,7 @@ class ActsLate(Scripted):
     command_delay_s = 0.25
 
     def __init__(self):
-        super().__init__(self.gap, lambda t: bottle(t - self.command_delay_s))
+        super().__init__(squeezing, lambda t: bottle(t - self.command_delay_s))
         self.told_s = inf
 
     def apply(self, command):
@@ -86,7 +86,7 @@ class ActsLate(Scripted):
         if command.value == -20.0 and t > REST_S + self.command_delay_s:
             self.told_s = min(self.told_s, t)
 
-    def gap(self, t):
+    def gap_m(self, t):
         return min(squeezing(t - self.command_delay_s) + 0.1 * max(t - self.told_s - 0.2, 0.0), 0.074)
 
 
@@ -628,8 +628,9 @@ def test_fingers_whose_clock_stands_still_are_relaxed_after_the_opening_time_on_
 
 def test_fingers_that_are_open_are_not_opened_again(ordinary):
     values = [c.value for c in ordinary[0].commands]
-    # The release ends when the gap has stood still for 0.1 s, and then there is one more command.
-    assert values[::-1].index(20.0) - 1 == pytest.approx(101, abs=2)
+    # The fingers open from 54 to 80 mm at 50 mm/s. The release ends when the gap has stood still for 0.1 s, and then
+    # there is one more command.
+    assert values[::-1].index(20.0) - 1 == pytest.approx(520 + 101, abs=2)
 
 
 def test_the_wall_clock_of_a_grasp_is_what_it_took():

@@ -95,6 +95,7 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
         self._fingertips: TactileFingertips | None = None
         self._polling = Polling(RATE_HZ)
         self._gap_m = self._target_m = 0.0
+        self._elapsed_s = 1.0 / RATE_HZ
         self._pads = NO_PADS
         self._zero = ((0.0,) * CELLS, (0.0,) * CELLS)
         self._asked = Request(active=True, go=False, position=0, speed=0, force=0)
@@ -138,6 +139,7 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
         told = not isinstance(self._link, UrCapLink)
         effort_n = status.current * AMPERES_A_STEP * self.config.newtons_per_ampere if told else nan
         frame = self._polling.frame(self._gap_m, effort_n, bit_of(status.fault))
+        self._elapsed_s = frame.dt_s
         (left_n, right_n), signals = self._felt()
         return Reading(frame._replace(force_left_n=left_n, force_right_n=right_n), self._pads, signals)
 
@@ -286,10 +288,10 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
         return status
 
     def _move_target(self, goal_m: float, speed_m_s: float) -> None:
-        """Move the target on by the way of one frame: the gripper itself cannot move that slowly."""
+        """Move the target on by the way since the last frame: the gripper itself cannot move that slowly."""
         if speed_m_s == 0.0:
             self._target_m = self._gap_m
-        step = speed_m_s / RATE_HZ
+        step = speed_m_s * self._elapsed_s
         self._target_m += min(max(goal_m - self._target_m, -step), step)
         if goal_m < self._gap_m:
             self._target_m = max(self._target_m, self._gap_m - AHEAD_M)

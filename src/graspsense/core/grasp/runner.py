@@ -270,7 +270,9 @@ class _Grasp:
         # Imported here: a pure model, as most grasps are of, needs none.
         from graspsense.core.grasp.protection.protection import Protection
 
-        return Protection(self.info, self.controller, self.run, self._fault_seen)
+        return Protection(
+            self.info, self.controller, self.run, self._fault_seen, self.backend.command_delay_s
+        )
 
     def watch_with(self, watcher: Watcher) -> None:
         """Let this watcher see the ticks from the contact on."""
@@ -418,8 +420,13 @@ class _Grasp:
 
         Those that stand still until then would otherwise count as open, and be stopped before they move.
         """
+        if state.phase not in (Phase.OPENING, RELEASE):
+            return state
         delay_s = self.backend.command_delay_s
-        if not delay_s or state.phase not in (Phase.OPENING, RELEASE):
+        if state.phase == RELEASE and self.protection is not None:
+            # A gap that is told late stands still for longer.
+            delay_s = self.protection.opening.stands_s
+        if not delay_s:
             return state
         return state._replace(still=RestState(frame.t_s + delay_s, frame.gap_m))
 

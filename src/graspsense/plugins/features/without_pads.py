@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import evolve, frozen
 
-from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, create, setting
+from graspsense.plugin_api import APPROACH, HOLD, Channel, Feature, Features, FeatureSet, create, setting
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -16,6 +16,14 @@ if TYPE_CHECKING:
 
 START_M: Final = 1e-3
 """Travel before which the fingers are only set in motion."""
+TRAVEL_M: Final = 3e-3
+"""Travel from the contact on after which the effort must have shown that there is one."""
+FLAT_SHARE: Final = 0.05
+"""Share of its rise over the contact effort that the effort makes at least between two quarters of the travel."""
+LIMIT_SHARE: Final = 0.85
+"""Share of the largest effort of the approach from which on it cannot rise before the squeeze allows more."""
+SLOWED_SHARE: Final = 0.7
+"""Share of their speed before the contact below which the fingers have met a resistance."""
 
 
 @frozen(kw_only=True)
@@ -69,10 +77,13 @@ class WithoutPads(FeatureSet[WithoutPadsConfig]):
             rest_window_s=config.rest_window_s,
         ).extract(evolve(trace, force_left_n=effort_n, force_right_n=effort_n))
         names = [feature.name for feature in self.features]
-        return self.result(
-            {name: six[name] for name in names},
-            {name: six.reasons[name] for name in names if name in six.reasons},
-        )
+        reasons = {name: six.reasons[name] for name in names if name in six.reasons}
+        doubt = _doubt(trace, effort_n, config.contact_effort_n)
+        if doubt:
+            # The rest of the hold does not depend on the contact.
+            holds = bool((trace.phase == HOLD).any())
+            reasons |= {name: doubt for name in names if not (holds and name == "p_steady")}
+        return self.result({name: six[name] for name in names if name not in reasons}, reasons)
 
 
 def _without_start(
@@ -90,3 +101,50 @@ def _without_start(
         return effort_n
     end = above[0] + below[0]
     return np.concatenate([np.minimum(effort_n[:end], 0.0), effort_n[end:]])
+
+
+def _doubt(trace: Trace, effort_n: NDArray[np.float64], contact_n: float) -> str:
+    """Return why the effort does not tell the contact: the fingers moved on without a resistance; empty if it does.
+
+    From a contact on the effort stays above the threshold and rises, or the fingers slow down.
+    """
+    contact = int(np.argmax(trace.closing & (effort_n >= contact_n)))
+    if not effort_n[contact] >= contact_n:
+        return ""
+    squeezed = np.flatnonzero(trace.phase > APPROACH)
+    stop = int(squeezed[0]) if len(squeezed) else len(trace) - 1
+    gaps = trace.gap_m[contact:]
+    where = f"contact not certain: the effort is {effort_n[contact]:.1f} N at {gaps[0] * 1e3:.1f} mm"
+    if not len(squeezed) and trace.gap_m[0] - np.min(gaps) < START_M:
+        return f"{where}, and the fingers had not moved"
+    eases = (trace.closing & (effort_n < contact_n))[contact:]
+    eased_m = float(np.sum(np.maximum(-np.diff(gaps), 0.0)[eases[:-1]]))
+    falls = np.flatnonzero(eases[: max(stop - contact, 0)])
+    fallen_m = float(gaps[0] - gaps[falls[-1]]) if len(falls) else 0.0
+    if max(eased_m, fallen_m) >= TRAVEL_M:
+        return f"{where} and falls again, while the fingers move on by {max(eased_m, fallen_m) * 1e3:.1f} mm"
+    flat = _is_flat(trace, effort_n, contact, stop, contact_n)
+    return f"{where} and does not rise, while the fingers move on" if flat else ""
+
+
+def _is_flat(trace: Trace, effort_n: NDArray[np.float64], contact: int, stop: int, contact_n: float) -> bool:
+    """Return whether the effort stays the same over the first half of the way from the contact to the stop."""
+    gaps, efforts, times = (values[contact : stop + 1] for values in (trace.gap_m, effort_n, trace.t_s))
+    if len(gaps) == 0 or not gaps[0] - gaps[-1] >= TRAVEL_M:
+        return False
+    travels = gaps[0] - gaps
+    quarter, half = (int(np.argmax(travels >= share * travels[-1])) for share in (0.25, 0.5))
+    if not 0 < quarter < half:
+        return False
+    free_n, top_n = float(np.mean(efforts[:quarter])), float(np.max(efforts))
+    if free_n >= LIMIT_SHARE * top_n and np.max(effort_n[stop:]) * LIMIT_SHARE >= top_n:
+        # The effort is at the limit of the approach, and higher in the squeeze.
+        return False
+    earlier = trace.closing[:contact] & (trace.gap_m[:contact] <= gaps[0] + TRAVEL_M)
+    begin = int(np.argmax(earlier)) if earlier.any() else contact
+    if begin < contact and trace.gap_m[begin] - gaps[0] > START_M:
+        usual_m_s = (trace.gap_m[begin] - gaps[0]) / (times[0] - trace.t_s[begin])
+        if travels[half] < SLOWED_SHARE * usual_m_s * (times[half] - times[0]):
+            return False
+    rise_n = float(np.mean(efforts[quarter:half])) - free_n
+    return rise_n <= FLAT_SHARE * (top_n - contact_n)

@@ -99,6 +99,10 @@ class Motor:
         if not self._commands or asked != self._commands[-1]:
             self._commands.append(asked)
 
+    def shift(self, step_m: float) -> None:
+        """Let the gap jump by this (m), which is no motion of the fingers."""
+        self._extreme_m += step_m
+
     def see(self, frame: Frame, phase: int) -> Fault | None:
         """Take the frame of a tick and return a fault that it shows."""
         commands = self._commands

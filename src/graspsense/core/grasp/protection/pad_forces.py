@@ -23,6 +23,8 @@ IMAGES: Final = 5.0
 CHANGE_N: Final = 1.0
 """Change of the other pad's force in that time that a sound pad would have felt too."""
 
+FREE_SHARE: Final = 0.25
+"""Share of the contact force below which a pad holds nothing."""
 OPENED_M: Final = 0.005
 EMPTY_S: Final = 0.1
 """So much wider than at the contact, and for so long, no object touches both fingers any more."""
@@ -112,4 +114,24 @@ class EmptyForce:
             "pads feel nothing there",
             f"both pads feel {felt_n:.1f} N or more although the fingers have let go: they stopped, or their zero "
             "drifted, in the squeeze, so its forces are wrong; check the fingertips",
+        )
+
+
+class EmptyHold:
+    """Sees that both pads feel nothing while the fingers hold what both have felt."""
+
+    def __init__(self, contact_n: float) -> None:
+        self._free_n = FREE_SHARE * contact_n
+        self._lasts_s = 0.0
+
+    def see(self, frame: Frame) -> Fault | None:
+        """Take the frame of a tick of the hold; return the fault once it has lasted."""
+        felt_n = max(frame.force_left_n, frame.force_right_n)
+        self._lasts_s = lasting(self._lasts_s, felt_n < self._free_n, frame.dt_s)
+        if self._lasts_s <= EMPTY_S:
+            return None
+        return Fault(
+            "pads feel nothing in the hold",
+            f"both felt a contact, and feel {felt_n:.2f} N at most now: the object is gone, or both have stopped; "
+            "check the fingertips",
         )

@@ -18,9 +18,10 @@ from graspsense.core.grasp.protection.cells import Fingertips
 from graspsense.core.grasp.protection.drift import Drift
 from graspsense.core.grasp.protection.effort_ceiling import asked_effort_n, effort_ceiling_n, limited
 from graspsense.core.grasp.protection.motor import FeltForce, FreeEffort, Motor
-from graspsense.core.grasp.protection.pad_forces import EmptyForce, PadBalance, StuckForce
+from graspsense.core.grasp.protection.opening import Opening
+from graspsense.core.grasp.protection.pad_forces import EmptyForce, EmptyHold, PadBalance, StuckForce
 from graspsense.core.grasp.protection.reports import Reports
-from graspsense.core.grasp.protection.speed import GapSpeed, Rush, Standstill
+from graspsense.core.grasp.protection.speed import GapAbsent, GapJump, GapSpeed, Rush, Standstill
 from graspsense.core.grasp.protection.status import StatusWatch
 from graspsense.core.grasp.protection.touch import Touch
 from graspsense.core.values.device import DeviceInfo
@@ -38,6 +39,8 @@ from graspsense.core.values.signals import (
 )
 
 RELEASE: Final = int(Phase.RELEASE)
+FEW_JUMPS: Final = 4
+"""Jumps of a gap that are not taken for motion; with more of them, the fingers may move as fast as it says."""
 
 
 class Protection:
@@ -53,6 +56,7 @@ class Protection:
         controller: Controller[object],
         run: RunConfig,
         tell: Callable[[Fault], None],
+        command_delay_s: float = 0.0,
     ) -> None:
         self._tell = tell
         self._told: dict[str, Fault] = {}
@@ -74,7 +78,7 @@ class Protection:
         pads_hz = min(rates.get("force_left", 0.0), rates.get("force_right", 0.0))
         self._touch, self._drift = Touch(contact_n, run.first_effort_n, pads_hz), Drift(contact_n)
         self._stuck, self._balance = StuckForce(pads_hz), PadBalance()
-        self._empty = EmptyForce(contact_n)
+        self._empty, self._empty_hold = EmptyForce(contact_n), EmptyHold(contact_n)
         self._felt, self._gap_speed = (
             FeltForce(info.rate_hz, pads_hz, info.friction_n),
             GapSpeed(info.rate_hz),
@@ -84,7 +88,12 @@ class Protection:
         self._motor = Motor("effort" in rates, info.rate_hz)
         self._status = StatusWatch(info.status_bits)
         first_m_s = run.first_speed_m_s if info.clock == "device" else inf
-        self._standstill = Standstill()
+        self._standstill, self._jump, self._absent = (
+            Standstill(),
+            GapJump(info.speed_limit_m_s),
+            GapAbsent(info.rate_hz),
+        )
+        self.opening = Opening(info.rate_hz, command_delay_s)
         self._rush = Rush(min(first_m_s, info.speed_limit_m_s), info.rate_hz)
         self._reports = Reports(info.rate_hz, rates.get("pads", 0.0))
 
@@ -103,6 +112,9 @@ class Protection:
         self._see(self._reports.see(reading, phase), phase)
         for fault in self._status.see(frame, phase):
             self._see(fault, phase)
+        jump = self._jump.see(frame)
+        if self._jump.jumps <= FEW_JUMPS:
+            self._motor.shift(self._jump.step_m)
         self._see(self._motor.see(frame, phase), phase)
         if phase == APPROACH and self._touch.free():
             self._see(self._rush.see(frame))
@@ -111,6 +123,9 @@ class Protection:
         closing = phase in (APPROACH, SQUEEZE, HOLD)
         if closing:
             self._see(self._gap_speed.see(frame))
+            self._see(jump)
+            self._see(self._absent.see(frame))
+        self._see(self.opening.see(frame, phase), phase)
         if self._has_pads:
             self._see_pads(reading, phase, command)
         allowed = self._limited(phase, command)
@@ -122,6 +137,7 @@ class Protection:
             self._see(self._standstill.see(frame, allowed))
         self.acted += allowed.value != command.value or self._gives(command) > asked_effort_n(allowed)
         self._motor.apply(frame, allowed)
+        self._jump.apply(frame, allowed)
         return allowed
 
     def before_closing(self, frame: Frame) -> Fault | None:
@@ -159,6 +175,7 @@ class Protection:
             self._see(self._stuck.see(frame))
             if phase == HOLD:
                 self._see(self._balance.see(frame))
+                self._see(self._empty_hold.see(frame))
 
     def _see(self, fault: Fault | None, phase: int = APPROACH) -> None:
         if fault is None:

@@ -17,7 +17,7 @@ LOST_SHARE: Final = 0.02
 ENDS_SHARE: Final = 0.5
 """Share of lost frames that ends the grasp: a controller that sees half of them does not control."""
 FEWEST: Final = 200
-"""Frames after which a share is told."""
+"""Frames, with the lost ones, after which a share is told."""
 IMAGES_LATE: Final = 5.0
 """Periods of the cell images without a new one after which the forces are out of date."""
 IMAGES_LATE_S: Final = 0.1
@@ -66,7 +66,7 @@ class Reports:
         self._frames += 1
         self._expected += dt_s / self._period_s
         lost = self._expected - self._frames
-        if self._frames < FEWEST or lost < LOST_SHARE * self._expected:
+        if self._expected < FEWEST or lost < LOST_SHARE * self._expected:
             return None
         return Fault(
             "frames lost",

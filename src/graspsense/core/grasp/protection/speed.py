@@ -1,16 +1,17 @@
-"""Whether the gap moves as the velocity says, and whether the fingers approach too fast or not at all.
+"""Whether the gap moves as the velocity says, and whether the fingers approach too fast, not at all, or in a jump.
 
 An encoder can stand still, and a gripper that closes by itself may take no limit of the speed.
 """
 
 from __future__ import annotations
 
-from math import exp, nan
+from math import exp, inf, nan
 from typing import Final
 
+from graspsense.core.grasp.protection.motor import direction_of
 from graspsense.core.grasp.protection.touch import CLOSED_M
 from graspsense.core.values.faults import Fault
-from graspsense.core.values.signals import EFFORT, FORCE, POSITION, Command, Frame
+from graspsense.core.values.signals import EFFORT, FORCE, POSITION, VELOCITY, Command, Frame
 
 MEMORY_S: Final = 0.5
 """Time constant over which travels are summed."""
@@ -29,6 +30,12 @@ STILL_S: Final = 3.0
 """Time for which fingers that are told to close may stand still."""
 TOLD_M: Final = 0.003
 """Travel that they must have been told in this time."""
+JUMP: Final = 3.0
+"""Speed over the commanded one that fingers can have between two frames, whose times are those of their arrival."""
+JUMP_M: Final = 0.001
+"""Change of the gap between two frames that is no jump: a few steps of a coarse encoder."""
+ABSENT_S: Final = 0.1
+"""Time for which the gap may be no number while the fingers close; at least three frames."""
 
 
 class GapSpeed:
@@ -112,6 +119,62 @@ class Standstill:
             "emergency stop, a thing that blocks them, or one that is too wide for the opening",
             ends=True,
         )
+
+
+class GapJump:
+    """Watches for a gap that changes faster than fingers with this limit of the speed move under their commands."""
+
+    def __init__(self, speed_limit_m_s: float) -> None:
+        self._limit_m_s = speed_limit_m_s
+        self._gap_m, self._dt_s = nan, 0.0
+        self._told_m_s = [speed_limit_m_s, speed_limit_m_s]
+        self._direction = 0
+        self.step_m = 0.0
+        """The jump of the last frame (m), 0 without one."""
+        self.jumps = 0
+        """The number of jumps."""
+
+    def apply(self, frame: Frame, command: Command) -> None:
+        """Take the command that is applied after this frame; that of an effort leaves the speed to the gripper."""
+        kind, value, _, speed_limit_m_s = command
+        speed_m_s = min(inf if kind == EFFORT else speed_limit_m_s, self._limit_m_s)
+        self._told_m_s = [self._told_m_s[1], min(abs(value), speed_m_s) if kind == VELOCITY else speed_m_s]
+        # An object can push fingers open that press with an effort.
+        self._direction = 0 if kind == EFFORT else direction_of(command, frame.gap_m)
+
+    def see(self, frame: Frame) -> Fault | None:
+        """Take the frame of a tick; return the jump that it shows."""
+        step_m, elapsed_s = frame.gap_m - self._gap_m, frame.dt_s + self._dt_s
+        self._gap_m, self._dt_s = frame.gap_m, frame.dt_s
+        told_m_s = max(self._told_m_s)
+        against = step_m * self._direction > 0.0
+        allowed_m = JUMP_M + (told_m_s * frame.dt_s if against else JUMP * told_m_s * elapsed_s)
+        if not abs(step_m) > allowed_m:
+            self.step_m = 0.0
+            return None
+        self.step_m = step_m
+        self.jumps += 1
+        return Fault(
+            "gap jumps",
+            f"it changed by {step_m * 1e3:+.1f} mm within {frame.dt_s * 1e3:.0f} ms, faster than the fingers were told "
+            "to move: it is wrong before or after that, and so may be what follows from it; check the encoder",
+        )
+
+
+class GapAbsent:
+    """Watches for a gap that is no number any more, with frames at this rate (Hz)."""
+
+    def __init__(self, rate_hz: float) -> None:
+        self._allowed_s = max(ABSENT_S, 3.0 / rate_hz)
+        self._known_s = nan
+
+    def see(self, frame: Frame) -> Fault | None:
+        """Take the frame of a tick while the fingers close or hold; a gap that was never known shows nothing."""
+        if frame.gap_m == frame.gap_m:
+            self._known_s = frame.t_s
+        if not frame.t_s - self._known_s > self._allowed_s:
+            return None
+        return Fault("gap absent", "the gripper does not tell its gap any more: check its encoder", ends=True)
 
 
 def closing_speed_m_s(frame: Frame, command: Command) -> float:

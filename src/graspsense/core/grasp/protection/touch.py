@@ -75,12 +75,16 @@ class Pad:
         self.felt = False
         self.force_n = nan
         self._free_gap_m = self._free_t_s = nan
+        self.first_n = nan
+        """The force of the first tick."""
         self.absent_s = 0.0
         self.sharp = False
         """Whether the force rose to that of the contact within a short travel and time."""
 
     def see(self, force_n: float, frame: Frame, sharp_s: float) -> None:
         """Take the force (N) of this tick, which is not felt if it is NaN. A sharp rise takes at most `sharp_s`."""
+        if self.first_n != self.first_n:
+            self.first_n = force_n
         if force_n < FREE_SHARE * self._contact_n:
             self._free_gap_m, self._free_t_s = frame.gap_m, frame.t_s
         if not self.felt and force_n >= self._contact_n:
@@ -231,7 +235,11 @@ class Touch:
         mean_m_s = self._approach_m_s.value
         sharp = self._left.sharp or self._right.sharp
         slowed = self._speed_m_s.value < SLOWED_SHARE * mean_m_s
-        risen = max(self._left.force_n, self._right.force_n) >= 2.0 * self._contact_n
+        # Over what the pads felt before the fingers closed, which may be no contact.
+        risen = any(
+            pad.force_n >= max(pad.first_n, self._contact_n) + self._contact_n
+            for pad in (self._left, self._right)
+        )
         if sharp or slowed or risen:
             self._witnessed = True
             self._claimed_t_s = nan
