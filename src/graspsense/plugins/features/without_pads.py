@@ -108,6 +108,8 @@ def _doubt(trace: Trace, effort_n: NDArray[np.float64], contact_n: float) -> str
 
     From a contact on the effort stays above the threshold and rises, or the fingers slow down.
     """
+    if len(trace) == 0:
+        return ""
     contact = int(np.argmax(trace.closing & (effort_n >= contact_n)))
     if not effort_n[contact] >= contact_n:
         return ""
