@@ -11,7 +11,7 @@ from typing import Final
 from graspsense.core.values.faults import Fault
 from graspsense.core.values.signals import APPROACH, Frame, Phase
 
-CLOSED_M: Final = 0.003
+LEAST_TRAVEL_M: Final = 0.003
 """Travel of the closing from which on the opening must show."""
 OPENED_M: Final = 0.001
 """Change of the gap that shows it."""
@@ -39,7 +39,7 @@ class Opening:
                 self._widest_m = max(self._widest_m, frame.gap_m)
                 self._start_m, self._start_s = frame.gap_m, frame.t_s
             return None
-        if self._opened or not self._widest_m - self._start_m >= CLOSED_M:
+        if self._opened or not self._widest_m - self._start_m >= LEAST_TRAVEL_M:
             return None
         elapsed_s = frame.t_s - self._start_s
         self._opened = abs(frame.gap_m - self._start_m) >= OPENED_M

@@ -23,7 +23,7 @@ IMAGES: Final = 5.0
 CHANGE_N: Final = 1.0
 """Change of the other pad's force in that time that a sound pad would have felt too."""
 
-FREE_SHARE: Final = 0.25
+EMPTY_SHARE: Final = 0.25
 """Share of the contact force below which a pad holds nothing."""
 OPENED_M: Final = 0.005
 EMPTY_S: Final = 0.1
@@ -121,7 +121,7 @@ class EmptyHold:
     """Sees that both pads feel nothing while the fingers hold what both have felt."""
 
     def __init__(self, contact_n: float) -> None:
-        self._free_n = FREE_SHARE * contact_n
+        self._free_n = EMPTY_SHARE * contact_n
         self._lasts_s = 0.0
 
     def see(self, frame: Frame) -> Fault | None:
