@@ -48,7 +48,6 @@ STORED = {
     "trade": ["benchmarks/results/trade.md"],
     "other_data": ["benchmarks/results/other_data.md"],
     "paper": [f"{OF_PAPER}/paper.md", f"{OF_PAPER}/fit.md"],
-    "posterior": [f"{OF_PAPER}/posterior.md"],
 }
 """The results that the percentages of a page are from. Their tables may leave out the sign."""
 

@@ -165,6 +165,8 @@ def _print(result: Identification) -> None:
         {"VERDICT": lambda cell: Style.GOOD if cell == "chosen" else None},
     )
     echo()
+    if not result.undetermined:
+        return
     echo("not determined by these recordings:")
     echo_table(
         ("WHAT", "WHY", "WHAT WOULD DETERMINE IT"),

@@ -88,6 +88,8 @@ def _undetermined(result: Identification) -> str:
     rows = [
         (undetermined.what, undetermined.reason, undetermined.remedy) for undetermined in result.undetermined
     ]
+    if not rows:
+        return paragraph("These recordings determine every number of the scene.")
     return table("What these recordings leave open", ("what", "why", "what would determine it"), rows)
 
 

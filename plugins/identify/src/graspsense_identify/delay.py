@@ -13,13 +13,12 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import frozen
 
 from graspsense.simulator_api import IdentifiedParameter, Undetermined
 from graspsense_identify.choose import LEAST_GAIN
 from graspsense_identify.fit import Fitted
 from graspsense_identify.interval import identified, normal
-from graspsense_identify.laws import LOSS, damper, scale_of
 from graspsense_identify.prepare import MAX_LAG_S
 from graspsense_identify.refuse import shows_memory
 from graspsense_identify.spread import refits
@@ -49,9 +48,6 @@ class Delay:
     high_s: float = math.nan
     """The 90 % interval of that."""
     basis: str = ""
-    beside_loss_s: float = math.nan
-    """Half its interval if the object also had a damper (`loss`), which it was identified without; NaN if it has one,
-    or if the delay of the settings is used."""
 
     @property
     def parameters(self) -> list[IdentifiedParameter]:
@@ -81,9 +77,6 @@ class Delay:
             reason = (
                 f"the recordings rather show {1e3 * self.shown_s:.3g} ms, but other terms fit as well without"
             )
-        elif self.beside_loss_s > 0.5 * WIDEST_S:
-            half_ms = 1e3 * self.beside_loss_s
-            reason = f"a damper (loss) and a longer delay fit as well: with one, it is +- {half_ms:.2g} ms"
         else:
             return []
         return [
@@ -151,12 +144,6 @@ def delay_of(fitted: Fitted, settings_s: float, lag: Lag) -> Delay:
     random = max(scattered, normal() * lagging.lag_error_s)
     half = math.hypot(random, normal() * max(lag.error_s, PATH_ERROR_S))
     shown = used_s + lagging.lag_s
-    beside = math.nan
-    if lag.lag_s != 0.0 and LOSS not in fitted.candidate.slots:
-        loss = damper(scale_of(fitted.squeezes))
-        values = (*fitted.values, *loss.starts()[0])
-        damped = evolve(fitted, candidate=fitted.candidate.joined(loss), values=values)
-        beside = damped.refitted(has_lag=True).lag_error_s
     return Delay(
         settings_s=settings_s,
         used_s=used_s,
@@ -164,5 +151,4 @@ def delay_of(fitted: Fitted, settings_s: float, lag: Lag) -> Delay:
         low_s=shown - half,
         high_s=shown + half,
         basis=again.basis,
-        beside_loss_s=normal() * beside,
     )

@@ -203,12 +203,6 @@ def static_candidates(scale: DataScale) -> list[CandidateLaw]:
     ]
 
 
-def damper(scale: DataScale) -> CandidateLaw:
-    """Return a damper, which looks like a lag of the sensor."""
-    unit = scale.force_n / scale.speed_m_s
-    return CandidateLaw(free=(_free(LOSS, "damping_n_s_m", unit, (1e-4, 10.0), 0.1),))
-
-
 def memories(scale: DataScale) -> list[CandidateLaw]:
     """Return the terms with a memory that a candidate may have beside the others, the simplest first."""
     k = scale.force_n / scale.depth_m
@@ -219,6 +213,7 @@ def memories(scale: DataScale) -> list[CandidateLaw]:
         stiffness = _free(slot, "k_n_m", k, (1e-3, 100.0), share, 2.0 * share)
         return CandidateLaw(free=(stiffness, _free(slot, "tau_s", 1.0, (shortest, longest), *times_s)))
 
-    loss, single = damper(scale), branch(MAXWELL, 0.3, 0.2, 0.03)
+    damping = _free(LOSS, "damping_n_s_m", scale.force_n / scale.speed_m_s, (1e-4, 10.0), 0.1)
+    loss, single = CandidateLaw(free=(damping,)), branch(MAXWELL, 0.3, 0.2, 0.03)
     fast, slow = branch(MAXWELL, 0.2, 0.04), branch(SECOND, 0.2, 0.4)
     return [loss, single, fast.joined(slow), single.joined(loss)]

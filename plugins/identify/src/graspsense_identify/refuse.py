@@ -28,35 +28,6 @@ HOLD_TIMES: Final = 5.0
 FALL_SHARE: Final = 0.25
 """A fall of the force by this share of the peak between two samples needs a term of its own."""
 
-_NOT_FITTED: Final = (
-    (
-        "gas",
-        "gas that is hardly compressed is a spring, and what escapes relaxes: both are part of the other terms here",
-        "measure the area that moves, the volume and the vent, and write the term by hand",
-    ),
-    (
-        "liquid",
-        "only two combinations of its five numbers change the force, and these by a ringing that pads are too slow for",
-        "measure area, neck and level, and write the term by hand",
-    ),
-    (
-        "slosh",
-        "beside the force of a squeeze, the oscillation of the contents is smaller than the error of a sensor",
-        "measure the mass of the contents, and the frequency on a free container, and write the term by hand",
-    ),
-    (
-        "surface",
-        "beside a spring, a branch and a damper, no number of it changes the force of a squeeze",
-        "tap the surface, measure its frequency and decay, and write the term by hand",
-    ),
-    (
-        "worn",
-        "one squeeze wears little, which looks like a change of stiffness; recordings have no number of uses",
-        "record one object many times in a row, and identify the first and the last ten apart",
-    ),
-)
-"""The terms that are not fitted, why, and what would determine them."""
-
 _REMEDIES: Final = {
     "k1_n_m": "squeeze deeper",
     "k3_n_m3": "squeeze deeper",
@@ -103,8 +74,6 @@ def undetermined(fitted: Fitted, intervals: Uncertainty, shares: Shares) -> Iter
             remedy="record from before the contact",
             in_scene=True,
         )
-    for what, reason, remedy in _NOT_FITTED:
-        yield Undetermined(what=what, reason=reason, remedy=remedy)
 
 
 def refusals(
