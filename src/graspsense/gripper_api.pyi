@@ -101,7 +101,7 @@ from graspsense.sources.manifest.message_numbers import message_columns as messa
 
 # A grasp that another program makes
 from graspsense.core.pipeline.anytime import anytime_of as anytime_of
-from graspsense.core.pipeline.pipeline_model import model_for as model_for
+from graspsense.core.pipeline.pipeline import model_for as model_for
 
 # Recordings as they are replayed
 from graspsense.recording.replayable import Recording as Recording

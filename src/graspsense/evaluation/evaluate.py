@@ -13,12 +13,11 @@ import numpy as np
 from graspsense.core.learn.labelled import TARGETS, Labelled, Target, class_of
 from graspsense.core.settings.selected import select_component
 from graspsense.core.values.errors import ConfigError
-from graspsense.evaluation.confusion import confusion
 from graspsense.evaluation.controls import PERMUTATIONS, ControlMeasurements
 from graspsense.evaluation.crossval import ClassifierFactory
 from graspsense.evaluation.evaluator import Evaluator, Progress
 from graspsense.evaluation.gathered_warnings import gathered_warnings
-from graspsense.evaluation.results import Evaluation
+from graspsense.evaluation.results import Evaluation, confusion
 from graspsense.evaluation.trial_notes import notes_on
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 from attrs import evolve, frozen
 
 from graspsense.core.components.caller import set_option
-from graspsense.core.components.nearest_key import nearest_path
+from graspsense.core.components.strict import nearest_path
 from graspsense.core.grasp.runner import run_uninterrupted
 from graspsense.core.learn.checkpoints import with_checkpoints
 from graspsense.core.pipeline.wiring import check_recording
