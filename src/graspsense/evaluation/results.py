@@ -8,8 +8,8 @@ from typing import Any
 from attrs import field, frozen
 
 from graspsense.core.learn.labelled import Target, recognised
+from graspsense.core.values.display import sentence, table
 from graspsense.core.values.printable import in_one_line
-from graspsense.core.values.short_html import sentence, table
 from graspsense.evaluation.doubt import Reliability, SetCoverage
 from graspsense.evaluation.intervals import Difference, RecognitionRate
 
