@@ -20,7 +20,7 @@ from arguments import parser_of
 from scipy.special import ndtri
 
 from graspsense.core.components.registry import installed
-from graspsense.core.pipeline.pipeline_model import model_for
+from graspsense.core.pipeline.pipeline import model_for
 from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.features import UNKNOWN
 from graspsense.evaluation.intervals import percent, percentages, wilson

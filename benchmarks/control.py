@@ -36,7 +36,7 @@ from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.grasp.sinks import Sink
 from graspsense.core.pipeline.anytime import Anytime, anytime_of
-from graspsense.core.pipeline.pipeline_model import model_for
+from graspsense.core.pipeline.pipeline import model_for
 from graspsense.core.settings.resolved import resolve
 from graspsense.experiments.versions import where_measured
 from graspsense.live.feeds import FILE_TIMEOUT_S, LiveFeed

@@ -192,7 +192,7 @@ def scene_files(count: int, folder: Path) -> list[dict[str, Any]]:
     """Write random scenes of `random_scenes.py` as files; return each with its gripper settings and speed."""
     from random_scenes import scene_of
 
-    from graspsense.core.files.toml_values import toml_value
+    from graspsense.core.files.toml_text import toml_value
 
     scenes = []
     for number in range(count):

@@ -18,7 +18,7 @@ from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
 from string import Template
-from textwrap import dedent
+from textwrap import dedent, indent
 from typing import Any
 
 import attrs
@@ -283,8 +283,19 @@ def hooks_page() -> str:
 
 
 def hook_example(spec: Any) -> str:
-    """Return the example in the docstring of a hook: the module of a plugin that implements it."""
-    return dedent(inspect.cleandoc(spec.__doc__).partition(EXAMPLE)[2])
+    """Return the module of a plugin that implements a hook as the example in its docstring does.
+
+    The example of a hook that gives entries is the statement that yields one.
+    """
+    example = dedent(inspect.cleandoc(spec.__doc__).partition(EXAMPLE)[2])
+    entry = re.match(r"yield (\w+)\(", example)
+    if entry is None:
+        return example
+    names = {"graspsense.plugin_api": ["hookimpl"]}
+    names.setdefault(DOOR_OF[entry[1]].__name__, []).insert(0, entry[1])
+    imports = "".join(f"from {door} import {', '.join(names[door])}\n" for door in sorted(names))
+    arguments = ", ".join(inspect.signature(spec).parameters)
+    return f"{imports}\n\n@hookimpl\ndef {spec.__name__}({arguments}):\n{indent(example, '    ')}"
 
 
 def terms_page() -> str:

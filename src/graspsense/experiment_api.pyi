@@ -24,7 +24,7 @@ from graspsense.experiments.task_results import RecognitionResult as Recognition
 # Results and their statistics
 from graspsense.experiments.summary import ConditionResult as ConditionResult
 from graspsense.experiments.summary import Summary as Summary
-from graspsense.evaluation.confusion import Confusion as Confusion
+from graspsense.evaluation.results import Confusion as Confusion
 from graspsense.evaluation.over_seeds import MeanDifference as MeanDifference
 from graspsense.evaluation.over_seeds import OverSeeds as OverSeeds
 from graspsense.evaluation.over_seeds import mean_difference as mean_difference

@@ -14,7 +14,7 @@ from graspsense.core.values.errors import GraspsenseError as GraspsenseError
 
 # Emulated devices
 from graspsense.core.components.emulated import EmulatedDevice as EmulatedDevice
-from graspsense.core.drivers.emulated_port import EmulatedPort as EmulatedPort
+from graspsense.core.drivers.emulated_serial import EmulatedPort as EmulatedPort
 from graspsense.core.drivers.emulated_serial import EmulatedSerial as EmulatedSerial
 from graspsense.core.drivers.emulated_serial import EmulatorFaults as EmulatorFaults
 from graspsense.core.drivers.emulated_serial import SerialFaults as SerialFaults
@@ -22,8 +22,8 @@ from graspsense.core.drivers.emulated_body import BackendWithEmulator as Backend
 from graspsense.core.drivers.emulated_body import EmulatorSettings as EmulatorSettings
 from graspsense.core.drivers.emulated_body import opened_body as opened_body
 from graspsense.core.drivers.emulated_body import own_keys_first as own_keys_first
-from graspsense.core.drivers.emulated_fingers import EmulatedFingers as EmulatedFingers
-from graspsense.core.drivers.emulated_fingers import FingerTarget as FingerTarget
+from graspsense.core.drivers.emulated_body import EmulatedFingers as EmulatedFingers
+from graspsense.core.drivers.emulated_body import FingerTarget as FingerTarget
 from graspsense.core.components.entries import EmulatorEntry as EmulatorEntry
 
 # Polling, reading threads and clocks of devices
@@ -101,7 +101,7 @@ from graspsense.sources.manifest.message_numbers import message_columns as messa
 
 # A grasp that another program makes
 from graspsense.core.pipeline.anytime import anytime_of as anytime_of
-from graspsense.core.pipeline.pipeline_model import model_for as model_for
+from graspsense.core.pipeline.pipeline import model_for as model_for
 
 # Recordings as they are replayed
 from graspsense.recording.replayable import Recording as Recording

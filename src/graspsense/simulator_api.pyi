@@ -14,7 +14,7 @@ from graspsense.core.components.entries import ModelEntry as ModelEntry
 from graspsense.core.components.setting import CHANGES_NO_RESULT as CHANGES_NO_RESULT
 from graspsense.core.components.strict import ValidationFailed as ValidationFailed
 from graspsense.core.components.strict import structured as structured
-from graspsense.core.settings.toml_kinds import refuse_other_kind as refuse_other_kind
+from graspsense.core.settings.layers import refuse_other_kind as refuse_other_kind
 from graspsense.core.files.toml_text import TomlError as TomlError
 from graspsense.core.files.toml_text import toml_values as toml_values
 from graspsense.core.values.errors import suggestion as suggestion
@@ -69,8 +69,8 @@ from graspsense.core.control.tick import free_parts as free_parts
 from graspsense.core.control.tick import free_tick as free_tick
 from graspsense.core.grasp.runner import tick_params as tick_params
 from graspsense.core.grasp.runner import ended_by_itself as ended_by_itself
-from graspsense.core.grasp.time_limits import overdue as overdue
-from graspsense.core.grasp.time_limits import seconds_at_most as seconds_at_most
+from graspsense.core.grasp.opened_gripper import overdue as overdue
+from graspsense.core.grasp.opened_gripper import seconds_at_most as seconds_at_most
 from graspsense.core.values.events import event_name as event_name
 from graspsense.core.values.trace import FrameTable as FrameTable
 
@@ -87,6 +87,6 @@ from graspsense.core.compiling.compiling import is_on_disk as is_on_disk
 # Where to keep files, and reading those that a user names
 from graspsense.core.files.user_folders import cache_folder as cache_folder
 from graspsense.core.files.whole_file import write_whole as write_whole
-from graspsense.core.files.regular_file import first_bytes as first_bytes
+from graspsense.core.files.whole_file import first_bytes as first_bytes
 from graspsense.core.files.closed_paths import is_closed as is_closed
 from graspsense.core.files.closed_paths import make_closed as make_closed

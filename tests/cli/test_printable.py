@@ -205,7 +205,7 @@ def test_pictures_show_a_dollar_as_it_is(tmp_path):
     pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
     from matplotlib.figure import Figure
 
-    from graspsense.evaluation.confusion import Confusion
+    from graspsense.evaluation.results import Confusion
     from graspsense.report.confusion import confusion_png
     from graspsense.report.grasp_picture import grasp_png
     from graspsense.report.literal_text import show_literally

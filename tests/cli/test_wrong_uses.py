@@ -17,12 +17,11 @@ from repository import ROOT
 from graspsense import evaluate, load_pipeline, load_trials
 from graspsense.core.compiling import compile_notice
 from graspsense.core.components.firstparty import EXAMPLES
-from graspsense.core.components.nearest_key import nearest_path
-from graspsense.core.components.strict import ValidationFailed, structured
+from graspsense.core.components.strict import ValidationFailed, nearest_path, structured
 from graspsense.core.learn.copies import without_copies
 from graspsense.core.learn.labelled import Labelled
+from graspsense.core.settings.layers import KINDS, toml_kind
 from graspsense.core.settings.resolved import resolve
-from graspsense.core.settings.toml_kinds import KINDS, toml_kind
 from graspsense.core.values.errors import ConfigError, counted
 from graspsense.core.values.features import FeatureTable
 from graspsense.core.values.signals import Outcome

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from graspsense import load_pipeline
 from graspsense.core.drivers.device_clock import DeviceClock, clock_report
-from graspsense.core.values.channel_times import apart_s
 from graspsense.core.values.errors import UnknownName
+from graspsense.core.values.trial import apart_s
 
 PADS = ("force_left", "force_right", "pads")
 

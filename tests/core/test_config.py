@@ -16,8 +16,7 @@ from hypothesis import strategies as st
 
 from graspsense.core.components.caller import command_line
 from graspsense.core.components.registry import IsolatedPlugins
-from graspsense.core.files.toml_text import key_lines
-from graspsense.core.files.toml_values import toml_key, toml_value
+from graspsense.core.files.toml_text import key_lines, toml_key, toml_value
 from graspsense.core.settings.layers import Flag, Layer, read_layer
 from graspsense.core.settings.resolved import resolve
 from graspsense.core.settings.selected import build, create, recipe_of

@@ -13,7 +13,7 @@ from attrs import field, frozen
 from parts import GentleState, Hand, HandConfig, Peak, PeakConfig
 
 from graspsense.core.components.registry import Component, IsolatedPlugins
-from graspsense.core.components.registry.declaration import config_of
+from graspsense.core.components.registry.parts import config_of
 from graspsense.core.components.step_params import params_of
 from graspsense.core.pipeline.wiring import check
 from graspsense.core.settings.resolved import settings_from

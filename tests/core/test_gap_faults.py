@@ -8,8 +8,7 @@ from grippers import REST_S, Scripted, bottle, squeezing
 
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.protection.motor import Motor
-from graspsense.core.grasp.protection.opening import Opening
-from graspsense.core.grasp.protection.speed import GapAbsent, GapJump
+from graspsense.core.grasp.protection.speed import GapAbsent, GapJump, Opening
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.values.signals import (
     EFFORT,

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import inspect
 import logging
 import re
-import textwrap
 import types
 
 import click
 import pytest
 from cases import every_case
 from parts import implementing
-from repository import ROOT
+from repository import ROOT, script_of_docs
 
 from graspsense.core.components import hookspecs
 from graspsense.core.components.entries import (
@@ -42,6 +40,7 @@ from graspsense.plugin_api import (
 from graspsense.simulator_api import collect
 
 HOOKS = {name: spec for name, spec in vars(hookspecs).items() if name.startswith("graspsense_")}
+PAGES = script_of_docs("role_pages")
 DOCS = (ROOT / "docs" / "hooks.md").read_text(encoding="utf-8")
 RUN = RunInfo(components={"gripper": "graspsense/replay 0.1.0"}, settings={"run": {"seed": 7}}, seed=7)
 EVENT = GraspEvent(1.5, Phase.SQUEEZE, "both pads touch")
@@ -49,7 +48,7 @@ EVENT = GraspEvent(1.5, Phase.SQUEEZE, "both pads touch")
 
 def example(hook: str) -> types.ModuleType:
     """Return the plugin module that the docstring of this hook gives as its example."""
-    code = textwrap.dedent(inspect.cleandoc(HOOKS[hook].__doc__).partition("\n\nExample::\n\n")[2])
+    code = PAGES.hook_example(HOOKS[hook])
     assert code, f"the docstring of {hook} has no example"
     module = types.ModuleType(f"example_of_{hook}")
     vars(module)["GRASPSENSE_API"] = (2, 0)

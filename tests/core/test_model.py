@@ -18,7 +18,7 @@ from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.model_content import digest
 from graspsense.core.learn.model_file import as_json, load_model, write_model
 from graspsense.core.learn.training import train
-from graspsense.core.pipeline.pipeline_model import model_for
+from graspsense.core.pipeline.pipeline import model_for
 from graspsense.core.settings.layers import Flag
 from graspsense.core.settings.resolved import resolve
 from graspsense.core.settings.selected import SelectedComponent

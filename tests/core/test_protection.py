@@ -14,9 +14,8 @@ from graspsense.core.grasp.protection.drift import PadDrift
 from graspsense.core.grasp.protection.effort_ceiling import effort_ceiling_n, limited
 from graspsense.core.grasp.protection.motor import FeltForce, FreeEffort, Motor
 from graspsense.core.grasp.protection.pad_forces import EmptyForce, EmptyHold, StuckForce
-from graspsense.core.grasp.protection.reports import Reports
+from graspsense.core.grasp.protection.reports import Reports, StatusWatch
 from graspsense.core.grasp.protection.speed import GapSpeed, Standstill
-from graspsense.core.grasp.protection.status import StatusWatch
 from graspsense.core.grasp.protection.touch import Touch
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.faults import StatusBit

@@ -7,7 +7,7 @@ import pytest
 from cases import every_case
 from commands import graspsense
 
-from graspsense.core.files.regular_file import NotAFile, first_bytes
+from graspsense.core.files.whole_file import NotAFile, first_bytes
 from graspsense.core.grasp.calibration_files import read_calibration
 from graspsense.core.values.errors import ConfigError
 from graspsense.sources.recordings.icub import read_grasp

@@ -13,8 +13,8 @@ from test_conformal import bottles, model_of
 from test_evaluate import judged
 
 from graspsense.core.components.registry import installed
+from graspsense.core.learn.certainty import MIN_TRIALS, TEMPERATURES, at_temperature, temperature_of
 from graspsense.core.learn.model_file import as_json, load_model, write_model
-from graspsense.core.learn.temperature import MIN_TRIALS, RANGE, at_temperature, temperature_of
 from graspsense.core.values.errors import DataDamaged
 
 
@@ -39,7 +39,7 @@ def test_the_temperature_undoes_how_sure_a_classifier_is(sureness):
 
 @given(
     arrays(np.float64, (5, 4), elements=st.floats(0.0, 1.0)).filter(lambda p: (p.max(axis=1) > 0.01).all()),
-    st.floats(*RANGE),
+    st.floats(*TEMPERATURES),
 )
 def test_the_order_of_the_labels_stays_and_probabilities_sum_to_one(raw, temperature):
     given = raw / raw.sum(axis=1, keepdims=True)

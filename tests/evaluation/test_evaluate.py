@@ -15,11 +15,10 @@ from graspsense.core.learn.labelled import ControlFeatures, Labelled
 from graspsense.core.settings.selected import SelectedComponent
 from graspsense.core.values.errors import ComponentFailed, ConfigError
 from graspsense.core.values.features import FeatureTable
-from graspsense.evaluation.confusion import confusion
 from graspsense.evaluation.crossval import thinned
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.evaluation.json_codec import from_json, to_json
-from graspsense.evaluation.results import Evaluation
+from graspsense.evaluation.results import Evaluation, confusion
 from graspsense.report.verdict import verdict
 
 

@@ -1,7 +1,6 @@
 """The generated pages and the drawing are current, and the commands and examples of the other pages are valid."""
 
 import doctest
-import importlib.util
 import os
 import pkgutil
 import re
@@ -15,23 +14,15 @@ import click
 import numpy
 import pytest
 from cases import every_case
-from repository import ROOT
+from repository import ROOT, script_of_docs
 from test_imports import DOORS, MAY_KNOW, ROOMS
 
 from graspsense import plugin_api, simulator_api
 from graspsense.cli.main import cli
 from graspsense.experiments.experiment_file import read_experiment
 
-
-def script(name):
-    spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-PAGES = script("role_pages")
-DRAWING = script("package_drawing")
+PAGES = script_of_docs("role_pages")
+DRAWING = script_of_docs("package_drawing")
 
 
 MADE_PAGES = {

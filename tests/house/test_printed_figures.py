@@ -11,7 +11,7 @@ from repository import ROOT
 
 from graspsense.core.components.registry import installed
 from graspsense.core.learn.checkpoints import split_checkpoints
-from graspsense.core.pipeline.pipeline_model import model_for
+from graspsense.core.pipeline.pipeline import model_for
 from graspsense.core.settings.resolved import resolve
 from graspsense.core.settings.selected import select_component
 from graspsense.evaluation.checkpoints import SURE, early_recognition

@@ -15,9 +15,8 @@ from repository import ROOT
 from graspsense import Evaluation, Features, Prediction, load_pipeline
 from graspsense.core.components.moved_names import SPECIAL
 from graspsense.core.values.errors import PluginUnavailable
-from graspsense.evaluation.confusion import Confusion
 from graspsense.evaluation.intervals import RecognitionRate
-from graspsense.evaluation.results import Measurement
+from graspsense.evaluation.results import Confusion, Measurement
 from graspsense.testing_api import a_trial, squeeze, with_channels
 
 PAGES = [*ROOT.glob("docs/**/*.md"), ROOT / "README.md", *ROOT.glob("examples/*/README.md")]

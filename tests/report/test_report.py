@@ -20,9 +20,8 @@ from commands import graspsense, printed
 from kept import keep
 
 from graspsense.core.components.registry import installed
-from graspsense.evaluation.confusion import confusion
 from graspsense.evaluation.intervals import Difference, RecognitionRate
-from graspsense.evaluation.results import Evaluation, Measurement
+from graspsense.evaluation.results import Evaluation, Measurement, confusion
 from graspsense.experiments.executors.serial import Serial
 from graspsense.experiments.experiment_file import read_experiment
 from graspsense.experiments.page import write_page

@@ -10,7 +10,7 @@ import browser as browsers
 import pytest
 from test_report_signals import CHANNELS, grasp
 
-from graspsense.evaluation.confusion import confusion
+from graspsense.evaluation.results import confusion
 from graspsense.experiments.executors.serial import Serial
 from graspsense.experiments.experiment_file import read_experiment
 from graspsense.experiments.findings import FoundTable

@@ -17,7 +17,7 @@ from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import FeatureTable
 from graspsense.core.values.signals import Frame, Reading, no_pads
-from graspsense.recording.same_grasp import curve_bytes, grasp_numbers
+from graspsense.recording.replayable import curve_bytes, grasp_numbers
 from graspsense.sources.trial_source import load_trials
 from graspsense.store.recover import recover_file
 

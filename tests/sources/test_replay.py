@@ -31,7 +31,7 @@ from graspsense.sources.recordings.icub import IcubGrasp, read_grasp, read_recor
 from graspsense.sources.recordings.replay import ReplayBackend, ReplayConfig
 from graspsense.store.record_grasp import record_grasp
 from graspsense.store.store import Store
-from graspsense.store.trial_ref import recorded_settings
+from graspsense.store.stored_grasps import recorded_settings
 
 REST_DEG = (20.0, 80.0, 10.0, 40.0, 30.0, 50.0, 32.0, 45.0, 5.0)
 """Joints 7 to 15."""

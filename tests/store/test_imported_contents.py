@@ -11,7 +11,7 @@ from graspsense.recording.replayable import content_sha256
 from graspsense.store.changes import set_aside
 from graspsense.store.imported_contents import ImportedContents
 from graspsense.store.store import Store
-from graspsense.store.trial_ref import stored_recording
+from graspsense.store.stored_grasps import stored_recording
 
 
 def test_a_content_that_the_store_has_is_refused_until_its_trial_is_set_aside(tmp_path):

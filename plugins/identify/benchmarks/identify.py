@@ -37,7 +37,7 @@ from attrs import asdict, frozen
 from graspsense import load_pipeline
 from graspsense.classifier_api import table_of
 from graspsense.core.components.identification import RecordedSqueeze
-from graspsense.core.files.toml_values import toml_value
+from graspsense.core.files.toml_text import toml_value
 from graspsense.evaluation.intervals import clustered, wilson
 from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import create

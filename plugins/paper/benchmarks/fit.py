@@ -38,7 +38,7 @@ import numpy as np
 from attrs import evolve, frozen
 
 from graspsense.classifier_api import table_of
-from graspsense.core.files.toml_values import toml_value
+from graspsense.core.files.toml_text import toml_value
 from graspsense.core.values.trace import Trace
 from graspsense.evaluation.crossval import cross_validate
 from graspsense.evaluation.folds import stratified

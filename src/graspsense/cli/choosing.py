@@ -53,8 +53,7 @@ class Chosen:
 
 def pipeline_beside(model: str) -> str:
     """Return the file of the pipeline beside a model. Raises ConfigError if it is a TOML file of another kind."""
-    from graspsense.core.settings.layers import read_toml
-    from graspsense.core.settings.toml_kinds import refuse_other_kind
+    from graspsense.core.settings.layers import read_toml, refuse_other_kind
 
     path = Path(model).with_suffix(".toml")
     if path.is_file():
@@ -237,7 +236,7 @@ def _part(united: Labelled, component: Component, columns: NDArray[np.int64], **
 def pipeline_text(chosen: Chosen, model: str) -> str:
     """Return a pipeline file with what was chosen, and with the gripper and the controller of the trials."""
     from graspsense.core.components.strict import plain
-    from graspsense.core.files.toml_values import toml_key, toml_value
+    from graspsense.core.files.toml_text import toml_key, toml_value
     from graspsense.recording.provenance import recipe
 
     settings = recipe(chosen.labelled.provenance.get("settings") or {})

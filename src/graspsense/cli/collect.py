@@ -200,7 +200,7 @@ def _has_model(settings: Settings) -> bool:
     A pipeline can name the model that is to be trained on these trials.
     """
     from graspsense.core.components.registry import installed
-    from graspsense.core.pipeline.pipeline_model import model_for
+    from graspsense.core.pipeline.pipeline import model_for
     from graspsense.core.values.errors import ConfigError
 
     try:

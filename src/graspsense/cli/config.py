@@ -54,7 +54,7 @@ def validate(name: str | None, as_json: bool, **asked: Any) -> None:
     """Check that the settings are valid and the components fit together, without opening anything."""
     from graspsense.core.components.registry import installed
     from graspsense.core.pipeline.anytime import anytime_of
-    from graspsense.core.pipeline.pipeline_model import model_for
+    from graspsense.core.pipeline.pipeline import model_for
     from graspsense.core.pipeline.wiring import check
     from graspsense.core.values.errors import ConfigError, WiringError
 

@@ -17,7 +17,7 @@ import click
 from graspsense.cli.options import GRIPPER_ALONE, pipeline_options, settings_of
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import talk
-from graspsense.core.values.exit_code import ExitCode
+from graspsense.core.values.errors import ExitCode
 
 if TYPE_CHECKING:
     from graspsense.core.components.emulated import EmulatedDevice

@@ -14,8 +14,7 @@ from graspsense.cli.live import Live, LiveOptions, live_options, shown_live
 from graspsense.cli.options import force_option, keys_option
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
-from graspsense.core.values.errors import counted
-from graspsense.core.values.exit_code import ExitCode
+from graspsense.core.values.errors import ExitCode, counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

@@ -40,7 +40,7 @@ def export(source: str, target: str, pictures: bool, as_json: bool) -> None:
     from graspsense.recording.reader import read_recorded
     from graspsense.sources.recordings.dataset_recordings import datasets_to_write, write_dataset
     from graspsense.store import export_table
-    from graspsense.store.trial_ref import stored_grasp
+    from graspsense.store.stored_grasps import stored_grasp
 
     path = Path(target)
     table = Path(source).is_dir()

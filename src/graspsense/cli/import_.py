@@ -161,7 +161,7 @@ class _Chosen:
         Raises WiringError for a model that the user has chosen.
         """
         from graspsense.core.components.registry import installed
-        from graspsense.core.pipeline.pipeline_model import model_for
+        from graspsense.core.pipeline.pipeline import model_for
         from graspsense.core.values.errors import WiringError
 
         self._unpredicted = ""

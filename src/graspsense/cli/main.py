@@ -21,8 +21,7 @@ from graspsense.cli.terminal import Style, echo, echo_as_it_is, has_colour, talk
 from graspsense.core.compiling.compile_notice import tell_compiling
 from graspsense.core.components.caller import command_line
 from graspsense.core.grasp.interrupts import ended_like_ctrl_c
-from graspsense.core.values.errors import GraspsenseError, PluginUnavailable
-from graspsense.core.values.exit_code import ExitCode
+from graspsense.core.values.errors import ExitCode, GraspsenseError, PluginUnavailable
 
 PROGRAM: Final = "graspsense"
 COMPLETION_VARIABLE: Final = "_GRASPSENSE_COMPLETE"

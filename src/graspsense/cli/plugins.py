@@ -11,7 +11,7 @@ import click
 
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, state_style
-from graspsense.core.values.exit_code import ExitCode
+from graspsense.core.values.errors import ExitCode
 
 if TYPE_CHECKING:
     from graspsense.core.components.registry import Component, Plugins, PluginStatus

@@ -9,7 +9,7 @@ import click
 from graspsense.cli.output import echo_json
 from graspsense.cli.sources import named_store
 from graspsense.cli.terminal import echo, talk
-from graspsense.core.values.exit_code import ExitCode
+from graspsense.core.values.errors import ExitCode
 
 
 @click.command()

@@ -61,7 +61,7 @@ def _settings(recording: str, pipeline: str | None, options: tuple[str, ...], fo
     from graspsense.core.settings.layers import Flag
     from graspsense.core.settings.resolved import resolve
     from graspsense.sources.recordings.replay import kind_and_name, known_kinds
-    from graspsense.store.trial_ref import recorded_settings
+    from graspsense.store.stored_grasps import recorded_settings
 
     kind, name = kind_and_name(recording)
     kinds = known_kinds()

@@ -24,7 +24,7 @@ from graspsense.cli.terminal import (
     talk,
     warn,
 )
-from graspsense.core.values.exit_code import ExitCode
+from graspsense.core.values.errors import ExitCode
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -446,7 +446,7 @@ def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
         }
         echo_json(plan)
         return
-    from graspsense.core.files.toml_values import toml_value
+    from graspsense.core.files.toml_text import toml_value
 
     echo("would open, tare, close, hold and release with:")
     for table, component in settings.components.items():

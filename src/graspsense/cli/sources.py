@@ -315,8 +315,8 @@ def _settings(source: str, given: Mapping[str, Any], classifier: str | None) -> 
 def _alone(table: str, name: str, given: Mapping[str, Any], source: str) -> SelectedComponent:
     """Return a component outside of any pipeline, with the keys that options give it."""
     from graspsense.core.components.entries import TABLE_OF_ROLE
-    from graspsense.core.components.nearest_key import nearest_path
     from graspsense.core.components.registry import installed
+    from graspsense.core.components.strict import nearest_path
     from graspsense.core.settings.layers import Merged, option_layers, typed_path
     from graspsense.core.settings.resolved import default_paths
     from graspsense.core.settings.selected import SelectedComponent, build_plausible

@@ -113,8 +113,8 @@ def predict_value(model_name: str, source: str, as_json: bool, given: Mapping[st
     from graspsense.core.learn.copies import learned_from, row_hashes
     from graspsense.core.values.features import assumed_units
     from graspsense.evaluation.json_codec import to_json
-    from graspsense.regression.error import error_of
     from graspsense.regression.model import load_regression
+    from graspsense.regression.results import error_of
 
     model = load_regression(model_name)
     table, labelled, notes = _to_predict(model, source, given)

@@ -150,7 +150,7 @@ def show_history(source: str, as_json: bool) -> None:
 
     from graspsense.store.changes import history
     from graspsense.store.store import Store
-    from graspsense.store.trial_ref import parse_trial_ref
+    from graspsense.store.stored_grasps import parse_trial_ref
 
     folder, number = (source, None) if Path(source).is_dir() else parse_trial_ref(source)
     with Store.read(folder) as store:
@@ -172,7 +172,7 @@ def _change(refs: Sequence[str], change: Callable[[Store, Sequence[int]], None],
     """Change trials of one store, all or none, and print what was done to each."""
     from graspsense.store.changes import history
     from graspsense.store.store import Store
-    from graspsense.store.trial_ref import parse_trial_ref
+    from graspsense.store.stored_grasps import parse_trial_ref
 
     trials = [parse_trial_ref(ref) for ref in refs]
     folders = {folder for folder, _ in trials}

@@ -77,8 +77,7 @@ def _misplaced_words(context: click.Context, arguments: Sequence[str]) -> Iterat
 def _option_for(word: str) -> str:
     """Return the option whose value this word probably is."""
     if word.endswith(".toml"):
-        from graspsense.core.settings.layers import read_layer
-        from graspsense.core.settings.toml_kinds import toml_kind
+        from graspsense.core.settings.layers import read_layer, toml_kind
         from graspsense.core.values.errors import GraspsenseError
 
         with suppress(GraspsenseError):

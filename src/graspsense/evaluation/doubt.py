@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import evolve, field, frozen
 
-from graspsense.core.learn.certainty import Certainty, certainty_of, with_certainty
+from graspsense.core.learn.certainty import (
+    Certainty,
+    at_temperature,
+    certainty_of,
+    temperature_of,
+    with_certainty,
+)
 from graspsense.core.learn.conformal import (
     COVERAGE,
     Answers,
@@ -17,7 +23,6 @@ from graspsense.core.learn.conformal import (
     sets_of,
     units_needed,
 )
-from graspsense.core.learn.temperature import at_temperature, temperature_of
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import UNKNOWN
 from graspsense.evaluation.crossval import (

@@ -11,9 +11,8 @@ from typing import Any, Final
 from attrs import evolve
 
 from graspsense.core.components.entries import ExperimentEntry
-from graspsense.core.components.nearest_key import key_paths
 from graspsense.core.components.registry import Resource, installed
-from graspsense.core.components.strict import InvalidValue, ValidationFailed, keys_of, structured
+from graspsense.core.components.strict import InvalidValue, ValidationFailed, key_paths, keys_of, structured
 from graspsense.core.settings.layers import Layer, Merged, option_layers, read_toml, typed_path
 from graspsense.core.settings.resolved import Settings, default_paths
 from graspsense.core.values.errors import ConfigError, GraspsenseError, UnknownName

@@ -23,7 +23,7 @@ from attrs import evolve, frozen
 
 from graspsense.core.components.caller import option
 from graspsense.core.components.strict import plain
-from graspsense.core.files.toml_values import toml_key, toml_value
+from graspsense.core.files.toml_text import toml_key, toml_value
 from graspsense.core.settings.resolved import without_followers
 from graspsense.core.settings.settings_file import to_toml
 from graspsense.core.values.errors import ConfigError, named

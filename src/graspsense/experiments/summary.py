@@ -11,9 +11,9 @@ from attrs import evolve, field, frozen
 from graspsense.core.components.caller import option
 from graspsense.core.learn.labelled import Target, recognised
 from graspsense.core.values.errors import ConfigError, counted
-from graspsense.evaluation.confusion import Confusion
 from graspsense.evaluation.intervals import RecognitionRate
 from graspsense.evaluation.over_seeds import MeanDifference, OverSeeds, mean_difference
+from graspsense.evaluation.results import Confusion
 from graspsense.experiments.experiment import ExperimentCase, Planned
 from graspsense.experiments.results import EXPERIMENT, PIPELINES, Results
 from graspsense.experiments.task import TaskResult

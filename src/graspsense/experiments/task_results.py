@@ -10,9 +10,8 @@ from attrs import field, frozen
 
 from graspsense.core.learn.labelled import Target
 from graspsense.core.values.tree import TreeNode
-from graspsense.evaluation.confusion import Confusion, confusion
 from graspsense.evaluation.intervals import RecognitionRate, rate_among, rate_of
-from graspsense.evaluation.results import Measurement
+from graspsense.evaluation.results import Confusion, Measurement, confusion
 from graspsense.report.grasp_curve import GraspCurve
 
 if TYPE_CHECKING:

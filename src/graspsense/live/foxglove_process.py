@@ -41,7 +41,6 @@ from graspsense.live.admission import (
     why_not,
 )
 from graspsense.live.stream import buffers
-from graspsense.recording.beside_control import leave_control_alone
 from graspsense.recording.layout import (
     CDR_HEADER,
     IS_SIGNAL,
@@ -49,10 +48,10 @@ from graspsense.recording.layout import (
     IS_TOPIC,
     TICK_SCHEMA,
     TICK_TOPIC,
+    LogClock,
     Topic,
 )
-from graspsense.recording.log_clock import LogClock
-from graspsense.recording.wire_messages import complete_messages
+from graspsense.recording.wire_messages import complete_messages, leave_control_alone
 
 WAITING_BYTES: Final = HISTORY_BYTES + (8 << 20)
 """Bytes that may wait for a viewer before it is dropped."""

@@ -12,7 +12,7 @@ from importlib import import_module
 
 from graspsense.core.values.errors import FAILURES, named
 from graspsense.live.stream import batches
-from graspsense.recording.beside_control import leave_control_alone
+from graspsense.recording.wire_messages import leave_control_alone
 
 
 def main(target: str) -> int:

@@ -35,8 +35,8 @@ from graspsense.live.admission import (
     why_not,
 )
 from graspsense.live.stream import Message, batches
-from graspsense.recording.beside_control import leave_control_alone
 from graspsense.recording.layout import TICK_FIELDS
+from graspsense.recording.wire_messages import leave_control_alone
 
 WAITING_BYTES: Final = 8 << 20
 """Text that may wait for a viewer before it is dropped."""

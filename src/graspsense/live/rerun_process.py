@@ -19,8 +19,8 @@ import rerun.blueprint as rrb
 from graspsense.core.values.errors import FAILURES, named
 from graspsense.live.admission import say
 from graspsense.live.stream import Message, batches
-from graspsense.recording.beside_control import leave_control_alone
-from graspsense.recording.log_clock import LogClock
+from graspsense.recording.layout import LogClock
+from graspsense.recording.wire_messages import leave_control_alone
 
 FLUSH_S: Final = 2.0
 """How long a viewer may take what is left when the grasping program has ended."""

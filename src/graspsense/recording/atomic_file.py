@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from graspsense.core.files.whole_file import write_whole
-from graspsense.core.values.errors import ConfigError, GraspsenseError
-from graspsense.core.values.exit_code import ExitCode
+from graspsense.core.values.errors import ConfigError, ExitCode, GraspsenseError
 
 
 class SaveFailed(GraspsenseError):

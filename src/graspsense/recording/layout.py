@@ -1,4 +1,4 @@
-"""The layout of a recording: topics, fields and metadata of its MCAP file, and the protocol to the writer process.
+"""The layout of a recording: topics, fields, times and metadata of its file, and the protocol to the writer process.
 
 Messages are ROS 2 messages in CDR (schema encoding `ros2msg`, message encoding `cdr`). Every field is a number of 8
 bytes or a fixed number of them, and the last one may be a fixed number of smaller ones, the pixels of a camera; so a
@@ -243,3 +243,27 @@ IS_END: Final = b"E"
 """The trial is over: finish the file and give it its final name."""
 READY: Final = "ready\n"
 """Line that the writer process prints once the file exists. Its last line is a JSON object."""
+
+
+_LAST_NS: Final = 2**64 - 1
+"""The last time that a message can have, in the year 2554."""
+
+
+class LogClock:
+    """Gives the gripper's time plus `base_ns`, the wall-clock time in nanoseconds at time 0 of the gripper's clock.
+
+    If `base_ns` is None, it is taken from the first message.
+    """
+
+    def __init__(self, base_ns: int | None = None) -> None:
+        self._base_ns = base_ns
+
+    def log_ns(self, t_s: float, now_ns: int) -> int:
+        """Return the time to log a message at that is of the gripper's time `t_s` and has come at `now_ns`."""
+        if self._base_ns is None:
+            self._base_ns = now_ns - _ns(t_s)
+        return min(max(0, self._base_ns + _ns(t_s)), _LAST_NS)
+
+
+def _ns(t_s: float) -> int:
+    return round(t_s * 1e9) if abs(t_s) < 1e9 else 0

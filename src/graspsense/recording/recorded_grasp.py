@@ -22,7 +22,7 @@ from graspsense.core.values.channel import Channel as DeclaredChannel
 from graspsense.core.values.channel import FastChannel, TactileArray
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.events import LABELLED, GraspEvent, event_from_json
-from graspsense.core.values.signals import Frame, Image, Pads, Phase, Reading, Samples, no_pads
+from graspsense.core.values.signals import APPROACH, Frame, Image, Pads, Phase, Reading, Samples, no_pads
 from graspsense.core.values.trace import SI_UNITS, Trace, trace_of
 from graspsense.recording.layout import (
     EVENT,
@@ -42,7 +42,6 @@ from graspsense.recording.trial_record import DeviceRecord, TrialRecord
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
 
 _KINDS: Final = {kind: np.dtype(name).newbyteorder("<") for kind, name in KINDS.items()}
 TICK_ROW: Final = np.dtype(
@@ -303,3 +302,14 @@ class RecordedGrasp:
             mounting=self.device.mounting,
             events=self.labelled_events(),
         )
+
+
+def with_phases_of(whole: Trace, replayed: Trace) -> Trace:
+    """Return the whole trace with the phases of a replay, of which the last one holds after its end.
+
+    A controller that saw a rest, or a failure, ends a replay before the recording does.
+    """
+    phases = replayed.phase[: len(whole)]
+    last = int(phases[-1]) if len(phases) else APPROACH
+    held = np.full(len(whole) - len(phases), last, dtype=np.int64)
+    return evolve(whole, phase=np.concatenate((phases, held)), events=replayed.events)

@@ -18,8 +18,7 @@ from attrs import evolve, field, frozen
 
 from graspsense import __version__
 from graspsense.core.components.channels import as_json, from_json, further
-from graspsense.core.files.toml_text import toml_values
-from graspsense.core.files.toml_values import toml_key, toml_value
+from graspsense.core.files.toml_text import toml_key, toml_value, toml_values
 from graspsense.core.values.channel import Channel, TactileArray
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.json_values import json_text

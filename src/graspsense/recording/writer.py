@@ -20,8 +20,7 @@ from mcap.writer import CompressionType, Writer
 
 from graspsense import __version__
 from graspsense.core.files.whole_file import sync_folder
-from graspsense.recording.layout import CDR_HEADER, PADS_TOPIC, PART, TICK_SCHEMA, TICK_TOPIC, Topic
-from graspsense.recording.log_clock import LogClock
+from graspsense.recording.layout import CDR_HEADER, PADS_TOPIC, PART, TICK_SCHEMA, TICK_TOPIC, LogClock, Topic
 from graspsense.recording.recording_info import RecordingInfo
 
 CHUNK_NS: Final = 50_000_000

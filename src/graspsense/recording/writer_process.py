@@ -16,9 +16,8 @@ import time
 from pathlib import Path
 from typing import Final
 
-from graspsense.recording.beside_control import leave_control_alone
 from graspsense.recording.layout import IS_END, IS_SIGNAL, IS_TICK, IS_TOPIC, READY, Topic
-from graspsense.recording.wire_messages import complete_messages
+from graspsense.recording.wire_messages import complete_messages, leave_control_alone
 from graspsense.recording.writer import RecordingWriter
 
 READ_EVERY_S: Final = 0.01

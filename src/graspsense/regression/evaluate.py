@@ -19,10 +19,16 @@ from graspsense.evaluation.evaluator import Progress
 from graspsense.evaluation.folds import INSTANCE_HELD_OUT, in_order, instance_held_out, stratified
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.evaluation.intervals import MIN_INSTANCES, rate_of
-from graspsense.regression.error import RegressionError, difference_of_errors, error_of
 from graspsense.regression.estimators import FittedRegression, check_estimator
 from graspsense.regression.intervals import intervals_of
-from graspsense.regression.results import IntervalCoverage, RegressionEvaluation, RegressionMeasurement
+from graspsense.regression.results import (
+    IntervalCoverage,
+    RegressionError,
+    RegressionEvaluation,
+    RegressionMeasurement,
+    difference_of_errors,
+    error_of,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -1,13 +1,69 @@
-"""The results of an evaluation of predicted numbers; their JSON form is that of `graspsense evaluate --json`."""
+"""The results of an evaluation of predicted numbers; their JSON form is that of `graspsense evaluate --json`.
+
+Errors have 95 % intervals that take the instances into account.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 
 from attrs import frozen
 
-from graspsense.evaluation.intervals import Difference, RecognitionRate
-from graspsense.regression.error import RegressionError
+from graspsense.core.values.errors import counted
+from graspsense.evaluation.intervals import Difference, Interval, RecognitionRate, mean_interval
+
+
+@frozen(kw_only=True)
+class RegressionError:
+    """The error of predicted numbers, in their unit.
+
+    `mean_absolute` is the mean absolute error, with its 95 % `interval` (None with the reason in `no_interval`),
+    `root_mean_square` that of the squared errors. `instances` is the number of objects that the interval takes into
+    account, None if they are not known.
+    """
+
+    n: int
+    mean_absolute: float
+    root_mean_square: float
+    interval: Interval | None
+    no_interval: str = ""
+    instances: int | None = None
+
+    def words(self, unit: str) -> str:
+        """Return the mean absolute error as text, with its interval."""
+        counts = counted(self.n, "trial") + (
+            "" if self.instances is None else f" of {counted(self.instances, 'instance')}"
+        )
+        if self.interval is None:
+            return (
+                f"{self.mean_absolute:.4g} {unit}".rstrip() + f" ({counts}; no interval: {self.no_interval})"
+            )
+        low, high = self.interval
+        return f"{self.mean_absolute:.4g} {unit}".rstrip() + f" (95 %: {low:.4g} to {high:.4g}; {counts})"
+
+
+def error_of(errors: Sequence[float], instances: Sequence[str] | None) -> RegressionError:
+    """Return the error of these predictions; `errors` are predicted minus true values."""
+    absolute = [abs(error) for error in errors]
+    interval, reason = mean_interval(absolute, instances)
+    return RegressionError(
+        n=len(absolute),
+        mean_absolute=math.fsum(absolute) / len(absolute),
+        root_mean_square=math.sqrt(math.fsum(error * error for error in errors) / len(errors)),
+        interval=None if interval is None else (max(interval[0], 0.0), interval[1]),
+        no_interval=reason,
+        instances=None if instances is None else len(set(instances)),
+    )
+
+
+def difference_of_errors(
+    errors: Sequence[float], others: Sequence[float], instances: Sequence[str] | None
+) -> Difference:
+    """Return the mean absolute error of `first` minus that of `second`, on the same trials, with its 95 % interval."""
+    each = [abs(value) - abs(other) for value, other in zip(errors, others, strict=True)]
+    interval, reason = mean_interval(each, instances)
+    return Difference(math.fsum(each) / len(each), interval, reason)
 
 
 @frozen(kw_only=True)

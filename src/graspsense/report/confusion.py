@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from graspsense.report.write import new_figure, write_picture
 
 if TYPE_CHECKING:
-    from graspsense.evaluation.confusion import Confusion
+    from graspsense.evaluation.results import Confusion
 
 
 def confusion_text(confusion: Confusion) -> list[str]:

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from html import escape
 
 from graspsense.core.values.tree import TreeNode
-from graspsense.evaluation.confusion import Confusion
 from graspsense.evaluation.doubt import Reliability, SetCoverage
 from graspsense.evaluation.intervals import percent
+from graspsense.evaluation.results import Confusion
 from graspsense.report.html import Section, bullets, figure, folded, pair, paragraph
 from graspsense.report.matrix import confusion_table
 from graspsense.report.rates import RateRow, rates_list, rates_picture, rates_table

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from graspsense.report.html import wide
 
 if TYPE_CHECKING:
-    from graspsense.evaluation.confusion import Confusion
+    from graspsense.evaluation.results import Confusion
 
 
 def confusion_table(confusion: Confusion, caption: str) -> str:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from graspsense.core.values.display import sentence, table
 from graspsense.core.values.features import Features, Prediction, certainty_words
-from graspsense.core.values.short_html import sentence, table
 from graspsense.core.values.trace import SampleTrace, Trace
 from graspsense.core.values.trial import Trial
 from graspsense.core.values.units import display_unit, quantity, without_underscores

@@ -14,7 +14,7 @@ from graspsense.core.components.identification import RecordedSqueeze
 from graspsense.core.learn.labelled import class_of
 from graspsense.core.values.errors import ConfigError, suggestion
 from graspsense.store.naming import STORE, as_source
-from graspsense.store.trial_ref import parse_trial_ref
+from graspsense.store.stored_grasps import parse_trial_ref
 
 if TYPE_CHECKING:
     from graspsense.recording.recorded_grasp import RecordedGrasp

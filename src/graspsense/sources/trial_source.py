@@ -12,8 +12,7 @@ from attrs import evolve, field, fields_dict, frozen
 from graspsense.core.components.strict import ValidationFailed, structured
 from graspsense.core.learn.checkpoints import with_checkpoints
 from graspsense.core.learn.labelled import Labelled
-from graspsense.core.settings.layers import read_toml
-from graspsense.core.settings.toml_kinds import KINDS, toml_kind
+from graspsense.core.settings.layers import KINDS, read_toml, toml_kind
 from graspsense.core.values.errors import ConfigError, PluginUnavailable
 from graspsense.core.values.label_text import alike_words, spelled_alike
 from graspsense.sources.identified import IDENTIFIED, gripper_flags, identified_scenes

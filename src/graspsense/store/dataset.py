@@ -27,7 +27,7 @@ from graspsense.recording.controls import Controls, controls, without_constant_g
 from graspsense.recording.provenance import recipe
 from graspsense.recording.readable import note_on, readable
 from graspsense.recording.reader import read_recorded
-from graspsense.recording.same_grasp import curve_bytes, grasp_numbers
+from graspsense.recording.replayable import curve_bytes, grasp_numbers
 from graspsense.recording.trial_record import FeatureValues
 from graspsense.store.changes import with_changed_numbers
 from graspsense.store.extract_again import ExtractedTrials, extract_again

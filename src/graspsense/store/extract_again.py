@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 from attrs import evolve, frozen
 
 from graspsense.core.components.caller import set_option
-from graspsense.core.components.nearest_key import nearest_path
+from graspsense.core.components.strict import nearest_path
 from graspsense.core.grasp.runner import run_uninterrupted
 from graspsense.core.learn.checkpoints import with_checkpoints
 from graspsense.core.pipeline.wiring import check_recording
@@ -22,11 +22,11 @@ from graspsense.core.settings.layers import Flag, Layer
 from graspsense.core.settings.resolved import NONE, Settings, default_paths, resolve, without_followers
 from graspsense.core.values.errors import ComponentFailed, ConfigError, DataDamaged, named
 from graspsense.recording.before_contact import before_contact, contact_force_of
-from graspsense.recording.held_phases import with_phases_of
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.recording.provenance import recipe
 from graspsense.recording.readable import error_of_all, readable
 from graspsense.recording.reader import read_recorded
+from graspsense.recording.recorded_grasp import with_phases_of
 from graspsense.recording.trial_record import FeatureValues
 
 if TYPE_CHECKING:

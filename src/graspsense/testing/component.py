@@ -13,7 +13,7 @@ import attrs
 from graspsense.core.components.roles import ClassifierConfig
 from graspsense.core.components.setting import unit_of_name
 from graspsense.core.components.strict import keys_of, plain
-from graspsense.core.files.toml_values import toml_key, toml_value
+from graspsense.core.files.toml_text import toml_key, toml_value
 from graspsense.core.settings.selected import build
 from graspsense.core.values.errors import ConfigError, PluginUnavailable
 from graspsense.testing.checks import CheckFailed, checks_of, demand

@@ -1,7 +1,8 @@
 """The hooks that a plugin can implement. Component hooks return entries; observer hooks return nothing.
 
 A plugin implements hooks as module functions marked with `graspsense.plugin_api.hookimpl`, in the module that its entry
-point in the group `graspsense.plugins` names. No hook depends on the order of plugins, and none can change a run.
+point in the group `graspsense.plugins` names. No hook depends on the order of plugins, and none can change a run. The
+example of a hook that returns entries is the statement of its implementation that yields one.
 """
 
 from __future__ import annotations
@@ -49,17 +50,12 @@ def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:  # type: ignor
 
     Example::
 
-        from graspsense.plugin_api import SensorBackendEntry, hookimpl
-
-
-        @hookimpl
-        def graspsense_sensor_backends():
-            yield SensorBackendEntry(
-                name="lab-hand",
-                target="lab_hand.backend:LabHand",
-                summary="the two-finger hand of our lab, over a serial line",
-                needs="pip install pyserial",
-            )
+        yield SensorBackendEntry(
+            name="lab-hand",
+            target="lab_hand.backend:LabHand",
+            summary="the two-finger hand of our lab, over a serial line",
+            needs="pip install pyserial",
+        )
     """
 
 
@@ -69,16 +65,11 @@ def graspsense_controllers() -> Iterable[ControllerEntry]:  # type: ignore[empty
 
     Example::
 
-        from graspsense.plugin_api import ControllerEntry, hookimpl
-
-
-        @hookimpl
-        def graspsense_controllers():
-            yield ControllerEntry(
-                name="gentle",
-                target="lab_hand.gentle:GentleController",
-                summary="closes ever more slowly",
-            )
+        yield ControllerEntry(
+            name="gentle",
+            target="lab_hand.gentle:GentleController",
+            summary="closes ever more slowly",
+        )
     """
 
 
@@ -90,16 +81,11 @@ def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:  # type: ignore[empt
 
     Example::
 
-        from graspsense.plugin_api import FeatureSetEntry, hookimpl
-
-
-        @hookimpl
-        def graspsense_feature_sets():
-            yield FeatureSetEntry(
-                name="stiffness",
-                target="lab_hand.stiffness:Stiffness",
-                summary="slope of force over gap in the squeeze",
-            )
+        yield FeatureSetEntry(
+            name="stiffness",
+            target="lab_hand.stiffness:Stiffness",
+            summary="slope of force over gap in the squeeze",
+        )
     """
 
 
@@ -112,16 +98,11 @@ def graspsense_classifiers() -> Iterable[ClassifierEntry]:  # type: ignore[empty
 
     Example::
 
-        from graspsense.plugin_api import ClassifierEntry, hookimpl
-
-
-        @hookimpl
-        def graspsense_classifiers():
-            yield ClassifierEntry(
-                name="nearest",
-                target="lab_hand.nearest:Nearest",
-                summary="the label of the nearest trial",
-            )
+        yield ClassifierEntry(
+            name="nearest",
+            target="lab_hand.nearest:Nearest",
+            summary="the label of the nearest trial",
+        )
     """
 
 
@@ -133,16 +114,11 @@ def graspsense_pipelines() -> Iterable[PipelineEntry]:  # type: ignore[empty-bod
 
     Example::
 
-        from graspsense.plugin_api import PipelineEntry, hookimpl
-
-
-        @hookimpl
-        def graspsense_pipelines():
-            yield PipelineEntry(
-                name="lab",
-                resource="lab_hand:pipelines/lab.toml",
-                summary="our hand, with hybrid control",
-            )
+        yield PipelineEntry(
+            name="lab",
+            resource="lab_hand:pipelines/lab.toml",
+            summary="our hand, with hybrid control",
+        )
     """
 
 
@@ -152,17 +128,11 @@ def graspsense_models() -> Iterable[ModelEntry]:  # type: ignore[empty-body]
 
     Example::
 
-        from graspsense.plugin_api import hookimpl
-        from graspsense.simulator_api import ModelEntry
-
-
-        @hookimpl
-        def graspsense_models():
-            yield ModelEntry(
-                name="lab-cans",
-                resource="lab_hand:models/cans.json",
-                summary="open and closed cans, trained on 400 grasps of our hand",
-            )
+        yield ModelEntry(
+            name="lab-cans",
+            resource="lab_hand:models/cans.json",
+            summary="open and closed cans, trained on 400 grasps of our hand",
+        )
     """
 
 
@@ -176,16 +146,11 @@ def graspsense_datasets() -> Iterable[DatasetEntry]:  # type: ignore[empty-body]
 
     Example::
 
-        from graspsense.plugin_api import DatasetEntry, hookimpl
-
-
-        @hookimpl
-        def graspsense_datasets():
-            yield DatasetEntry(
-                name="lab-csv",
-                recordings="lab_hand.csv:recordings",
-                summary="the CSV files of our lab",
-            )
+        yield DatasetEntry(
+            name="lab-csv",
+            recordings="lab_hand.csv:recordings",
+            summary="the CSV files of our lab",
+        )
     """
 
 
@@ -198,16 +163,11 @@ def graspsense_commands() -> Iterable[CommandEntry]:  # type: ignore[empty-body]
 
     Example::
 
-        from graspsense.plugin_api import CommandEntry, hookimpl
-
-
-        @hookimpl
-        def graspsense_commands():
-            yield CommandEntry(
-                name="home-hand",
-                target="lab_hand.cli:home",
-                summary="move our hand to its home position",
-            )
+        yield CommandEntry(
+            name="home-hand",
+            target="lab_hand.cli:home",
+            summary="move our hand to its home position",
+        )
     """
 
 
@@ -220,18 +180,12 @@ def graspsense_emulators() -> Iterable[EmulatorEntry]:  # type: ignore[empty-bod
 
     Example::
 
-        from graspsense.gripper_api import EmulatorEntry
-        from graspsense.plugin_api import hookimpl
-
-
-        @hookimpl
-        def graspsense_emulators():
-            yield EmulatorEntry(
-                name="lab-hand",
-                target="lab_hand.emulator:emulate",
-                summary="our hand, behind a pseudo terminal",
-                wires=("pty",),
-            )
+        yield EmulatorEntry(
+            name="lab-hand",
+            target="lab_hand.emulator:emulate",
+            summary="our hand, behind a pseudo terminal",
+            wires=("pty",),
+        )
     """
 
 
@@ -243,17 +197,11 @@ def graspsense_identifiers() -> Iterable[IdentifierEntry]:  # type: ignore[empty
 
     Example::
 
-        from graspsense.plugin_api import hookimpl
-        from graspsense.simulator_api import IdentifierEntry
-
-
-        @hookimpl
-        def graspsense_identifiers():
-            yield IdentifierEntry(
-                name="lab-sim",
-                target="lab_sim.identification:identify",
-                summary="stiffness and width, as a scene of our simulator",
-            )
+        yield IdentifierEntry(
+            name="lab-sim",
+            target="lab_sim.identification:identify",
+            summary="stiffness and width, as a scene of our simulator",
+        )
     """
 
 
@@ -266,17 +214,11 @@ def graspsense_live_observers() -> Iterable[LiveObserverEntry]:  # type: ignore[
 
     Example::
 
-        from graspsense.gripper_api import LiveObserverEntry
-        from graspsense.plugin_api import hookimpl
-
-
-        @hookimpl
-        def graspsense_live_observers():
-            yield LiveObserverEntry(
-                name="lab-wall",
-                target="lab_hand.wall:observe",
-                summary="the screen on the wall of our lab",
-            )
+        yield LiveObserverEntry(
+            name="lab-wall",
+            target="lab_hand.wall:observe",
+            summary="the screen on the wall of our lab",
+        )
     """
 
 
@@ -289,20 +231,14 @@ def graspsense_experiment_kinds() -> Iterable[ExperimentKindEntry]:  # type: ign
 
     Example::
 
-        from graspsense.experiment_api import ExperimentKindEntry
-        from graspsense.plugin_api import hookimpl
-
-
-        @hookimpl
-        def graspsense_experiment_kinds():
-            yield ExperimentKindEntry(
-                name="wear",
-                run="lab_study.wear:run",
-                keys="lab_study.wear:WearSettings",
-                result="lab_study.wear:WearResult",
-                findings="lab_study.wear:findings",
-                summary="how a bottle changes from squeeze to squeeze",
-            )
+        yield ExperimentKindEntry(
+            name="wear",
+            run="lab_study.wear:run",
+            keys="lab_study.wear:WearSettings",
+            result="lab_study.wear:WearResult",
+            findings="lab_study.wear:findings",
+            summary="how a bottle changes from squeeze to squeeze",
+        )
     """
 
 
@@ -312,13 +248,7 @@ def graspsense_experiments() -> Iterable[ExperimentEntry]:  # type: ignore[empty
 
     Example::
 
-        from graspsense.experiment_api import ExperimentEntry
-        from graspsense.plugin_api import hookimpl
-
-
-        @hookimpl
-        def graspsense_experiments():
-            yield ExperimentEntry(name="worn-cans", resource="lab_study:experiments/worn_cans.toml")
+        yield ExperimentEntry(name="worn-cans", resource="lab_study:experiments/worn_cans.toml")
     """
 
 
@@ -331,18 +261,12 @@ def graspsense_conformance_checks() -> Iterable[ConformanceCheckEntry]:  # type:
 
     Example::
 
-        from graspsense.plugin_api import hookimpl
-        from graspsense.simulator_api import ConformanceCheckEntry
-
-
-        @hookimpl
-        def graspsense_conformance_checks():
-            yield ConformanceCheckEntry(
-                name="fingers-have-names",
-                target="lab_hand.checks:check_fingers",
-                hook="lab_hand_fingers",
-                summary="every finger has a name of its own",
-            )
+        yield ConformanceCheckEntry(
+            name="fingers-have-names",
+            target="lab_hand.checks:check_fingers",
+            hook="lab_hand_fingers",
+            summary="every finger has a name of its own",
+        )
     """
 
 
@@ -355,19 +279,13 @@ def graspsense_probe_devices(timeout_s: float) -> Iterable[FoundDevice]:  # type
 
     Example::
 
-        from graspsense.gripper_api import FoundDevice
-        from graspsense.plugin_api import hookimpl
-
-
-        @hookimpl
-        def graspsense_probe_devices(timeout_s):
-            yield FoundDevice(
-                backend="lab-hand",
-                serial="0042",
-                where="/dev/ttyUSB0",
-                ready=False,
-                advice="add yourself to the group dialout",
-            )
+        yield FoundDevice(
+            backend="lab-hand",
+            serial="0042",
+            where="/dev/ttyUSB0",
+            ready=False,
+            advice="add yourself to the group dialout",
+        )
     """
 
 
@@ -381,19 +299,13 @@ def graspsense_diagnose(config: object, timeout_s: float) -> Iterable[Finding]: 
 
     Example::
 
-        from graspsense.gripper_api import Finding
-        from graspsense.plugin_api import hookimpl
-
-
-        @hookimpl
-        def graspsense_diagnose(config, timeout_s):
-            yield Finding(
-                subject="serial line",
-                state="problem",
-                words="no permission on /dev/ttyUSB0",
-                advice="add yourself to the group dialout",
-                numbers={"baud": 115200},
-            )
+        yield Finding(
+            subject="serial line",
+            state="problem",
+            words="no permission on /dev/ttyUSB0",
+            advice="add yourself to the group dialout",
+            numbers={"baud": 115200},
+        )
     """
 
 

@@ -1,8 +1,9 @@
-"""Writing a file completely or not at all, whatever other programs write to the same name or to its folder.
+"""Files as a whole: written completely or not at all, and read if they are regular ones of a bounded size.
 
-The data goes to a new file `NAME.<16 hexadecimal digits>.part` in the same folder, which takes the name when it is
-complete and on the disk. Its writer holds a lock on it: one without a lock was left by a program that was killed, and
-is deleted when the next file is written to that folder.
+Data is written to a new file `NAME.<16 hexadecimal digits>.part` in the same folder, which takes the name when it is
+complete and on the disk, whatever other programs write there. Its writer holds a lock on it: one without a lock was
+left by a program that was killed, and is deleted when the next file is written to that folder. A pipe without a writer,
+or a device such as /dev/zero, would keep its reader for ever or take all memory.
 """
 
 from __future__ import annotations
@@ -13,8 +14,9 @@ import re
 import secrets
 import stat
 from contextlib import suppress
+from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Final
+from typing import BinaryIO, Final, cast
 
 _LEFTOVER: Final = re.compile(r".+\.[0-9a-f]{16}\.part")
 _SWEPT: Final[set[str]] = set()
@@ -113,3 +115,32 @@ def _lock(fd: int, *, waits: bool = True) -> None:
     import fcntl
 
     fcntl.flock(fd, fcntl.LOCK_EX if waits else fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+_WITHOUT_WAITING: Final = (
+    getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
+)
+
+
+class NotAFile(OSError):
+    """A pipe, a socket or a device where a file is needed."""
+
+
+def opened_file(source: Traversable | Path) -> BinaryIO:
+    """Open a regular file for reading. Raises OSError if it cannot be, NotAFile if it is a pipe or a device."""
+    if not isinstance(source, Path):
+        return cast(BinaryIO, source.open("rb"))
+    descriptor = os.open(source, os.O_RDONLY | _WITHOUT_WAITING)
+    kind = os.fstat(descriptor).st_mode
+    if stat.S_ISREG(kind):
+        return os.fdopen(descriptor, "rb")
+    os.close(descriptor)
+    if stat.S_ISDIR(kind):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(source))
+    raise NotAFile(f"{source} is a pipe or a device, not a file")
+
+
+def first_bytes(source: Traversable | Path, most: int) -> bytes:
+    """Return the content of a regular file, of a larger one `most` + 1 bytes. Raises OSError, NotAFile."""
+    with opened_file(source) as file:
+        return file.read(most + 1)

@@ -13,10 +13,9 @@ from graspsense.core.components.run_config import RunConfig
 from graspsense.core.control.contact import CONTACT_FORCE_N, RestState, at_rest, update_rest
 from graspsense.core.control.guard import GuardParams, GuardState, guard
 from graspsense.core.control.tick import OPEN_SPEED_M_S, OPEN_WINDOW_S
-from graspsense.core.grasp.time_limits import frame_timeout_s, no_frame
+from graspsense.core.grasp.opened_gripper import frame_timeout_s, no_frame
 from graspsense.core.values.device import DeviceInfo
-from graspsense.core.values.errors import DeviceLost, GraspsenseError
-from graspsense.core.values.exit_code import ExitCode
+from graspsense.core.values.errors import DeviceLost, ExitCode, GraspsenseError
 from graspsense.core.values.signals import EFFORT, Command, Pads, Reading
 
 RAMP_N_S: Final = 2.0

@@ -18,8 +18,7 @@ from graspsense.core.components.roles import Controller, FeatureSet, SensorBacke
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.values.channel import Channel
 from graspsense.core.values.device import DeviceInfo
-from graspsense.core.values.errors import ConfigError, DeviceLost, GraspsenseError, named
-from graspsense.core.values.exit_code import ExitCode
+from graspsense.core.values.errors import ConfigError, DeviceLost, ExitCode, GraspsenseError, named
 from graspsense.core.values.signals import Command, Image, Pads, Reading, Samples
 
 T = TypeVar("T")

@@ -38,9 +38,15 @@ from graspsense.core.control.tick import (
 )
 from graspsense.core.grasp.interrupts import Interrupts
 from graspsense.core.grasp.losses import Losses, lost_in_words
-from graspsense.core.grasp.opened_gripper import described, opened_gripper
+from graspsense.core.grasp.opened_gripper import (
+    described,
+    frame_timeout_s,
+    no_frame,
+    opened_gripper,
+    overdue,
+    seconds_at_most,
+)
 from graspsense.core.grasp.sinks import DeviceSink, EventSink, PictureSink, Sink, Watcher
-from graspsense.core.grasp.time_limits import frame_timeout_s, no_frame, overdue, seconds_at_most
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import FAILURES, DeviceLost, RecordingEnded, TareRefused, named, place_of
 from graspsense.core.values.events import EventSource, GraspEvent, event_name

@@ -11,10 +11,9 @@ from attrs import evolve, frozen
 
 from graspsense.core.components.entries import TABLE_OF_ROLE
 from graspsense.core.components.setting import CHANGES_NO_RESULT, NAMES_INPUT, settings_marked, worded
-from graspsense.core.learn.certainty import Certainty, with_certainty
+from graspsense.core.learn.certainty import Certainty, at_temperature, with_certainty
 from graspsense.core.learn.conformal import Answers, PredictionSets, scores_of
 from graspsense.core.learn.novelty import Novelty
-from graspsense.core.learn.temperature import at_temperature
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.features import (
     LARGEST_VALUE,
@@ -65,7 +64,7 @@ class Model:
     certainty: Certainty | None = None
     """How often its answers are right, by their support; None in a model that is not calibrated."""
     temperature: float | None = None
-    """The temperature (`learn.temperature`) of the probabilities of the labels that are not predicted."""
+    """The temperature (`learn.certainty`) of the probabilities of the labels that are not predicted."""
     learned_from: tuple[str, ...] = ()
     """The hashes (`learn.copies`) of the recorded trials that it was trained on."""
     checkpoints: tuple[tuple[float, Model], ...] = ()

@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from graspsense import __version__
-from graspsense.core.files.regular_file import first_bytes
-from graspsense.core.files.whole_file import write_whole
+from graspsense.core.files.whole_file import first_bytes, write_whole
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.limits import MODEL_BYTES
 

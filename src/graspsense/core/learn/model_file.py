@@ -14,7 +14,7 @@ import numpy as np
 from attrs import evolve
 
 from graspsense.core.components.entries import ModelEntry
-from graspsense.core.learn.certainty import Certainty, certainty_from
+from graspsense.core.learn.certainty import TEMPERATURES, Certainty, certainty_from
 from graspsense.core.learn.conformal import COVERAGES, PredictionSets, sets_from
 from graspsense.core.learn.model import COMPARED_TABLES, EQUAL, Model, checkpoint_model, refuse_improbable
 from graspsense.core.learn.model_content import (
@@ -27,7 +27,6 @@ from graspsense.core.learn.model_content import (
 )
 from graspsense.core.learn.novelty import Novelty, novelty_from
 from graspsense.core.learn.stored_values import StoredValueError, StoredValues
-from graspsense.core.learn.temperature import RANGE as TEMPERATURES
 from graspsense.core.values.errors import (
     ComponentFailed,
     ConfigError,

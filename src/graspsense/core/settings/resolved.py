@@ -14,20 +14,19 @@ from typing import TYPE_CHECKING, Any, Final, cast
 from attrs import fields, frozen
 
 from graspsense.core.components.entries import TABLE_OF_ROLE, Role
-from graspsense.core.components.nearest_key import key_paths
 from graspsense.core.components.registry import Component, Plugins, installed
 from graspsense.core.components.setting import followed_settings
 from graspsense.core.components.strict import (
     InvalidValue,
     ValidationFailed,
     implausible_values,
+    key_paths,
     keys_of,
     plain,
     shown,
     structured,
 )
-from graspsense.core.files.toml_text import KeyPath
-from graspsense.core.files.toml_values import toml_value
+from graspsense.core.files.toml_text import KeyPath, toml_value
 from graspsense.core.settings.layers import (
     Flag,
     Layer,

@@ -8,7 +8,7 @@ from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 from graspsense import __version__
-from graspsense.core.files.toml_values import toml_key, toml_value
+from graspsense.core.files.toml_text import toml_key, toml_value
 
 if TYPE_CHECKING:
     from graspsense.core.settings.resolved import Settings

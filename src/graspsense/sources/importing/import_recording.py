@@ -15,8 +15,8 @@ from graspsense.core.values.errors import FAILURES
 from graspsense.core.values.events import LABELLED
 from graspsense.core.values.signals import Reading
 from graspsense.recording.atomic_file import SaveFailed
-from graspsense.recording.held_phases import with_phases_of
 from graspsense.recording.layout import DEVICE, RESULT, START, TICK, pads_numbers, pads_topic, signal_topics
+from graspsense.recording.recorded_grasp import with_phases_of
 from graspsense.recording.replayable import content_sha256
 from graspsense.recording.trial_record import TrialRecord
 from graspsense.recording.writer import RecordingWriter

@@ -13,7 +13,7 @@ import numpy as np
 
 from graspsense.core.components.channels import from_json, further
 from graspsense.core.files.csv_text import text_of_cell
-from graspsense.core.files.regular_file import first_bytes
+from graspsense.core.files.whole_file import first_bytes
 from graspsense.core.values.channel import FLOATS, Channel, FastChannel, TactileArray
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.limits import CELLS, CHANNEL_NUMBERS

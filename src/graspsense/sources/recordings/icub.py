@@ -23,7 +23,7 @@ import numpy as np
 from attrs import frozen
 
 from graspsense.core.components.channels import signal_type
-from graspsense.core.files.regular_file import first_bytes
+from graspsense.core.files.whole_file import first_bytes
 from graspsense.core.values.errors import ConfigError, DataDamaged, suggestion
 from graspsense.core.values.fingers import PREFIX, FingerForce, opposed_forces
 from graspsense.core.values.limits import TEXT_BYTES

@@ -25,8 +25,7 @@ from graspsense.recording.before_contact import before_contact
 from graspsense.recording.controls import Controls, controls, without_constant_gap
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import each_readable, error_of_all, note_on
-from graspsense.recording.replayable import Recording, recorded_channels
-from graspsense.recording.same_grasp import curve_bytes, grasp_numbers
+from graspsense.recording.replayable import Recording, curve_bytes, grasp_numbers, recorded_channels
 from graspsense.sources.recordings.dataset_recordings import readable_or_not
 from graspsense.sources.recordings.noise_thresholds import THRESHOLDS, thresholds_for
 from graspsense.store.first_line import NAMES, UNITS, numbers_of

@@ -40,7 +40,7 @@ def _mcap(name: str) -> Recording:
 
 
 def _stored(name: str) -> Recording:
-    from graspsense.store.trial_ref import stored_recording
+    from graspsense.store.stored_grasps import stored_recording
 
     return stored_recording(name)
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from math import nan
 from typing import Final
 
-from graspsense.core.grasp.protection.motor import lasting
-from graspsense.core.grasp.protection.recent_mean import RecentMean
+from graspsense.core.grasp.protection.motor import RecentMean, lasting
 from graspsense.core.values.faults import Fault
 from graspsense.core.values.signals import Frame, Phase
 

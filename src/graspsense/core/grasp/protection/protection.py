@@ -18,11 +18,9 @@ from graspsense.core.grasp.protection.cells import Fingertips
 from graspsense.core.grasp.protection.drift import Drift
 from graspsense.core.grasp.protection.effort_ceiling import asked_effort_n, effort_ceiling_n, limited
 from graspsense.core.grasp.protection.motor import FeltForce, FreeEffort, Motor
-from graspsense.core.grasp.protection.opening import Opening
 from graspsense.core.grasp.protection.pad_forces import EmptyForce, EmptyHold, PadBalance, StuckForce
-from graspsense.core.grasp.protection.reports import Reports
-from graspsense.core.grasp.protection.speed import GapAbsent, GapJump, GapSpeed, Rush, Standstill
-from graspsense.core.grasp.protection.status import StatusWatch
+from graspsense.core.grasp.protection.reports import Reports, StatusWatch
+from graspsense.core.grasp.protection.speed import GapAbsent, GapJump, GapSpeed, Opening, Rush, Standstill
 from graspsense.core.grasp.protection.touch import Touch
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.faults import LIMITED, Fault

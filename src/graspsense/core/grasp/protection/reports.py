@@ -1,12 +1,15 @@
-"""Whether frames and cell images keep coming: a clock that stands still, lost frames, images that stop."""
+"""Whether frames and cell images keep coming (clock, lost frames, images), and what the bits of the status say."""
 
 from __future__ import annotations
 
-from math import nan
+from collections.abc import Sequence
+from functools import reduce
+from math import inf, nan
+from operator import or_
 from typing import Final
 
-from graspsense.core.values.faults import Fault
-from graspsense.core.values.signals import APPROACH, HOLD, SQUEEZE, Reading
+from graspsense.core.values.faults import Fault, StatusBit
+from graspsense.core.values.signals import APPROACH, HOLD, SQUEEZE, Frame, Reading
 
 STANDS_S: Final = 0.1
 """Time, counted in frames of the declared rate, for which the clock of the gripper may stand still."""
@@ -74,3 +77,39 @@ class Reports:
             "connection and the load of this computer",
             ends=lost >= ENDS_SHARE * self._expected,
         )
+
+
+class StatusWatch:
+    """Watches the status of each frame for the bits that the gripper has declared, and for others."""
+
+    def __init__(self, bits: Sequence[StatusBit]) -> None:
+        self._bits = tuple(bits)
+        self._known = reduce(or_, (bit.mask for bit in self._bits), 0)
+        self._seconds = [0.0] * len(self._bits)
+
+    def see(self, frame: Frame, phase: int) -> list[Fault]:
+        """Return the faults that the bits of this frame show; none in most ticks."""
+        status = frame.status
+        if not status or not self._bits:
+            return []
+        closing = phase in (APPROACH, SQUEEZE, HOLD)
+        faults: list[Fault] = []
+        for i, bit in enumerate(self._bits):
+            if status & bit.mask:
+                if closing:
+                    self._seconds[i] += max(frame.dt_s, 0.0)
+                faults.append(Fault(bit.name, bit.meaning, ends=closing and self._seconds[i] > bit.limit_s))
+        unknown = status & ~self._known
+        if unknown:
+            faults.append(
+                Fault(f"status {unknown:#x}", "the gripper does not say what this bit of its status means")
+            )
+        return faults
+
+    def before_closing(self, frame: Frame) -> list[Fault]:
+        """Return the faults for which the fingers must not close."""
+        return [
+            Fault(bit.name, bit.meaning, ends=True)
+            for bit in self._bits
+            if frame.status & bit.mask and bit.limit_s < inf
+        ]

@@ -15,7 +15,7 @@ from math import inf, nan
 from typing import Final
 
 from graspsense.core.control.contact import MOVED_M
-from graspsense.core.grasp.protection.recent_mean import RecentMean
+from graspsense.core.grasp.protection.motor import RecentMean
 from graspsense.core.values.faults import Fault
 from graspsense.core.values.signals import (
     APPROACH,
