@@ -618,12 +618,22 @@ def test_fingers_that_are_closed_or_move_do_not_stand_still():
     assert not any(watch.see(frame(k / 100, 0.05 - 0.005 * k / 1000), command) for k in range(2000))
 
 
-@every_case(("gap_m", "left_n", "told"), [(0.06, 2.0, True), (0.053, 2.0, False), (0.06, 0.1, False)])
-def test_pads_that_feel_a_contact_when_the_fingers_have_opened_are_told(gap_m, left_n, told):
+@every_case(
+    ("gap_m", "left_n", "right_n", "told"),
+    [
+        (0.06, 2.0, 2.0, True),
+        (0.053, 2.0, 2.0, False),
+        (0.06, 0.1, 2.0, False),
+        (0.06, 0.1, 6.0, True),
+        (0.06, 0.1, -0.7, True),
+        (0.053, 0.1, 6.0, False),
+    ],
+)
+def test_pads_that_feel_a_contact_when_the_fingers_have_opened_are_told(gap_m, left_n, right_n, told):
     """Both felt it first at 50 mm. Within 5 mm of that, a soft object can still touch; one pad alone can be pushed."""
     watch = EmptyForce(0.625)
     watch.see(frame(0.0, gap=0.05, left=3.0, right=3.0), int(Phase.SQUEEZE))
-    opening = [frame(0.001 * k, gap=gap_m, left=left_n, right=2.0) for k in range(200)]
+    opening = [frame(0.001 * k, gap=gap_m, left=left_n, right=right_n) for k in range(200)]
     faults = [fault for tick in opening if (fault := watch.see(tick, int(Phase.RELEASE)))]
     assert bool(faults) == told
     assert not any(fault.ends for fault in faults)

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.trace import trace_of
 from graspsense.plugin_api import GraspColumns, checked_recording
+from graspsense.sources.columns.grasp_columns import without_missing
 
 N = 100
 
@@ -144,3 +145,36 @@ def test_a_part_of_the_samples_takes_the_part_of_each_channel():
     ).rows(slice(20, 40), "squeeze 1")
     imu = trace(checked_recording(given_)).signals["imu"].values[:, 0]
     assert (imu[0], imu[-1]) == (pytest.approx(0.2, abs=2e-3), pytest.approx(0.39, abs=2e-3))
+
+
+def topics_in_one_table(*, force_until_s=9.0, force_late_s=0.001):
+    """Return a table with rows of the gap alone and of the force alone, as an export of topics writes it."""
+    t_s = np.arange(N) * 0.01
+    force_s = t_s[t_s < force_until_s] + force_late_s
+    order = np.argsort(np.concatenate((t_s, force_s)), kind="stable")
+    nothing = np.full(len(force_s), np.nan)
+    force_n = np.concatenate((np.full(N, np.nan), 5.0 * force_s))[order]
+    gap_m = np.concatenate((0.06 - 0.01 * t_s, nothing))[order]
+    times = np.concatenate((t_s, force_s))[order]
+    return GraspColumns(source="bag.csv", t_s=times, gap_m=gap_m, left_n=force_n, right_n=force_n)
+
+
+def test_gap_and_force_with_rows_of_their_own_hold_their_last_values():
+    frames = [reading.frame for reading in checked_recording(topics_in_one_table()).readings]
+    assert len(frames) == N - 1  # the first row of the gap has no force yet
+    # The force of each row of the gap is that of 9 ms before.
+    assert [frame.force_left_n for frame in frames] == pytest.approx([5.0 * (f.t_s - 0.009) for f in frames])
+    # Equal times are of one moment.
+    assert len(checked_recording(topics_in_one_table(force_late_s=0.0)).readings) == N
+
+
+def test_a_force_that_ends_before_the_gap_is_not_held_to_the_end():
+    kept = without_missing(topics_in_one_table(force_until_s=0.5))
+    assert kept.t_s[-1] <= 0.511
+    assert len(kept.warnings) == 1
+    with pytest.raises(DataDamaged):
+        checked_recording(topics_in_one_table(force_late_s=10.0))
+    # Times that go back are refused as those of any other table.
+    back = topics_in_one_table()
+    with pytest.raises(DataDamaged):
+        checked_recording(evolve(back, t_s=np.where(back.t_s > 0.5, back.t_s - 0.3, back.t_s)))

@@ -288,3 +288,23 @@ def test_the_number_to_predict_in_another_unit_is_told(tmp_path):
     notes = read_labelled(path, None, value="break_n").notes
     assert any("break_mn" in note and "another unit" in note for note in notes)
     assert not any("width" in note for note in notes)
+
+
+def test_sessions_that_are_not_held_out_are_told(tmp_path):
+    """Each session has all objects; or one of them only, so that who holds out the object holds out the session."""
+    values = np.random.default_rng(0).normal(size=N).round(3)
+    lines = [
+        f"{label},{value},{i // 2 % 5},{label}{i % 3},{label}{i % 3}-{i % 2},{i % 7}"
+        for i, (label, value) in enumerate(zip(LABELS, values, strict=True))
+    ]
+    path = tmp_path / "grasps.csv"
+    path.write_text("\n".join(["object,width,session,item,operator,seed", *lines]))
+    told = [
+        note
+        for note in read_labelled(path, "object", instance="item").notes
+        if note.startswith("not held out")
+    ]
+    assert len(told) == 1
+    assert "session" in told[0]
+    told = [note for note in read_labelled(path, "object").notes if note.startswith("not held out")]
+    assert len(told) == 2

@@ -353,6 +353,26 @@ def plain(folder, extra, *, force=None, gap=None, time=None):
     return recordings(folder, PLAIN + extra)
 
 
+def test_rows_beside_a_file_that_have_other_times_are_told(tmp_path):
+    gap, force = squeezing()
+    pandas_csv(tmp_path / "jar_1.csv", {"t": T_S, "gap": gap})
+    text = "files = '{label}_1.csv'\nbeside = 'pad.csv'\ntime = 't'\ngap = 'gap'\nforce = \"'pad.N'\""
+    for late_s, told in ((0.0, 0), (0.004, 0), (0.5, 1), (-10.0, 1)):
+        pandas_csv(tmp_path / "pad.csv", {"t": T_S + late_s, "N": force})
+        (recording,) = recordings(tmp_path, text)
+        assert len([notice for notice in recording.notices if "row by row" in notice]) == told
+
+
+@every_case("digits", [0, 1, 2])
+def test_times_with_too_few_digits_are_refused_with_the_rate_or_its_key(tmp_path, digits):
+    gap, force = squeezing()
+    times = [f"{1732850000.1 + t:.{digits}f}" for t in T_S / 30.0]
+    pandas_csv(tmp_path / "jar_1.csv", {"t": times, "gap": gap, "N": force})
+    text = "files = '{label}_1.csv'\ntime = 't'\ngap = 'gap'\nforce = 'N'"
+    with pytest.raises(DataDamaged, match="rate_hz"):
+        recordings(tmp_path, text)
+
+
 def test_zero_is_taken_from_the_first_samples_or_seconds(tmp_path):
     _, force = squeezing()
     for zero in ("20 samples", "0.2 s", "200 ms"):

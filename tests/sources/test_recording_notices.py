@@ -161,3 +161,33 @@ def test_a_gap_that_stops_in_the_squeeze_is_noticed() -> None:
     stairs = np.floor(np.clip(T_S - 1.0, 0.0, 1.0) * 4.0)
     force = np.where(T_S < 2.7, 1.5 * stairs, 0.0) + NOISE_N[0]
     assert noticed(force, force, np.where(T_S < 2.6, OPEN_AGAIN_M - 0.0005 * stairs, OPEN_AGAIN_M)) == ()
+
+
+def test_a_slow_gap_that_opens_after_a_hold_without_creep_has_not_stopped() -> None:
+    """50 Hz in a recording of 1000 Hz: the first step of an opening at 0.2 m/s is 4 mm, and so is the next one."""
+    t_s = np.arange(3000) * 0.001
+    closing = np.where(t_s < 1.2, np.maximum(0.08 - 0.03 * t_s, 0.0485), 0.0485)
+    gap = np.where(t_s < 2.5, closing, 0.0485 + 0.2 * (t_s - 2.5))
+    load = np.where(
+        t_s > 1.0, np.minimum((t_s - 1.0) / 0.25, 1.0) * (6.0 - np.clip(t_s - 1.25, 0.0, 1.0)), 0.0
+    )
+    load = load * np.clip((2.55 - t_s) / 0.05, 0.0, 1.0) + np.random.default_rng(1).normal(
+        0.0, 0.01, len(t_s)
+    )
+    for every in (1, 10, 20, 50):
+        assert noticed(load, load, gap[np.arange(3000) // every * every], rate_hz=1000.0) == ()
+    # One that had stopped goes on, in the hold, by what it has missed.
+    stopped = np.where((t_s >= 0.9) & (t_s < 1.6), gap[900], gap)[np.arange(3000) // 20 * 20]
+    (notice,) = noticed(load, load, stopped, rate_hz=1000.0)
+    assert "then jumps by 4.5 mm" in notice
+
+
+def test_a_force_without_noise_that_stays_after_the_fingers_opened_is_noticed() -> None:
+    quick = np.clip((T_S - 1.0) / 0.15, 0.0, 1.0) * 6.0
+    (notice,) = noticed(quick, quick, OPEN_AGAIN_M)
+    assert "or its sensor stopped" in notice
+    released = np.where(T_S < 2.7, quick, 0.0)
+    assert noticed(released, released, OPEN_AGAIN_M) == ()
+    # At 2 Hz the last value of a force can be one of the hold.
+    slow = released[np.arange(300) // 50 * 50]
+    assert not any("sensor stopped" in notice for notice in noticed(slow, slow, OPEN_AGAIN_M))

@@ -17,6 +17,7 @@ from graspsense.core.values.fingers import FingerForce, opposed_forces
 from graspsense.core.values.signals import NO_PADS, Frame, Image, Phase, Reading, Samples
 from graspsense.recording.replayable import Recording
 from graspsense.sources.columns.fast_samples import latest_values, most_in_a_tick, sample_blocks
+from graspsense.sources.formats.topic_clocks import Messages, common_clock
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -28,6 +29,8 @@ Spans = tuple[tuple[float, float], ...]
 LARGE_LOSS: Final = 0.05
 """Share of the samples beyond which leaving them out is told as a warning, and not advised."""
 FEWEST_AT_A_RATE: Final = 20
+LONGEST_S: Final = 9e9
+"""Longest time whose nanoseconds have 64 bits."""
 STEADY_RATE: Final = 2.0
 """Samples of a slower sensor are at least so many, and at most so many times as far apart as they usually are."""
 PLAUSIBLE: Final = {
@@ -137,12 +140,58 @@ def without_missing(columns: GraspColumns) -> GraspColumns:
     """Return the samples that have a time, a gap and both forces.
 
     If most lack one, all are returned, unless those that have them come at a steady rate, as those of a slower sensor.
+    Gap and forces that have rows of their own, as topics that were written to one table, hold their last values.
     """
-    needed = (columns.t_s, columns.gap_m, columns.left_n, columns.right_n)
-    known: NDArray[np.bool_] = np.logical_and.reduce([~np.isnan(values) for values in needed])
+    rarest = min(np.count_nonzero(~np.isnan(values)) for values in _needed(columns))
+    if 2 * int(_known(columns).sum()) < rarest:
+        columns = _held(columns)
+    known = _known(columns)
     if known.all() or (2 * int(known.sum()) < len(known) and not _at_a_steady_rate(known)):
         return columns
     return only(columns, known, f"without a number ({columns.place(int(np.argmin(known)))})")
+
+
+def _needed(columns: GraspColumns) -> tuple[Numbers, ...]:
+    return columns.t_s, columns.gap_m, columns.left_n, columns.right_n
+
+
+def _known(columns: GraspColumns) -> NDArray[np.bool_]:
+    known: NDArray[np.bool_] = np.logical_and.reduce([~np.isnan(values) for values in _needed(columns)])
+    return known
+
+
+def _held(columns: GraspColumns) -> GraspColumns:
+    """Return the rows of the gap or of a force, whichever has most, with the last values of the others.
+
+    They are the columns themselves if one has no number, or if the time goes back.
+    """
+    values = {"gap": columns.gap_m, "left force": columns.left_n, "right force": columns.right_n}
+    rows = {name: np.flatnonzero(~np.isnan(column)) for name, column in values.items()}
+    rises = bool((np.diff(columns.t_s) >= 0.0).all()) and np.ptp(columns.t_s) < LONGEST_S
+    if not rises or not all(map(len, rows.values())):
+        return columns
+    ns = np.round((columns.t_s - columns.t_s[0]) * 1e9).astype(np.int64)
+    stamps = {name: ns[known].tolist() for name, known in rows.items()}
+    clock = common_clock(
+        columns.source, {name: Messages(recorded_ns=t, stamped_ns=t) for name, t in stamps.items()}
+    )
+    most = max(rows.values(), key=len)
+    at_ns = ns - clock.began_ns
+    most = most[(at_ns[most] >= clock.begin_ns) & (at_ns[most] <= clock.end_ns)]
+
+    def held(name: str) -> Numbers:
+        last, old = clock.topics[name].latest(at_ns[most])
+        return np.where(old, np.nan, values[name][rows[name][last]])
+
+    words = "gap and force have rows of their own: the last value of each is used"
+    return evolve(
+        columns.rows(most),
+        gap_m=held("gap"),
+        left_n=held("left force"),
+        right_n=held("right force"),
+        notes=(*columns.notes, words),
+        warnings=(*columns.warnings, *clock.notices),
+    )
 
 
 def _at_a_steady_rate(known: NDArray[np.bool_]) -> bool:
@@ -322,8 +371,13 @@ def _advice_on_times(t_s: Numbers) -> str:
     """Return what to do about times that do not increase, as far as it would help: it is tried on these times."""
     split = 'If the rows come from several grasps, split the file by a column: split = "COLUMN"'
     steps = np.diff(t_s)
-    if bool((steps < 0.0).any()) or not t_s[-1] > t_s[0]:
+    if bool((steps < 0.0).any()):
         return split
+    if not t_s[-1] > t_s[0]:
+        return (
+            f"All {len(t_s)} rows have one time, as if it had been written with too few digits: leave out time and "
+            "write rate_hz = SAMPLES A SECOND. " + split
+        )
     new = 1 + int((steps > 0.0).sum())
     lost = len(t_s) - new
     if lost <= LARGE_LOSS * len(t_s):

@@ -171,8 +171,11 @@ def _seldom(what: str, times: Numbers, force: Numbers) -> Iterator[str]:
 def _drift(what: str, gap: Numbers, force: Numbers, units: Mapping[str, str]) -> Iterator[str]:
     """Yield that a force does not come back when the fingers are open again."""
     span = float(np.ptp(force))
-    if np.count_nonzero(np.diff(force)) < FEWEST:  # measured too rarely
-        return
+    changes = np.flatnonzero(np.diff(force))
+    if len(changes) < FEWEST:  # measured too rarely, unless its last value stays for longer than others did
+        held = len(force) - 1 - int(changes[-1]) if len(changes) > 1 else 0
+        if held <= max(FEWEST, USUAL_HOLDS * float(np.diff(changes).max(initial=0))):
+            return
     ends = force[:ZERO_SAMPLES], force[-ZERO_SAMPLES:]
     steady = max(float(np.ptp(part)) for part in ends) <= STEADY * span
     first_load = int(np.argmax(force > force[0] + FREE * span))
@@ -182,7 +185,7 @@ def _drift(what: str, gap: Numbers, force: Numbers, units: Mapping[str, str]) ->
     if steady and opened and abs(apart) > DRIFT * span:
         yield (
             f"{what} ends {apart:+.3g} {units.get('force_left', 'N')} from where it began, although the fingers are "
-            "open again: its zero drifts, and all forces have a part of that"
+            "open again: its zero drifts, and all forces have a part of that, or its sensor stopped"
         )
 
 
@@ -239,29 +242,30 @@ def _stopped_gap(times: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
     """
     begins = np.concatenate(([0], np.flatnonzero(np.diff(gap)) + 1, [len(gap)])).tolist()
     # The gap can have fewer values than rows.
-    longest = max(FEWEST, USUAL_HOLDS * float(np.median(np.diff(begins))))
-    lasting = [(begin, end) for begin, end in pairwise(begins) if end - begin >= longest]
+    usual = int(np.median(np.diff(begins)))
+    longest = max(FEWEST, USUAL_HOLDS * usual)
+    changes = np.abs(np.diff(gap[begins[:-1]])).tolist()
     span = float(np.ptp(force))
-    for begin, end in lasting:
+    for k, (begin, end) in enumerate(pairwise(begins)):
+        during = force[begin:end]
+        if end - begin < longest or k == 0 or not float(np.ptp(during)) > FREE * span:
+            continue
         stays = (
             f"the gap stays at {gap[begin] * 1e3:.4g} mm from {times[begin]:.4g} to {times[end - 1]:.4g} s"
         )
-        during = force[begin:end]
-        if begin == 0 or not float(np.ptp(during)) > FREE * span:
-            continue
         if end == len(gap):
             if during.max() - force.min() > 0.5 * span and during[-1] - force.min() < FREE_GLITCH * span:
                 yield f"{stays}, although the force is gone: did its sensor stop?"
-        elif end + 1 < len(gap):
-            jump, *around = np.abs(np.diff(gap)[[end - 1, begin - 1, end]]).tolist()
-            calm = abs(float(force[end] - force[end - 1])) < FREE_GLITCH * span
-            if jump > JUMP * max(around) and jump > STOPPED_STEPS * _least_step(gap) and calm:
-                yield f"{stays} while the force changes, and then jumps by {jump * 1e3:.3g} mm: did its sensor stop?"
-
-
-def _least_step(gap: Numbers) -> float:
-    steps = np.abs(np.diff(gap))
-    return float(steps[steps > 0.0].min(initial=np.inf))
+        elif end + usual < len(gap):
+            moves_on = end + longest > begins[k + 2] < len(gap)
+            around = max(changes[k - 1], changes[k + 1] if moves_on else 0.0)
+            across = force[max(begin, end - usual)], force[min(end + usual, len(force)) - 1]
+            calm = abs(float(across[1] - across[0])) < FREE_GLITCH * span
+            if changes[k] > JUMP * around and changes[k] > STOPPED_STEPS * min(changes) and calm:
+                yield (
+                    f"{stays} while the force changes, and then jumps by {changes[k] * 1e3:.3g} mm: did its sensor "
+                    "stop?"
+                )
 
 
 def _pads(recording: Recording) -> dict[str, Numbers]:

@@ -19,6 +19,7 @@ from graspsense.core.values.features import LARGEST_VALUE
 from graspsense.sources.trial_table.identifiers import (
     LEAST_LINES,
     TIMES,
+    groups_trials,
     is_count,
     is_time,
     name_objects,
@@ -85,6 +86,16 @@ def doubts(
         if doubted
     ]
     return notes + _mixed(numbers)
+
+
+def not_held_out(columns: CsvColumns, names: Sequence[str], instances: Sequence[str] | None) -> list[str]:
+    """Return notes on those of these columns whose sessions, operators or devices are in training and test data."""
+    return [
+        f"not held out: trials of one {name} are in training and test data. If it matters, a further {name} is "
+        f"recognised less often than told; {option('instance', name)} holds it out"
+        for name in names
+        if groups_trials(name, columns.texts(name), instances)
+    ]
 
 
 def _of_recording(

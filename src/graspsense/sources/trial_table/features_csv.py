@@ -27,7 +27,7 @@ from graspsense.recording.atomic_file import write_or_replace
 from graspsense.recording.controls import Controls, controls
 from graspsense.sources.formats.arff_columns import ArffColumns
 from graspsense.sources.formats.csv_columns import CsvColumns
-from graspsense.sources.trial_table.doubtful_columns import doubts
+from graspsense.sources.trial_table.doubtful_columns import doubts, not_held_out
 from graspsense.sources.trial_table.exported_table import ExportedTable, exported
 from graspsense.sources.trial_table.identifiers import identifies, names_a_recording, text_identifies
 
@@ -83,6 +83,7 @@ def read_labelled(
     if export is None:
         others = [name for name in columns.names if name not in reserved]
         notes += doubts(columns, labels, others, table, None if target is None else target.values)
+        notes += not_held_out(columns, [name for name in others if name not in table.names], instances)
     return Labelled(
         source=str(path),
         table=table,

@@ -40,6 +40,8 @@ _OF_RECORDINGS: Final = frozenset({
     "datetime", "trial", "fold", "split", "file", "filename", "uid", "uuid",
 })  # fmt: skip
 """What a recording is known by; no gripper measures it."""
+_DIVISIONS: Final = frozenset({"seed", "trial", "fold", "split", "uid", "uuid"})
+"""Those that tell nothing of what was the same for several recordings."""
 _NUMBERED: Final = frozenset(
     {"id", "no", "nr", "num", "number", "index", "idx", "name", "code", "of", "the", "random"}
 )
@@ -80,6 +82,22 @@ def names_a_recording(name: str) -> bool:
     """
     words = set(words_in(name))
     return bool(words & _OF_RECORDINGS) and words <= _OF_RECORDINGS | _NUMBERED
+
+
+def groups_trials(name: str, values: Sequence[str], instances: Sequence[str] | None) -> bool:
+    """Return whether a column names sessions, operators or devices that whole instances do not hold out.
+
+    Each of them has several trials, also with several instances. Missing values are empty.
+    """
+    units = range(len(values)) if instances is None else instances
+    pairs = {(value, unit) for value, unit in zip(values, units, strict=True) if value}
+    counts = Counter(filter(None, values))
+    return (
+        names_a_recording(name)
+        and not _DIVISIONS & set(words_in(name))
+        and len(pairs) > len(counts) > 1
+        and min(counts.values()) > 1
+    )
 
 
 def identifies(

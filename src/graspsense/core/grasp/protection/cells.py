@@ -115,7 +115,7 @@ class Fingertip:
         names = ", ".join(str(number) for number in cells[:NAMED]) + (", ..." if len(cells) > NAMED else "")
         return Fault(
             f"{self.side} fingertip with frozen cells",
-            f"{len(cells)} of {len(self._cells)} cells stand still ({names}), so its force is too small",
+            f"{len(cells)} of {len(self._cells)} cells stand still ({names}), so its force can be too small",
         )
 
     def _saturated(self) -> NDArray[np.bool_]:

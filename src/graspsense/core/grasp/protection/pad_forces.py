@@ -88,9 +88,10 @@ class StuckForce:
 
 
 class EmptyForce:
-    """Sees that both pads feel a contact although the fingers are wider open than where they first felt it.
+    """Sees that pads feel a force although the fingers are wider open than where they first felt it.
 
-    No object touches both fingers then: the pads stopped, or their zero has drifted, since the contact.
+    No object touches both fingers then: the pads stopped, or their zero has drifted, since the contact. One alone may
+    carry a part of an object's weight, and none feels a pull.
     """
 
     def __init__(self, contact_n: float) -> None:
@@ -100,19 +101,21 @@ class EmptyForce:
 
     def see(self, frame: Frame, phase: int) -> Fault | None:
         """Take the frame of a tick; return the fault once it has lasted."""
-        felt_n = min(frame.force_left_n, frame.force_right_n)
+        least_n, most_n = sorted((frame.force_left_n, frame.force_right_n))
         if phase != Phase.RELEASE:
-            if not self._contact_gap_m > 0.0 and felt_n > self._contact_n:
+            if not self._contact_gap_m > 0.0 and least_n > self._contact_n:
                 self._contact_gap_m = frame.gap_m
             return None
-        empty = felt_n > self._contact_n and frame.gap_m > self._contact_gap_m + OPENED_M
-        self._lasts_s = lasting(self._lasts_s, empty, frame.dt_s)
+        felt = abs(least_n) > self._contact_n or most_n > max(self._contact_n, ALLOWED_N)
+        open_again = frame.gap_m > self._contact_gap_m + OPENED_M
+        self._lasts_s = lasting(self._lasts_s, felt and open_again, frame.dt_s)
         if self._lasts_s <= EMPTY_S:
             return None
         return Fault(
             "pads feel nothing there",
-            f"both pads feel {felt_n:.1f} N or more although the fingers have let go: they stopped, or their zero "
-            "drifted, in the squeeze, so its forces are wrong; check the fingertips",
+            f"the pads feel {frame.force_left_n:.1f} N (left) and {frame.force_right_n:.1f} N (right) although the "
+            "fingers have let go: one stopped, or its zero drifted, in the squeeze, so that its forces are wrong; "
+            "check the fingertips",
         )
 
 
