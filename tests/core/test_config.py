@@ -180,7 +180,7 @@ def test_every_leaf_has_an_origin_and_every_origin_a_leaf(plugins, write):
 
 
 def test_an_experiment_lies_between_the_file_and_the_options(plugins, write):
-    layer = Layer.without_file({"controller": {"force_n": 15, "speed_m_s": 0.5}}, "experiment paper")
+    layer = Layer(label="experiment paper", values={"controller": {"force_n": 15, "speed_m_s": 0.5}})
 
     settings = resolve(write(BASE), experiment=layer, options=["controller.speed_m_s=0.25"])
 

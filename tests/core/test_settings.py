@@ -235,7 +235,7 @@ def test_a_recorded_threshold_follows_an_option_too():
     recorded = without_followers(resolve(options=["controller.contact_force_n=1.25"]).values)
     assert "contact_force_n" not in recorded["features"]
     again = resolve(
-        experiment=Layer.without_file(recorded, "a recording"),
+        experiment=Layer(label="a recording", values=recorded),
         options=["controller.contact_force_n=0.25"],
         force=True,
     )

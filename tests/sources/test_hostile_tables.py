@@ -215,7 +215,7 @@ def test_long_texts_take_linear_time(tmp_path):
     path.write_text(f"a b c\n{'1' * 300_000}x 1 1\n0 1 2\n")
     assert "a" in read_text(path)[0].texts
     merged = Merged()
-    layer = Layer.without_file({"table": {f"k{i}": i for i in range(20_000)}}, "file")
+    layer = Layer(label="file", values={"table": {f"k{i}": i for i in range(20_000)}})
     merged.add((), layer.values, layer)
     assert merged.owner_of(("table", "k7")) is layer
     merged.add((), {"table": 3}, layer)

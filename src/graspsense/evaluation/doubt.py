@@ -156,20 +156,15 @@ def calibrated_by(model: Model, labelled: Labelled) -> Model:
 
 def calibrated_with(model: Model, answers: Pooled, labelled: Labelled) -> Model:
     """Return a model with certainty and prediction sets from answers for its trials, made without their instances."""
-    return _with_calibration(model, answers, labelled.labels, exchangeable_instances(labelled))
-
-
-def _with_calibration(
-    model: Model, pooled: Pooled, labels: Sequence[str], instances: Sequence[str] | None
-) -> Model:
-    calibration = _calibration(pooled, labels, instances, np.arange(len(labels)))
+    instances, trials = exchangeable_instances(labelled), len(labelled)
+    calibration = _calibration(answers, labelled.labels, instances, np.arange(trials))
     if isinstance(calibration, str):
         return evolve(model, sets=_no_sets(instances, calibration))
     return evolve(
         model,
         certainty=calibration.certainty,
         temperature=calibration.temperature,
-        sets=evolve(calibration.sets, unknown=int(pooled.unlike.sum()), trials=len(labels)),
+        sets=evolve(calibration.sets, unknown=int(answers.unlike.sum()), trials=trials),
     )
 
 

@@ -143,7 +143,7 @@ def _resolved(
     # The settings of the recording have been accepted when it was made.
     return resolve(
         "default",
-        experiment=Layer.without_file(values, "the recording"),
+        experiment=Layer(label="the recording", values=values),
         options=options,
         flags=(*flags, *replay),
         force=True,

@@ -121,6 +121,6 @@ def recorded_settings(kind: str, name: str) -> Layer:
     """
     grasp = stored_grasp(name) if kind == "store" else read_recorded(name)
     values = {"classifier": {"type": NONE}, **without_followers(grasp.record().settings)}
-    return Layer.without_file(
-        {k: v for k, v in values.items() if k != "gripper"}, f"the recording {grasp.path.name}"
+    return Layer(
+        label=f"the recording {grasp.path.name}", values={k: v for k, v in values.items() if k != "gripper"}
     )

@@ -11,7 +11,7 @@ none of that; a field that is given here is for a class that does not declare it
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 from attrs import field, frozen
 from attrs.validators import and_, deep_iterable, ge, instance_of, matches_re, min_len, optional
@@ -372,6 +372,41 @@ class Finding:
 
 
 ComponentEntry = SensorBackendEntry | ControllerEntry | FeatureSetEntry | ClassifierEntry
+ResourceEntry = (
+    PipelineEntry
+    | ModelEntry
+    | DatasetEntry
+    | CommandEntry
+    | EmulatorEntry
+    | IdentifierEntry
+    | LiveObserverEntry
+    | ExperimentKindEntry
+    | ExperimentEntry
+    | ConformanceCheckEntry
+)
+
+
+class ResourceKind(NamedTuple):
+    """A kind of resource: the hook whose entries declare it, the type of these entries, and the kind in words."""
+
+    hook: str
+    entry: type
+    words: str
+
+
+RESOURCES: Final = (
+    ResourceKind("graspsense_pipelines", PipelineEntry, "pipeline"),
+    ResourceKind("graspsense_models", ModelEntry, "model"),
+    ResourceKind("graspsense_datasets", DatasetEntry, "data set"),
+    ResourceKind("graspsense_commands", CommandEntry, "command"),
+    ResourceKind("graspsense_emulators", EmulatorEntry, "emulator"),
+    ResourceKind("graspsense_identifiers", IdentifierEntry, "identifier of objects for gripper"),
+    ResourceKind("graspsense_live_observers", LiveObserverEntry, "live observer"),
+    ResourceKind("graspsense_experiment_kinds", ExperimentKindEntry, "kind of experiment"),
+    ResourceKind("graspsense_experiments", ExperimentEntry, "experiment"),
+    ResourceKind("graspsense_conformance_checks", ConformanceCheckEntry, "conformance check"),
+)
+KIND_OF_ENTRY: Final = {kind.entry: kind.words for kind in RESOURCES}
 
 ENTRY_OF_ROLE: dict[Role, type] = {
     "sensor-backend": SensorBackendEntry,

@@ -16,7 +16,7 @@ BUILTIN_MODULE: Final = "graspsense.plugins.builtin"
 class Shipped:
     """A distribution of this project beside `graspsense`: how it is installed, and the names that it has by kind.
 
-    A kind is a role, or a word of `graspsense.core.components.registry.parts.KIND_OF_ENTRY`.
+    A kind is a role, or a word of `graspsense.core.components.entries.KIND_OF_ENTRY`.
     """
 
     distribution: str

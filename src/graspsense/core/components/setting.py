@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, Final, Literal, cast, get_args, get_origin
+from typing import Any, Final, Literal, NamedTuple, cast, get_args, get_origin
 
 import attrs
 from attrs import frozen, validators
@@ -120,23 +120,21 @@ def setting(
     ...     speed_m_s: float = setting(default=0.02, unit="m/s", above=0.0, meaning="Speed of closing.")
     >>> assert GentleConfig(speed_m_s=0.01).speed_m_s == 0.01
     """
-    _check_meaning_and_default(meaning, default, factory)
-    _check_limits(default, minimum, maximum, above, below)
+    if not meaning.strip():
+        raise TypeError("a setting needs a meaning: say in a sentence what its value does")
+    if factory is not None and default is not attrs.NOTHING:
+        raise TypeError("a setting has one default: give `default` or `factory`")
+    limits = _Limits(minimum, above, maximum, below)
+    _check_limits(limits, default)
     _check_origin(origin)
-    plain_number = isinstance(default, int | float) and not isinstance(default, bool)
-    number = bool(unit) or plausible is not None or plain_number
-    checks = list(_limits(default, minimum, maximum, above, below, number=number))
+    checks = _checks(limits, default, number=bool(unit) or plausible is not None or _is_number(default))
     if validator is not None:
         checks.append(validator)
     check: Any = validators.and_(*checks) if checks else None
     if check is not None and default is None:
         check = validators.optional(check)
     declaration = Declaration(
-        meaning=meaning,
-        unit=unit,
-        allowed=_allowed_words(minimum, maximum, above, below),
-        plausible=plausible,
-        origin=origin,
+        meaning=meaning, unit=unit, allowed=limits.words, plausible=plausible, origin=origin
     )
     _check_plausible(declaration, default)
     metadata = {_DECLARATION: declaration, **(effect or {}), **({_FOLLOWS: follows} if follows else {})}
@@ -144,14 +142,6 @@ def setting(
     if factory is not None:
         return attrs.field(factory=factory, validator=check, metadata=metadata)
     return attrs.field(default=default, validator=check, metadata=metadata)
-
-
-def _check_meaning_and_default(meaning: str, default: Any, factory: Callable[[], Any] | None) -> None:
-    """Raise TypeError if the meaning is missing, or there are two defaults."""
-    if not meaning.strip():
-        raise TypeError("a setting needs a meaning: say in a sentence what its value does")
-    if factory is not None and default is not attrs.NOTHING:
-        raise TypeError("a setting has one default: give `default` or `factory`")
 
 
 def _check_plausible(declaration: Declaration, default: Any) -> None:
@@ -172,20 +162,46 @@ def _check_origin(origin: str) -> None:
             raise TypeError(str(error)) from error
 
 
-def _check_limits(
-    default: Any, minimum: float | None, maximum: float | None, above: float | None, below: float | None
-) -> None:
+class _Limits(NamedTuple):
+    """The limits of a setting: None where there is none."""
+
+    minimum: float | None
+    above: float | None
+    maximum: float | None
+    below: float | None
+
+    @property
+    def words(self) -> str:
+        """The values that are allowed, in words; empty if all are."""
+        minimum, above, maximum, below = self
+        if minimum is not None and maximum is not None and not math.isinf(maximum):
+            return f"{minimum:g} to {maximum:g}"
+        most = "may be inf" if maximum == math.inf else None if maximum is None else f"at most {maximum:g}"
+        words = (
+            None if minimum is None else f"at least {minimum:g}",
+            None if above is None else f"above {above:g}",
+            most,
+            None if below is None else f"below {below:g}",
+        )
+        return ", ".join(filter(None, words))
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _check_limits(limits: _Limits, default: Any) -> None:
     """Raise TypeError for two lower or two upper limits, and for a default outside of them."""
+    minimum, above, maximum, below = limits
     if (minimum is not None and above is not None) or (maximum is not None and below is not None):
         raise TypeError(
             "a setting has one lower and one upper limit: `minimum` or `above`, `maximum` or `below`"
         )
-    if not isinstance(default, int | float) or isinstance(default, bool):
+    if not _is_number(default):
         return
     outside = (minimum is not None and default < minimum) or (maximum is not None and default > maximum)
     if outside or (above is not None and default <= above) or (below is not None and default >= below):
-        allowed = _allowed_words(minimum, maximum, above, below)
-        raise TypeError(f"the default {default} is not allowed: a value is {allowed}")
+        raise TypeError(f"the default {default} is not allowed: a value is {limits.words}")
 
 
 def declared(field: attrs.Attribute[Any]) -> Declaration:
@@ -281,35 +297,21 @@ def given_claims(values: Any) -> frozenset[str]:
     )
 
 
-def _limits(
-    default: Any,
-    minimum: float | None,
-    maximum: float | None,
-    above: float | None,
-    below: float | None,
-    *,
-    number: bool,
-) -> list[Any]:
+def _checks(limits: _Limits, default: Any, *, number: bool) -> list[Any]:
     """Return the validators of the allowed range, and of the choices of a `Literal`."""
     if isinstance(default, str):
         return [_is_a_choice]
-    checks: list[Any] = []
-    if isinstance(default, int) and not isinstance(default, bool):
-        checks.append(validators.instance_of(int))
-    for limit, validator in (
-        (minimum, validators.ge),
-        (above, validators.gt),
-        (maximum, validators.le),
-        (below, validators.lt),
-    ):
-        if limit is not None:
-            checks.append(validator(limit))
-    infinite = isinstance(default, float) and math.isinf(default)
-    if number and not infinite and maximum is None and below is None:
+    whole = isinstance(default, int) and not isinstance(default, bool)
+    checks: list[Any] = [validators.instance_of(int)] if whole else []
+    kinds = (validators.ge, validators.gt, validators.le, validators.lt)
+    checks += [kind(limit) for kind, limit in zip(kinds, limits, strict=True) if limit is not None]
+    if isinstance(default, float) and math.isinf(default):
+        return [*checks, _is_not_nan]
+    if number and limits.maximum is None and limits.below is None:
         checks.append(validators.lt(math.inf))
-    if number and not infinite and minimum is None and above is None:
+    if number and limits.minimum is None and limits.above is None:
         checks.append(validators.gt(-math.inf))
-    return [*checks, _is_not_nan] if infinite else checks
+    return checks
 
 
 def _is_not_nan(instance: Any, attribute: attrs.Attribute[Any], value: Any) -> None:
@@ -326,23 +328,6 @@ def _is_a_choice(instance: Any, attribute: attrs.Attribute[Any], value: Any) -> 
         raise ValueError(
             f"{attribute.name!r} must be one of {', '.join(map(repr, get_args(kind)))}: {value!r}"
         )
-
-
-def _allowed_words(
-    minimum: float | None, maximum: float | None, above: float | None, below: float | None
-) -> str:
-    if minimum is not None and maximum is not None and not math.isinf(maximum):
-        return f"{minimum:g} to {maximum:g}"
-    words = []
-    if minimum is not None:
-        words.append(f"at least {minimum:g}")
-    if above is not None:
-        words.append(f"above {above:g}")
-    if maximum is not None:
-        words.append("may be inf" if math.isinf(maximum) else f"at most {maximum:g}")
-    if below is not None:
-        words.append(f"below {below:g}")
-    return ", ".join(words)
 
 
 def worded(key: str, value: Any) -> tuple[str, str]:

@@ -115,11 +115,6 @@ class Layer:
     typed: str = ""
     final: bool = False
 
-    @classmethod
-    def without_file(cls, values: Mapping[str, Any], label: str) -> Layer:
-        """Return a layer of values that are not from a file."""
-        return cls(label=label, values=values)
-
     def where(self, path: KeyPath) -> str:
         """Return the place of a key, with its line where there is one."""
         for end in range(len(path), 0, -1):

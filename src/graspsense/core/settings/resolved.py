@@ -140,7 +140,7 @@ def settings_from(values: Mapping[str, Any], called: str, plugins: Plugins | Non
     }
     plugins = installed() if plugins is None else plugins
     # These values have been accepted before.
-    return _resolved_layers(called, [Layer.without_file(given, called)], [], plugins, force=True)
+    return _resolved_layers(called, [Layer(label=called, values=given)], [], plugins, force=True)
 
 
 def _resolved_layers(
@@ -260,8 +260,8 @@ def _choose_sent_kind(merged: Merged, controller: Component, gripper: SelectedCo
     kind = next((name for name in (*entry.commands, *entry.alternatives) if name in accepted), None)
     if kind is not None and kind not in entry.commands:
         merged.values["sends"] = kind
-        merged.owner[controller.table, "sends"] = Layer.without_file(
-            {}, f"{gripper.component.qualified} accepts {kind}"
+        merged.owner[controller.table, "sends"] = Layer(
+            label=f"{gripper.component.qualified} accepts {kind}", values={}
         )
 
 
@@ -276,7 +276,7 @@ def _follow(
         value = values.get(owner, {}).get(name)
         if key not in merged.values and value is not None and value != defaults[key]:
             merged.values[key] = value
-            merged.owner[table, key] = Layer.without_file({}, path)
+            merged.owner[table, key] = Layer(label=path, values={})
             given.add(key)
     return frozenset(given)
 

@@ -21,18 +21,14 @@ from attrs import frozen
 
 from graspsense.core.components.entries import (
     DECLARED,
+    KIND_OF_ENTRY,
     TABLE_OF_ROLE,
-    CommandEntry,
     ComponentEntry,
-    ConformanceCheckEntry,
     DatasetEntry,
-    EmulatorEntry,
     ExperimentEntry,
-    ExperimentKindEntry,
-    IdentifierEntry,
-    LiveObserverEntry,
     ModelEntry,
     PipelineEntry,
+    ResourceEntry,
     Role,
 )
 from graspsense.core.values.errors import FAILURES, ConfigError, PluginUnavailable
@@ -114,20 +110,7 @@ _ADVICE = {
 }
 
 
-EntryT = TypeVar(
-    "EntryT",
-    ComponentEntry,
-    PipelineEntry,
-    ModelEntry,
-    DatasetEntry,
-    CommandEntry,
-    EmulatorEntry,
-    ExperimentEntry,
-    ExperimentKindEntry,
-    IdentifierEntry,
-    LiveObserverEntry,
-    ConformanceCheckEntry,
-)
+EntryT = TypeVar("EntryT", bound=ComponentEntry | ResourceEntry)
 
 
 def canonical(distribution: str) -> str:
@@ -355,18 +338,6 @@ class Resource(Declared[EntryT]):
 
 
 _TARGETS: Final = ("target", "recordings", "export", "run", "keys", "result", "findings")
-KIND_OF_ENTRY: Final[dict[type, str]] = {
-    PipelineEntry: "pipeline",
-    ModelEntry: "model",
-    DatasetEntry: "data set",
-    CommandEntry: "command",
-    EmulatorEntry: "emulator",
-    ExperimentEntry: "experiment",
-    ExperimentKindEntry: "kind of experiment",
-    IdentifierEntry: "identifier of objects for gripper",
-    LiveObserverEntry: "live observer",
-    ConformanceCheckEntry: "conformance check",
-}
 
 
 AnswerT = TypeVar("AnswerT")

@@ -18,20 +18,13 @@ from attrs import evolve
 
 from graspsense.core.components.entries import (
     ENTRY_OF_ROLE,
+    KIND_OF_ENTRY,
+    RESOURCES,
     TABLE_OF_ROLE,
-    CommandEntry,
-    ConformanceCheckEntry,
-    DatasetEntry,
-    EmulatorEntry,
-    ExperimentEntry,
     ExperimentKindEntry,
     FeatureSetEntry,
     Finding,
     FoundDevice,
-    IdentifierEntry,
-    LiveObserverEntry,
-    ModelEntry,
-    PipelineEntry,
     Role,
 )
 from graspsense.core.components.firstparty import provider
@@ -53,7 +46,6 @@ from graspsense.core.components.registry.isolation import (
     imported,
 )
 from graspsense.core.components.registry.parts import (
-    KIND_OF_ENTRY,
     AnswerT,
     Component,
     EntryT,
@@ -76,18 +68,6 @@ COMPONENT_HOOKS: Final[dict[str, Role]] = {
     "graspsense_controllers": "controller",
     "graspsense_feature_sets": "feature-set",
     "graspsense_classifiers": "classifier",
-}
-RESOURCE_HOOKS: Final[dict[str, type]] = {
-    "graspsense_pipelines": PipelineEntry,
-    "graspsense_models": ModelEntry,
-    "graspsense_datasets": DatasetEntry,
-    "graspsense_commands": CommandEntry,
-    "graspsense_emulators": EmulatorEntry,
-    "graspsense_identifiers": IdentifierEntry,
-    "graspsense_live_observers": LiveObserverEntry,
-    "graspsense_experiment_kinds": ExperimentKindEntry,
-    "graspsense_experiments": ExperimentEntry,
-    "graspsense_conformance_checks": ConformanceCheckEntry,
 }
 
 PartT = TypeVar("PartT", bound=Component | Resource[Any])
@@ -284,9 +264,9 @@ class Plugins:
             ]
             resources = [
                 Resource(entry, source.distribution, source.version)
-                for hook, kind in RESOURCE_HOOKS.items()
-                if hook in hooks
-                for entry in self._hooks.entries(plugin, hook, kind)
+                for kind in RESOURCES
+                if kind.hook in hooks
+                for entry in self._hooks.entries(plugin, kind.hook, kind.entry)
             ]
             _check_distinct([*self._components, *components])
             _check_distinct([*self._resources, *resources])
