@@ -16,9 +16,23 @@ from typing import Any, Final
 import numpy as np
 from attrs import evolve, frozen
 from numba import njit
-from peer_scenes import MODES, SCENES, PeerScene, law
+from peer_scenes import (
+    KC,
+    LIGHT,
+    MODES,
+    SCENES,
+    TICK,
+    TICKS,
+    X0,
+    B,
+    C,
+    K,
+    Law,
+    M,
+    PeerScene,
+    law,
+)
 from scipy.integrate import solve_ivp
-from simulation_scene import KC, LIGHT, TICK, TICKS, X0, B, C, K, Law, M, Run
 
 from graspsense.simulator_api import RunConfig
 from graspsense_sim_gripper.config import SimConfig
@@ -26,6 +40,9 @@ from graspsense_sim_gripper.run.batch.compiled_grasps import CompiledGrasps
 from graspsense_sim_gripper.run.batch.job import Job
 from graspsense_sim_gripper.run.batch.scenes import Scenes
 from graspsense_sim_gripper.run.compiled.loop_code import CompiledLoops
+
+Trace = tuple[Any, Any, Any]
+"""Gap closed (m), force (N) and what was commanded, at each millisecond."""
 
 REFERENCE_STEPS: Final = 64
 """Steps a millisecond of the reference: fourth order, with every event located. Four times as many change the trace of
@@ -40,7 +57,7 @@ class Engine:
 
     name: str
     setting: str
-    grasp: Callable[[], Run]
+    grasp: Callable[[], Trace]
 
 
 # ---------------------------------------------------------------------------------------------------- ours
@@ -67,14 +84,12 @@ def _our_engine(config: SimConfig, setting: str) -> Engine:
     grasps = CompiledGrasps(scenes, CompiledLoops(Law.step), lambda kinds: True)
     grasps.grasp(config.object, 0)
 
-    def grasp() -> Run:
+    def grasp() -> Trace:
         done = grasps.grasp(config.object, 0)
         assert done is not None
         trace = done.trace
         part = slice(0, TICKS)
-        return Run(
-            x=config.open_gap_m - trace.gap_m[part], force=trace.force_left_n[part], u=trace.command[part]
-        )
+        return config.open_gap_m - trace.gap_m[part], trace.force_left_n[part], trace.command[part]
 
     return Engine(name="graspsense", setting=setting, grasp=grasp)
 
@@ -82,16 +97,15 @@ def _our_engine(config: SimConfig, setting: str) -> Engine:
 # ------------------------------------------------------------------------- loops as a user would write them
 
 
-def empty() -> tuple[Any, Any, Any]:
-    """Return arrays for the trace: positions, forces and efforts."""
+def empty() -> Trace:
     return np.zeros(TICKS), np.zeros(TICKS), np.zeros(TICKS)
 
 
 def _engine(name: str, setting: str, loop: Callable[..., None], scene: PeerScene) -> Engine:
-    def grasp() -> Run:
-        xs, forces, us = empty()
-        loop(scene.start, xs, forces, us)
-        return Run(x=xs, force=forces, u=us)
+    def grasp() -> Trace:
+        trace = empty()
+        loop(scene.start, *trace)
+        return trace
 
     grasp()
     return Engine(name=name, setting=setting, grasp=grasp)
@@ -230,7 +244,7 @@ def loops(scene: PeerScene) -> Iterator[Callable[[], Engine]]:
 # ------------------------------------------------------------------------------- solvers with error control
 
 
-def _piecewise(scene: PeerScene, solve: Callable[..., tuple[float, Any, int]]) -> Run:
+def _piecewise(scene: PeerScene, solve: Callable[..., tuple[float, Any, int]]) -> Trace:
     """Grasp with a solver that is started anew at each tick and after each event.
 
     `solve(s, u, mode, t)` integrates from `t` (s) to the end of the tick, or to the first event before it, and returns
@@ -251,7 +265,7 @@ def _piecewise(scene: PeerScene, solve: Callable[..., tuple[float, Any, int]]) -
             if event >= 0:
                 scene.jump(event, s, u, mode)
                 settle(s, u, mode, g, event)
-    return Run(x=xs, force=forces, u=us)
+    return xs, forces, us
 
 
 def scipy_engine(scene: PeerScene, method: str, rtol: float) -> Engine:
@@ -416,11 +430,11 @@ def mujoco_engine(scene: PeerScene, count: int) -> Engine:
                     s[i] += h * ds[i]
                 settle(s, u, mode, g)
 
-    def grasp() -> Run:
+    def grasp() -> Trace:
         mujoco.mj_resetData(model, data)
-        xs, forces, us = empty()
-        loop(scene.start, xs, forces, us, data.qpos, data.qvel, data.qfrc_applied)
-        return Run(x=xs, force=forces, u=us)
+        trace = empty()
+        loop(scene.start, *trace, data.qpos, data.qvel, data.qfrc_applied)
+        return trace
 
     grasp()
     how = "own springs" if native else "forces applied"
@@ -443,7 +457,7 @@ def prepared(prepare: Callable[[], Engine]) -> tuple[Engine, float]:
     return engine, time.thread_time() - began
 
 
-def timed(engine: Engine) -> tuple[Run, float]:
+def timed(engine: Engine) -> tuple[Trace, float]:
     """Return one grasp, and its processor time (s)."""
     began = time.thread_time()
     run = engine.grasp()

@@ -5,8 +5,11 @@
 Each scene is a system of ordinary differential equations with events, as a user would write it for an integrator:
 `rates(s, u, mode, ds)` with the state `s`, the discrete modes and the derivative; `guards(s, u, mode, g)`, each of
 which is positive once its event is due; `jump(k, s, u, mode)`, which applies event k; `output(s, mode)`, which gives x,
-x' and the force. All are compiled by numba. The controller is `simulation_scene.closed_law` at 1 kHz, closed in every
-engine. For our simulator the same scene is a config and, but for the first, an object file in `peer_objects/`.
+x' and the force. All are compiled by numba. The controller is `closed_law` at 1 kHz for 7 s, closed in every engine.
+For our simulator it is an ordinary controller (`Law`), and the scene is a config and, but for the first, an object file
+in `peer_objects/`. The first is the shipped object `light_surface` on a straight drive of constant mass:
+
+    M x'' = u - B x' - f,    m y'' = f - k y - c y',    f = kc max(0, x - y - x0)
 """
 
 from __future__ import annotations
@@ -14,16 +17,88 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from attrs import evolve, frozen
 from numba import njit
-from simulation_scene import CONFIG, KC, LIGHT, OPEN_M, X0, B, C, K, M, closed_law
 
 from graspsense.gripper_api import gap_and_rate, revolutions_at
+from graspsense.plugin_api import APPROACH, EFFORT, RUNNING, STEADY, Command, Controller
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.drive_models import LINKAGES
+
+M, B, LIGHT, C, K, KC, X0 = 1.0, 20.0, 0.02, 5.0, 2e3, 2e4, 0.02
+TICK, TICKS = 1e-3, 7000
+OPEN_M = 0.07
+CONFIG = SimConfig(
+    object="light_surface",
+    spread=False,
+    sensor="ideal",
+    transmission="straight",
+    moving_mass_kg=M,
+    coulomb_n=0.0,
+    breakaway_n=0.0,
+    load_friction_coefficient=0.0,
+    damping_n_s_m=B,
+    open_gap_m=OPEN_M,
+    pad_stiffness_n_m=math.inf,
+)
+
+
+class LawState(NamedTuple):
+    phase: int
+    outcome: int
+    begun_s: float
+    integral_n: float
+    switched_s: float
+
+
+class LawParams(NamedTuple):
+    seconds: float
+
+
+def closed_law(
+    t: float, x: float, v: float, f: float, integral: float, since: float
+) -> tuple[float, float, float]:
+    """Return u, the integral and the instant of the switch: a speed of 30 mm/s until 1 N, then a force."""
+    if since < 0.0 and f <= 1.0:
+        off = 0.03 - v
+        integral += 400.0 * off * TICK
+        u = 60.0 * off + integral
+    else:
+        if since < 0.0:
+            since = t
+        wanted = min(1.0 + 10.0 * (t - since), 15.0)
+        if t > 5.0:
+            wanted = max(15.0 - 10.0 * (t - 5.0), 5.0)
+        u = wanted + (wanted - f) - 40.0 * v
+    return min(max(u, -100.0), 100.0), integral, since
+
+
+def step(params: LawParams, state: LawState, reading: Any) -> tuple[Command, LawState]:
+    """The same law as a controller's step."""
+    frame = reading.frame
+    begun = state.begun_s
+    if begun < 0.0:
+        begun = frame.t_s
+    t = frame.t_s - begun
+    u, integral, since = closed_law(
+        t, OPEN_M - frame.gap_m, -frame.velocity_m_s, frame.force_left_n, state.integral_n, state.switched_s
+    )
+    outcome = STEADY if t >= params.seconds - 0.5 * TICK else RUNNING
+    return Command(EFFORT, u, math.inf, math.inf), LawState(APPROACH, outcome, begun, integral, since)
+
+
+class Law(Controller[None]):
+    step = staticmethod(step)
+
+    def params(self) -> LawParams:
+        return LawParams(TICK * TICKS)
+
+    def init(self) -> LawState:
+        return LawState(APPROACH, RUNNING, -1.0, 0.0, -1.0)
+
 
 OBJECTS: Final = Path(__file__).parent / "peer_objects"
 MODES: Final = 2

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from simulation_scene import CONFIG, KC, LIGHT, TICK, TICKS, X0, B, C, K, Law, M, closed_law
+from peer_scenes import CONFIG, KC, LIGHT, TICK, TICKS, X0, B, C, K, Law, M, closed_law
 
 from graspsense.simulator_api import RunConfig
 from graspsense_sim_gripper.run.batch import run_many
