@@ -230,6 +230,21 @@ def test_a_held_grasp_without_rest_or_contact_has_the_same_reasons_without_its_r
         assert any(why in reason for reason in whole[1].values())
 
 
+def test_open_fingers_at_rest_after_the_release_of_a_recording_are_no_rest_of_the_squeeze():
+    """A recording of another program goes on after the release, which no phase tells."""
+    moving = squeeze(after=0)
+    opening = [(0.0540 + 1e-4 * k, max(8.0 - 0.2 * k, 0.0), max(8.0 - 0.2 * k, 0.0)) for k in range(200)]
+    rows = moving + opening + [(0.0740, 0.0, 0.0)] * 400
+    extracted = FEATURES.extract(made_trace(rows))
+    assert math.isnan(extracted["f_steady"])
+    form = compiled_extraction(FEATURES.extract)
+    columns = TickColumns(*(column.tolist() for column in columns_of_ticks(made_trace(rows))))
+    assert repr(form.result(form.measure(form.params, columns)).values) == repr(extracted.values)
+    # A force below that of a contact is one of a hold, where the fingers have not opened.
+    weak = FEATURES.extract(made_trace(moving + [(0.0540, 0.3, 0.3)] * 200))
+    assert weak["f_steady"] == 0.3
+
+
 def coarse_squeeze(rate_hz, step_m, hold_s, measured_hz=1e9):
     """Closing at 8 mm/s, a squeeze of 2.4 mm to 8 N in 3 s, and a hold; the gap in steps, and measured so often."""
     times = np.arange(0.0, 4.5 + hold_s, 1.0 / rate_hz)

@@ -500,6 +500,14 @@ def test_a_fault_in_one_squeeze_is_of_that_squeeze(tmp_path, spoilt, value, samp
     assert all(column(squeeze, "force_left_n").max() == pytest.approx(20.0) for squeeze in good)
 
 
+def test_a_zero_that_changes_in_a_squeeze_joins_no_others_to_it(tmp_path):
+    gap, force, times = repeated(1.0, 1.0, 1.0, 1.0)
+    changed = np.where(np.arange(len(force)) > 1.5 * len(force) / 4, 0.4 * force.max(), 0.0)
+    squeezes = plain(tmp_path, 'split = "force"', force=force + changed, gap=gap, time=times)
+    assert [recording.source for recording in squeezes] == [f"jar.csv, squeeze {k}" for k in range(1, 5)]
+    assert any("zero" in notice for recording in squeezes for notice in recording.notices)
+
+
 def test_a_grasp_is_cut_at_its_release_and_resampled(tmp_path):
     _, force = squeezing()
     force[250:] = 0.0

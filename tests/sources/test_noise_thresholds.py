@@ -67,6 +67,20 @@ def test_rest_is_within_the_noise_and_several_samples(gap_noise_m, step_s):
     assert speed < 0.005
 
 
+def test_the_thresholds_of_rest_are_not_those_of_open_fingers():
+    """A hold of 0.3 s on a coarse gap, a release, and a second of open fingers: a window of that length fits both."""
+    times = np.arange(0.0, 4.5, 0.01)
+    gap = np.interp(times, [0.0, 1.0, 3.0, 3.3, 3.6], [0.07, 0.06, 0.054, 0.054, 0.07])
+    gap = np.round(gap / 5e-5) * 5e-5
+    force = np.interp(times, [1.0, 3.0, 3.3, 3.4], [0.0, 8.0, 8.0, 0.0])
+    readings = [
+        Reading(Frame(t, 0.01, g, 0.0, nan, f, f, nan, nan, 0), NO_PADS)
+        for t, g, f in zip(times.tolist(), gap.tolist(), force.tolist(), strict=True)
+    ]
+    recording = Recording(name="squeeze", rate_hz=100.0, readings=tuple(readings))
+    assert thresholds_for([recording]).settings["controller.rest_window_s"] <= 0.3
+
+
 def test_recordings_that_begin_close_to_the_object_are_not_too_wide():
     whole = squeeze()
     close = evolve(whole, readings=whole.readings[980:])

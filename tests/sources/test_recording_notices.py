@@ -191,3 +191,16 @@ def test_a_force_without_noise_that_stays_after_the_fingers_opened_is_noticed() 
     # At 2 Hz the last value of a force can be one of the hold.
     slow = released[np.arange(300) // 50 * 50]
     assert not any("sensor stopped" in notice for notice in noticed(slow, slow, OPEN_AGAIN_M))
+
+
+@every_case(("rate_hz", "samples"), [(50.0, 4), (20.0, 1), (20.0, 2), (200.0, 8)])
+def test_a_glitch_under_a_load_is_noticed_at_any_rate(rate_hz: float, samples: int) -> None:
+    t_s = np.arange(0.0, 2.0, 1.0 / rate_hz)
+    course = np.interp(t_s, [0.6, 0.9, 1.5, 1.6], [0.0, 9.0, 8.5, 0.0])
+    course += np.random.default_rng(2).normal(0.0, 0.01, len(t_s))
+    gap = np.interp(t_s, [0.0, 0.6, 0.9, 1.5, 1.7], [0.08, 0.05, 0.0494, 0.0494, 0.06])
+    assert noticed(course, course, gap, rate_hz=rate_hz) == ()
+    spoilt = course.copy()
+    spoilt[int(1.1 * rate_hz) :][:samples] = 60.0
+    (notice,) = noticed(spoilt, spoilt, gap, rate_hz=rate_hz)
+    assert "60 N at 1.1 s" in notice

@@ -369,3 +369,12 @@ def test_a_table_before_the_names_of_another_one_is_not_left_out(tmp_path):
     assert all(word in str(refused.error) for word in ("line 92", "90 lines", "two tables"))
     (calibrated,) = recordings(tmp_path, ["1,2,3", "4,5,6", HEADER, *ROWS[:9]])
     assert len(calibrated.recording.readings) == 9
+
+
+@every_case(
+    "summary", [["1,2,3,4"], ["Peak,Mean,Least,Most", "9.1,4.2,0.0,9.1"], ["a,b,c,d", *["1,2,3,4"] * 4]]
+)
+def test_a_summary_in_as_many_columns_is_left_out_and_told(summary, tmp_path):
+    (labelled,) = recordings(tmp_path, [*summary, HEADER, *ROWS])
+    assert len(labelled.recording.readings) == len(ROWS)
+    assert any(f"line {len(summary) + 1}" in note for note in labelled.recording.notes)

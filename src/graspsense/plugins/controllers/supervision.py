@@ -278,8 +278,10 @@ def _squeezing(params: Any, now: GraspProgress, frame: Frame) -> GraspProgress:
         outcome = CRUSHED
     elif t - felt_t > params.slip_time_s and gap < peak_gap:
         outcome = SLIPPED
-    elif at_rest(still, t, params.rest_window_s) and (
-        abs(force - params.target_force_n) <= params.force_tolerance_n
+    elif (
+        at_rest(still, t, params.rest_window_s)
+        and abs(force - params.target_force_n) <= params.force_tolerance_n
+        and (felt_t == t or not gap > peak_gap)  # else the fingers rest open, in a recording that goes on
     ):
         phase, outcome = HOLD, STEADY
     elif t > now.deadline_s:

@@ -210,7 +210,8 @@ def measure(params: ChittaParams, ticks: TickColumns) -> Measured:
             still = state
         # A controller can wait for more than rest, such as a force. The rest in its hold phase is then the one meant.
         shows = phase[i] == HOLD or not holds
-        if shows and gap[since] == gap[since] and at_rest(still, t[i], window_s):
+        let_go = gap[i] > p_first + params.rest_speed_m_s * window_s and left[i] < tau_1 and right[i] < tau_1
+        if shows and not let_go and gap[since] == gap[since] and at_rest(still, t[i], window_s):
             hole_s = hole_within(t, since, i)
             if hole_s > 0.0 and not at_rest(still, t[i] - hole_s, window_s):
                 unseen_s = hole_s
@@ -366,13 +367,12 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
         """Return the tick at which rest begins and the one at which its window ends, both before `end`, or None."""
         # A controller can wait for more than rest, such as a force. The rest in its hold phase is then the one meant.
         held = trace.phase[contact:end] == HOLD
-        offsets = first_rest(
-            trace.t_s[contact:end],
-            trace.gap_m[contact:end],
-            held if held.any() else ~held,
-            self.config.rest_speed_m_s,
-            window_s,
-        )
+        shows = held if held.any() else ~held
+        # A recording can go on after the release, and then rest with open fingers.
+        tau_1, speed, gap = self.config.contact_force_n, self.config.rest_speed_m_s, trace.gap_m[contact:end]
+        free = (trace.force_left_n[contact:end] < tau_1) & (trace.force_right_n[contact:end] < tau_1)
+        shows &= ~(free & (gap > gap[0] + speed * window_s))
+        offsets = first_rest(trace.t_s[contact:end], gap, shows, speed, window_s)
         return None if offsets is None else (contact + offsets[0], contact + offsets[1])
 
     def _no_contact(self, trace: Trace) -> float:

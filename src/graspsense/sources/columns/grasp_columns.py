@@ -28,6 +28,8 @@ Spans = tuple[tuple[float, float], ...]
 """Begin and end (s) of each of several events."""
 LARGE_LOSS: Final = 0.05
 """Share of the samples beyond which leaving them out is told as a warning, and not advised."""
+GLITCHES: Final = 0.03
+"""Share of the samples up to which those that no gripper has are glitches, and not all in another unit."""
 FEWEST_AT_A_RATE: Final = 20
 LONGEST_S: Final = 9e9
 """Longest time whose nanoseconds have 64 bits."""
@@ -416,9 +418,17 @@ def _check_plausible(columns: GraspColumns, quantity: str, unit_of: str, *values
         return
     low, high, unit, others = PLAUSIBLE[quantity]
     every = np.concatenate(values)
-    extreme = float(every[int(np.argmax(np.maximum(every - high, low - every)))])
+    worst = int(np.argmax(np.maximum(every - high, low - every)))
+    extreme = float(every[worst])
     if low <= extreme <= high:
         return
+    beyond = np.count_nonzero((every < low) | (every > high)) / len(every)
+    if beyond <= GLITCHES:
+        raise DataDamaged(
+            f"{columns.source}, {columns.place(worst % len(columns))}: the {quantity} is {extreme:g} {unit} there, "
+            f"which no gripper has, and plausible in {1.0 - beyond:.1%} of the samples: leave out what is no "
+            "measurement"
+        )
     advice = [
         f"in {unit}, write its unit behind it: [{unit}]"
         for unit, f in others.items()

@@ -30,7 +30,7 @@ TURNS: Final = 0.3
 """Share of the changes without a load that go against the one before, where they are noise."""
 LARGE_TURNS: Final = 0.1
 """Share of the changes without a load that turn and exceed the least one, where the steps of a force are fine."""
-FEWEST_IN_COURSE: Final = 50
+FEWEST_IN_COURSE: Final = 30
 """Fewest samples from which on the course of a force is told from a glitch."""
 GLITCH_SAMPLES: Final = 3
 GLITCH_S: Final = 0.05
@@ -42,6 +42,10 @@ LOADED_GLITCH: Final = 0.5
 """Share of its range by which a force leaves its course in a glitch: up to this share of the force, and above it."""
 GLITCH_NOISE: Final = 10.0
 """A glitch is at least so many times the usual distance from the course."""
+FAR: Final = 2.0
+FAR_S: Final = 0.2
+FAR_SAMPLES: Final = 10
+"""A force under a load that leaves its course by so many times the range of that is a glitch if it takes no longer."""
 ZERO_SAMPLES: Final = 10
 STEADY: Final = 0.1
 """Share of its range by which a force may change in the samples that its zero is taken from."""
@@ -134,13 +138,16 @@ def _glitches(what: str, times: Numbers, force: Numbers, units: Mapping[str, str
     sampled, sampled_times = force[::every], times[::every]
     if len(sampled) < FEWEST_IN_COURSE:
         return
-    longest = min(GLITCH_SAMPLES, int(GLITCH_S / float(np.median(np.diff(sampled_times)))))
-    around = np.pad(sampled, longest, mode="reflect")
-    course = np.median(np.lib.stride_tricks.sliding_window_view(around, 2 * longest + 1), axis=1)
+    step_s = float(np.median(np.diff(sampled_times)))
+    course = _course(sampled, min(GLITCH_SAMPLES, int(GLITCH_S / step_s)))
     apart, span = np.abs(sampled - course), float(np.ptp(sampled))
     free = course < course.min() + FREE_GLITCH * np.ptp(course)
     noise = float(np.median(apart))
     left = (apart > np.where(free, FREE_GLITCH, LOADED_GLITCH) * span) & (apart > GLITCH_NOISE * noise)
+    # Under a load, nothing exceeds all other forces several times and then comes back, however rarely it is measured.
+    wide = _course(sampled, min(FAR_SAMPLES, max(1, int(FAR_S / step_s))))
+    loaded = wide > wide.min() + FREE_GLITCH * np.ptp(wide)
+    left |= loaded & (np.abs(sampled - wide) > FAR * np.ptp(wide))
     count = int(left.sum())
     if not 0 < count <= MOST_GLITCHES * len(sampled):
         return
@@ -151,6 +158,12 @@ def _glitches(what: str, times: Numbers, force: Numbers, units: Mapping[str, str
         f"{sampled_times[k]:.4g} s{others}): if that is a glitch, take it out, since it can "
         "pass for a contact"
     )
+
+
+def _course(force: Numbers, longest: int) -> Numbers:
+    """Return a force without what lasts at most so many samples."""
+    around = np.pad(force, longest, mode="reflect")
+    return np.median(np.lib.stride_tricks.sliding_window_view(around, 2 * longest + 1), axis=1)
 
 
 def _seldom(what: str, times: Numbers, force: Numbers) -> Iterator[str]:
@@ -195,8 +208,7 @@ def _bump(times: Numbers, gap: Numbers, force: Numbers, units: Mapping[str, str]
     t_s, gap, force = times[known], gap[known], force[known]
     if len(force) < FEWEST_IN_COURSE:
         return
-    around = np.pad(force, 1, mode="edge")
-    course = np.median(np.lib.stride_tricks.sliding_window_view(around, 3), axis=1)
+    course = _course(force, 1)
     low, span = float(np.quantile(course, 0.01)), float(np.ptp(course))
     contact = FREE_GLITCH * span if "force_left" in units else min(FREE_GLITCH * span, CONTACT_FORCE_N)
     contact = max(contact, GLITCH_NOISE * float(np.median(np.abs(np.diff(force, 2)))))

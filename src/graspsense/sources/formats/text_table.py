@@ -175,6 +175,8 @@ class _Layout:
         numeric = _numeric_columns(sample, width)
         data = next((k for k, (_, row) in enumerate(self.rows) if _is_data(row, width, numeric)), None)
         top = self.rows[0][1]
+        if data is not None and (names := self._second_names(data, width, numeric)):
+            return self._later_header(names + 1, width, numeric)
         if data is None or (data == 1 and len(top) > 1):
             return top, None, 1, self.rows[0][0]
         if data == 0:
@@ -185,6 +187,20 @@ class _Layout:
                 return [f"c{k}" for k in range(1, width + 1)], None, 0, 0
             return top, None, 1, self.rows[0][0]
         return self._later_header(data, width, numeric)
+
+    def _second_names(self, data: int, width: int, numeric: frozenset[int]) -> int | None:
+        """Return the last row of names behind a few rows of numbers, as those of a summary; None if there is none."""
+        most = data + max(_FEW_BEFORE, int(_MOST_BEFORE * len(self.rows)))
+        named = [
+            k
+            for k, (_, row) in enumerate(self.rows[data + 1 : most + 1], data + 1)
+            if not any(is_number(row[c]) or is_missing(row[c]) for c in numeric if c < len(row))
+            and _can_be_names(row, width, [set()] * width)
+            and all(row != earlier for _, earlier in self.rows[:data])
+            and k + 1 < len(self.rows)
+            and _is_data(self.rows[k + 1][1], width, numeric)
+        ]
+        return named[-1] if named else None
 
     def _later_header(
         self, data: int, width: int, numeric: frozenset[int]

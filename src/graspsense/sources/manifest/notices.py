@@ -160,8 +160,11 @@ def _of_holes(columns: GraspColumns) -> Iterator[str]:
 
 def _usual_range(force: Numbers) -> tuple[float, float]:
     """Return the least and the largest force, apart from one sample in a hundred, which may be a glitch."""
-    low, high = np.quantile(force, [GLITCHES, 1.0 - GLITCHES]).tolist()
-    return low, high
+    low, high = (
+        np.quantile(force, GLITCHES, method="higher"),
+        np.quantile(force, 1.0 - GLITCHES, method="lower"),
+    )
+    return float(low), float(high)
 
 
 def _falls_on_contact(columns: GraspColumns) -> bool:

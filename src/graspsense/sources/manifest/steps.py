@@ -20,7 +20,7 @@ from graspsense.sources.columns.grasp_columns import (
     finger_sides,
     only,
 )
-from graspsense.sources.manifest.closings import without_rise
+from graspsense.sources.manifest.closings import closings, without_rise
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -64,10 +64,12 @@ def squeezes(columns: GraspColumns) -> list[GraspColumns]:
     what it rose by, so squeezes of different forces and a zero that drifts are told apart. The next one begins halfway
     after the end, where both fingers are free. A force that is missing, or that no gripper has, is of its own
     squeeze: there the last force before it counts. A glitch of two samples does not end a squeeze, nor does a force
-    that goes and comes back while the fingers close further.
+    that goes and comes back while the fingers close further. Fingers that open end it, if the force then stays what
+    it is, as after a change of its zero.
     """
     force = _known_force(columns)
     runs = _of_one_closing(columns.gap_m, _held_runs(force, np.diff(columns.t_s)))
+    runs = list(_divided(columns, force, runs))
     if not runs:
         raise DataDamaged(f"{columns.source}: no squeeze was found, because its force never rises")
     between = (_middle(columns.t_s, end, begin) for (_, end), (begin, _) in pairwise(runs))
@@ -129,6 +131,26 @@ def _of_one_closing(gap: NDArray[np.float64], runs: list[tuple[int, int]]) -> li
                 begin = joined.pop()[0]
         joined.append((begin, end))
     return joined
+
+
+def _divided(
+    columns: GraspColumns, force: NDArray[np.float64], runs: list[tuple[int, int]]
+) -> Iterator[tuple[int, int]]:
+    """Yield the squeezes, divided where the fingers are open and the force does not change while they move."""
+    t_s, closed = columns.t_s, closings(columns.gap_m)
+    for begin, end in runs:
+        inside = [(closing, opened) for closing, opened in closed if closing < end and opened > begin]
+        share = LOADED * float(np.ptp(force[begin:end]))
+        for (_, opened), (closing, _) in pairwise(inside):
+            lasts = closing - opened >= FEWEST and t_s[closing] - t_s[opened] >= SHORTEST_RELEASE_S
+            if not (begin < opened and closing < end and lasts):
+                continue
+            free = force[opened:closing]
+            held = min(force[begin:opened].max(), force[closing:end].max())
+            if np.ptp(free) < share < held - free.max():
+                yield begin, opened
+                begin = closing
+        yield begin, end
 
 
 def _stays_closed(gap: NDArray[np.float64], end: int, begin: int) -> bool:

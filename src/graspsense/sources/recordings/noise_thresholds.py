@@ -215,7 +215,7 @@ class _Noise:
         if not len(touched):
             return False
         k = int(touched[0])
-        shows = np.ones(len(self.gap) - k, dtype=np.bool_)
+        shows = (self.both[k:] >= contact) | ~(self.gap[k:] > self.gap[k] + speed * window)
         return first_rest(self.times[k:], self.gap[k:], shows, speed, window) is not None
 
 
