@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from attrs import asdict, evolve
+from attrs import evolve
 
 from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json, file_to_write_as
@@ -16,9 +16,6 @@ from graspsense.cli.tradeoff_recognition import commands
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-    from graspsense.experiments.sensed import SensedTrade
-    from graspsense.report.simulation import SimulationTrade
 
 
 @click.group()
@@ -106,33 +103,12 @@ def condition(
 @click.option(
     "--seeds", type=click.IntRange(min=1), default=2, show_default=True, help="Grasps of each scene."
 )
-@click.option(
-    "--recognition-seeds",
-    type=click.IntRange(min=0),
-    default=4,
-    show_default=True,
-    help="Seeds for recognition and the distributions of features, with the sensors of the gripper; 0: leave it out.",
-)
-@click.option(
-    "--instances",
-    type=click.IntRange(min=2),
-    default=4,
-    show_default=True,
-    help="Individuals of each object and state that a seed grasps, for recognition.",
-)
-@click.option(
-    "--png",
-    metavar="FILE.png",
-    callback=file_to_write_as(".png"),
-    help="Draw the result; recognition in FILE_recognition.png.",
-)
+@click.option("--png", metavar="FILE.png", callback=file_to_write_as(".png"), help="Draw the result.")
 @markdown_option
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def simulation(
     scenes: tuple[str, ...],
     seeds: int,
-    recognition_seeds: int,
-    instances: int,
     png: str | None,
     markdown: str | None,
     as_json: bool,
@@ -141,15 +117,12 @@ def simulation(
     """Run the same grasps with several accuracies and step lengths of the simulator.
 
     Errors of features, peak force and force trace with ideal sensors are relative to a reference that keeps every term
-    and halves its steps until nothing changes. With the sensors of the gripper, recognition and the distributions of
-    features are compared with those of the reference, and the fastest equivalent variant is named. Times are measured
-    on the same grasps.
+    and halves its steps until nothing changes. Times are measured on the same grasps. What an accuracy does to
+    recognition is measured by `graspsense tradeoff accuracy`.
     """
     from graspsense.cli.progress import ProgressLine
-    from graspsense.experiments.sensed import sensed_trade
-    from graspsense.experiments.sensed_report import about, conclusion, sensed_rows
     from graspsense.experiments.simulation import trade_simulation
-    from graspsense.report.simulation import simulation_rows
+    from graspsense.report.simulation import simulation_markdown, simulation_png, simulation_rows
 
     settings = settings_of(**asked)
     wanted = _scenes(scenes, asked)
@@ -158,55 +131,21 @@ def simulation(
         trade = trade_simulation(
             settings, scenes=wanted, seeds=range(first_seed, first_seed + seeds), progress=progress
         )
-        sensed = None
-        if recognition_seeds:
-            numbers = range(first_seed, first_seed + recognition_seeds)
-            sensed = sensed_trade(settings, instances=instances, seeds=numbers, progress=progress)
     # What may have taken an hour is printed before a file can fail to be written.
     if as_json:
-        echo_json(trade.as_json() if sensed is None else {**trade.as_json(), "recognition": asdict(sensed)})
+        echo_json(trade.as_json())
     else:
         made = ", ".join(f"{key} {value}" for key, value in trade.made.items())
         echo(f"{trade.gripper}, simulated: {', '.join(trade.scenes)}, {len(trade.seeds)} seeds each")
         echo(f"{made}\n")
         echo_table(*simulation_rows(trade))
-        if sensed is not None:
-            echo(f"\n{about(sensed)}")
-            echo(f"{conclusion(sensed)}\n")
-            echo_table(*sensed_rows(sensed))
-    _write_files(png, markdown, trade, sensed)
-
-
-def _write_files(
-    png: str | None, markdown: str | None, trade: SimulationTrade, sensed: SensedTrade | None
-) -> None:
-    """Draw the pictures and write the page, if they are asked for."""
-    from graspsense.experiments.sensed_report import sensed_markdown
-    from graspsense.report.simulation import simulation_markdown
-
-    pictures = _drawn(Path(png), trade, sensed) if png else []
-    if markdown is None:
-        return
-    places = [os.path.relpath(picture, Path(markdown).parent) for picture in pictures]
-    page = simulation_markdown(trade, places[0] if places else None)
-    if sensed is not None:
-        drawn = [f"![Recognition against time]({places[1]})", ""] if places else []
-        page = "\n".join([page, *drawn, *sensed_markdown(sensed)])
-    write_text(markdown, page)
-
-
-def _drawn(path: Path, trade: SimulationTrade, sensed: SensedTrade | None) -> list[Path]:
-    """Draw the result and return the names of the pictures."""
-    from graspsense.experiments.sensed_report import sensed_png
-    from graspsense.report.simulation import simulation_png
-
-    pictures = [path]
-    simulation_png(trade, path)
-    if sensed is not None:
-        pictures.append(path.with_name(f"{path.stem}_recognition.png"))
-        sensed_png(sensed, pictures[1])
-    talk(f"drawn in {', '.join(map(str, pictures))}")
-    return pictures
+    picture = None
+    if png:
+        simulation_png(trade, Path(png))
+        talk(f"drawn in {png}")
+        picture = os.path.relpath(png, Path(markdown or png).parent)
+    if markdown:
+        write_text(markdown, simulation_markdown(trade, picture))
 
 
 def write_text(path: str, text: str) -> None:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import TYPE_CHECKING, Any, Final
 
 from attrs import asdict, frozen
 
@@ -21,18 +21,27 @@ LEAST_ERROR: Final = 1e-9
 """Smaller errors are drawn at this value, because a logarithmic axis cannot show 0."""
 
 
-@frozen(kw_only=True, slots=False)
-class MeasuredVariant:
-    """A variant of a simulated gripper, and its processor time (s) for one grasp, without set-up and compilation."""
+@frozen(kw_only=True)
+class VariantPoint:
+    """The errors of one variant and its processor time, both measured on the same grasps.
+
+    `seconds` is the processor time for one grasp, without set-up and compilation. `errors` are the largest errors over
+    all grasps, by quantity, and infinite if a feature is missing that the reference has. `setup_s` is the additional
+    time of the first grasps, for compiling or for loading compiled code. `failure` is the reason why there are no
+    errors, or why grasps ended otherwise than in the reference.
+    """
 
     method: str
     fidelity: str
     step: str
     role: str
     seconds: float
+    setup_s: float
+    errors: Mapping[str, float]
+    failure: str = ""
 
     @classmethod
-    def measured(cls, variant: SimulationVariant, **figures: Any) -> Self:
+    def measured(cls, variant: SimulationVariant, **figures: Any) -> VariantPoint:
         """Return what was measured of a variant; `figures` has the other fields."""
         return cls(
             method=variant.method,
@@ -46,25 +55,6 @@ class MeasuredVariant:
     def curve(self) -> str:
         """Name of the curve that the point belongs to."""
         return f"{self.method}, {self.fidelity}"
-
-    @property
-    def name(self) -> str:
-        """Method, fidelity and step in words."""
-        return f"{self.curve}, {self.step}"
-
-
-@frozen(kw_only=True, slots=False)
-class VariantPoint(MeasuredVariant):
-    """The errors of one variant and its processor time, both measured on the same grasps.
-
-    `errors` are the largest errors over all grasps, by quantity, and infinite if a feature is missing that the
-    reference has. `setup_s` is the additional time of the first grasps, for compiling or for loading compiled code.
-    `failure` is the reason why there are no errors, or why grasps ended otherwise than in the reference.
-    """
-
-    setup_s: float
-    errors: Mapping[str, float]
-    failure: str = ""
 
 
 @frozen(kw_only=True)
@@ -100,6 +90,7 @@ def simulation_rows(trade: SimulationTrade) -> tuple[tuple[str, ...], list[tuple
 def simulation_markdown(trade: SimulationTrade, picture: str | None = None) -> str:
     """Return the page: the table of variants, and the picture if there is one."""
     made = ", ".join(f"{key} {value}" for key, value in trade.made.items())
+    header, rows = simulation_rows(trade)
     lines = [
         "# Accuracy and time of the simulator",
         "",
@@ -111,15 +102,11 @@ def simulation_markdown(trade: SimulationTrade, picture: str | None = None) -> s
         f"Measured with: {made}.",
         "",
         *([f"![Error against time]({picture})", ""] if picture else []),
-        *markdown_table(*simulation_rows(trade)),
+        f"| {' | '.join(header)} |",
+        f"|{'---|' * len(header)}",
+        *(f"| {' | '.join(row)} |" for row in rows),
     ]
     return "\n".join(lines) + "\n"
-
-
-def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Return a table in Markdown."""
-    lines = [f"| {' | '.join(header)} |", f"|{'---|' * len(header)}"]
-    return [*lines, *(f"| {' | '.join(row)} |" for row in rows)]
 
 
 def simulation_png(trade: SimulationTrade, path: Path) -> None:
@@ -136,7 +123,7 @@ def simulation_png(trade: SimulationTrade, path: Path) -> None:
     handles: dict[str, Any] = {}
     for ax, name in zip(axes, names, strict=False):
         handles.update(_draw_curves(ax, trade, name))
-        axes_of(ax, name, "error, relative")
+        _prepare(ax, name)
     for ax in axes[panels:]:
         ax.set_axis_off()
     failed = [p for p in trade.points if p.failure]
@@ -179,13 +166,13 @@ def _draw_curves(ax: Any, trade: SimulationTrade, quantity: str) -> dict[str, An
     return handles
 
 
-def axes_of(ax: Any, title: str, y: str) -> None:
-    """Prepare axes for values of `y` against the time of a grasp."""
+def _prepare(ax: Any, title: str) -> None:
+    """Prepare axes for errors against the time of a grasp."""
     ax.set_xscale("log")
     ax.set_yscale("log")
     ax.set_title(title, fontsize=9)
     ax.set_xlabel("ms a grasp", fontsize=8)
-    ax.set_ylabel(y, fontsize=8)
+    ax.set_ylabel("error, relative", fontsize=8)
     ax.tick_params(labelsize=7, which="both")
     ax.grid(True, which="major", lw=0.3)
 
