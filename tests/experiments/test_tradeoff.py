@@ -116,27 +116,3 @@ def test_the_simulator_gets_better_with_finer_steps(capsys, tmp_path):
     # Near what the reference itself is exact to.
     assert errors[3] < 0.2 * errors[0]
     assert "| even steps |" in page.read_text()
-
-
-@pytest.mark.slow
-def test_the_condition_of_features_is_told_and_sensors_make_it_worse(capsys):
-    arguments = ["--scene", "odwalla:full_closed", "--seeds", "3", "--json"]
-    assert ended(["tradeoff", "condition", *arguments]) == 0
-    ideal, pads = json.loads(capsys.readouterr().out)
-    assert (ideal["sensor"], pads["sensor"]) == ("ideal", "pads")
-    finest = {feature["feature"]: feature["finest"] for feature in ideal["features"]}
-    jumpy = {feature["feature"]: feature["finest"] for feature in pads["features"]}
-    # With ideal sensors the physics is well conditioned; the reading of cell images is not.
-    assert max(finest.values()) < 1e-3
-    assert jumpy["delta_t"] > 1e-3
-
-
-@pytest.mark.slow
-def test_who_asks_for_more_than_a_feature_can_give_is_told(capsys):
-    assert ended(["run", "--explain-model"]) == 0
-    printed = " ".join(capsys.readouterr().out.split())
-    assert "gripper.accuracy = 0.01 is finer than delta_t, dp_dt, df_dt can be" in printed
-    assert ended(["run", "--explain-model", "-o", "gripper.sensor=ideal"]) == 0
-    printed = " ".join(capsys.readouterr().out.split())
-    assert "relative movement for 1 ppm of each of" in printed
-    assert "is finer than" not in printed

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
@@ -14,8 +14,6 @@ from attrs import evolve, frozen
 
 from graspsense.core.components.roles import BatchBackend, Grasped, SimulationVariant
 from graspsense.core.values.errors import ConfigError
-from graspsense.experiments.condition import SCALES
-from graspsense.experiments.sensors import with_ideal_sensors
 from graspsense.experiments.versions import measured_on
 from graspsense.report.simulation import PEAK, TRACE, SimulationTrade, VariantPoint
 
@@ -34,6 +32,8 @@ SCENES: Final = (
     "toy",
     "block",
 )
+SCALES: Final[Mapping[str, float]] = {"m": 1e-3, "N": 1.0, "s": 0.05, "m/s": 1e-3, "N/s": 1.0}
+"""Errors are relative to the value of the reference, or to this value of the same unit if that is larger."""
 LEAST_S: Final = 0.2
 """A variant is run again until this much processor time is measured, so that the clock's resolution is negligible."""
 LEAST_RUNS: Final = 3
@@ -118,8 +118,8 @@ def _measured(
     tick: Callable[[], None] | None,
 ) -> tuple[list[_Measured], float, float]:
     """Return features and force of every grasp, the processor time of one, and the additional time of the first run."""
-    config = evolve(with_ideal_sensors(settings.gripper).config, **variant.settings)
-    backend = settings.gripper.component.create(config)
+    ideal = settings.gripper.create().ideal_sensors
+    backend = settings.gripper.component.create(evolve(settings.gripper.config, **ideal, **variant.settings))
     controller, feature_set = settings.controller.create(), settings.features.create()
     backend.expect_features(feature_set)
     extract = _Extraction(feature_set)

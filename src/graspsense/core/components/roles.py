@@ -290,13 +290,6 @@ class BatchBackend(SensorBackend[ConfigT]):
         """Return the variants that trade accuracy for time; empty if there are none."""
         return ()
 
-    def perturbed(self, scenes: Sequence[str], share: float) -> Mapping[str, BatchBackend[Any]]:
-        """Return this gripper with each parameter of it, or of these scenes, larger by a share; "" is unchanged.
-
-        They keep every term, and their steps do not depend on the parameters. Empty if this is not possible.
-        """
-        return {}
-
     @abstractmethod
     def run_many(
         self,
