@@ -168,7 +168,6 @@ def graspsense_experiment_kinds() -> Iterable[ExperimentKindEntry]:
         ("early", "early", "EarlySettings", 0.0363, "recognition against the time since contact"),
         ("squeezes", "squeezes", "RepeatSettings", 0.0025, "recognition against the number of squeezes"),
         ("physics", "physics", "ModelErrorSettings", 0.00578, "recognition when test trials lack a term"),
-        ("next_squeeze", "next_squeeze", "NextSqueezeSettings", 0.0156, "rules for the next squeeze"),
         (
             "compare",
             "compare",
@@ -204,7 +203,6 @@ def graspsense_experiments() -> Iterable[ExperimentEntry]:
         ("trade_force", 0.009),
         ("trade_frame_rate", 0.00337),
         ("trade_joint", None),
-        ("trade_next", 0.0156),
         ("trade_noise", 0.000927),
         ("trade_physics", 0.00529),
         ("trade_recognition", None),

@@ -10,7 +10,6 @@ from graspsense.experiments.findings import CONTROLS, Findings, FoundTable, cont
 from graspsense.experiments.summary import Summary
 from graspsense.experiments.trade.classifier_findings import compare_classifiers
 from graspsense.experiments.trade.cost_findings import Report, cost_report, damage_table
-from graspsense.experiments.trade.sequential_findings import compare_sequential
 from graspsense.experiments.trade.trade_point import Advice
 from graspsense.report.wording import TARGETS
 
@@ -40,8 +39,6 @@ def findings(summary: Summary) -> Findings:
             continue
         if case.kind == "compare":
             reports[part] = compare_classifiers(part, title, conditions)
-        elif case.kind == "next_squeeze":
-            reports[part] = compare_sequential(part, title, conditions, float(case.judge.fixed_n))
         else:
             reports[part] = cost_report(part, title, conditions, case.judge)
     tables = [table for report in reports.values() for table in report.tables]
