@@ -128,7 +128,6 @@ targets = ["state"]
         ("early", "moments_s = [0.0, 1.0]", 2),
         ("squeezes", "most = 2", 2),
         ("physics", "error = 0.1", 2),
-        ("compare", "", 2),
     ],
 )
 def test_each_trade_runs_and_gives_advice(tmp_path, kind, more, trials):

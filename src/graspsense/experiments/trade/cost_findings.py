@@ -26,9 +26,9 @@ class Report:
     """The findings of one part of an experiment; `text` sums them up in a few sentences."""
 
     text: str
-    tables: tuple[FoundTable, ...]
-    picture: str = ""
-    advice: tuple[Advice, ...] = ()
+    table: FoundTable
+    picture: str
+    advice: tuple[Advice, ...]
 
 
 def cost_report(part: str, title: str, conditions: Sequence[ConditionResult], cost: Any) -> Report:
@@ -62,9 +62,7 @@ def cost_report(part: str, title: str, conditions: Sequence[ConditionResult], co
         note=text,
         numbers=2,
     )
-    return Report(
-        text=text, tables=(table,), picture=_picture(series, cost.axis, title), advice=tuple(advice)
-    )
+    return Report(text=text, table=table, picture=_picture(series, cost.axis, title), advice=tuple(advice))
 
 
 def damage_table() -> tuple[FoundTable, list[str]]:
