@@ -1,4 +1,4 @@
-"""What a simulator's accuracy costs: the table, the page, the picture, and what the command refuses."""
+"""What a simulator's accuracy costs: the table, and what the command refuses."""
 
 import json
 import math
@@ -6,16 +6,7 @@ import math
 import pytest
 
 from graspsense.cli.main import main
-from graspsense.core.values.errors import ConfigError
-from graspsense.report.simulation import (
-    PEAK,
-    TRACE,
-    SimulationTrade,
-    VariantPoint,
-    simulation_markdown,
-    simulation_png,
-    simulation_rows,
-)
+from graspsense.experiments.simulation import PEAK, TRACE, SimulationTrade, VariantPoint, simulation_rows
 
 QUANTITIES = ("p_first", "delta_t", PEAK, TRACE)
 
@@ -61,24 +52,6 @@ def test_a_row_says_time_set_up_errors_and_what_failed():
     assert by_step["broken", "1 ms"][3:7] == ("-", "12.5", "-", "-")
 
 
-def test_the_page_has_the_table_with_date_and_versions():
-    page = simulation_markdown(TRADE)
-    assert "date 2026-11-21" in page
-    assert "numpy 2.4" in page
-    assert "| even | full | 1 ms | 1 | 12.5 | 1.0e-02 |" in page
-    assert "simulated" in page
-
-
-@pytest.mark.slow
-def test_the_picture_is_drawn_with_failures(tmp_path):
-    pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
-    file = tmp_path / "trade.png"
-    simulation_png(TRADE, file)
-    assert file.read_bytes().startswith(b"\x89PNG")
-    with pytest.raises(ConfigError, match="cannot be written"):
-        simulation_png(TRADE, tmp_path / "no" / "trade.png")
-
-
 def ended(arguments):
     with pytest.raises(SystemExit) as end:
         main(arguments)
@@ -99,9 +72,8 @@ def test_the_group_lists_what_there_is(capsys):
 
 
 @pytest.mark.slow
-def test_the_simulator_gets_better_with_finer_steps(capsys, tmp_path):
-    page = tmp_path / "page.md"
-    arguments = ["--scene", "can:empty_open", "--seeds", "1", "--markdown", str(page), "--json"]
+def test_the_simulator_gets_better_with_finer_steps(capsys):
+    arguments = ["--scene", "can:empty_open", "--seeds", "1", "--json"]
     assert ended(["tradeoff", "simulation", *arguments]) == 0
     answer = json.loads(capsys.readouterr().out)
     points = answer["points"]
@@ -115,4 +87,3 @@ def test_the_simulator_gets_better_with_finer_steps(capsys, tmp_path):
     assert 0.01 > errors[0] > 2.0 * errors[1] > 2.0 * errors[2] > 0.0
     # Near what the reference itself is exact to.
     assert errors[3] < 0.2 * errors[0]
-    assert "| even steps |" in page.read_text()

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
 from typing import Any
 
 import click
 
 from graspsense.cli.options import pipeline_options, settings_of
-from graspsense.cli.output import echo_json, file_to_write_as
-from graspsense.cli.terminal import echo, echo_table, talk
+from graspsense.cli.output import echo_json
+from graspsense.cli.terminal import echo, echo_table
 from graspsense.cli.tradeoff_recognition import commands
 
 
@@ -35,19 +33,10 @@ for _command in commands():
 @click.option(
     "--seeds", type=click.IntRange(min=1), default=2, show_default=True, help="Grasps of each scene."
 )
-@click.option("--png", metavar="FILE.png", callback=file_to_write_as(".png"), help="Draw the result.")
-@click.option(
-    "--markdown",
-    metavar="FILE.md",
-    callback=file_to_write_as(".md"),
-    help="Write the tables as a Markdown page.",
-)
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def simulation(
     scenes: tuple[str, ...],
     seeds: int,
-    png: str | None,
-    markdown: str | None,
     as_json: bool,
     **asked: Any,
 ) -> None:
@@ -58,8 +47,7 @@ def simulation(
     recognition is measured by `graspsense tradeoff accuracy`.
     """
     from graspsense.cli.progress import ProgressLine
-    from graspsense.experiments.simulation import SCENES, trade_simulation
-    from graspsense.report.simulation import simulation_markdown, simulation_png, simulation_rows
+    from graspsense.experiments.simulation import SCENES, simulation_rows, trade_simulation
 
     settings = settings_of(**asked)
     wanted = scenes or ((asked["object_name"],) if asked["object_name"] else SCENES)
@@ -68,29 +56,10 @@ def simulation(
         trade = trade_simulation(
             settings, scenes=wanted, seeds=range(first_seed, first_seed + seeds), progress=progress
         )
-    # What may have taken an hour is printed before a file can fail to be written.
     if as_json:
         echo_json(trade.as_json())
-    else:
-        made = ", ".join(f"{key} {value}" for key, value in trade.made.items())
-        echo(f"{trade.gripper}, simulated: {', '.join(trade.scenes)}, {len(trade.seeds)} seeds each")
-        echo(f"{made}\n")
-        echo_table(*simulation_rows(trade))
-    picture = None
-    if png:
-        simulation_png(trade, Path(png))
-        talk(f"drawn in {png}")
-        picture = os.path.relpath(png, Path(markdown or png).parent)
-    if markdown:
-        write_text(markdown, simulation_markdown(trade, picture))
-
-
-def write_text(path: str, text: str) -> None:
-    """Write a page and say where it is. Raises ClickException if that is not possible."""
-    from graspsense.core.files.whole_file import write_whole
-
-    try:
-        write_whole(Path(path), text.encode())
-    except OSError as error:
-        raise click.ClickException(f"{path} cannot be written: {error.strerror}") from error
-    talk(f"written to {path}")
+        return
+    made = ", ".join(f"{key} {value}" for key, value in trade.made.items())
+    echo(f"{trade.gripper}, simulated: {', '.join(trade.scenes)}, {len(trade.seeds)} seeds each")
+    echo(f"{made}\n")
+    echo_table(*simulation_rows(trade))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any, Final
 
@@ -50,11 +50,13 @@ class FoundTable:
         lines = [f"## {self.title}", ""]
         if self.note:
             lines += [self.note, ""]
-        lines.append(f"| {' | '.join(self.header)} |")
-        lines.append("|---" * len(self.header) + "|")
-        for row in self.rows:
-            lines.append(f"| {' | '.join(_cell(cell) for cell in row)} |")
-        return [*lines, ""]
+        return [*lines, *markdown_table(self.header, self.rows), ""]
+
+
+def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return a table of plain texts as lines of Markdown."""
+    lines = [f"| {' | '.join(header)} |", "|---" * len(header) + "|"]
+    return [*lines, *(f"| {' | '.join(map(_cell, row))} |" for row in rows)]
 
 
 def control_cells(condition: ConditionResult) -> tuple[str, ...]:

@@ -10,12 +10,11 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import asdict, evolve, frozen
 
 from graspsense.core.components.roles import BatchBackend, Grasped, SimulationVariant
 from graspsense.core.values.errors import ConfigError
 from graspsense.experiments.versions import measured_on
-from graspsense.report.simulation import PEAK, TRACE, SimulationTrade, VariantPoint
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,6 +23,9 @@ if TYPE_CHECKING:
     from graspsense.core.values.features import Features
     from graspsense.core.values.trace import Trace
 
+HEADER: Final = ("METHOD", "FIDELITY", "STEP OR ACCURACY", "MS A GRASP", "SET-UP, S")
+PEAK: Final = "peak force"
+TRACE: Final = "force trace, rms"
 SCENES: Final = (
     "odwalla:full_open",
     "odwalla:full_closed",
@@ -39,6 +41,71 @@ LEAST_S: Final = 0.2
 LEAST_RUNS: Final = 3
 """It is run at least this often after the first time, since a single run may contain the collection of the garbage that
 compiling left."""
+
+
+@frozen(kw_only=True)
+class VariantPoint:
+    """The errors of one variant and its processor time, both measured on the same grasps.
+
+    `seconds` is the processor time for one grasp, without set-up and compilation. `errors` are the largest errors over
+    all grasps, by quantity, and infinite if a feature is missing that the reference has. `setup_s` is the additional
+    time of the first grasps, for compiling or for loading compiled code. `failure` is the reason why there are no
+    errors, or why grasps ended otherwise than in the reference.
+    """
+
+    method: str
+    fidelity: str
+    step: str
+    role: str
+    seconds: float
+    setup_s: float
+    errors: Mapping[str, float]
+    failure: str = ""
+
+    @classmethod
+    def measured(cls, variant: SimulationVariant, **figures: Any) -> VariantPoint:
+        """Return what was measured of a variant; `figures` has the other fields."""
+        return cls(
+            method=variant.method,
+            fidelity=variant.fidelity,
+            step=variant.step,
+            role=variant.role,
+            **figures,
+        )
+
+
+@frozen(kw_only=True)
+class SimulationTrade:
+    """All variants of a simulated gripper, measured on the same grasps."""
+
+    gripper: str
+    scenes: tuple[str, ...]
+    seeds: tuple[int, ...]
+    quantities: tuple[str, ...]
+    points: tuple[VariantPoint, ...]
+    made: Mapping[str, str]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the trade-off as values for JSON."""
+        return asdict(self)
+
+
+def simulation_rows(trade: SimulationTrade) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return the header and the rows of the table: time, set-up and the largest error of each quantity."""
+    header = (*HEADER, *(name.upper() for name in trade.quantities), "")
+    rows = []
+    for point in trade.points:
+        errors = [_short(point.errors.get(name, math.nan)) for name in trade.quantities]
+        note = point.failure or ("the reference" if point.role == "reference" else "")
+        seconds, setup = (
+            f"{v:.3g}" if math.isfinite(v) else "-" for v in (1e3 * point.seconds, point.setup_s)
+        )
+        rows.append((point.method, point.fidelity, point.step, seconds, setup, *errors, note))
+    return header, rows
+
+
+def _short(error: float) -> str:
+    return "-" if math.isnan(error) else ("inf" if math.isinf(error) else f"{error:.1e}")
 
 
 def trade_simulation(
