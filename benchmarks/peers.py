@@ -22,8 +22,8 @@ from attrs import frozen
 from peer_engines import REFERENCE_STEPS, located_rk4, loops, mujoco_engines, ours, prepared, solvers, timed
 from peer_scenes import SCENES, PeerScene
 
-from graspsense.experiments.findings import markdown_table
 from graspsense.experiments.versions import where_measured
+from graspsense.report.found_table import markdown_table
 
 WARM_S = 0.1
 """A shorter grasp is preceded by one that is not timed, since the engine before has left other data in the caches."""

@@ -27,7 +27,6 @@ from graspsense.core.components.channels import cells_of
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.values.errors import RecordingEnded
-from graspsense.experiments.findings import markdown_table
 from graspsense.experiments.versions import where_measured
 from graspsense.gripper_api import no_signals
 from graspsense.plugin_api import (
@@ -46,6 +45,7 @@ from graspsense.plugin_api import (
 )
 from graspsense.recording.recorder import Recorder
 from graspsense.recording.recording_info import RecordingInfo
+from graspsense.report.found_table import markdown_table
 
 CELLS, IMAGE_HZ, PICTURES = 22, 30.0, 16
 

@@ -12,7 +12,7 @@ import click
 
 from graspsense.cli.live import Live, LiveOptions, live_options, shown_live
 from graspsense.cli.options import force_option, keys_option
-from graspsense.cli.output import echo_json
+from graspsense.cli.output import echo_found, echo_json
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
 from graspsense.core.values.errors import counted
 from graspsense.core.values.exit_code import ExitCode
@@ -245,7 +245,7 @@ def _print(summary: Summary, more: Findings | None, account: Account, page: str)
     else:
         for table in more.tables:
             echo(table.title, Style.HEADING)
-            echo_table(tuple(name.upper() for name in table.header), list(table.rows))
+            echo_found(table)
             echo()
     for note in account.notes:
         echo(f"note: {note}", Style.CAUTION, indent=2)

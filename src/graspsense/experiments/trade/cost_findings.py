@@ -10,9 +10,9 @@ from typing import Any, Final
 from attrs import frozen
 
 from graspsense.evaluation.intervals import percent, span
-from graspsense.experiments.findings import FoundTable
 from graspsense.experiments.summary import ConditionResult
 from graspsense.experiments.trade.trade_point import Advice, TradePoint, advise, trade_points
+from graspsense.report.found_table import FoundTable
 from graspsense.report.html import figure
 from graspsense.report.rates import RateRow, draw_breaks, rate_axis_title, rate_scale
 from graspsense.report.svg import DASHES, INKS, QUIET, Picture, reaching

@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from graspsense.evaluation.intervals import percent
-from graspsense.experiments.findings import CONTROLS, Findings, FoundTable, control_cells
+from graspsense.experiments.findings import CONTROLS, Findings, control_cells
 from graspsense.experiments.summary import Summary
 from graspsense.experiments.trade.cost_findings import Report, cost_report, damage_table
 from graspsense.experiments.trade.trade_point import Advice
+from graspsense.report.found_table import FoundTable
 from graspsense.report.wording import TARGETS
 
 RULE: Final = (
