@@ -52,9 +52,9 @@ class ExperimentCommand(click.Command):
 @click.option(
     "--executor",
     metavar="HOW",
-    help="serial, processes, dask, or dask:ADDRESS.  [default: processes; serial on one core]",
+    help="serial, processes, or dask:ADDRESS.  [default: processes; serial on one core]",
 )
-@click.option("--workers", type=int, help="Number of processes or local workers.  [default: number of cores]")
+@click.option("--workers", type=int, help="Number of processes.  [default: number of cores]")
 @keys_option("Set a key of the file: -o seeds=3, -o data.trials=2.", "KEY=VALUE")
 @force_option
 @live_options
