@@ -26,7 +26,7 @@ from random_scenes import controller_is_stable, error_of, flags_of
 
 from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import ConfigError, create
-from graspsense.report.simulation import markdown_table
+from graspsense.report.found_table import markdown_table
 from graspsense.simulator_api import NotCompilable, RunConfig, bind
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.chosen_steps import ChosenSteps

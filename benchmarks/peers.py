@@ -26,7 +26,7 @@ from peer_engines import REFERENCE_STEPS, located_rk4, loops, mujoco_engines, ou
 from peer_scenes import SCENES, PeerScene
 
 from graspsense.experiments.versions import where_measured
-from graspsense.report.simulation import markdown_table
+from graspsense.report.found_table import markdown_table
 
 WARM_S = 0.1
 """A shorter grasp is preceded by one that is not timed, since the engine before has left other data in the caches."""

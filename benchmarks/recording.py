@@ -45,7 +45,7 @@ from graspsense.plugin_api import (
 )
 from graspsense.recording.recorder import Recorder
 from graspsense.recording.recording_info import RecordingInfo
-from graspsense.report.simulation import markdown_table
+from graspsense.report.found_table import markdown_table
 
 CELLS, IMAGE_HZ, PICTURES = 22, 30.0, 16
 

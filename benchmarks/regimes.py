@@ -29,7 +29,7 @@ from random_scenes import Bench, Scene, controller_is_stable, flags_of, record_o
 from graspsense.evaluation.intervals import wilson
 from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import ConfigError
-from graspsense.report.simulation import markdown_table
+from graspsense.report.found_table import markdown_table
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.error import deviation
 from graspsense_sim_gripper.run.batch.job import FinishedGrasp

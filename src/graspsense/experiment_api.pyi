@@ -33,8 +33,8 @@ from graspsense.evaluation.intervals import wilson as wilson
 # Findings: tables and words
 from graspsense.experiments.findings import CONTROLS as CONTROLS
 from graspsense.experiments.findings import Findings as Findings
-from graspsense.experiments.findings import FoundTable as FoundTable
-from graspsense.experiments.findings import code as code
+from graspsense.report.found_table import FoundTable as FoundTable
+from graspsense.report.html import code as code
 from graspsense.experiments.findings import control_cells as control_cells
 from graspsense.evaluation.intervals import percent as percent
 from graspsense.evaluation.intervals import span as span

@@ -301,39 +301,3 @@ def test_a_file_of_the_current_folder_does_not_choose_where_compiled_code_is(lab
     (data / ".numba_config.yaml").write_text(f"cache_dir: {data / 'cache'}\n")
     assert lab.run(cwd=data) == ("42.0 False 0", "")
     assert not lab.mark.exists()
-
-
-DASK = """
-import os
-import psutil
-from graspsense.experiments.executors.dask import DaskCluster
-
-if __name__ == "__main__":
-    cluster = DaskCluster(None, 2)
-    cluster._client.wait_for_workers(2, timeout=60)
-    mine = psutil.Process()
-    for process in (mine, *mine.children(recursive=True)):
-        for socket in process.net_connections("inet"):
-            if socket.status == psutil.CONN_LISTEN:
-                print(process.pid == os.getpid(), socket.laddr.ip)
-    cluster.close()
-    # A program that the user starts later finds its own modules again.
-    assert "PYTHONSAFEPATH" not in os.environ
-"""
-
-
-@pytest.mark.slow
-def test_a_dask_cluster_of_a_run_is_reached_from_this_machine_alone(tmp_path):
-    pytest.importorskip("distributed", reason="Dask is not installed")
-    (tmp_path / "program.py").write_text(DASK)
-    done = subprocess.run(
-        [sys.executable, str(tmp_path / "program.py")],
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    listening = [line.split() for line in done.stdout.splitlines()]
-    assert {own for own, _ in listening} == {"True", "False"}
-    assert {address for _, address in listening} <= {"127.0.0.1", "::1"}

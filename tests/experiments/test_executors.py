@@ -97,10 +97,14 @@ def lab(tmp_path):
 
 
 @pytest.mark.parametrize("executor", ["processes", "dask"])
-def test_whatever_a_task_does_the_others_are_kept(lab, executor):
+def test_whatever_a_task_does_the_others_are_kept(lab, executor, request):
     lab.write("fine", "kills", "kills once", "raises", "prints", "exits")
-    how = ("-o", "seeds=1", "--executor", executor, "--workers", "2")
-    code, summary, stderr = lab.run("out", *how)
+    if executor == "dask":
+        _, address, worker = request.getfixturevalue("cluster")
+        worker(), worker()
+        executor = f"dask:{address}"
+    how = ("-o", "seeds=1", "--workers", "2", "--executor")
+    code, summary, stderr = lab.run("out", *how, executor)
 
     assert code == 1, stderr
     assert summary["stopped"] is None
@@ -115,7 +119,7 @@ def test_whatever_a_task_does_the_others_are_kept(lab, executor):
     assert "it ended its worker" in reasons["kills, seed 0"]
 
     kept = lab.results("out")
-    code, summary, stderr = lab.run("out", *how, "--resume", WAYWARD_TAMED="1")
+    code, summary, stderr = lab.run("out", *how, "processes", "--resume", WAYWARD_TAMED="1")
 
     assert code == 0, stderr
     assert (summary["kept"], summary["done"], summary["complete"]) == (3, 3, True)

@@ -11,7 +11,6 @@ from kept import keep
 
 from graspsense.core.components.registry import installed
 from graspsense.core.values.errors import ConfigError
-from graspsense.experiments.executors.dask import DaskCluster
 from graspsense.experiments.executors.processes import Processes
 from graspsense.experiments.executors.serial import Serial
 from graspsense.experiments.experiment_file import _located, read_experiment
@@ -234,17 +233,11 @@ def test_the_code_of_a_component_that_a_setting_names_is_an_input(monkeypatch):
     assert contents[foreign.name] != contents_of(params)[foreign.name]
 
 
-def dask_cluster():
-    pytest.importorskip("distributed", reason="Dask is not installed")
-    return DaskCluster(None, 2)
-
-
 @pytest.mark.parametrize(
     "executor",
     [
         pytest.param(Serial, id="serial"),
         pytest.param(partial(Processes, 2), id="processes", marks=pytest.mark.slow),
-        pytest.param(dask_cluster, id="dask", marks=pytest.mark.slow),
     ],
 )
 def test_a_table_that_is_replaced_while_the_experiment_runs_is_no_result_of_what_it_was_before(

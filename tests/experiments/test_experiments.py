@@ -470,7 +470,7 @@ def test_recorded_trials_are_not_simulated_in_silence(tmp_path):
     table = tmp_path / "t.csv"
     table.write_text("what,a\n" + "x,1\ny,2\n" * 5)
     with pytest.raises(ConfigError, match="has recorded trials"):
-        read_experiment("trade_next", [f'data.source="{table}"', 'data.label="what"', "seeds=1"])
+        read_experiment("trade_squeezes", [f'data.source="{table}"', 'data.label="what"', "seeds=1"])
 
 
 def test_an_experiment_does_not_write_into_a_store(file, tmp_path):

@@ -1,8 +1,7 @@
-"""What recognition costs: the front, paired tests, and when to squeeze again."""
+"""What recognition costs: the front, and paired tests."""
 
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 from cases import every_case
 
@@ -15,13 +14,6 @@ from graspsense.experiments.run import run_experiment
 from graspsense.experiments.summary import ConditionResult, summarise
 from graspsense.experiments.task_results import ClassifierResult, TrialValues
 from graspsense.experiments.trade.costs import mean_seconds
-from graspsense.experiments.trade.next_squeeze import (
-    Decision,
-    ForceChoices,
-    SqueezePredictions,
-    SqueezeStatistics,
-    decide,
-)
 from graspsense.experiments.trade.trade_point import advise, trade_points
 
 
@@ -117,52 +109,6 @@ def test_the_front_takes_intervals_into_account_and_a_high_value_may_be_the_chea
     assert [point.on_front for point in trade_points([high, low], False)] == ["yes", "yes"]
 
 
-KNOWS = np.array([[0.98, 0.02], [0.02, 0.98]])
-GUESSES = np.full((2, 2), 0.5)
-
-
-def squeezed(answer, seconds=1.0):
-    return SqueezePredictions(answer=np.array([answer]), seconds=np.array([seconds]))
-
-
-def statistics(confusion, seconds=1.0):
-    return SqueezeStatistics(confusion=confusion, seconds=np.full(2, seconds))
-
-
-def test_who_is_sure_at_the_contact_does_not_squeeze():
-    known = (squeezed(1), statistics(KNOWS))
-    forces = ForceChoices(answers={17.0: squeezed(0)}, statistics={17.0: statistics(KNOWS)})
-    decision = decide(0, known, forces, sure=0.9, most=3, again_s=1.0)
-    assert decision == Decision(answer=1, seconds=0.0, squeezes=0)
-
-
-def test_who_is_not_takes_the_force_that_tells_most_per_second():
-    nothing = (squeezed(0), statistics(GUESSES))
-    answers = {17.0: squeezed(0, 0.3), 20.0: squeezed(1, 0.4)}
-    informative = ForceChoices(
-        answers=answers, statistics={17.0: statistics(GUESSES, 0.3), 20.0: statistics(KNOWS, 0.4)}
-    )
-    decision = decide(0, nothing, informative, sure=0.9, most=3, again_s=1.0)
-    assert decision == Decision(answer=1, seconds=0.4, squeezes=1)
-    # Both are equally informative; one takes less time.
-    equal = ForceChoices(
-        answers=answers, statistics={17.0: statistics(KNOWS, 0.3), 20.0: statistics(KNOWS, 0.4)}
-    )
-    decision = decide(0, nothing, equal, sure=0.9, most=3, again_s=1.0)
-    assert decision == Decision(answer=0, seconds=0.3, squeezes=1)
-
-
-def test_a_second_squeeze_costs_its_opening_and_never_more_than_allowed():
-    nothing = (squeezed(0), statistics(GUESSES))
-    forces = ForceChoices(
-        answers={17.0: squeezed(0, 0.3), 20.0: squeezed(1, 0.4)},
-        statistics={17.0: statistics(KNOWS, 0.3), 20.0: statistics(KNOWS, 0.4)},
-    )
-    decision = decide(0, nothing, forces, sure=0.999, most=3, again_s=1.0)
-    assert (decision.seconds, decision.squeezes) == (pytest.approx(0.3 + 1.0 + 0.4), 2)
-    assert decide(0, nothing, forces, sure=0.999, most=1, again_s=1.0).squeezes == 1
-
-
 COMMON = """
 title = "Small"
 seeds = 2
@@ -182,8 +128,6 @@ targets = ["state"]
         ("early", "moments_s = [0.0, 1.0]", 2),
         ("squeezes", "most = 2", 2),
         ("physics", "error = 0.1", 2),
-        ("next_squeeze", "forces_n = [17.0, 20.0]", 1),
-        ("compare", "", 2),
     ],
 )
 def test_each_trade_runs_and_gives_advice(tmp_path, kind, more, trials):

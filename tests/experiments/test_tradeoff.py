@@ -1,22 +1,12 @@
-"""What a simulator's accuracy costs: the table, the page, the picture, and what the command refuses."""
+"""What a simulator's accuracy costs: the table, and what the command refuses."""
 
 import json
 import math
 
 import pytest
-from attrs import evolve
 
 from graspsense.cli.main import main
-from graspsense.core.values.errors import ConfigError
-from graspsense.report.simulation import (
-    PEAK,
-    TRACE,
-    SimulationTrade,
-    VariantPoint,
-    simulation_markdown,
-    simulation_png,
-    simulation_rows,
-)
+from graspsense.experiments.simulation import PEAK, TRACE, SimulationTrade, VariantPoint, simulation_rows
 
 QUANTITIES = ("p_first", "delta_t", PEAK, TRACE)
 
@@ -62,24 +52,6 @@ def test_a_row_says_time_set_up_errors_and_what_failed():
     assert by_step["broken", "1 ms"][3:7] == ("-", "12.5", "-", "-")
 
 
-def test_the_page_has_the_table_with_date_and_versions():
-    page = simulation_markdown(TRADE)
-    assert "date 2026-11-21" in page
-    assert "numpy 2.4" in page
-    assert "| even | full | 1 ms | 1 | 12.5 | 1.0e-02 |" in page
-    assert "simulated" in page
-
-
-@pytest.mark.slow
-def test_the_picture_is_drawn_with_failures(tmp_path):
-    pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
-    file = tmp_path / "trade.png"
-    simulation_png(TRADE, file)
-    assert file.read_bytes().startswith(b"\x89PNG")
-    with pytest.raises(ConfigError, match="cannot be written"):
-        simulation_png(TRADE, tmp_path / "no" / "trade.png")
-
-
 def ended(arguments):
     with pytest.raises(SystemExit) as end:
         main(arguments)
@@ -100,11 +72,9 @@ def test_the_group_lists_what_there_is(capsys):
 
 
 @pytest.mark.slow
-def test_the_simulator_gets_better_with_finer_steps(capsys, tmp_path):
-    page = tmp_path / "page.md"
-    arguments = ["--scene", "can:empty_open", "--seeds", "1", "--markdown", str(page), "--json"]
-    few = ["--recognition-seeds", "1", "--instances", "2"]
-    assert ended(["tradeoff", "simulation", *arguments, *few]) == 0
+def test_the_simulator_gets_better_with_finer_steps(capsys):
+    arguments = ["--scene", "can:empty_open", "--seeds", "1", "--json"]
+    assert ended(["tradeoff", "simulation", *arguments]) == 0
     answer = json.loads(capsys.readouterr().out)
     points = answer["points"]
     assert [p["role"] for p in points].count("reference") == 1
@@ -117,59 +87,3 @@ def test_the_simulator_gets_better_with_finer_steps(capsys, tmp_path):
     assert 0.01 > errors[0] > 2.0 * errors[1] > 2.0 * errors[2] > 0.0
     # Near what the reference itself is exact to.
     assert errors[3] < 0.2 * errors[0]
-    assert "| even steps |" in page.read_text()
-
-
-@pytest.mark.slow
-def test_the_condition_of_features_is_told_and_sensors_make_it_worse(capsys):
-    arguments = ["--scene", "odwalla:full_closed", "--seeds", "3", "--json"]
-    assert ended(["tradeoff", "condition", *arguments]) == 0
-    ideal, pads = json.loads(capsys.readouterr().out)
-    assert (ideal["sensor"], pads["sensor"]) == ("ideal", "pads")
-    finest = {feature["feature"]: feature["finest"] for feature in ideal["features"]}
-    jumpy = {feature["feature"]: feature["finest"] for feature in pads["features"]}
-    # With ideal sensors the physics is well conditioned; the reading of cell images is not.
-    assert max(finest.values()) < 1e-3
-    assert jumpy["delta_t"] > 1e-3
-
-
-@pytest.mark.slow
-def test_who_asks_for_more_than_a_feature_can_give_is_told(capsys):
-    assert ended(["run", "--explain-model"]) == 0
-    printed = " ".join(capsys.readouterr().out.split())
-    assert "gripper.accuracy = 0.01 is finer than delta_t, dp_dt, df_dt can be" in printed
-    assert ended(["run", "--explain-model", "-o", "gripper.sensor=ideal"]) == 0
-    printed = " ".join(capsys.readouterr().out.split())
-    assert "relative movement for 1 ppm of each of" in printed
-    assert "is finer than" not in printed
-
-
-@pytest.mark.slow
-def test_recognition_and_distances_of_variants_against_the_reference(tmp_path):
-    from graspsense.core.settings.resolved import resolve
-    from graspsense.experiments.sensed import sensed_trade
-    from graspsense.experiments.sensed_report import conclusion, sensed_png, sensed_rows
-
-    settings = resolve("default", options=["classifier.type=c45"])
-    variants = [
-        variant
-        for variant in settings.gripper.create().variants()
-        if variant.role == "reference"
-        or (variant.settings.get("accuracy") == 1e-4 and variant.fidelity == "scene")
-    ]
-    # On the catalogue even the coarsest accuracy gives accurate steps, so that a worse model has to be another one.
-    softer = {**variants[-1].settings, "pad_stiffness_n_m": 3000.0}
-    variants.append(evolve(variants[-1], step="soft fingertips", settings=softer))
-    trade = sensed_trade(settings, objects=["can"], instances=6, seeds=(1, 2), variants=variants)
-    points = {point.step: point for point in trade.points}
-    worse, fine = points["soft fingertips"], points["0.0001"]
-    # This feature is well conditioned, so that its distance is due to the model.
-    far, near = (next(d for d in point.distances if d.feature == "p_steady") for point in (worse, fine))
-    assert far.distance > 10.0 * near.distance
-    assert trade.grasps == 18
-    # Two seeds show no equivalence, and that is said.
-    assert "no variant is shown to be equivalent" in conclusion(trade)
-    header, rows = sensed_rows(trade)
-    assert all(len(row) == len(header) for row in rows)
-    sensed_png(trade, tmp_path / "trade.png")
-    assert (tmp_path / "trade.png").read_bytes().startswith(b"\x89PNG")

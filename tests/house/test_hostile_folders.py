@@ -91,16 +91,13 @@ def run(folder, *arguments):
     [
         "run --save kept -o classifier.type=none",
         "experiment it.toml --out out --executor processes --workers 2",
-        "experiment it.toml --out out --executor dask --workers 2",
         "import grasp.csv --time t --gap g --force f --force f --label can --save kept",
         "plugins check graspsense-c45 --no-wheel",
         "evaluate simulated --objects block,can:full_open --instances 2 --trials 2 --folds 2 -o gripper.compile=never",
     ],
-    ids=["run", "processes", "dask", "import", "plugins", "evaluate"],
+    ids=["run", "processes", "import", "plugins", "evaluate"],
 )
 def test_no_command_imports_from_the_current_folder(folder, command):
-    if "dask" in command:
-        pytest.importorskip("distributed", reason="Dask is not installed")
     run(folder, *command.split())
     assert ran(folder) == []
 

@@ -182,22 +182,6 @@ def test_times_at_the_ends_of_the_calendar_have_an_order_or_none():
     assert order == (2, 1, 0) or (order is None and "recorded_at" in why)
 
 
-@pytest.mark.slow
-def test_a_local_dask_cluster_without_shared_memory_is_refused_with_the_other_choice(monkeypatch):
-    pytest.importorskip("distributed")
-    import _multiprocessing
-
-    from graspsense.experiments.executors.dask import DaskCluster
-
-    class NoSemaphores(_multiprocessing.SemLock):
-        def __new__(cls, *arguments):
-            raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
-
-    monkeypatch.setattr(_multiprocessing, "SemLock", NoSemaphores)
-    with pytest.raises(ConfigError, match="executor=processes"):
-        DaskCluster(None, 1)
-
-
 def test_a_folder_of_calibrations_is_found_below_the_home_and_told_where_it_is_not_there(
     tmp_path, monkeypatch
 ):

@@ -12,7 +12,7 @@ import click
 
 from graspsense.cli.live import Live, LiveOptions, live_options, shown_live
 from graspsense.cli.options import force_option, keys_option
-from graspsense.cli.output import echo_json
+from graspsense.cli.output import echo_found, echo_json
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
 from graspsense.core.values.errors import ExitCode, counted
 
@@ -51,9 +51,9 @@ class ExperimentCommand(click.Command):
 @click.option(
     "--executor",
     metavar="HOW",
-    help="serial, processes, dask, or dask:ADDRESS.  [default: processes; serial on one core]",
+    help="serial, processes, or dask:ADDRESS.  [default: processes; serial on one core]",
 )
-@click.option("--workers", type=int, help="Number of processes or local workers.  [default: number of cores]")
+@click.option("--workers", type=int, help="Number of processes.  [default: number of cores]")
 @keys_option("Set a key of the file: -o seeds=3, -o data.trials=2.", "KEY=VALUE")
 @force_option
 @live_options
@@ -244,7 +244,7 @@ def _print(summary: Summary, more: Findings | None, account: Account, page: str)
     else:
         for table in more.tables:
             echo(table.title, Style.HEADING)
-            echo_table(tuple(name.upper() for name in table.header), list(table.rows))
+            echo_found(table)
             echo()
     for note in account.notes:
         echo(f"note: {note}", Style.CAUTION, indent=2)

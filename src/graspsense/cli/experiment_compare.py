@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
-from graspsense.cli.output import echo_json, file_to_write_as
-from graspsense.cli.terminal import Style, echo, echo_table
+from graspsense.cli.output import echo_found, echo_json, file_to_write_as
+from graspsense.cli.terminal import Style, echo
 
 DEFAULT_PAGE = "comparison.html"
 
@@ -30,15 +30,7 @@ def compare(folders: tuple[str, ...], out: str, as_json: bool) -> None:
     simulate the same trials with the same seeds.
     """
     from graspsense.experiments.comparison import compare_experiments
-    from graspsense.experiments.comparison_page import (
-        DIFFERENCE_HEADER,
-        RATE_HEADER,
-        comparison_page,
-        difference_rows,
-        failure_lines,
-        rate_rows,
-        settings_rows,
-    )
+    from graspsense.experiments.comparison_page import comparison_page, comparison_tables, failure_lines
     from graspsense.report.write import write_html
 
     comparison = compare_experiments(folders)
@@ -50,20 +42,11 @@ def compare(folders: tuple[str, ...], out: str, as_json: bool) -> None:
     echo()
     for line in failure_lines(comparison):
         echo(f"WARNING     {line}", Style.CAUTION, indent=12)
-    header, rows = settings_rows(comparison)
-    for title, columns, cells in (
-        ("What differs", header[:-1], [row[:-1] for row in rows]),
-        ("Recognition rates", RATE_HEADER, rate_rows(comparison)),
-        (
-            f"Differences from {comparison.experiments[0].name}",
-            DIFFERENCE_HEADER,
-            difference_rows(comparison),
-        ),
-    ):
-        echo(title, Style.HEADING)
-        if cells:
-            echo_table(tuple(name.upper() for name in columns), cells)
+    for table in comparison_tables(comparison):
+        echo(table.title, Style.HEADING)
+        if table.rows:
+            echo_found(table)
         else:
-            echo("nothing")
+            echo(table.note)
         echo()
     echo(f"page        {out}", indent=12)

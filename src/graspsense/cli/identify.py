@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from graspsense.cli.options import keys_option
-from graspsense.cli.output import check_outputs, echo_json, file_to_write_as
+from graspsense.cli.output import check_outputs, echo_found, echo_json, file_to_write_as
 from graspsense.cli.sources import named_source
-from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
+from graspsense.cli.terminal import Style, echo, echo_entry, talk
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from graspsense.core.components.identification import Identification, IdentifiedParameter
+    from graspsense.core.components.identification import Identification
 
 
 @click.command()
@@ -127,6 +126,7 @@ def _write_page(page: Path, result: Identification, scene: str) -> None:
 def _print(result: Identification) -> None:
     """Print the identified object, the candidates, and what is not determined."""
     from graspsense.core.components.identification import held_out_in_words, repeatability
+    from graspsense.report.identification import identification_tables, percent_of_peak
 
     rms = [fit.rms_n for fit in result.fits]
     relative = [fit.residual for fit in result.fits]
@@ -140,52 +140,20 @@ def _print(result: Identification) -> None:
     if result.held_out:
         echo_entry("held out", held_out_in_words(result.held_out))
     if len(result.fits) > 1:
-        echo_entry("repeatable", f"squeezes differ by {_percent(repeatability(result.fits))} of the peak")
+        echo_entry(
+            "repeatable", f"squeezes differ by {percent_of_peak(repeatability(result.fits))} of the peak"
+        )
+    parameters, candidates, undetermined = identification_tables(result)
     echo()
-    echo_table(
-        ("PARAMETER", "VALUE", "UNIT", "90 % INTERVAL", "BASIS"),
-        [
-            (parameter.name, f"{parameter.value:.4g}", parameter.unit, _interval(parameter), parameter.basis)
-            for parameter in result.parameters
-        ],
-    )
+    echo_found(parameters)
     echo()
-    echo_table(
-        ("CANDIDATE", "PARAMETERS", "ERROR", "FIT", "VERDICT"),
-        [
-            (
-                candidate.terms,
-                str(candidate.parameters),
-                _percent(candidate.error),
-                _percent(candidate.fit_error),
-                candidate.verdict,
-            )
-            for candidate in result.candidates
-        ],
-        {"VERDICT": lambda cell: Style.GOOD if cell == "chosen" else None},
-    )
+    echo_found(candidates, {"VERDICT": lambda cell: Style.GOOD if cell == "chosen" else None})
     echo()
     if not result.undetermined:
         return
     echo("not determined by these recordings:")
-    echo_table(
-        ("WHAT", "WHY", "WHAT WOULD DETERMINE IT"),
-        [
-            (undetermined.what, undetermined.reason, undetermined.remedy)
-            for undetermined in result.undetermined
-        ],
-    )
+    echo_found(undetermined)
     echo()
-
-
-def _interval(parameter: IdentifiedParameter) -> str:
-    if math.isnan(parameter.low):
-        return "-"
-    return f"{parameter.low:.4g} to {parameter.high:.4g}"
-
-
-def _percent(share: float) -> str:
-    return "-" if math.isnan(share) else f"{100.0 * share:.2f} %"
 
 
 def _as_values(out: str | None, result: Identification) -> dict[str, Any]:

@@ -1,16 +1,19 @@
-"""JSON on stdout, and options that name a file to write."""
+"""JSON and tables of results on stdout, and options that name a file to write."""
 
 from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import click
 
-from graspsense.cli.terminal import echo_as_it_is
+from graspsense.cli.terminal import StyleOf, echo_as_it_is, echo_table
+
+if TYPE_CHECKING:
+    from graspsense.report.found_table import FoundTable
 
 _PROBE_BYTES: Final = 1 << 16
 """Size of the file by which is tested whether a folder can be written; more than the smallest model."""
@@ -27,6 +30,16 @@ def echo_json(value: object, long: bool = False) -> None:
     echo_as_it_is(
         json.dumps(json_ready(value), indent=None if long else 2, ensure_ascii=False, allow_nan=False)
     )
+
+
+def echo_found(table: FoundTable, styles: Mapping[str, StyleOf] | None = None) -> None:
+    """Print the header and the rows of a table of results; `styles` are by the header, in capitals.
+
+    A unit in square brackets stays as it is.
+    """
+    names = (name.partition("[") for name in table.header)
+    header = tuple(f"{words.upper()}{bracket}{unit}" for words, bracket, unit in names)
+    echo_table(header, table.rows, styles)
 
 
 def file_to_write(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:

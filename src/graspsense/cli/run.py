@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from graspsense.core.values.device import DeviceInfo
     from graspsense.core.values.features import Prediction
     from graspsense.core.values.trial import Trial
-    from graspsense.experiments.condition import Conditions
     from graspsense.report.film import Film
 
 LARGEST_DRAWN_SEED: Final = 999_999
@@ -127,7 +126,12 @@ def run(
         if drawn:
             talk(f"seed {asked['seed']}, drawn for this trial; --seed {asked['seed']} repeats the grasp")
         shown.finished(trial, save)
-        _say_all(settings, trial, interrupted, kept, explain_model, as_json)
+        if as_json:
+            echo_json(_as_json(trial, kept))
+        else:
+            print_trial(trial)
+            _print_better(settings, trial)
+            _print_model(trial)
         if plot is not None:
             draw_grasp(trial, Path(plot))
         _write_film(film, save, kept)
@@ -141,25 +145,6 @@ def _performed(
     if save is None:
         return (*grasped(settings, sinks), None)
     return _kept(save, label, settings, sinks, changed)
-
-
-def _say_all(
-    settings: Settings,
-    trial: Trial,
-    interrupted: bool,
-    kept: Mapping[str, Any] | None,
-    explain_model: bool,
-    as_json: bool,
-) -> None:
-    """Print the trial, as text or as JSON."""
-    asked = explain_model and "model" in trial.report and not interrupted
-    condition = _condition(settings) if asked else None
-    if as_json:
-        further = {} if condition is None else {"condition": condition.as_values()}
-        echo_json({**_as_json(trial, kept), **further})
-    else:
-        print_trial(trial)
-        _print_further(settings, trial, condition)
 
 
 def _run_beside(
@@ -197,12 +182,6 @@ def _as_json(trial: Trial, kept: Mapping[str, Any] | None) -> dict[str, Any]:
     return {**trial_as_json(trial), **({} if kept is None else {"kept": kept})}
 
 
-def _print_further(settings: Settings, trial: Trial, condition: Conditions | None) -> None:
-    """Print which pipeline recognises more, and what the simulator computed."""
-    _print_better(settings, trial)
-    _print_model(trial, condition)
-
-
 def grasped(settings: Settings, sinks: Sequence[Sink]) -> tuple[Trial, bool]:
     """Grasp, and return the trial and whether it was interrupted."""
     from graspsense.core.components.registry import installed
@@ -227,17 +206,6 @@ def finish(trial: Trial, interrupted: bool, problem: str = "") -> None:
         raise KeyboardInterrupt
 
 
-def _condition(settings: Settings) -> Conditions | None:
-    """Return how far each feature of this grasp moves for 1 ppm of a parameter; None without an object."""
-    from graspsense.cli.progress import ProgressLine
-    from graspsense.experiments.condition import conditions
-
-    if settings.held in ("", "none"):
-        return None
-    with ProgressLine() as progress:
-        return conditions(settings, [settings.held], [settings.run.seed], progress=progress)
-
-
 def _print_better(settings: Settings, trial: Trial) -> None:
     """Name the pipeline that recognises more, if the plugin of this one declares it."""
     from graspsense.core.components.entries import PipelineEntry
@@ -252,18 +220,14 @@ def _print_better(settings: Settings, trial: Trial) -> None:
         )
 
 
-def _print_model(trial: Trial, condition: Conditions | None) -> None:
-    """Print what is known of the simulator's model: what is not verified, and where asked for, terms and condition."""
-    from graspsense.cli.condition_table import print_conditions
-
+def _print_model(trial: Trial) -> None:
+    """Print what is known of the simulator's model: what is not verified, and where asked for, its terms."""
     print_not_verified(trial.report)
     if "model" in trial.report:
         print_model(trial.report["model"])
         if "selection" in trial.report:
             print_without(trial.report["model"].get("without", ()), trial.report["selection"]["accuracy"])
             print_selection(trial.report["selection"])
-    if condition is not None:
-        print_conditions(condition, trial.report["selection"]["accuracy"])
 
 
 def _labelled_settings(label: str | None, asked: Mapping[str, Any]) -> Settings:

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from graspsense.cli.output import echo_json
+from graspsense.cli.output import echo_found, echo_json
 from graspsense.cli.sources import command_line, is_csv, keep_features, trials_of
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, echo_table, talk
-from graspsense.core.values.errors import counted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     from graspsense.core.learn.labelled import Labelled
     from graspsense.core.values.features import FeatureTable
     from graspsense.regression.model import PredictedValue, RegressionModel
-    from graspsense.regression.results import RegressionEvaluation, RegressionMeasurement
+    from graspsense.regression.results import RegressionEvaluation
 
 _FOR_LABELS: Final = ("png", "target", "checkpoints")
 
@@ -211,16 +210,9 @@ def _print_predictions(
 
 
 def _print_evaluation(evaluation: RegressionEvaluation) -> None:
-    unseen = evaluation.protocol == "instance_held_out"
-    objects = "objects of which no grasp was used for training" if unseen else (
-        "objects of which other grasps may have been used for training"
-    )  # fmt: skip
-    echo(
-        f"{evaluation.estimator} predicts {evaluation.target_value} of {counted(evaluation.headline.n, 'trial')} of "
-        f"{evaluation.source} with a mean "
-        f"absolute error of {evaluation.headline.words(evaluation.unit)}, on {objects}.",
-        Style.HEADING,
-    )
+    from graspsense.report.number_section import not_measured, number_table, number_verdict
+
+    echo(number_verdict(evaluation), Style.HEADING)
     for warning in evaluation.warnings:
         echo_entry("WARNING", warning, Style.CAUTION)
     echo()
@@ -244,41 +236,9 @@ def _print_evaluation(evaluation: RegressionEvaluation) -> None:
     for note in evaluation.notes:
         echo_entry("note", note)
     echo()
-    all_of = {**evaluation.protocols, **evaluation.controls}
-    unit = f" [{evaluation.unit}]" if evaluation.unit else ""
-    echo_table(
-        ("PROTOCOL OR CONTROL", f"ERROR{unit}", "95 %", "TRIALS", "LARGER BY", "WHAT"),
-        [
-            _row(name, measured, evaluation.headline.n)
-            for name, measured in all_of.items()
-            if measured.error is not None
-        ],
-    )
-    for name, measured in all_of.items():
-        if measured.error is None:
-            echo(f"{name}: not measured ({measured.reason})", indent=2)
-
-
-def _row(name: str, measured: RegressionMeasurement, trials: int) -> tuple[str, ...]:
-    error, by = measured.error, measured.difference
-    assert error is not None
-    interval = (
-        "no interval" if error.interval is None else f"{error.interval[0]:.4g} to {error.interval[1]:.4g}"
-    )
-    larger = ""
-    if by is not None:
-        larger = f"{by.value:+.3g}"
-        if by.interval is not None:
-            larger += f" ({by.interval[0]:+.3g} to {by.interval[1]:+.3g})"
-    compared = f" (compared with {measured.difference_of})" if measured.difference_of else ""
-    return (
-        name,
-        f"{error.mean_absolute:.4g}",
-        interval,
-        f"{error.n} of {trials}",
-        larger,
-        f"{measured.what}{compared}",
-    )
+    echo_found(number_table(evaluation))
+    for sentence in not_measured(evaluation):
+        echo(sentence, indent=2)
 
 
 def _with_unit(value: float, unit: str) -> str:

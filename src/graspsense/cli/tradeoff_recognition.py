@@ -22,8 +22,6 @@ EXPERIMENTS: Final[Mapping[str, tuple[str, str]]] = {
     "sensing": ("trade_sensing", "Recognition against frame rate, noise and number of cells."),
     "physics": ("trade_physics", "Recognition against errors of the physics in the training data."),
     "accuracy": ("trade_accuracy", "Recognition against the accuracy of the simulator."),
-    "next": ("trade_next", "Choice of the next squeeze, compared with a fixed squeeze."),
-    "classifiers": ("trade_classifiers", "Classifiers on the same folds, and the value of each feature."),
 }
 """Name to the experiment and what it measures."""
 

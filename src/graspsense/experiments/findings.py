@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from html import escape
 from typing import Any, Final
 
 from attrs import field, frozen
@@ -12,7 +11,8 @@ from attrs import field, frozen
 from graspsense.evaluation.intervals import percent
 from graspsense.experiments.summary import ConditionResult
 from graspsense.recording.provenance import commit_text
-from graspsense.report.html import Section, bullets, paragraph, table
+from graspsense.report.found_table import FoundTable, markdown_cell
+from graspsense.report.html import Section, bullets
 
 MARKDOWN: Final = "report.md"
 CONTROLS: Final[Mapping[str, str]] = {
@@ -23,38 +23,6 @@ CONTROLS: Final[Mapping[str, str]] = {
     "instance_held_out": "new bottles",
 }
 """The controls in a table of rates, each with the title of its column."""
-
-
-@frozen(kw_only=True)
-class FoundTable:
-    """A table of plain texts; columns from index `numbers` on are numbers."""
-
-    id: str
-    title: str
-    header: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    note: str = ""
-    numbers: int = 99
-    verdicts: tuple[int, ...] = ()
-    """Columns that say whether something holds."""
-
-    def section(self, drawn: str = "") -> Section:
-        """Return the section of the table; `drawn` is the picture above it."""
-        body = (paragraph(self.note) if self.note else "") + drawn
-        rows = table(self.title, self.header, self.rows, self.numbers, self.verdicts)
-        return Section(id=self.id, title=self.title, body=body + rows)
-
-    @property
-    def markdown(self) -> list[str]:
-        """The table as lines of Markdown."""
-        lines = [f"## {self.title}", ""]
-        if self.note:
-            lines += [self.note, ""]
-        lines.append(f"| {' | '.join(self.header)} |")
-        lines.append("|---" * len(self.header) + "|")
-        for row in self.rows:
-            lines.append(f"| {' | '.join(_cell(cell) for cell in row)} |")
-        return [*lines, ""]
 
 
 def control_cells(condition: ConditionResult) -> tuple[str, ...]:
@@ -102,14 +70,5 @@ class Findings:
         for shown in self.tables:
             lines += shown.markdown
         if self.notes:
-            lines += ["## Notes", "", *(f"- {_cell(note)}" for note in self.notes), ""]
+            lines += ["## Notes", "", *(f"- {markdown_cell(note)}" for note in self.notes), ""]
         return "\n".join(lines)
-
-
-def code(text: str) -> str:
-    """Return preformatted text, for a page."""
-    return f'<pre tabindex="0" role="region" aria-label="text">{escape(text)}</pre>'
-
-
-def _cell(text: str) -> str:
-    return text.replace("|", "\\|").replace("\n", " ")

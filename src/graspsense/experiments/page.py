@@ -18,8 +18,8 @@ from graspsense.experiments.summary import ConditionResult, Summary, unreadable_
 from graspsense.experiments.task_results import RecognitionResult
 from graspsense.recording.atomic_file import write_or_replace
 from graspsense.recording.provenance import commit_text
-from graspsense.report.evaluation_sections import code, confusion_section, controls_section, tree_section
-from graspsense.report.html import Page, Section, bullets, facts, folded, pair, paragraph, table
+from graspsense.report.evaluation_sections import confusion_section, controls_section, tree_section
+from graspsense.report.html import Page, Section, bullets, code, facts, folded, pair, paragraph, table
 from graspsense.report.rates import RateRow, rates_over, rates_picture, rates_table
 from graspsense.report.traces import features_by_class, features_table, one_grasp, traces_by_class
 from graspsense.report.wording import TARGETS, control_words, protocol_words
@@ -306,8 +306,8 @@ def _made_of(summary: Summary, results: Results) -> Section:
         facts(pairs)
         + bullets(notes)
         + folded("Versions", facts(versions))
-        + folded("The experiment with all its settings", code("experiment file", text))
-        + folded("Settings of the first case", code("settings", json.dumps(settings, indent=1)))
+        + folded("The experiment with all its settings", code(text, "experiment file"))
+        + folded("Settings of the first case", code(json.dumps(settings, indent=1), "settings"))
         + paragraph(
             "The method follows S. Chitta, M. Piccoli and J. Sturm, Tactile Object Class and Internal State "
             "Recognition for Mobile Manipulation, ICRA 2010. Intervals over seeds are Student's; those of one run "

@@ -5,19 +5,16 @@ from __future__ import annotations
 import math
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import asdict, evolve, frozen
 
 from graspsense.core.components.roles import BatchBackend, Grasped, SimulationVariant
 from graspsense.core.values.errors import ConfigError
-from graspsense.experiments.condition import SCALES
-from graspsense.experiments.sensors import with_ideal_sensors
 from graspsense.experiments.versions import measured_on
-from graspsense.report.simulation import PEAK, TRACE, SimulationTrade, VariantPoint
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,6 +23,9 @@ if TYPE_CHECKING:
     from graspsense.core.values.features import Features
     from graspsense.core.values.trace import Trace
 
+HEADER: Final = ("METHOD", "FIDELITY", "STEP OR ACCURACY", "MS A GRASP", "SET-UP, S")
+PEAK: Final = "peak force"
+TRACE: Final = "force trace, rms"
 SCENES: Final = (
     "odwalla:full_open",
     "odwalla:full_closed",
@@ -34,11 +34,78 @@ SCENES: Final = (
     "toy",
     "block",
 )
+SCALES: Final[Mapping[str, float]] = {"m": 1e-3, "N": 1.0, "s": 0.05, "m/s": 1e-3, "N/s": 1.0}
+"""Errors are relative to the value of the reference, or to this value of the same unit if that is larger."""
 LEAST_S: Final = 0.2
 """A variant is run again until this much processor time is measured, so that the clock's resolution is negligible."""
 LEAST_RUNS: Final = 3
 """It is run at least this often after the first time, since a single run may contain the collection of the garbage that
 compiling left."""
+
+
+@frozen(kw_only=True)
+class VariantPoint:
+    """The errors of one variant and its processor time, both measured on the same grasps.
+
+    `seconds` is the processor time for one grasp, without set-up and compilation. `errors` are the largest errors over
+    all grasps, by quantity, and infinite if a feature is missing that the reference has. `setup_s` is the additional
+    time of the first grasps, for compiling or for loading compiled code. `failure` is the reason why there are no
+    errors, or why grasps ended otherwise than in the reference.
+    """
+
+    method: str
+    fidelity: str
+    step: str
+    role: str
+    seconds: float
+    setup_s: float
+    errors: Mapping[str, float]
+    failure: str = ""
+
+    @classmethod
+    def measured(cls, variant: SimulationVariant, **figures: Any) -> VariantPoint:
+        """Return what was measured of a variant; `figures` has the other fields."""
+        return cls(
+            method=variant.method,
+            fidelity=variant.fidelity,
+            step=variant.step,
+            role=variant.role,
+            **figures,
+        )
+
+
+@frozen(kw_only=True)
+class SimulationTrade:
+    """All variants of a simulated gripper, measured on the same grasps."""
+
+    gripper: str
+    scenes: tuple[str, ...]
+    seeds: tuple[int, ...]
+    quantities: tuple[str, ...]
+    points: tuple[VariantPoint, ...]
+    made: Mapping[str, str]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the trade-off as values for JSON."""
+        return asdict(self)
+
+
+def simulation_rows(trade: SimulationTrade) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return the header and the rows of the table: time, set-up and the largest error of each quantity."""
+    header = (*HEADER, *(name.upper() for name in trade.quantities), "")
+    rows = []
+    for point in trade.points:
+        errors = [_short(point.errors.get(name, math.nan)) for name in trade.quantities]
+        note = point.failure or ("the reference" if point.role == "reference" else "")
+        seconds, setup = (
+            f"{v:.3g}" if math.isfinite(v) else "-" for v in (1e3 * point.seconds, point.setup_s)
+        )
+        rows.append((point.method, point.fidelity, point.step, seconds, setup, *errors, note))
+    return header, rows
+
+
+def _short(error: float) -> str:
+    return "-" if math.isnan(error) else ("inf" if math.isinf(error) else f"{error:.1e}")
 
 
 def trade_simulation(
@@ -118,8 +185,8 @@ def _measured(
     tick: Callable[[], None] | None,
 ) -> tuple[list[_Measured], float, float]:
     """Return features and force of every grasp, the processor time of one, and the additional time of the first run."""
-    config = evolve(with_ideal_sensors(settings.gripper).config, **variant.settings)
-    backend = settings.gripper.component.create(config)
+    ideal = settings.gripper.create().ideal_sensors
+    backend = settings.gripper.component.create(evolve(settings.gripper.config, **ideal, **variant.settings))
     controller, feature_set = settings.controller.create(), settings.features.create()
     backend.expect_features(feature_set)
     extract = _Extraction(feature_set)

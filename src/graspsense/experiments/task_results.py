@@ -26,7 +26,7 @@ MOST_KEPT_GRASPS: Final = 1000
 class ClassifierResult:
     """The rate of one classifier for one target, with its confusion matrix.
 
-    `cost` is what the rate costs in a trade-off experiment, `squeezes` the mean number of squeezes per answer.
+    `cost` is what the rate costs in a trade-off experiment.
     """
 
     classifier: str
@@ -40,7 +40,6 @@ class ClassifierResult:
     tree: tuple[TreeNode, ...] | None = None
     """The tree that the classifier grows on all trials; None if it grows none, or was not asked to."""
     cost: float | None = None
-    squeezes: float | None = None
 
     @classmethod
     def from_answers(

@@ -168,14 +168,6 @@ def graspsense_experiment_kinds() -> Iterable[ExperimentKindEntry]:
         ("early", "early", "EarlySettings", 0.0363, "recognition against the time since contact"),
         ("squeezes", "squeezes", "RepeatSettings", 0.0025, "recognition against the number of squeezes"),
         ("physics", "physics", "ModelErrorSettings", 0.00578, "recognition when test trials lack a term"),
-        ("next_squeeze", "next_squeeze", "NextSqueezeSettings", 0.0156, "rules for the next squeeze"),
-        (
-            "compare",
-            "compare",
-            "ComparisonSettings",
-            0.0232,
-            "classifiers against training and prediction time",
-        ),
     ):
         yield ExperimentKindEntry(
             name=name,
@@ -200,11 +192,9 @@ def graspsense_experiments() -> Iterable[ExperimentEntry]:
         ("probing_force", 0.00986),
         ("trade_accuracy", 0.00626),
         ("trade_cells", 0.0033),
-        ("trade_classifiers", 0.0232),
         ("trade_force", 0.009),
         ("trade_frame_rate", 0.00337),
         ("trade_joint", None),
-        ("trade_next", 0.0156),
         ("trade_noise", 0.000927),
         ("trade_physics", 0.00529),
         ("trade_recognition", None),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
 
 from graspsense.core.values.tree import TreeNode
 from graspsense.evaluation.doubt import Reliability, SetCoverage
@@ -104,8 +103,3 @@ def tree_section(nodes: Sequence[TreeNode], what: str) -> Section:
         "the predicted label."
     )
     return Section(id="tree", title="Decision tree", body=paragraph(text) + tree_list(nodes))
-
-
-def code(label: str, text: str) -> str:
-    """Return preformatted text in a scrollable box."""
-    return f'<pre tabindex="0" role="region" aria-label="{escape(label)}">{escape(text)}</pre>'

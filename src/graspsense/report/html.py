@@ -179,6 +179,11 @@ def wide(label: str, body: str) -> str:
     )
 
 
+def code(text: str, label: str = "text") -> str:
+    """Return preformatted text in a scrollable box; `label` is its name for screen readers."""
+    return f'<pre tabindex="0" role="region" aria-label="{escape(label)}">{escape(text)}</pre>'
+
+
 def facts(pairs: Sequence[tuple[str, str]]) -> str:
     """Return a description list from pairs of a term and its description."""
     return f"<dl>{''.join(f'<dt>{escape(k)}</dt><dd>{inline(v)}</dd>' for k, v in pairs)}</dl>"

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from graspsense.core.components.identification import held_out_in_words, repeatability
+from graspsense.report.found_table import FoundTable
 from graspsense.report.html import Page, Section, bullets, figure, panels, paragraph, table
 from graspsense.report.svg import INKS, QUIET, WIDTH, AxisScale, Picture, reaching
 
@@ -36,6 +37,7 @@ def identification_page(result: Identification, scene: str) -> Page:
     relative = [fit.residual for fit in result.fits]
     chosen = next(candidate.terms for candidate in result.candidates if candidate.chosen)
     what = result.label or "the object"
+    parameters, candidates, undetermined = identification_tables(result)
     return Page(
         kind="Identified object",
         title=what,
@@ -47,10 +49,10 @@ def identification_page(result: Identification, scene: str) -> Page:
         ),
         beside=bullets(result.refusals, "warning") + bullets(result.notes),
         sections=(
-            Section(id="parameters", title="Parameters", body=_parameters(result.parameters)),
-            Section(id="open", title="Not determined", body=_undetermined(result)),
+            parameters.section(),
+            undetermined.section(),
             Section(id="fits", title="Data and fit", body=_fits(result.fits)),
-            Section(id="candidates", title="Candidates", body=_candidates(result)),
+            candidates.section(),
             Section(id="pairs", title="Pairs of parameters", body=_pairs(result)),
             Section(id="check", title="Simulated beside recorded squeezes", body=_checks(result.checks)),
         ),
@@ -67,50 +69,45 @@ def _held_out(errors: Sequence[float]) -> str:
     return f"Held out: {held_out_in_words(errors)}. " if errors else ""
 
 
-def _parameters(parameters: Sequence[IdentifiedParameter]) -> str:
-    rows = [
-        (
-            parameter.name,
-            f"{parameter.value:.4g}",
-            _number(parameter.low),
-            _number(parameter.high),
-            parameter.unit,
-            parameter.basis,
-        )
-        for parameter in parameters
-    ]
-    return table(
-        "Values with 90 % intervals", ("parameter", "value", "from", "to", "unit", "the interval is"), rows, 1
+def identification_tables(result: Identification) -> tuple[FoundTable, FoundTable, FoundTable]:
+    """Return the parameters, the candidates, and what the recordings do not determine."""
+    parameters = FoundTable(
+        id="parameters",
+        title="Parameters",
+        header=("parameter", "value", "unit", "90 % interval", "basis"),
+        rows=tuple(
+            (parameter.name, f"{parameter.value:.4g}", parameter.unit, _interval(parameter), parameter.basis)
+            for parameter in result.parameters
+        ),
     )
-
-
-def _undetermined(result: Identification) -> str:
-    rows = [
-        (undetermined.what, undetermined.reason, undetermined.remedy) for undetermined in result.undetermined
-    ]
-    if not rows:
-        return paragraph("These recordings determine every number of the scene.")
-    return table("What these recordings leave open", ("what", "why", "what would determine it"), rows)
-
-
-def _candidates(result: Identification) -> str:
-    rows = [
-        (
-            candidate.terms,
-            str(candidate.parameters),
-            _percent(candidate.error),
-            _percent(candidate.fit_error),
-            candidate.verdict,
-        )
-        for candidate in result.candidates
-    ]
-    note = paragraph(
-        "The error is the rms residual over the peak force, of other recordings with a width and a stiffness of their "
-        "own, or of other stretches of a single recording. The simplest candidate is chosen whose error is not larger "
-        "than the least by more than a standard error of the difference."
+    candidates = FoundTable(
+        id="candidates",
+        title="Candidates",
+        header=("candidate", "parameters", "error", "fit", "verdict"),
+        rows=tuple(
+            (
+                candidate.terms,
+                str(candidate.parameters),
+                percent_of_peak(candidate.error),
+                percent_of_peak(candidate.fit_error),
+                candidate.verdict,
+            )
+            for candidate in result.candidates
+        ),
+        note="The error is the rms residual over the peak force, of other recordings with a width and a stiffness of "
+        "their own, or of other stretches of a single recording; the fit is that of the recordings themselves. The "
+        "simplest candidate is chosen whose error is not larger than the least by more than a standard error of the "
+        "difference.",
+        numbers=1,
     )
-    header = ("candidate", "parameters", "error", "error, fitted", "verdict")
-    return note + table("Candidates", header, rows, 1)
+    undetermined = FoundTable(
+        id="open",
+        title="Not determined by these recordings",
+        header=("what", "why", "what would determine it"),
+        rows=tuple((quantity.what, quantity.reason, quantity.remedy) for quantity in result.undetermined),
+        note="" if result.undetermined else "These recordings determine every number of the scene.",
+    )
+    return parameters, candidates, undetermined
 
 
 def _fits(fits: Sequence[SqueezeFit]) -> str:
@@ -210,9 +207,10 @@ def _histogram(check: PredictiveCheck) -> str:
     return figure(picture.svg(words), words)
 
 
-def _number(value: float) -> str:
-    return "–" if math.isnan(value) else f"{value:.4g}"
+def _interval(parameter: IdentifiedParameter) -> str:
+    return "-" if math.isnan(parameter.low) else f"{parameter.low:.4g} to {parameter.high:.4g}"
 
 
-def _percent(share: float) -> str:
-    return "–" if math.isnan(share) else f"{100.0 * share:.2f} %"
+def percent_of_peak(share: float) -> str:
+    """Return a share of the peak force in per cent; a dash where there is none."""
+    return "-" if math.isnan(share) else f"{100.0 * share:.2f} %"

@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING, Final
 from attrs import evolve
 
 from graspsense.core.learn.copies import without_copies
+from graspsense.core.values.errors import counted
 from graspsense.regression.estimators import DEFAULT_ESTIMATOR
 from graspsense.regression.evaluate import evaluate_regression
+from graspsense.report.found_table import FoundTable
 from graspsense.report.html import Page, Section, bullets, figure, pair, paragraph, table
 from graspsense.report.svg import INKS, QUIET, Picture, number, reaching
 from graspsense.store.dataset import labelled_store
 
 if TYPE_CHECKING:
+    from graspsense.regression.error import RegressionError
     from graspsense.regression.results import RegressionEvaluation, RegressionMeasurement
 
 MEASUREMENTS: Final = "grasp"
@@ -52,16 +55,70 @@ def with_numbers(page: Page, numbers: Sequence[Section]) -> Page:
     return evolve(page, sections=(*page.sections[:place], *numbers, *page.sections[place:]))
 
 
+def number_verdict(evaluation: RegressionEvaluation) -> str:
+    """Return the error with which the number is predicted, and on which objects, in a sentence."""
+    unseen = evaluation.protocol == "instance_held_out"
+    grasps = "no grasp was used" if unseen else "other grasps may have been used"
+    trials = counted(evaluation.headline.n, "trial")
+    return (
+        f"{evaluation.estimator} predicts {evaluation.target_value} of {trials} of {evaluation.source} with a mean "
+        f"absolute error of {evaluation.headline.words(evaluation.unit)}, on objects of which {grasps} for training."
+    )
+
+
+def number_table(evaluation: RegressionEvaluation) -> FoundTable:
+    """Return the errors of the protocols and controls that were measured."""
+    measured = {**evaluation.protocols, **evaluation.controls}
+    return FoundTable(
+        id="errors",
+        title=f"Errors of {evaluation.target_value}: other protocols, and controls",
+        header=(
+            "protocol or control",
+            _with_unit("error", evaluation.unit and f"[{evaluation.unit}]"),
+            "95 %",
+            "trials",
+            "larger by",
+            "what",
+        ),
+        rows=tuple(
+            _cells(name, measurement.error, measurement, evaluation.headline.n)
+            for name, measurement in measured.items()
+            if measurement.error is not None
+        ),
+        numbers=1,
+    )
+
+
+def not_measured(evaluation: RegressionEvaluation) -> list[str]:
+    """Return a sentence for each protocol or control that could not be measured."""
+    measured = {**evaluation.protocols, **evaluation.controls}
+    return [f"{name}: not measured ({each.reason})" for name, each in measured.items() if each.error is None]
+
+
+def _cells(
+    name: str, error: RegressionError, measurement: RegressionMeasurement, trials: int
+) -> tuple[str, ...]:
+    larger = ""
+    if measurement.difference is not None:
+        larger = f"{measurement.difference.value:+.3g}"
+        if measurement.difference.interval is not None:
+            low, high = measurement.difference.interval
+            larger += f" ({low:+.3g} to {high:+.3g})"
+    compared = f" (compared with {measurement.difference_of})" if measurement.difference_of else ""
+    return (
+        name,
+        f"{error.mean_absolute:.4g}",
+        "no interval" if error.interval is None else f"{error.interval[0]:.4g} to {error.interval[1]:.4g}",
+        f"{error.n} of {trials}",
+        larger,
+        f"{measurement.what}{compared}",
+    )
+
+
 def number_section(evaluation: RegressionEvaluation) -> Section:
     """Return the section with the error of a predicted number, its controls, and each prediction beside the truth."""
     name, unit = evaluation.target_value, evaluation.unit
-    objects = (
-        "objects of which no grasp was used for training"
-        if evaluation.protocol == "instance_held_out"
-        else "grasps of which others of the same object may have been used for training"
-    )
-    error = evaluation.headline.words(unit)
-    text = f"{evaluation.estimator} predicts {name} with a mean absolute error of {error}, on {objects}."
+    text = number_verdict(evaluation)
     if evaluation.explained is not None:
         text += (
             f" R² is {evaluation.explained:.2f}: 1 is perfect, 0 no better than always predicting the mean."
@@ -75,36 +132,17 @@ def number_section(evaluation: RegressionEvaluation) -> Section:
             f"{intervals.covered.words}; they are plus or minus "
             f"{_with_unit(number(intervals.mean_half_width), unit)} on average."
         )
-    measured = {**evaluation.protocols, **evaluation.controls}
-    rows = [
-        _row(key, measured_key) for key, measured_key in measured.items() if measured_key.error is not None
-    ]
-    missing = [
-        f"{key}: not measured ({measured_key.reason})"
-        for key, measured_key in measured.items()
-        if measured_key.error is None
-    ]
-    header = ("protocol or control", _with_unit("error", unit and f"[{unit}]"), "95 %", "trials", "what")
-    caption = f"Errors of {name}: other protocols, and controls"
+    errors = number_table(evaluation)
+    rows = [(name.replace("_", " "), *cells) for name, *cells in errors.rows]
     body = (
         paragraph(text)
         + bullets(evaluation.warnings, "warning")
-        + pair(_scatter(evaluation), table(caption, header, rows, 1) + bullets(missing))
+        + pair(
+            _scatter(evaluation),
+            table(errors.title, errors.header, rows, errors.numbers) + bullets(not_measured(evaluation)),
+        )
     )
     return Section(id=f"number-{_identifier(name)}", title=f"Predicted number: {name}", body=body)
-
-
-def _row(key: str, measurement: RegressionMeasurement) -> tuple[str, ...]:
-    assert measurement.error is not None
-    interval = measurement.error.interval
-    span = "none" if interval is None else f"{number(interval[0])} to {number(interval[1])}"
-    return (
-        key.replace("_", " "),
-        number(measurement.error.mean_absolute),
-        span,
-        str(measurement.error.n),
-        measurement.what,
-    )
 
 
 def _scatter(evaluation: RegressionEvaluation) -> str:

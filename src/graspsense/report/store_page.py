@@ -18,7 +18,6 @@ from graspsense.recording.provenance import commit_text
 from graspsense.recording.readable import note_on, readable
 from graspsense.recording.reader import read_recorded
 from graspsense.report.evaluation_page import beside, features_section, result_sections
-from graspsense.report.evaluation_sections import code
 from graspsense.report.film import picture_of_trial
 from graspsense.report.further_channels import channel_figures
 from graspsense.report.grasp_curve import GraspCurve, grasp_curve
@@ -26,6 +25,7 @@ from graspsense.report.html import (
     Page,
     Section,
     bullets,
+    code,
     facts,
     figure,
     folded,
@@ -289,7 +289,7 @@ def _provenance(
         + table("Trials by label and outcome", ("label", "outcome", "state", "trials"), by_label, 3)
         + folded(newest, table(newest, header, rows))
         + _changes(changes)
-        + folded(f"Settings of trial {trial.summary.id}", code("settings", trial.record.settings_text))
+        + folded(f"Settings of trial {trial.summary.id}", code(trial.record.settings_text, "settings"))
     )
     return Section(id="made", title="Provenance", body=body)
 

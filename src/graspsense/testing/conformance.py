@@ -1,9 +1,9 @@
-"""Runs the checks of a component: all at once, as cases of pytest, or by a class to inherit from."""
+"""Runs the checks of a component: all at once, or as cases of pytest."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 from attrs import define, field
 
@@ -193,42 +193,3 @@ def parametrize_checks(name: str, **options: Any) -> Any:
 
     cases = list(examine(name, **options).cases())
     return pytest.mark.parametrize("check", cases, ids=[case.id for case in cases])
-
-
-class Conformance:
-    """Base class for a class `Test...` with a test for each check of the component `name`.
-
-    `keys`, `unplugged`, `absent`, `expected_failures`, `wheel` and `data` are as in `examine`.
-    """
-
-    name: ClassVar[str]
-    keys: ClassVar[Mapping[str, Any]] = {}
-    unplugged: ClassVar[Mapping[str, Any] | None] = None
-    absent: ClassVar[Mapping[str, Any] | None] = None
-    expected_failures: ClassVar[Mapping[str, str]] = {}
-    wheel: ClassVar[bool] = True
-    data: ClassVar[Mapping[str, str]] = {}
-
-    def __init_subclass__(cls) -> None:
-        super().__init_subclass__()
-        examined = examine(
-            cls.name,
-            keys=cls.keys,
-            unplugged=cls.unplugged,
-            absent=cls.absent,
-            expected_failures=cls.expected_failures,
-            wheel=cls.wheel,
-            data=cls.data,
-        )
-        several = len(examined.subjects) > 1
-        for case in examined.cases():
-            part, _, check = case.id.rpartition(":")
-            test = f"test_{part}_{check}" if several else f"test_{check}"
-            setattr(cls, "".join(c if c.isalnum() else "_" for c in test), _test_of(case))
-
-
-def _test_of(case: BoundCheck | MinimumCase) -> Callable[[Any], None]:
-    def test(self: Any) -> None:
-        case.run()
-
-    return test

@@ -255,8 +255,7 @@ class SimulationVariant:
     """Settings of a simulated gripper with a certain trade-off between accuracy and time.
 
     `settings` are keys of the gripper's own table. Variants of one `method` and `fidelity` form a curve, on which
-    `step` names the point. The `role` is `reference` for the variant that errors are measured against. With those that
-    are `for_recognition`, recognition is measured as well.
+    `step` names the point. The `role` is `reference` for the variant that errors are measured against.
     """
 
     method: str
@@ -264,7 +263,6 @@ class SimulationVariant:
     step: str
     settings: Mapping[str, Any]
     role: Literal["curve", "reference"] = "curve"
-    for_recognition: bool = False
 
 
 class BatchOptions(TypedDict, total=False):
@@ -291,13 +289,6 @@ class BatchBackend(SensorBackend[ConfigT]):
     def variants(self) -> Sequence[SimulationVariant]:
         """Return the variants that trade accuracy for time; empty if there are none."""
         return ()
-
-    def perturbed(self, scenes: Sequence[str], share: float) -> Mapping[str, BatchBackend[Any]]:
-        """Return this gripper with each parameter of it, or of these scenes, larger by a share; "" is unchanged.
-
-        They keep every term, and their steps do not depend on the parameters. Empty if this is not possible.
-        """
-        return {}
 
     @abstractmethod
     def run_many(

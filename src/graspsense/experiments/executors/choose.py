@@ -9,7 +9,7 @@ from graspsense.core.components.caller import option
 from graspsense.core.values.errors import ConfigError, suggestion
 from graspsense.experiments.executors.base import Executor
 
-NAMES = ("serial", "processes", "dask")
+NAMES = ("serial", "processes", "dask:ADDRESS")
 
 
 def chosen(asked: str | None, workers: int | None = None) -> Callable[[], Executor]:
@@ -22,10 +22,10 @@ def chosen(asked: str | None, workers: int | None = None) -> Callable[[], Execut
         raise ConfigError(f"{option('workers', str(workers))}: give at least 1")
     number = workers or cores
     name, _, address = (asked or ("processes" if number > 1 else "serial")).partition(":")
-    if name not in NAMES or (address and name != "dask"):
+    if name not in (("dask",) if address else ("serial", "processes")):
         raise ConfigError(
-            f"there is no executor {asked!r}.{suggestion(name, NAMES)} There are {', '.join(NAMES)}, and "
-            "dask:ADDRESS, as in dask:tcp://10.0.0.1:8786"
+            f"there is no executor {asked!r}.{suggestion(name, NAMES)} There are {', '.join(NAMES)}, as in "
+            "dask:tcp://10.0.0.1:8786"
         )
     if name == "serial":
         from graspsense.experiments.executors.serial import Serial
@@ -37,4 +37,4 @@ def chosen(asked: str | None, workers: int | None = None) -> Callable[[], Execut
         return lambda: Processes(number)
     from graspsense.experiments.executors.dask import DaskCluster
 
-    return lambda: DaskCluster(address or None, number)
+    return lambda: DaskCluster(address)

@@ -1,25 +1,20 @@
-"""Runs tasks on a Dask cluster: an existing one, by the address of its scheduler, or a local one made for the run."""
+"""Runs tasks on a Dask cluster, by the address of its scheduler."""
 
 from __future__ import annotations
 
-import os
-import tempfile
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import suppress
 from importlib import import_module
 from typing import Any, Final, Literal
 
-from graspsense.core.components.caller import option
 from graspsense.core.values.errors import ConfigError, PluginUnavailable, named
 from graspsense.experiments.executors.base import ExecutorLost
 from graspsense.experiments.task import Task, TaskResult, run_task
 from graspsense.experiments.versions import differences, versions
 
 HINT: Final = 'the executor dask needs Dask: pip install "graspsense[dask]", or pip install dask distributed'
-LOOPBACK: Final = "127.0.0.1"
-"""Where a cluster that was made for the run listens, dashboard included: no other machine can reach it."""
 CONNECTING_S: Final = 10.0
 WORKERS_COMING_S: Final = 30.0
 LOOKING_S: Final = 2.0
@@ -32,25 +27,14 @@ WITHOUT_WORKERS_S: Final = 60.0
 class DaskCluster:
     """The executor `dask`."""
 
-    def __init__(self, address: str | None, workers: int) -> None:
+    def __init__(self, address: str) -> None:
         try:
             # Imported only here, because the import takes a second.
-            dask, self._distributed = import_module("dask"), import_module("distributed")
+            self._distributed = import_module("distributed")
         except ImportError as error:
             raise PluginUnavailable(f"{HINT} ({error})") from error
-        self._cluster: Any = None
-        self._wanted = workers
-        self._local = ExitStack()
-        if address is None:
-            self._local.enter_context(_without_current_folder())
-            # Dask imports from its folder for temporary files: with its default, other users could write there.
-            scratch = tempfile.TemporaryDirectory(prefix="graspsense-", ignore_cleanup_errors=True)
-            dask.config.set({"temporary-directory": self._local.enter_context(scratch)})
-            # Dask retries a task once: its worker may have been dying because of another task.
-            dask.config.set({"distributed.scheduler.allowed-failures": 1})
-            self._cluster = self._local_cluster(workers)
         try:
-            self._client = self._distributed.Client(address or self._cluster, timeout=CONNECTING_S)
+            self._client = self._distributed.Client(address, timeout=CONNECTING_S)
         except (OSError, TimeoutError, ValueError) as error:
             raise ConfigError(
                 f"no Dask scheduler answers at {address} within {CONNECTING_S:g} s ({error}). Start one with "
@@ -58,27 +42,6 @@ class DaskCluster:
             ) from error
         self._futures: list[Any] = []
         self._seen = time.monotonic()
-
-    def _local_cluster(self, workers: int) -> Any:
-        """Return a cluster on this machine. Raises ConfigError if none can be started, as without shared memory."""
-        try:
-            return self._distributed.LocalCluster(
-                n_workers=workers,
-                threads_per_worker=1,
-                host=LOOPBACK,
-                dashboard_address=f"{LOOPBACK}:0",
-                silence_logs=50,
-            )
-        except Exception as error:  # Dask raises various exceptions, from several layers
-            self._local.close()
-            cause: BaseException = error
-            while cause.__cause__ is not None:
-                cause = cause.__cause__
-            raise ConfigError(
-                f"no local Dask cluster can be started here: {named(error)} ({named(cause)}). Dask needs shared memory "
-                f"(/dev/shm) and sockets of this machine. Use {option('executor', 'processes')}, or name a running "
-                "scheduler"
-            ) from error
 
     @property
     def workers(self) -> int:
@@ -174,27 +137,20 @@ class DaskCluster:
             self._watch()
 
     def _watch(self) -> None:
-        """Check scheduler and workers, and restart lost local ones. Raises ExecutorLost if none is left."""
+        """Check scheduler and workers. Raises ExecutorLost if none is left."""
         if self._client.status != "running":
             raise ExecutorLost(_GONE)
-        if self._cluster is not None and len(self._cluster.workers) < self._wanted:
-            # The nanny of a worker gives up after it has died several times.
-            self._cluster.scale(self._wanted)
         if self._client.nthreads():
             self._seen = time.monotonic()
         elif time.monotonic() - self._seen > WITHOUT_WORKERS_S:
             raise ExecutorLost(f"the Dask cluster has had no worker for {WITHOUT_WORKERS_S:g} s")
 
     def close(self) -> None:
-        """Cancel the unfinished tasks, and stop the cluster if it was made for the run."""
+        """Cancel the unfinished tasks."""
         with suppress(Exception):
             self._client.cancel(self._futures, force=True)
         with suppress(Exception):
             self._client.close(timeout=5)
-        if self._cluster is not None:
-            with suppress(Exception):
-                self._cluster.close(timeout=5)
-        self._local.close()
 
     def _compare(self) -> None:
         """Raise ConfigError if no worker appears, or if one has other versions than this process."""
@@ -216,24 +172,6 @@ class DaskCluster:
                 "workers have other versions than this process, so that their results would not be comparable:\n  "
                 + "\n  ".join(differs)
             )
-
-
-@contextmanager
-def _without_current_folder() -> Iterator[None]:
-    """Have the processes that begin meanwhile import nothing from the current folder.
-
-    These are the workers, those that replace lost ones, and the process that tracks their resources.
-    """
-    name = "PYTHONSAFEPATH"
-    users_own = os.environ.get(name)
-    os.environ[name] = "1"
-    try:
-        yield
-    finally:
-        if users_own is None:
-            os.environ.pop(name, None)
-        else:
-            os.environ[name] = users_own
 
 
 def _done(task: Task, answer: str | Exception) -> TaskResult:

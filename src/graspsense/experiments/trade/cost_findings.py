@@ -10,9 +10,9 @@ from typing import Any, Final
 from attrs import frozen
 
 from graspsense.evaluation.intervals import percent, span
-from graspsense.experiments.findings import FoundTable
 from graspsense.experiments.summary import ConditionResult
 from graspsense.experiments.trade.trade_point import Advice, TradePoint, advise, trade_points
+from graspsense.report.found_table import FoundTable
 from graspsense.report.html import figure
 from graspsense.report.rates import RateRow, draw_breaks, rate_axis_title, rate_scale
 from graspsense.report.svg import DASHES, INKS, QUIET, Picture, reaching
@@ -26,9 +26,9 @@ class Report:
     """The findings of one part of an experiment; `text` sums them up in a few sentences."""
 
     text: str
-    tables: tuple[FoundTable, ...]
-    picture: str = ""
-    advice: tuple[Advice, ...] = ()
+    table: FoundTable
+    picture: str
+    advice: tuple[Advice, ...]
 
 
 def cost_report(part: str, title: str, conditions: Sequence[ConditionResult], cost: Any) -> Report:
@@ -62,9 +62,7 @@ def cost_report(part: str, title: str, conditions: Sequence[ConditionResult], co
         note=text,
         numbers=2,
     )
-    return Report(
-        text=text, tables=(table,), picture=_picture(series, cost.axis, title), advice=tuple(advice)
-    )
+    return Report(text=text, table=table, picture=_picture(series, cost.axis, title), advice=tuple(advice))
 
 
 def damage_table() -> tuple[FoundTable, list[str]]:

@@ -13,15 +13,15 @@ from graspsense.core.components.strict import structured
 from graspsense.core.learn.checkpoints import contact_of
 from graspsense.core.values.features import Features, table_of
 from graspsense.core.values.signals import Phase
+from graspsense.evaluation.crossval import cross_validate
+from graspsense.evaluation.folds import stratified, trials_by_class
 from graspsense.experiments.recognise import classifiers_of
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
 from graspsense.experiments.trade.costs import CostSettings
 from graspsense.experiments.trade.trade_task import (
-    STRATIFIED,
-    predictions,
+    FOLDS,
     settings_of,
     simulated_result,
-    stratified_folds,
     target_labels,
     trial_groups,
 )
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from graspsense.core.values.trace import Trace
 
 
+STRATIFIED: Final = f"stratified_{FOLDS}_fold"
 MOST_MOMENTS: Final = 100
 """Limit on the moments at which a grasp is recognised."""
 
@@ -73,10 +74,12 @@ def early(params: Mapping[str, Any], seed: int) -> RecognitionResult:
     for name, learner in classifiers_of(params).items():
         suffix = f", {name}" if len(params["learners"]) > 1 else ""
         for target in early_settings.targets:
-            folds = stratified_folds(data.labels, target, seed)
             true = target_labels(data.labels, target)
+            groups = trials_by_class(data.labels, target)
+            folds = [stratified([true[i] for i in rows], FOLDS, seed) for rows in groups]
             for moment, features in rows.items():
-                predicted = predictions(learner, table_of(features), data.labels, target, folds, seed)
+                table = table_of(features)
+                predicted = cross_validate(learner, table, true, groups, folds, seed=seed).predicted
                 cost = float(np.mean(used_s[moment]))
                 results.append(
                     ClassifierResult.from_answers(

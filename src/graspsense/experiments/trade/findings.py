@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from graspsense.evaluation.intervals import percent
-from graspsense.experiments.findings import CONTROLS, Findings, FoundTable, control_cells
+from graspsense.experiments.findings import CONTROLS, Findings, control_cells
 from graspsense.experiments.summary import Summary
-from graspsense.experiments.trade.classifier_findings import compare_classifiers
 from graspsense.experiments.trade.cost_findings import Report, cost_report, damage_table
-from graspsense.experiments.trade.sequential_findings import compare_sequential
 from graspsense.experiments.trade.trade_point import Advice
+from graspsense.report.found_table import FoundTable
 from graspsense.report.wording import TARGETS
 
 RULE: Final = (
@@ -38,13 +37,8 @@ def findings(summary: Summary) -> Findings:
         ]
         if not conditions:
             continue
-        if case.kind == "compare":
-            reports[part] = compare_classifiers(part, title, conditions)
-        elif case.kind == "next_squeeze":
-            reports[part] = compare_sequential(part, title, conditions, float(case.judge.fixed_n))
-        else:
-            reports[part] = cost_report(part, title, conditions, case.judge)
-    tables = [table for report in reports.values() for table in report.tables]
+        reports[part] = cost_report(part, title, conditions, case.judge)
+    tables = [report.table for report in reports.values()]
     controls = _controls_table(summary, titles)
     if controls is not None:
         tables.append(controls)
@@ -54,7 +48,7 @@ def findings(summary: Summary) -> Findings:
         tables.append(table)
         notes += reasons
     advice = [piece for report in reports.values() for piece in report.advice]
-    if len(reports) > 1 and advice:
+    if len(reports) > 1:
         tables.insert(0, _advice_table(advice))
     values: dict[str, Any] = {part: {"advice": report.text} for part, report in reports.items()}
     return Findings(
@@ -62,7 +56,7 @@ def findings(summary: Summary) -> Findings:
         headline=_headline(advice) if len(reports) == 1 else "",
         tables=tuple(tables),
         notes=tuple(notes),
-        drawn={part: report.picture for part, report in reports.items() if report.picture},
+        drawn={part: report.picture for part, report in reports.items()},
         values=values,
     )
 

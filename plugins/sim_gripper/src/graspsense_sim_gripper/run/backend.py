@@ -45,12 +45,10 @@ from graspsense_sim_gripper.run.build import EFFORT_LIMIT_N, build, device_info,
 from graspsense_sim_gripper.run.compiled.compose import INTERPRETED, composed_move, composition
 from graspsense_sim_gripper.run.explain import explain
 from graspsense_sim_gripper.run.model_report import accuracy_report, model_report
-from graspsense_sim_gripper.run.perturbed import perturbed
 from graspsense_sim_gripper.run.problem import IMAGES_PER_BLOCK, GraspController
 from graspsense_sim_gripper.run.sampled_loop import instability
 from graspsense_sim_gripper.run.term_failure import TermFailed, not_finite_in_tick, raised_in_term
 from graspsense_sim_gripper.scene.library import kinds_in, object_kinds
-from graspsense_sim_gripper.scene.scaled import ScaledParameter
 from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
 from graspsense_sim_gripper.solve.state import PlantState, is_finite
 
@@ -82,7 +80,6 @@ class SimBackend(BatchBackend[SimConfig]):
         super().__init__(config)
         self._controller: GraspController | None = None
         self._features: FeatureSet[Any] | None = None
-        self._scaled: ScaledParameter | None = None
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -247,14 +244,6 @@ class SimBackend(BatchBackend[SimConfig]):
 
         return variants()
 
-    def perturbed(self, scenes: Sequence[str], share: float) -> Mapping[str, SimBackend]:
-        """Return this gripper, and this gripper with each parameter larger by this share, see `perturbed`."""
-        changed = {}
-        for name, (config, scaled) in perturbed(self.config, scenes, share).items():
-            changed[name] = SimBackend(config)
-            changed[name]._scaled = scaled
-        return changed
-
     def run_many(
         self,
         controller: Controller[Any],
@@ -266,7 +255,7 @@ class SimBackend(BatchBackend[SimConfig]):
         # Imported here, since a single grasp needs neither threads nor compiling.
         from graspsense_sim_gripper.run.batch.threads import grasps, job_of
 
-        job = job_of(self.config, controller, options, features=self._features, scaled=self._scaled)
+        job = job_of(self.config, controller, options, features=self._features)
         done = grasps(job, scenes, seeds, _COMPILED[self.config.compile], options)
         return [
             Grasped(

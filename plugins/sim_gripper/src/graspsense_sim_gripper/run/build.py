@@ -45,7 +45,6 @@ from graspsense_sim_gripper.run.problem import GraspSetup
 from graspsense_sim_gripper.scene.instance import PAD_CELLS, deepest_dent, draws_of_number, params_of_terms
 from graspsense_sim_gripper.scene.library import find, split_number
 from graspsense_sim_gripper.scene.random_numbers import key_of
-from graspsense_sim_gripper.scene.scaled import ScaledParameter
 from graspsense_sim_gripper.scene.spec import ObjectSpec, TermParams
 from graspsense_sim_gripper.solve.scheme import PlantParams, Steps
 from graspsense_sim_gripper.solve.state import PlantState
@@ -127,18 +126,15 @@ class Problem:
                 yield _setup(self.model_config, self.spec, None, seed)
 
 
-def build(config: SimConfig, scene: str, scaled: ScaledParameter | None = None) -> Problem:
+def build(config: SimConfig, scene: str) -> Problem:
     """Return the problem of grasping an object: a name, a scene file (`*.toml`), or `none` for no object.
-
-    `scaled`: a parameter of the object that is larger by a share.
 
     Raises UnknownName for an unknown name, ConfigError for a file that cannot be read as an object.
     """
     if scene == "none":
         return Problem(config, None)
     name, number = split_number(scene)
-    spec = find(name)
-    return Problem(config, spec if scaled is None else scaled.applied_to(spec), number)
+    return Problem(config, find(name), number)
 
 
 @lru_cache(maxsize=64)

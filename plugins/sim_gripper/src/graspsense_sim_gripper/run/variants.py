@@ -19,7 +19,6 @@ _FORMS: Final = (
         step="until all stands still",
         settings={"fidelity": "reference", "accuracy": 1e-4},
         role="reference",
-        for_recognition=True,
     ),
     *(
         SimulationVariant(
@@ -27,7 +26,6 @@ _FORMS: Final = (
             fidelity="scene",
             step=f"{accuracy:g}",
             settings={"fidelity": "scene", "accuracy": accuracy},
-            for_recognition=True,
         )
         for accuracy in ACCURACIES
     ),
@@ -37,7 +35,6 @@ _FORMS: Final = (
             fidelity="scene",
             step=f"{step_s * 1e3:g} ms",
             settings={"fidelity": "scene", "step_s": step_s},
-            for_recognition=step_s == STEPS_S[0],
         )
         for step_s in STEPS_S
     ),

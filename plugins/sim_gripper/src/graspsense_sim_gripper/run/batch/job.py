@@ -51,7 +51,6 @@ from graspsense_sim_gripper.run.problem import GraspController, GraspSetup
 from graspsense_sim_gripper.run.recorded_trace import recorded_trace
 from graspsense_sim_gripper.run.term_failure import not_finite_in_tick, raised_in_term
 from graspsense_sim_gripper.scene.random_numbers import key_of
-from graspsense_sim_gripper.scene.scaled import ScaledParameter
 from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
 from graspsense_sim_gripper.solve.state import PlantState
 
@@ -118,8 +117,6 @@ class Job:
     """Whether traces are kept."""
     features: FeatureSet[Any] | None = None
     """The feature set whose features are verified where a model is selected."""
-    scaled: ScaledParameter | None = None
-    """A parameter of the objects that is larger by a share."""
     extraction: CompiledExtraction | None = field(init=False)
     """The form of `extract` that can be compiled; None if there is none, or if traces are kept."""
     ends_with_hold: bool = field()

@@ -77,7 +77,7 @@ class Scenes:
         """
         job, key = self.job, scene_key(name)
         chosen = self.selected.get(key)
-        problem = build(job.config, name, job.scaled)
+        problem = build(job.config, name)
         if problem.spec is not None and chosen is None:
             chosen = select(problem, job.grasp_controller, compiled=compiled)
         self._scenes[key] = SelectedScene(job, problem, chosen)

@@ -39,7 +39,6 @@ from graspsense_sim_gripper.run.compiled.extraction import compiled_measure, is_
 from graspsense_sim_gripper.run.compiled.loop_code import CompiledLoops, is_kept
 from graspsense_sim_gripper.run.compiled.padding import compiled_kinds
 from graspsense_sim_gripper.scene.library import kinds_in
-from graspsense_sim_gripper.scene.scaled import ScaledParameter
 
 WORTH_COMPILING: Final = 350
 """Number of grasps with the same kinds of terms in this process from which compiling saves more time than it takes:
@@ -98,12 +97,10 @@ def job_of(
     options: BatchOptions,
     *,
     features: FeatureSet[Any] | None = None,
-    scaled: ScaledParameter | None = None,
 ) -> Job:
     """Return the settings of a batch. Raises TypeError for an unknown option.
 
-    `features`: the feature set whose features are verified. `scaled`: a parameter of the objects that is larger by a
-    share.
+    `features`: the feature set whose features are verified.
     """
     unknown = options.keys() - BatchOptions.__annotations__.keys()
     if unknown:
@@ -115,7 +112,6 @@ def job_of(
         extract=options.get("extract"),
         traces=options.get("traces", False),
         features=features,
-        scaled=scaled,
     )
 
 
@@ -221,7 +217,7 @@ class _Batch:
             return True
         if n >= WORTH_LOADING:
             job = self.job
-            usual = SelectedScene(job, build(job.config, scene, job.scaled), None).composition
+            usual = SelectedScene(job, build(job.config, scene), None).composition
             composition = usual._replace(kinds=kinds, converges=job.config.fidelity == "reference")
             if is_kept(composition, type(job.controller).step):
                 return True

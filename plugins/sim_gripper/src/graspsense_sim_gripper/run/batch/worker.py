@@ -51,10 +51,6 @@ class PlainProcess:
     def __init__(self, scenes: Scenes) -> None:
         self._scenes = scenes
         job = scenes.job
-        if job.scaled is not None:
-            raise NotHandedOver(
-                "a parameter of the objects is scaled, and another process finds them by name"
-            )
         try:
             self._greeting = _line(
                 {
