@@ -18,7 +18,7 @@ from arguments import parser_of
 from numpy.typing import NDArray
 
 from graspsense.experiments.versions import where_measured
-from graspsense.report.simulation import markdown_table
+from graspsense.report.found_table import markdown_table
 
 N_FEATURES = 6
 N_CLASSES = 11

@@ -41,7 +41,7 @@ from graspsense.core.settings.resolved import resolve
 from graspsense.experiments.versions import where_measured
 from graspsense.live.feeds import FILE_TIMEOUT_S, LiveFeed
 from graspsense.plugin_api import SQUEEZE, DeviceInfo, create
-from graspsense.report.simulation import markdown_table
+from graspsense.report.found_table import markdown_table
 from graspsense_pr2_gripper import backend as driver
 from graspsense_pr2_gripper import emulation, opening
 from graspsense_pr2_gripper.backend import Pr2Backend

@@ -34,7 +34,7 @@ from graspsense.plugin_api import (
     SensorBackend,
     create,
 )
-from graspsense.report.simulation import markdown_table
+from graspsense.report.found_table import markdown_table
 from graspsense.testing.hostile import HOSTILE
 from graspsense_pr2_gripper.backend import Pr2Backend
 from graspsense_pr2_gripper.config import FaultConfig, Pr2Config

@@ -44,7 +44,7 @@ from graspsense.evaluation.choosing import FOLDS
 from graspsense.evaluation.intervals import percent, percentages
 from graspsense.evaluation.ranking import OutsideAnswers, Ranking, protocols_of, rank
 from graspsense.recording.reader import read_recorded
-from graspsense.report.simulation import markdown_table
+from graspsense.report.found_table import markdown_table
 from graspsense.sources.trial_source import STORE, TrialSource, labelled_trials
 from graspsense.store.store import COUNTS, Store
 

@@ -41,7 +41,7 @@ from graspsense.core.files.toml_text import toml_value
 from graspsense.evaluation.intervals import clustered, wilson
 from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import create
-from graspsense.report.simulation import markdown_table
+from graspsense.report.found_table import markdown_table
 from graspsense.simulator_api import RunConfig
 from graspsense_identify.laws import SLOTS
 from graspsense_identify.run import identify

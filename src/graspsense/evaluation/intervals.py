@@ -116,6 +116,11 @@ class Difference:
         """Whether the difference is above zero at 95 %; False without an interval."""
         return self.interval is not None and self.interval[0] > 0.0
 
+    @property
+    def excludes_zero(self) -> bool:
+        """Whether a difference is shown at 95 %; False without an interval."""
+        return self.interval is not None and not self.interval[0] <= 0.0 <= self.interval[1]
+
 
 def rate_of(
     right: Sequence[bool],

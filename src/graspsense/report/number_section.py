@@ -17,8 +17,7 @@ from graspsense.report.svg import INKS, QUIET, Picture, number, reaching
 from graspsense.store.dataset import labelled_store
 
 if TYPE_CHECKING:
-    from graspsense.regression.error import RegressionError
-    from graspsense.regression.results import RegressionEvaluation, RegressionMeasurement
+    from graspsense.regression.results import RegressionError, RegressionEvaluation, RegressionMeasurement
 
 MEASUREMENTS: Final = "grasp"
 """The section of the page of a store before which numbers stand."""

@@ -9,7 +9,7 @@ from attrs import evolve
 
 from graspsense.simulator_api import SimulationVariant
 
-ACCURACIES: Final = (0.5, 0.3, 0.1, 0.03, 0.01, 0.001, 1e-4)
+ACCURACIES: Final = (0.5, 0.1, 0.01, 0.001, 1e-4)
 STEPS_S: Final = (1e-3, 5e-4, 2e-4, 1e-4)
 
 _FORMS: Final = (
@@ -26,6 +26,7 @@ _FORMS: Final = (
             fidelity="scene",
             step=f"{accuracy:g}",
             settings={"fidelity": "scene", "accuracy": accuracy},
+            for_recognition=True,
         )
         for accuracy in ACCURACIES
     ),
