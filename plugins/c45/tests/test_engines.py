@@ -135,12 +135,12 @@ def test_many_small_fits_use_compiled_code_once_the_plain_form_took_as_long(monk
 
     chosen = {}
     for on_disk in (True, False):
-        monkeypatch.setattr(compiled, "kept", lambda on_disk=on_disk: on_disk)
+        monkeypatch.setattr(compiled, "kept", lambda slim, on_disk=on_disk: on_disk)
         fits, chosen[on_disk] = Fits(), []
         for _ in range(6):
-            chosen[on_disk].append(fits.choose_fast("auto", 6_000))
+            chosen[on_disk].append(fits.choose_fast("auto", 6_000, True))
             fits.add_plain(1.0)
-        assert not fits.choose_fast("plain", 6_000)
+        assert not fits.choose_fast("plain", 6_000, True)
     assert chosen == {True: [False] + 5 * [True], False: [k >= engines.COMPILING_S for k in range(6)]}
 
 
@@ -149,6 +149,6 @@ def test_a_tree_of_the_plain_form_counts(monkeypatch):
     monkeypatch.setattr(fitting, "_FITS", fits)
     monkeypatch.setattr(engines, "LOADING_S", 1e-9)
     monkeypatch.setattr(engines, "COMPILING_S", 1e-9)
-    assert not fits.choose_fast("auto", 6_000)
+    assert not fits.choose_fast("auto", 6_000, True)
     fit(grasps(1, 300, None, "one"))
-    assert fits.choose_fast("auto", 6_000)
+    assert fits.choose_fast("auto", 6_000, True)

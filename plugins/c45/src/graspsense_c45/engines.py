@@ -44,26 +44,29 @@ class Fits:
 
     def __init__(self) -> None:
         self._plain_s = 0.0
-        self._kept: bool | None = None
+        self._kept: dict[bool, bool] = {}
 
-    def choose_fast(self, engine: Engine, n_values: int) -> bool:
-        """Return whether to fit a table of so many values by compiled code. Raises as `choose_fast` does."""
+    def choose_fast(self, engine: Engine, n_values: int, slim: bool) -> bool:
+        """Return whether to fit a table of so many values by compiled code; slim: see `building.compiled`.
+
+        Raises as the function `choose_fast` does.
+        """
         if choose_fast(engine, n_values):
             return True
         if engine != "auto" or self._plain_s < LOADING_S or missing_for_fast():
             return False
-        return self._plain_s >= COMPILING_S or self._is_kept()
+        return self._plain_s >= COMPILING_S or self._is_kept(slim)
 
     def add_plain(self, seconds: float) -> None:
         """Count a tree that took the interpreter so much processor time."""
         self._plain_s += seconds
 
-    def _is_kept(self) -> bool:
-        if self._kept is None:
+    def _is_kept(self, slim: bool) -> bool:
+        if slim not in self._kept:
             from graspsense_c45.building.compiled import kept
 
-            self._kept = kept()
-        return self._kept
+            self._kept[slim] = kept(slim)
+        return self._kept[slim]
 
 
 @cache

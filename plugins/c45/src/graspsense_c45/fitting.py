@@ -53,9 +53,8 @@ def _fit_rows(
 ) -> Tree:
     """Return a tree that is grown on some rows of a table (None: all), and pruned on others if by reduced error."""
     training = make_training_set(table, grown_on, options)
-    compiled = _FITS.choose_fast(
-        engine, training.values.size * (1 if training.scale.weight_bits == 0 else PARTS)
-    )
+    n_values = training.values.size * (1 if training.scale.weight_bits == 0 else PARTS)
+    compiled = _FITS.choose_fast(engine, n_values, training.slim)
     began = time.thread_time()
     builder = TreeBuilder(training, compiled)
     if options.actual_split_value:

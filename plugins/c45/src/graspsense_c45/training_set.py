@@ -45,6 +45,11 @@ class TrainingSet:
     options: Options
 
     @property
+    def slim(self) -> bool:
+        """Whether all attributes are numeric and no value is missing, so that compiled code may be shorter."""
+        return self.complete and not self.value_counts.any()
+
+    @property
     def total_weight(self) -> float:
         """The weight of all rows, in rows."""
         return real_weight(int(self.weights.sum()), self.scale.weight_bits)

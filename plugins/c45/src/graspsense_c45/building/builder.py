@@ -111,9 +111,9 @@ class TreeBuilder:
     def _call(self, function: Callable[..., Any], written: Any, *others: Any) -> Any:
         """Call a function of numbers and arrays, the first argument of which it writes to."""
         if self._compiled:
-            from graspsense_c45.building.compiled import compiled
+            from graspsense_c45.building.compiled import call
 
-            return compiled(function)(written, *others)
+            return call(function, self._training.slim, written, *others)
         columns = _as_lists(written)
         result = function(columns, *map(_as_lists, others))
         for array, column in zip(written, columns, strict=True):
@@ -173,13 +173,21 @@ def _growth(training: TrainingSet, n_nodes: int, n_entries: int) -> growing.Grow
     n_terms = n_rows + 1 if training.unit else 1
     return growing.Growth(
         entries=_entries(training, n_entries),
-        candidates=growing.Candidates(
-            usable=np.zeros(n_attributes, dtype=np.bool_),
-            gain=np.zeros(n_attributes),
-            ratio=np.zeros(n_attributes),
-            place=_zeros(n_attributes),
-            averaged=training.averaged,
-            value_counts=training.value_counts,
+        search=growing.Search(
+            candidates=growing.Candidates(
+                usable=np.zeros(n_attributes, dtype=np.bool_),
+                gain=np.zeros(n_attributes),
+                ratio=np.zeros(n_attributes),
+                place=_zeros(n_attributes),
+                averaged=training.averaged,
+                value_counts=training.value_counts,
+            ),
+            counted=growing.Counted(
+                passed=_zeros(training.n_classes),
+                known=_zeros(training.n_classes),
+                by_value=np.zeros((most_values, training.n_classes), dtype=np.int64),
+            ),
+            terms=growing.Terms(_zeros(n_terms), _zeros(n_terms - 1)),
         ),
         deal=Deal(
             slots=_zeros(n_entries),
@@ -193,13 +201,7 @@ def _growth(training: TrainingSet, n_nodes: int, n_entries: int) -> growing.Grow
             values=np.zeros(n_entries),
             n_missing=_zeros(1),
         ),
-        counted=growing.Counted(
-            passed=_zeros(training.n_classes),
-            known=_zeros(training.n_classes),
-            by_value=np.zeros((most_values, training.n_classes), dtype=np.int64),
-        ),
         waiting=growing.Waiting(*(_zeros(n_nodes) for _ in range(4))),
-        terms=growing.Terms(_zeros(n_terms), _zeros(n_terms - 1)),
     )
 
 

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 from graspsense_c45.arithmetic import TOLERANCE
 from graspsense_c45.arrays import Integers, IntegerTable, Numbers, NumberTable
-from graspsense_c45.building.nodes import Nodes
 from graspsense_c45.splits import ALL_VALUES
 
 
@@ -37,13 +36,13 @@ class Split(NamedTuple):
     """How a node is split.
 
     numeric: whether by a cut. place: of the cut, behind this entry; of a nominal attribute the category. children: from
-    `first` on.
+    `eldest` on.
     """
 
     attribute: int
     numeric: bool
     place: int
-    first: int
+    eldest: int
     n_children: int
 
 
@@ -70,11 +69,11 @@ class Deal(NamedTuple):
     n_missing: Integers
 
 
-def deal_out(place: Place, split: Split, nodes: Nodes, entries: Entries, deal: Deal) -> bool:
+def deal_out(place: Place, split: Split, counts: IntegerTable, entries: Entries, deal: Deal) -> bool:
     """Deal out the entries of a node, and count the classes of its children; return whether there is room enough."""
-    known_stop = deal_known(place, split, nodes, entries, deal)
+    known_stop = deal_known(place, split, counts, entries, deal)
     deal.n_missing[0] = place.stop - known_stop
-    return known_stop == place.stop or deal_missing(place, known_stop, split, nodes, entries, deal)
+    return known_stop == place.stop or deal_missing(place, known_stop, split, counts, entries, deal)
 
 
 def sort_by_child(place: Place, split: Split, entries: Entries, deal: Deal) -> None:
@@ -86,7 +85,7 @@ def sort_by_child(place: Place, split: Split, entries: Entries, deal: Deal) -> N
             move(entries.rows[a], entries.values[a], place, split.n_children, missing, deal)
 
 
-def deal_known(place: Place, split: Split, nodes: Nodes, entries: Entries, deal: Deal) -> int:
+def deal_known(place: Place, split: Split, counts: IntegerTable, entries: Entries, deal: Deal) -> int:
     """Deal out the entries that know the value; return where those without it begin."""
     rows, values = entries.rows[split.attribute], entries.values[split.attribute]
     for child in range(split.n_children):
@@ -107,12 +106,12 @@ def deal_known(place: Place, split: Split, nodes: Nodes, entries: Entries, deal:
         deal.slots[row] = slot
         deal.known[slot] += weight
         deal.n_entries[slot] += 1
-        nodes.counts[split.first + slot][entries.labels[row]] += weight
+        counts[split.eldest + slot][entries.labels[row]] += weight
     return place.stop
 
 
 def deal_missing(
-    place: Place, known_stop: int, split: Split, nodes: Nodes, entries: Entries, deal: Deal
+    place: Place, known_stop: int, split: Split, counts: IntegerTable, entries: Entries, deal: Deal
 ) -> bool:
     """Deal out the entries that do not know the value, in parts; return whether there are enough entries for them."""
     n_missing = place.stop - known_stop
@@ -139,10 +138,10 @@ def deal_missing(
         deal.ordinals[row] = i - known_stop
         for child in range(number):
             if deal.share[child] > 0.0:
-                part = part_of(row, child, deal)
+                part = part_of(row, deal.ordinals[row], deal.parts[child])
                 entries.labels[part] = label
                 entries.weights[part] = round(weight * deal.share[child])
-                nodes.counts[split.first + child][label] += entries.weights[part]
+                counts[split.eldest + child][label] += entries.weights[part]
     return True
 
 
@@ -152,9 +151,9 @@ def share_of(known: int, total: int, n_children: int) -> float:
     return share if share > TOLERANCE else 0.0
 
 
-def part_of(row: int, child: int, deal: Deal) -> int:
-    """Return the number of the part of an entry that a child gets."""
-    return row if deal.parts[child] < 0 else deal.parts[child] + deal.ordinals[row]
+def part_of(row: int, ordinal: int, parts: int) -> int:
+    """Return the number of the part of an entry that a child gets; see `Deal.ordinals` and `Deal.parts`."""
+    return row if parts < 0 else parts + ordinal
 
 
 def move(rows: Integers, values: Numbers, place: Place, n_children: int, missing: bool, deal: Deal) -> None:
@@ -182,5 +181,6 @@ def move(rows: Integers, values: Numbers, place: Place, n_children: int, missing
                 rows[end], values[end] = row, spare_values[i]
                 end += 1
             elif (slot < 0 or slot == n_children) and deal.share[child] > 0.0:
-                rows[end], values[end] = part_of(row, child, deal), spare_values[i]
+                rows[end] = part_of(row, deal.ordinals[row], deal.parts[child])
+                values[end] = spare_values[i]
                 end += 1

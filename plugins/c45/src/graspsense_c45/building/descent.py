@@ -80,18 +80,20 @@ def enter_child(node: int, moves: bool, nodes: Nodes, rows: Rows, descent: Desce
 
 def weigh_known(node: int, nodes: Nodes, rows: Rows, descent: Descent) -> None:
     """Write, for each child of a node, the weight of the rows that know the value and come to it."""
-    feature, first = nodes.feature[node], nodes.first_child[node]
-    for child in range(first, first + nodes.n_children[node]):
+    feature, eldest = nodes.feature[node], nodes.first_child[node]
+    threshold, category = nodes.threshold[node], nodes.category[node]
+    for child in range(eldest, eldest + nodes.n_children[node]):
         descent.known[child] = 0
     for i in range(descent.begin[node], descent.stop[node]):
         value = rows.values[descent.rows[i]][feature]
         if value == value:
-            descent.known[first + slot_of(value, node, nodes)] += descent.weights[i]
+            descent.known[eldest + slot_of(value, threshold, category)] += descent.weights[i]
 
 
 def move_rows(node: int, child: int, nodes: Nodes, rows: Rows, descent: Descent) -> None:
     """Write the rows of a node that come to a child behind those of the node."""
-    feature, first, number = nodes.feature[node], nodes.first_child[node], nodes.n_children[node]
+    feature, eldest, number = nodes.feature[node], nodes.first_child[node], nodes.n_children[node]
+    threshold, category = nodes.threshold[node], nodes.category[node]
     begin, stop = descent.begin[node], descent.stop[node]
     descent.begin[child] = descent.stop[child] = stop
     if not has_room(node, descent):
@@ -99,7 +101,7 @@ def move_rows(node: int, child: int, nodes: Nodes, rows: Rows, descent: Descent)
     share = 0.0
     if not rows.complete:
         total = 0
-        for other in range(first, first + number):
+        for other in range(eldest, eldest + number):
             total += descent.known[other]
         share = share_of(descent.known[child], total, number)
     end = stop
@@ -110,7 +112,7 @@ def move_rows(node: int, child: int, nodes: Nodes, rows: Rows, descent: Descent)
             if share > 0.0:
                 descent.rows[end], descent.weights[end] = row, round(weight * share)
                 end += 1
-        elif first + slot_of(value, node, nodes) == child:
+        elif eldest + slot_of(value, threshold, category) == child:
             descent.rows[end], descent.weights[end] = row, weight
             end += 1
     descent.stop[child] = end
@@ -118,13 +120,14 @@ def move_rows(node: int, child: int, nodes: Nodes, rows: Rows, descent: Descent)
 
 def move_others(node: int, child: int, nodes: Nodes, rows: Rows, descent: Descent) -> None:
     """Write the rows of a node that do not come to a child behind those of the node; no value is missing."""
-    feature, first = nodes.feature[node], nodes.first_child[node]
+    feature, eldest = nodes.feature[node], nodes.first_child[node]
+    threshold, category = nodes.threshold[node], nodes.category[node]
     begin, stop = descent.begin[node], descent.stop[node]
     descent.begin[child] = end = stop
     if has_room(node, descent):
         for i in range(begin, stop):
             row = descent.rows[i]
-            if first + slot_of(rows.values[row][feature], node, nodes) != child:
+            if eldest + slot_of(rows.values[row][feature], threshold, category) != child:
                 descent.rows[end], descent.weights[end] = row, descent.weights[i]
                 end += 1
     descent.stop[child] = end
@@ -137,9 +140,8 @@ def has_room(node: int, descent: Descent) -> bool:
     return not descent.lacking[0]
 
 
-def slot_of(value: float, node: int, nodes: Nodes) -> int:
-    """Return the child that a value goes to, counted from 0."""
-    threshold, category = nodes.threshold[node], nodes.category[node]
+def slot_of(value: float, threshold: float, category: int) -> int:
+    """Return the child that a value goes to, counted from 0; see `splits.Splits`."""
     if threshold == threshold:
         return 1 if value > threshold else 0
     if category == ALL_VALUES:

@@ -80,15 +80,21 @@ class Terms(NamedTuple):
     steps: Integers
 
 
+class Search(NamedTuple):
+    """What the search for the best split of a node works on."""
+
+    candidates: Candidates
+    counted: Counted
+    terms: Terms
+
+
 class Growth(NamedTuple):
     """What growing works on."""
 
     entries: Entries
-    candidates: Candidates
+    search: Search
     deal: Deal
-    counted: Counted
     waiting: Waiting
-    terms: Terms
 
 
 def grow(nodes: Nodes, growth: Growth, rules: Rules) -> int:
@@ -97,9 +103,10 @@ def grow(nodes: Nodes, growth: Growth, rules: Rules) -> int:
     nodes: leaves without weight. Where those or the entries do not suffice, -1 is returned, and all is to be prepared
     again, with more.
     """
-    entries, waiting = growth.entries, growth.waiting
+    # Most functions get a part of it only: a compiler takes the longer the more arrays are passed.
+    entries, search, deal, waiting = growth
     if rules.unit:
-        tabulate(growth.terms, rules.scale)
+        tabulate(search.terms, rules.scale)
     for row in range(rules.n_rows):
         nodes.counts[0][entries.labels[row]] += entries.weights[row]
     waiting.node[0] = waiting.begin[0] = 0
@@ -113,33 +120,40 @@ def grow(nodes: Nodes, growth: Growth, rules: Rules) -> int:
             waiting.stop[n_waiting],
             waiting.free[n_waiting],
         )
-        chosen = best_split(place, nodes, growth, rules)
+        chosen = best_split(place, nodes.counts[place.node], entries, search, rules)
         if chosen < 0:
             continue
-        split = make_split(place.node, chosen, n_nodes, nodes, growth, rules)
+        split = make_split(place.node, chosen, n_nodes, nodes, entries, search.candidates, rules)
         n_nodes += split.n_children
-        if n_nodes > len(nodes.feature) or not deal_out(place, split, nodes, entries, growth.deal):
+        if n_nodes > len(nodes.feature) or not deal_out(place, split, nodes.counts, entries, deal):
             return -1
-        n_waiting = add_children(n_waiting, place, split, nodes, growth, rules)
+        n_open = add_children(n_waiting, place, split, nodes.counts, waiting, deal, rules)
+        if n_open > 0:
+            sort_by_child(place, split, entries, deal)
+        n_waiting += n_open
     return n_nodes
 
 
 def add_children(
-    n_waiting: int, place: Place, split: Split, nodes: Nodes, growth: Growth, rules: Rules
+    n_waiting: int,
+    place: Place,
+    split: Split,
+    counts: IntegerTable,
+    waiting: Waiting,
+    deal: Deal,
+    rules: Rules,
 ) -> int:
-    """Add those children of a node that may be split to the waiting nodes; return the number of these."""
-    waiting, deal, begin = growth.waiting, growth.deal, place.begin
-    n_before = n_waiting
+    """Add those children of a node that may be split behind the waiting nodes; return their number."""
+    begin, n_open = place.begin, 0
     for slot in range(split.n_children):
         stop = begin + deal.n_entries[slot]
-        if is_open(nodes.counts[split.first + slot], rules):
-            waiting.node[n_waiting], waiting.free[n_waiting] = split.first + slot, deal.free[slot]
-            waiting.begin[n_waiting], waiting.stop[n_waiting] = begin, stop
-            n_waiting += 1
+        if is_open(counts[split.eldest + slot], rules):
+            i = n_waiting + n_open
+            waiting.node[i], waiting.free[i] = split.eldest + slot, deal.free[slot]
+            waiting.begin[i], waiting.stop[i] = begin, stop
+            n_open += 1
         begin = stop
-    if n_waiting > n_before:
-        sort_by_child(place, split, growth.entries, deal)
-    return n_waiting
+    return n_open
 
 
 def is_open(counts: Integers, rules: Rules) -> bool:
@@ -159,33 +173,35 @@ def tabulate(terms: Terms, scale: Scale) -> None:
         terms.steps[number] = terms.terms[number + 1] - terms.terms[number]
 
 
-def best_split(place: Place, nodes: Nodes, growth: Growth, rules: Rules) -> int:
+def best_split(place: Place, counts: Integers, entries: Entries, search: Search, rules: Rules) -> int:
     """Return the attribute to split an open node on, -1 if it stays a leaf; write the splits to the candidates."""
-    counts, scale, candidates = nodes.counts[place.node], rules.scale, growth.candidates
+    scale, candidates = rules.scale, search.candidates
     total = weight_of(counts)
     weight = real_weight(total, scale.weight_bits)
     limits = limits_of(place.stop - place.begin, total, weight, rules.n_classes, rules.min_objects, scale)
     for a in range(len(candidates.gain)):
         candidates.usable[a] = False
         if candidates.value_counts[a] > 0:
-            enter_values(a, place, total, growth, rules)
+            enter_values(a, place, total, entries, search, rules)
         else:
-            enter_cut(a, place, counts, limits, growth, rules)
+            enter_cut(a, place, counts, limits, entries, search, rules)
     chosen: int = choose_attribute(
         candidates.usable, candidates.gain, candidates.ratio, candidates.averaged, rules.by_ratio
     )
     return chosen
 
 
-def enter_cut(a: int, place: Place, counts: Integers, limits: Limits, growth: Growth, rules: Rules) -> None:
+def enter_cut(
+    a: int, place: Place, counts: Integers, limits: Limits, entries: Entries, search: Search, rules: Rules
+) -> None:
     """Enter the best cut of a numeric attribute at a node."""
-    entries, candidates, scale = growth.entries, growth.candidates, rules.scale
+    candidates, counted, scale = search.candidates, search.counted, rules.scale
     total = weight_of(counts)
     stop, totals, known = place.stop, counts, total
     if not rules.complete:
-        stop = count_known(a, place, counts, entries, growth.counted.known)
+        stop = count_known(a, place, counts, entries, counted.known)
         if stop < place.stop:
-            totals = growth.counted.known
+            totals = counted.known
             known = weight_of(totals)
             weight = real_weight(total, scale.weight_bits)
             limits = limits_of(stop - place.begin, known, weight, rules.n_classes, rules.min_objects, scale)
@@ -198,10 +214,10 @@ def enter_cut(a: int, place: Place, counts: Integers, limits: Limits, growth: Gr
         stop=stop,
         labels=entries.labels,
         counts=totals,
-        passed=growth.counted.passed,
+        passed=counted.passed,
     )
     if rules.unit:
-        cut = scan_unit(run, growth.terms.terms, growth.terms.steps, limits)
+        cut = scan_unit(run, search.terms.terms, search.terms.steps, limits)
     else:
         cut = scan_weighted(run, entries.weights, scale, limits)
     if cut.place < 0:
@@ -225,9 +241,9 @@ def count_known(a: int, place: Place, counts: Integers, entries: Entries, known:
     return stop
 
 
-def enter_values(a: int, place: Place, total: int, growth: Growth, rules: Rules) -> None:
+def enter_values(a: int, place: Place, total: int, entries: Entries, search: Search, rules: Rules) -> None:
     """Enter the best split of a nominal attribute at a node."""
-    entries, candidates, counted = growth.entries, growth.candidates, growth.counted
+    candidates, counted = search.candidates, search.counted
     n_values = candidates.value_counts[a]
     for k in range(rules.n_classes):
         counted.known[k] = 0
@@ -253,15 +269,16 @@ def enter_values(a: int, place: Place, total: int, growth: Growth, rules: Rules)
     candidates.place[a] = split.category
 
 
-def make_split(node: int, chosen: int, first: int, nodes: Nodes, growth: Growth, rules: Rules) -> Split:
-    """Split a node by the best split of an attribute; its children are `first` and those behind it."""
-    candidates = growth.candidates
+def make_split(
+    node: int, chosen: int, eldest: int, nodes: Nodes, entries: Entries, candidates: Candidates, rules: Rules
+) -> Split:
+    """Split a node by the best split of an attribute; its children are `eldest` and those behind it."""
     place, n_values = candidates.place[chosen], candidates.value_counts[chosen]
     number = 2 if n_values == 0 or rules.binary_splits else n_values
-    nodes.feature[node], nodes.first_child[node], nodes.n_children[node] = chosen, first, number
+    nodes.feature[node], nodes.first_child[node], nodes.n_children[node] = chosen, eldest, number
     if n_values > 0:
         nodes.category[node] = place
     else:
-        values = growth.entries.values[chosen]
+        values = entries.values[chosen]
         nodes.threshold[node] = midpoint(values[place], values[place + 1])
-    return Split(attribute=chosen, numeric=n_values == 0, place=place, first=first, n_children=number)
+    return Split(attribute=chosen, numeric=n_values == 0, place=place, eldest=eldest, n_children=number)

@@ -61,8 +61,8 @@ def collapse(nodes: Nodes, errors: Integers, margin: int, slack: float) -> None:
 
 def sum_over_children(node: int, nodes: Nodes, numbers: Integers) -> int:
     """Return the sum of these numbers of the nodes over the children of one."""
-    total, first = 0, nodes.first_child[node]
-    for child in range(first, first + nodes.n_children[node]):
+    total, eldest = 0, nodes.first_child[node]
+    for child in range(eldest, eldest + nodes.n_children[node]):
         total += numbers[child]
     return total
 
@@ -123,9 +123,9 @@ def estimate_leaf(counts: Integers, pruning: Pruning) -> int:
 
 def heaviest_child(node: int, nodes: Nodes, weight_bits: int) -> int:
     """Return the heaviest child of a node, the last one of equals."""
-    first = nodes.first_child[node]
-    best, chosen = 0.0, first
-    for child in range(first, first + nodes.n_children[node]):
+    eldest = nodes.first_child[node]
+    best, chosen = 0.0, eldest
+    for child in range(eldest, eldest + nodes.n_children[node]):
         weight = real_weight(weight_of(nodes.counts[child]), weight_bits)
         if is_not_lighter(weight, best):
             best, chosen = weight, child

@@ -60,8 +60,8 @@ def prune_node(node: int, nodes: Nodes, errors: HeldOutErrors) -> None:
     errors.as_tree[node] = as_leaf
     if nodes.n_children[node] == 0:
         return
-    below, first = 0, nodes.first_child[node]
-    for child in range(first, first + nodes.n_children[node]):
+    below, eldest = 0, nodes.first_child[node]
+    for child in range(eldest, eldest + nodes.n_children[node]):
         if real_weight(weight_of(nodes.counts[child]), errors.weight_bits) < TOLERANCE:
             # A branch without training weight predicts the class of its parent.
             below += errors_of_class(majority, errors.counts[child])
