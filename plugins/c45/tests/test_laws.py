@@ -91,7 +91,10 @@ def test_best_cut_is_the_first_of_those_within_the_tolerance():
         run = Run(rows, values, 0, n, labels, counts, [0] * n_classes)
         terms = [term(number, scale) for number in range(n + 1)]
         steps = [high - low for low, high in itertools.pairwise(terms)]
-        for cut in (scan_unit(run, terms, steps, limits), scan_weighted(run, weights, scale, limits)):
+        for cut in (
+            scan_unit(run, terms, steps, limits),
+            scan_weighted(run, weights, [0] * n_classes, scale, limits),
+        ):
             assert (cut.place, cut.numerator) == best_place(numerators, limits)
             assert cut.n_cuts == len(numerators)
 

@@ -173,7 +173,7 @@ def _growth(training: TrainingSet, n_nodes: int, n_entries: int) -> growing.Grow
     n_terms = n_rows + 1 if training.unit else 1
     return growing.Growth(
         entries=_entries(training, n_entries),
-        search=growing.Search(
+        search=growing.SplitSearch(
             candidates=growing.Candidates(
                 usable=np.zeros(n_attributes, dtype=np.bool_),
                 gain=np.zeros(n_attributes),
@@ -184,6 +184,7 @@ def _growth(training: TrainingSet, n_nodes: int, n_entries: int) -> growing.Grow
             ),
             counted=growing.Counted(
                 passed=_zeros(training.n_classes),
+                terms=_zeros(training.n_classes),
                 known=_zeros(training.n_classes),
                 by_value=np.zeros((most_values, training.n_classes), dtype=np.int64),
             ),

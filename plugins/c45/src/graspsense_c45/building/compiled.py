@@ -17,7 +17,7 @@ from graspsense_c45.splits import Splits
 
 
 def _enter_no_values(
-    a: int, place: Place, total: int, entries: Entries, search: growing.Search, rules: growing.Rules
+    a: int, place: Place, total: int, entries: Entries, search: growing.SplitSearch, rules: growing.Rules
 ) -> None:
     pass
 

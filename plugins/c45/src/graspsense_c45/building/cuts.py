@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
-from graspsense_c45.arithmetic import Scale, real_weight, term
+from graspsense_c45.arithmetic import LN2, Scale, real_weight, term
 from graspsense_c45.arrays import Integers, Numbers
 from graspsense_c45.building.nodes import weight_of
 from graspsense_c45.criteria import (
@@ -103,13 +104,16 @@ def scan_unit(run: Run, terms: Integers, steps: Integers, limits: Limits) -> Cut
             continue
         n_cuts += 1
         numerator = inside - terms[left] - terms[total - left]
-        if is_better_cut(numerator, best, tolerance, least_numerator):
+        if numerator > best and is_better_cut(numerator, best, tolerance, least_numerator):
             best, place, cut_left = numerator, i, left
     return Cut(best, place, cut_left, n_cuts)
 
 
-def scan_weighted(run: Run, weights: Integers, scale: Scale, limits: Limits) -> Cut:
-    """Return the best cut of a run whose rows have any fixed-point weights; otherwise as `scan_unit`."""
+def scan_weighted(run: Run, weights: Integers, terms: Integers, scale: Scale, limits: Limits) -> Cut:
+    """Return the best cut of a run whose rows have any fixed-point weights; otherwise as `scan_unit`.
+
+    terms: an entry for each class, written here.
+    """
     rows, values, begin, stop, labels, counts, passed = run
     _, least, tolerance, least_numerator = limits
     total = weight_of(counts)
@@ -118,22 +122,42 @@ def scan_weighted(run: Run, weights: Integers, scale: Scale, limits: Limits) -> 
     left = 0
     for k in range(len(passed)):
         passed[k] = 0
+        terms[k] = term(counts[k], scale)
+    rough = rough_scale(scale)
     for i in range(begin, stop - 1):
         row = rows[i]
         k, weight = labels[row], weights[row]
-        low = passed[k]
-        high = counts[k] - low
-        passed[k] = low + weight
+        low = passed[k] + weight
+        passed[k] = low
         left += weight
         right = total - left
-        inside += term(low + weight, scale) - term(low, scale)
-        inside += term(high - weight, scale) - term(high, scale)
-        if left < least or right < least:
-            continue
-        if not are_apart(values[i], values[i + 1]):
+        sides = term(low, scale) + term(counts[k] - low, scale)
+        inside += sides - terms[k]
+        terms[k] = sides
+        if left < least or right < least or not are_apart(values[i], values[i + 1]):
             continue
         n_cuts += 1
+        # Most places are no better. A rough logarithm shows that, whose error is far below the tolerance.
+        if inside - rough_term(left, rough) - rough_term(right, rough) < best + 0.5 * tolerance:
+            continue
         numerator = inside - term(left, scale) - term(right, scale)
         if is_better_cut(numerator, best, tolerance, least_numerator):
             best, place, cut_left = numerator, i, left
     return Cut(best, place, cut_left, n_cuts)
+
+
+class RoughScale(NamedTuple):
+    """The terms in a unit of weight, and the logarithm of the units in a row."""
+
+    terms: float
+    ln_units: float
+
+
+def rough_scale(scale: Scale) -> RoughScale:
+    """Return the numbers of `rough_term` for these units."""
+    return RoughScale(math.ldexp(1.0, scale.term_bits - scale.weight_bits), scale.weight_bits * LN2)
+
+
+def rough_term(units: int, scale: RoughScale) -> float:
+    """Return the term of the weight of a row or more, in less time than `term`; the error is below 1e-12 of the weight."""
+    return units * scale.terms * (math.log(units) - scale.ln_units)

@@ -66,9 +66,13 @@ class Waiting(NamedTuple):
 
 
 class Counted(NamedTuple):
-    """Weights by class, written before they are read: on one side of a cut, of known rows, and by nominal value."""
+    """Weights by class, written before they are read: on one side of a cut, of known rows, and by nominal value.
+
+    terms: for each class, the sum of L(class) over the sides of a cut.
+    """
 
     passed: Integers
+    terms: Integers
     known: Integers
     by_value: IntegerTable
 
@@ -80,7 +84,7 @@ class Terms(NamedTuple):
     steps: Integers
 
 
-class Search(NamedTuple):
+class SplitSearch(NamedTuple):
     """What the search for the best split of a node works on."""
 
     candidates: Candidates
@@ -92,7 +96,7 @@ class Growth(NamedTuple):
     """What growing works on."""
 
     entries: Entries
-    search: Search
+    search: SplitSearch
     deal: Deal
     waiting: Waiting
 
@@ -173,7 +177,7 @@ def tabulate(terms: Terms, scale: Scale) -> None:
         terms.steps[number] = terms.terms[number + 1] - terms.terms[number]
 
 
-def best_split(place: Place, counts: Integers, entries: Entries, search: Search, rules: Rules) -> int:
+def best_split(place: Place, counts: Integers, entries: Entries, search: SplitSearch, rules: Rules) -> int:
     """Return the attribute to split an open node on, -1 if it stays a leaf; write the splits to the candidates."""
     scale, candidates = rules.scale, search.candidates
     total = weight_of(counts)
@@ -192,7 +196,13 @@ def best_split(place: Place, counts: Integers, entries: Entries, search: Search,
 
 
 def enter_cut(
-    a: int, place: Place, counts: Integers, limits: Limits, entries: Entries, search: Search, rules: Rules
+    a: int,
+    place: Place,
+    counts: Integers,
+    limits: Limits,
+    entries: Entries,
+    search: SplitSearch,
+    rules: Rules,
 ) -> None:
     """Enter the best cut of a numeric attribute at a node."""
     candidates, counted, scale = search.candidates, search.counted, rules.scale
@@ -219,7 +229,7 @@ def enter_cut(
     if rules.unit:
         cut = scan_unit(run, search.terms.terms, search.terms.steps, limits)
     else:
-        cut = scan_weighted(run, entries.weights, scale, limits)
+        cut = scan_weighted(run, entries.weights, counted.terms, scale, limits)
     if cut.place < 0:
         return
     gain = gain_of_cut(cut.numerator, cut.n_cuts, known, total, scale, rules.mdl_correction)
@@ -241,7 +251,9 @@ def count_known(a: int, place: Place, counts: Integers, entries: Entries, known:
     return stop
 
 
-def enter_values(a: int, place: Place, total: int, entries: Entries, search: Search, rules: Rules) -> None:
+def enter_values(
+    a: int, place: Place, total: int, entries: Entries, search: SplitSearch, rules: Rules
+) -> None:
     """Enter the best split of a nominal attribute at a node."""
     candidates, counted = search.candidates, search.counted
     n_values = candidates.value_counts[a]
