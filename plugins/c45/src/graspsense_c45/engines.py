@@ -10,7 +10,7 @@ from graspsense_c45.options import Engine
 
 WORTH_COMPILING = 500_000
 """Values (rows x attributes) of one table from which "auto" compiles at once."""
-PARTS = 10
+PARTS = 5
 """How many values one counts for where rows have fractional weights, as parts of rows have: their terms take longer."""
 COMPILING_S = 4.0
 """Processor time for trees by the interpreter, in this process, after which "auto" compiles, which takes 4 to 7 s.

@@ -159,5 +159,5 @@ def rough_scale(scale: Scale) -> RoughScale:
 
 
 def rough_term(units: int, scale: RoughScale) -> float:
-    """Return the term of the weight of a row or more, in less time than `term`; the error is below 1e-12 of the weight."""
+    """Return the term of the weight of a row or more, to within 1e-12 of that weight, in less time than `term`."""
     return units * scale.terms * (math.log(units) - scale.ln_units)
