@@ -84,7 +84,7 @@ def main() -> None:
     given = parser.parse_args()
     if given.short:
         given.rows, given.repeats = [1_000], 1
-    names = ["sklearn", "numpy", *(["fast"] if importlib.util.find_spec("numba") else [])]
+    names = ["sklearn", "plain", *(["fast"] if importlib.util.find_spec("numba") else [])]
     rows = [row for n_rows in given.rows for row in measure(n_rows, given.repeats, names)]
     print(f"{where_measured()}\n{N_FEATURES} features, {N_CLASSES} classes; CPU seconds, medians\n")
     header = ("rows", "contender", "fit s", "ratio", "predict s", "ratio", "nodes")

@@ -1,4 +1,4 @@
-"""The two engines give the same tree, to the bit."""
+"""The interpreter and compiled code give the same tree, to the bit."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from graspsense_c45 import Attribute, Options, Schema, class_indices, engines, fit, fitting, make_table
 from graspsense_c45.engines import Fits, choose_fast
 
-pytest.importorskip("numba", reason="the extra 'fast' (numba) is not installed: there is one engine only")
+pytest.importorskip("numba", reason="the extra 'fast' (numba) is not installed: nothing is compiled")
 
 OPTIONS: list[dict[str, Any]] = [
     {},
@@ -52,12 +52,12 @@ def test_same_tree_and_predictions(weights, decimals):
     sizes = []
     for seed, options in enumerate(OPTIONS):
         table = grasps(seed, [40, 300, 1_500][seed % 3], decimals, weights)
-        numpy_tree = fit(table, Options(**options), engine="numpy")
+        plain_tree = fit(table, Options(**options), engine="plain")
         fast_tree = fit(table, Options(**options), engine="fast")
-        assert numpy_tree == fast_tree, options
-        predicted = [class_indices(numpy_tree, table.values, engine) for engine in ("numpy", "fast")]
+        assert plain_tree == fast_tree, options
+        predicted = [class_indices(plain_tree, table.values, engine) for engine in ("plain", "fast")]
         assert predicted[0].tolist() == predicted[1].tolist()
-        sizes.append(numpy_tree.node_count)
+        sizes.append(plain_tree.node_count)
     assert max(sizes) > 50
 
 
@@ -66,7 +66,7 @@ def test_same_tree_where_branches_are_raised_and_pruned_again():
     raised = 0
     for seed in range(8):
         table = grasps(seed, 2_000, 1, "one")
-        trees = [fit(table, Options(min_objects=1), engine=engine) for engine in ("numpy", "fast")]
+        trees = [fit(table, Options(min_objects=1), engine=engine) for engine in ("plain", "fast")]
         assert trees[0] == trees[1]
         raised += trees[0] != fit(table, Options(min_objects=1, subtree_raising=False), engine="fast")
     assert raised > 3
@@ -78,8 +78,30 @@ def test_same_tree_for_weights_of_any_size(factor):
     table = grasps(3, 60, 1, "any")
     weighted = make_table(table.schema, table.values, table.labels, table.weights * factor)
     for options in ({}, {"min_objects": 1}, {"criterion": "info_gain", "pruning": "reduced_error"}):
-        trees = [fit(weighted, Options(**options), engine=engine) for engine in ("numpy", "fast")]
+        trees = [fit(weighted, Options(**options), engine=engine) for engine in ("plain", "fast")]
         assert trees[0] == trees[1], options
+
+
+def nominal_and_missing(seed, missing):
+    rng = np.random.default_rng(seed)
+    numeric = grasps(seed, 400, 1, "any")
+    codes = (numeric.labels[:, None] + rng.integers(0, 3, (400, 2))) % [3, 12]
+    values = np.where(rng.random((400, 7)) < missing, np.nan, np.hstack((numeric.values, codes)))
+    attributes = [Attribute(f"n{count}", values=tuple(map(str, range(count)))) for count in (3, 12)]
+    schema = Schema((*numeric.schema.attributes, *attributes), numeric.schema.classes)
+    return make_table(schema, values, numeric.labels, numeric.weights)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("missing", [0.0, 0.05, 0.6])
+def test_same_tree_for_nominal_and_missing_values(missing):
+    for seed, options in enumerate([*OPTIONS, {"binary_splits": True}]):
+        table = nominal_and_missing(seed, missing)
+        trees = [fit(table, Options(**options), engine=engine) for engine in ("plain", "fast")]
+        assert trees[0] == trees[1], options
+        if "pruning" not in options:
+            leaves = trees[0].class_weights[trees[0].splits.feature < 0]
+            assert leaves.sum() == pytest.approx(table.weights.sum(), rel=1e-9)
 
 
 def oracle_tables():
@@ -96,37 +118,37 @@ def test_same_tree_on_the_awkward_sets(path):
     schema = Schema(tuple(Attribute(f"x{i}") for i in range(values.shape[1])), tuple(range(labels.max() + 1)))
     table = make_table(schema, values, labels, weights)
     for options in OPTIONS:
-        trees = [fit(table, Options(**options), engine=engine) for engine in ("numpy", "fast")]
+        trees = [fit(table, Options(**options), engine=engine) for engine in ("plain", "fast")]
         assert trees[0] == trees[1], options
 
 
 def test_auto_compiles_only_what_pays():
-    assert not choose_fast("numpy", 10**9)
+    assert not choose_fast("plain", 10**9)
     assert not choose_fast("auto", 6_000)
     assert choose_fast("auto", 6_000_000)
     assert choose_fast("fast", 1)
 
 
-def test_many_small_fits_use_compiled_code_once_numpy_took_as_long(monkeypatch):
+def test_many_small_fits_use_compiled_code_once_the_plain_form_took_as_long(monkeypatch):
     pytest.importorskip("graspsense")
-    from graspsense_c45.depthfirst import compiled
+    from graspsense_c45.building import compiled
 
     chosen = {}
     for on_disk in (True, False):
-        monkeypatch.setattr(compiled, "kept", lambda on_disk=on_disk: on_disk)
+        monkeypatch.setattr(compiled, "kept", lambda slim, on_disk=on_disk: on_disk)
         fits, chosen[on_disk] = Fits(), []
-        for _ in range(5):
-            chosen[on_disk].append(fits.choose_fast("auto", 6_000))
-            fits.add_growing(1.0)
-        assert not fits.choose_fast("numpy", 6_000)
-    assert chosen == {True: [False] + 4 * [True], False: 3 * [False] + 2 * [True]}
+        for _ in range(6):
+            chosen[on_disk].append(fits.choose_fast("auto", 6_000, True))
+            fits.add_plain(1.0)
+        assert not fits.choose_fast("plain", 6_000, True)
+    assert chosen == {True: [False] + 5 * [True], False: [k >= engines.COMPILING_S for k in range(6)]}
 
 
-def test_a_tree_that_numpy_grows_counts(monkeypatch):
+def test_a_tree_of_the_plain_form_counts(monkeypatch):
     fits = Fits()
     monkeypatch.setattr(fitting, "_FITS", fits)
     monkeypatch.setattr(engines, "LOADING_S", 1e-9)
     monkeypatch.setattr(engines, "COMPILING_S", 1e-9)
-    assert not fits.choose_fast("auto", 6_000)
+    assert not fits.choose_fast("auto", 6_000, True)
     fit(grasps(1, 300, None, "one"))
-    assert fits.choose_fast("auto", 6_000)
+    assert fits.choose_fast("auto", 6_000, True)

@@ -38,7 +38,7 @@ def test_a_stored_tree_predicts_with_numpy_alone():
 
 
 @pytest.mark.parametrize("missing", ["numba", "graspsense"])
-def test_where_the_compiled_engine_is_not_installed_numpy_answers(missing):
+def test_where_nothing_can_be_compiled_the_plain_form_answers(missing):
     code = (
         "import sys, importlib.util\n"
         "found = importlib.util.find_spec\n"

@@ -1,14 +1,15 @@
 """The laws by themselves, against textbook values and the mathematics."""
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 
 from graspsense_c45 import JavaRandom, criteria
-from graspsense_c45.arithmetic import ln, one_minus_exp, x_ln_x
+from graspsense_c45.arithmetic import Scale, ln, one_minus_exp, term, x_ln_x
+from graspsense_c45.building.cuts import Limits, Run, scan_unit, scan_weighted
 from graspsense_c45.estimates import estimated_errors, prepare_confidence
-from graspsense_c45.nodewise.cuts import NOT_ADMISSIBLE, CutLimits, scan
 
 
 def test_logarithm_is_right_to_the_last_bits():
@@ -16,7 +17,7 @@ def test_logarithm_is_right_to_the_last_bits():
     for x in (rng.random(2_000) * 10.0 ** rng.uniform(-300, 300, 2_000)).tolist():
         assert ln(x) == pytest.approx(math.log(x), rel=4e-16, abs=2e-16)
     assert ln(1.0) == 0.0
-    assert x_ln_x(np.array([0.0, 5e-7, 1.0])).tolist() == [0.0, 0.0, 0.0]
+    assert [x_ln_x(x) for x in (0.0, 5e-7, 1.0)] == [0.0, 0.0, 0.0]
 
 
 def test_one_minus_exp_keeps_small_arguments():
@@ -39,9 +40,8 @@ def test_estimates_at_the_ends():
     assert estimated_errors(0.0, 0.0, confidence) == 0.0
     assert estimated_errors(3.0, 3.0, confidence) == 3.0
     assert estimated_errors(3.0, 1.0, prepare_confidence(0.6)) == 1.0
-    weights = np.linspace(1.0, 50.0, 500)
-    shares = estimated_errors(weights, weights * 0.3, confidence)
-    assert ((shares >= weights * 0.3) & (shares <= weights + 1e-12)).all()
+    for weight in np.linspace(1.0, 50.0, 500).tolist():
+        assert weight * 0.3 <= estimated_errors(weight, weight * 0.3, confidence) <= weight + 1e-12
 
 
 def test_least_side_weight_is_a_tenth_of_the_mean_class_within_bounds():
@@ -52,28 +52,51 @@ def test_least_side_weight_is_a_tenth_of_the_mean_class_within_bounds():
     assert criteria.min_side_weight(5_000.0, 4, 200.0) == 200.0
 
 
-def scanned(numerators, tolerance, least):
+def best_place(numerators, limits):
     best, taken = 0, -1
-    for i, numerator in enumerate(numerators):
-        if numerator != NOT_ADMISSIBLE and numerator - best > tolerance and numerator >= least:
+    for i, numerator in numerators.items():
+        if numerator - best > limits.tolerance and numerator >= limits.least_numerator:
             best, taken = numerator, i
-    return taken
+    return taken, best
 
 
-def test_best_cut_is_the_one_the_scan_ends_on():
-    # Values close to each other compared with the tolerance, so that the first of several near-ties decides.
-    rng = np.random.default_rng(3)
+def numerator_of(left, right, scale):
+    """Of the gain of a cut (see `criteria.gain`), from the weights of the classes on its sides."""
+    sides = sum(term(weight, scale) for weight in (*left, *right)) - term(sum(left), scale)
+    whole = [sum(pair) for pair in zip(left, right, strict=True)]
+    undivided = term(sum(whole), scale) - sum(term(weight, scale) for weight in whole)
+    return undivided + sides - term(sum(right), scale)
+
+
+def test_best_cut_is_the_first_of_those_within_the_tolerance():
+    # Tolerances of the size of the differences, so that the first of several near-ties decides.
+    rng, scale = np.random.default_rng(3), Scale(0, 40)
     for _ in range(300):
-        shape = (int(rng.integers(1, 6)), int(rng.integers(1, 30)))
-        numerators = np.cumsum(rng.integers(-3, 4, shape), axis=1) + rng.integers(-20, 20)
-        numerators[rng.random(shape) < 0.2] = NOT_ADMISSIBLE
-        tolerance, least = int(rng.integers(0, 7)), rng.integers(0, 7, shape[0])
-        limits = CutLimits(np.zeros((shape[0], 1), np.int64), least, least, tolerance)
-        best, place = np.zeros(shape[0], np.int64), np.full(shape[0], -1)
-        scan(numerators, limits, best, place)
-        for a, own in enumerate(numerators.tolist()):
-            assert place[a] == scanned(own, tolerance, int(least[a]))
-            assert best[a] == (own[place[a]] if place[a] >= 0 else 0)
+        n, n_classes = int(rng.integers(2, 30)), int(rng.integers(1, 5))
+        values, labels = sorted(rng.integers(0, 12, n).tolist()), rng.integers(0, n_classes, n).tolist()
+        rows, weights = rng.permutation(n).tolist(), [1] * n
+        limits = Limits(
+            True, int(rng.integers(1, 4)), int(rng.integers(0, 2**40)), int(rng.integers(0, 2**40))
+        )
+        by_class = [[w * (labels[row] == k) for k in range(n_classes)] for row, w in enumerate(weights)]
+        numerators = {}
+        for i in range(n - 1):
+            left, right = (
+                [sum(column) for column in zip(*(by_class[row] for row in side), strict=True)]
+                for side in (rows[: i + 1], rows[i + 1 :])
+            )
+            if min(sum(left), sum(right)) >= limits.least_weight and values[i] < values[i + 1]:
+                numerators[i] = numerator_of(left, right, scale)
+        counts = [labels.count(k) for k in range(n_classes)]
+        run = Run(rows, values, 0, n, labels, counts, [0] * n_classes)
+        terms = [term(number, scale) for number in range(n + 1)]
+        steps = [high - low for low, high in itertools.pairwise(terms)]
+        for cut in (
+            scan_unit(run, terms, steps, limits),
+            scan_weighted(run, weights, [0] * n_classes, scale, limits),
+        ):
+            assert (cut.place, cut.numerator) == best_place(numerators, limits)
+            assert cut.n_cuts == len(numerators)
 
 
 def test_java_random_is_javas():

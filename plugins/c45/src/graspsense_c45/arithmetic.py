@@ -5,19 +5,16 @@ not depend on them at all. Weights and ``x ln x`` terms are therefore summed as 
 the order, and the two transcendental functions are written in IEEE operations, since those of numpy and of compilers
 differ in the last bit between machines.
 
-The functions are elementwise: they accept numbers and arrays. The compiled engine compiles the same lines. It
-replaces three of them (`select`, `mantissa_and_exponent`, `to_integer`) by versions for one number, since numba's own
-versions return arrays; see `depthfirst.compiled`.
+The functions are for single numbers. The compiler takes the same lines; `building.compiled` says what it replaces.
 """
 
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
-import numpy as np
-
-from graspsense_c45.arrays import AnyArray, Elementwise, Integer, Real, Truth, Whole
+from graspsense_c45.arrays import Integers, Numbers
 
 TOLERANCE = 1e-6
 """Numbers closer than this are equal for J48 (weka.core.Utils.SMALL). ``x ln x`` counts as 0 for x below it."""
@@ -40,34 +37,19 @@ class Scale(NamedTuple):
     term_bits: int
 
 
-def select(condition: Truth, where_true: Real | Whole, where_false: Real | Whole) -> AnyArray:
-    """Return one of two numbers, elementwise."""
-    return np.where(condition, where_true, where_false)
-
-
-def mantissa_and_exponent(x: Real) -> tuple[Real, Whole]:
-    """Return m in [0.5, 1) and an integer e with ``x = m * 2**e``; both are 0 for 0."""
-    return np.frexp(x)
-
-
-def to_integer(x: Real) -> Elementwise:
-    """Return an integral number as a 64-bit integer."""
-    return np.asarray(x, dtype=np.int64)
-
-
-def ln(x: Real) -> Elementwise:
+def ln(x: float) -> float:
     """Return the natural logarithm of positive numbers, to below one unit in the last place.
 
     With ``x = m * 2**e`` and m in [sqrt(1/2), sqrt(2)), the logarithm of m is the series of 2 artanh((m - 1) / (m +
     1)).
     """
-    mantissa, exponent = mantissa_and_exponent(x)
-    low = mantissa < _SQRT_HALF
-    m = select(low, mantissa + mantissa, mantissa)
-    e = exponent - low
+    m, e = math.frexp(x)
+    if m < _SQRT_HALF:
+        m += m
+        e -= 1
     f = (m - 1.0) / (m + 1.0)
     z = f * f
-    series: Real = 1.0 / 23.0
+    series = 1.0 / 23.0
     series = series * z + 1.0 / 21.0
     series = series * z + 1.0 / 19.0
     series = series * z + 1.0 / 17.0
@@ -82,13 +64,13 @@ def ln(x: Real) -> Elementwise:
     return e * _LN2_HIGH + (2.0 * f + tail)
 
 
-def one_minus_exp(y: Real) -> Real:
+def one_minus_exp(y: float) -> float:
     """Return ``1 - exp(y)`` for ``y <= 0``, without cancellation near 0; below -700 the value at -700.
 
     q is first the series of exp(r) - 1 at r = y / 1024, and is then replaced ten times by (1 + q)**2 - 1.
     """
-    r = np.maximum(y, -700.0) / 1024.0
-    q: Real = 1.0 / 14.0
+    r = max(y, -700.0) / 1024.0
+    q = 1.0 / 14.0
     q = (q * r + 1.0) / 13.0
     q = (q * r + 1.0) / 12.0
     q = (q * r + 1.0) / 11.0
@@ -107,24 +89,33 @@ def one_minus_exp(y: Real) -> Real:
     return -q
 
 
-def x_ln_x(x: Real) -> Real:
+def x_ln_x(x: float) -> float:
     """Return ``x ln x``, and 0 for x below the tolerance (J48's rule)."""
-    return select(x < TOLERANCE, 0.0, x * ln(x))
+    return 0.0 if x < TOLERANCE else x * ln(x)
 
 
-def real_weight(units: Whole, weight_bits: Integer) -> Elementwise:
+def real_weight(units: int, weight_bits: int) -> float:
     """Return a fixed-point weight as a number of rows (exact)."""
-    return np.ldexp(units * 1.0, -weight_bits)
+    return math.ldexp(float(units), -weight_bits)
 
 
-def real_term(units: Whole, term_bits: int) -> Real:
+def real_term(units: int, term_bits: int) -> float:
     """Return a fixed-point term as a number."""
-    return np.ldexp(units * 1.0, -term_bits)
+    return math.ldexp(float(units), -term_bits)
 
 
-def term(units: Whole, scale: Scale) -> Elementwise:
+def term(units: int, scale: Scale) -> int:
     """Return ``x ln x`` of a fixed-point weight as a fixed-point term."""
-    return to_integer(np.rint(np.ldexp(x_ln_x(real_weight(units, scale.weight_bits)), scale.term_bits)))
+    return _known_term(units, scale)
+
+
+def new_term(units: int, scale: Scale) -> int:
+    """Return what `term` does, computed again."""
+    return round(math.ldexp(x_ln_x(real_weight(units, scale.weight_bits)), scale.term_bits))
+
+
+_known_term = lru_cache(maxsize=1 << 17)(new_term)
+"""In the interpreter a term takes longer than the rest of a step, and the same weights come again and again."""
 
 
 def bits_below(total: float, bits: int) -> int:
@@ -132,16 +123,13 @@ def bits_below(total: float, bits: int) -> int:
     return bits - math.frexp(total)[1]
 
 
-def first_maximum(columns: AnyArray, start: float | Integer, margin: float | Integer) -> Elementwise:
+def first_maximum(numbers: Numbers | Integers, start: float, margin: float) -> int:
     """Return the index of the first entry that no later one exceeds by more than `margin`.
 
-    The scan goes along the first axis of `columns`; the first entry is compared with `start`, and 0 is returned where
-    no entry exceeds that.
+    The first entry is compared with `start`, and 0 is returned where no entry exceeds that.
     """
-    best: Elementwise = start
-    chosen: Whole = 0
-    for k in range(len(columns)):
-        better = columns[k] - best > margin
-        best = select(better, columns[k], best)
-        chosen = select(better, k, chosen)
+    best, chosen = start, 0
+    for k in range(len(numbers)):
+        if numbers[k] - best > margin:
+            best, chosen = numbers[k], k
     return chosen

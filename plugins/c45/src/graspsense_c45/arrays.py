@@ -25,13 +25,13 @@ SmallLabels = NDArray[Any]
 AnyArray = NDArray[Any]
 """Integers or numbers, as the function says."""
 
-Elementwise = Any
-"""The result of an elementwise function: a number where the arguments are numbers, else an array."""
-Real = float | NDArray[np.float64]
-"""A number, or an array for a function that works elementwise."""
-Integer = int | np.int64
-"""An integer in code that is compiled."""
-Whole = Integer | NDArray[np.int64]
-"""An integer, or an array of integers for a function that works elementwise."""
-Truth = bool | np.bool_ | NDArray[np.bool_]
-"""A truth value, or an array for a function that works elementwise."""
+Integers = list[int] | NDArray[Any]
+"""Integers of code that is also compiled: the interpreter has them in a list, which it reads faster than an array."""
+IntegerTable = list[list[int]] | NDArray[Any]
+"""The same in rows of equal length."""
+Numbers = list[float] | NDArray[np.float64]
+"""Numbers of code that is also compiled."""
+NumberTable = list[list[float]] | NDArray[np.float64]
+"""The same in rows of equal length."""
+Truths = list[bool] | NDArray[np.bool_]
+"""Truth values of code that is also compiled."""

@@ -46,7 +46,7 @@ class C45Classifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     units: the units of the columns, as a mapping of names or a sequence, for paths and rules.
     random_state: with ``reduced_error`` pruning, an integer or a RandomState shuffles the rows before some are held
         out; None keeps their order, as J48 does (whose seed does not decide which rows are held out).
-    engine: ``numpy``, ``fast`` (needs the extra ``fast``) or ``auto``; the tree is the same.
+    engine: ``plain``, ``fast`` (compiled; needs the extra ``fast``) or ``auto``; the tree is the same.
 
     After fitting: ``tree_`` (a `tree.Tree`), ``classes_``, ``n_features_in_``, ``feature_names_in_`` where X has names.
     NaN in X is missing; so are None and NA in a data frame.

@@ -1,4 +1,4 @@
-"""Whether a tree is grown by compiled code (`depthfirst`) or by numpy (`nodewise`); the results are the same."""
+"""Whether compiled code or the interpreter grows a tree; both run the same functions, with the same result."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from typing import get_args
 from graspsense_c45.options import Engine
 
 WORTH_COMPILING = 500_000
-"""Values (rows x attributes) of one table from which "auto" chooses the compiled engine at once."""
-COMPILING_S = 3.0
-"""Processor time for growing trees by numpy, in this process, after which "auto" compiles, which takes 3 to 7 s.
-However many fits come, they take at most about twice as long as with the better engine from the beginning."""
-LOADING_S = 1.0
+"""Values (rows x attributes) of one table from which "auto" compiles at once."""
+PARTS = 5
+"""How many values one counts for where rows have fractional weights, as parts of rows have: their terms take longer."""
+COMPILING_S = 4.0
+"""Processor time for trees by the interpreter, in this process, after which "auto" compiles, which takes 4 to 7 s.
+However many fits come, they take at most about twice as long as with compiled code from the beginning."""
+LOADING_S = 0.5
 """The same where an earlier process has kept the machine code."""
 
 _NEEDED = ("numba", "graspsense")
@@ -21,9 +23,9 @@ _NEEDED = ("numba", "graspsense")
 
 
 def choose_fast(engine: Engine, n_values: int) -> bool:
-    """Return whether to use the compiled engine for so many values.
+    """Return whether to use compiled code for so many values.
 
-    "auto" chooses the numpy engine where the compiled one is not installed; see `missing_for_fast`.
+    "auto" does not where it cannot be compiled; see `missing_for_fast`.
 
     Raises ValueError for an unknown engine, and ModuleNotFoundError where "fast" is not installed.
     """
@@ -32,7 +34,7 @@ def choose_fast(engine: Engine, n_values: int) -> bool:
     if engine == "fast" and missing_for_fast():
         raise ModuleNotFoundError(
             f"engine='fast' needs {' and '.join(missing_for_fast())}, which is not installed; "
-            "install graspsense-c45[fast] or use engine='numpy'"
+            "install graspsense-c45[fast] or use engine='plain'"
         )
     return engine == "fast" or (engine == "auto" and n_values >= WORTH_COMPILING and not missing_for_fast())
 
@@ -41,30 +43,33 @@ class Fits:
     """The fits of this process, by which "auto" chooses the engine of the next one."""
 
     def __init__(self) -> None:
-        self._grown_s = 0.0
-        self._kept: bool | None = None
+        self._plain_s = 0.0
+        self._kept: dict[bool, bool] = {}
 
-    def choose_fast(self, engine: Engine, n_values: int) -> bool:
-        """Return whether to fit a table of so many values by the compiled engine. Raises as `choose_fast` does."""
+    def choose_fast(self, engine: Engine, n_values: int, slim: bool) -> bool:
+        """Return whether to fit a table of so many values by compiled code; slim: see `building.compiled`.
+
+        Raises as the function `choose_fast` does.
+        """
         if choose_fast(engine, n_values):
             return True
-        if engine != "auto" or self._grown_s < LOADING_S or missing_for_fast():
+        if engine != "auto" or self._plain_s < LOADING_S or missing_for_fast():
             return False
-        return self._grown_s >= COMPILING_S or self._is_kept()
+        return self._plain_s >= COMPILING_S or self._is_kept(slim)
 
-    def add_growing(self, seconds: float) -> None:
-        """Count a tree that numpy has grown in so much processor time."""
-        self._grown_s += seconds
+    def add_plain(self, seconds: float) -> None:
+        """Count a tree that took the interpreter so much processor time."""
+        self._plain_s += seconds
 
-    def _is_kept(self) -> bool:
-        if self._kept is None:
-            from graspsense_c45.depthfirst.compiled import kept
+    def _is_kept(self, slim: bool) -> bool:
+        if slim not in self._kept:
+            from graspsense_c45.building.compiled import kept
 
-            self._kept = kept()
-        return self._kept
+            self._kept[slim] = kept(slim)
+        return self._kept[slim]
 
 
 @cache
 def missing_for_fast() -> tuple[str, ...]:
-    """Return the packages that the compiled engine needs and that are not installed; with any, "auto" means numpy."""
+    """Return the packages that compiling needs and that are not installed; with any, "auto" means plain."""
     return tuple(name for name in _NEEDED if find_spec(name) is None)

@@ -3,34 +3,20 @@
 from __future__ import annotations
 
 import time
-from typing import Protocol
 
 import numpy as np
 
 from graspsense_c45.arrays import Indices, Reals
-from graspsense_c45.engines import Fits
-from graspsense_c45.nodewise.builder import NodewiseTreeBuilder
-from graspsense_c45.nodewise.reduced_error import prune_reduced_error
+from graspsense_c45.building.builder import TreeBuilder
+from graspsense_c45.engines import PARTS, Fits
 from graspsense_c45.options import J48, Engine, Options
 from graspsense_c45.splits import LEAF, GrowingTree
 from graspsense_c45.table import MISSING_CLASS, Table
-from graspsense_c45.training_set import TrainingSet, make_training_set
+from graspsense_c45.training_set import make_training_set
 from graspsense_c45.tree import Tree, finish
 from graspsense_c45.weka_folds import hold_out
 
 _FITS = Fits()
-
-
-class TreeBuilder(Protocol):
-    """What a form of the builder does: it grows a tree when it is made, and prunes it on request."""
-
-    tree: GrowingTree
-
-    def collapse(self) -> None:
-        """Make leaves of subtrees that hardly save training errors."""
-
-    def prune_pessimistic(self) -> None:
-        """Prune by estimated errors, after collapsing if at all."""
 
 
 def fit(
@@ -47,15 +33,7 @@ def fit(
         return _fit_held_out(table, options, held_out, engine)
     if held_out is not None:
         raise ValueError(f"held_out goes with pruning='reduced_error'; pruning is {options.pruning!r}")
-    training = make_training_set(table, None, options)
-    builder = _builder(training, engine)
-    if options.actual_split_value:
-        _use_actual_values(builder.tree, table.values)
-    if options.collapse:
-        builder.collapse()
-    if options.pruning == "pessimistic":
-        builder.prune_pessimistic()
-    return finish(builder.tree, training.scale.weight_bits, table.schema, options.laplace)
+    return _fit_rows(table, options, None, np.arange(0), engine)
 
 
 def _fit_held_out(table: Table, options: Options, held_out: Indices | None, engine: Engine) -> Tree:
@@ -67,25 +45,29 @@ def _fit_held_out(table: Table, options: Options, held_out: Indices | None, engi
         raise ValueError(
             "all rows are held out, or the others have weight 0; leave some rows to grow the tree on"
         )
+    return _fit_rows(table, options, grown_on, np.intersect1d(with_class, held_out), engine)
+
+
+def _fit_rows(
+    table: Table, options: Options, grown_on: Indices | None, held_out: Indices, engine: Engine
+) -> Tree:
+    """Return a tree that is grown on some rows of a table (None: all), and pruned on others if by reduced error."""
     training = make_training_set(table, grown_on, options)
-    tree = _builder(training, engine).tree
-    if options.actual_split_value:
-        _use_actual_values(tree, table.values)
-    prune_reduced_error(tree, training, table, np.intersect1d(with_class, held_out))
-    return finish(tree, training.scale.weight_bits, table.schema, options.laplace)
-
-
-def _builder(training: TrainingSet, engine: Engine) -> TreeBuilder:
-    """Return the compiled builder where it is wanted and can build this tree, else the plain one."""
-    if _FITS.choose_fast(engine, training.values.size):
-        from graspsense_c45.depthfirst.builder import DepthFirstTreeBuilder
-
-        if DepthFirstTreeBuilder.can_build(training):
-            return DepthFirstTreeBuilder(training)
+    n_values = training.values.size * (1 if training.scale.weight_bits == 0 else PARTS)
+    compiled = _FITS.choose_fast(engine, n_values, training.slim)
     began = time.thread_time()
-    builder = NodewiseTreeBuilder(training)
-    _FITS.add_growing(time.thread_time() - began)
-    return builder
+    builder = TreeBuilder(training, compiled)
+    if options.actual_split_value:
+        _use_actual_values(builder.tree, table.values)
+    if options.pruning == "reduced_error":
+        builder.prune_reduced_error(table, held_out)
+    elif options.collapse:
+        builder.collapse()
+    if options.pruning == "pessimistic":
+        builder.prune_pessimistic()
+    if not compiled:
+        _FITS.add_plain(time.thread_time() - began)
+    return finish(builder.tree, training.scale.weight_bits, table.schema, options.laplace)
 
 
 def _use_actual_values(tree: GrowingTree, values: Reals) -> None:

@@ -14,8 +14,11 @@ def feature_importances(tree: Tree) -> Reals:
 
     The fractions add up to 1; all are 0 where the tree gains no information. The impurity of a node is its entropy.
     """
-    classes = np.asarray(x_ln_x(tree.class_weights)).sum(axis=1)
-    weighted_impurity = (x_ln_x(tree.weighted_n_node_samples) - classes) / LN2
+    classes = np.array([[x_ln_x(weight) for weight in row] for row in tree.class_weights.tolist()]).sum(
+        axis=1
+    )
+    whole = np.array([x_ln_x(weight) for weight in tree.weighted_n_node_samples.tolist()])
+    weighted_impurity = (whole - classes) / LN2
     gained = np.zeros(len(tree.schema.attributes))
     for node in range(tree.node_count):
         if not tree.is_leaf(node):

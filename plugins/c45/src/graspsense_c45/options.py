@@ -8,7 +8,7 @@ from attrs import frozen
 
 Criterion = Literal["gain_ratio", "info_gain"]
 Pruning = Literal["pessimistic", "reduced_error", "none"]
-Engine = Literal["auto", "numpy", "fast"]
+Engine = Literal["auto", "plain", "fast"]
 
 
 @frozen

@@ -89,7 +89,7 @@ def node_distributions(tree: Tree, laplace: bool) -> Reals:
 def _leaves(tree: Tree, x: Reals, engine: Engine) -> Indices:
     """Return the leaf of each row; no value may be missing."""
     if choose_fast(engine, x.size) and not any(attribute.is_nominal for attribute in tree.schema.attributes):
-        from graspsense_c45.depthfirst import compiled
+        from graspsense_c45.building import compiled
 
         return compiled.leaves_of_rows(tree.splits, x)
     return leaves_of_rows(tree.splits, x, np.arange(len(x)), np.zeros(len(x), dtype=np.int64))

@@ -73,19 +73,6 @@ class GrowingTree(Splits):
 
     counts: FixedPoint
 
-    def make_leaves(self, nodes: Indices) -> None:
-        """Make leaves of these nodes."""
-        self.feature[nodes] = LEAF
-        self.threshold[nodes] = np.nan
-        self.category[nodes] = ALL_VALUES
-        self.first_child[nodes] = 0
-        self.n_children[nodes] = 0
-
-    def replace(self, nodes: Indices, by: Indices) -> None:
-        """Give each node the split and the children of another one; the counts of the node stay."""
-        for column in (self.feature, self.threshold, self.category, self.first_child, self.n_children):
-            column[nodes] = column[by]
-
 
 def ranges(starts: AnyArray, lengths: AnyArray) -> Indices:
     """Return the integers of several ranges, one range after the other."""

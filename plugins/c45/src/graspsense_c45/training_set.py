@@ -14,18 +14,12 @@ from graspsense_c45.arithmetic import (
     WEIGHT_BITS,
     Scale,
     bits_below,
-    first_maximum,
-    real_term,
     real_weight,
-    term,
     x_ln_x,
 )
-from graspsense_c45.arrays import AnyArray, FixedPoint, Indices, Integer, Mask, Real, Reals, SmallLabels
+from graspsense_c45.arrays import FixedPoint, Indices, Mask, Reals, SmallLabels
 from graspsense_c45.options import Options
 from graspsense_c45.table import MISSING_CLASS, Table
-
-_MOST_TABULATED = 4
-"""Weight of a row, on average, up to which the terms are tabulated."""
 
 
 @frozen(eq=False, slots=False)
@@ -36,7 +30,7 @@ class TrainingSet:
     n_classes: declared classes. value_counts: declared values of a nominal attribute, 0 for a numeric one.
     averaged: whether an attribute enters the average gain.
     scale: the units of weights and terms. unit: whether every row weighs 1 and no value is missing.
-    complete: whether no value is missing. term_table: the terms of 0, 1, ... rows where weights are whole, else empty.
+    complete: whether no value is missing.
     """
 
     values: Reals
@@ -49,26 +43,16 @@ class TrainingSet:
     unit: bool
     complete: bool
     options: Options
-    term_table: FixedPoint
 
-    def terms(self, weights: AnyArray | Integer) -> FixedPoint:
-        """Return ``x ln x`` of fixed-point weights, as fixed-point terms."""
-        if self.term_table.size:
-            return np.asarray(self.term_table[weights])
-        return np.asarray(term(weights, self.scale))
-
-    def real_weights(self, weights: AnyArray | Integer) -> Reals:
-        """Return fixed-point weights as numbers of rows (exact)."""
-        return np.asarray(real_weight(weights, self.scale.weight_bits))
-
-    def real_terms(self, terms: AnyArray | Integer) -> Reals:
-        """Return fixed-point terms as numbers."""
-        return np.asarray(real_term(terms, self.scale.term_bits))
+    @property
+    def slim(self) -> bool:
+        """Whether all attributes are numeric and no value is missing, so that compiled code may be shorter."""
+        return self.complete and not self.value_counts.any()
 
     @property
     def total_weight(self) -> float:
         """The weight of all rows, in rows."""
-        return float(self.real_weights(self.weights.sum()))
+        return real_weight(int(self.weights.sum()), self.scale.weight_bits)
 
     @cached_property
     def weight_margin(self) -> int:
@@ -82,44 +66,9 @@ class TrainingSet:
         """The training errors that a subtree may save without being kept, in fixed-point weight."""
         return float(np.ldexp(criteria.COLLAPSE_SLACK, min(self.scale.weight_bits, 80)))
 
-    def gain_tolerance(self, weight: Real) -> FixedPoint:
-        """Return the tolerance of a gain, as a difference of numerators at nodes of this weight (in rows)."""
-        return np.asarray(criteria.gain_tolerance(weight, self.scale.term_bits), dtype=np.int64)
-
-    def least_numerator(self, weight: Real, known_weight: Real) -> FixedPoint:
-        """Return the numerator below which a gain counts as 0; both weights in rows."""
-        return np.asarray(
-            criteria.least_numerator(weight, known_weight, self.scale.term_bits), dtype=np.int64
-        )
-
-    def least_units(self, weight: Real) -> FixedPoint:
-        """Return the least fixed-point weight that counts as `weight` rows or more."""
-        return np.asarray(criteria.least_units(weight, self.scale.weight_bits), dtype=np.int64)
-
     def small_labels(self) -> SmallLabels:
         """Return the labels in the smallest type that holds them."""
         return self.labels.astype(np.min_scalar_type(self.n_classes))
-
-    def majority_class(self, counts: FixedPoint) -> Indices:
-        """Return the first class that no other exceeds by more than the margin, for each row of counts."""
-        if self.scale.weight_bits == 0:
-            # The margin is 0, and this is several times faster than the scan.
-            return np.asarray(np.argmax(counts, axis=1))
-        return np.asarray(first_maximum(counts.T, 0, self.weight_margin), dtype=np.int64)
-
-    def majority_of(self, counts: FixedPoint) -> int:
-        """Return the first class of one node that no other exceeds by more than the margin."""
-        best, chosen, margin = 0, 0, self.weight_margin
-        for k, weight in enumerate(counts.tolist()):
-            if weight - best > margin:
-                best, chosen = weight, k
-        return chosen
-
-    def training_errors(self, counts: FixedPoint) -> FixedPoint:
-        """Return the fixed-point weight outside the majority class, for each row of counts."""
-        majority = self.majority_class(counts)
-        errors: FixedPoint = counts.sum(axis=1) - counts[np.arange(len(counts)), majority]
-        return errors
 
 
 def make_training_set(table: Table, rows: Indices | None, options: Options) -> TrainingSet:
@@ -142,8 +91,7 @@ def make_training_set(table: Table, rows: Indices | None, options: Options) -> T
         [0 if attribute.values is None else len(attribute.values) for attribute in table.schema.attributes],
         dtype=np.int64,
     )
-    scale = Scale(weight_bits, bits_below(float(x_ln_x(total)) + 1.0, TERM_BITS))
-    tabulated = weight_bits == 0 and total <= _MOST_TABULATED * len(labels)
+    scale = Scale(weight_bits, bits_below(x_ln_x(total) + 1.0, TERM_BITS))
     return TrainingSet(
         values=values,
         labels=labels,
@@ -155,7 +103,6 @@ def make_training_set(table: Table, rows: Indices | None, options: Options) -> T
         unit=unit_weights and complete,
         complete=complete,
         options=options,
-        term_table=np.asarray(term(np.arange(int(total) + 1 if tabulated else 0), scale)),
     )
 
 

@@ -141,17 +141,17 @@ class Tree:
 
 def largest_class(rows: Reals) -> Indices:
     """Return the first class of each row that no other exceeds by more than the tolerance, scanning as J48 does."""
-    return np.asarray(first_maximum(rows.T, -1.0, TOLERANCE), dtype=np.int64)
+    return np.array([first_maximum(row, -1.0, TOLERANCE) for row in rows.tolist()], dtype=np.int64)
 
 
 def finish(grown: GrowingTree, weight_bits: int, schema: Schema, laplace: bool) -> Tree:
     """Return the tree that was grown and pruned, without the nodes that are no longer reached."""
     order = np.concatenate(grown.levels(ROOT))
-    n_children = grown.n_children[order]
+    n_children = grown.n_children[order].astype(np.int32)
     splits = Splits(
-        grown.feature[order],
+        grown.feature[order].astype(np.int32),
         grown.threshold[order],
-        grown.category[order],
+        grown.category[order].astype(np.int32),
         first_children(n_children),
         n_children,
     )
