@@ -58,7 +58,7 @@ class GraspingJob:
     options: BatchOptions
     makes_signals: bool
     """Whether the gripper has further channels, which are not handed over."""
-    batch: Batch = field(factory=lambda: Batch(1, {}))
+    batch: Batch = field(factory=Batch)
     """What the grasps of this process share."""
 
     def grasp(self, thing: str, seed: int) -> Grasped:
@@ -94,7 +94,6 @@ class GraspingJob:
                     "config": asdict(self.config),
                     "controller": [name, values],
                     "run": asdict(self.options.get("run") or RunConfig()),
-                    "grasps": self.batch.grasps,
                 }
             )
         except (ConfigError, UnknownName, TypeError, ValueError) as error:
@@ -127,7 +126,6 @@ def grasps(job: GraspingJob, things: Sequence[str], seeds: Sequence[int]) -> lis
         raise ValueError(f"{len(things)} scenes and {len(seeds)} seeds: give one seed a scene")
     wanted = job.options.get("workers") or os.cpu_count() or 1
     workers = max(1, min(wanted, len(things) // WORTH_A_PROCESS))
-    job = evolve(job, batch=Batch(len(things) // workers, {}))
     progress = job.options.get("progress")
     with _processes(job, workers) as free:
 

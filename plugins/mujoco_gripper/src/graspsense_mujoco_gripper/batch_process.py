@@ -16,7 +16,6 @@ from graspsense.simulator_api import RunConfig
 from graspsense_mujoco_gripper.backend import gripper_in_batch
 from graspsense_mujoco_gripper.batch import COLUMNS, GraspingJob, line_of
 from graspsense_mujoco_gripper.config import MujocoConfig
-from graspsense_mujoco_gripper.prepared import Batch
 
 
 def main() -> None:
@@ -37,7 +36,6 @@ def main() -> None:
         create("controller", name, **values),
         {"run": RunConfig(**greeting["run"]), "traces": True},
         makes_signals=False,
-        batch=Batch(greeting["grasps"], {}),
     )
     for line in asked:
         columns = io.BytesIO()

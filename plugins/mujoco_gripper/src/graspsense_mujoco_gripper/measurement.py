@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Set
 from math import hypot
-from typing import Any, NamedTuple
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -27,26 +27,6 @@ LEFT, RIGHT, THING, ALL = 1, 2, 4, 7
 def plain(values: NDArray[Any]) -> Any:
     """Return a view of an array, row by row, whose numbers are read and set in a fraction of the time of numpy."""
     return memoryview(values.reshape(-1))  # type: ignore[arg-type]
-
-
-class GapTerms(NamedTuple):
-    """The gap: the distance of two geoms, or else an offset and a weighted sum of values of the model."""
-
-    geoms: Any
-    values: Any
-    places: Any
-    weights: Any
-    offset_m: float
-
-    def in_arrays(self) -> GapTerms:
-        """Return the same for compiled code; `values` remain those of the model."""
-        return GapTerms(
-            geoms=np.array(self.geoms, np.int64),
-            values=np.asarray(self.values),
-            places=np.array(self.places, np.int64),
-            weights=np.array(self.weights, np.float64),
-            offset_m=float(self.offset_m),
-        )
 
 
 class GapGauge:
@@ -74,10 +54,20 @@ class GapGauge:
         if self._gap.geoms and not self._faces:
             model, (left, right) = self._model, self._ids
             return lambda: float(mujoco.mj_geomDistance(model, data, left, right, FARTHEST_M, None))
-        # Sums of a few numbers take less time in the interpreter than in numpy.
-        _, values, places, weights, offset_m = self.terms(data, axis)
-        terms = list(zip(places, weights, strict=True))
+        if self._faces:
+            values, offset_m = plain(data.site_xpos), 0.0
+            terms = [
+                (3 * site + k, sign * float(axis[k]) / len(sites))
+                for sign, sites in zip(SIDES, self._faces, strict=True)
+                for site in sites
+                for k in range(3)
+                if axis[k] != 0.0
+            ]
+        else:
+            values, offset_m = plain(data.qpos), self._gap.offset_m
+            terms = [(self._ids[0], self._gap.scale)]
 
+        # Sums of a few numbers take less time in the interpreter than in numpy.
         def gap_m() -> float:
             total: float = offset_m
             for k, weight in terms:
@@ -85,30 +75,6 @@ class GapGauge:
             return total
 
         return gap_m
-
-    def terms(self, data: mujoco.MjData, axis: Floats) -> GapTerms:
-        """Return what the gap follows from."""
-        if self._faces:
-            terms = [
-                (3 * site + k, sign * float(axis[k]) / len(sites))
-                for sign, sites in zip((-1.0, 1.0), self._faces, strict=True)
-                for site in sites
-                for k in range(3)
-                if axis[k] != 0.0
-            ]
-            places, weights = map(list, zip(*terms, strict=True))
-            return GapTerms(
-                geoms=[], values=plain(data.site_xpos), places=places, weights=weights, offset_m=0.0
-            )
-        if self._gap.geoms:
-            return GapTerms(geoms=self._ids, values=plain(data.qpos), places=[], weights=[], offset_m=0.0)
-        return GapTerms(
-            geoms=[],
-            values=plain(data.qpos),
-            places=self._ids,
-            weights=[self._gap.scale],
-            offset_m=self._gap.offset_m,
-        )
 
 
 class ForceGauge:
@@ -127,14 +93,14 @@ class ForceGauge:
     ) -> None:
         self._model, self._data, self._axis = model, data, axis
         # The last one is that of soft bodies, whose contacts have the geom -1.
-        self.roles = [0] * (model.ngeom + 1)
+        self._roles = [0] * (model.ngeom + 1)
         for role, geoms in zip(
             (LEFT, RIGHT, THING), (*(geoms_of(model, finger) for finger in fingers), things), strict=True
         ):
             for geom in geoms:
-                self.roles[geom] |= role
+                self._roles[geom] |= role
         self._sensors = [self._sensor(finger, side) for finger, side in zip(fingers, SIDES, strict=True)]
-        self._by_contacts, self.only_contacts = None in self._sensors, self._sensors == [None, None]
+        self._by_contacts = None in self._sensors
         self._factors: dict[tuple[int, int], tuple[float, float]] = {}
         self._wrench = np.zeros(6)
         self._force = plain(self._wrench)
@@ -164,7 +130,7 @@ class ForceGauge:
 
     def _sums(self) -> tuple[float, float]:
         """Return the sums of the forces at the contacts of each finger."""
-        model, data, factors, roles, force = self._model, self._data, self._factors, self.roles, self._force
+        model, data, factors, roles, force = self._model, self._data, self._factors, self._roles, self._force
         contacts, rows = data.contact, None
         left = right = 0.0
         for k, pair in enumerate(contacts.geom.tolist()):
@@ -185,7 +151,6 @@ class ForceGauge:
     def _along_axis(self, frames: Floats) -> list[float]:
         """Return the component along the closing direction of each row of the frames of the contacts."""
         axis, rows = self._axis, frames.reshape(-1, 3)
-        # Added in the order of compiled code, which the product of numpy does not keep.
         total = rows[:, 0] * axis[0]
         for j in (1, 2):
             if axis[j] != 0.0:

@@ -6,7 +6,7 @@ from typing import Final
 
 import mujoco
 import numpy as np
-from attrs import define, evolve, frozen
+from attrs import define, evolve, field, frozen
 
 from graspsense_mujoco_gripper.catalogue import soften_walls
 from graspsense_mujoco_gripper.config import MujocoConfig
@@ -49,9 +49,7 @@ class Prepared:
 class Batch:
     """What the grasps of a process share: what the first one of each thing prepares."""
 
-    grasps: int
-    """Their number; 1 where the controller turned out not to be compilable."""
-    known: dict[MujocoConfig, Prepared]
+    known: dict[MujocoConfig, Prepared] = field(factory=dict)
 
     def prepared(self, config: MujocoConfig, timestep_s: float) -> Prepared:
         """Return what the grasps with these settings have in common. Raises ConfigError, UnknownName."""
