@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import ceil, inf, nan
 from pathlib import Path
 from typing import Any, Final, Unpack, final
@@ -33,6 +33,8 @@ from graspsense.simulator_api import (
     BatchBackend,
     BatchOptions,
     Grasped,
+    HandedGrasp,
+    RunConfig,
     SimulationVariant,
     Viewer,
 )
@@ -150,9 +152,10 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         """Grasp each thing with its seed, in a process on each core."""
         for name in dict.fromkeys(scenes):
             read_scene(name, self.config.scene)
-        makes_signals = any(self.with_object(name).makes_signals() for name in set(scenes))
-        job = GraspingJob(gripper_in_batch, self.config, controller, options, makes_signals)
-        return grasps(job, scenes, seeds)
+        # Further channels are not handed over from process to process.
+        alone = any(self.with_object(name).makes_signals() for name in set(scenes))
+        job = GraspingJob(gripper_in_batch, self.config, controller, options.get("run") or RunConfig())
+        return grasps(job, scenes, seeds, options, alone=alone)
 
     def makes_signals(self) -> bool:
         """Return whether there are channels that each tick has besides the frame and the cells."""
@@ -421,6 +424,13 @@ def gripper_in_batch(config: MujocoConfig, batch: Batch) -> MujocoGripper:
     gripper = MujocoGripper(config)
     gripper.join(batch)
     return gripper
+
+
+def grasps_in_process(
+    controller: Controller[Any], run: RunConfig, common: Mapping[str, Any]
+) -> Callable[[str, int], HandedGrasp]:
+    """Return what runs a grasp in this process, as `GraspProcess` asks for it."""
+    return GraspingJob(gripper_in_batch, MujocoConfig(**common["config"]), controller, run).grasp
 
 
 def kept_steps(steps: int, most: float) -> list[int]:
