@@ -48,14 +48,14 @@ from graspsense_mujoco_gripper.drive import ActuatorDrive, Travel, instability
 from graspsense_mujoco_gripper.gripper_file import GripperFile, read_gripper
 from graspsense_mujoco_gripper.measurement import (
     ForceGauge,
-    GapGauge,
     Palm,
     SpringCells,
     cells_of,
+    gap_reader,
     geoms_of,
     plain,
 )
-from graspsense_mujoco_gripper.model import OBJ, identifier
+from graspsense_mujoco_gripper.model import identifier
 from graspsense_mujoco_gripper.prepared import Batch, prepare
 from graspsense_mujoco_gripper.roughness import Roughness
 from graspsense_mujoco_gripper.scene import read_scene, scene_named
@@ -205,7 +205,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         data.qpos[: len(travel.qpos_open)] = travel.qpos_open
         mujoco.mj_forward(model, data)
         self._model, self._travel, self._generator = model, travel, generator
-        self._measured_gap_m = GapGauge(model, self._gripper.gap).reader(data, travel.axis)
+        self._measured_gap_m = gap_reader(model, data, self._gripper.gap, travel.axis)
         things = {k for k in range(model.ngeom) if self._of_thing(k)}
         if model.nflex:
             things.add(SOFT)
@@ -217,18 +217,16 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             else ForceGauge(model, data, fingers, things, travel.axis)
         )
         self._sensors = [
-            int(model.sensor_adr[identifier(model, OBJ.mjOBJ_SENSOR, channel.sensor, "sensor")])
+            int(model.sensor_adr[identifier(model, "sensor", channel.sensor)])
             for channel in self._gripper.channels.values()
         ]
         self._edges = [
-            int(model.sensor_adr[identifier(model, OBJ.mjOBJ_SENSOR, finger.edge, "sensor")])
+            int(model.sensor_adr[identifier(model, "sensor", finger.edge)])
             for finger in fingers
             if finger.edge
         ]
         self._signals: Any = signal_type(self._channels_of(self._gripper))
-        self._shell = [
-            identifier(model, OBJ.mjOBJ_EQUALITY, PREFIX + name, "equality") for name in self._thing.shell
-        ]
+        self._shell = [identifier(model, "equality", PREFIX + name) for name in self._thing.shell]
         self._drive = ActuatorDrive(model, data, self._gripper, travel)
         self._motion = ArmMotion(
             model, self._scene, min(geoms_of(model, self._gripper.left)), self._gripper.left.edge

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from graspsense.plugin_api import EFFORT, FORCE, POSITION, VELOCITY, Command, ConfigError
 from graspsense_mujoco_gripper.gripper_file import GripperFile
-from graspsense_mujoco_gripper.measurement import GapGauge, closing_axis, faces, plain
+from graspsense_mujoco_gripper.measurement import closing_axis, faces, gap_reader, plain
 from graspsense_mujoco_gripper.model import identifier
 
 Floats = NDArray[np.float64]
@@ -92,7 +92,6 @@ def _moved(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None) -
     _check_angles(model, gripper)
     data = mujoco.MjData(model)
     ids = actuator_ids(model, gripper)
-    gauge = GapGauge(model, gripper.gap)
     steps = max(int(TEST_S / model.opt.timestep), 1)
     data.ctrl[ids] = gripper.open
     for _ in range(steps):
@@ -100,7 +99,7 @@ def _moved(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None) -
     _check(model, data)
     axis = closing_axis(gripper, *faces(model, data, gripper))
     qpos_open = data.qpos.copy()
-    measured_m = gauge.reader(data, axis)
+    measured_m = gap_reader(model, data, gripper.gap, axis)
     start_m = measured_m()
     data.ctrl[ids] = gripper.closed
     gaps, lengths, states = [start_m], [data.actuator_length[ids].copy()], [qpos_open]
@@ -124,8 +123,9 @@ def _moved(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None) -
     left, right = faces(model, data, gripper)
     axis = closing_axis(gripper, left, right)
     _check_opposed(model, gripper, axis, (states[0], states[-1]))
-    if gauge.along_axis:
-        measured_m = gauge.reader(data, axis)
+    if gripper.gap.sites or gripper.gap.left:
+        # The gap depends on the closing direction.
+        measured_m = gap_reader(model, data, gripper.gap, axis)
         for k, state in enumerate(states):
             data.qpos[:] = state
             mujoco.mj_kinematics(model, data)
@@ -144,13 +144,18 @@ def _moved(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None) -
 
 def _check_angles(model: mujoco.MjModel, gripper: GripperFile) -> None:
     """Raise ConfigError for hinges that hardly turn: their ranges are probably radians, read as degrees."""
-    hinges = (model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited == 1)
-    widest = float(np.ptp(model.jnt_range[hinges], axis=1).max(initial=0.0))
+    widest = widest_hinge_rad(model)
     if not gripper.angle and 0.0 < widest < LEAST_TURN_RAD:
         raise ConfigError(
             f"gripper.file: the hinges of the model turn by {np.degrees(widest):.2g} degrees at most, as if radians "
             'were read as degrees: give angle = "radian", or angle = "degree" where that is right'
         )
+
+
+def widest_hinge_rad(model: mujoco.MjModel) -> float:
+    """Return the range of the limited hinge that turns furthest; 0 without one."""
+    hinges = (model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited == 1)
+    return float(np.ptp(model.jnt_range[hinges], axis=1).max(initial=0.0))
 
 
 def _check_opposed(
@@ -183,7 +188,7 @@ def _mass(model: mujoco.MjModel, gripper: GripperFile, qpos: Floats, axis: Float
         mujoco.mj_forward(model, data)
         accelerations.append(data.qacc.copy())
         forces.append(data.actuator_force[ids].copy())
-    measured_m = GapGauge(model, gripper.gap).reader(data, axis)
+    measured_m = gap_reader(model, data, gripper.gap, axis)
     gap_m = measured_m()
     mujoco.mj_integratePos(model, data.qpos, accelerations[1] - accelerations[0], MASS_S2)
     mujoco.mj_kinematics(model, data)
@@ -198,7 +203,7 @@ def _mass(model: mujoco.MjModel, gripper: GripperFile, qpos: Floats, axis: Float
 
 def actuator_ids(model: mujoco.MjModel, gripper: GripperFile) -> list[int]:
     """Return the numbers of the closing actuators. Raises ConfigError for one with a state or a nonlinear gain."""
-    ids = [identifier(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name, "actuator") for name in gripper.actuators]
+    ids = [identifier(model, "actuator", name) for name in gripper.actuators]
     for k, name in zip(ids, gripper.actuators, strict=True):
         if model.actuator_gaintype[k] != mujoco.mjtGain.mjGAIN_FIXED or model.actuator_gainprm[k][0] == 0.0:
             raise ConfigError(f"gripper.file: actuator {name!r} has no fixed gain: muscles are not supported")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from graspsense.plugin_api import ConfigError, Samples
 from graspsense_mujoco_gripper.gripper_file import Finger, Gap, GripperFile, PalmSensor
-from graspsense_mujoco_gripper.model import OBJ, POINT, identifier
+from graspsense_mujoco_gripper.model import POINT, identifier
 
 Floats = NDArray[np.float64]
 FARTHEST_M = 10.0
@@ -29,52 +29,32 @@ def plain(values: NDArray[Any]) -> Any:
     return memoryview(values.reshape(-1))  # type: ignore[arg-type]
 
 
-class GapGauge:
-    """Measures the gap (m) as a gripper file says."""
+def gap_reader(model: mujoco.MjModel, data: mujoco.MjData, gap: Gap, axis: Floats) -> Callable[[], float]:
+    """Return a function that returns the gap (m) in the present state of `data`, as a gripper file says."""
+    if gap.geoms:
+        left, right = (identifier(model, "geom", name) for name in gap.geoms)
+        return lambda: float(mujoco.mj_geomDistance(model, data, left, right, FARTHEST_M, None))
+    if gap.joint:
+        values, offset_m = plain(data.qpos), gap.offset_m
+        terms = [(int(model.jnt_qposadr[identifier(model, "joint", gap.joint)]), gap.scale)]
+    else:
+        values, offset_m = plain(data.site_xpos), 0.0
+        terms = [
+            (3 * site + k, sign * float(axis[k]) / len(sites))
+            for sign, sites in zip(SIDES, _face_sites(model, gap), strict=True)
+            for site in sites
+            for k in range(3)
+            if axis[k] != 0.0
+        ]
 
-    def __init__(self, model: mujoco.MjModel, gap: Gap) -> None:
-        self._gap = gap
-        self._faces = _face_sites(model, gap)
-        if self._faces:
-            self._ids = []
-        elif gap.geoms:
-            self._ids = [identifier(model, OBJ.mjOBJ_GEOM, name, "geom") for name in gap.geoms]
-        else:
-            joint = identifier(model, OBJ.mjOBJ_JOINT, gap.joint, "joint")
-            self._ids = [int(model.jnt_qposadr[joint])]
-        self._model = model
+    # Sums of a few numbers take less time in the interpreter than in numpy.
+    def gap_m() -> float:
+        total: float = offset_m
+        for k, weight in terms:
+            total += weight * values[k]
+        return total
 
-    @property
-    def along_axis(self) -> bool:
-        """Whether the gap depends on the closing direction."""
-        return bool(self._faces)
-
-    def reader(self, data: mujoco.MjData, axis: Floats) -> Callable[[], float]:
-        """Return a function that returns the gap in the present state of `data`."""
-        if self._gap.geoms and not self._faces:
-            model, (left, right) = self._model, self._ids
-            return lambda: float(mujoco.mj_geomDistance(model, data, left, right, FARTHEST_M, None))
-        if self._faces:
-            values, offset_m = plain(data.site_xpos), 0.0
-            terms = [
-                (3 * site + k, sign * float(axis[k]) / len(sites))
-                for sign, sites in zip(SIDES, self._faces, strict=True)
-                for site in sites
-                for k in range(3)
-                if axis[k] != 0.0
-            ]
-        else:
-            values, offset_m = plain(data.qpos), self._gap.offset_m
-            terms = [(self._ids[0], self._gap.scale)]
-
-        # Sums of a few numbers take less time in the interpreter than in numpy.
-        def gap_m() -> float:
-            total: float = offset_m
-            for k, weight in terms:
-                total += weight * values[k]
-            return total
-
-        return gap_m
+    return gap_m
 
 
 class ForceGauge:
@@ -110,7 +90,7 @@ class ForceGauge:
         if not finger.sensor:
             return None
         model, data = self._model, self._data
-        sensor = identifier(model, OBJ.mjOBJ_SENSOR, finger.sensor, "sensor")
+        sensor = identifier(model, "sensor", finger.sensor)
         kind, address = int(model.sensor_type[sensor]), int(model.sensor_adr[sensor])
         if kind == mujoco.mjtSensor.mjSENS_TOUCH:
             return lambda: float(data.sensordata[address])
@@ -182,7 +162,7 @@ class SpringCells:
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, gripper: GripperFile) -> None:
         self._positions, self._rests, self._springs = plain(data.qpos), plain(model.qpos_spring), []
         for finger in (gripper.left, gripper.right):
-            joints = [identifier(model, OBJ.mjOBJ_JOINT, name, "joint") for name in finger.cells]
+            joints = [identifier(model, "joint", name) for name in finger.cells]
             springs = [(int(model.jnt_qposadr[k]), float(model.jnt_stiffness[k].flat[0])) for k in joints]
             for name, (_, stiffness) in zip(finger.cells, springs, strict=True):
                 if stiffness <= 0.0:
@@ -211,7 +191,7 @@ class Palm:
         accelerometer: PalmSensor,
         generator: np.random.Generator,
     ) -> None:
-        sensor = identifier(model, OBJ.mjOBJ_SENSOR, accelerometer.sensor, "sensor")
+        sensor = identifier(model, "sensor", accelerometer.sensor)
         if model.sensor_type[sensor] != mujoco.mjtSensor.mjSENS_ACCELEROMETER:
             raise ConfigError(f"gripper.file: the sensor {accelerometer.sensor!r} is not an accelerometer")
         address = int(model.sensor_adr[sensor])
@@ -254,7 +234,7 @@ def cells_of(model: mujoco.MjModel, data: mujoco.MjData, gripper: GripperFile) -
         return None
     addresses = []
     for finger in (gripper.left, gripper.right):
-        sensor = identifier(model, OBJ.mjOBJ_SENSOR, finger.array, "sensor")
+        sensor = identifier(model, "sensor", finger.array)
         values, cells = int(model.sensor_dim[sensor]), finger.rows * finger.columns
         if values % cells:
             raise ConfigError(
@@ -277,27 +257,27 @@ def closing_axis(gripper: GripperFile, left: Floats, right: Floats) -> Floats:
     return axis / length
 
 
-def width_m(model: mujoco.MjModel) -> float:
-    """Return how wide a thing is along its x axis: from its geoms that touch, and its flexible parts."""
+def extent(model: mujoco.MjModel, axis: int) -> tuple[float, float]:
+    """Return from where to where (m) a thing reaches along an axis: its geoms that touch, and its flexible parts."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    ends = [float(x) for x in data.flexvert_xpos[:, 0]] if model.nflexvert else []
+    ends = [float(end) for end in data.flexvert_xpos[:, axis]] if model.nflexvert else []
     for k in range(model.ngeom):
         if model.geom_contype[k] or model.geom_conaffinity[k]:
-            row = data.geom_xmat[k].reshape(3, 3)[0]
-            centre = float(data.geom_xpos[k][0] + row @ model.geom_aabb[k][:3])
+            row = data.geom_xmat[k].reshape(3, 3)[axis]
+            centre = float(data.geom_xpos[k][axis] + row @ model.geom_aabb[k][:3])
             reach = float(np.abs(row) @ model.geom_aabb[k][3:])
             ends += [centre - reach, centre + reach]
-    return max(ends) - min(ends) if ends else 0.0
+    return min(ends, default=0.0), max(ends, default=0.0)
 
 
 def _face_sites(model: mujoco.MjModel, gap: Gap) -> tuple[list[int], ...]:
     """Return the sites of the left and the right face; nothing where the gap has neither sites nor points."""
     if gap.sites:
-        return tuple([identifier(model, OBJ.mjOBJ_SITE, name, "site")] for name in gap.sites)
+        return tuple([identifier(model, "site", name)] for name in gap.sites)
     if gap.left:
         return tuple(
-            [identifier(model, OBJ.mjOBJ_SITE, f"{POINT}{side}{k}", "site") for k in range(len(points))]
+            [identifier(model, "site", f"{POINT}{side}{k}") for k in range(len(points))]
             for side, points in (("left", gap.left), ("right", gap.right))
         )
     return ()
@@ -309,9 +289,7 @@ def faces(model: mujoco.MjModel, data: mujoco.MjData, gripper: GripperFile) -> t
     if sites := _face_sites(model, gap):
         left, right = (data.site_xpos[site].mean(axis=0) for site in sites)
     elif gap.geoms:
-        left, right = (
-            data.geom_xpos[identifier(model, OBJ.mjOBJ_GEOM, name, "geom")].copy() for name in gap.geoms
-        )
+        left, right = (data.geom_xpos[identifier(model, "geom", name)].copy() for name in gap.geoms)
     else:
         left, right = (
             np.mean([data.geom_xpos[k] for k in geoms_of(model, finger)], axis=0)
@@ -322,9 +300,9 @@ def faces(model: mujoco.MjModel, data: mujoco.MjData, gripper: GripperFile) -> t
 
 def geoms_of(model: mujoco.MjModel, finger: Finger) -> frozenset[int]:
     """Return the numbers of the geoms of a finger that can touch."""
-    geoms = {identifier(model, OBJ.mjOBJ_GEOM, name, "geom") for name in finger.geoms}
+    geoms = {identifier(model, "geom", name) for name in finger.geoms}
     for name in finger.bodies:
-        body = identifier(model, OBJ.mjOBJ_BODY, name, "body")
+        body = identifier(model, "body", name)
         start = int(model.body_geomadr[body])
         geoms |= set(range(start, start + int(model.body_geomnum[body])))
     return frozenset(geoms)
