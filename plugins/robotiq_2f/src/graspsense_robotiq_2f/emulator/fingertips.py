@@ -74,8 +74,6 @@ class EmulatedFingertips:
         self._began_s = self._monotonic()
         self._period_s = self._due_s = self._pressed_s = 0.0
         self._last = Felt(0.0, 0.0)
-        self.sent = 0
-        """The number of packets with measurements."""
 
     def heard(self, data: bytes) -> bytes:
         """Return the replies to what a host sent."""
@@ -118,7 +116,6 @@ class EmulatedFingertips:
             fields.append(Field(DYNAMIC, number, (change,)))
             fields.append(Field(ACCELERATION, number, (0, 0, G_COUNTS)))
             fields.append(Field(GYROSCOPE, number, (0, 0, 0)))
-        self.sent += 1
         return encoded(fields)
 
     def _cells(self, finger: int, force_n: float) -> tuple[int, ...]:
