@@ -7,6 +7,9 @@ from graspsense.core.components.roles import Grasped as Grasped
 from graspsense.core.components.roles import SimulationVariant as SimulationVariant
 from graspsense.core.components.roles import Viewer as Viewer
 from graspsense.core.grasp.runner import run_uninterrupted as run_uninterrupted
+from graspsense.core.drivers.grasp_process import GraspProcess as GraspProcess
+from graspsense.core.drivers.grasp_process import HandedGrasp as HandedGrasp
+from graspsense.core.drivers.grasp_process import NotHandedOver as NotHandedOver
 from graspsense.core.components.run_config import RunConfig as RunConfig
 
 # Models, and settings in files of their own

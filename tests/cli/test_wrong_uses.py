@@ -80,7 +80,6 @@ def run(monkeypatch, tmp_path):
         ("evaluate man.toml", "manifest:"),
         ("evaluate pipe.toml", "simulated"),
         ("predict simulated default", "predict default simulated"),
-        ("run --gripper robotiq-2f85", "pip install -e ./examples/robotiq_2f85"),
         ("run -o features.type=grasp-curve", "pip install -e ./examples/grasp_curve"),
         ("evaluate table.csv", "--label COLUMN"),
         ("evaluate nothere.csv", "no file of this name"),

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from graspsense.plugin_api import UnknownName, create
 from graspsense.simulator_api import RunConfig, run_uninterrupted
+from graspsense_mujoco_gripper import prepared
 
 HYBRID = create("controller", "hybrid", sends="velocity", closing_speed_m_s=0.15)
 FEATURES = create("feature-set", "chitta")
@@ -82,3 +83,11 @@ def test_a_controller_that_other_processes_cannot_make_again_grasps_here(alone):
     own = Unregistered(HYBRID.config)
     done = GRIPPER.run_many(own, things, seeds, run=RUN, extract=Values(), workers=2)
     assert [grasped.extracted for grasped in done] == [alone[grasp][1] for grasp in GRASPS[:2]]
+
+
+def test_a_batch_prepares_each_thing_once(monkeypatch):
+    prepare, made = prepared.prepare, []
+    monkeypatch.setattr(prepared, "prepare", lambda *given: made.append(given[0].object) or prepare(*given))
+    short = evolve(RUN, grasp_timeout_s=0.1, opening_timeout_s=0.1)
+    GRIPPER.run_many(HYBRID, ["block", "can", "block"], [1, 2, 3], run=short, workers=1)
+    assert made == ["block", "can"]

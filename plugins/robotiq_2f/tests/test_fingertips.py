@@ -24,7 +24,6 @@ from graspsense_robotiq_2f.emulator.fingertips import (
     COUNTS_PER_N,
     NOISE_COUNTS,
     EmulatedFingertips,
-    Felt,
     emulated_boards,
 )
 from graspsense_robotiq_2f.tactile import (
@@ -50,7 +49,7 @@ from graspsense_robotiq_2f.tactile_protocol import (
 CELL = st.integers(0, 0xFFFF)
 NOISE_OF_SUM = 6.0 * NOISE_COUNTS * CELLS**0.5
 """Six standard deviations."""
-REST = EmulatedFingertips(lambda: Felt(0.0, 0.0)).rest
+REST = EmulatedFingertips(lambda: (0.0, 0.0)).rest
 
 
 @given(
@@ -94,7 +93,7 @@ def clock(monkeypatch):
 
 
 def test_every_period_has_one_packet_and_images_come_at_60_hz(clock):
-    tips = EmulatedFingertips(lambda: Felt(2.0, 4.0))
+    tips = EmulatedFingertips(lambda: (2.0, 4.0))
     tips.heard(packet(0x58, bytes((1,))))
     packets = Packets()
     measured = []
@@ -115,7 +114,7 @@ def test_every_period_has_one_packet_and_images_come_at_60_hz(clock):
 
 
 def test_they_are_silent_until_asked_and_after_a_period_of_zero(clock):
-    tips = EmulatedFingertips(lambda: Felt(0.0, 0.0))
+    tips = EmulatedFingertips(lambda: (0.0, 0.0))
     clock.now_s = 1.0
     assert tips.unasked() == b""
     [(command, _)] = Packets().fed(tips.heard(packet(READ)))
@@ -127,7 +126,7 @@ def test_they_are_silent_until_asked_and_after_a_period_of_zero(clock):
 
 @pytest.fixture
 def port():
-    tips = EmulatedFingertips(lambda: Felt(2.0, 4.0))
+    tips = EmulatedFingertips(lambda: (2.0, 4.0))
     port = EmulatedPort("pty", tips.heard, tips.unasked, 0.001)
     yield port
     port.close()
@@ -169,7 +168,7 @@ def test_the_driver_reads_images_in_a_thread_with_their_age(port):
 @pytest.fixture
 def ports():
     """The ports of two boards."""
-    boards = emulated_boards(2, lambda: Felt(2.0, 4.0))
+    boards = emulated_boards(2, lambda: (2.0, 4.0))
     ports = [EmulatedPort("pty", board.heard, board.unasked, 0.001) for board in boards]
     yield ports, boards
     for port in ports:

@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.components.run_config import RunConfig
+from graspsense.core.drivers import grasp_process
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.values.errors import UnknownName
 from graspsense.gripper_api import Outcome
@@ -34,15 +35,15 @@ from graspsense.plugin_api import (
     create,
     hookimpl,
 )
-from graspsense.simulator_api import CompiledExtraction
+from graspsense.simulator_api import CompiledExtraction, NotHandedOver
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.backend import SimBackend
-from graspsense_sim_gripper.run.batch import buffers, threads, worker
+from graspsense_sim_gripper.run.batch import buffers, threads
 from graspsense_sim_gripper.run.batch.drawn import draw_numbers
 from graspsense_sim_gripper.run.batch.job import Job, grasp_plain
 from graspsense_sim_gripper.run.batch.scenes import Scenes
 from graspsense_sim_gripper.run.batch.threads import SLICE, run_many, slices_of
-from graspsense_sim_gripper.run.batch.worker import NotHandedOver, PlainProcess
+from graspsense_sim_gripper.run.batch.worker import PlainProcess
 from graspsense_sim_gripper.run.compiled import loop_code
 from graspsense_sim_gripper.run.model_report import model_report
 from graspsense_sim_gripper.scene.library import catalogue, kinds_in, shipped_scenes
@@ -507,9 +508,9 @@ def test_a_process_that_is_killed_leaves_its_grasps_to_this_one(monkeypatch):
 
 def test_an_answer_that_breaks_off_is_no_answer():
     with pytest.raises(EOFError):
-        worker._read_line(io.BytesIO(b'{"done": []'))
+        grasp_process._read_line(io.BytesIO(b'{"done": []'))
     with pytest.raises(EOFError):
-        worker._read(io.BytesIO(b"abc"), 4)
+        grasp_process._read(io.BytesIO(b"abc"), 4)
 
 
 def test_what_is_not_all_in_names_and_values_is_not_handed_over():

@@ -1,7 +1,5 @@
 """Registers, packets and geometry of the gripper's motor."""
 
-from math import pi
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -55,7 +53,6 @@ def test_the_gap_of_a_position_gives_the_position(stroke, inverted, position, le
 
 def test_the_gap_is_the_chord_of_the_jaw():
     assert Jaw(0, 2048, 0.1).gap_m(1024) == pytest.approx(0.1 * 2**0.5)
-    assert Jaw(0, 2048, 0.1).step_m == pytest.approx(0.1 * 2 * pi / 4096)
 
 
 @given(st.binary(max_size=200), st.integers(1, 30))

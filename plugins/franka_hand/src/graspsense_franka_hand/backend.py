@@ -43,7 +43,6 @@ from graspsense_franka_hand.orders import (
     STOP,
     WIDEST_M,
     HandGone,
-    HandLink,
     Order,
 )
 
@@ -80,7 +79,7 @@ class FrankaBackend(BackendWithEmulator[FrankaConfig]):
 
     def __init__(self, config: FrankaConfig) -> None:
         super().__init__(config)
-        self._link: HandLink | None = None
+        self._link: LibfrankaLink | LockStepHand | None = None
         self._emulated: LockStepHand | None = None
         self._waiting: Order | None = None
         self._table: LoadTable | None = None

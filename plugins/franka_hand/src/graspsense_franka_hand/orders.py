@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple, Protocol
+from typing import Final, NamedTuple
 
 RATE_HZ: Final = 15.0
 """A hand sends at most 15 states a second (users' measurements)."""
@@ -45,16 +45,3 @@ class HandState(NamedTuple):
 
 class HandGone(Exception):
     """The hand cannot be reached, or no longer; the text says why."""
-
-
-class HandLink(Protocol):
-    """A connection to a hand."""
-
-    def newest(self, timeout_s: float) -> HandState | None:
-        """Return the next state, None if none comes in time. Raises HandGone."""
-
-    def send(self, order: Order) -> None:
-        """Order it; what it still does is stopped first. Raises HandGone."""
-
-    def close(self) -> None:
-        """Stop the fingers if the hand can be reached, and let go of it."""

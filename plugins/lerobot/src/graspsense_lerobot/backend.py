@@ -76,7 +76,7 @@ class LeRobotBackend(SensorBackend[LeRobotConfig]):
                 f"no {config.robot} as gripper.robot_config describes it: {error}. Look at its power and cable, and at "
                 "gripper.robot_config"
             ) from error
-        self._gap_m = self._target_m = config.jaw.gap_m(position)
+        self._gap_m = self._target_m = config.gap_m(position)
         self._polling = Polling(config.rate_hz, time, SLOPE_FRAMES)
         return self._described()
 
@@ -88,7 +88,7 @@ class LeRobotBackend(SensorBackend[LeRobotConfig]):
             position, load = self._opened().read()
         except NoAnswer as error:
             raise self._lost(error) from error
-        self._gap_m = self.config.jaw.gap_m(position)
+        self._gap_m = self.config.gap_m(position)
         self._effort_n = load * self.config.newtons_per_unit
         effort_n = nan if self.config.load == "none" else self._effort_n
         return Reading(self._polling.frame(self._gap_m, effort_n), NO_PADS)
@@ -97,7 +97,7 @@ class LeRobotBackend(SensorBackend[LeRobotConfig]):
         """Move the target on by the way of one frame, and send it. Raises DeviceLost."""
         self._target_m = self._next_target(command)
         try:
-            self._opened().send(self.config.jaw.position(self._target_m))
+            self._opened().send(self.config.position_at(self._target_m))
         except NoAnswer as error:
             raise self._lost(error) from error
 
@@ -108,7 +108,7 @@ class LeRobotBackend(SensorBackend[LeRobotConfig]):
         """Stop the fingers where they are, and disconnect the robot."""
         motor, self._motor = self._motor, None
         if motor is not None:
-            motor.close(self.config.jaw.position(self._gap_m))
+            motor.close(self.config.position_at(self._gap_m))
             self._retries = motor.retries
 
     def report(self) -> dict[str, float | int | str | bool]:

@@ -4,29 +4,9 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from attrs import field, frozen
+from attrs import frozen
 
 from graspsense.plugin_api import setting
-
-
-@frozen(kw_only=True)
-class RobotMotor:
-    """What the position of a gripper's motor means: the gap (m) at two positions, and linear between them."""
-
-    open_position: float = field()
-    closed_position: float = field()
-    open_gap_m: float = field()
-    closed_gap_m: float = field()
-
-    def gap_m(self, position: float) -> float:
-        """Return the gap at this position."""
-        share = (position - self.closed_position) / (self.open_position - self.closed_position)
-        return self.closed_gap_m + share * (self.open_gap_m - self.closed_gap_m)
-
-    def position(self, gap_m: float) -> float:
-        """Return the position of this gap; a gap beyond the ends is that of the nearer end."""
-        share = (gap_m - self.closed_gap_m) / (self.open_gap_m - self.closed_gap_m)
-        return self.closed_position + min(max(share, 0.0), 1.0) * (self.open_position - self.closed_position)
 
 
 @frozen(kw_only=True)
@@ -89,15 +69,15 @@ class LeRobotConfig:
         """The name of the position in observations and actions."""
         return self.position or f"{self.motor}.pos"
 
-    @property
-    def jaw(self) -> RobotMotor:
-        """What the position means."""
-        return RobotMotor(
-            open_position=self.open_position,
-            closed_position=self.closed_position,
-            open_gap_m=self.open_gap_m,
-            closed_gap_m=self.closed_gap_m,
-        )
+    def gap_m(self, position: float) -> float:
+        """Return the gap at this position; it is linear between that of the closed and that of the open gripper."""
+        share = (position - self.closed_position) / (self.open_position - self.closed_position)
+        return self.closed_gap_m + share * (self.open_gap_m - self.closed_gap_m)
+
+    def position_at(self, gap_m: float) -> float:
+        """Return the position of this gap; a gap beyond the ends is that of the nearer end."""
+        share = (gap_m - self.closed_gap_m) / (self.open_gap_m - self.closed_gap_m)
+        return self.closed_position + min(max(share, 0.0), 1.0) * (self.open_position - self.closed_position)
 
     def __attrs_post_init__(self) -> None:
         if self.open_position == self.closed_position:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import ceil, inf, nan
 from pathlib import Path
 from typing import Any, Final, Unpack, final
@@ -12,7 +12,6 @@ import numpy as np
 from attrs import evolve
 
 from graspsense.plugin_api import (
-    APPROACH,
     EFFORT,
     NO_PADS,
     POSITION,
@@ -33,16 +32,11 @@ from graspsense.plugin_api import (
 from graspsense.simulator_api import (
     BatchBackend,
     BatchOptions,
-    FrameTable,
-    FreeRun,
     Grasped,
-    NotCompilable,
+    HandedGrasp,
     RunConfig,
     SimulationVariant,
-    TickParams,
-    TickState,
     Viewer,
-    first_call,
 )
 from graspsense_mujoco_gripper.arm_motion import ArmMotion
 from graspsense_mujoco_gripper.batch import GraspingJob, grasps
@@ -51,30 +45,20 @@ from graspsense_mujoco_gripper.catalogue import catalogue
 from graspsense_mujoco_gripper.config import MujocoConfig
 from graspsense_mujoco_gripper.draft import Draft, drafted
 from graspsense_mujoco_gripper.drive import ActuatorDrive, Travel, instability
-from graspsense_mujoco_gripper.engine import contacts_of
 from graspsense_mujoco_gripper.gripper_file import GripperFile, read_gripper
 from graspsense_mujoco_gripper.measurement import (
     ForceGauge,
-    GapGauge,
     Palm,
     SpringCells,
     cells_of,
+    gap_reader,
     geoms_of,
     plain,
 )
-from graspsense_mujoco_gripper.model import OBJ, identifier
+from graspsense_mujoco_gripper.model import identifier
 from graspsense_mujoco_gripper.prepared import Batch, prepare
 from graspsense_mujoco_gripper.roughness import Roughness
 from graspsense_mujoco_gripper.scene import read_scene, scene_named
-from graspsense_mujoco_gripper.ticks import (
-    MOST_TICKS,
-    Forces,
-    Moved,
-    SteppedModel,
-    TickBuffers,
-    Ticked,
-    compiled_ticks,
-)
 from graspsense_mujoco_gripper.world import PREFIX, is_thing
 
 INTEGRATORS: Final = ("Euler", "implicitfast", "implicit", "RK4", "discrete")
@@ -87,9 +71,6 @@ DEEPEST_M: Final = 1e-3
 """A thing that begins deeper in a finger is refused."""
 TOUCH_N: Final = 0.1
 """Force on both fingers from which on the motion of the scene begins: less may be the palm that swings."""
-AMPLE: Final = 16
-"""Compiled ticks leave this share of the memory for contacts to them, and steps with more to the interpreter."""
-NO_ERRORS: Final = np.empty(0)
 MANY: Final = 256
 """Errors of the forces that are drawn at once."""
 SWING, MOST_SWINGS = 0.1, 20
@@ -106,7 +87,6 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
     _camera: Camera | None = None
     _window: Window | None = None
     _batch: Batch | None = None
-    _run_ticks: Callable[..., Any] | None = None
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -172,9 +152,10 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         """Grasp each thing with its seed, in a process on each core."""
         for name in dict.fromkeys(scenes):
             read_scene(name, self.config.scene)
-        makes_signals = any(self.with_object(name).makes_signals() for name in set(scenes))
-        job = GraspingJob(gripper_in_batch, self.config, controller, options, makes_signals)
-        return grasps(job, scenes, seeds)
+        # Further channels are not handed over from process to process.
+        alone = any(self.with_object(name).makes_signals() for name in set(scenes))
+        job = GraspingJob(gripper_in_batch, self.config, controller, options.get("run") or RunConfig())
+        return grasps(job, scenes, seeds, options, alone=alone)
 
     def makes_signals(self) -> bool:
         """Return whether there are channels that each tick has besides the frame and the cells."""
@@ -182,14 +163,8 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         return bool(gripper.channels) or gripper.accelerometer is not None or self._is_shaken()
 
     def join(self, batch: Batch) -> None:
-        """Take part in a batch: with what its grasps share, and compiled where that is possible and saves time."""
+        """Take part in a batch, whose grasps share what the first one of each thing prepares."""
         self._batch = batch
-
-    def expect(self, controller: Controller[Any], run: RunConfig) -> None:
-        """Take the law that is compiled with the ticks."""
-        del run
-        if self._batch is not None:
-            self._run_ticks = compiled_ticks(type(controller).step, self._batch.grasps)
 
     def see(self, viewer: Viewer) -> None:
         """Make pictures of the next grasp without a screen, or show it in MuJoCo's own viewer."""
@@ -230,7 +205,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         data.qpos[: len(travel.qpos_open)] = travel.qpos_open
         mujoco.mj_forward(model, data)
         self._model, self._travel, self._generator = model, travel, generator
-        self._measured_gap_m = GapGauge(model, self._gripper.gap).reader(data, travel.axis)
+        self._measured_gap_m = gap_reader(model, data, self._gripper.gap, travel.axis)
         things = {k for k in range(model.ngeom) if self._of_thing(k)}
         if model.nflex:
             things.add(SOFT)
@@ -242,18 +217,16 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             else ForceGauge(model, data, fingers, things, travel.axis)
         )
         self._sensors = [
-            int(model.sensor_adr[identifier(model, OBJ.mjOBJ_SENSOR, channel.sensor, "sensor")])
+            int(model.sensor_adr[identifier(model, "sensor", channel.sensor)])
             for channel in self._gripper.channels.values()
         ]
         self._edges = [
-            int(model.sensor_adr[identifier(model, OBJ.mjOBJ_SENSOR, finger.edge, "sensor")])
+            int(model.sensor_adr[identifier(model, "sensor", finger.edge)])
             for finger in fingers
             if finger.edge
         ]
         self._signals: Any = signal_type(self._channels_of(self._gripper))
-        self._shell = [
-            identifier(model, OBJ.mjOBJ_EQUALITY, PREFIX + name, "equality") for name in self._thing.shell
-        ]
+        self._shell = [identifier(model, "equality", PREFIX + name) for name in self._thing.shell]
         self._drive = ActuatorDrive(model, data, self._gripper, travel)
         self._motion = ArmMotion(
             model, self._scene, min(geoms_of(model, self._gripper.left)), self._gripper.left.edge
@@ -272,7 +245,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
                 Palm(model, data, self._gripper.accelerometer, generator),
                 [1] * self._steps,
             )
-        self._errors, self._drawn = NO_ERRORS, 0
+        self._errors: list[float] = []
         self._tick_s, self._timestep_s = 1.0 / self.config.rate_hz, model.opt.timestep
         self._warnings, self._values = plain(data.warning.number), plain(data.sensordata)
         self._gap_m, self._rate_m_s = self._measured_gap_m(), 0.0
@@ -280,44 +253,6 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         self._command = Command(EFFORT, 0.0, inf, inf)
         self._ticks, self._swings, self._broken, self._greatest_n = 0, 0, False, 0.0
         self._measured_m = self._rounded(self._gap_m)
-        self._stepped = False
-        self._rig = None if self._run_ticks is None else self._compiled_rig(data)
-
-    def _compiled_rig(self, data: mujoco.MjData) -> SteppedModel | None:
-        """Return what compiled ticks take; None where more takes part in a tick than they know."""
-        forces = self._forces
-        more = (
-            self._cells,
-            self._palm,
-            self._rough,
-            self._viewer,
-            self._sensors,
-            self._edges,
-            self._scene.shake,
-        )
-        if not isinstance(forces, ForceGauge) or not forces.only_contacts:
-            return None
-        contacts = contacts_of(data)
-        if contacts is None or any(more) or self._motion.moves:
-            return None
-        gap = GapGauge(self._model, self._gripper.gap).terms(data, self._travel.axis)
-        return SteppedModel(
-            model=self._model._address,
-            data=data._address,
-            kept=np.array(self._kept),
-            timestep_s=self._timestep_s,
-            tick_s=self._tick_s,
-            gap=gap.in_arrays(),
-            gap_step_m=self.config.gap_step_m,
-            forces=Forces(contacts, np.array(forces.roles), self._travel.axis, np.zeros(6)),
-            drive=self._drive.law.in_arrays(),
-            warnings=data.warning.number,
-            most_bytes=data.narena // AMPLE,
-            shell=np.array(self._shell, np.int64),
-            equalities=data.eq_active,
-            breaks_at_n=self._thing.breaks_at_n if self._shell else inf,
-            swing_n=SWING * self._drive.effort_limit_n,
-        )
 
     def _check_start(self, data: mujoco.MjData) -> None:
         """Raise ConfigError where the thing is in the fingers at the start."""
@@ -355,10 +290,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         """Step the model by one tick and measure. Raises DeviceLost where MuJoCo warns that the state is bad."""
         del timeout_s
         data = self._opened()
-        if self._stepped:
-            self._stepped = False
-        else:
-            self._step(data)
+        self._step(data)
         if any(self._warnings) and (problem := instability(data)):
             raise DeviceLost(f"the simulation became unstable: {problem}. Use a smaller gripper.timestep_s")
         self._ticks += 1
@@ -381,52 +313,6 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
                 self._palm.measure(self._rate_m_s)
             if self._shell and not self._broken:
                 self._break_shell(data)
-
-    def free_ticks(self, params: TickParams, state: TickState, frame: Frame, most: int) -> FreeRun | None:
-        """Run ticks of this phase at once, if code was compiled for it."""
-        rig = self._rig
-        if rig is None or self._run_ticks is None or any(self._warnings):
-            return None
-        if rig.forces.contacts.used_bytes[0] > rig.most_bytes:
-            return None
-        drive, most, errors = self._drive, min(most, MOST_TICKS), NO_ERRORS
-        if self.config.force_noise_n:
-            self._draw(2 * most)
-            errors = self._errors
-        buffers = TickBuffers(errors, np.empty((most, len(Frame._fields))), np.empty((4, most)))
-        moved = Moved(
-            gap_m=self._gap_m,
-            rate_m_s=self._rate_m_s,
-            target_m=drive.target_m,
-            effort_n=drive.effort_n,
-            broken=self._broken,
-        )
-        ticked = Ticked(
-            ticks=self._ticks,
-            measured_m=self._measured_m,
-            greatest_n=self._greatest_n,
-            swings=self._swings,
-            command=self._command,
-        )
-        try:
-            with first_call():
-                run = self._run_ticks(rig, params, state, moved, ticked, buffers, most)
-        except NotCompilable:
-            self._run_ticks = None
-            if self._batch is not None:
-                self._batch.grasps = 1
-            return None
-        n, self._stepped, state, moved, ticked = run
-        self._gap_m, self._rate_m_s, drive.target_m, drive.effort_n, self._broken = moved
-        self._ticks, self._measured_m, self._greatest_n, self._swings, self._command = ticked
-        self._drawn = 2 * n
-        if state.phase < APPROACH:
-            return FreeRun(n, [], [], state)
-        kinds, values, *limits = buffers.sent[:, :n].tolist()
-        sent = map(Command, map(int, kinds), values, *limits)
-        return FreeRun(
-            n_ticks=n, frames=FrameTable(buffers.rows[:n]), commands=values, state=state, sent=sent
-        )
 
     def _show(self, viewer: Viewer, data: mujoco.MjData, t_s: float) -> None:
         if self._camera is not None and t_s >= self._next_picture_s:
@@ -480,19 +366,9 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
 
     def _noise(self) -> float:
         """Return the next error of a force (N)."""
-        if self._drawn >= len(self._errors):
-            self._draw(1)
-        self._drawn += 1
-        return float(self._errors[self._drawn - 1])
-
-    def _draw(self, count: int) -> None:
-        """Draw errors until there are so many that were not used."""
-        left = [self._errors[self._drawn :]]
-        missing = count - len(left[0])
-        left += [
-            self._generator.normal(0.0, self.config.force_noise_n, MANY) for _ in range(0, missing, MANY)
-        ]
-        self._errors, self._drawn = np.concatenate(left), 0
+        if not self._errors:
+            self._errors = self._generator.normal(0.0, self.config.force_noise_n, MANY).tolist()[::-1]
+        return self._errors.pop()
 
     def _rounded(self, gap_m: float) -> float:
         step = self.config.gap_step_m
@@ -546,6 +422,13 @@ def gripper_in_batch(config: MujocoConfig, batch: Batch) -> MujocoGripper:
     gripper = MujocoGripper(config)
     gripper.join(batch)
     return gripper
+
+
+def grasps_in_process(
+    controller: Controller[Any], run: RunConfig, common: Mapping[str, Any]
+) -> Callable[[str, int], HandedGrasp]:
+    """Return what runs a grasp in this process, as `GraspProcess` asks for it."""
+    return GraspingJob(gripper_in_batch, MujocoConfig(**common["config"]), controller, run).grasp
 
 
 def kept_steps(steps: int, most: float) -> list[int]:

@@ -17,7 +17,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from graspsense.plugin_api import ConfigError
-from graspsense_mujoco_gripper.drive import LEAST_TURN_RAD
+from graspsense_mujoco_gripper.drive import LEAST_TURN_RAD, widest_hinge_rad
 from graspsense_mujoco_gripper.gripper_file import model_path
 from graspsense_mujoco_gripper.model import compiled, exclude_neighbours, read_spec
 
@@ -114,8 +114,7 @@ def _model(path: Path) -> tuple[mujoco.MjModel, bool]:
             spec.compiler.degree = False
         exclude_neighbours(spec)
         model = compiled(spec, str(path))
-        hinges = model.jnt_range[(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited == 1)]
-        if not len(hinges) or float(np.ptp(hinges, axis=1).max()) > LEAST_TURN_RAD:
+        if not 0.0 < widest_hinge_rad(model) < LEAST_TURN_RAD:
             break
     return model, radian
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 from bisect import bisect_left
 from hashlib import sha256
 from math import inf, isfinite, sqrt
-from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 
 from graspsense.plugin_api import EFFORT, FORCE, POSITION, VELOCITY, Command, ConfigError
 from graspsense_mujoco_gripper.gripper_file import GripperFile
-from graspsense_mujoco_gripper.measurement import GapGauge, closing_axis, faces, plain
+from graspsense_mujoco_gripper.measurement import closing_axis, faces, gap_reader, plain
 from graspsense_mujoco_gripper.model import identifier
 
 Floats = NDArray[np.float64]
@@ -93,7 +92,6 @@ def _moved(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None) -
     _check_angles(model, gripper)
     data = mujoco.MjData(model)
     ids = actuator_ids(model, gripper)
-    gauge = GapGauge(model, gripper.gap)
     steps = max(int(TEST_S / model.opt.timestep), 1)
     data.ctrl[ids] = gripper.open
     for _ in range(steps):
@@ -101,7 +99,7 @@ def _moved(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None) -
     _check(model, data)
     axis = closing_axis(gripper, *faces(model, data, gripper))
     qpos_open = data.qpos.copy()
-    measured_m = gauge.reader(data, axis)
+    measured_m = gap_reader(model, data, gripper.gap, axis)
     start_m = measured_m()
     data.ctrl[ids] = gripper.closed
     gaps, lengths, states = [start_m], [data.actuator_length[ids].copy()], [qpos_open]
@@ -125,8 +123,9 @@ def _moved(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None) -
     left, right = faces(model, data, gripper)
     axis = closing_axis(gripper, left, right)
     _check_opposed(model, gripper, axis, (states[0], states[-1]))
-    if gauge.along_axis:
-        measured_m = gauge.reader(data, axis)
+    if gripper.gap.sites or gripper.gap.left:
+        # The gap depends on the closing direction.
+        measured_m = gap_reader(model, data, gripper.gap, axis)
         for k, state in enumerate(states):
             data.qpos[:] = state
             mujoco.mj_kinematics(model, data)
@@ -145,13 +144,18 @@ def _moved(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None) -
 
 def _check_angles(model: mujoco.MjModel, gripper: GripperFile) -> None:
     """Raise ConfigError for hinges that hardly turn: their ranges are probably radians, read as degrees."""
-    hinges = (model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited == 1)
-    widest = float(np.ptp(model.jnt_range[hinges], axis=1).max(initial=0.0))
+    widest = widest_hinge_rad(model)
     if not gripper.angle and 0.0 < widest < LEAST_TURN_RAD:
         raise ConfigError(
             f"gripper.file: the hinges of the model turn by {np.degrees(widest):.2g} degrees at most, as if radians "
             'were read as degrees: give angle = "radian", or angle = "degree" where that is right'
         )
+
+
+def widest_hinge_rad(model: mujoco.MjModel) -> float:
+    """Return the range of the limited hinge that turns furthest; 0 without one."""
+    hinges = (model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited == 1)
+    return float(np.ptp(model.jnt_range[hinges], axis=1).max(initial=0.0))
 
 
 def _check_opposed(
@@ -184,7 +188,7 @@ def _mass(model: mujoco.MjModel, gripper: GripperFile, qpos: Floats, axis: Float
         mujoco.mj_forward(model, data)
         accelerations.append(data.qacc.copy())
         forces.append(data.actuator_force[ids].copy())
-    measured_m = GapGauge(model, gripper.gap).reader(data, axis)
+    measured_m = gap_reader(model, data, gripper.gap, axis)
     gap_m = measured_m()
     mujoco.mj_integratePos(model, data.qpos, accelerations[1] - accelerations[0], MASS_S2)
     mujoco.mj_kinematics(model, data)
@@ -199,7 +203,7 @@ def _mass(model: mujoco.MjModel, gripper: GripperFile, qpos: Floats, axis: Float
 
 def actuator_ids(model: mujoco.MjModel, gripper: GripperFile) -> list[int]:
     """Return the numbers of the closing actuators. Raises ConfigError for one with a state or a nonlinear gain."""
-    ids = [identifier(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name, "actuator") for name in gripper.actuators]
+    ids = [identifier(model, "actuator", name) for name in gripper.actuators]
     for k, name in zip(ids, gripper.actuators, strict=True):
         if model.actuator_gaintype[k] != mujoco.mjtGain.mjGAIN_FIXED or model.actuator_gainprm[k][0] == 0.0:
             raise ConfigError(f"gripper.file: actuator {name!r} has no fixed gain: muscles are not supported")
@@ -235,114 +239,11 @@ def instability(data: mujoco.MjData) -> str:
     return ""
 
 
-class DriveLaw(NamedTuple):
-    """What the controls follow from: in lists for the interpreter, in arrays for compiled code."""
-
-    ids: Any
-    """(n,) The numbers of the closing actuators."""
-    actuators: Any
-    """(n, 8) Gain, bias (3), and the ranges of control and force of each."""
-    gaps_m: Any
-    """(m,) The gaps of the test move."""
-    lengths: Any
-    slopes: Any
-    """(m, n) The lengths of the transmissions at these gaps, and their changes with the gap."""
-    mass_kg: float
-    servo_rad_s: float
-    effort_limit_n: float
-    control: Any
-    length: Any
-    velocity: Any
-    """The memory of the model: controls, and the present lengths and velocities of all actuators."""
-    together_n: Any
-    """(n,) The forces of `_keep_together`."""
-
-    def in_arrays(self) -> DriveLaw:
-        """Return the same law for compiled code; the memory remains that of the model."""
-        return DriveLaw._make(value if isinstance(value, float) else np.asarray(value) for value in self)
-
-
-def set_controls(
-    law: DriveLaw, command: Command, gap_m: float, rate_m_s: float, dt_s: float, target_m: float
-) -> tuple[float, float]:
-    """Set the controls for the next `dt_s` under a command; return the effort that they exert, and the next target.
-
-    It runs compiled as well. The sums over the actuators are written out: with the few that a gripper has, the
-    interpreter is faster than numpy.
-    """
-    effort, target_m = _effort(law, command, gap_m, rate_m_s, dt_s, target_m)
-    limit = min(command.effort_limit_n, law.effort_limit_n)
-    effort = min(max(effort, -limit), limit)
-    row = min(max(bisect_left(law.gaps_m, gap_m), 1), len(law.gaps_m) - 1)
-    slopes, count = law.slopes[row], len(law.ids)
-    total = 0.0
-    for slope in slopes:
-        total += abs(slope)
-    per_slope = effort / total
-    if count > 1:
-        _keep_together(law, row, gap_m, rate_m_s)
-    exerted_n = 0.0
-    for k in range(count):
-        number, slope, actuator = law.ids[k], slopes[k], law.actuators[k]
-        wanted = (-per_slope if slope > 0.0 else per_slope) if slope != 0.0 else 0.0
-        if count > 1:
-            wanted += law.together_n[k]
-        bias = actuator[1] + actuator[2] * law.length[number] + actuator[3] * law.velocity[number]
-        control = min(max((wanted - bias) / actuator[0], actuator[4]), actuator[5])
-        law.control[number] = control
-        exerted_n -= min(max(actuator[0] * control + bias, actuator[6]), actuator[7]) * slope
-    return exerted_n, target_m
-
-
-def _keep_together(law: DriveLaw, row: int, gap_m: float, rate_m_s: float) -> None:
-    """Set forces that keep several actuators at the positions of the test move for this gap, without effort."""
-    slopes, lower, upper = law.slopes[row], law.lengths[row - 1], law.lengths[row]
-    start_m, end_m = law.gaps_m[row - 1], law.gaps_m[row]
-    share = min(max((gap_m - start_m) / (end_m - start_m), 0.0), 1.0)
-    square = 0.0
-    for slope in slopes:
-        square += slope * slope
-    stiffness, frequency = law.mass_kg / square * law.servo_rad_s, law.servo_rad_s
-    closing = 0.0
-    for k in range(len(slopes)):
-        number = law.ids[k]
-        away = lower[k] + share * (upper[k] - lower[k]) - law.length[number]
-        force = stiffness * (frequency * away + 2.0 * (slopes[k] * rate_m_s - law.velocity[number]))
-        law.together_n[k] = force
-        closing += slopes[k] * force
-    for k in range(len(slopes)):
-        law.together_n[k] -= slopes[k] * (closing / square)
-
-
-def _effort(
-    law: DriveLaw, command: Command, gap_m: float, rate_m_s: float, dt_s: float, target_m: float
-) -> tuple[float, float]:
-    """Return the effort for a command; a servo on the gap keeps the speed, or reaches the position."""
-    kind, value, _, speed_limit = command
-    if kind in (EFFORT, FORCE):
-        if not isfinite(speed_limit):
-            return value, gap_m
-        # From half of the largest speed on, the effort falls, to nothing at the largest.
-        closing = -rate_m_s if value > 0.0 else rate_m_s
-        return value * min(max(2.0 - 2.0 * closing / speed_limit, 0.0), 1.0), gap_m
-    if kind == VELOCITY:
-        speed = min(max(value, -speed_limit), speed_limit)
-    elif kind == POSITION:
-        most = speed_limit if isfinite(speed_limit) else 1.0
-        speed = min(max((value - target_m) / dt_s, -most), most)
-    else:
-        raise ValueError("no kind of command")
-    target_m += speed * dt_s
-    stiffness = law.mass_kg * (law.servo_rad_s * law.servo_rad_s)
-    # A target that the fingers cannot follow runs away only as far as the limit of the effort can use.
-    farthest_m = min(command.effort_limit_n, law.effort_limit_n) / stiffness
-    target_m = min(max(target_m, gap_m - farthest_m), gap_m + farthest_m)
-    damping = 2.0 * law.mass_kg * law.servo_rad_s
-    return stiffness * (gap_m - target_m) + damping * (rate_m_s - speed), target_m
-
-
 class ActuatorDrive:
-    """Sets the controls for a command."""
+    """Sets the controls for a command.
+
+    The sums over the actuators are written out: with the few that a gripper has, that is faster than numpy.
+    """
 
     def __init__(
         self, model: mujoco.MjModel, data: mujoco.MjData, gripper: GripperFile, travel: Travel
@@ -355,36 +256,86 @@ class ActuatorDrive:
         controls = np.where(limited[:, None], model.actuator_ctrlrange[ids], [-inf, inf])
         forced = model.actuator_forcelimited[ids].astype(bool)
         forces = np.where(forced[:, None], model.actuator_forcerange[ids], [-inf, inf])
-        actuators = np.column_stack([gain, bias, controls, forces]).tolist()
-        servo_rad_s = min(max(sqrt(SERVO_N_M / travel.mass_kg), SERVO_RAD_S), FASTEST_RAD_S)
-        self.effort_limit_n = gripper.effort_limit_n or _greatest(travel, actuators)
-        self.law = DriveLaw(
-            ids=ids,
-            actuators=actuators,
-            gaps_m=travel.gap_m.tolist(),
-            lengths=travel.length.T.tolist(),
-            slopes=travel.slopes().tolist(),
-            mass_kg=float(travel.mass_kg),
-            servo_rad_s=servo_rad_s,
-            effort_limit_n=float(self.effort_limit_n),
-            control=plain(data.ctrl),
-            length=plain(data.actuator_length),
-            velocity=plain(data.actuator_velocity),
-            together_n=[0.0] * len(ids),
-        )
+        # Gain, bias (3), and the ranges of control and force of each.
+        self._actuators = np.column_stack([gain, bias, controls, forces]).tolist()
+        self._ids = ids
+        self._gaps_m, self._lengths = travel.gap_m.tolist(), travel.length.T.tolist()
+        self._slopes = travel.slopes().tolist()
+        self._mass_kg = float(travel.mass_kg)
+        self._servo_rad_s = min(max(sqrt(SERVO_N_M / travel.mass_kg), SERVO_RAD_S), FASTEST_RAD_S)
+        self._control = plain(data.ctrl)
+        self._length, self._velocity = plain(data.actuator_length), plain(data.actuator_velocity)
+        self.effort_limit_n = float(gripper.effort_limit_n or _greatest(travel, self._actuators))
         self.effort_n = 0.0
         """The effort that the actuators exert (N), positive where it closes."""
-        self.target_m = travel.open_m
-        self.longest_s = min(SERVO_SHARE / servo_rad_s, LONGEST_S)
+        self._target_m = travel.open_m
+        self.longest_s = min(SERVO_SHARE / self._servo_rad_s, LONGEST_S)
         """Controls are kept no longer than this."""
 
     def reset(self, gap_m: float) -> None:
         """Begin at this gap."""
-        self.target_m = gap_m
+        self._target_m = gap_m
 
     def set_controls(self, command: Command, gap_m: float, rate_m_s: float, dt_s: float) -> None:
         """Set the controls for the next `dt_s` under a command."""
-        self.effort_n, self.target_m = set_controls(self.law, command, gap_m, rate_m_s, dt_s, self.target_m)
+        effort = self._effort(command, gap_m, rate_m_s, dt_s)
+        limit = min(command.effort_limit_n, self.effort_limit_n)
+        effort = min(max(effort, -limit), limit)
+        row = min(max(bisect_left(self._gaps_m, gap_m), 1), len(self._gaps_m) - 1)
+        slopes, count = self._slopes[row], len(self._ids)
+        per_slope = effort / sum(map(abs, slopes))
+        together_n = self._keeping_together(row, gap_m, rate_m_s) if count > 1 else [0.0]
+        exerted_n = 0.0
+        for k in range(count):
+            number, slope, actuator = self._ids[k], slopes[k], self._actuators[k]
+            wanted = (-per_slope if slope > 0.0 else per_slope) if slope != 0.0 else 0.0
+            wanted += together_n[k]
+            bias = actuator[1] + actuator[2] * self._length[number] + actuator[3] * self._velocity[number]
+            control = min(max((wanted - bias) / actuator[0], actuator[4]), actuator[5])
+            self._control[number] = control
+            exerted_n -= min(max(actuator[0] * control + bias, actuator[6]), actuator[7]) * slope
+        self.effort_n = exerted_n
+
+    def _keeping_together(self, row: int, gap_m: float, rate_m_s: float) -> list[float]:
+        """Return forces that keep several actuators at the positions of the test move for this gap, without effort."""
+        slopes, lower, upper = self._slopes[row], self._lengths[row - 1], self._lengths[row]
+        start_m, end_m = self._gaps_m[row - 1], self._gaps_m[row]
+        share = min(max((gap_m - start_m) / (end_m - start_m), 0.0), 1.0)
+        square = sum(slope * slope for slope in slopes)
+        stiffness, frequency = self._mass_kg / square * self._servo_rad_s, self._servo_rad_s
+        closing, together_n = 0.0, []
+        for k, slope in enumerate(slopes):
+            number = self._ids[k]
+            away = lower[k] + share * (upper[k] - lower[k]) - self._length[number]
+            force = stiffness * (frequency * away + 2.0 * (slope * rate_m_s - self._velocity[number]))
+            together_n.append(force)
+            closing += slope * force
+        return [force - slope * (closing / square) for force, slope in zip(together_n, slopes, strict=True)]
+
+    def _effort(self, command: Command, gap_m: float, rate_m_s: float, dt_s: float) -> float:
+        """Return the effort for a command; a servo on the gap keeps the speed, or reaches the position."""
+        kind, value, effort_limit, speed_limit = command
+        if kind in (EFFORT, FORCE):
+            self._target_m = gap_m
+            if not isfinite(speed_limit):
+                return value
+            # From half of the largest speed on, the effort falls, to nothing at the largest.
+            closing = -rate_m_s if value > 0.0 else rate_m_s
+            return value * min(max(2.0 - 2.0 * closing / speed_limit, 0.0), 1.0)
+        if kind == VELOCITY:
+            speed = min(max(value, -speed_limit), speed_limit)
+        elif kind == POSITION:
+            most = speed_limit if isfinite(speed_limit) else 1.0
+            speed = min(max((value - self._target_m) / dt_s, -most), most)
+        else:
+            raise ValueError("no kind of command")
+        target_m = self._target_m + speed * dt_s
+        stiffness = self._mass_kg * (self._servo_rad_s * self._servo_rad_s)
+        # A target that the fingers cannot follow runs away only as far as the limit of the effort can use.
+        farthest_m = min(effort_limit, self.effort_limit_n) / stiffness
+        self._target_m = min(max(target_m, gap_m - farthest_m), gap_m + farthest_m)
+        damping = 2.0 * self._mass_kg * self._servo_rad_s
+        return stiffness * (gap_m - self._target_m) + damping * (rate_m_s - speed)
 
 
 def _greatest(travel: Travel, actuators: list[list[float]]) -> float:

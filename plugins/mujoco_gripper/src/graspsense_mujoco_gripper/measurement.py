@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Set
 from math import hypot
-from typing import Any, NamedTuple
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from graspsense.plugin_api import ConfigError, Samples
 from graspsense_mujoco_gripper.gripper_file import Finger, Gap, GripperFile, PalmSensor
-from graspsense_mujoco_gripper.model import OBJ, POINT, identifier
+from graspsense_mujoco_gripper.model import POINT, identifier
 
 Floats = NDArray[np.float64]
 FARTHEST_M = 10.0
@@ -29,86 +29,32 @@ def plain(values: NDArray[Any]) -> Any:
     return memoryview(values.reshape(-1))  # type: ignore[arg-type]
 
 
-class GapTerms(NamedTuple):
-    """The gap: the distance of two geoms, or else an offset and a weighted sum of values of the model."""
+def gap_reader(model: mujoco.MjModel, data: mujoco.MjData, gap: Gap, axis: Floats) -> Callable[[], float]:
+    """Return a function that returns the gap (m) in the present state of `data`, as a gripper file says."""
+    if gap.geoms:
+        left, right = (identifier(model, "geom", name) for name in gap.geoms)
+        return lambda: float(mujoco.mj_geomDistance(model, data, left, right, FARTHEST_M, None))
+    if gap.joint:
+        values, offset_m = plain(data.qpos), gap.offset_m
+        terms = [(int(model.jnt_qposadr[identifier(model, "joint", gap.joint)]), gap.scale)]
+    else:
+        values, offset_m = plain(data.site_xpos), 0.0
+        terms = [
+            (3 * site + k, sign * float(axis[k]) / len(sites))
+            for sign, sites in zip(SIDES, _face_sites(model, gap), strict=True)
+            for site in sites
+            for k in range(3)
+            if axis[k] != 0.0
+        ]
 
-    geoms: Any
-    values: Any
-    places: Any
-    weights: Any
-    offset_m: float
+    # Sums of a few numbers take less time in the interpreter than in numpy.
+    def gap_m() -> float:
+        total: float = offset_m
+        for k, weight in terms:
+            total += weight * values[k]
+        return total
 
-    def in_arrays(self) -> GapTerms:
-        """Return the same for compiled code; `values` remain those of the model."""
-        return GapTerms(
-            geoms=np.array(self.geoms, np.int64),
-            values=np.asarray(self.values),
-            places=np.array(self.places, np.int64),
-            weights=np.array(self.weights, np.float64),
-            offset_m=float(self.offset_m),
-        )
-
-
-class GapGauge:
-    """Measures the gap (m) as a gripper file says."""
-
-    def __init__(self, model: mujoco.MjModel, gap: Gap) -> None:
-        self._gap = gap
-        self._faces = _face_sites(model, gap)
-        if self._faces:
-            self._ids = []
-        elif gap.geoms:
-            self._ids = [identifier(model, OBJ.mjOBJ_GEOM, name, "geom") for name in gap.geoms]
-        else:
-            joint = identifier(model, OBJ.mjOBJ_JOINT, gap.joint, "joint")
-            self._ids = [int(model.jnt_qposadr[joint])]
-        self._model = model
-
-    @property
-    def along_axis(self) -> bool:
-        """Whether the gap depends on the closing direction."""
-        return bool(self._faces)
-
-    def reader(self, data: mujoco.MjData, axis: Floats) -> Callable[[], float]:
-        """Return a function that returns the gap in the present state of `data`."""
-        if self._gap.geoms and not self._faces:
-            model, (left, right) = self._model, self._ids
-            return lambda: float(mujoco.mj_geomDistance(model, data, left, right, FARTHEST_M, None))
-        # Sums of a few numbers take less time in the interpreter than in numpy.
-        _, values, places, weights, offset_m = self.terms(data, axis)
-        terms = list(zip(places, weights, strict=True))
-
-        def gap_m() -> float:
-            total: float = offset_m
-            for k, weight in terms:
-                total += weight * values[k]
-            return total
-
-        return gap_m
-
-    def terms(self, data: mujoco.MjData, axis: Floats) -> GapTerms:
-        """Return what the gap follows from."""
-        if self._faces:
-            terms = [
-                (3 * site + k, sign * float(axis[k]) / len(sites))
-                for sign, sites in zip((-1.0, 1.0), self._faces, strict=True)
-                for site in sites
-                for k in range(3)
-                if axis[k] != 0.0
-            ]
-            places, weights = map(list, zip(*terms, strict=True))
-            return GapTerms(
-                geoms=[], values=plain(data.site_xpos), places=places, weights=weights, offset_m=0.0
-            )
-        if self._gap.geoms:
-            return GapTerms(geoms=self._ids, values=plain(data.qpos), places=[], weights=[], offset_m=0.0)
-        return GapTerms(
-            geoms=[],
-            values=plain(data.qpos),
-            places=self._ids,
-            weights=[self._gap.scale],
-            offset_m=self._gap.offset_m,
-        )
+    return gap_m
 
 
 class ForceGauge:
@@ -127,14 +73,14 @@ class ForceGauge:
     ) -> None:
         self._model, self._data, self._axis = model, data, axis
         # The last one is that of soft bodies, whose contacts have the geom -1.
-        self.roles = [0] * (model.ngeom + 1)
+        self._roles = [0] * (model.ngeom + 1)
         for role, geoms in zip(
             (LEFT, RIGHT, THING), (*(geoms_of(model, finger) for finger in fingers), things), strict=True
         ):
             for geom in geoms:
-                self.roles[geom] |= role
+                self._roles[geom] |= role
         self._sensors = [self._sensor(finger, side) for finger, side in zip(fingers, SIDES, strict=True)]
-        self._by_contacts, self.only_contacts = None in self._sensors, self._sensors == [None, None]
+        self._by_contacts = None in self._sensors
         self._factors: dict[tuple[int, int], tuple[float, float]] = {}
         self._wrench = np.zeros(6)
         self._force = plain(self._wrench)
@@ -144,7 +90,7 @@ class ForceGauge:
         if not finger.sensor:
             return None
         model, data = self._model, self._data
-        sensor = identifier(model, OBJ.mjOBJ_SENSOR, finger.sensor, "sensor")
+        sensor = identifier(model, "sensor", finger.sensor)
         kind, address = int(model.sensor_type[sensor]), int(model.sensor_adr[sensor])
         if kind == mujoco.mjtSensor.mjSENS_TOUCH:
             return lambda: float(data.sensordata[address])
@@ -164,7 +110,7 @@ class ForceGauge:
 
     def _sums(self) -> tuple[float, float]:
         """Return the sums of the forces at the contacts of each finger."""
-        model, data, factors, roles, force = self._model, self._data, self._factors, self.roles, self._force
+        model, data, factors, roles, force = self._model, self._data, self._factors, self._roles, self._force
         contacts, rows = data.contact, None
         left = right = 0.0
         for k, pair in enumerate(contacts.geom.tolist()):
@@ -185,7 +131,6 @@ class ForceGauge:
     def _along_axis(self, frames: Floats) -> list[float]:
         """Return the component along the closing direction of each row of the frames of the contacts."""
         axis, rows = self._axis, frames.reshape(-1, 3)
-        # Added in the order of compiled code, which the product of numpy does not keep.
         total = rows[:, 0] * axis[0]
         for j in (1, 2):
             if axis[j] != 0.0:
@@ -217,7 +162,7 @@ class SpringCells:
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, gripper: GripperFile) -> None:
         self._positions, self._rests, self._springs = plain(data.qpos), plain(model.qpos_spring), []
         for finger in (gripper.left, gripper.right):
-            joints = [identifier(model, OBJ.mjOBJ_JOINT, name, "joint") for name in finger.cells]
+            joints = [identifier(model, "joint", name) for name in finger.cells]
             springs = [(int(model.jnt_qposadr[k]), float(model.jnt_stiffness[k].flat[0])) for k in joints]
             for name, (_, stiffness) in zip(finger.cells, springs, strict=True):
                 if stiffness <= 0.0:
@@ -246,7 +191,7 @@ class Palm:
         accelerometer: PalmSensor,
         generator: np.random.Generator,
     ) -> None:
-        sensor = identifier(model, OBJ.mjOBJ_SENSOR, accelerometer.sensor, "sensor")
+        sensor = identifier(model, "sensor", accelerometer.sensor)
         if model.sensor_type[sensor] != mujoco.mjtSensor.mjSENS_ACCELEROMETER:
             raise ConfigError(f"gripper.file: the sensor {accelerometer.sensor!r} is not an accelerometer")
         address = int(model.sensor_adr[sensor])
@@ -289,7 +234,7 @@ def cells_of(model: mujoco.MjModel, data: mujoco.MjData, gripper: GripperFile) -
         return None
     addresses = []
     for finger in (gripper.left, gripper.right):
-        sensor = identifier(model, OBJ.mjOBJ_SENSOR, finger.array, "sensor")
+        sensor = identifier(model, "sensor", finger.array)
         values, cells = int(model.sensor_dim[sensor]), finger.rows * finger.columns
         if values % cells:
             raise ConfigError(
@@ -312,27 +257,27 @@ def closing_axis(gripper: GripperFile, left: Floats, right: Floats) -> Floats:
     return axis / length
 
 
-def width_m(model: mujoco.MjModel) -> float:
-    """Return how wide a thing is along its x axis: from its geoms that touch, and its flexible parts."""
+def extent(model: mujoco.MjModel, axis: int) -> tuple[float, float]:
+    """Return from where to where (m) a thing reaches along an axis: its geoms that touch, and its flexible parts."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    ends = [float(x) for x in data.flexvert_xpos[:, 0]] if model.nflexvert else []
+    ends = [float(end) for end in data.flexvert_xpos[:, axis]] if model.nflexvert else []
     for k in range(model.ngeom):
         if model.geom_contype[k] or model.geom_conaffinity[k]:
-            row = data.geom_xmat[k].reshape(3, 3)[0]
-            centre = float(data.geom_xpos[k][0] + row @ model.geom_aabb[k][:3])
+            row = data.geom_xmat[k].reshape(3, 3)[axis]
+            centre = float(data.geom_xpos[k][axis] + row @ model.geom_aabb[k][:3])
             reach = float(np.abs(row) @ model.geom_aabb[k][3:])
             ends += [centre - reach, centre + reach]
-    return max(ends) - min(ends) if ends else 0.0
+    return min(ends, default=0.0), max(ends, default=0.0)
 
 
 def _face_sites(model: mujoco.MjModel, gap: Gap) -> tuple[list[int], ...]:
     """Return the sites of the left and the right face; nothing where the gap has neither sites nor points."""
     if gap.sites:
-        return tuple([identifier(model, OBJ.mjOBJ_SITE, name, "site")] for name in gap.sites)
+        return tuple([identifier(model, "site", name)] for name in gap.sites)
     if gap.left:
         return tuple(
-            [identifier(model, OBJ.mjOBJ_SITE, f"{POINT}{side}{k}", "site") for k in range(len(points))]
+            [identifier(model, "site", f"{POINT}{side}{k}") for k in range(len(points))]
             for side, points in (("left", gap.left), ("right", gap.right))
         )
     return ()
@@ -344,9 +289,7 @@ def faces(model: mujoco.MjModel, data: mujoco.MjData, gripper: GripperFile) -> t
     if sites := _face_sites(model, gap):
         left, right = (data.site_xpos[site].mean(axis=0) for site in sites)
     elif gap.geoms:
-        left, right = (
-            data.geom_xpos[identifier(model, OBJ.mjOBJ_GEOM, name, "geom")].copy() for name in gap.geoms
-        )
+        left, right = (data.geom_xpos[identifier(model, "geom", name)].copy() for name in gap.geoms)
     else:
         left, right = (
             np.mean([data.geom_xpos[k] for k in geoms_of(model, finger)], axis=0)
@@ -357,9 +300,9 @@ def faces(model: mujoco.MjModel, data: mujoco.MjData, gripper: GripperFile) -> t
 
 def geoms_of(model: mujoco.MjModel, finger: Finger) -> frozenset[int]:
     """Return the numbers of the geoms of a finger that can touch."""
-    geoms = {identifier(model, OBJ.mjOBJ_GEOM, name, "geom") for name in finger.geoms}
+    geoms = {identifier(model, "geom", name) for name in finger.geoms}
     for name in finger.bodies:
-        body = identifier(model, OBJ.mjOBJ_BODY, name, "body")
+        body = identifier(model, "body", name)
         start = int(model.body_geomadr[body])
         geoms |= set(range(start, start + int(model.body_geomnum[body])))
     return frozenset(geoms)

@@ -15,7 +15,6 @@ from graspsense.plugin_api import ConfigError
 from graspsense.simulator_api import first_bytes
 from graspsense_mujoco_gripper.gripper_file import GripperFile
 
-OBJ: Final = mujoco.mjtObj
 # MuJoCo would print each warning and write it to MUJOCO_LOG.TXT in the current folder; `instability` tells them.
 mujoco.set_mju_user_warning(lambda text: None)
 
@@ -133,27 +132,12 @@ def compiled(spec: mujoco.MjSpec, called: str) -> mujoco.MjModel:
     return model
 
 
-def identifier(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str, what: str) -> int:
-    """Return the number of a named part of a model. Raises ConfigError with the names that it has."""
-    number = int(mujoco.mj_name2id(model, kind, name))
-    if number < 0:
-        known = [mujoco.mj_id2name(model, kind, k) for k in range(_count(model, kind))]
-        shown = ", ".join(label for label in known if label) or "none with a name"
-        raise ConfigError(f"gripper.file: the model has no {what} {name!r}; there are {shown}")
-    return number
-
-
-def _count(model: mujoco.MjModel, kind: mujoco.mjtObj) -> int:
-    counts = {
-        mujoco.mjtObj.mjOBJ_BODY: model.nbody,
-        mujoco.mjtObj.mjOBJ_SITE: model.nsite,
-        mujoco.mjtObj.mjOBJ_GEOM: model.ngeom,
-        mujoco.mjtObj.mjOBJ_JOINT: model.njnt,
-        mujoco.mjtObj.mjOBJ_ACTUATOR: model.nu,
-        mujoco.mjtObj.mjOBJ_SENSOR: model.nsensor,
-        mujoco.mjtObj.mjOBJ_EQUALITY: model.neq,
-    }
-    return int(counts[kind])
+def identifier(model: mujoco.MjModel, kind: str, name: str) -> int:
+    """Return the number of a named part of a model, such as a `geom`. Raises ConfigError with the names that it has."""
+    try:
+        return int(getattr(model, kind)(name).id)
+    except KeyError as error:
+        raise ConfigError(f"gripper.file: the model has no {kind} {name!r}. {error.args[0]}") from error
 
 
 def _check_assets(spec: mujoco.MjSpec, path: Path) -> None:

@@ -6,13 +6,13 @@ from typing import Final
 
 import mujoco
 import numpy as np
-from attrs import define, evolve, frozen
+from attrs import define, evolve, field, frozen
 
 from graspsense_mujoco_gripper.catalogue import soften_walls
 from graspsense_mujoco_gripper.config import MujocoConfig
 from graspsense_mujoco_gripper.drive import Travel, test_move
 from graspsense_mujoco_gripper.gripper_file import GripperFile, read_gripper
-from graspsense_mujoco_gripper.measurement import width_m
+from graspsense_mujoco_gripper.measurement import extent
 from graspsense_mujoco_gripper.model import compiled, gripper_spec
 from graspsense_mujoco_gripper.scene import SceneModel, read_scene
 from graspsense_mujoco_gripper.variation import vary
@@ -49,9 +49,7 @@ class Prepared:
 class Batch:
     """What the grasps of a process share: what the first one of each thing prepares."""
 
-    grasps: int
-    """Their number; 1 where the controller turned out not to be compilable."""
-    known: dict[MujocoConfig, Prepared]
+    known: dict[MujocoConfig, Prepared] = field(factory=dict)
 
     def prepared(self, config: MujocoConfig, timestep_s: float) -> Prepared:
         """Return what the grasps with these settings have in common. Raises ConfigError, UnknownName."""
@@ -73,8 +71,11 @@ def prepare(config: MujocoConfig, timestep_s: float) -> Prepared:
     put_on_arm(spec, scene.scene)
     _integrate(spec, config.integrator, soft=scene.spec is not None and len(scene.spec.flexes) > 0)
     model = compiled(spec, str(path))
-    width = None if scene.spec is None else width_m(compiled(scene.spec, config.object))
-    return Prepared(config, gripper, spec, model, test_move(model, gripper, width), scene)
+    width_m = None
+    if scene.spec is not None:
+        left_m, right_m = extent(compiled(scene.spec, config.object), 0)
+        width_m = right_m - left_m
+    return Prepared(config, gripper, spec, model, test_move(model, gripper, width_m), scene)
 
 
 def _integrate(spec: mujoco.MjSpec, integrator: str, *, soft: bool) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graspsense_mujoco_gripper.gripper_file import GripperFile
-from graspsense_mujoco_gripper.model import OBJ, identifier
+from graspsense_mujoco_gripper.model import identifier
 
 WAVES: Final = 12
 WAVELENGTH_M: Final = (0.0002, 0.002)
@@ -34,7 +34,7 @@ class Roughness:
     ) -> None:
         self._model, self._data, self._thing = model, data, thing
         joints = [
-            identifier(model, OBJ.mjOBJ_JOINT, name, "joint")
+            identifier(model, "joint", name)
             for finger in (gripper.left, gripper.right)
             for name in finger.cells
         ]

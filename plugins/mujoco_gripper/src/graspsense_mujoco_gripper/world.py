@@ -9,6 +9,7 @@ import numpy as np
 
 from graspsense.plugin_api import ConfigError
 from graspsense_mujoco_gripper.bump import add_ball
+from graspsense_mujoco_gripper.measurement import extent
 from graspsense_mujoco_gripper.model import compiled
 from graspsense_mujoco_gripper.scene import Floats, Scene, SceneModel, unit_vector
 from graspsense_mujoco_gripper.variation import scale_friction, scale_mass
@@ -133,16 +134,7 @@ def _set_bits(child: mujoco.MjSpec) -> None:
 
 def _lowest(model: mujoco.MjModel) -> float:
     """Return the height (m) of the lowest point of a thing above its origin."""
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    lowest = [float(z) - model.flex_radius[0] for z in data.flexvert_xpos[:, 2]]
-    for k in range(model.ngeom):
-        if model.geom_contype[k] or model.geom_conaffinity[k]:
-            centre, half = model.geom_aabb[k, :3], model.geom_aabb[k, 3:]
-            turn = data.geom_xmat[k].reshape(3, 3)
-            middle = data.geom_xpos[k] + turn @ centre
-            lowest.append(float(middle[2] - np.abs(turn[2]) @ half))
-    return min(lowest, default=0.0)
+    return extent(model, 2)[0] - float(max(model.flex_radius, default=0.0))
 
 
 def is_thing(model: mujoco.MjModel, body: int) -> bool:

@@ -78,8 +78,6 @@ class Packets:
 
     def __init__(self) -> None:
         self._data = b""
-        self.skipped = 0
-        """The number of bytes that belonged to no packet."""
 
     def fed(self, data: bytes) -> list[tuple[int, bytes]]:
         """Take bytes and return the complete packets, each with its command and data."""
@@ -88,10 +86,8 @@ class Packets:
         while True:
             start = self._data.find(START)
             if start < 0:
-                self.skipped += len(self._data)
                 self._data = b""
                 return packets
-            self.skipped += start
             self._data = self._data[start:]
             if len(self._data) < HEADER or len(self._data) < HEADER + self._data[3]:
                 return packets

@@ -30,11 +30,6 @@ class Jaw(NamedTuple):
         """The gap where it is open."""
         return self.gap_m(self.opened)
 
-    @property
-    def step_m(self) -> float:
-        """The change of the gap for one step, at most: that of the closed jaw."""
-        return self.length_m * RADIANS_A_STEP
-
     def gap_m(self, position: int) -> float:
         """Return the gap at this position; 0 beyond the closed one."""
         angle = (position - self.closed) * self.opens * RADIANS_A_STEP

@@ -98,7 +98,6 @@ SHIPPED: Final = (
 """The distributions in `plugins`, for the hint if one is not installed."""
 
 EXAMPLES: Final = (
-    _example("graspsense-robotiq-2f85", "robotiq_2f85", {"sensor-backend": ("robotiq-2f85",)}),
     _example("graspsense-grasp-curve", "grasp_curve", {"feature-set": ("grasp-curve", "chitta-and-curve")}),
 )
 """The distributions in `examples`, which are installed from a clone only."""

@@ -7,7 +7,7 @@ from typing import Final, final
 
 from graspsense.gripper_api import EmulatedPort, EmulatedSerial
 from graspsense_robotiq_2f.config import RobotiqConfig
-from graspsense_robotiq_2f.emulator.fingertips import Felt, emulated_boards
+from graspsense_robotiq_2f.emulator.fingertips import emulated_boards
 from graspsense_robotiq_2f.emulator.hand import Hand
 from graspsense_robotiq_2f.emulator.modbus import answered
 from graspsense_robotiq_2f.emulator.ur_cap import answered as answered_by_ur_cap
@@ -35,7 +35,9 @@ class EmulatedGripper(EmulatedSerial):
         self._config = config
         self._hand = Hand(config, seed)
         self._data = b""
-        self._boards = emulated_boards(config.tactile_ports.count("emulated"), self._felt, seed=seed)
+        count = config.tactile_ports.count("emulated")
+        # Felt without the lock: who unplugs may hold it, and waits for the thread that asks what is felt.
+        self._boards = emulated_boards(count, lambda: self._hand.fingers.forces_n, seed=seed)
         self._tactile_ports: list[EmulatedPort] = []
 
     @property
@@ -106,7 +108,3 @@ class EmulatedGripper(EmulatedSerial):
             "effort_n": round(fingers.effort_n, 3),
             "going": self._hand.going,
         }
-
-    def _felt(self) -> Felt:
-        # Not by waiting: who unplugs may hold the lock, and waits for the thread that calls this.
-        return self._hand.felt

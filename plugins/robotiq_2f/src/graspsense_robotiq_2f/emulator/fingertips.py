@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from random import Random
-from typing import Final, NamedTuple
+from typing import Final
 
 from graspsense_robotiq_2f.tactile_protocol import (
     ACCELERATION,
@@ -45,19 +45,15 @@ _SHAPE: Final = [
 _TOTAL: Final = sum(_SHAPE)
 
 
-class Felt(NamedTuple):
-    """What the pads feel: the forces (N) on the left and the right one."""
-
-    left_n: float
-    right_n: float
-
-
 class EmulatedFingertips:
-    """A board with these fingertips, whose forces `felt` returns. `heard` and `unasked` are the sides of a port."""
+    """A board with these fingertips; `felt` returns the forces (N) on the left and the right one.
+
+    `heard` and `unasked` are the sides of a port.
+    """
 
     def __init__(
         self,
-        felt: Callable[[], Felt],
+        felt: Callable[[], tuple[float, float]],
         monotonic: Callable[[], float] | None = None,
         seed: int = 0,
         fingers: Sequence[int] = range(FINGERS),
@@ -73,9 +69,7 @@ class EmulatedFingertips:
         self._packets = Packets()
         self._began_s = self._monotonic()
         self._period_s = self._due_s = self._pressed_s = 0.0
-        self._last = Felt(0.0, 0.0)
-        self.sent = 0
-        """The number of packets with measurements."""
+        self._last = (0.0, 0.0)
 
     def heard(self, data: bytes) -> bytes:
         """Return the replies to what a host sent."""
@@ -118,7 +112,6 @@ class EmulatedFingertips:
             fields.append(Field(DYNAMIC, number, (change,)))
             fields.append(Field(ACCELERATION, number, (0, 0, G_COUNTS)))
             fields.append(Field(GYROSCOPE, number, (0, 0, 0)))
-        self.sent += 1
         return encoded(fields)
 
     def _cells(self, finger: int, force_n: float) -> tuple[int, ...]:
@@ -130,7 +123,10 @@ class EmulatedFingertips:
 
 
 def emulated_boards(
-    count: int, felt: Callable[[], Felt], monotonic: Callable[[], float] | None = None, seed: int = 0
+    count: int,
+    felt: Callable[[], tuple[float, float]],
+    monotonic: Callable[[], float] | None = None,
+    seed: int = 0,
 ) -> list[EmulatedFingertips]:
     """Return this many boards: one with both fingertips, or two with one each, the left one first."""
     split = [range(FINGERS)] if count == 1 else [range(finger, finger + 1) for finger in range(count)]

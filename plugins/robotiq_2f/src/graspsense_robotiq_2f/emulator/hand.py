@@ -7,7 +7,6 @@ from typing import Final
 
 from graspsense.gripper_api import EmulatedFingers, FingerTarget
 from graspsense_robotiq_2f.config import RobotiqConfig
-from graspsense_robotiq_2f.emulator.fingertips import Felt
 from graspsense_robotiq_2f.registers import (
     ACTIVE,
     AMPERES_A_STEP,
@@ -44,11 +43,6 @@ class Hand:
     def registers(self) -> tuple[int, ...]:
         """The output registers as they were written last."""
         return tuple(self._registers)
-
-    @property
-    def felt(self) -> Felt:
-        """The forces on the pads of the body."""
-        return Felt(*self.fingers.forces_n)
 
     @property
     def going(self) -> bool:

@@ -27,7 +27,7 @@ class LockStepGripper:
         self._hand = Hand(config, seed)
         self._now_s = 0.0
         count = config.tactile_ports.count("emulated")
-        self._boards = emulated_boards(count, lambda: self._hand.felt, self.monotonic, seed)
+        self._boards = emulated_boards(count, lambda: self._hand.fingers.forces_n, self.monotonic, seed)
 
     @property
     def body_report(self) -> Mapping[str, float | int | str | bool]:

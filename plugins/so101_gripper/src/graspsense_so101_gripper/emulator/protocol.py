@@ -3,23 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final, Protocol
+from typing import Final
+
+from graspsense_so101_gripper.emulator.motor import EmulatedMotor
 
 HEADER: Final = b"\xff\xff"
 BROADCAST: Final = 0xFE
 PING, READ, WRITE, REG_WRITE, ACTION, SYNC_READ, SYNC_WRITE = 1, 2, 3, 4, 5, 0x82, 0x83
-
-
-class Memory(Protocol):
-    """A motor's memory."""
-
-    status: int
-
-    def read(self, address: int, count: int) -> bytes:
-        """Return bytes of the memory."""
-
-    def write(self, address: int, data: bytes) -> None:
-        """Write bytes into the memory."""
 
 
 def checksum(body: bytes) -> int:
@@ -36,7 +26,7 @@ def packet(motor: int, kind: int, data: bytes = b"") -> bytes:
 class Requests:
     """Finds packets in a stream of bytes and lets the motors of a bus answer them."""
 
-    def __init__(self, motors: Mapping[int, Memory]) -> None:
+    def __init__(self, motors: Mapping[int, EmulatedMotor]) -> None:
         self._motors = motors
         self._data = b""
         self._waiting: dict[int, tuple[int, bytes]] = {}

@@ -22,7 +22,7 @@ from typing import Any, Final, Unpack
 from attrs import define, field
 
 from graspsense.plugin_api import Controller, FeatureSet
-from graspsense.simulator_api import BatchOptions, NotCompilable, RunConfig
+from graspsense.simulator_api import BatchOptions, NotCompilable, NotHandedOver, RunConfig
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.batch.compiled_grasps import CompiledGrasps
 from graspsense_sim_gripper.run.batch.drawn import Drawing, compiled_drawing, draw_numbers, is_drawing_kept
@@ -33,7 +33,7 @@ from graspsense_sim_gripper.run.batch.job import (
     grasp_plain,
 )
 from graspsense_sim_gripper.run.batch.scenes import Scenes, SelectedScene, scene_key
-from graspsense_sim_gripper.run.batch.worker import NotHandedOver, PlainProcess
+from graspsense_sim_gripper.run.batch.worker import PlainProcess
 from graspsense_sim_gripper.run.build import build
 from graspsense_sim_gripper.run.compiled.extraction import compiled_measure, is_measure_kept
 from graspsense_sim_gripper.run.compiled.loop_code import CompiledLoops, is_kept

@@ -1,1 +1,0 @@
-"""A Robotiq 2F-85 gripper for graspsense."""
