@@ -42,17 +42,6 @@ def _write_rate(rate: RecognitionRate) -> dict[str, Any]:
     }
 
 
-def _read_rate(values: Any, _: type) -> RecognitionRate:
-    interval = values["interval"]
-    return RecognitionRate(
-        correct=values["correct"],
-        n=values["n"],
-        interval=None if interval is None else (float(interval[0]), float(interval[1])),
-        no_interval=values.get("no_interval", ""),
-        instances=values.get("instances"),
-    )
-
-
 _CONVERTER: Final = cattrs.Converter()
 # A key of the JSON is the alias of its field: it stays where the field has a new name.
 _CONVERTER.register_unstructure_hook_factory(
@@ -62,4 +51,3 @@ _CONVERTER.register_structure_hook_factory(
     attrs.has, lambda cls: make_dict_structure_fn(cls, _CONVERTER, _cattrs_use_alias=True)
 )
 _CONVERTER.register_unstructure_hook(RecognitionRate, _write_rate)
-_CONVERTER.register_structure_hook(RecognitionRate, _read_rate)

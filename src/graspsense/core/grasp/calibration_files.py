@@ -52,6 +52,10 @@ class Calibration:
     sha256: str = ""
 
 
+_STORED: Final = ("kind", "serial", "device", "made", "data")
+"""The fields in the file, beside its format, version and hash."""
+
+
 def calibration_path(folder: str | Path, serial: str, kind: str) -> Path:
     """Return the path of a calibration of this kind and serial number; an empty folder means that of the user.
 
@@ -77,15 +81,9 @@ def calibration_folder(given: str | Path) -> Path | None:
 
 def write_calibration(path: Path, calibration: Calibration) -> Calibration:
     """Write the file atomically, and return the calibration with its hash. Raises OSError."""
-    content = {
-        "format": FORMAT,
-        "version": VERSION,
-        "kind": calibration.kind,
-        "serial": calibration.serial,
-        "device": dict(calibration.device),
-        "made": calibration.made,
-        "data": dict(calibration.data),
-    }
+    said = {name: getattr(calibration, name) for name in _STORED}
+    tables = {"device": dict(calibration.device), "data": dict(calibration.data)}
+    content = {"format": FORMAT, "version": VERSION, **said, **tables}
     sha256 = _hash(content)
     make_closed(path.parent)
     write_whole(path, json.dumps({**content, "sha256": sha256}, indent=1).encode(), mode=0o644)
@@ -122,14 +120,7 @@ def read_calibration(path: Path) -> Calibration:
             "file as it was"
         )
     try:
-        calibration = Calibration(
-            kind=content["kind"],
-            serial=content["serial"],
-            device=content["device"],
-            made=content["made"],
-            data=content["data"],
-            sha256=sha256,
-        )
+        calibration = Calibration(**{name: content[name] for name in _STORED}, sha256=sha256)
         datetime.fromisoformat(calibration.made)
         _READERS[calibration.kind](calibration)
     except (KeyError, TypeError, ValueError) as error:
