@@ -31,7 +31,7 @@ STRETCH_FOLDS: Final = 3
 STATIC_KEPT: Final = 3
 """Static laws that are tried with every memory."""
 WORTH_KEEPING: Final = 4.0
-"""A candidate whose residual is larger than the least by this factor is not tried with a lag, nor with own values."""
+"""A candidate whose residual is larger than the least by this factor is not tried with a lag."""
 WORTH_TRYING: Final = 3.0
 """A candidate whose fit is worse than the best by this factor is not judged by held-out data."""
 MANY: Final = 4
@@ -54,18 +54,6 @@ class Choice:
     """The fits of the chosen candidate to each squeeze by itself; none with fewer than three objects with names."""
     varies: bool = False
     """Whether common values fit worse than noise would make them."""
-
-    def instead(self, fitted: Fitted, verdict: str) -> Choice:
-        """Return the choice of another of the refined candidates."""
-        scores = [
-            evolve(score, chosen=True, verdict=f"chosen: {verdict}")
-            if score.terms == fitted.candidate.name
-            else evolve(score, chosen=False, verdict="only common values need its terms")
-            if score.chosen
-            else score
-            for score in self.scores
-        ]
-        return evolve(self, fitted=fitted, scores=tuple(sorted(scores, key=_rank)))
 
 
 @frozen(kw_only=True, eq=False)

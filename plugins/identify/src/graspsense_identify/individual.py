@@ -1,8 +1,7 @@
-"""Fits of the chosen law to each squeeze by itself, and whether a simpler law with own values explains them better.
+"""Fits of the chosen law to each squeeze by itself, and whether its values vary from squeeze to squeeze.
 
-Common values that do not hold for all objects fit badly, and a law with more terms, or a lag, may mimic that. So a
-simpler law with values of each squeeze is taken instead of the chosen one where it has more evidence, and the lag is
-then that of a single squeeze.
+Common values that do not hold for all objects fit badly, and a lag may mimic that. So where the values vary, no lag is
+taken from the squeezes.
 """
 
 from __future__ import annotations
@@ -30,26 +29,15 @@ def alone(fitted: Fitted) -> list[Fitted]:
 
 
 def with_own_values(choice: Choice) -> Choice:
-    """Return the choice with the fits to each squeeze, or that of a simpler candidate whose values differ."""
+    """Return the choice with the fits to each squeeze, and whether the values vary."""
     own = alone(choice.fitted)
-    choice = evolve(choice, alone=own)
-    if not own or _evidence(own) > _common_evidence(choice.fitted) - EVIDENCE:
-        return choice
-    least = min(_evidence(own), _common_evidence(choice.fitted))
-    simpler = [fitted for fitted in choice.refined if fitted.parameters < choice.fitted.parameters]
-    for fitted in sorted(simpler, key=lambda law: (law.parameters, law.rms)):
-        fits = alone(fitted)
-        if _evidence(fits) < least - EVIDENCE:
-            choice = evolve(choice.instead(fitted, "simpler, with values of each object"), alone=fits)
-            break
-    return evolve(choice, varies=True)
+    varies = bool(own) and _evidence(own) <= _common_evidence(choice.fitted) - EVIDENCE
+    return evolve(choice, alone=own, varies=varies)
 
 
 def lag_of(choice: Choice) -> Lag:
     """Return the lag of the force beyond the settings."""
-    if not choice.varies:
-        return lag_beyond_settings(choice.refined)
-    return lag_beyond_settings(in_threads(lambda fitted: fitted.part([0]).refitted(), choice.refined))
+    return Lag() if choice.varies else lag_beyond_settings(choice.refined)
 
 
 def of_each(choice: Choice) -> Fitted:
