@@ -90,7 +90,7 @@ def _of_zero(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
     felt = _is_felt(force)
     for name, pad in _pads(columns):
         least, most = _usual_range(pad)
-        if _is_felt(pad) and least < 0.0 and abs(least) > abs(most):
+        if _is_felt(pad) and least < -OFFSET * (high - low) and abs(least) > abs(most):
             yield f"{name} is negative where it is largest: is it a pull? Turn its sign: -FORCE"
     steady, touched = _is_steady(force), not columns.units.get("force") and _both_touch_at_first(columns)
     if _falls_on_contact(columns):
