@@ -97,11 +97,13 @@ def signal_notices(recording: Recording) -> Iterator[str]:
     """
     times = np.array([reading.frame.t_s for reading in recording.readings])
     gap = np.array([reading.frame.gap_m for reading in recording.readings])
-    pads = _pads(recording)
+    left = np.array([reading.frame.force_left_n for reading in recording.readings])
+    right = np.array([reading.frame.force_right_n for reading in recording.readings])
+    pads = force_of_pads(left, right)
     told = [text for what, force in pads.items() for text in _of_sensor(what, times, force, recording.units)]
     yield from told
-    if len(pads) > 1 and not told:
-        for what, other in zip(pads, reversed(pads.values()), strict=True):
+    if not told and len(pads) > 1:
+        for what, other in zip(pads, (right, left), strict=True):
             yield from _numb(what, times, gap, pads[what], other, recording.units)
     for what, force in pads.items():
         known = np.isfinite(force)
@@ -111,9 +113,9 @@ def signal_notices(recording: Recording) -> Iterator[str]:
                 yield from _seldom(what, times[known], force[known])
             yield from _drift(what, gap[known], force[known], recording.units)
     if not {"gap", "t"} & recording.units.keys() and len(gap) >= FEWEST:
-        yield from _bump(times, gap, np.mean(list(pads.values()), axis=0), recording.units)
+        yield from _bump(times, gap, (left + right) / 2.0, recording.units)
         yield from _jump(times, gap)
-        yield from _stopped_gap(times, gap, np.mean(list(pads.values()), axis=0))
+        yield from _stopped_gap(times, gap, (left + right) / 2.0)
 
 
 def _of_sensor(what: str, times: Numbers, force: Numbers, units: Mapping[str, str]) -> Iterator[str]:
@@ -314,10 +316,8 @@ def _stopped_gap(times: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
                 )
 
 
-def _pads(recording: Recording) -> dict[str, Numbers]:
+def force_of_pads(left: Numbers, right: Numbers) -> dict[str, Numbers]:
     """Return the force of each pad by its name in a sentence; of both together where one stands for both."""
-    left = np.array([reading.frame.force_left_n for reading in recording.readings])
-    right = np.array([reading.frame.force_right_n for reading in recording.readings])
     if np.array_equal(left, right, equal_nan=True):
         return {"the force": left}
     return {"the force of the left pad": left, "the force of the right pad": right}
