@@ -204,3 +204,21 @@ def test_a_glitch_under_a_load_is_noticed_at_any_rate(rate_hz: float, samples: i
     spoilt[int(1.1 * rate_hz) :][:samples] = 60.0
     (notice,) = noticed(spoilt, spoilt, gap, rate_hz=rate_hz)
     assert "60 N at 1.1 s" in notice
+
+
+@every_case("side", ["left", "right"])
+@every_case("from_s", [0.0, 0.5, 1.5, 2.0])
+def test_a_pad_that_feels_nothing_but_noise_while_the_other_is_loaded_is_noticed(
+    from_s: float, side: str
+) -> None:
+    dead = np.where(from_s <= T_S, NOISE_N[1], RELEASED_N)
+    pads = (dead, RELEASED_N) if side == "left" else (RELEASED_N, dead)
+    (notice,) = (notice for notice in noticed(*pads, OPEN_AGAIN_M) if "leaves its course" not in notice)
+    assert f"{side} pad stays at" in notice
+    assert "while the other pad feels up to 6" in notice
+
+
+def test_a_sound_pad_that_reads_low_or_feels_the_object_later_is_not_doubted() -> None:
+    for low in (0.5 * RELEASED_N, 0.1 * RELEASED_N, np.where(T_S < 1.2, NOISE_N[1], RELEASED_N)):
+        for pads in ((low, RELEASED_N), (RELEASED_N, low)):
+            assert not any("stays at" in notice for notice in noticed(*pads, OPEN_AGAIN_M))

@@ -42,6 +42,10 @@ LOADED_GLITCH: Final = 0.5
 """Share of its range by which a force leaves its course in a glitch: up to this share of the force, and above it."""
 GLITCH_NOISE: Final = 10.0
 """A glitch is at least so many times the usual distance from the course."""
+NUMB: Final = 0.02
+"""Share of the range of the other pad up to which a pad feels nothing,"""
+NUMB_SHARE: Final = 0.1
+"""and of the samples in which the other one is loaded, from which on that is told."""
 FAR: Final = 2.0
 FAR_S: Final = 0.2
 FAR_SAMPLES: Final = 10
@@ -93,9 +97,14 @@ def signal_notices(recording: Recording) -> Iterator[str]:
     """
     times = np.array([reading.frame.t_s for reading in recording.readings])
     gap = np.array([reading.frame.gap_m for reading in recording.readings])
-    pads = _pads(recording)
-    for what, force in pads.items():
-        yield from _of_sensor(what, times, force, recording.units)
+    left = np.array([reading.frame.force_left_n for reading in recording.readings])
+    right = np.array([reading.frame.force_right_n for reading in recording.readings])
+    pads = force_of_pads(left, right)
+    told = [text for what, force in pads.items() for text in _of_sensor(what, times, force, recording.units)]
+    yield from told
+    if not told and len(pads) > 1:
+        for what, other in zip(pads, (right, left), strict=True):
+            yield from _numb(what, times, gap, pads[what], other, recording.units)
     for what, force in pads.items():
         known = np.isfinite(force)
         if int(known.sum()) >= FEWEST:
@@ -104,9 +113,9 @@ def signal_notices(recording: Recording) -> Iterator[str]:
                 yield from _seldom(what, times[known], force[known])
             yield from _drift(what, gap[known], force[known], recording.units)
     if not {"gap", "t"} & recording.units.keys() and len(gap) >= FEWEST:
-        yield from _bump(times, gap, np.mean(list(pads.values()), axis=0), recording.units)
+        yield from _bump(times, gap, (left + right) / 2.0, recording.units)
         yield from _jump(times, gap)
-        yield from _stopped_gap(times, gap, np.mean(list(pads.values()), axis=0))
+        yield from _stopped_gap(times, gap, (left + right) / 2.0)
 
 
 def _of_sensor(what: str, times: Numbers, force: Numbers, units: Mapping[str, str]) -> Iterator[str]:
@@ -130,6 +139,32 @@ def _of_sensor(what: str, times: Numbers, force: Numbers, units: Mapping[str, st
         )
 
 
+def _numb(
+    what: str, times: Numbers, gap: Numbers, force: Numbers, other: Numbers, units: Mapping[str, str]
+) -> Iterator[str]:
+    """Yield that a pad feels nothing but its noise while the other one is loaded, and the gap has not opened."""
+    known = np.isfinite(force) & np.isfinite(other)
+    t, gap, force, other = times[known], gap[known], force[known], other[known]
+    if len(force) < FEWEST:
+        return
+    low, span = float(np.quantile(other, 0.01)), float(np.ptp(other))
+    noise = max(float(np.median(np.abs(np.diff(part, 2)))) for part in (force, other))
+    loaded = other > low + 0.5 * span
+    begin = int(loaded.argmax())
+    free = np.flatnonzero(other[:begin] < low + FREE_GLITCH * span)
+    if not len(free) or not span > GLITCH_NOISE * noise:
+        return
+    loaded &= gap <= gap[begin]
+    zero = float(np.median(force[free]))
+    numb = np.flatnonzero(loaded & (np.abs(force - zero) < max(GLITCH_NOISE * noise, NUMB * span)))
+    if len(numb) >= FEWEST and len(numb) > NUMB_SHARE * np.count_nonzero(loaded):
+        yield (
+            f"{what} stays at {zero:.3g} {units.get('force_left', 'N')} from {t[numb[0]]:.4g} to {t[numb[-1]]:.4g} "
+            f"{units.get('t', 's')}, while the other pad feels up to {other[numb].max():.3g}: does its fingertip not "
+            "answer, or did one finger alone touch?"
+        )
+
+
 def _glitches(what: str, times: Numbers, force: Numbers, units: Mapping[str, str]) -> Iterator[str]:
     """Yield that a force leaves its course for a few samples: without a load, or by most of its range anywhere."""
     changes = np.flatnonzero(np.diff(force)) + 1
@@ -147,7 +182,8 @@ def _glitches(what: str, times: Numbers, force: Numbers, units: Mapping[str, str
     # Under a load, nothing exceeds all other forces several times and then comes back, however rarely it is measured.
     wide = _course(sampled, min(FAR_SAMPLES, max(1, int(FAR_S / step_s))))
     loaded = wide > wide.min() + FREE_GLITCH * np.ptp(wide)
-    left |= loaded & (np.abs(sampled - wide) > FAR * np.ptp(wide))
+    far = np.abs(sampled - wide)
+    left |= loaded & (far > max(FAR * float(np.ptp(wide)), GLITCH_NOISE * float(np.median(far))))
     count = int(left.sum())
     if not 0 < count <= MOST_GLITCHES * len(sampled):
         return
@@ -280,10 +316,8 @@ def _stopped_gap(times: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
                 )
 
 
-def _pads(recording: Recording) -> dict[str, Numbers]:
+def force_of_pads(left: Numbers, right: Numbers) -> dict[str, Numbers]:
     """Return the force of each pad by its name in a sentence; of both together where one stands for both."""
-    left = np.array([reading.frame.force_left_n for reading in recording.readings])
-    right = np.array([reading.frame.force_right_n for reading in recording.readings])
     if np.array_equal(left, right, equal_nan=True):
         return {"the force": left}
     return {"the force of the left pad": left, "the force of the right pad": right}

@@ -11,7 +11,7 @@ import numpy as np
 from graspsense.core.control.contact import CONTACT_FORCE_N, both_touch
 from graspsense.core.values.errors import DataDamaged
 from graspsense.sources.columns.grasp_columns import GraspColumns
-from graspsense.sources.columns.recording_notices import FEWEST, STEADY, ZERO_SAMPLES
+from graspsense.sources.columns.recording_notices import FEWEST, STEADY, ZERO_SAMPLES, force_of_pads
 from graspsense.sources.manifest.steps import NOISE, squeezes
 
 if TYPE_CHECKING:
@@ -27,8 +27,6 @@ HOLE_FORCE: Final = 0.2
 """A time step of so many usual ones, and so long, is a hole if the force changes in it by this share of its range."""
 SHORTEST_S: Final = 0.1
 """No grasp is shorter (s)."""
-MILLIMETRES: Final = 0.5
-"""A gap beyond this (m) is in another unit."""
 OFFSET: Final = 0.05
 """Share of the range of a pad that its force may have without contact."""
 STRONG_N: Final = 300.0
@@ -54,17 +52,15 @@ def notices_of(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
 
 
 def _of_gap(columns: GraspColumns) -> Iterator[str]:
-    gap, in_m = columns.gap_m, not columns.units.get("gap")
+    gap = columns.gap_m
     moved, span = float(gap[int(columns.force_n.argmax())] - gap[0]), float(np.ptp(gap))
-    if span == 0.0 and in_m:
+    if span == 0.0 and not columns.units.get("gap"):
         yield "the gap does not change during the recording: is it another column?"
     if span > 0.0 and moved > 0.2 * span:
         yield (
             "the gap rises while the force rises: is it a position that grows on closing? Write the gap as a "
             f'difference: gap = "{_opening(gap):g} - POSITION"'
         )
-    if in_m and float(np.abs(gap).max()) > MILLIMETRES:
-        yield 'the gap is too large for metres: if it is in millimetres, write gap = "COLUMN [mm]"'
 
 
 def _of_unit(columns: GraspColumns) -> Iterator[str]:
@@ -88,9 +84,9 @@ def _of_zero(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
     force = columns.force_n
     low, high = _usual_range(force)
     felt = _is_felt(force)
-    for name, pad in _pads(columns):
+    for name, pad in force_of_pads(columns.left_n, columns.right_n).items():
         least, most = _usual_range(pad)
-        if _is_felt(pad) and least < 0.0 and abs(least) > abs(most):
+        if _is_felt(pad) and least < -OFFSET * (high - low) and abs(least) > abs(most):
             yield f"{name} is negative where it is largest: is it a pull? Turn its sign: -FORCE"
     steady, touched = _is_steady(force), not columns.units.get("force") and _both_touch_at_first(columns)
     if _falls_on_contact(columns):
@@ -110,18 +106,11 @@ def _of_zero(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
                 "missing." + _OFFSET * steady
             )
     elif not zeroed:
-        for name, pad in _pads(columns):
+        for name, pad in force_of_pads(columns.left_n, columns.right_n).items():
             least, most = _usual_range(pad)
             offset = abs(float(pad[:ZERO_SAMPLES].mean()))
             if _is_felt(pad) and _is_steady(pad) and offset > OFFSET * (most - least):
                 yield f'{name} does not begin at zero: if the fingers were free then, write zero = "10 samples"'
-
-
-def _pads(columns: GraspColumns) -> list[tuple[str, Numbers]]:
-    """Return the force of each pad with its name; of both together where one force stands for both."""
-    if np.array_equal(columns.left_n, columns.right_n):
-        return [("the force", columns.left_n)]
-    return [("the force of the left pad", columns.left_n), ("the force of the right pad", columns.right_n)]
 
 
 def _both_touch_at_first(columns: GraspColumns) -> bool:

@@ -128,14 +128,15 @@ def _joined(manifest: ReadManifest, tables: list[ColumnTable], path: Path) -> li
 
 def _other_times(manifest: ReadManifest, table: ColumnTable, other: ColumnTable, path: Path) -> Iterator[str]:
     """Yield that rows that are used together have different times, if both files have the column of the time."""
-    for name in {name for part in manifest.expressions["time"] for name in part.names}:
-        if name in table.numbers and name in other.numbers and len(table) > 1:
-            apart = np.abs(other.numbers[name] - table.numbers[name])
-            if np.nanmax(apart, initial=0.0) > np.nanmedian(np.abs(np.diff(table.numbers[name]))):
-                yield (
-                    f"{path.name} is used row by row, and its {name} differs by up to {np.nanmax(apart):.4g} from "
-                    f"that of {table.source}: if these are times of one clock, its rows belong elsewhere"
-                )
+    names = {name for part in manifest.expressions["time"] for name in part.names}
+    for name in names & table.numbers.keys() & other.numbers.keys():
+        apart = np.abs(other.numbers[name] - table.numbers[name])
+        largest = float(np.max(apart, initial=0.0, where=np.isfinite(apart)))
+        if len(table) > 1 and largest * (len(table) - 1) > np.ptp(table.numbers[name]):
+            yield (
+                f"{path.name} is used row by row, and its {name} differs by up to {largest:.4g} from "
+                f"that of {table.source}: if these are times of one clock, its rows belong elsewhere"
+            )
 
 
 def grasps_in(

@@ -89,15 +89,10 @@ def groups_trials(name: str, values: Sequence[str], instances: Sequence[str] | N
 
     Each of them has several trials, also with several instances. Missing values are empty.
     """
-    units = range(len(values)) if instances is None else instances
-    pairs = {(value, unit) for value, unit in zip(values, units, strict=True) if value}
     counts = Counter(filter(None, values))
-    return (
-        names_a_recording(name)
-        and not _DIVISIONS & set(words_in(name))
-        and len(pairs) > len(counts) > 1
-        and min(counts.values()) > 1
-    )
+    pairs = {pair for pair in zip(values, instances or range(len(values)), strict=True) if pair[0]}
+    several = len(pairs) > len(counts) > 1 and min(counts.values()) > 1
+    return several and names_a_recording(name) and not _DIVISIONS & set(words_in(name))
 
 
 def identifies(
