@@ -11,7 +11,6 @@ from attrs import frozen
 from graspsense.report.html import facts, figure, table
 from graspsense.report.svg import (
     DASHES,
-    GRID,
     INKS,
     LINE,
     QUIET,
@@ -34,6 +33,8 @@ class RateRow:
     what: str = ""
     strong: bool = False
     """Whether it is the rate that the others are compared with."""
+    joined: bool = True
+    """Whether the line of its series goes through it, where it is drawn against a number; else its mark is small."""
 
     @property
     def words(self) -> str:
@@ -111,7 +112,10 @@ def rates_picture(rows: Sequence[RateRow], caption: str) -> str:
 def rates_over(
     series: Mapping[str, Sequence[tuple[float, RateRow]]], axis: str, caption: str, guess: float | None = None
 ) -> str:
-    """Return a figure of rates against a number, one line per series; `guess` is the rate of guessing."""
+    """Return a figure of rates against a number, one line per series through those of its rates that are `joined`.
+
+    `guess` is the rate of guessing.
+    """
     legends = [lines_within(name, WIDTH - 80) for name in series]
     picture = Picture(262 + LEGEND * len(series) + LINE * sum(len(lines) - 1 for lines in legends))
     xs = [x for points in series.values() for x, _ in points]
@@ -119,10 +123,7 @@ def rates_over(
     y_scale = rate_scale([row for points in series.values() for _, row in points], 215, 24)
     picture.y_axis(y_scale, 36, picture.width - 8, rate_axis_title(y_scale))
     draw_breaks(picture, y_scale, 36, 0.0, upright=True)
-    for x in dict.fromkeys(xs):
-        picture.line([(x_scale(x), 24), (x_scale(x), 215)], GRID, width=1)
-        picture.text(x_scale(x), 229, number(x), anchor="middle", ink=QUIET)
-    picture.text((x_scale.start + x_scale.end) / 2, 245, axis, anchor="middle", ink=QUIET)
+    picture.x_axis(x_scale, 24, 215, axis)
     if guess is not None and y_scale.low <= 100 * guess <= y_scale.high:
         y = y_scale(100 * guess)
         picture.line([(36, y), (picture.width - 8, y)], QUIET, dash="3 3")
@@ -138,12 +139,14 @@ def rates_over(
         shift = 5.0 * (k - (len(series) - 1) / 2)
         places = [(x_scale(x) + shift, y_scale(100 * row.rate)) for x, row in drawn]
         with picture.plot(x_scale, y_scale, 24, 215):
-            picture.line(places, ink, width=2, dash=dash)
+            joined = [place for place, (_, row) in zip(places, drawn, strict=True) if row.joined]
+            picture.line(joined, ink, width=2, dash=dash)
             for (x, place), (_, row) in zip(places, drawn, strict=True):
                 if row.interval is not None:
                     low, high = (y_scale(100 * end) for end in row.interval)
                     picture.line([(x, low), (x, high)], ink, width=2)
-                picture.mark(x, place, ink, k, words=f"{row.name}: {row.words}")
+                size = 4.0 if row.joined else 1.8
+                picture.mark(x, place, ink, k, size, f"{row.name}: {row.words}")
         picture.line([(40, y - 4), (66, y - 4)], ink, width=2, dash=dash)
         picture.mark(53, y - 4, ink, k)
         for line in legends[k]:

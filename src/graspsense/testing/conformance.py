@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import Any, Final
 
-from attrs import define, field
+from attrs import define, field, frozen
 
 from graspsense.core.components.entries import ConformanceCheckEntry
 from graspsense.core.components.registry import Component, Plugins, installed
@@ -34,59 +35,12 @@ def checks_for(subject: Subject | Package) -> tuple[Check, ...]:
 MINIMUM_CASE: Final = "enough-checks-ran"
 
 
-@define(eq=False)
-class BoundCheck:
-    """One check of one component. `run` raises the outcome that pytest expects."""
+@frozen
+class ConformanceCase:
+    """A case of pytest: its name, which begins with the component, and what raises the outcome that pytest expects."""
 
-    check: Check
-    subject: Subject | Package
-    examined: Examined
-
-    @property
-    def id(self) -> str:
-        """The component and the check, as pytest shows them."""
-        return f"{self.subject.name}:{self.check.id}"
-
-    def result(self) -> Result:
-        """Return the result; the check is run once."""
-        return self.examined.result(self.subject, self.check)
-
-    def run(self) -> None:
-        """Run it as a test of pytest."""
-        import pytest
-
-        result = self.result()
-        if result.state == "failed":
-            pytest.fail(result.text, pytrace=False)
-        if result.state == "expected failure":
-            pytest.xfail(result.text)
-        if result.state == "skipped":
-            pytest.skip(result.text)
-
-
-@define(eq=False)
-class MinimumCase:
-    """The requirement that enough checks of a component ran."""
-
-    subject: Subject | Package
-    examined: Examined
-
-    @property
-    def id(self) -> str:
-        """The component and the name of this case."""
-        return f"{self.subject.name}:{MINIMUM_CASE}"
-
-    def run(self) -> None:
-        """Fail if too few checks of the component ran."""
-        import pytest
-
-        report = ConformanceReport(
-            [self.examined.result(self.subject, check) for check in checks_for(self.subject)]
-        )
-        print(report.counts())  # noqa: T201 (pytest shows it beside a failure, and with -rP)
-        text = report.too_few_ran(self.subject.name, self.subject.role)
-        if text:
-            pytest.fail(text, pytrace=False)
+    id: str
+    run: Callable[[], None]
 
 
 @define(eq=False)
@@ -111,12 +65,34 @@ class Examined:
             return Result(subject.name, subject.role, check.id, check.title, "skipped", why)
         return outcome_of(check, subject, self.expected)
 
-    def cases(self) -> Iterator[BoundCheck | MinimumCase]:
+    def cases(self) -> Iterator[ConformanceCase]:
         """Yield every check of every component, and after each component whether enough of them ran."""
         for subject in self.subjects:
             for check in checks_for(subject):
-                yield BoundCheck(check, subject, self)
-            yield MinimumCase(subject, self)
+                yield ConformanceCase(f"{subject.name}:{check.id}", partial(self._test, subject, check))
+            yield ConformanceCase(f"{subject.name}:{MINIMUM_CASE}", partial(self._test_minimum, subject))
+
+    def _test(self, subject: Subject | Package, check: Check) -> None:
+        """Run a check as a test of pytest."""
+        import pytest
+
+        result = self.result(subject, check)
+        if result.state == "failed":
+            pytest.fail(result.text, pytrace=False)
+        if result.state == "expected failure":
+            pytest.xfail(result.text)
+        if result.state == "skipped":
+            pytest.skip(result.text)
+
+    def _test_minimum(self, subject: Subject | Package) -> None:
+        """Fail if too few checks of the component ran."""
+        import pytest
+
+        report = ConformanceReport([self.result(subject, check) for check in checks_for(subject)])
+        print(report.counts())  # noqa: T201 (pytest shows it beside a failure, and with -rP)
+        text = report.too_few_ran(subject.name, subject.role)
+        if text:
+            pytest.fail(text, pytrace=False)
 
     def report(self, told: Callable[[Result], None] = lambda _: None) -> ConformanceReport:
         """Run every check and return the results; `told` is called with each of them."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
-from typing import Any, Final
+from typing import Any
 
 from attrs import frozen
 
@@ -13,12 +13,8 @@ from graspsense.evaluation.intervals import percent, span
 from graspsense.experiments.summary import ConditionResult
 from graspsense.experiments.trade.trade_point import Advice, TradePoint, advise, trade_points
 from graspsense.report.found_table import FoundTable
-from graspsense.report.html import figure
-from graspsense.report.rates import RateRow, draw_breaks, rate_axis_title, rate_scale
-from graspsense.report.svg import DASHES, INKS, QUIET, Picture, reaching
+from graspsense.report.rates import RateRow, rates_over
 from graspsense.report.wording import TARGETS
-
-LEFT: Final = 40.0
 
 
 @frozen(kw_only=True)
@@ -35,7 +31,7 @@ def cost_report(part: str, title: str, conditions: Sequence[ConditionResult], co
     """Return the rates against their cost; `cost` holds the keys of `Cost`."""
     rows: list[tuple[str, ...]] = []
     advice: list[Advice] = []
-    series: dict[str, Sequence[TradePoint]] = {}
+    series: dict[str, Sequence[tuple[float, RateRow]]] = {}
     for target in dict.fromkeys(condition.target for condition in conditions):
         points = trade_points(
             [result for result in conditions if result.target == target], cost.cheap == "low"
@@ -52,7 +48,7 @@ def cost_report(part: str, title: str, conditions: Sequence[ConditionResult], co
             )
             for point in points
         ]
-        series[TARGETS[target]] = points
+        series[TARGETS[target]] = [(point.cost, _row(point)) for point in points]
     text = " ".join(sentence.text for sentence in advice)
     table = FoundTable(
         id=part,
@@ -62,7 +58,13 @@ def cost_report(part: str, title: str, conditions: Sequence[ConditionResult], co
         note=text,
         numbers=2,
     )
-    return Report(text=text, table=table, picture=_picture(series, cost.axis, title), advice=tuple(advice))
+    caption = (
+        f"{title}. Bars are 95 % intervals of the mean. Large marks, which are joined, may be on the Pareto front; "
+        "small ones are not."
+    )
+    return Report(
+        text=text, table=table, picture=rates_over(series, cost.axis, caption), advice=tuple(advice)
+    )
 
 
 def damage_table() -> tuple[FoundTable, list[str]]:
@@ -83,47 +85,6 @@ def damage_table() -> tuple[FoundTable, list[str]]:
     return table, [f"Damage, {name}: {row['reason']}" for name, row in known.items()]
 
 
-def _picture(series: Mapping[str, Sequence[TradePoint]], axis: str, title: str) -> str:
-    """Return the rates against their costs, with a line through the Pareto front of each target."""
-    every = [point for points in series.values() for point in points]
-    picture = Picture(262 + 15 * (len(series) + 1))
-    x = reaching([point.cost for point in every], LEFT, picture.width - 14)
-    y = rate_scale([_row(point) for point in every], 215, 24)
-    picture.y_axis(y, LEFT - 4, picture.width - 8, rate_axis_title(y))
-    draw_breaks(picture, y, LEFT - 4, 0.0, upright=True)
-    picture.x_axis(x, 24, 215, axis)
-    words = []
-    for k, (target, points) in enumerate(series.items()):
-        ink = INKS[k % len(INKS)]
-        on_front = sorted((point for point in points if point.on_front != "no"), key=lambda point: point.cost)
-        # Each target is shifted, so that equal rates at the same cost do not hide each other.
-        shift = 5.0 * (k - (len(series) - 1) / 2)
-        line = [(x(point.cost) + shift, y(100 * point.condition.rate.mean)) for point in on_front]
-        with picture.plot(x, y, 24, 215):
-            picture.line(line, ink, dash=DASHES[k % len(DASHES)])
-            for point in points:
-                place = x(point.cost) + shift
-                interval = point.condition.rate.interval
-                if interval is not None:
-                    low, high = (y(100 * rate) for rate in interval)
-                    picture.line([(place, low), (place, high)], ink, width=1.2)
-                size = 4.0 if point.on_front != "no" else 1.8
-                read_out = f"{point.name}, {target}: {point.rate_text}"
-                picture.mark(place, y(100 * point.condition.rate.mean), ink, k, size, read_out)
-        legend = 262.0 + 15 * k
-        picture.mark(53, legend - 4, ink, k)
-        picture.text(62, legend, target)
-        words.append(f"{target}: " + ", ".join(f"{point.name} {point.rate_text}" for point in points))
-    picture.text(
-        LEFT,
-        262.0 + 15 * len(series),
-        "large, joined: may be on the Pareto front; small: not on it",
-        ink=QUIET,
-    )
-    caption = f"{title}. Bars are 95 % intervals of the mean."
-    return figure(picture.svg(f"Recognition rate against {axis}. {'; '.join(words)}"), caption)
-
-
 def _row(point: TradePoint) -> RateRow:
     rate = point.condition.rate
-    return RateRow(name=point.name, rate=rate.mean, interval=rate.interval)
+    return RateRow(name=point.name, rate=rate.mean, interval=rate.interval, joined=point.on_front != "no")
