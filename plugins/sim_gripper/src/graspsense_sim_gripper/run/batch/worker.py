@@ -9,7 +9,7 @@ import numpy as np
 from attrs import asdict
 
 from graspsense.plugin_api import Controller
-from graspsense.simulator_api import GraspProcess, HandedGrasp, NotHandedOver, RunConfig
+from graspsense.simulator_api import GraspProcess, HandedGrasp, RunConfig
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.cache import restored, stored
 from graspsense_sim_gripper.run.batch.job import FinishedGrasp, Job, grasp_plain
