@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from graspsense.evaluation.distribution import distribution_distance
-from graspsense.evaluation.equivalence import equivalence
+from graspsense.evaluation.over_seeds import equivalence
 
 RNG = np.random.default_rng(4)
 LABELS = ["full"] * 200 + ["empty"] * 200

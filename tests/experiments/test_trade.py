@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from cases import every_case
 
-from graspsense.evaluation.equivalence import verdict_on
+from graspsense.evaluation.over_seeds import verdict_on
 from graspsense.experiments.executors.serial import Serial
 from graspsense.experiments.experiment_file import read_experiment
 from graspsense.experiments.page import findings_of

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from graspsense.evaluation.equivalence import MARGIN, Verdict, verdict_on
 from graspsense.evaluation.intervals import unpaired_difference
-from graspsense.evaluation.over_seeds import MeanDifference
+from graspsense.evaluation.over_seeds import MARGIN, MeanDifference, Verdict, verdict_on
 from graspsense.experiments.summary import ConditionResult, Summary
 from graspsense.report.verdict import in_hundred
 from graspsense.report.wording import TARGETS

@@ -6,7 +6,7 @@ Every variant grasps the same objects with the same seeds as the reference. Two 
   (`graspsense.evaluation.distribution`),
 - the recognition rate of a classifier that is trained on the variant's grasps and tested on other grasps of the
   reference, and whether it is equivalent to that of a classifier trained on the reference
-  (`graspsense.evaluation.equivalence`).
+  (`graspsense.evaluation.over_seeds`).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from graspsense.core.settings.selected import SelectedComponent
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import FeatureTable, table_of
 from graspsense.evaluation.distribution import DistributionDistance, distribution_distance
-from graspsense.evaluation.equivalence import Equivalence, equivalence
+from graspsense.evaluation.over_seeds import Equivalence, equivalence
 from graspsense.experiments.recognise import TEST_SEED_OFFSET, predictions
 from graspsense.experiments.sensors import sensors_of
 from graspsense.report.simulation import MeasuredVariant

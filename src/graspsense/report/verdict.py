@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 from graspsense.core.values.errors import counted
-from graspsense.evaluation.equivalence import MARGIN, verdict_on
 from graspsense.evaluation.intervals import percent, percentages
+from graspsense.evaluation.over_seeds import MARGIN, verdict_on
 from graspsense.evaluation.results import Evaluation, Measurement
 from graspsense.report.wording import TARGETS
 

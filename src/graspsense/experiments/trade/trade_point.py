@@ -11,9 +11,8 @@ from attrs import frozen
 
 from graspsense.core.learn.labelled import class_of
 from graspsense.core.values.errors import counted
-from graspsense.evaluation.equivalence import verdict_on
 from graspsense.evaluation.intervals import percent, span
-from graspsense.evaluation.over_seeds import MeanDifference
+from graspsense.evaluation.over_seeds import MeanDifference, verdict_on
 from graspsense.experiments.summary import ConditionResult
 from graspsense.report.wording import TARGETS
 
