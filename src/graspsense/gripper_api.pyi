@@ -13,7 +13,7 @@ from graspsense.core.values.errors import TareRefused as TareRefused
 from graspsense.core.values.errors import GraspsenseError as GraspsenseError
 
 # Emulated devices
-from graspsense.core.components.emulated import EmulatedDevice as EmulatedDevice
+from graspsense.core.drivers.emulated_serial import EmulatedDevice as EmulatedDevice
 from graspsense.core.drivers.emulated_serial import EmulatedPort as EmulatedPort
 from graspsense.core.drivers.emulated_serial import EmulatedSerial as EmulatedSerial
 from graspsense.core.drivers.emulated_serial import EmulatorFaults as EmulatorFaults

@@ -20,7 +20,7 @@ from graspsense.cli.terminal import talk
 from graspsense.core.values.errors import ExitCode
 
 if TYPE_CHECKING:
-    from graspsense.core.components.emulated import EmulatedDevice
+    from graspsense.core.drivers.emulated_serial import EmulatedDevice
 
 LOOK_S: Final = 0.5
 """How often it is looked whether the device still runs."""

@@ -1,4 +1,7 @@
-"""An emulated gripper behind a pseudo-terminal or a socket: plugged in, unplugged, and with faults of the line."""
+"""Devices that software emulates on this machine: what each has, and one behind a pseudo-terminal or a socket.
+
+A plugin makes a device, and `graspsense emulate` runs it. It can be plugged in and unplugged; one on a line has faults.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ import socket
 import threading
 import time
 import tty
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from math import inf
@@ -16,8 +19,35 @@ from typing import Final, Literal, NamedTuple, final
 
 from attrs import frozen
 
-from graspsense.core.components.emulated import EmulatedDevice
 from graspsense.core.components.setting import setting
+
+
+class EmulatedDevice(ABC):
+    """An emulated device, which exists from the first `plug` to the end of its process, however that ends.
+
+    `wire` is the interface of the operating system in use, `rate_hz` the rate of its reports.
+    """
+
+    wire: str
+    rate_hz: float
+
+    @property
+    @abstractmethod
+    def words(self) -> Mapping[str, str]:
+        """The words that `tell` understands, with their effects; at least `plug` and `unplug`."""
+
+    @abstractmethod
+    def tell(self, word: str) -> None:
+        """Execute one of `words`. Raises KeyError for any other, NoDevice if it cannot be plugged in."""
+
+    @abstractmethod
+    def state(self) -> Mapping[str, float | int | str | bool]:
+        """Return its state; `failed` is the reason if it ended by itself, empty while it runs."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Unplug it and release all resources."""
+
 
 LARGEST: Final = 4096
 MOST_UNSENT: Final = 1 << 16

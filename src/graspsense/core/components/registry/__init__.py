@@ -1,9 +1,9 @@
 """Finding and loading plugins, isolating those that fail, and selecting a component by role and name.
 
-- `parts`: what a plugin brings, as the registry holds it.
+- `parts`: what a plugin brings and declares, as the registry holds it.
 - `discovery`: which plugins are installed, and which may be loaded.
 - `isolation`: one plugin at a time, when it is loaded and when its hooks are called.
-- `registry`: the plugins of a process.
+- `plugins`: the plugins of a process.
 """
 
 from graspsense.core.components.registry.discovery import PluginSource, builtin_source, installed_sources
