@@ -17,6 +17,7 @@ from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.trace import signals_of
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.recording.reader import read_recorded
+from graspsense.sources.manifest.understood import understood_file
 from graspsense.sources.recordings.dataset_recordings import readable_or_not
 from graspsense.sources.trial_source import load_trials
 from graspsense.store.store import Store
@@ -498,6 +499,22 @@ def test_a_fault_in_one_squeeze_is_of_that_squeeze(tmp_path, spoilt, value, samp
     assert bad == ([] if np.isnan(value) else [3])  # samples without a number are left out
     good = [recording for k, recording in enumerate(squeezes, 1) if k != 3]
     assert all(column(squeeze, "force_left_n").max() == pytest.approx(20.0) for squeeze in good)
+
+
+def test_squeezes_of_topics_in_one_table_are_found_without_a_false_alarm(tmp_path):
+    gap, force, times = repeated(1.0, 1.0, 1.0)
+    rows = [(t, f"{g}", "", "") for t, g in zip(times, gap, strict=True)]
+    rows += [(t + 0.002, "", f"{f}", "") for t, f in zip(times, force, strict=True)]
+    rows += [(t + 0.004, "", "", f"{f}") for t, f in zip(times, force, strict=True)]
+    text = "\n".join(["t,gap,l,r", *(f"{t:.3f},{g},{left},{right}" for t, g, left, right in sorted(rows))])
+    (tmp_path / "jar.csv").write_text(text + "\n")
+    columns = "time = 't'\ngap = 'gap'\nleft = 'l'\nright = 'r'"
+    squeezes = recordings(tmp_path, f"files = '{{label}}.csv'\nsplit = 'force'\n{columns}")
+    assert len(squeezes) == 3
+    assert not any(squeeze.notices for squeeze in squeezes)
+    single = [f"{t:.3f},{g},{left}" for t, g, left, right in sorted(rows) if not right]
+    (tmp_path / "jar.csv").write_text("\n".join(["t,gap,force", *single]) + "\n")
+    assert len(understood_file(tmp_path / "jar.csv").squeezes) == 3
 
 
 def test_a_zero_that_changes_in_a_squeeze_joins_no_others_to_it(tmp_path):

@@ -91,7 +91,7 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
             "t": "" if _has_time(manifest, table, available) else "sample",
         },
         notes=tuple(notes),
-        warnings=(*table.warnings, *_doubts(manifest, available, t_s, gap[0], left_n + right_n)),
+        warnings=(*table.warnings, *_doubts(manifest, available, t_s, gap[0], (left_n, right_n))),
         lines=table.lines,
         events=events,
     )
@@ -138,15 +138,19 @@ def _fingers(
 
 
 def _doubts(
-    manifest: ReadManifest, columns: AvailableColumns, t_s: Numbers, gap: Numbers, force: Numbers
+    manifest: ReadManifest,
+    columns: AvailableColumns,
+    t_s: Numbers,
+    gap: Numbers,
+    pads: tuple[Numbers, Numbers],
 ) -> Iterator[str]:
     """Yield a sentence for each unit that is most likely another one, and for topics that may be apart in time."""
     yield from _doubtful_units(manifest, columns)
     yield from _counted_time(manifest, columns)
     if manifest.keys.split == "force":
-        yield from without_number(t_s, gap, force)
+        yield from dict.fromkeys(text for force in pads for text in without_number(t_s, gap, force))
     later_s = _later_s(manifest, columns)
-    if told := doubtful_delay(t_s, gap, force, later_s):
+    if told := doubtful_delay(t_s, gap, pads[0] + pads[1], later_s):
         yield told
 
 

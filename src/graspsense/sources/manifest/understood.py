@@ -95,8 +95,12 @@ def _squeezes(
         if not names or len(t_s) < 2:
             continue
         parts = [np.abs(table.numbers[name]).reshape(len(table), -1).sum(axis=1) for name in names]
-        force = np.nan_to_num(np.sum(parts, axis=0))
-        columns = GraspColumns(source=table.source, t_s=t_s, gap_m=force, left_n=force, right_n=force)
+        force = np.sum(parts, axis=0)
+        known = np.isfinite(force)  # a topic that was written to one table with others has rows of its own
+        t_s, force = t_s[known], force[known]
+        columns = GraspColumns(source=table.source, t_s=t_s, gap_m=-force, left_n=force, right_n=force)
+        if len(t_s) < 2:
+            return names[0], ()
         try:
             spans = squeezes(columns)
         except DataDamaged:
