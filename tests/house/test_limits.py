@@ -29,7 +29,6 @@ LONG_FUNCTIONS: dict[str, str] = {}
 """Functions over `MAX_LINES` lines, as `path:name`, with the reason or the measured cost of a shorter form."""
 
 MANY_PARAMETERS = {
-    "graspsense/cli/collect.py:collect": OPTIONS,
     "graspsense/cli/evaluate.py:evaluate": OPTIONS,
     "graspsense/cli/experiment.py:experiment": OPTIONS,
     "graspsense/cli/identify.py:identify": OPTIONS,

@@ -60,7 +60,6 @@ def collect(
     operator: str | None,
     values: tuple[str, ...],
     changed: bool,
-    live: LiveOptions,
     as_json: bool,
     **asked: Any,
 ) -> None:
@@ -79,6 +78,7 @@ def collect(
     from graspsense.store.collecting import Collection, Wanted
     from graspsense.store.store import Store
 
+    live = LiveOptions.taken_from(asked)
     wanted = Wanted(
         words=tuple(word.strip() for word in labels.split(",") if word.strip()),
         each=each,

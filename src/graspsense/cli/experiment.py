@@ -67,7 +67,8 @@ def experiment(
     workers: int | None,
     options: tuple[str, ...],
     force: bool,
-    live: LiveOptions,
+    live: bool,
+    live_address: str | None,
     dry_run: bool,
     as_json: bool,
 ) -> None:
@@ -97,7 +98,7 @@ def experiment(
     if dry_run:
         _plan(planned, results, workers or os.cpu_count() or 1, as_json)
         return
-    with shown_live(live) as shown:
+    with shown_live(LiveOptions(live, live_address)) as shown:
         account = _run(planned, results, make, resume, shown)
         summary = summarise(planned, results)
         page, problem = _written_page(summary, results)

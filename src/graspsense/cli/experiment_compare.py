@@ -30,7 +30,7 @@ def compare(folders: tuple[str, ...], out: str, as_json: bool) -> None:
     simulate the same trials with the same seeds.
     """
     from graspsense.experiments.comparison import compare_experiments
-    from graspsense.experiments.comparison_page import comparison_page, comparison_tables, failure_lines
+    from graspsense.experiments.comparison_page import comparison_page, comparison_tables, doubts
     from graspsense.report.write import write_html
 
     comparison = compare_experiments(folders)
@@ -40,7 +40,7 @@ def compare(folders: tuple[str, ...], out: str, as_json: bool) -> None:
         return
     echo(comparison.headline, Style.RESULT)
     echo()
-    for line in failure_lines(comparison):
+    for line in doubts(comparison):
         echo(f"WARNING     {line}", Style.CAUTION, indent=12)
     for table in comparison_tables(comparison):
         echo(table.title, Style.HEADING)

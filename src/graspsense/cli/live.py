@@ -5,8 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import wraps
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 
 import click
 
@@ -33,6 +32,11 @@ class LiveOptions(NamedTuple):
     foxglove: int | None = None
     rerun: str | None = None
 
+    @classmethod
+    def taken_from(cls, asked: dict[str, Any]) -> LiveOptions:
+        """Return these of the options of a command, and remove them from the others."""
+        return cls(*(asked.pop(name) for name in cls._fields))
+
     @property
     def page(self) -> bool:
         """Whether there is to be a page."""
@@ -40,28 +44,15 @@ class LiveOptions(NamedTuple):
 
 
 def live_options(command: _Command) -> _Command:
-    """Add `--live` and `--live-address` to a command, whose parameter `live` receives all options as `LiveOptions`."""
-
-    @wraps(command)
-    def with_options(
-        *args: Any,
-        live: bool,
-        live_address: str | None,
-        foxglove: int | None = None,
-        rerun: str | None = None,
-        **others: Any,
-    ) -> Any:
-        return command(*args, live=LiveOptions(live, live_address, foxglove, rerun), **others)
-
-    added = click.option(
+    """Add `--live` and `--live-address` to a command."""
+    command = click.option(
         "--live-address",
         metavar="HOST[:PORT]",
         help="--live on another address than loopback, or on a port that you choose.",
-    )(with_options)
-    added = click.option("--live", is_flag=True, help="Show it on a page in the browser while it goes on.")(
-        added
+    )(command)
+    return click.option("--live", is_flag=True, help="Show it on a page in the browser while it goes on.")(
+        command
     )
-    return cast("_Command", added)
 
 
 def viewer_options(command: _Command) -> _Command:

@@ -87,7 +87,6 @@ def run(
     picture: str | None,
     video: str | None,
     viewer: bool,
-    live: LiveOptions,
     dry_run: bool,
     as_json: bool,
     **asked: Any,
@@ -99,6 +98,7 @@ def run(
     """
     from graspsense.core.pipeline.wiring import check
 
+    live = LiveOptions.taken_from(asked)
     if beside and any((plot, explain_model, dry_run, picture, video, viewer, live != LiveOptions())):
         raise click.UsageError(
             "--beside goes without --plot, --explain-model, --dry-run, --picture, --video, --viewer, --live, "

@@ -6,8 +6,7 @@ from html import escape
 
 from graspsense.experiments.answer import answer
 from graspsense.experiments.comparison import ConditionDifference, ExperimentComparison, condition_name
-from graspsense.experiments.page import SIMULATED, rate_row
-from graspsense.experiments.summary import unreadable_lines
+from graspsense.experiments.page import SIMULATED, failure_lines, rate_row
 from graspsense.report.found_table import FoundTable
 from graspsense.report.html import Page, Section, bullets, facts, pair, paragraph
 from graspsense.report.rates import rates_picture
@@ -34,7 +33,7 @@ def comparison_page(comparison: ExperimentComparison) -> Page:
         answer=comparison.answer,
         headline=comparison.headline,
         beside=paragraph(text)
-        + bullets(failure_lines(comparison), "warning")
+        + bullets(doubts(comparison), "warning")
         + bullets([SIMULATED] if simulated else [], "notes"),
         sections=(
             settings.section(),
@@ -45,19 +44,9 @@ def comparison_page(comparison: ExperimentComparison) -> Page:
     )
 
 
-def failure_lines(comparison: ExperimentComparison) -> list[str]:
-    """Return a sentence for each experiment of which tasks failed or are missing."""
-    failed = [
-        f"{experiment.name}: {len(experiment.summary.failed)} tasks failed and "
-        f"{experiment.summary.missing} have no result; they are not included"
-        for experiment in comparison.experiments
-        if experiment.summary.failed or experiment.summary.missing
-    ]
-    return failed + [
-        f"{experiment.name}: {line}"
-        for experiment in comparison.experiments
-        for line in unreadable_lines(experiment.summary)
-    ]
+def doubts(comparison: ExperimentComparison) -> list[str]:
+    """Return a sentence for each experiment of which tasks failed, are missing or cannot be read."""
+    return [f"{each.name}: {line}" for each in comparison.experiments for line in failure_lines(each.summary)]
 
 
 def comparison_tables(comparison: ExperimentComparison) -> tuple[FoundTable, FoundTable, FoundTable]:

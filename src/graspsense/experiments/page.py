@@ -22,7 +22,7 @@ from graspsense.report.evaluation_sections import confusion_section, controls_se
 from graspsense.report.html import Page, Section, bullets, code, facts, folded, pair, paragraph, table
 from graspsense.report.rates import RateRow, rates_over, rates_picture, rates_table
 from graspsense.report.traces import features_by_class, features_table, one_grasp, traces_by_class
-from graspsense.report.wording import TARGETS, control_words, protocol_words
+from graspsense.report.wording import TARGETS, about_grasps, control_words, protocol_words
 from graspsense.report.write import write_html
 
 NAME: Final = "report.html"
@@ -64,7 +64,7 @@ def experiment_page(summary: Summary, results: Results) -> Page:
             question=experiment.question,
             answer=findings.answer,
             headline=findings.headline,
-            beside=_failures(summary) + bullets([SIMULATED], "notes"),
+            beside=bullets(failure_lines(summary), "warning") + bullets([SIMULATED], "notes"),
             sections=(*findings.page_sections(), _made_of(summary, results)),
         )
     best = best_condition(summary)
@@ -105,28 +105,25 @@ def rate_row(condition: ConditionResult, *, strong: bool = False, name: str = ""
 def _beside(summary: Summary, best: ConditionResult | None) -> str:
     """Return what must be read with the answer: how it was measured, and what casts doubt on it."""
     if best is None:
-        return _failures(summary)
+        return bullets(failure_lines(summary), "warning")
     result = _first_result(summary, best)
     seeds = len(best.by_seed)
-    features = ", ".join(name for name, _ in result.trials.features) if result and result.trials else ""
+    features = [name for name, _ in result.trials.features] if result and result.trials else []
     origin = "simulated" if best.simulated else "recorded"
     if best.simulated and seeds > 1:
         origin += f" anew for each of {seeds} seeds"
     guess = best.majority
-    guessing = (
-        f" Always guessing the most frequent label is right in {100 * guess.mean:.0f} %." if guess else ""
-    )
+    answers = len(best.of_first_seed.confusion.labels)
+    about = about_grasps(features, best.recognised, answers, None if guess is None else guess.mean)
     text = (
-        "A gripper closes two fingers with force sensors on an object that it cannot see into. Each grasp gives a few "
-        f"numbers ({features}), from which a classifier learns {TARGETS[best.recognised]}. There are "
-        f"{counted(len(best.of_first_seed.confusion.labels), 'possible answer')}.{guessing} Each case has "
-        f"{counted(best.rate.n, 'grasp')}, {origin}. "
+        f"{about} Each case has {counted(best.rate.n, 'grasp')}, {origin}. "
         f"Every grasp is classified by {protocol_words(best.protocol)}. A 95 % interval contains the true mean in "
         "95 of 100 such experiments."
     )
     warnings = list(dict.fromkeys(best.of_first_seed.warnings))
     notes = [SIMULATED] if best.simulated else []
-    return paragraph(text) + _failures(summary) + bullets(warnings, "warning") + bullets(notes, "notes")
+    doubts = [*failure_lines(summary), *warnings]
+    return paragraph(text) + bullets(doubts, "warning") + bullets(notes, "notes")
 
 
 def _first_result(summary: Summary, condition: ConditionResult) -> RecognitionResult | None:
@@ -135,7 +132,8 @@ def _first_result(summary: Summary, condition: ConditionResult) -> RecognitionRe
     return None if seed is None else summary.recognition(condition.case.name, seed)
 
 
-def _failures(summary: Summary) -> str:
+def failure_lines(summary: Summary) -> list[str]:
+    """Return a sentence each on tasks that failed, on results that cannot be read, and on tasks without a result."""
     lines = []
     if summary.failed:
         reasons = list(dict.fromkeys(task.reason for task in summary.failed))
@@ -143,7 +141,7 @@ def _failures(summary: Summary) -> str:
     lines += unreadable_lines(summary)
     if summary.missing:
         lines.append(f"{summary.missing} tasks have no result yet and are not included")
-    return bullets(lines, "warning")
+    return lines
 
 
 def _rates(summary: Summary) -> Section:

@@ -17,7 +17,7 @@ from graspsense.report.html import Page, Section, bullets, facts, paragraph, tab
 from graspsense.report.rates import RateRow
 from graspsense.report.traces import features_by_class
 from graspsense.report.verdict import headline, verdict
-from graspsense.report.wording import TARGETS, control_words, protocol_words
+from graspsense.report.wording import TARGETS, about_grasps, control_words, protocol_words
 
 if TYPE_CHECKING:
     from graspsense.core.learn.labelled import Labelled
@@ -46,14 +46,12 @@ def evaluation_page(
 def beside(evaluation: Evaluation, labelled: Labelled) -> str:
     """Return what must be read with the answer, with the warnings."""
     guess = evaluation.controls["majority_class"].rate
-    guessing = (
-        f" Always guessing the most frequent label is right in {100 * guess.rate:.0f} %." if guess else ""
+    answers = len(evaluation.confusion.labels)
+    about = about_grasps(
+        labelled.table.names, evaluation.recognised, answers, None if guess is None else guess.rate
     )
     text = (
-        "A gripper closes two fingers with force sensors on an object that it cannot see into. Each grasp gives a few "
-        f"numbers ({', '.join(labelled.table.names)}), from which a classifier learns "
-        f"{TARGETS[evaluation.recognised]}. There are {len(evaluation.confusion.labels)} possible answers."
-        f"{guessing} Every grasp is classified by {protocol_words(evaluation.protocol)}. "
+        f"{about} Every grasp is classified by {protocol_words(evaluation.protocol)}. "
         "A 95 % interval contains the true rate in 95 of 100 such collections."
     )
     notes = list(evaluation.notes)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Final
+
+from graspsense.core.values.errors import counted
 
 CONTROLS: Final[Mapping[str, tuple[str, str]]] = {
     "majority_class": ("most frequent label", "always the same answer, without any measurement"),
@@ -38,6 +40,18 @@ TARGETS: Final[Mapping[str, str]] = {
     "state": "the state of a known object",
 }
 """Target to what is recognised, in words."""
+
+
+def about_grasps(features: Sequence[str], target: str, answers: int, guess: float | None) -> str:
+    """Return what a grasp measures and a classifier learns, and the rate of guessing, where it was measured."""
+    text = (
+        "A gripper closes two fingers with force sensors on an object that it cannot see into. Each grasp gives a few "
+        f"numbers ({', '.join(features)}), from which a classifier learns {TARGETS[target]}. There are "
+        f"{counted(answers, 'possible answer')}."
+    )
+    if guess is None:
+        return text
+    return f"{text} Always guessing the most frequent label is right in {100 * guess:.0f} %."
 
 
 def control_words(name: str, what: str) -> tuple[str, str]:
