@@ -33,11 +33,6 @@ class Splits:
     first_child: NodeColumn
     n_children: NodeColumn
 
-    def inner(self, nodes: Indices) -> Indices:
-        """Return those of the nodes that are not leaves."""
-        chosen: Indices = nodes[self.feature[nodes] != LEAF]
-        return chosen
-
     def children(self, nodes: Indices) -> Indices:
         """Return all children of these nodes, in the order of the nodes."""
         return ranges(self.first_child[nodes], self.n_children[nodes])

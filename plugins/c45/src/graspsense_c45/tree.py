@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from attrs import frozen
 
-from graspsense_c45.arithmetic import TOLERANCE, first_maximum
+from graspsense_c45.arithmetic import TOLERANCE
 from graspsense_c45.arrays import AnyArray, Indices, Reals
 from graspsense_c45.schema import Attribute, Schema
 from graspsense_c45.splits import LEAF, ROOT, GrowingTree, Splits
@@ -140,8 +140,13 @@ class Tree:
 
 
 def largest_class(rows: Reals) -> Indices:
-    """Return the first class of each row that no other exceeds by more than the tolerance, scanning as J48 does."""
-    return np.array([first_maximum(row, -1.0, TOLERANCE) for row in rows.tolist()], dtype=np.int64)
+    """Return `arithmetic.first_maximum` of each row, as J48 finds the class of a distribution."""
+    largest, chosen = np.full(len(rows), -1.0), np.zeros(len(rows), dtype=np.int64)
+    for k in range(rows.shape[1]):
+        better = rows[:, k] - largest > TOLERANCE
+        largest[better] = rows[better, k]
+        chosen[better] = k
+    return chosen
 
 
 def finish(grown: GrowingTree, weight_bits: int, schema: Schema, laplace: bool) -> Tree:

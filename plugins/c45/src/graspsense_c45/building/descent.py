@@ -112,9 +112,10 @@ def move_rows(node: int, child: int, nodes: Nodes, rows: Rows, descent: Descent)
             if share > 0.0:
                 descent.rows[end], descent.weights[end] = row, round(weight * share)
                 end += 1
-        elif eldest + slot_of(value, threshold, category) == child:
+        else:
+            # Written in any case: a branch would often be mispredicted.
             descent.rows[end], descent.weights[end] = row, weight
-            end += 1
+            end += eldest + slot_of(value, threshold, category) == child
     descent.stop[child] = end
 
 
@@ -127,9 +128,8 @@ def move_others(node: int, child: int, nodes: Nodes, rows: Rows, descent: Descen
     if has_room(node, descent):
         for i in range(begin, stop):
             row = descent.rows[i]
-            if eldest + slot_of(rows.values[row][feature], threshold, category) != child:
-                descent.rows[end], descent.weights[end] = row, descent.weights[i]
-                end += 1
+            descent.rows[end], descent.weights[end] = row, descent.weights[i]
+            end += eldest + slot_of(rows.values[row][feature], threshold, category) != child
     descent.stop[child] = end
 
 
