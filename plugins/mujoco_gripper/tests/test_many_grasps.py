@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from graspsense.plugin_api import UnknownName, create
 from graspsense.simulator_api import RunConfig, run_uninterrupted
-from graspsense_mujoco_gripper import prepared
+from graspsense_mujoco_gripper import backend
 
 HYBRID = create("controller", "hybrid", sends="velocity", closing_speed_m_s=0.15)
 FEATURES = create("feature-set", "chitta")
@@ -86,8 +86,8 @@ def test_a_controller_that_other_processes_cannot_make_again_grasps_here(alone):
 
 
 def test_a_batch_prepares_each_thing_once(monkeypatch):
-    prepare, made = prepared.prepare, []
-    monkeypatch.setattr(prepared, "prepare", lambda *given: made.append(given[0].object) or prepare(*given))
+    prepare, made = backend.prepare, []
+    monkeypatch.setattr(backend, "prepare", lambda *given: made.append(given[0].object) or prepare(*given))
     short = evolve(RUN, grasp_timeout_s=0.1, opening_timeout_s=0.1)
     GRIPPER.run_many(HYBRID, ["block", "can", "block"], [1, 2, 3], run=short, workers=1)
     assert made == ["block", "can"]

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache, partial
 from math import ceil, inf, nan
 from pathlib import Path
 from typing import Any, Final, Unpack, final
 
 import mujoco
 import numpy as np
-from attrs import evolve
+from attrs import asdict, evolve
 
 from graspsense.plugin_api import (
     EFFORT,
@@ -33,13 +34,15 @@ from graspsense.simulator_api import (
     BatchBackend,
     BatchOptions,
     Grasped,
+    GraspProcess,
     HandedGrasp,
     RunConfig,
     SimulationVariant,
     Viewer,
+    run_uninterrupted,
 )
 from graspsense_mujoco_gripper.arm_motion import ArmMotion
-from graspsense_mujoco_gripper.batch import GraspingJob, grasps
+from graspsense_mujoco_gripper.batch import grasps
 from graspsense_mujoco_gripper.camera import Camera, Window, free_camera, offscreen, require_screen
 from graspsense_mujoco_gripper.catalogue import catalogue
 from graspsense_mujoco_gripper.config import MujocoConfig
@@ -56,7 +59,7 @@ from graspsense_mujoco_gripper.measurement import (
     plain,
 )
 from graspsense_mujoco_gripper.model import identifier
-from graspsense_mujoco_gripper.prepared import Batch, prepare
+from graspsense_mujoco_gripper.prepared import Prepared, prepare
 from graspsense_mujoco_gripper.roughness import Roughness
 from graspsense_mujoco_gripper.scene import read_scene, scene_named
 from graspsense_mujoco_gripper.world import PREFIX, is_thing
@@ -73,6 +76,8 @@ TOUCH_N: Final = 0.1
 """Force on both fingers from which on the motion of the scene begins: less may be the palm that swings."""
 MANY: Final = 256
 """Errors of the forces that are drawn at once."""
+MOST_KNOWN: Final = 16
+"""Things that a batch keeps prepared."""
 SWING, MOST_SWINGS = 0.1, 20
 """The loop counts as unstable if the effort changes its sign above this share of its limit more often than this."""
 
@@ -86,7 +91,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
     _viewer: Viewer | None = None
     _camera: Camera | None = None
     _window: Window | None = None
-    _batch: Batch | None = None
+    _prepared: Callable[[MujocoConfig, float], Prepared] | None = None
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -152,19 +157,21 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         """Grasp each thing with its seed, in a process on each core."""
         for name in dict.fromkeys(scenes):
             read_scene(name, self.config.scene)
-        # Further channels are not handed over from process to process.
-        alone = any(self.with_object(name).makes_signals() for name in set(scenes))
-        job = GraspingJob(gripper_in_batch, self.config, controller, options.get("run") or RunConfig())
-        return grasps(job, scenes, seeds, options, alone=alone)
+        run, common = options.get("run") or RunConfig(), {"config": asdict(self.config)}
+        if any(self.with_object(name).makes_signals() for name in set(scenes)):
+            # Further channels are not handed over from process to process.
+            options = {**options, "workers": 1}
+        there = partial(GraspProcess, f"{__name__}:grasps_here", controller, run, common)
+        return grasps(grasps_here(controller, run, common), there, scenes, seeds, options)
 
     def makes_signals(self) -> bool:
         """Return whether there are channels that each tick has besides the frame and the cells."""
         gripper, _ = read_gripper(self.config.file)
         return bool(gripper.channels) or gripper.accelerometer is not None or self._is_shaken()
 
-    def join(self, batch: Batch) -> None:
+    def join(self, prepared: Callable[[MujocoConfig, float], Prepared]) -> None:
         """Take part in a batch, whose grasps share what the first one of each thing prepares."""
-        self._batch = batch
+        self._prepared = prepared
 
     def see(self, viewer: Viewer) -> None:
         """Make pictures of the next grasp without a screen, or show it in MuJoCo's own viewer."""
@@ -185,7 +192,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         config = self.config
         self._steps = self._steps_of_a_tick()
         timestep_s = 1.0 / (config.rate_hz * self._steps)
-        prepared = self._batch.prepared(config, timestep_s) if self._batch else prepare(config, timestep_s)
+        prepared = (self._prepared or prepare)(config, timestep_s)
         self._gripper, travel = prepared.gripper, prepared.travel
         self._thing, self._scene = prepared.scene.thing, prepared.scene.scene
         generator = np.random.default_rng(seed)
@@ -417,18 +424,19 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         return report
 
 
-def gripper_in_batch(config: MujocoConfig, batch: Batch) -> MujocoGripper:
-    """Return a gripper that takes part in a batch."""
-    gripper = MujocoGripper(config)
-    gripper.join(batch)
-    return gripper
-
-
-def grasps_in_process(
+def grasps_here(
     controller: Controller[Any], run: RunConfig, common: Mapping[str, Any]
 ) -> Callable[[str, int], HandedGrasp]:
-    """Return what runs a grasp in this process, as `GraspProcess` asks for it."""
-    return GraspingJob(gripper_in_batch, MujocoConfig(**common["config"]), controller, run).grasp
+    """Return what grasps a thing with a seed in this process, as `GraspProcess` asks for it."""
+    config, prepared = MujocoConfig(**common["config"]), lru_cache(MOST_KNOWN)(prepare)
+
+    def grasp(thing: str, seed: int) -> HandedGrasp:
+        gripper = MujocoGripper(evolve(config, object=thing))
+        gripper.join(prepared)
+        done = run_uninterrupted(gripper, controller, evolve(run, seed=int(seed)))
+        return HandedGrasp(done.outcome, done.reason, done.trace, done.report)
+
+    return grasp
 
 
 def kept_steps(steps: int, most: float) -> list[int]:

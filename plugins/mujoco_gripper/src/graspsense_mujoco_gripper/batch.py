@@ -10,60 +10,30 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from queue import SimpleQueue
-from typing import Any, Final
+from typing import Final
 
-from attrs import asdict, evolve, field, frozen
-
-from graspsense.plugin_api import Controller, SensorBackend
-from graspsense.simulator_api import (
-    BatchOptions,
-    Grasped,
-    GraspProcess,
-    HandedGrasp,
-    NotHandedOver,
-    RunConfig,
-    run_uninterrupted,
-)
-from graspsense_mujoco_gripper.config import MujocoConfig
-from graspsense_mujoco_gripper.prepared import Batch
+from graspsense.simulator_api import BatchOptions, Grasped, GraspProcess, HandedGrasp, NotHandedOver
 
 WORTH_A_PROCESS: Final = 4
 """Grasps that take about as long as the start of a process."""
-TARGET: Final = "graspsense_mujoco_gripper.backend:grasps_in_process"
-
-
-@frozen(eq=False)
-class GraspingJob:
-    """What all grasps of a batch have in common."""
-
-    gripper: Callable[[MujocoConfig, Batch], SensorBackend[MujocoConfig]]
-    """Makes a gripper that takes part in a batch."""
-    config: MujocoConfig
-    controller: Controller[Any]
-    run: RunConfig
-    batch: Batch = field(factory=Batch)
-    """What the grasps of this process share."""
-
-    def grasp(self, thing: str, seed: int) -> HandedGrasp:
-        """Run one grasp here."""
-        gripper = self.gripper(evolve(self.config, object=thing), self.batch)
-        done = run_uninterrupted(gripper, self.controller, evolve(self.run, seed=int(seed)))
-        return HandedGrasp(done.outcome, done.reason, done.trace, done.report)
 
 
 def grasps(
-    job: GraspingJob, things: Sequence[str], seeds: Sequence[int], options: BatchOptions, *, alone: bool
+    here: Callable[[str, int], HandedGrasp],
+    there: Callable[[], GraspProcess],
+    things: Sequence[str],
+    seeds: Sequence[int],
+    options: BatchOptions,
 ) -> list[Grasped]:
-    """Return the grasp of each thing with its seed, in order; `alone`: all of them in this process.
+    """Return the grasp of each thing with its seed, in order, by processes that `there` makes, or else `here`.
 
     Raises ValueError if their numbers differ.
     """
     if len(things) != len(seeds):
         raise ValueError(f"{len(things)} scenes and {len(seeds)} seeds: give one seed a scene")
-    wanted = options.get("workers") or os.cpu_count() or 1
-    workers = 1 if alone else max(1, min(wanted, len(things) // WORTH_A_PROCESS))
+    workers = max(1, min(options.get("workers") or os.cpu_count() or 1, len(things) // WORTH_A_PROCESS))
     progress = options.get("progress")
-    with _processes(job, workers) as free:
+    with _processes(there, workers) as free:
 
         def grasp(k: int) -> Grasped:
             process = free.get()
@@ -74,7 +44,7 @@ def grasps(
                 process = None
             finally:
                 free.put(process)
-            return _grasped(job.grasp(things[k], seeds[k]), options)
+            return _grasped(here(things[k], seeds[k]), options)
 
         done: list[Grasped] = []
         numbers = range(len(things))
@@ -103,7 +73,7 @@ def _grasped(handed: HandedGrasp, options: BatchOptions) -> Grasped:
 
 
 @contextmanager
-def _processes(job: GraspingJob, workers: int) -> Iterator[SimpleQueue[GraspProcess | None]]:
+def _processes(there: Callable[[], GraspProcess], workers: int) -> Iterator[SimpleQueue[GraspProcess | None]]:
     """Yield the processes that are free, and end them; None stands for this process."""
     free: SimpleQueue[GraspProcess | None] = SimpleQueue()
     with ExitStack() as started:
@@ -111,8 +81,6 @@ def _processes(job: GraspingJob, workers: int) -> Iterator[SimpleQueue[GraspProc
             process = None
             if workers > 1:
                 with suppress(NotHandedOver):
-                    process = started.enter_context(
-                        GraspProcess(TARGET, job.controller, job.run, {"config": asdict(job.config)})
-                    )
+                    process = started.enter_context(there())
             free.put(process)
         yield free

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 import mujoco
 import numpy as np
-from attrs import define, evolve, field, frozen
+from attrs import evolve, frozen
 
 from graspsense_mujoco_gripper.catalogue import soften_walls
 from graspsense_mujoco_gripper.config import MujocoConfig
@@ -17,8 +15,6 @@ from graspsense_mujoco_gripper.model import compiled, gripper_spec
 from graspsense_mujoco_gripper.scene import SceneModel, read_scene
 from graspsense_mujoco_gripper.variation import vary
 from graspsense_mujoco_gripper.world import add_thing, put_on_arm
-
-MOST_KNOWN: Final = 16
 
 
 @frozen(eq=False)
@@ -43,22 +39,6 @@ class Prepared:
             place = place + vary(scene, generator) * axis
         add_thing(spec, scene, place, axis)
         return compiled(spec, f"the gripper with {self.config.object}")
-
-
-@define(eq=False)
-class Batch:
-    """What the grasps of a process share: what the first one of each thing prepares."""
-
-    known: dict[MujocoConfig, Prepared] = field(factory=dict)
-
-    def prepared(self, config: MujocoConfig, timestep_s: float) -> Prepared:
-        """Return what the grasps with these settings have in common. Raises ConfigError, UnknownName."""
-        known = self.known.get(config)
-        if known is None:
-            if len(self.known) >= MOST_KNOWN:
-                self.known.clear()
-            known = self.known[config] = prepare(config, timestep_s)
-        return known
 
 
 def prepare(config: MujocoConfig, timestep_s: float) -> Prepared:

@@ -16,6 +16,14 @@ IDENTITY_NUMBERS: Final = Identity._fields[Identity._fields.index("pad_counts_pe
 """The fields of the feature report that `faults.identity` may set."""
 
 
+def _probability(meaning: str) -> Any:
+    return setting(default=0.0, minimum=0.0, maximum=1.0, meaning=meaning)
+
+
+def _beginning(what: str) -> Any:
+    return setting(default=0.0, unit="s", minimum=0.0, meaning=f"Device time from which on {what}.")
+
+
 @frozen(kw_only=True)
 class FaultConfig:
     """Faults of the emulated device, by default none. Probabilities are for each report or command.
@@ -23,31 +31,11 @@ class FaultConfig:
     A time `..._at_s` is a device time, from which on the fault lasts. Left and right are those of the board.
     """
 
-    drop: float = setting(default=0.0, minimum=0.0, maximum=1.0, meaning="Probability that a report is lost.")
-    corrupt: float = setting(
-        default=0.0,
-        minimum=0.0,
-        maximum=1.0,
-        meaning="Probability that a bit of a report is flipped.",
-    )
-    repeat: float = setting(
-        default=0.0,
-        minimum=0.0,
-        maximum=1.0,
-        meaning="Probability that a report is repeated.",
-    )
-    reorder: float = setting(
-        default=0.0,
-        minimum=0.0,
-        maximum=1.0,
-        meaning="Probability that a report comes after the next one.",
-    )
-    delay: float = setting(
-        default=0.0,
-        minimum=0.0,
-        maximum=1.0,
-        meaning="Probability that a report comes delay_s late.",
-    )
+    drop: float = _probability("Probability that a report is lost.")
+    corrupt: float = _probability("Probability that a bit of a report is flipped.")
+    repeat: float = _probability("Probability that a report is repeated.")
+    reorder: float = _probability("Probability that a report comes after the next one.")
+    delay: float = _probability("Probability that a report comes delay_s late.")
     delay_s: float = setting(
         default=0.02,
         unit="s",
@@ -55,18 +43,8 @@ class FaultConfig:
         plausible=(1e-4, 10.0),
         meaning="Time by which a delayed report is late.",
     )
-    drop_command: float = setting(
-        default=0.0,
-        minimum=0.0,
-        maximum=1.0,
-        meaning="Probability that a command is lost, though its write succeeds.",
-    )
-    corrupt_command: float = setting(
-        default=0.0,
-        minimum=0.0,
-        maximum=1.0,
-        meaning="Probability that a bit of a command is flipped.",
-    )
+    drop_command: float = _probability("Probability that a command is lost, though its write succeeds.")
+    corrupt_command: float = _probability("Probability that a bit of a command is flipped.")
     stall_at_s: float = setting(
         default=inf,
         unit="s",
@@ -92,12 +70,7 @@ class FaultConfig:
         maximum=43,
         meaning="Raw cell that keeps its value from freeze_at_s on (-1: none); 0 to 21 left, 22 to 43 right.",
     )
-    freeze_at_s: float = setting(
-        default=0.0,
-        unit="s",
-        minimum=0.0,
-        meaning="Device time from which on freeze_cell keeps its value.",
-    )
+    freeze_at_s: float = _beginning("freeze_cell keeps its value")
     drift_counts_s: float = setting(
         default=0.0,
         unit="counts/s",
@@ -112,68 +85,38 @@ class FaultConfig:
         default="both",
         meaning="Fingertip with pad_fault or drift_counts_s.",
     )
-    pad_at_s: float = setting(
-        default=0.0,
-        unit="s",
-        minimum=0.0,
-        meaning="Device time from which on pad_fault and drift_counts_s act.",
-    )
+    pad_at_s: float = _beginning("pad_fault and drift_counts_s act")
     image_fault: Literal["none", "frozen", "stale"] = setting(
         default="none",
         meaning="frozen: the counter of cell images stands still. stale: so it does, and the age of the image rises.",
     )
-    image_at_s: float = setting(
-        default=0.0,
-        unit="s",
-        minimum=0.0,
-        meaning="Device time from which on image_fault acts.",
-    )
+    image_at_s: float = _beginning("image_fault acts")
     status_bits: int = setting(
         default=0,
         minimum=0,
         maximum=0xFFFF,
         meaning="Bits that are set in the status of each report from status_at_s on.",
     )
-    status_at_s: float = setting(
-        default=0.0,
-        unit="s",
-        minimum=0.0,
-        meaning="Device time from which on status_bits are set.",
-    )
+    status_at_s: float = _beginning("status_bits are set")
     motor_gain: float = setting(
         default=1.0,
         plausible=(-10.0, 10.0),
         meaning="Applied effort over commanded effort from motor_at_s on; below 0: the motor turns the wrong way.",
     )
-    motor_at_s: float = setting(
-        default=0.0,
-        unit="s",
-        minimum=0.0,
-        meaning="Device time from which on motor_gain acts.",
-    )
+    motor_at_s: float = _beginning("motor_gain acts")
     effort_report_gain: float = setting(
         default=1.0,
         plausible=(-10.0, 10.0),
         meaning="Reported effort over applied effort from effort_report_at_s on.",
     )
-    effort_report_at_s: float = setting(
-        default=0.0,
-        unit="s",
-        minimum=0.0,
-        meaning="Device time from which on effort_report_gain acts.",
-    )
+    effort_report_at_s: float = _beginning("effort_report_gain acts")
     clock_rate: float = setting(
         default=1.0,
         minimum=0.0,
         plausible=(0.0, 100.0),
         meaning="Rate of the clock of the device from clock_at_s on; 0: it stands still.",
     )
-    clock_at_s: float = setting(
-        default=0.0,
-        unit="s",
-        minimum=0.0,
-        meaning="Device time from which on clock_rate acts.",
-    )
+    clock_at_s: float = _beginning("clock_rate acts")
     identity: dict[str, Any] = setting(
         factory=dict,
         meaning="Numbers of the feature report that replace those of the board, under their names in "

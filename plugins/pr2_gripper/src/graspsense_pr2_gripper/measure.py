@@ -59,17 +59,16 @@ _MIRRORED: Final = (
 """The cells of a fingertip with the -z and +z sides swapped: sides, corners, tip cells, and the columns of the pad."""
 
 
-class _PadForces(NamedTuple):
-    left_n: float
-    right_n: float
-    left_edge_n: float
-    right_edge_n: float
+class _PadForce(NamedTuple):
+    """The forces on a pad and its edges, the number of its dead cells, and its status bits."""
+
+    force_n: float
+    edge_n: float
+    bad: int
     status: int
 
 
-_NO_FORCES: Final = _PadForces(
-    left_n=math.nan, right_n=math.nan, left_edge_n=math.nan, right_edge_n=math.nan, status=0
-)
+_NO_FORCE: Final = _PadForce(force_n=math.nan, edge_n=math.nan, bad=0, status=0)
 
 
 class Measure:
@@ -104,7 +103,7 @@ class Measure:
         self._zero: Tips | None = stored
         self._accelerometer = Accelerometer(identity.accelerometer_g) if config.accelerometer else None
         self._pads = no_pads(CELLS)
-        self._forces = _NO_FORCES
+        self._forces = (_NO_FORCE, _NO_FORCE)
         self._ticks = tuple(revolutions_at(self._link, gap_m) * self._ticks_rev for gap_m in GAPS_M)
         self._gap_m = math.nan
         self._first_us: int | None = None
@@ -125,12 +124,13 @@ class Measure:
             self._take(image)
             self.image_age_s = 1e-6 * (report.time_us - image.time_us)
         gap, rate = gap_and_rate(self._link, report.encoder_ticks / self._ticks_rev)
-        forces, status = self._forces, report.status | self._encoder_status(report, gap)
+        of_left, of_right = self._forces
+        status = report.status | of_left.status | of_right.status | self._encoder_status(report, gap)
         if report.command_result in RESULT_BITS:
             status |= RESULT_BITS[report.command_result]
         if report.image_age_us > self._oldest_us and report.image:
             status |= OLD_IMAGE
-        left, right = forces.left_n, forces.right_n
+        left, right = of_left.force_n, of_right.force_n
         if status & (LEFT_ABSENT | RIGHT_ABSENT):
             swap = self._swap
             left = math.nan if status & (RIGHT_ABSENT if swap else LEFT_ABSENT) else left
@@ -143,9 +143,9 @@ class Measure:
             effort_n=report.effort_un / 1e6,
             force_left_n=left,
             force_right_n=right,
-            edge_left_n=forces.left_edge_n,
-            edge_right_n=forces.right_edge_n,
-            status=status | forces.status,
+            edge_left_n=of_left.edge_n,
+            edge_right_n=of_right.edge_n,
+            status=status,
         )
         self._last_us = report.time_us
         if self._accelerometer is None:
@@ -193,42 +193,31 @@ class Measure:
         self._compute_forces()
 
     def _compute_forces(self) -> None:
-        pads = self._pads
+        left, right = self._pads.left, self._pads.right
         # Without a tare, a cell is dead by its value alone.
-        zero = (pads.left, pads.right) if self._zero is None else self._zero
-        left, left_bad = masked(pads.left, zero[0])
-        right, right_bad = masked(pads.right, zero[1])
-        bad = left_bad + right_bad
-        self.bad_cells = max(self.bad_cells, bad)
-        status = 0
-        if bad:
-            status = BAD_CELL | _dead(LEFT_DEAD, pads.left, zero[0]) | _dead(RIGHT_DEAD, pads.right, zero[1])
+        zero = (left, right) if self._zero is None else self._zero
+        self._forces = self._of_pad(0, left, zero[0]), self._of_pad(1, right, zero[1])
+        self.bad_cells = max(self.bad_cells, sum(pad.bad for pad in self._forces))
+
+    def _of_pad(self, side: int, cells: tuple[float, ...], zero: tuple[float, ...]) -> _PadForce:
+        """Return the forces on the left (0) or the right pad."""
+        good, bad = masked(cells, zero)
+        status = BAD_CELL if bad else 0
+        if bad and masked(cells[FIRST_PAD_CELL:], zero[FIRST_PAD_CELL:])[1] > ENDURED_CELLS:
+            status |= (LEFT_DEAD, RIGHT_DEAD)[side]
         if self._zero is None:
             # Without a tare there is no force: the offsets alone are some thousand counts for each cell.
-            self._forces = _PadForces(
-                left_n=0.0, right_n=0.0, left_edge_n=0.0, right_edge_n=0.0, status=status
-            )
-            return
+            return _PadForce(force_n=0.0, edge_n=0.0, bad=bad, status=status)
         if self._gains is None:
-            left_n = pad_force(left, zero[0], self._pad_per_n, FIRST_PAD_CELL)
-            right_n = pad_force(right, zero[1], self._pad_per_n, FIRST_PAD_CELL)
+            force_n = pad_force(good, zero, self._pad_per_n, FIRST_PAD_CELL)
         else:
-            left_n = cells_force(left, zero[0], self._gains[0], FIRST_PAD_CELL)
-            right_n = cells_force(right, zero[1], self._gains[1], FIRST_PAD_CELL)
+            force_n = cells_force(good, zero, self._gains[side], FIRST_PAD_CELL)
         if self._tables is not None:
-            left_n, left_inside = load_of(self._tables[0], left_n)
-            right_n, right_inside = load_of(self._tables[1], right_n)
-            if not (left_inside and right_inside):
-                status |= BEYOND_TABLE
-        self._forces = _PadForces(
-            left_n=math.nan if left_bad == CELLS else left_n,
-            right_n=math.nan if right_bad == CELLS else right_n,
-            left_edge_n=edge_force(left, zero[0], self._edge_per_n),
-            right_edge_n=edge_force(right, zero[1], self._edge_per_n),
+            force_n, inside = load_of(self._tables[side], force_n)
+            status |= 0 if inside else BEYOND_TABLE
+        return _PadForce(
+            force_n=math.nan if bad == CELLS else force_n,
+            edge_n=edge_force(good, zero, self._edge_per_n),
+            bad=bad,
             status=status,
         )
-
-
-def _dead(bit: int, cells: tuple[float, ...], zero: tuple[float, ...]) -> int:
-    """Return the bit if too many cells on the face of a pad do not answer, else 0."""
-    return bit if masked(cells[FIRST_PAD_CELL:], zero[FIRST_PAD_CELL:])[1] > ENDURED_CELLS else 0

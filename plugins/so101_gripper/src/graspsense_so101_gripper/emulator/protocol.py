@@ -9,7 +9,7 @@ from graspsense_so101_gripper.emulator.motor import EmulatedMotor
 
 HEADER: Final = b"\xff\xff"
 BROADCAST: Final = 0xFE
-PING, READ, WRITE, REG_WRITE, ACTION, SYNC_READ, SYNC_WRITE = 1, 2, 3, 4, 5, 0x82, 0x83
+PING, READ, WRITE, SYNC_READ, SYNC_WRITE = 1, 2, 3, 0x82, 0x83
 
 
 def checksum(body: bytes) -> int:
@@ -29,7 +29,6 @@ class Requests:
     def __init__(self, motors: Mapping[int, EmulatedMotor]) -> None:
         self._motors = motors
         self._data = b""
-        self._waiting: dict[int, tuple[int, bytes]] = {}
 
     def forget(self) -> None:
         """Forget an incomplete request."""
@@ -74,10 +73,6 @@ class Requests:
             return self._read(motor, given)
         if instruction == WRITE and given:
             self._write(motor, given[0], given[1:])
-        elif instruction == REG_WRITE and given:
-            self._waiting[motor] = given[0], given[1:]
-        elif instruction == ACTION and motor in self._waiting:
-            self._write(motor, *self._waiting.pop(motor))
         return packet(motor, self._motors[motor].status)
 
     def _read(self, motor: int, given: bytes) -> bytes:
