@@ -464,7 +464,7 @@ def grasped(case: str, value: Any, config: SimConfig, spec: ObjectSpec, **contro
         done, said = whole_grasp(config, spec, law)
     except ConfigError as error:
         return {"case": case, "value": value, "refused": str(error), "flagged": True, "holds": True}
-    error, quantity = error_of(done, reference)
+    error, quantity = error_of(done, reference, config)
     peak = reference.state.peak_n
     return {
         "case": case,

@@ -142,9 +142,9 @@ def record_of(grasp: FinishedGrasp, dt_s: float) -> GraspRecord:
     )
 
 
-def error_of(grasp: FinishedGrasp, reference: FinishedGrasp) -> tuple[float, str]:
-    """Return the largest error of all quantities, and the quantity."""
-    dt = 1.0 / SimConfig().rate_hz
+def error_of(grasp: FinishedGrasp, reference: FinishedGrasp, config: SimConfig) -> tuple[float, str]:
+    """Return the largest error of all quantities, and the quantity. `config` is that of both grasps."""
+    dt = 1.0 / config.rate_hz
     return deviation(record_of(grasp, dt), record_of(reference, dt))
 
 

@@ -24,14 +24,13 @@ from typing import Any, Final
 import numpy as np
 from arguments import parser_of
 from attrs import evolve
-from random_scenes import Bench, Scene, controller_is_stable, flags_of, record_of
+from random_scenes import Bench, Scene, controller_is_stable, error_of, flags_of
 
 from graspsense.evaluation.intervals import wilson
 from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import ConfigError
 from graspsense.report.found_table import markdown_table
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.run.accuracy.error import deviation
 from graspsense_sim_gripper.run.batch.job import FinishedGrasp
 from graspsense_sim_gripper.scene.spec import ObjectSpec
 from graspsense_sim_gripper.scene.terms.registry import in_order
@@ -126,7 +125,6 @@ def scene_of(number: int) -> Scene:
 def measured(bench: Bench, scene: Scene) -> Row:
     """Return the errors and flags of the grasps in a scene."""
     row: Row = {"sensor": scene.config.sensor}
-    dt = 1.0 / scene.config.rate_hz
     try:
         reference, setup, chosen, _ = bench.grasp(scene, REFERENCE, "reference")
     except ConfigError as error:
@@ -134,21 +132,21 @@ def measured(bench: Bench, scene: Scene) -> Row:
     row |= {"outcome": reference.outcome.name, "stable": controller_is_stable(setup, chosen)}
     row["reference_resolved"] = reference.state.step.unresolved + reference.state.contact.unbalanced == 0
     for accuracy in ACCURACIES:
-        row[f"{accuracy:g}"] = _case(bench, scene, accuracy, reference, dt)
+        row[f"{accuracy:g}"] = _case(bench, scene, accuracy, reference)
     if not row["reference_resolved"] or any(row[f"{a:g}"]["error"] > a for a in ACCURACIES):
         even = evolve(scene, config=evolve(scene.config, step_s=EVEN_S))
-        row["even"] = _case(bench, even, 0.01, reference, dt)["error"]
+        row["even"] = _case(bench, even, 0.01, reference)["error"]
     return row
 
 
-def _case(bench: Bench, scene: Scene, accuracy: float, reference: FinishedGrasp, dt_s: float) -> Row:
+def _case(bench: Bench, scene: Scene, accuracy: float, reference: FinishedGrasp) -> Row:
     try:
         done, _, chosen, job = bench.grasp(scene, accuracy, "scene")
     except ConfigError as error:
         return {"error": math.inf, "refused": str(error)[:200]}
     except ArithmeticError as error:
         return {"error": math.inf, "refused": f"{type(error).__name__}: {error}"}
-    error, quantity = deviation(record_of(done, dt_s), record_of(reference, dt_s))
+    error, quantity = error_of(done, reference, scene.config)
     return {
         "error": error,
         "of": quantity,

@@ -26,8 +26,8 @@ import sys
 import tempfile
 import time
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import groupby, product
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any, Final
 
@@ -77,11 +77,6 @@ SCENES: Final[Mapping[str, tuple[Mapping[str, Any], ...]]] = {
     "creeping hertz": (
         {"type": "rigid", "hertz_n_m15": 20000.0},
         {"type": "maxwell", "k_n_m": 400.0, "tau_s": 0.25},
-    ),
-    "two branches": (
-        {"type": "elastic", "k1_n_m": 1000.0},
-        {"type": "maxwell", "k_n_m": 600.0, "tau_s": 0.08},
-        {"type": "maxwell", "k_n_m": 400.0, "tau_s": 0.5},
     ),
     "creeping and damped": (
         {"type": "elastic", "k1_n_m": 1200.0},
@@ -173,27 +168,16 @@ def squeezes_of(
 
 
 def true_values(terms: Sequence[Mapping[str, Any]], identified: str) -> dict[str, float]:
-    """Return the true values of the parameters, with a foam's force at the compression of the identified scene.
-
-    The first of two Maxwell branches is the one that is the first in the identified scene, by their relaxation times.
-    """
-    scene = tomllib.loads(identified)["terms"]
-    at_m = {term["type"]: term.get("at_m") for term in scene}
-    times = [term["tau_s"] for term in scene if term["type"] == "maxwell"]
-    branches = sorted(
-        (row for row in terms if row["type"] == "maxwell"), key=lambda branch: float(branch["tau_s"])
-    )
-    if times != sorted(times):
-        branches.reverse()
+    """Return the true values of the parameters, with a foam's force at the compression of the identified scene."""
+    at_m = {term["type"]: term.get("at_m") for term in tomllib.loads(identified)["terms"]}
     values = {}
     for term in terms:
-        name = "maxwell 2" if term["type"] == "maxwell" and term is not branches[0] else term["type"]
         for key, value in term.items():
             if key in ("type", "at_m"):
                 continue
             if term["type"] == "foam" and key == "force_n" and at_m.get("foam"):
                 value = value * (at_m["foam"] / term["at_m"]) ** term["exponent"]
-            values[f"{name}.{key}"] = float(value)
+            values[f"{term['type']}.{key}"] = float(value)
     return values
 
 
@@ -243,11 +227,6 @@ def measured(name: str, sensor: str, count: int, repeat: int) -> Row:
     )
 
 
-def _covered(rows: Sequence[Sequence[Sequence[Any]]]) -> list[bool]:
-    """Return whether each interval holds the true value."""
-    return [low <= truth <= high for row in rows for _, truth, _, low, high in row]
-
-
 def _share(part: int, whole: int) -> str:
     if not whole:
         return "–"
@@ -257,7 +236,7 @@ def _share(part: int, whole: int) -> str:
 
 def _covered_share(group: Sequence[Mapping[str, Any]]) -> str:
     """Return the share of the intervals that cover. The intervals of a scene share their error: they are clustered."""
-    covered = _covered([row["parameters"] for row in group])
+    covered = [low <= truth <= high for row in group for _, truth, _, low, high in row["parameters"]]
     scenes = [str(k) for k, row in enumerate(group) for _ in row["parameters"]]
     if len(set(scenes)) < 2:
         return f"{sum(covered)} of {len(covered)}"
@@ -294,18 +273,13 @@ def tables(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
 
 def grouped(
     rows: Sequence[Mapping[str, Any]], *keys: str
-) -> Iterator[tuple[tuple[Any, ...], Sequence[Mapping[str, Any]]]]:
-    """Yield the rows with the same values of these keys, with these values: by sensor, and in order."""
-
-    def values(row: Mapping[str, Any]) -> tuple[Any, ...]:
-        return tuple(row[key] for key in keys)
-
-    def place(row: Mapping[str, Any]) -> tuple[Any, ...]:
-        order = {"sensor": list(SENSORS), "scene": list(SCENES)}
-        return tuple(order[key].index(row[key]) if key in order else row[key] for key in keys)
-
-    for group_values, group in groupby(sorted(rows, key=place), key=values):
-        yield group_values, list(group)
+) -> Iterable[tuple[tuple[Any, ...], Sequence[Mapping[str, Any]]]]:
+    """Return the rows with the same values of these keys, with these values, in the order of sensors and scenes."""
+    order = {name: place for place, name in enumerate((*SENSORS, *SCENES))}
+    groups: dict[tuple[Any, ...], list[Mapping[str, Any]]] = {}
+    for row in sorted(rows, key=lambda row: [order.get(row[key], row[key]) for key in keys]):
+        groups.setdefault(tuple(row[key] for key in keys), []).append(row)
+    return groups.items()
 
 
 def transfer(counts: Sequence[int]) -> Iterator[dict[str, float]]:

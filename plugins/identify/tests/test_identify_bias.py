@@ -44,14 +44,6 @@ def errors_of(name):
 
 
 @pytest.mark.slow
-def test_the_nodes_of_a_path_bias_relaxation_times_and_the_error_is_taken_away():
-    biased, after = errors_of("two branches")
-    # Noise-free forces: what is left of the error is that of the simulation.
-    assert np.abs(biased).max() > 5e-4
-    assert np.abs(after).max() < 1e-4
-
-
-@pytest.mark.slow
 def test_the_force_of_a_damper_right_after_the_contact_needs_nodes_between_the_ticks():
     biased, after = errors_of("creeping and damped")
     assert np.abs(biased).max() > 1e-3

@@ -17,9 +17,9 @@ from graspsense_sim_gripper.run.identification import Switchable, find_term
 Values = Sequence[float] | NDArray[np.float64]
 """Values of the free parameters of a candidate."""
 
-SLOTS: Final = ("elastic", "rigid", "maxwell", "maxwell", "loss", "foam", "snap")
+SLOTS: Final = ("elastic", "rigid", "maxwell", "loss", "foam", "snap")
 """The terms of the compiled law, of which a candidate switches some on. All candidates share its code."""
-ELASTIC, RIGID, MAXWELL, SECOND, LOSS, FOAM, SNAP = range(len(SLOTS))
+ELASTIC, RIGID, MAXWELL, LOSS, FOAM, SNAP = range(len(SLOTS))
 MAX_STARTS: Final = 40
 
 
@@ -67,14 +67,9 @@ class FreeParameter:
     sign: float = 1.0
 
     @property
-    def term(self) -> str:
-        """The term, with its number where a candidate may have two of the kind."""
-        return f"{SLOTS[self.slot]} 2" if self.slot == SECOND else SLOTS[self.slot]
-
-    @property
     def label(self) -> str:
         """The name with that of its term."""
-        return f"{self.term}.{self.name}"
+        return f"{SLOTS[self.slot]}.{self.name}"
 
     @property
     def is_force(self) -> bool:
@@ -207,13 +202,9 @@ def memories(scale: DataScale) -> list[CandidateLaw]:
     """Return the terms with a memory that a candidate may have beside the others, the simplest first."""
     k = scale.force_n / scale.depth_m
     shortest, longest = 0.3 * scale.sample_s, 5.0 * scale.memory_s
-
-    def branch(slot: int, share: float, *shares_of_time: float) -> CandidateLaw:
-        times_s = [min(max(part * scale.memory_s, 1.5 * shortest), 0.5 * longest) for part in shares_of_time]
-        stiffness = _free(slot, "k_n_m", k, (1e-3, 100.0), share, 2.0 * share)
-        return CandidateLaw(free=(stiffness, _free(slot, "tau_s", 1.0, (shortest, longest), *times_s)))
-
+    times_s = [min(max(part * scale.memory_s, 1.5 * shortest), 0.5 * longest) for part in (0.2, 0.03)]
+    stiffness = _free(MAXWELL, "k_n_m", k, (1e-3, 100.0), 0.3, 0.6)
+    branch = CandidateLaw(free=(stiffness, _free(MAXWELL, "tau_s", 1.0, (shortest, longest), *times_s)))
     damping = _free(LOSS, "damping_n_s_m", scale.force_n / scale.speed_m_s, (1e-4, 10.0), 0.1)
-    loss, single = CandidateLaw(free=(damping,)), branch(MAXWELL, 0.3, 0.2, 0.03)
-    fast, slow = branch(MAXWELL, 0.2, 0.04), branch(SECOND, 0.2, 0.4)
-    return [loss, single, fast.joined(slow), single.joined(loss)]
+    loss = CandidateLaw(free=(damping,))
+    return [loss, branch, branch.joined(loss)]

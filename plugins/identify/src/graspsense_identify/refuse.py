@@ -11,7 +11,7 @@ import numpy as np
 from graspsense.simulator_api import SqueezeFit, Undetermined, repeatability
 from graspsense_identify.fit import Fitted
 from graspsense_identify.held_out import CONFIRMS
-from graspsense_identify.laws import SNAP
+from graspsense_identify.laws import MAXWELL, SNAP
 from graspsense_identify.prepare import BREAK_SHARE, Squeeze
 from graspsense_identify.share import Shares
 from graspsense_identify.spread import LEAST_INSTANCES, Uncertainty
@@ -126,8 +126,8 @@ def _parameters(fitted: Fitted, uncertainty: Uncertainty) -> Iterator[Undetermin
             continue
         interval = f"its 90 % interval is {uncertainty.low[i]:.3g} to {uncertainty.high[i]:.3g}"
         remedy = _REMEDIES.get(parameter.name, "record more squeezes")
-        if parameter.term.startswith("maxwell"):
-            needed = max(HOLD_TIMES * fitted.by_label[f"{parameter.term}.tau_s"], 2.0 * hold_s)
+        if parameter.slot == MAXWELL:
+            needed = max(HOLD_TIMES * fitted.by_label["maxwell.tau_s"], 2.0 * hold_s)
             remedy = f"hold for {needed:.2g} s (the longest hold is {hold_s:.2g} s)"
         elif "deeper" in remedy:
             remedy += f" (the deepest is {depth_mm:.2g} mm)"
