@@ -7,8 +7,17 @@ import numpy as np
 import pytest
 
 from graspsense_c45 import JavaRandom, criteria
-from graspsense_c45.arithmetic import Scale, ln, one_minus_exp, term, x_ln_x
-from graspsense_c45.building.cuts import Limits, Run, scan_unit, scan_weighted
+from graspsense_c45.arithmetic import (
+    TERM_BITS,
+    WEIGHT_BITS,
+    Scale,
+    bits_below,
+    ln,
+    one_minus_exp,
+    term,
+    x_ln_x,
+)
+from graspsense_c45.building.cuts import Limits, Run, rough_scale, rough_term, scan_unit, scan_weighted
 from graspsense_c45.estimates import estimated_errors, prepare_confidence
 
 
@@ -97,6 +106,17 @@ def test_best_cut_is_the_first_of_those_within_the_tolerance():
         ):
             assert (cut.place, cut.numerator) == best_place(numerators, limits)
             assert cut.n_cuts == len(numerators)
+
+
+def test_rough_terms_are_far_closer_than_the_tolerance():
+    rng = np.random.default_rng(4)
+    for total in (3.0, 1e3, 1e9, 1e150):
+        scale = Scale(bits_below(total, WEIGHT_BITS), bits_below(x_ln_x(total) + 1.0, TERM_BITS))
+        tolerance = criteria.gain_tolerance(total, scale.term_bits)
+        for weight in (1.0, *rng.uniform(1.0, total, 50)):
+            units = round(math.ldexp(weight, scale.weight_bits))
+            error = abs(rough_term(units, rough_scale(scale)) - term(units, scale)) if units else 0.0
+            assert error < 1e-5 * tolerance
 
 
 def test_java_random_is_javas():

@@ -114,7 +114,7 @@ def new_term(units: int, scale: Scale) -> int:
     return round(math.ldexp(x_ln_x(real_weight(units, scale.weight_bits)), scale.term_bits))
 
 
-_known_term = lru_cache(maxsize=1 << 17)(new_term)
+_known_term = lru_cache(maxsize=1 << 16)(new_term)
 """In the interpreter a term takes longer than the rest of a step, and the same weights come again and again."""
 
 
