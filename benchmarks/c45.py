@@ -64,8 +64,7 @@ def measure(n_rows: int, repeats: int, names: list[str]) -> list[list[str]]:
         for name in names:
             estimator = contender(name)
             fits[name].append(seconds(lambda e=estimator: e.fit(x, y)))  # type: ignore[misc]
-            for _ in range(3):
-                predicts[name].append(seconds(lambda e=estimator: e.predict(x)))  # type: ignore[misc]
+            predicts[name].append(seconds(lambda e=estimator: e.predict(x)))  # type: ignore[misc]
             nodes[name] = estimator.tree_.node_count
     rows = []
     for name in names:

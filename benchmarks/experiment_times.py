@@ -10,8 +10,6 @@ first experiment alone.
 
 from __future__ import annotations
 
-import os
-import time
 from statistics import median
 
 from arguments import parser_of
@@ -44,11 +42,9 @@ def main() -> None:
     asked = given.names or [name for name in shipped() if not read_experiment(name).parts]
     of_kind: dict[str, list[float]] = {}
     for name in asked[:1] if given.short else asked:
-        begun = time.monotonic()
         kind, share = seconds_per_trial(name)
         of_kind.setdefault(kind, []).append(share)
-        taken = f"{time.monotonic() - begun:.0f} s, load {os.getloadavg()[0]:.1f}"
-        print(f"{name}: {share:.3g} s per trial ({taken})", flush=True)
+        print(f"{name}: {share:.3g} s per trial", flush=True)
     for kind, shares in of_kind.items():
         print(f"kind {kind}: {median(shares):.3g} s per trial")
     print(where_measured())

@@ -118,14 +118,13 @@ def moments(grasp: Grasp) -> dict[str, float]:
     begins = {phase: trace.t_s[trace.phase == phase] for phase in (APPROACH, SQUEEZE, HOLD)}
     approach, squeeze, hold = (begins[phase] for phase in (APPROACH, SQUEEZE, HOLD))
     start, end = float(approach[0]), float(approach[-1])
-    times = {
+    return {
         "opening": 0.5 * start,
         "approach, early": start + 0.2 * (end - start),
         "approach, late": start + 0.8 * (end - start),
         "squeeze": float(np.mean(squeeze)) if len(squeeze) else end,
         "hold": float(np.mean(hold)) if len(hold) else float(trace.t_s[-1]),
     }
-    return times
 
 
 def result_of(fault: str, side: str, phase: str, controller: str, at_s: float, grasp: Grasp) -> FaultyGrasp:
