@@ -65,7 +65,6 @@ from graspsense.core.control.tick import tick as tick
 from graspsense.core.control.tick import first_state as first_state
 from graspsense.core.control.tick import events_of as events_of
 from graspsense.core.control.tick import CLOSES as CLOSES
-from graspsense.core.control.tick import FreeRun as FreeRun
 from graspsense.core.control.tick import after_free as after_free
 from graspsense.core.control.tick import free_from as free_from
 from graspsense.core.control.tick import free_parts as free_parts
@@ -75,7 +74,6 @@ from graspsense.core.grasp.runner import ended_by_itself as ended_by_itself
 from graspsense.core.grasp.opened_gripper import overdue as overdue
 from graspsense.core.grasp.opened_gripper import seconds_at_most as seconds_at_most
 from graspsense.core.values.events import event_name as event_name
-from graspsense.core.values.trace import FrameTable as FrameTable
 
 # Compiling a function with all that it calls
 from graspsense.core.compiling.call_graph import NotCompilable as NotCompilable

@@ -31,7 +31,7 @@ from graspsense.core.control.contact import CONTACT_FORCE_N
 from graspsense.core.control.free_motion import FreeMotion
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError
-from graspsense.core.values.signals import Command, Frame, Outcome, Pads, Reading
+from graspsense.core.values.signals import Command, Outcome, Pads, Reading
 
 if TYPE_CHECKING:
     import numpy as np
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from graspsense.core.components.compiled_features import CompiledFeatures
     from graspsense.core.components.entries import Feature
     from graspsense.core.components.run_config import RunConfig
-    from graspsense.core.control.tick import FreeRun, TickParams, TickState
     from graspsense.core.values.channel import Channel
     from graspsense.core.values.features import Features, FeatureTable, Prediction
     from graspsense.core.values.trace import Trace
@@ -191,16 +190,6 @@ class SensorBackend(ABC, Generic[ConfigT]):
         The guard has limited the command. With a device clock, it limits effort and speed to `run.first_effort_n` and
         `run.first_speed_m_s` (by default 12 N and 15 mm/s) until a pad touches, so a fast approach needs larger ones.
         """
-
-    def free_ticks(self, params: TickParams, state: TickState, frame: Frame, most: int) -> FreeRun | None:
-        """Run up to `most` ticks at once after the command that was applied last; None to run none.
-
-        A simulator may do so, with the controller of `expect`, until the phase changes, the controller tells an event,
-        the guard acts for the first time or stops the grasp, or a cell image arrives. `state` is that after the tick of
-        `frame`. The results are those of `read` and `apply`. `free_motion.FreeMotion` is for ticks without a force.
-        """
-        del params, state, frame, most
-        return None
 
     @abstractmethod
     def tare(self, images: Sequence[Pads]) -> None:

@@ -10,7 +10,7 @@ instead, which give the same commands and states for less (see `graspsense.core.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from math import inf, nan
 from typing import Any, NamedTuple
 
@@ -216,20 +216,6 @@ class FreeTicks(NamedTuple):
 
 FreeState = tuple[Any, RestState]
 """What changes from tick to tick in free motion: the memory of the controller's law, and since when the gap rests."""
-
-
-class FreeRun(NamedTuple):
-    """Ticks of a phase that a backend has run at once."""
-
-    n_ticks: int
-    frames: Sequence[Frame]
-    """The frame of each tick, if they are of a phase that is recorded (from the approach on); otherwise none."""
-    commands: list[float]
-    """The value that was commanded after each of these frames."""
-    state: TickState
-    """The state after the last of them."""
-    sent: Iterable[Command] | None = None
-    """These commands; None for efforts without limits."""
 
 
 def _never_free(params: Any, law: Any, frame: Frame) -> tuple[Any, FreeLimits]:

@@ -54,7 +54,6 @@ from graspsense.core.values.faults import LIMITED, Fault
 from graspsense.core.values.features import Prediction
 from graspsense.core.values.signals import (
     APPROACH,
-    EFFORT,
     HOLD,
     NO_GAP,
     RUNNING,
@@ -356,7 +355,7 @@ class _Grasp:
         state, phase, watcher = self.state, self.state.phase, self.state.guard
         images: list[Pads] = []
         newest = n_ticks = 0
-        most_ticks, leaps, losses = self._most_ticks(), self._leaps(), self.losses
+        most_ticks, losses = self._most_ticks(), self.losses
         while n_ticks < most_ticks:
             n_ticks += 1
             reading = self._checked(read(timeout_s))
@@ -386,7 +385,7 @@ class _Grasp:
                 self.late += frame.dt_s > late_s
                 if losses is not None:
                     losses.see(reading)
-                self._count(phase, 1, self._acted(state) > acted)
+                self._count(phase, self._acted(state) > acted)
             try:
                 apply(command)
             finally:
@@ -401,9 +400,6 @@ class _Grasp:
                 state = self._watched(self.watcher, frame, state)
             if state.done or watcher.stopped or self._fault() is not None:
                 return
-            if leaps and same_phase and (self.watcher is None or phase not in (SQUEEZE, HOLD)):
-                n_ticks += self._leap(phase, reading, int(most_ticks - n_ticks))
-                state = self.state
         raise _Overdue(overdue(run))
 
     def _checked(self, reading: Reading | None) -> Reading:
@@ -442,30 +438,6 @@ class _Grasp:
         Ticks are counted, since the clock of a device may stand still, and the squeeze must end nevertheless.
         """
         return inf if self.info.opening is None else ceil(seconds_at_most(self.run) * self.info.rate_hz)
-
-    def _leaps(self) -> bool:
-        """Return whether the gripper is asked for ticks at once; watchers need only the squeeze."""
-        offers = type(self.backend).free_ticks is not SensorBackend.free_ticks
-        return offers and self.info.harmless and self.info.clock == "virtual"
-
-    def _leap(self, phase: int, reading: Reading, most: int) -> int:
-        """Let the gripper run ticks of this phase at once, record and show them, and return their number.
-
-        The cell image of all of them is that of the reading before.
-        """
-        free = self.backend.free_ticks(self.params, self.state, reading.frame, most)
-        if free is None:
-            return 0
-        limited, self.state = free.state.guard.acted - self.state.guard.acted, free.state
-        if free.frames:
-            self.last = free.frames[-1]
-            self.recorder.extend(free.frames, phase, free.commands)
-            self._count(phase, free.n_ticks, limited)
-        if self.sinks:
-            sent = free.sent or (Command(EFFORT, effort_n, inf, inf) for effort_n in free.commands)
-            for frame, command in zip(free.frames, sent, strict=True):
-                self._show(Reading(frame, reading.pads), phase, command)
-        return free.n_ticks
 
     def _show(self, reading: Reading, phase: int, command: Command) -> None:
         """Pass a tick to the sinks."""
@@ -512,11 +484,11 @@ class _Grasp:
             self._event(frame.t_s, Phase(self.state.phase), "guard: a command was limited")
         return now
 
-    def _count(self, phase: int, commands: int, limited: int) -> None:
-        """Count commands, and how many of them guard or protection limited."""
+    def _count(self, phase: int, limited: bool) -> None:
+        """Count a command, and whether guard or protection limited it."""
         self.guarded += limited
         if phase in (SQUEEZE, HOLD):
-            self.squeezed += commands
+            self.squeezed += 1
             self.squeezed_guarded += limited
 
     def warnings(self) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import chain
 from typing import TYPE_CHECKING, Any, Final
 
@@ -163,22 +163,6 @@ class Trace:
         return evolve(self, **cut, signals=signals, events=events)
 
 
-class FrameTable(Sequence[Frame]):
-    """Frames as the rows of an array (n, fields of a frame), which become frames where they are looked at."""
-
-    def __init__(self, rows: Floats) -> None:
-        self.rows = rows
-
-    def __len__(self) -> int:
-        return len(self.rows)
-
-    def __getitem__(self, k: int | slice) -> Any:
-        if isinstance(k, slice):
-            return FrameTable(self.rows[k])
-        *numbers, status = self.rows[k].tolist()
-        return Frame._make([*numbers, int(status)])
-
-
 @define(eq=False)
 class TraceRecorder:
     """Collects the ticks of a running grasp; `trace()` returns those collected so far.
@@ -187,15 +171,12 @@ class TraceRecorder:
     """
 
     units: Mapping[str, str] = field(factory=lambda: dict(SI_UNITS))
-    frames: list[Frame | None] = field(factory=list, init=False)
-    """The frame of each tick; None for one that came in a table."""
+    frames: list[Frame] = field(factory=list, init=False)
     phases: list[int] = field(factory=list, init=False)
     commands: list[float] = field(factory=list, init=False)
     images: list[Pads] = field(factory=list, init=False)
     signals: list[Any] = field(factory=list, init=False)
     events: list[GraspEvent] = field(factory=list, init=False)
-    _tables: list[tuple[int, FrameTable]] = field(factory=list, init=False)
-    """The tables, each with the number of its first tick."""
     _blocks: tuple[Floats, ...] = field(default=(), init=False)
     """The frames that were converted to numbers before, in whole blocks."""
     pads: Pads = field(default=NO_PADS, init=False)
@@ -231,16 +212,6 @@ class TraceRecorder:
             values[i] = images.add(values[i])
         return type(signals)._make(values)
 
-    def extend(self, frames: Sequence[Frame], phase: int, commands: Sequence[float]) -> None:
-        """Add ticks of one phase without a new cell image, of a gripper without further channels."""
-        if isinstance(frames, FrameTable):
-            self._tables.append((len(self.frames), frames))
-            self.frames.extend([None] * len(frames))
-        else:
-            self.frames.extend(frames)
-        self.phases.extend([phase] * len(frames))
-        self.commands.extend(commands)
-
     def trace(self) -> Trace:
         """Return the trace of the ticks collected so far."""
         trace = self.first_ticks(len(self.frames), len(self.images))
@@ -255,29 +226,16 @@ class TraceRecorder:
         A thread may call it while ticks are added: the lists only grow. Blocks of frames are converted once.
         """
         blocks = self._blocks
-        self._blocks = blocks = (*blocks, *self._between(len(blocks) * BLOCK, n - n % BLOCK))
+        self._blocks = blocks = (*blocks, *_blocks_of(self.frames[len(blocks) * BLOCK : n - n % BLOCK]))
         whole = blocks[: n // BLOCK]
         return _trace_from(
-            [*whole, *self._between(len(whole) * BLOCK, n)],
+            [*whole, *_blocks_of(self.frames[len(whole) * BLOCK : n])],
             self.phases[:n],
             self.commands[:n],
             self.images[:m],
             self.units,
             self.signals[:n],
         )
-
-    def _between(self, start: int, stop: int) -> Iterator[Floats]:
-        """Return the numbers of the frames from `start` to before `stop`, in arrays of at most `BLOCK` rows."""
-        for begin in range(start, stop, BLOCK):
-            end = min(begin + BLOCK, stop)
-            parts: list[Floats] = []
-            for first_tick, table in self._tables:
-                if first_tick < end and first_tick + len(table) > begin:
-                    parts += _blocks_of(self.frames[begin:first_tick])
-                    parts.append(table.rows[max(begin - first_tick, 0) : end - first_tick])
-                    begin = min(first_tick + len(table), end)
-            parts += _blocks_of(self.frames[begin:end])
-            yield parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def trace_of(
