@@ -333,6 +333,7 @@ def _write_meta(
         },
     )
     write_json(folder / "meta/graspsense.json", _meanings(grasps, plan))
+    write_json(folder / "meta/episodes.json", {"episodes": [_listed(row, plan) for row in rows]})
     (folder / "README.md").write_text(_card(grasps, plan), "utf-8")
 
 
@@ -351,6 +352,20 @@ def meanings_of_numbers(events: Sequence[str], classes: Sequence[str]) -> dict[s
         "graspsense.phase": {str(int(phase)): phase.name.lower() for phase in Phase},
         "graspsense.event": {"0": "", **{str(k): name for k, name in enumerate(events, 1)}},
         "graspsense.prediction": {"0": "", **{str(k): name for k, name in enumerate(classes, 1)}},
+    }
+
+
+def _listed(row: Mapping[str, Any], plan: Plan) -> dict[str, Any]:
+    path = DATA_PATHS[3].format(chunk_index=row["data/chunk_index"], file_index=row["data/file_index"])
+    return {
+        "episode_id": row["episode_index"],
+        "task": row["tasks"][0],
+        "frames": row["length"],
+        "start_time": 0.0,
+        "end_time": (row["length"] - 1) / plan.fps,
+        "data_path": path,
+        "action_shape": [1],
+        "state_shape": [len(plan.state)],
     }
 
 
