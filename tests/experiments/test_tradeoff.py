@@ -120,3 +120,11 @@ def test_the_conclusion_says_whether_a_lower_accuracy_saves_time_or_costs_recogn
     assert "hardly" not in with_rates((-0.01, 0.11), slowest_s=1e-2)
     assert "shown at 0.5, 0.001" in with_rates((0.01, 0.09))
     assert "shown at 0.5, 0.001" in with_rates((-0.09, -0.01))
+
+
+@pytest.mark.slow
+def test_without_a_classifier_errors_and_times_are_measured(capsys):
+    arguments = ["--scene", "block", "--seeds", "1", "-o", "classifier.type=none", "--json"]
+    assert ended(["tradeoff", "simulation", *arguments]) == 0
+    points = json.loads(capsys.readouterr().out)["points"]
+    assert all(p["errors"] and p["recognised"] is None for p in points)

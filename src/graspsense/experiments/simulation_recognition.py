@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from attrs import evolve
 
-from graspsense.core.components.caller import set_option
 from graspsense.core.components.roles import BatchBackend
-from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.intervals import difference, rate_among
 from graspsense.experiments.recognise import TEST_SEED_OFFSET, true_and_predicted
 from graspsense.sources.simulated import Group, simulated
@@ -38,17 +36,13 @@ def with_recognition(
 
     `instances`: individuals of each object in each state, for training and as many for the test; each is grasped once.
 
-    A gripper that has no such variant is left as it is. Raises ConfigError if the pipeline has no classifier.
+    Without such variants, or in a pipeline without a classifier, nothing is added.
     """
     learner, backend = settings.classifier, settings.gripper.create()
     assert isinstance(backend, BatchBackend)
     chosen = [variant for variant in backend.variants() if variant.for_recognition]
-    if not chosen:
+    if learner is None or not chosen:
         return trade
-    if learner is None:
-        raise ConfigError(
-            f"recognition needs a classifier: choose one, as in {set_option('classifier.type=c45')}"
-        )
     (reference,) = (variant for variant in backend.variants() if variant.role == "reference")
     seed = settings.run.seed
 
