@@ -1,6 +1,7 @@
 """The table `[identified]` of a scene file, in which `graspsense identify` notes what the scene was made from.
 
-It is checked and not used: the numbers of a scene are its other keys.
+The simulator checks it only: the numbers of a scene are its other keys. The trials of identified scenes need its label
+and its settings of the gripper.
 """
 
 from __future__ import annotations
