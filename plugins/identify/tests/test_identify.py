@@ -149,8 +149,9 @@ def test_recordings_without_contact_are_left_out_with_a_note_unless_all_are():
 
     assert [squeeze.name for squeeze in ready] == ["one", "one"]
     assert notes == ["left out: empty: no force exceeds the noise: nothing was touched"]
-    with pytest.raises(ConfigError, match="nothing was touched"):
-        _ready(SimConfig(), [empty], [], has_cells=False)
+    pulled = evolve(empty, warnings=("the force is negative where it is largest",))
+    with pytest.raises(ConfigError, match=r"nothing was touched\n  1 of the 1 recordings: the force is neg"):
+        _ready(SimConfig(), [pulled], [], has_cells=False)
 
 
 def test_a_ramp_at_one_speed_shows_no_memory_and_a_hold_does():

@@ -165,7 +165,7 @@ def _ready(
         except NoSqueeze as refusal:
             refused.append(refusal)
     if not ready:
-        raise refused[0]
+        raise NoSqueeze("\n  ".join((str(refused[0]), *_looks_wrong(squeezes))))
     kept = list(ready)
     for k in not_broken(list(ready.values())):
         ready[kept[k]] = prepare(squeezes[kept[k]], may_break=False)
