@@ -50,6 +50,11 @@ _OF_TIMES: Final = TIMES | {
     "since",
     "total",
 }
+_OF_A_SESSION: Final = frozenset({
+    "temperature", "temp", "humidity", "battery", "baseline", "zero", "initial", "start", "before"
+})  # fmt: skip
+_TEMPERATURES: Final = frozenset({"C", "\u00b0C", "degC"})
+"""What can be the same, or drift, in a whole session; by the name of a column, or by its unit."""
 _OFTEN: Final = 3
 """Lines with the same value from which on it may stand for something else than a measurement."""
 _FEW: Final = 0.1
@@ -147,6 +152,16 @@ def _of_time_and_digits(
             "its name is that of a time",
             [name for name in counted if name not in rising and _is_named_as_time(name)],
             "If it is the time of recording, it reveals the labels: ",
+        ),
+        (
+            "it is from before the contact, or can drift in a session, by its name or unit",
+            [
+                name
+                for name, values in numbers.items()
+                if (_OF_A_SESSION & set(words_in(name)) or columns.units[name] in _TEMPERATURES)
+                and differs_by_label(values, labels)
+            ],
+            "If it tells when a trial was recorded, it reveals the labels: ",
         ),
         (
             "its values pass from label to label without a gap or an overlap, as those of a clock or a counter do",
@@ -254,6 +269,17 @@ def passes_without_a_gap(values: Numbers, labels: Sequence[str]) -> bool:
     return bool((steps[ends] > 0.0).all() and (steps[ends] <= _USUAL * usual).all())
 
 
+def differs_by_label(values: Numbers, labels: Sequence[str]) -> bool:
+    """Return whether the values of a label vary by less than half of the variance of all values."""
+    known = np.flatnonzero(~np.isnan(values))
+    codes = np.unique(np.array(labels)[known], return_inverse=True)[1]
+    sizes = np.bincount(codes)
+    if len(sizes) < 2 or int(sizes.min()) < LEAST_LINES:
+        return False
+    means = np.bincount(codes, weights=values[known]) / sizes
+    return bool(np.var(values[known] - means[codes]) < 0.5 * np.var(values[known]))
+
+
 def is_proportional(values: Numbers, target: Numbers) -> bool:
     """Return whether these are the numbers of the target with another factor and zero, as rounding allows."""
     known = ~np.isnan(values)
@@ -285,8 +311,8 @@ def _mixed(numbers: dict[str, Numbers]) -> list[str]:
         if stand_in is not None:
             times = int((known == stand_in).sum())
             notes.append(
-                f"{name} is {stand_in:g} in {times} trials, far from all other values: if it stands for a missing "
-                "value, leave the cell empty"
+                f"{name} is {stand_in:g} in {times} trials, unlike all other values: if it stands for a missing "
+                "value, or a sensor had stopped or was at the end of its range, leave the cell empty"
             )
         elif unit_changes(known):
             notes.append(
@@ -296,7 +322,11 @@ def _mixed(numbers: dict[str, Numbers]) -> list[str]:
 
 
 def stand_in_of(known: Numbers) -> float | None:
-    """Return the value that several lines have and that is farther from all others than these are from each other."""
+    """Return the value that several lines have and that is farther from all others than these are from each other.
+
+    Or the one that is repeated by far more often than any other one, where the others hardly repeat. A zero can be
+    measured so often.
+    """
     if len(known) < 2 * LEAST_LINES:
         return None
     value, times = Counter(known.tolist()).most_common(1)[0]
@@ -304,7 +334,15 @@ def stand_in_of(known: Numbers) -> float | None:
     if times < _OFTEN or len(np.unique(others)) < LEAST_LINES:
         return None
     span = float(others.max() - others.min())
-    return float(value) if value < others.min() - span or value > others.max() + span else None
+    far = value < others.min() - span or value > others.max() + span
+    stuck = value != 0.0 and times >= LEAST_LINES and _mostly_different(others)
+    return float(value) if far or stuck else None
+
+
+def _mostly_different(values: Numbers) -> bool:
+    """Return whether no value is that of more than two lines, and few are those of two."""
+    counts = np.unique(values, return_counts=True)[1]
+    return len(values) >= LEAST_LINES and int(counts.max()) <= 2 and len(counts) > (1.0 - _FEW) * len(values)
 
 
 def unit_changes(known: Numbers) -> bool:
