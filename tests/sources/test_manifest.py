@@ -579,6 +579,13 @@ def test_what_looks_wrong_is_noticed_with_its_remedy(columns, says, tmp_path):
     assert fine.notices == ()
 
 
+def test_a_pull_is_no_contact_at_the_beginning_and_an_offset_is_no_pull(tmp_path):
+    _, force = squeezing()
+    for spoilt, says in ((-force, "-FORCE"), (force - 30.0, 'zero = "10 samples"')):
+        (recording,) = plain(tmp_path, "", force=spoilt)
+        assert [says in notice for notice in recording.notices] == [True]
+
+
 def test_what_looks_wrong_in_the_force_of_one_pad_is_told_of_that_pad(tmp_path):
     gap, force = squeezing()
     sides = "files = 'jar.csv'\nlabel = 'jar'\ntime = 't'\ngap = 'gap [mm]'\nleft = 'L'\nright = 'R'"

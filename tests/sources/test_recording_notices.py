@@ -86,6 +86,15 @@ def test_a_force_that_is_measured_more_rarely_than_the_gap_is_noticed() -> None:
     assert noticed(LEFT[tenth], RIGHT[tenth]) == ()
 
 
+def test_a_gap_that_is_measured_more_rarely_than_the_force_is_noticed_and_a_coarse_one_is_not() -> None:
+    closing = np.where(
+        T_S < 1.0, 0.08 - 0.03 * T_S, 0.05 - 0.002 * (1.0 - np.exp(-np.clip(T_S - 1.0, 0.0, None) / 0.15))
+    )
+    (notice,) = noticed(LEFT, RIGHT, closing[np.arange(300) // 20 * 20])
+    assert "every 0.2 s only" in notice
+    assert noticed(LEFT, RIGHT, np.round(closing / 0.004) * 0.004) == ()
+
+
 OPEN_AGAIN_M = np.where(T_S < 2.6, np.maximum(0.08 - 0.03 * T_S, 0.05), 0.05 + 0.1 * (T_S - 2.6))
 RELEASED_N = np.where(T_S < 2.7, LOAD_N, 0.0) + NOISE_N[0]
 

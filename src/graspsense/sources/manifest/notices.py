@@ -42,10 +42,13 @@ def notices_of(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
     yield from columns.warnings
     if len(columns) < 2:
         return
-    yield from _of_gap(columns)
+    pulls = list(_of_sign(columns))
+    yield from pulls
     if not columns.units.get("force"):
         yield from _of_unit(columns)
-    yield from _of_zero(columns, zeroed=zeroed)
+    if not pulls:
+        yield from _of_gap(columns)
+        yield from _of_zero(columns, zeroed=zeroed)
     yield from _of_time(columns)
     if _is_felt(columns.force_n):
         yield from _of_holes(columns)
@@ -79,15 +82,21 @@ def _of_unit(columns: GraspColumns) -> Iterator[str]:
         )
 
 
+def _of_sign(columns: GraspColumns) -> Iterator[str]:
+    """Yield that a force is negative where it is largest, and not all along."""
+    low, high = _usual_range(columns.force_n)
+    for name, pad in force_of_pads(columns.left_n, columns.right_n).items():
+        least, most = _usual_range(pad)
+        loaded = least < -OFFSET * (high - low) and abs(least) > abs(most)
+        if _is_felt(pad) and loaded and 2.0 * abs(float(pad[:ZERO_SAMPLES].mean())) < abs(least):
+            yield f"{name} is negative where it is largest: is it a pull? Turn its sign: -FORCE"
+
+
 def _of_zero(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
-    """Yield what looks wrong in the sign of the forces and in their zero, and whether a contact was before."""
+    """Yield what looks wrong in the zero of the forces, and whether a contact was before."""
     force = columns.force_n
     low, high = _usual_range(force)
     felt = _is_felt(force)
-    for name, pad in force_of_pads(columns.left_n, columns.right_n).items():
-        least, most = _usual_range(pad)
-        if _is_felt(pad) and least < -OFFSET * (high - low) and abs(least) > abs(most):
-            yield f"{name} is negative where it is largest: is it a pull? Turn its sign: -FORCE"
     steady, touched = _is_steady(force), not columns.units.get("force") and _both_touch_at_first(columns)
     if _falls_on_contact(columns):
         yield (
