@@ -143,6 +143,8 @@ def test_a_force_that_goes_while_the_fingers_close_further_is_noticed() -> None:
     bump = np.where((T_S > 0.3) & (T_S < 0.45), 2.0, 0.0)
     (notice,) = noticed(LEFT + bump, RIGHT + bump, closing)
     assert "comes at 0.31 s" in notice
+    # A tap before the fingers move.
+    assert "comes at 0.31 s" in "".join(noticed(LEFT + bump, RIGHT + bump, np.minimum(closing, 0.07)))
     assert noticed(LEFT, RIGHT, closing) == ()
     assert noticed(LEFT + bump, RIGHT + bump) == ()
     assert noticed(LEFT + 0.2 * bump, RIGHT + 0.2 * bump, closing) == ()  # below the force of a contact

@@ -265,7 +265,7 @@ def _bump(times: Numbers, gap: Numbers, force: Numbers, units: Mapping[str, str]
     again = end + int(back[0])
     closes = float(gap[end] - gap[again])
     glitch = end - begin <= GLITCH_SAMPLES and t_s[end] - t_s[begin] <= GLITCH_S
-    if closes > BUMP_TRAVEL * np.ptp(gap) and gap[end:again].max() < gap[begin] and not glitch:
+    if closes > BUMP_TRAVEL * np.ptp(gap) and gap[end:again].max() <= gap[begin] and not glitch:
         yield (
             f"a force comes at {t_s[begin]:.4g} s and is gone at {t_s[end]:.4g} s, the fingers close by "
             f"{closes * 1e3:.3g} mm more, and it comes back at {t_s[again]:.4g} s: the contact is the first of these. "
