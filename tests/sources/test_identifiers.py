@@ -270,6 +270,22 @@ def test_a_column_that_may_reveal_the_labels_is_told(doubt, tmp_path):
     assert notes_on(tmp_path / "t.csv", *DOUBTFUL[doubt])
 
 
+@every_case("dead", [lambda f: -f, lambda f: 0.02 * f, lambda f: 1000.0 * f])
+def test_pads_that_disagree_in_some_trials_are_told(dead, tmp_path):
+    rng = np.random.default_rng(3)
+    left = rng.normal(8.0, 1.0, N)
+    right = left * rng.normal(1.0, 0.1, N)
+
+    def pads_told(left):
+        lines = [f"{label},{a:.3f},{b:.3f}" for label, a, b in zip(LABELS, left, right, strict=True)]
+        (tmp_path / "t.csv").write_text("\n".join(["object,f_left [N],f_right [N]", *lines]) + "\n")
+        return [note for note in read_labelled(tmp_path / "t.csv", "object").notes if "f_right" in note]
+
+    assert pads_told(np.where(np.arange(N) < 30, dead(left), left))
+    assert not pads_told(left)
+    assert not pads_told(rng.normal(0.0, 1.0, N))
+
+
 def test_a_column_that_all_trials_of_a_label_have_alike_is_told(tmp_path):
     three = [f"object {i // 20}" for i in range(N)]
     for column, values in (("rate [Hz]", (100.0, 99.7, 100.0)), ("is_first", (1, 0, 0)), ("lid", "aba")):

@@ -7,7 +7,7 @@ all.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from decimal import Decimal
 from typing import TYPE_CHECKING, Final
 
@@ -67,6 +67,9 @@ _USUAL: Final = 2.0
 _THOUSAND: Final = 1000.0
 _GAP: Final = 100.0
 """Ratio of two neighbouring values between which the unit may change."""
+_APART: Final = 0.1
+_ALIKE: Final = 1.0 / 3.0
+"""Ratios of a pad to the other one below which they are far apart, and above which they are alike."""
 _PROPORTIONAL: Final = 1.0 - 1e-6
 """Correlation with the number to predict from which on a column is that number in another unit."""
 
@@ -90,7 +93,7 @@ def doubts(
         for what, doubted, advice in checks
         if doubted
     ]
-    return notes + _mixed(numbers)
+    return notes + _mixed(numbers) + list(_pads_apart(numbers))
 
 
 def not_held_out(columns: CsvColumns, names: Sequence[str], instances: Sequence[str] | None) -> list[str]:
@@ -319,6 +322,22 @@ def _mixed(numbers: dict[str, Numbers]) -> list[str]:
                 f"{name} has two groups of values, one a thousand times the other: make sure that all have one unit"
             )
     return notes
+
+
+def _pads_apart(numbers: dict[str, Numbers]) -> Iterator[str]:
+    """Yield notes on columns of two pads that agree within a factor in most trials, and are far apart in others."""
+    for name, left in numbers.items():
+        other = name.replace("left", "right")
+        if other == name or other not in numbers:
+            continue
+        both, larger = left * numbers[other], np.maximum(np.abs(left), np.abs(numbers[other]))
+        apart, alike = both < _APART * larger**2, both > _ALIKE * larger**2
+        trials, others = int(apart.sum()), int((both >= _APART * larger**2).sum())
+        if trials >= _OFTEN and others >= LEAST_LINES and int(alike.sum()) > (1.0 - _FEW) * others:
+            yield (
+                f"{name} and {other} are alike in {others} trials, and in {trials} one of them is less than "
+                f"{_APART:.0%} of the other, or has another sign: did a fingertip fail there?"
+            )
 
 
 def stand_in_of(known: Numbers) -> float | None:
