@@ -216,8 +216,8 @@ def test_a_window_of_rest_that_ends_in_the_release_shows_none():
     chosen = thresholds_for([Recording(name="squeeze", rate_hz=100.0, readings=readings)]).settings
     speed, window = chosen["controller.rest_speed_m_s"], chosen["controller.rest_window_s"]
     k = int((force >= CONTACT_FORCE_N).argmax())
-    rest = first_rest(t_s[k:], gap[k:], np.ones(len(t_s) - k, dtype=bool), speed, window)
-    assert rest is None or force[k + rest[1]] > 9.0
+    resting = first_rest(t_s[k:], gap[k:], np.ones(len(t_s) - k, dtype=bool), speed, window)
+    assert resting is None or force[k + resting[1]] > 9.0
 
 
 def test_a_window_that_is_given_decides_the_speed():

@@ -218,11 +218,12 @@ class _Noise:
             return False
         k = int(touched[0])
         shows = (self.both[k:] >= contact) | ~(self.gap[k:] > self.gap[k] + speed * window)
-        rest = first_rest(self.times[k:], self.gap[k:], shows, speed, window)
-        if rest is None:
+        resting = first_rest(self.times[k:], self.gap[k:], shows, speed, window)
+        if resting is None:
             return False
-        during = self.both[k + rest[0] : k + rest[1] + 1]
-        return bool(during[-1] > _HELD * np.median(during))
+        since, shown = resting
+        force = self.both[k + since : k + shown + 1]
+        return bool(force[-1] > _HELD * np.median(force))
 
 
 def _contact_force(measured: Sequence[_Noise], scale: _Scale) -> tuple[dict[str, float], str]:
