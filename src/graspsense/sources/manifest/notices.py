@@ -31,6 +31,8 @@ OFFSET: Final = 0.05
 """Share of the range of a pad that its force may have without contact."""
 STRONG_N: Final = 300.0
 """A force whose range is beyond that of the usual grippers is in another unit."""
+WIDEST_M: Final = 5e-4
+"""No gripper opens less (m)."""
 GLITCHES: Final = 0.01
 """Share of the samples that can be glitches, at each end of the range of a force."""
 _OFFSET: Final = ' If the fingers were free, the sensor has an offset: zero = "10 samples"'
@@ -59,6 +61,11 @@ def _of_gap(columns: GraspColumns) -> Iterator[str]:
     moved, span = float(gap[int(columns.force_n.argmax())] - gap[0]), float(np.ptp(gap))
     if span == 0.0 and not columns.units.get("gap"):
         yield "the gap does not change during the recording: is it another column?"
+    if span > 0.0 and gap.min() > 0.0 and gap.max() < WIDEST_M and not columns.units.get("gap"):
+        yield (
+            f"the gap reaches {gap.max() * 1e3:.2g} mm only, which no gripper opens to: if it is in another unit, "
+            "write that behind it, as [m] or [mm]"
+        )
     if span > 0.0 and moved > 0.2 * span:
         yield (
             "the gap rises while the force rises: is it a position that grows on closing? Write the gap as a "
