@@ -207,8 +207,9 @@ def test_what_tells_of_the_recording_by_its_name_is_no_feature(heading, tmp_path
 
 def test_what_is_measured_is_a_feature_whatever_else_its_name_says(tmp_path):
     noise = np.random.default_rng(4).normal(size=N).round(3).tolist()
-    for heading in ("robot_force", "day_temperature", "number", "rise_time [s]"):
-        trials = read_labelled(table(tmp_path / "t.csv", heading, noise), "object")
+    headings = dict.fromkeys(("robot_force", "day_temperature", "number", "rise_time [s]"), noise)
+    for heading, values in {**headings, "gap_at_start [m]": [0.0797] * N}.items():
+        trials = read_labelled(table(tmp_path / "t.csv", heading, values), "object")
         assert len(trials.table.names) == 2
         assert not any("used, although" in note for note in trials.notes)
 

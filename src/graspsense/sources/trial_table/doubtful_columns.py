@@ -277,7 +277,7 @@ def differs_by_label(values: Numbers, labels: Sequence[str]) -> bool:
     known = np.flatnonzero(~np.isnan(values))
     codes = np.unique(np.array(labels)[known], return_inverse=True)[1]
     sizes = np.bincount(codes)
-    if len(sizes) < 2 or int(sizes.min()) < LEAST_LINES:
+    if len(sizes) < 2 or int(sizes.min()) < LEAST_LINES or np.ptp(values[known]) == 0.0:
         return False
     means = np.bincount(codes, weights=values[known]) / sizes
     return bool(np.var(values[known] - means[codes]) < 0.5 * np.var(values[known]))
