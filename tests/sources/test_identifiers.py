@@ -193,6 +193,8 @@ NAMED = {
     "operator": ["anna" if i < 27 else "ben" for i in range(N)],
     "randomSeed": [1234 + 8765 * (i // 30) for i in range(N)],
     "day [day]": [i // 20 for i in range(N)],
+    "predicted": ["can" if i < 28 else "jar" for i in range(N)],
+    "wd": ["Mon" if i < 15 else "Tue" if i < 40 else "Wed" for i in range(N)],
 }
 
 
@@ -205,10 +207,23 @@ def test_what_tells_of_the_recording_by_its_name_is_no_feature(heading, tmp_path
 
 def test_what_is_measured_is_a_feature_whatever_else_its_name_says(tmp_path):
     noise = np.random.default_rng(4).normal(size=N).round(3).tolist()
-    for heading in ("robot_force", "day_temperature", "number", "rise_time [s]"):
-        trials = read_labelled(table(tmp_path / "t.csv", heading, noise), "object")
+    headings = dict.fromkeys(("robot_force", "day_temperature", "number", "rise_time [s]"), noise)
+    for heading, values in {**headings, "gap_at_start [m]": [0.0797] * N}.items():
+        trials = read_labelled(table(tmp_path / "t.csv", heading, values), "object")
         assert len(trials.table.names) == 2
         assert not any("used, although" in note for note in trials.notes)
+
+
+@every_case("outlier", [1e12, 1e99])
+def test_a_measured_column_with_a_value_far_from_the_others_is_a_feature(outlier):
+    measured = np.random.default_rng(4).normal(size=N - 1).round(4).tolist()
+    assert not identifies("x", "", [*measured, outlier], LABELS)
+
+
+def test_measured_numbers_in_the_range_of_a_clock_are_a_feature():
+    for base in (1e9, 1e12):
+        measured = base + np.random.default_rng(4).normal(size=N).round(3)
+        assert not identifies("x", "", measured.tolist(), LABELS)
 
 
 @every_case("unit", ["hours", "Minutes", "days", "nr", "ID"])
@@ -240,6 +255,13 @@ DOUBTFUL = {
     "fewer digits for a label": ("x", [*NOISE[:30], *map(round, NOISE[30:])]),
     "measured once for each object": ("weight [g]", [98.0 + 0.37 * (i // 5) for i in range(N)]),
     "a number for what is missing": ("x", [value if i % 4 else -999 for i, value in enumerate(NOISE)]),
+    "a sensor that was stuck with one label": ("f [N]", [*[3.217] * 30, *NOISE[30:]]),
+    "the end of a range": ("f [N]", [min(value, 6.5) for value in NOISE]),
+    "a temperature that drifts": ("T [C]", (21.0 + 0.05 * np.arange(N) + 0.05 * RNG.normal(size=N)).tolist()),
+    "a gap before the contact": (
+        "gap_at_start [mm]",
+        [80.0 + i // 10 + RNG.normal(0.0, 0.1) for i in range(N)],
+    ),
     "millimetres and metres": ("x", [*NOISE[:30], *[f"{value / 1000:.6f}" for value in NOISE[30:]]]),
 }
 
@@ -247,6 +269,22 @@ DOUBTFUL = {
 @every_case("doubt", DOUBTFUL)
 def test_a_column_that_may_reveal_the_labels_is_told(doubt, tmp_path):
     assert notes_on(tmp_path / "t.csv", *DOUBTFUL[doubt])
+
+
+@every_case("dead", [lambda f: -f, lambda f: 0.02 * f, lambda f: 1000.0 * f])
+def test_pads_that_disagree_in_some_trials_are_told(dead, tmp_path):
+    rng = np.random.default_rng(3)
+    left = rng.normal(8.0, 1.0, N)
+    right = left * rng.normal(1.0, 0.1, N)
+
+    def pads_told(left):
+        lines = [f"{label},{a:.3f},{b:.3f}" for label, a, b in zip(LABELS, left, right, strict=True)]
+        (tmp_path / "t.csv").write_text("\n".join(["object,f_left [N],f_right [N]", *lines]) + "\n")
+        return [note for note in read_labelled(tmp_path / "t.csv", "object").notes if "f_right" in note]
+
+    assert pads_told(np.where(np.arange(N) < 30, dead(left), left))
+    assert not pads_told(left)
+    assert not pads_told(rng.normal(0.0, 1.0, N))
 
 
 def test_a_column_that_all_trials_of_a_label_have_alike_is_told(tmp_path):
@@ -264,6 +302,7 @@ def test_measured_columns_are_not_doubted(tmp_path_factory, seed):
         rng.lognormal(0.0, 1.5, N).round(5),
         np.maximum(rng.normal(0.0, 1.0, N), 0.0).round(4),  # a force that is zero in half of the trials
         rng.normal([3.0] * 30 + [40.0] * 30, 1.0).round(),
+        rng.choice([0.05, 0.1, 0.15, 0.2, 0.25], N, p=[0.5, 0.2, 0.1, 0.1, 0.1]),  # a time in samples
     ):
         assert not notes_on(path, "width [mm]", values.tolist())
 

@@ -116,6 +116,14 @@ def jaco(path):
     return gap, force
 
 
+def test_an_ending_in_capitals_is_that_of_the_pattern(tmp_path):
+    gap, force = squeezing()
+    pandas_csv(tmp_path / "jar_1.CSV", {"t": T_S, "gap": gap, "F": force})
+    keys = "files = '{label}_{order:d}.csv'\ntime = 't'\ngap = 'gap'\nforce = 'F'"
+    (recording,) = recordings(tmp_path, keys)
+    assert (recording.label, recording.order) == ("jar", 1.0)
+
+
 def test_three_fingers_in_blocks_of_one_file_are_folded_and_kept(tmp_path):
     gap, force = jaco(tmp_path / "000_real_life_data.csv")
 
@@ -565,6 +573,7 @@ def test_a_list_names_files_and_rows_with_their_facts(tmp_path):
         ({"force": -squeezing()[1]}, "the force is negative where it is largest: .*-FORCE"),
         ({"force": 10.0 + 2.0 * np.cos(T_S)}, "the recording begins in contact: there is no approach"),
         ({"gap": np.full(300, 0.05)}, "the gap does not change"),
+        ({"gap": 1e-3 * squeezing()[0]}, r"the gap reaches 0\.\d+ mm only"),
         # From 1 N of 20 N on: the contact force is 0.625 N.
         (
             {"force": squeezing()[1][105::2], "gap": squeezing()[0][105::2], "time": T_S[105::2]},
@@ -577,6 +586,13 @@ def test_what_looks_wrong_is_noticed_with_its_remedy(columns, says, tmp_path):
     assert [notice for notice in recording.notices if re.search(says, notice)], recording.notices
     (fine,) = plain(tmp_path, "")
     assert fine.notices == ()
+
+
+def test_a_pull_is_no_contact_at_the_beginning_and_an_offset_is_no_pull(tmp_path):
+    _, force = squeezing()
+    for spoilt, says in ((-force, "-FORCE"), (force - 30.0, 'zero = "10 samples"')):
+        (recording,) = plain(tmp_path, "", force=spoilt)
+        assert [says in notice for notice in recording.notices] == [True]
 
 
 def test_what_looks_wrong_in_the_force_of_one_pad_is_told_of_that_pad(tmp_path):

@@ -202,6 +202,24 @@ def test_the_window_of_rest_is_that_of_a_step_of_the_gap(step_s, step_m, hold_s)
         assert force[k + shown] == pytest.approx(8.0, rel=0.05)
 
 
+def test_a_window_of_rest_that_ends_in_the_release_shows_none():
+    """A gap in steps of 1 mm stays for 25 ms after the fingers open, in which half of the force goes."""
+    t_s = np.arange(400) * 0.01
+    pressed = np.where(t_s > 1.3, 2.0 * (1.0 - np.exp(-np.clip(t_s - 1.3, 0.0, None) / 0.15)), 0.0)
+    opening = 40.0 * np.clip(t_s - 3.39, 0.0, None)
+    gap = np.floor(np.clip(80.0 - 30.0 * (t_s - 0.3), 50.0, 80.0) - pressed + opening) * 1e-3
+    force = np.maximum(5.0 * (pressed - opening), 0.0)
+    readings = tuple(
+        Reading(Frame(t, 0.01, g, 0.0, nan, f, f, nan, nan, 0), NO_PADS)
+        for t, g, f in zip(t_s.tolist(), gap.tolist(), force.tolist(), strict=True)
+    )
+    chosen = thresholds_for([Recording(name="squeeze", rate_hz=100.0, readings=readings)]).settings
+    speed, window = chosen["controller.rest_speed_m_s"], chosen["controller.rest_window_s"]
+    k = int((force >= CONTACT_FORCE_N).argmax())
+    resting = first_rest(t_s[k:], gap[k:], np.ones(len(t_s) - k, dtype=bool), speed, window)
+    assert resting is None or force[k + resting[1]] > 9.0
+
+
 def test_a_window_that_is_given_decides_the_speed():
     recordings = [coarse(slow_squeeze(1.5, seed=k), 1e-4) for k in range(3)]
     settings = thresholds_for(recordings, {}, {"rest_window_s": 0.3}).settings

@@ -86,6 +86,15 @@ def test_a_force_that_is_measured_more_rarely_than_the_gap_is_noticed() -> None:
     assert noticed(LEFT[tenth], RIGHT[tenth]) == ()
 
 
+def test_a_gap_that_is_measured_more_rarely_than_the_force_is_noticed_and_a_coarse_one_is_not() -> None:
+    closing = np.where(
+        T_S < 1.0, 0.08 - 0.03 * T_S, 0.05 - 0.002 * (1.0 - np.exp(-np.clip(T_S - 1.0, 0.0, None) / 0.15))
+    )
+    (notice,) = noticed(LEFT, RIGHT, closing[np.arange(300) // 20 * 20])
+    assert "every 0.2 s only" in notice
+    assert noticed(LEFT, RIGHT, np.round(closing / 0.004) * 0.004) == ()
+
+
 OPEN_AGAIN_M = np.where(T_S < 2.6, np.maximum(0.08 - 0.03 * T_S, 0.05), 0.05 + 0.1 * (T_S - 2.6))
 RELEASED_N = np.where(T_S < 2.7, LOAD_N, 0.0) + NOISE_N[0]
 
@@ -134,6 +143,8 @@ def test_a_force_that_goes_while_the_fingers_close_further_is_noticed() -> None:
     bump = np.where((T_S > 0.3) & (T_S < 0.45), 2.0, 0.0)
     (notice,) = noticed(LEFT + bump, RIGHT + bump, closing)
     assert "comes at 0.31 s" in notice
+    # A tap before the fingers move.
+    assert "comes at 0.31 s" in "".join(noticed(LEFT + bump, RIGHT + bump, np.minimum(closing, 0.07)))
     assert noticed(LEFT, RIGHT, closing) == ()
     assert noticed(LEFT + bump, RIGHT + bump) == ()
     assert noticed(LEFT + 0.2 * bump, RIGHT + 0.2 * bump, closing) == ()  # below the force of a contact

@@ -12,9 +12,9 @@ from graspsense.evaluation.evaluate import evaluate
 from graspsense.sources.trial_table.features_csv import read_labelled
 
 
-def measured(factor):
+def measured(factor, base=0.0):
     rng = np.random.default_rng(2)
-    values = np.array([[rng.normal((6.0, 11.0)[i % 2], 0.6)] for i in range(40)]) * factor
+    values = np.array([[rng.normal((6.0, 11.0)[i % 2], 0.6)] for i in range(40)]) * factor + base
     table = FeatureTable(names=("compliance",), units=("m/N",), values=values)
     return Labelled(source="made here", table=table, labels=("stiff", "soft") * 20)
 
@@ -33,6 +33,25 @@ def test_a_classifier_recognises_what_differs_by_less_than_micrometres(classifie
         learning_curve=False,
     )
     assert evaluation.headline.rate >= 0.9
+
+
+def test_c45_recognises_what_differs_by_a_small_share_of_itself():
+    evaluation = evaluate(
+        select_component("classifier", "c45"),
+        measured(1e-12, 1.0),
+        classifier="c45",
+        folds=4,
+        controls=False,
+        learning_curve=False,
+    )
+    assert evaluation.headline.rate >= 0.9
+
+
+def test_a_column_that_differs_by_rounding_alone_is_no_feature(tmp_path):
+    path = tmp_path / "t.csv"
+    lines = [f"{'ab'[k % 2]},{1.0 + 2.0**-52 * (k * 7 % 5)!r},{k * 7 % 11}" for k in range(40)]
+    path.write_text("\n".join(["what,k [m],force", *lines]))
+    assert read_labelled(path, "what").table.names == ("force",)
 
 
 def test_a_table_whose_columns_vary_by_little_is_read_with_a_note(tmp_path):

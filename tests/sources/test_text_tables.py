@@ -68,6 +68,7 @@ VARIANTS = {
     "units": [HEADER, "s,mm,N,N", *ROWS],
     "units in brackets": [HEADER, "[s],[mm],(N),(N)", *ROWS],
     "preamble and units": ["Instrument: X", "", HEADER, "s,mm,N,N", *ROWS],
+    "units and remarks": [HEADER, "s,mm,N,N", ",encoder,left pad,right pad", *ROWS],
     "separator": ["sep=,", HEADER, *ROWS],
     "separator of Excel": ["sep=;", HEADER.replace(",", ";"), *DECIMAL_COMMAS],
     "repeated header": [HEADER, *ROWS[:90], HEADER, *ROWS[90:]],
@@ -199,6 +200,9 @@ def test_advice_on_repeated_times_is_tried_first(tmp_path):
     assert [notice for notice in dropped.notices if "190 samples" in notice]
     (repeated,) = recordings(tmp_path, [HEADER, *ROWS[:50], ROWS[49], *ROWS[50:]])
     assert 'duplicates = "drop"' in str(repeated.error)
+    twice = [HEADER, *(row for row in ROWS for _ in range(2))]
+    (repeated,) = recordings(tmp_path, twice)
+    assert "leaves out 200 of 400" in str(repeated.error)
 
 
 @every_case(
@@ -274,6 +278,8 @@ def test_a_unit_that_the_file_states_is_used_or_told(tmp_path, header, units, ke
             ("jar.csv", "line 152", "f1", "8,5"),
         ),
         (["a,b", "a,b", "a,b", *ROWS], ('start = "',)),
+        # The rows behind a repeated header are in other units.
+        ([HEADER, "s,mm,N,N", *ROWS[:90], HEADER, "s,cm,N,N", *ROWS[90:]], ("jar.csv", "line 94")),
     ],
 )
 def test_a_column_in_two_notations_and_numbers_without_a_header_are_refused(tmp_path, lines, words):

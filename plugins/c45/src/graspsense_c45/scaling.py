@@ -19,7 +19,7 @@ from graspsense_c45.tree import Tree
 
 _GAPS = 100
 """Fewest gaps that the values of a column must span to be used as they are."""
-_ROUNDING = 1e-9
+_ROUNDING = 1e-13
 """Variation relative to the largest value that is only rounding, and no measurement."""
 
 

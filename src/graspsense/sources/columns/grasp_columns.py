@@ -365,12 +365,13 @@ def check_increasing(columns: GraspColumns) -> None:
         t0, t1 = columns.t_s[k].item(), columns.t_s[k + 1].item()
         raise DataDamaged(
             f"{columns.source}, {columns.place(k + 1)}: the time goes from {t0!r} to {t1!r}; it must increase. "
-            + _advice_on_times(columns.t_s)
+            + _advice_on_times(columns)
         )
 
 
-def _advice_on_times(t_s: Numbers) -> str:
+def _advice_on_times(columns: GraspColumns) -> str:
     """Return what to do about times that do not increase, as far as it would help: it is tried on these times."""
+    t_s = columns.t_s
     split = 'If the rows come from several grasps, split the file by a column: split = "COLUMN"'
     steps = np.diff(t_s)
     if bool((steps < 0.0).any()):
@@ -382,7 +383,10 @@ def _advice_on_times(t_s: Numbers) -> str:
         )
     new = 1 + int((steps > 0.0).sum())
     lost = len(t_s) - new
-    if lost <= LARGE_LOSS * len(t_s):
+    values = np.column_stack((columns.gap_m, columns.left_n, columns.right_n))
+    same = steps == 0.0
+    twice = not (same[1:] & same[:-1]).any() and bool((np.diff(values, axis=0)[same] == 0.0).all())
+    if twice or lost <= LARGE_LOSS * len(t_s):
         return (
             f'If rows are repeated, write duplicates = "drop" in the manifest, which leaves out {lost} of {len(t_s)}. '
             + split

@@ -67,9 +67,10 @@ STOPPED_STEPS: Final = 5.0
 """Least steps of a gap that one goes on by, at least, when its sensor had stopped."""
 SELDOM_S: Final = 0.05
 SELDOM_ROWS: Final = 5
-"""A force that keeps each value for so long, and so many samples, is measured more rarely than the gap."""
+"""A force or gap that keeps each value for so long, and so many samples, is measured more rarely than the rows."""
 LARGE_CHANGE: Final = 0.2
-"""Share of its range by which such a force changes at once where contact and rest are seen too late."""
+LARGE_STEP: Final = 0.1
+"""Share of its range by which such a force, or such a gap, changes at once where contact and rest are seen too late."""
 FEWEST_CHANGES: Final = 5
 SELDOM_SHARE: Final = 0.1
 """Share of the changes of such a force that may be closer to the one before."""
@@ -110,11 +111,15 @@ def signal_notices(recording: Recording) -> Iterator[str]:
         if int(known.sum()) >= FEWEST:
             if "t" not in recording.units:
                 yield from _glitches(what, times[known], force[known], recording.units)
-                yield from _seldom(what, times[known], force[known])
+                yield from _seldom(what, times[known], force[known], LARGE_CHANGE)
             yield from _drift(what, gap[known], force[known], recording.units)
     if not {"gap", "t"} & recording.units.keys() and len(gap) >= FEWEST:
         yield from _bump(times, gap, (left + right) / 2.0, recording.units)
         yield from _jump(times, gap)
+        steps = np.abs(np.diff(gap))
+        # The steps of a coarse gap are alike.
+        if JUMP * steps.min(initial=np.inf, where=steps > 0.0) < steps.max():
+            yield from _seldom("the gap", times, gap, LARGE_STEP)
         yield from _stopped_gap(times, gap, (left + right) / 2.0)
 
 
@@ -202,18 +207,18 @@ def _course(force: Numbers, longest: int) -> Numbers:
     return np.median(np.lib.stride_tricks.sliding_window_view(around, 2 * longest + 1), axis=1)
 
 
-def _seldom(what: str, times: Numbers, force: Numbers) -> Iterator[str]:
-    """Yield that a force has a new value so rarely (s) that it changes by much of its range at once."""
-    changes = np.flatnonzero(np.diff(force)) + 1
+def _seldom(what: str, times: Numbers, values: Numbers, large: float) -> Iterator[str]:
+    """Yield that values are new so rarely (s) that they change by a `large` share of their range at once."""
+    changes = np.flatnonzero(np.diff(values)) + 1
     if len(changes) < FEWEST_CHANGES:
         return
     every_s = float(np.quantile(np.diff(times[changes]), SELDOM_SHARE))
     rows = float(np.quantile(np.diff(changes), SELDOM_SHARE))
-    largest = float(np.abs(np.diff(force)).max())
-    if every_s >= SELDOM_S and rows >= SELDOM_ROWS and largest > LARGE_CHANGE * np.ptp(force):
+    largest = float(np.abs(np.diff(values)).max())
+    if every_s >= SELDOM_S and rows >= SELDOM_ROWS and largest > large * np.ptp(values):
         yield (
-            f"{what} has a new value every {every_s:.2g} s only, and the gap has more: a contact is seen up to so much "
-            "too late, and a rest with an older force"
+            f"{what} has a new value every {every_s:.2g} s only, more rarely than the rows: a contact is seen up to so "
+            "much too late, and a rest with an older value"
         )
 
 
@@ -260,7 +265,7 @@ def _bump(times: Numbers, gap: Numbers, force: Numbers, units: Mapping[str, str]
     again = end + int(back[0])
     closes = float(gap[end] - gap[again])
     glitch = end - begin <= GLITCH_SAMPLES and t_s[end] - t_s[begin] <= GLITCH_S
-    if closes > BUMP_TRAVEL * np.ptp(gap) and gap[end:again].max() < gap[begin] and not glitch:
+    if closes > BUMP_TRAVEL * np.ptp(gap) and gap[end:again].max() <= gap[begin] and not glitch:
         yield (
             f"a force comes at {t_s[begin]:.4g} s and is gone at {t_s[end]:.4g} s, the fingers close by "
             f"{closes * 1e3:.3g} mm more, and it comes back at {t_s[again]:.4g} s: the contact is the first of these. "

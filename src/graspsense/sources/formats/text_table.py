@@ -211,11 +211,6 @@ class _Layout:
             for k in range(width)
         ]
         able = [k for k in range(data) if _can_be_names(self.rows[k][1], width, texts)]
-        units: list[str] | None = None
-        if len(able) > 1 and able[-1] == able[-2] + 1 and _are_units(self.rows[able[-1]][1]):
-            units = [cell.strip("[]()") for cell in self.rows[able.pop()][1]]
-        elif able and able[-1] + 1 < data and _are_units(self.rows[able[-1] + 1][1]):
-            units = [cell.strip("[]()") for cell in self.rows[able[-1] + 1][1]]
         if not able:
             number, row = self.rows[data]
             if all(len(row) == 1 for _, row in self.rows[:data]):
@@ -228,7 +223,14 @@ class _Layout:
                 f"{width} columns. If line {self.rows[data - 1][0]} is to be left out and the names stand in the next "
                 'line, say so in a manifest: start = "a text in that line"'
             )
-        names = able[-1]
+        # Units come behind the names, and remarks on the columns may come behind the units.
+        with_units = [
+            k
+            for k in able
+            if k + 1 < data and _are_units(self.rows[k + 1][1]) and {*range(k + 2, data)} <= {*able}
+        ]
+        names = (with_units or able[-1:])[0]
+        units = [cell.strip("[]()") for cell in self.rows[names + 1][1]] if with_units else None
         if names:
             self._refuse_numbers_before(names)
             skipped = [number for number, _ in self.rows[:names]]
@@ -236,7 +238,7 @@ class _Layout:
                 f"the names of the columns are those of line {self.rows[names][0]}; "
                 + _lines_words(skipped, "lines before them")
             )
-        return self.rows[names][1], units, names + (2 if units else 1), self.rows[names][0]
+        return self.rows[names][1], units, data if units else names + 1, self.rows[names][0]
 
     def _refuse_numbers_before(self, names: int) -> None:
         """Raise DataDamaged if rows of numbers that may be a part of the data come before the row `names`."""
@@ -282,7 +284,7 @@ class _Layout:
         if not again or all(map(is_number, header)):
             return rows
         self.notes.append(_lines_words(again, "repeated headers"))
-        return [row for row in rows if row[1] != header and not (units and _are_units(row[1]))]
+        return [row for row in rows if row[1] != header and [cell.strip("[]()") for cell in row[1]] != units]
 
     def _without_blank_end(self, names: list[str], rows: list[Row]) -> tuple[list[str], list[Row]]:
         """Return names and rows without a last column that a separator at the end of the lines makes."""

@@ -56,7 +56,8 @@ def _matching(manifest: ReadManifest) -> Iterator[NamedFile]:
         if path.name == manifest.place.name and path.resolve() == manifest.place.resolve():
             continue
         try:
-            matches = (template.fields(name) for template in templates)
+            spelled = (name, name.removesuffix(path.suffix) + path.suffix.lower())  # such as .CSV
+            matches = (template.fields(text) for text in spelled for template in templates)
             fields = next((match for match in matches if match is not None), None)
         except PatternError as error:
             raise ConfigError(f"{manifest.place}: files: {error}") from None

@@ -31,6 +31,8 @@ OFFSET: Final = 0.05
 """Share of the range of a pad that its force may have without contact."""
 STRONG_N: Final = 300.0
 """A force whose range is beyond that of the usual grippers is in another unit."""
+WIDEST_M: Final = 5e-4
+"""No gripper opens less (m)."""
 GLITCHES: Final = 0.01
 """Share of the samples that can be glitches, at each end of the range of a force."""
 _OFFSET: Final = ' If the fingers were free, the sensor has an offset: zero = "10 samples"'
@@ -42,10 +44,13 @@ def notices_of(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
     yield from columns.warnings
     if len(columns) < 2:
         return
-    yield from _of_gap(columns)
+    pulls = list(_of_sign(columns))
+    yield from pulls
     if not columns.units.get("force"):
         yield from _of_unit(columns)
-    yield from _of_zero(columns, zeroed=zeroed)
+    if not pulls:
+        yield from _of_gap(columns)
+        yield from _of_zero(columns, zeroed=zeroed)
     yield from _of_time(columns)
     if _is_felt(columns.force_n):
         yield from _of_holes(columns)
@@ -56,6 +61,11 @@ def _of_gap(columns: GraspColumns) -> Iterator[str]:
     moved, span = float(gap[int(columns.force_n.argmax())] - gap[0]), float(np.ptp(gap))
     if span == 0.0 and not columns.units.get("gap"):
         yield "the gap does not change during the recording: is it another column?"
+    if span > 0.0 and gap.min() > 0.0 and gap.max() < WIDEST_M and not columns.units.get("gap"):
+        yield (
+            f"the gap reaches {gap.max() * 1e3:.2g} mm only, which no gripper opens to: if it is in another unit, "
+            "write that behind it, as [m] or [mm]"
+        )
     if span > 0.0 and moved > 0.2 * span:
         yield (
             "the gap rises while the force rises: is it a position that grows on closing? Write the gap as a "
@@ -79,15 +89,21 @@ def _of_unit(columns: GraspColumns) -> Iterator[str]:
         )
 
 
+def _of_sign(columns: GraspColumns) -> Iterator[str]:
+    """Yield that a force is negative where it is largest, and not all along."""
+    low, high = _usual_range(columns.force_n)
+    for name, pad in force_of_pads(columns.left_n, columns.right_n).items():
+        least, most = _usual_range(pad)
+        loaded = least < -OFFSET * (high - low) and abs(least) > abs(most)
+        if _is_felt(pad) and loaded and 2.0 * abs(float(pad[:ZERO_SAMPLES].mean())) < abs(least):
+            yield f"{name} is negative where it is largest: is it a pull? Turn its sign: -FORCE"
+
+
 def _of_zero(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
-    """Yield what looks wrong in the sign of the forces and in their zero, and whether a contact was before."""
+    """Yield what looks wrong in the zero of the forces, and whether a contact was before."""
     force = columns.force_n
     low, high = _usual_range(force)
     felt = _is_felt(force)
-    for name, pad in force_of_pads(columns.left_n, columns.right_n).items():
-        least, most = _usual_range(pad)
-        if _is_felt(pad) and least < -OFFSET * (high - low) and abs(least) > abs(most):
-            yield f"{name} is negative where it is largest: is it a pull? Turn its sign: -FORCE"
     steady, touched = _is_steady(force), not columns.units.get("force") and _both_touch_at_first(columns)
     if _falls_on_contact(columns):
         yield (

@@ -48,6 +48,8 @@ _EARLY_SHARE: Final = 0.2
 """Share of the peak force up to which a force counts as without contact."""
 _FEW: Final = 5
 """Number of samples that scatter is computed from at least, and that a window of rest has at least in noise."""
+_HELD: Final = 0.75
+"""Share of the force in a window of rest below which the force at its end is that of a release."""
 _PRESSED: Final = 0.9
 """Share of the peak force from which on a gap is nearly at rest."""
 _REACHING: Final = 0.75
@@ -210,13 +212,18 @@ class _Noise:
         )
 
     def rests(self, contact: float, speed: float, window: float) -> bool:
-        """Return whether it comes to rest after both pads have touched, with these thresholds."""
+        """Return whether it comes to rest after both pads have touched, and still presses where that shows."""
         touched = np.flatnonzero(self.both >= contact)
         if not len(touched):
             return False
         k = int(touched[0])
         shows = (self.both[k:] >= contact) | ~(self.gap[k:] > self.gap[k] + speed * window)
-        return first_rest(self.times[k:], self.gap[k:], shows, speed, window) is not None
+        resting = first_rest(self.times[k:], self.gap[k:], shows, speed, window)
+        if resting is None:
+            return False
+        since, shown = resting
+        force = self.both[k + since : k + shown + 1]
+        return bool(force[-1] > _HELD * np.median(force))
 
 
 def _contact_force(measured: Sequence[_Noise], scale: _Scale) -> tuple[dict[str, float], str]:

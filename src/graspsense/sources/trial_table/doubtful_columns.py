@@ -7,7 +7,7 @@ all.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from decimal import Decimal
 from typing import TYPE_CHECKING, Final
 
@@ -50,6 +50,11 @@ _OF_TIMES: Final = TIMES | {
     "since",
     "total",
 }
+_OF_A_SESSION: Final = frozenset({
+    "temperature", "temp", "humidity", "battery", "baseline", "zero", "initial", "start", "before"
+})  # fmt: skip
+_TEMPERATURES: Final = frozenset({"C", "\u00b0C", "degC"})
+"""What can be the same, or drift, in a whole session; by the name of a column, or by its unit."""
 _OFTEN: Final = 3
 """Lines with the same value from which on it may stand for something else than a measurement."""
 _FEW: Final = 0.1
@@ -62,6 +67,9 @@ _USUAL: Final = 2.0
 _THOUSAND: Final = 1000.0
 _GAP: Final = 100.0
 """Ratio of two neighbouring values between which the unit may change."""
+_APART: Final = 0.1
+_ALIKE: Final = 1.0 / 3.0
+"""Ratios of a pad to the other one below which they are far apart, and above which they are alike."""
 _PROPORTIONAL: Final = 1.0 - 1e-6
 """Correlation with the number to predict from which on a column is that number in another unit."""
 
@@ -85,7 +93,7 @@ def doubts(
         for what, doubted, advice in checks
         if doubted
     ]
-    return notes + _mixed(numbers)
+    return notes + _mixed(numbers) + list(_pads_apart(numbers))
 
 
 def not_held_out(columns: CsvColumns, names: Sequence[str], instances: Sequence[str] | None) -> list[str]:
@@ -147,6 +155,16 @@ def _of_time_and_digits(
             "its name is that of a time",
             [name for name in counted if name not in rising and _is_named_as_time(name)],
             "If it is the time of recording, it reveals the labels: ",
+        ),
+        (
+            "it is from before the contact, or can drift in a session, by its name or unit",
+            [
+                name
+                for name, values in numbers.items()
+                if (_OF_A_SESSION & set(words_in(name)) or columns.units[name] in _TEMPERATURES)
+                and differs_by_label(values, labels)
+            ],
+            "If it tells when a trial was recorded, it reveals the labels: ",
         ),
         (
             "its values pass from label to label without a gap or an overlap, as those of a clock or a counter do",
@@ -254,6 +272,17 @@ def passes_without_a_gap(values: Numbers, labels: Sequence[str]) -> bool:
     return bool((steps[ends] > 0.0).all() and (steps[ends] <= _USUAL * usual).all())
 
 
+def differs_by_label(values: Numbers, labels: Sequence[str]) -> bool:
+    """Return whether the values of a label vary by less than half of the variance of all values."""
+    known = np.flatnonzero(~np.isnan(values))
+    codes = np.unique(np.array(labels)[known], return_inverse=True)[1]
+    sizes = np.bincount(codes)
+    if len(sizes) < 2 or int(sizes.min()) < LEAST_LINES or np.ptp(values[known]) == 0.0:
+        return False
+    means = np.bincount(codes, weights=values[known]) / sizes
+    return bool(np.var(values[known] - means[codes]) < 0.5 * np.var(values[known]))
+
+
 def is_proportional(values: Numbers, target: Numbers) -> bool:
     """Return whether these are the numbers of the target with another factor and zero, as rounding allows."""
     known = ~np.isnan(values)
@@ -285,8 +314,8 @@ def _mixed(numbers: dict[str, Numbers]) -> list[str]:
         if stand_in is not None:
             times = int((known == stand_in).sum())
             notes.append(
-                f"{name} is {stand_in:g} in {times} trials, far from all other values: if it stands for a missing "
-                "value, leave the cell empty"
+                f"{name} is {stand_in:g} in {times} trials, unlike all other values: if it stands for a missing "
+                "value, or a sensor had stopped or was at the end of its range, leave the cell empty"
             )
         elif unit_changes(known):
             notes.append(
@@ -295,8 +324,28 @@ def _mixed(numbers: dict[str, Numbers]) -> list[str]:
     return notes
 
 
+def _pads_apart(numbers: dict[str, Numbers]) -> Iterator[str]:
+    """Yield notes on columns of two pads that agree within a factor in most trials, and are far apart in others."""
+    for name, left in numbers.items():
+        other = name.replace("left", "right")
+        if other == name or other not in numbers:
+            continue
+        both, larger = left * numbers[other], np.maximum(np.abs(left), np.abs(numbers[other]))
+        apart, alike = both < _APART * larger**2, both > _ALIKE * larger**2
+        trials, others = int(apart.sum()), int((both >= _APART * larger**2).sum())
+        if trials >= _OFTEN and others >= LEAST_LINES and int(alike.sum()) > (1.0 - _FEW) * others:
+            yield (
+                f"{name} and {other} are alike in {others} trials, and in {trials} one of them is less than "
+                f"{_APART:.0%} of the other, or has another sign: did a fingertip fail there?"
+            )
+
+
 def stand_in_of(known: Numbers) -> float | None:
-    """Return the value that several lines have and that is farther from all others than these are from each other."""
+    """Return the value that several lines have and that is farther from all others than these are from each other.
+
+    Or the one that is repeated by far more often than any other one, where the others hardly repeat. A zero can be
+    measured so often.
+    """
     if len(known) < 2 * LEAST_LINES:
         return None
     value, times = Counter(known.tolist()).most_common(1)[0]
@@ -304,7 +353,15 @@ def stand_in_of(known: Numbers) -> float | None:
     if times < _OFTEN or len(np.unique(others)) < LEAST_LINES:
         return None
     span = float(others.max() - others.min())
-    return float(value) if value < others.min() - span or value > others.max() + span else None
+    far = value < others.min() - span or value > others.max() + span
+    stuck = value != 0.0 and times >= LEAST_LINES and _mostly_different(others)
+    return float(value) if far or stuck else None
+
+
+def _mostly_different(values: Numbers) -> bool:
+    """Return whether no value is that of more than two lines, and few are those of two."""
+    counts = np.unique(values, return_counts=True)[1]
+    return len(values) >= LEAST_LINES and int(counts.max()) <= 2 and len(counts) > (1.0 - _FEW) * len(values)
 
 
 def unit_changes(known: Numbers) -> bool:

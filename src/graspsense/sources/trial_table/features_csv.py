@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 SMALL: Final = 1e-3
 """A column that varies by less than this has few values that differ by J48's 1e-5."""
+_ROUNDING: Final = 1e-13
+"""Variation relative to the largest value that is only rounding, and no measurement, as in C4.5 trees."""
 LARGEST_WHOLE: Final = 2.0**53
 """From here on, not every whole number is a number of the computer."""
 
@@ -208,14 +210,17 @@ def _identified(columns: CsvColumns, labels: Sequence[str], order: Sequence[int]
         values = columns.numbers(name)
         why = identifies(name, columns.units[name], values, labels, order)
         if not why and _loses_digits(columns.cells[name], values):
-            why = "differ in digits that a number does not keep (subtract an offset)"
+            why = "differ in their last digits alone, which are rounding (subtract an offset)"
     if not why and names_a_recording(name):
         return "tell of the recording and not of the grasp, by their name"
     return why
 
 
 def _loses_digits(cells: Sequence[str], values: Sequence[float]) -> bool:
-    """Return whether different whole numbers of so many digits are the same number."""
+    """Return whether different whole numbers are the same number, or all numbers are but for rounding."""
+    known = np.array([value for value in values if value == value])
+    if len(known) and 0.0 < _span(known) < min(SMALL, _ROUNDING * float(np.abs(known).max())):
+        return True
     return len(set(values)) < len(set(cells)) and any(abs(value) >= LARGEST_WHOLE for value in values)
 
 

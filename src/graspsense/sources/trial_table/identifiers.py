@@ -37,10 +37,10 @@ _NAMES: Final = frozenset({
 })  # fmt: skip
 _OF_RECORDINGS: Final = frozenset({
     "session", "operator", "experimenter", "person", "user", "robot", "host", "seed", "batch", "weekday", "day", "date",
-    "datetime", "trial", "fold", "split", "file", "filename", "uid", "uuid",
+    "datetime", "trial", "fold", "split", "file", "filename", "uid", "uuid", "prediction", "predicted",
 })  # fmt: skip
-"""What a recording is known by; no gripper measures it."""
-_DIVISIONS: Final = frozenset({"seed", "trial", "fold", "split", "uid", "uuid"})
+"""What a recording is known by, and what a model said of it; no gripper measures it."""
+_DIVISIONS: Final = frozenset({"seed", "trial", "fold", "split", "uid", "uuid", "prediction", "predicted"})
 """Those that tell nothing of what was the same for several recordings."""
 _NUMBERED: Final = frozenset(
     {"id", "no", "nr", "num", "number", "index", "idx", "name", "code", "of", "the", "random"}
@@ -63,14 +63,18 @@ _ENDS: Final = 2
 """Objects that may have fewer lines than the others: the one that came before all others, and the last one."""
 _HASHED: Final = 1e7
 """Integers from this one on are hashes, if they number objects and are no multiples of 1000."""
-_EPOCHS: Final = tuple((6.3e8 * unit, 4.2e9 * unit) for unit in (1.0, 1e3, 1e6, 1e9))
-"""The years 1990 to 2100 in seconds, and smaller units, since 1970."""
+_EPOCH_S: Final = (6.3e8, 4.2e9)
+"""The years 1990 to 2100 in seconds since 1970."""
+_PER_SECOND: Final = (1.0, 1e3, 1e6, 1e9)
+"""The units of such times."""
 _MOST_VALUES: Final = 1.0 / 3.0
 """Share of different texts from which on they are no values of a nominal feature."""
 _DATE_TEXT: Final = re.compile(
     r"(\d{1,4}([-./])\d{1,2}\2\d{1,4})?[T ]?(\d{1,2}(:\d{2}){1,2}(\.\d+)?)?( ?Z| ?[+-]\d\d:?\d\d)?"
 )
-_WEEKDAYS: Final = frozenset(["monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday"])
+_WEEKDAYS: Final = re.compile(
+    r"mon(day)?|tue(sday)?|wed(nesday)?|thu(rsday)?|fri(day)?|sat(urday)?|sun(day)?"
+)
 _DATES: Final = ("%Y%m%d", "%Y%m%d%H%M", "%Y%m%d%H%M%S")
 
 
@@ -115,6 +119,8 @@ def identifies(
     whole = bool((column == np.floor(column)).all())
     values_of = np.unique(column)
     cells = cells_in_range(values_of) + 1.0
+    if cells < len(values_of):  # a value far from the others hides their grid
+        cells = math.inf
     if len(set(zip(column.tolist(), known, strict=True))) >= (1.0 - _TIES) * len(column):
         named = bool(_NAMES & set(words_in(name)))
         for lines in (given, None if order is None else np.array(order)[given]):
@@ -144,7 +150,9 @@ def text_identifies(texts: Sequence[str], labels: Sequence[str]) -> str:
     counts = Counter(text for text, _ in given)
     if len(counts) < 2:
         return ""
-    if all(map(_is_date, counts)) or (len(counts) > 2 and {text.lower() for text in counts} <= _WEEKDAYS):
+    if all(map(_is_date, counts)) or (
+        len(counts) > 2 and all(_WEEKDAYS.fullmatch(text.lower()) for text in counts)
+    ):
         return "are dates or times"
     if len(counts) > max(2, len(given) * _MOST_VALUES):
         return "are texts that hardly repeat, as names of trials, files and remarks do"
@@ -179,10 +187,12 @@ def words_in(name: str) -> list[str]:
 
 def _is_calendar(column: NDArray[np.float64]) -> bool:
     """Return whether these are times since 1970, or dates written as 20261126."""
-    least, most = float(column.min()), float(column.max())
-    if (
-        any(low <= least and most <= high for low, high in _EPOCHS)
-        and len(np.unique(column)) > len(column) / 2
+    least, most, distinct = float(column.min()), float(column.max()), len(np.unique(column))
+    low, high = _EPOCH_S
+    # No two grasps are recorded within a second.
+    if distinct > len(column) / 2 and any(
+        low * unit <= least and most <= high * unit and most - least >= (distinct - 1) * unit
+        for unit in _PER_SECOND
     ):
         return True
     if least < 19_700_101 or (column != np.floor(column)).any():
@@ -238,7 +248,7 @@ def _is_regular(values: NDArray[np.float64], most: float = _IRREGULAR) -> bool:
 def _hardly_repeats(n: int, distinct: int, cells: float) -> bool:
     """Return whether values on a grid repeat too rarely to be measured, if all its cells are as frequent."""
     ties = n - distinct
-    if ties == 0:
+    if ties == 0 or math.isinf(cells):
         return bool(np.log1p(-np.arange(n) / max(cells, n)).sum() < math.log(_BY_CHANCE))
     expected = n - cells * -math.expm1(n * math.log1p(-1.0 / cells))
     # The number of ties is about a Poisson variable.
