@@ -65,16 +65,18 @@ def coverage(k: int, rate: float, correlation: float, repeats: int, seed: int = 
 
 
 def evaluated(k: int, repeats: int, classifier: str = "c45") -> dict[str, float]:
-    """Return the coverage for a classifier that is cross-validated on two states of each of `k` instances."""
+    """Return the coverage for a classifier that is cross-validated on `k` instances, half of them full."""
     component = installed().find("classifier", classifier)
     learner = SelectedComponent(component, component.config_class()())
     rates, intervals = [], []
     for seed in range(repeats):
         rng = np.random.default_rng([1, k, seed])
         instance = np.repeat(np.arange(k), TRIALS)
-        full = np.tile(np.arange(TRIALS) % 2, k)
+        full = instance % 2
         shift = rng.normal(size=(k, 2))[instance]
-        values = 2.0 * full[:, np.newaxis] * np.array([1.0, 0.6]) + shift + rng.normal(size=(k * TRIALS, 2))
+        values = (
+            3.0 * full[:, np.newaxis] * np.array([1.0, 0.6]) + shift + 0.5 * rng.normal(size=(k * TRIALS, 2))
+        )
         trials = Labelled(
             source="normal features",
             table=FeatureTable(names=("a", "b"), units=("", ""), values=values),

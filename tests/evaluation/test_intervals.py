@@ -1,3 +1,4 @@
+import interval_coverage
 import numpy as np
 import pytest
 from cases import every_case
@@ -139,3 +140,15 @@ def test_instances_that_agree_give_no_interval_narrower_than_their_trials(counts
     low, high = rate_of(right, names).interval
     below, above = RecognitionRate(sum(right), len(right)).interval
     assert 0.0 <= low <= below <= above <= high <= 1.0
+
+
+def test_the_interval_of_a_cross_validated_rate_covers_the_rate_of_such_trials():
+    """Of the same intervals without the training trials that folds share, 83 % contain the true rate here."""
+    assert interval_coverage.evaluated(12, 60)["graspsense"] >= 0.9
+
+
+def test_folds_that_share_their_training_trials_widen_an_interval():
+    # The variance of a mean of ten folds is multiplied by 1 + 10 / 9.
+    effect = 1.0 + 10.0 / 9.0
+    right = [True] * 30 + [False] * 10
+    assert rate_of(right, folds=10).interval == pytest.approx(wilson(30 / effect, 40 / effect))

@@ -156,7 +156,7 @@ def test_the_headline_of_the_page_has_the_rate_without_the_luck_of_the_choice():
         )
         for k in range(32)
     }
-    ranking = ranking_of(measured, "folds", trials, ())
+    ranking = ranking_of(measured, "folds", trials, (), 10)
     best = ranking.candidates[0].rates["folds"].rate
 
     assert best > ranking.chosen.rate + 0.05

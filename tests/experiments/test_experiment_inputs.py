@@ -123,6 +123,20 @@ def test_files_and_folders_are_known_by_their_content(tmp_path, name):
     assert_counts(tmp_path / "cup.toml", {"data": {"named": {"cup": name}}})
 
 
+def test_a_folder_that_a_link_leads_to_counts_and_a_link_in_a_circle_ends(tmp_path):
+    data, elsewhere = tmp_path / "data", tmp_path / "elsewhere"
+    data.mkdir()
+    elsewhere.mkdir()
+    (data / "day1").symlink_to(elsewhere)
+    (data / "all").symlink_to(data)
+    (elsewhere / "jar.csv").write_text("1")
+    source = f"icub:{data}"
+    contents = contents_of([source])
+    assert contents_of([source]) == contents
+    (elsewhere / "jar.csv").write_text("22")
+    assert contents_of([source])[source] != contents[source]
+
+
 def test_files_that_a_file_names_count(tmp_path):
     (tmp_path / "meshes").mkdir()
     (tmp_path / "gripper.toml").write_text('model = "gripper.xml"\n')

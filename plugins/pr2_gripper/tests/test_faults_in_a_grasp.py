@@ -1,9 +1,18 @@
 """Faults injected in every phase of a grasp with the emulated board: nothing is crushed, and the fault is told."""
 
 import gripper_faults
+import numpy as np
 import pytest
 from gripper_faults import FAULTS
 
+from graspsense import load_pipeline
+from graspsense.core.components.registry import installed
+from graspsense.core.learn.labelled import Labelled
+from graspsense.core.learn.model_file import write_model
+from graspsense.core.learn.training import train
+from graspsense.core.settings.selected import SelectedComponent
+from graspsense.core.values.features import FeatureTable
+from graspsense.evaluation.doubt import calibrated
 from graspsense_pr2_gripper.config import FaultConfig
 
 CEILING_N = 1.25 * 20.0 + 7.0
@@ -125,7 +134,6 @@ def test_a_pad_that_is_known_to_be_bad_refuses_the_grasp():
 
 @pytest.mark.slow
 def test_a_picture_and_a_notebook_show_the_reason_and_the_warnings():
-    from graspsense import load_pipeline
     from graspsense.report.grasp_picture import _words
 
     faults = ["pad_fault=stuck", "pad_side=left", "pad_at_s=0.4"]
@@ -149,3 +157,36 @@ def test_a_motor_that_reports_what_it_was_told_presses_nothing_with_more():
     )
     assert grasp.reason.startswith("moves too easily")
     assert grasp.report["largest_force_n"] == 0.0
+
+
+def test_no_certainty_is_given_to_a_grasp_in_which_a_fault_was_seen(tmp_path):
+    """The features of a model's training, and so its certainty, are those of sound pads."""
+    rng = np.random.default_rng(0)
+    kinds, sizes = ("bottle", "can"), np.repeat([0.0586, 0.066], 30)
+    table = FeatureTable(
+        names=("p_first",), units=("m",), values=rng.normal(sizes, 0.0005, len(sizes))[:, np.newaxis]
+    )
+    trials = Labelled(source="a test", table=table, labels=tuple(np.repeat(kinds, 30).tolist()))
+    component = installed().find("classifier", "c45")
+    learner = SelectedComponent(component, component.config_class()())
+    model = calibrated(train(component, learner.config, trials, name="m"), learner, trials, 0)
+    write_model(tmp_path / "m.json", model)
+
+    def prediction(**faults):
+        options = (
+            "gripper.type=pr2",
+            "gripper.transport=emulated",
+            f"gripper.body_config.open_gap_m={NEAR['open_gap_m']}",
+            f"gripper.object={gripper_faults.OBJECT}",
+            f"classifier.model={tmp_path / 'm.json'}",
+            *(f"gripper.faults.{key}={value}" for key, value in faults.items()),
+        )
+        return load_pipeline(options=options).grasp().prediction
+
+    sound = prediction()
+    faulty = prediction(pad_fault="numb", pad_side="left", pad_at_s=0.7)
+    assert sound.label == faulty.label == "bottle"
+    assert sound.certainty > 0.8
+    assert sound.prediction_set == ("bottle",)
+    assert (faulty.certainty, faulty.prediction_set, faulty.coverage) == (None, (), None)
+    assert faulty.no_certainty

@@ -103,10 +103,10 @@ def early_recognition(
     for part, answer in zip(parts, answers, strict=True):
         predicted = [a or b for a, b in zip(answer.predicted, ended, strict=True)]
         name = WHOLE if part.after_s is None else f"{part.after_s:g} s"
-        rows.append(_row(name, whole, part, answer, predicted))
+        rows.append(_row(name, whole, part, answer, predicted, folds))
     reason = next((answer.reason for answer in answers if answer.reason), "")
     if not reason:
-        rows.append(_stopped(whole, parts, answers))
+        rows.append(_stopped(whole, parts, answers, folds))
     return EarlyRecognition(
         protocol="stratified" if instances is None else INSTANCE_HELD_OUT,
         rows=tuple(rows),
@@ -153,21 +153,28 @@ def _answers(
 
 
 def _row(
-    name: str, whole: Labelled, part: CheckpointTrials, answers: _Answers, predicted: Sequence[str]
+    name: str,
+    whole: Labelled,
+    part: CheckpointTrials,
+    answers: _Answers,
+    predicted: Sequence[str],
+    folds: int,
 ) -> EarlyRate:
     reached = part.rows.tolist()
     right = [a == b for a, b in zip(predicted, whole.labels, strict=True)]
     return EarlyRate(
         name=name,
-        rate=rate_among(whole, right),
+        rate=rate_among(whole, right, folds=folds),
         seconds=_mean(part.used_s) or 0.0,
         newtons=_mean(part.used_n),
-        covered=None if answers.reason else rate_among(whole, answers.covered.tolist(), reached),
-        single=None if answers.reason else rate_among(whole, (answers.sizes == 1).tolist(), reached),
+        covered=None if answers.reason else rate_among(whole, answers.covered.tolist(), reached, folds),
+        single=None if answers.reason else rate_among(whole, (answers.sizes == 1).tolist(), reached, folds),
     )
 
 
-def _stopped(whole: Labelled, parts: Sequence[CheckpointTrials], answers: Sequence[_Answers]) -> EarlyRate:
+def _stopped(
+    whole: Labelled, parts: Sequence[CheckpointTrials], answers: Sequence[_Answers], folds: int
+) -> EarlyRate:
     """Return the rate if each squeeze ends at the first checkpoint at which the set has one label."""
     predicted, seconds, newtons = (
         list(answers[-1].predicted),
@@ -185,11 +192,11 @@ def _stopped(whole: Labelled, parts: Sequence[CheckpointTrials], answers: Sequen
     early = np.flatnonzero(stopped).tolist()
     return EarlyRate(
         name=SURE,
-        rate=rate_among(whole, right),
+        rate=rate_among(whole, right, folds=folds),
         seconds=_mean(seconds) or 0.0,
         newtons=_mean(newtons),
-        covered=rate_among(whole, right, early) if early else None,
-        single=rate_among(whole, stopped.tolist()),
+        covered=rate_among(whole, right, early, folds) if early else None,
+        single=rate_among(whole, stopped.tolist(), folds=folds),
     )
 
 

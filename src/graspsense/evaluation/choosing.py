@@ -118,7 +118,7 @@ def choose(
     nested, chosen_in = _nested(answers, folds)
     right = nested.right(known.labels)
     # It is the rate of any of the candidates that a fold chose: where these differ, one of them may have been lucky.
-    rate = rate_of(right, known.instances, known.no_interval, float(len(chosen_in)))
+    rate = rate_of(right, known.instances, known.no_interval, float(len(chosen_in)), folds=FOLDS)
     ranking = ranking_of(
         {
             key: CandidateResult(
@@ -129,6 +129,7 @@ def choose(
         protocol,
         known,
         tuple(dict.fromkeys(notes)),
+        FOLDS,
         ChosenRate(rate=rate.rate, interval=rate.interval, of=len(answers)),
     )
     return ChosenPipeline(rate=rate, answers=nested, right=tuple(right), chosen_in=chosen_in, ranking=ranking)

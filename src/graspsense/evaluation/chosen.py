@@ -68,9 +68,9 @@ def comparisons_of(right: NDArray[np.bool_], instances: Sequence[str] | None) ->
 
 
 def rate_of_chosen(
-    right: NDArray[np.bool_], instances: Sequence[str] | None, no_interval: str = ""
+    right: NDArray[np.bool_], instances: Sequence[str] | None, no_interval: str = "", folds: int = 0
 ) -> ChosenRate:
-    """Return the rate of the candidate with the highest one, as `comparisons_of` takes them."""
+    """Return the rate of the candidate with the highest one, as `comparisons_of` takes them, from so many folds."""
     totals, sizes = _units(right, instances)
     best = int(right.sum(axis=1).argmax())
     rng = np.random.default_rng(_SEED)
@@ -91,8 +91,8 @@ def rate_of_chosen(
     largest = (_moved(parts)[:, varying] / spread[varying]).max(axis=1) if varying.any() else np.zeros(DRAWS)
     comparisons = _equivalent(float(np.quantile(largest, 0.975)))
     answers = right[best].tolist()
-    alone = rate_of(answers, instances, no_interval).interval
-    together = rate_of(answers, instances, no_interval, comparisons).interval
+    alone = rate_of(answers, instances, no_interval, folds=folds).interval
+    together = rate_of(answers, instances, no_interval, comparisons, folds=folds).interval
     interval = None if alone is None or together is None else (min(together[0], rate), max(alone[1], rate))
     return ChosenRate(rate=rate, interval=interval, of=len(right))
 

@@ -12,7 +12,7 @@ from graspsense.core.values.errors import counted
 from graspsense.evaluation.crossval import FitRefused, Groups, Pooled
 from graspsense.evaluation.evaluator import Evaluator, Headline
 from graspsense.evaluation.folds import INSTANCE_HELD_OUT, commonest, in_order, instance_held_out
-from graspsense.evaluation.intervals import RecognitionRate, percent
+from graspsense.evaluation.intervals import RecognitionRate, percent, rate_among
 from graspsense.evaluation.results import Measurement
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ class ControlMeasurements:
             what += " (the most frequent state of each class)"
         return correct.tolist(), Measurement(
             what,
-            self.evaluator.rate_among(correct.tolist()),
+            rate_among(self.trials, correct.tolist()),
             difference=self.evaluator.difference(self.headline.pooled.right(self.labels), correct.tolist()),
             difference_of=self.headline.protocol,
         )

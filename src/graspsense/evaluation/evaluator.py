@@ -56,7 +56,7 @@ class Evaluator:
         self.learner, self.trials, self.k, self.seed = learner, trials, k, seed
         self.progress, self.notes = progress, notes
         self.labels = trials.labels
-        self.rate_among = partial(rate_among, trials)
+        self.rate_among = partial(rate_among, trials, folds=k)
         self.groups = trials_by_class(self.labels, target)
         self._featureless = np.isnan(trials.table.values).all(axis=1)
         self.stratified_name = f"stratified_{k}_fold"

@@ -181,7 +181,7 @@ def rank(
             for protocol, predicted in answers.predicted.items()
         }
         measured[key] = CandidateResult(right=right, training_s=answers.training_s)
-    return ranking_of(measured, headline, reference, (*reference.notes, *dict.fromkeys(notes)))
+    return ranking_of(measured, headline, reference, (*reference.notes, *dict.fromkeys(notes)), folds)
 
 
 def ranking_of(
@@ -189,24 +189,27 @@ def ranking_of(
     headline: str,
     trials: Labelled,
     notes: Sequence[str],
+    folds: int,
     chosen: ChosenRate | None = None,
 ) -> Ranking:
     """Return the candidates of these trials, by the names of classifier and features, under the protocol `headline`.
 
-    `chosen` is the rate of the best without the luck of the choice; by default it is estimated from these answers.
-    Raises ConfigError without a candidate.
+    `folds` is the number of folds. `chosen` is the rate of the best without the luck of the choice; by default it is
+    estimated from these answers. Raises ConfigError without a candidate.
     """
     judged = [key for key in measured if key[1] != BEFORE_CONTACT]
     if not judged:
         raise no_candidate(notes)
     right_of = np.array([measured[key].right[headline] for key in judged])
     if chosen is None and len(judged) > 1:
-        chosen = rate_of_chosen(right_of, trials.instances, trials.no_interval)
+        chosen = rate_of_chosen(right_of, trials.instances, trials.no_interval, folds)
     return Ranking(
         source=trials.source,
         protocol=headline,
         trials=len(trials),
-        candidates=_ranked(measured, headline, trials, chosen, comparisons_of(right_of, trials.instances)),
+        candidates=_ranked(
+            measured, headline, trials, folds, chosen, comparisons_of(right_of, trials.instances)
+        ),
         notes=tuple(notes),
         chosen=chosen,
         guessing=trials.labels.count(commonest(trials.labels)) / len(trials),
@@ -255,7 +258,7 @@ def _measured(
                 groups=groups,
                 folds=[folds],
             )
-            sets = held_out.set_coverage(partial(rate_among, trials))
+            sets = held_out.set_coverage(partial(rate_among, trials, folds=int(folds.max()) + 1))
     return CandidateResult(right=right, training_s=seconds[0], sets=sets)
 
 
@@ -263,6 +266,7 @@ def _ranked(
     measured: Mapping[tuple[str, str], CandidateResult],
     headline: str,
     trials: Labelled,
+    folds: int,
     chosen: ChosenRate | None,
     comparisons: float,
 ) -> tuple[Candidate, ...]:
@@ -279,7 +283,7 @@ def _ranked(
             standing = _standing(loss)
         measured_key = measured[key]
         rates = {
-            protocol: rate_of(answers, trials.instances, trials.no_interval)
+            protocol: rate_of(answers, trials.instances, trials.no_interval, folds=folds)
             for protocol, answers in measured_key.right.items()
         }
         if key == best and chosen is not None:

@@ -50,11 +50,13 @@ class ClassifierResult:
         true: Sequence[str],
         predicted: Sequence[str],
         trials: Labelled | None = None,
+        folds: int = 0,
         **more: Any,
     ) -> ClassifierResult:
         """Return the result of these predictions; `more` are further fields.
 
-        If the answers are those of `trials`, in their order, the interval takes their instances into account.
+        If the answers are those of `trials`, in their order, the interval takes their instances into account, and with
+        `folds`, that so many folds share their training trials.
         """
         matrix = confusion(true, predicted)
         right = [answer == label for answer, label in zip(predicted, true, strict=True)]
@@ -62,7 +64,7 @@ class ClassifierResult:
             classifier=classifier,
             target=target,
             protocol=protocol,
-            rate=rate_of(right) if trials is None else rate_among(trials, right),
+            rate=rate_of(right, folds=folds) if trials is None else rate_among(trials, right, folds=folds),
             confusion=matrix,
             **more,
         )

@@ -205,7 +205,7 @@ class _Evaluator:
         """Return the error of these predictions, among these trials (default: all)."""
         rows = range(len(self.values)) if rows is None else rows
         errors = (predicted - self.values).tolist()
-        return error_of([errors[i] for i in rows], self._instances_of(rows))
+        return error_of([errors[i] for i in rows], self._instances_of(rows), self.k)
 
     def explained(self) -> float | None:
         """Return 1 minus the squared errors over those of the mean."""
@@ -232,7 +232,7 @@ class _Evaluator:
         return IntervalCoverage(
             asked=COVERAGE,
             unit=unit,
-            covered=rate_of(inside.tolist(), self.instances),
+            covered=rate_of(inside.tolist(), self.instances, folds=self.k),
             mean_half_width=float(radii.mean()),
         )
 

@@ -43,10 +43,10 @@ class RegressionError:
         return f"{self.mean_absolute:.4g} {unit}".rstrip() + f" (95 %: {low:.4g} to {high:.4g}; {counts})"
 
 
-def error_of(errors: Sequence[float], instances: Sequence[str] | None) -> RegressionError:
-    """Return the error of these predictions; `errors` are predicted minus true values."""
+def error_of(errors: Sequence[float], instances: Sequence[str] | None, folds: int = 0) -> RegressionError:
+    """Return the error of these predictions; `errors` are predicted minus true values, `folds` is of `rate_of`."""
     absolute = [abs(error) for error in errors]
-    interval, reason = mean_interval(absolute, instances)
+    interval, reason = mean_interval(absolute, instances, folds)
     return RegressionError(
         n=len(absolute),
         mean_absolute=math.fsum(absolute) / len(absolute),

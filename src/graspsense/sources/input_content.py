@@ -194,11 +194,18 @@ def _places_in_package(text: str) -> Iterator[str]:
 
 
 def _hash_of_tree(path: str) -> str:
-    """Return the hash of a file, or of all files below a folder with their names; hidden ones do not count."""
+    """Return the hash of a file, or of all files below a folder with their names; hidden ones do not count.
+
+    Links to folders are followed, each folder once.
+    """
     if not os.path.isdir(path):
         return _hash_of_file(path)
-    parts = []
-    for folder, folders, names in os.walk(path):
+    parts, entered = [], set[str]()
+    for folder, folders, names in os.walk(path, followlinks=True):
+        if os.path.realpath(folder) in entered:
+            folders.clear()
+            continue
+        entered.add(os.path.realpath(folder))
         folders[:] = sorted(name for name in folders if not name.startswith((".", "__pycache__")))
         for name in sorted(names):
             file = os.path.join(folder, name)

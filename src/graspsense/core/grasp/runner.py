@@ -50,7 +50,7 @@ from graspsense.core.grasp.sinks import DeviceSink, EventSink, PictureSink, Sink
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import FAILURES, DeviceLost, RecordingEnded, TareRefused, named, place_of
 from graspsense.core.values.events import EventSource, GraspEvent, event_name
-from graspsense.core.values.faults import LIMITED, Fault
+from graspsense.core.values.faults import LIMITED, Fault, faults_among
 from graspsense.core.values.features import Prediction
 from graspsense.core.values.signals import (
     APPROACH,
@@ -507,7 +507,7 @@ class _Grasp:
             why = f"the ceiling is {self.protection.ceiling_n:.1f} N; run.effort_ceiling_n allows more"
         told = f"{LIMITED}: {self.squeezed_guarded} of its {self.squeezed} commands were lowered; {why}"
         # With its share, instead of the first sight of it.
-        return (*(warning for warning in seen if not warning.startswith(LIMITED)), told)
+        return (*faults_among(seen), told)
 
     def _told(self, frame: Frame, phase: int, events: int) -> None:
         """Log the events that the controller told in this tick, one for each bit that is set."""

@@ -27,6 +27,7 @@ from graspsense.core.settings.resolved import Settings, resolve
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import FAILURES, ConfigError, WiringError, named, place_of
 from graspsense.core.values.events import GraspEvent
+from graspsense.core.values.faults import faults_among
 from graspsense.core.values.features import UNKNOWN, Features, FeatureTable, Prediction, missing
 from graspsense.core.values.signals import Outcome
 from graspsense.core.values.trial import RunInfo, Trial
@@ -210,6 +211,8 @@ def grasp_with(
         features, prediction = checkpoints[-1].features, checkpoints[-1].prediction
     else:
         features, prediction = _recognised(settings, feature_set, model, grasp)
+    if prediction is not None and faults_among(grasp.warnings):
+        prediction = prediction.without_certainty("a fault was seen in this grasp")
     trial = Trial(
         run=run,
         trace=grasp.trace,

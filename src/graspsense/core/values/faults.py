@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from math import inf
 from typing import Final
 
@@ -12,6 +13,11 @@ from graspsense.core.values.signals import Outcome
 
 LIMITED: Final = "squeeze limited"
 """The name of the warning of a squeeze that is not the one that the controller commanded."""
+
+
+def faults_among(warnings: Iterable[str]) -> list[str]:
+    """Return the warnings of a grasp that are faults, so not that its squeeze was limited."""
+    return [warning for warning in warnings if not warning.startswith(LIMITED)]
 
 
 @frozen(kw_only=True)

@@ -7,7 +7,7 @@ from array import array
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
-from attrs import field, frozen
+from attrs import evolve, field, frozen
 
 from graspsense.core.values.display import html
 from graspsense.core.values.errors import listed
@@ -241,6 +241,17 @@ class Prediction:
     def certainty(self) -> float | None:
         """The share of right answers among those that rest on as much; None if it was not measured."""
         return self.probabilities.get(self.label) if self.calibrated else None
+
+    def without_certainty(self, why: str) -> Prediction:
+        """Return it without certainty and set for this reason; one that has neither keeps its own reason."""
+        return evolve(
+            self,
+            prediction_set=(),
+            coverage=None,
+            calibrated=False,
+            certainty_interval=None,
+            no_certainty=self.no_certainty or why,
+        )
 
     @property
     def certainty_figure(self) -> str:

@@ -83,7 +83,7 @@ def early(params: Mapping[str, Any], seed: int) -> RecognitionResult:
                 cost = float(np.mean(used_s[moment]))
                 results.append(
                     ClassifierResult.from_answers(
-                        f"{moment:g} s{suffix}", target, STRATIFIED, true, predicted, data, cost=cost
+                        f"{moment:g} s{suffix}", target, STRATIFIED, true, predicted, data, FOLDS, cost=cost
                     )
                 )
     return simulated_result(data, results)

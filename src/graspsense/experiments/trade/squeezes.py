@@ -69,7 +69,7 @@ def squeezes(params: Mapping[str, Any], seed: int) -> RecognitionResult:
                 title = f"{counted(k, 'squeeze')}{suffix}"
                 results.append(
                     ClassifierResult.from_answers(
-                        title, target, INSTANCE_HELD_OUT, true, labels, objects, cost=k * one_s
+                        title, target, INSTANCE_HELD_OUT, true, labels, objects, FOLDS, cost=k * one_s
                     )
                 )
     return simulated_result(data, results)
