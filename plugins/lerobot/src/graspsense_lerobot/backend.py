@@ -7,7 +7,7 @@ force is one of that distance, and a speed is that of a target that moves.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import inf, nan
 from types import MappingProxyType
 from typing import Final, final
@@ -23,7 +23,6 @@ from graspsense.plugin_api import (
     DeviceInfo,
     DeviceLost,
     NoDevice,
-    Pads,
     Reading,
     SensorBackend,
 )
@@ -100,9 +99,6 @@ class LeRobotBackend(SensorBackend[LeRobotConfig]):
             self._opened().send(self.config.position_at(self._target_m))
         except NoAnswer as error:
             raise self._lost(error) from error
-
-    def tare(self, images: Sequence[Pads]) -> None:
-        """Do nothing: there are no pads."""
 
     def close(self) -> None:
         """Stop the fingers where they are, and disconnect the robot."""

@@ -394,9 +394,6 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             self._swings += swing_n > SWING * self._drive.effort_limit_n
         self._command = command
 
-    def tare(self, images: Sequence[Pads]) -> None:
-        """Do nothing: the cells of a model have no offset."""
-
     def close(self) -> None:
         """Forget the model."""
         for part in (self._camera, self._window):
