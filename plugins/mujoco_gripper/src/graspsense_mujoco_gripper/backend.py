@@ -354,7 +354,6 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             force_right_n=right,
             edge_left_n=edge_left,
             edge_right_n=edge_right,
-            status=0,
         )
         pads = NO_PADS
         if self._cells is not None:
