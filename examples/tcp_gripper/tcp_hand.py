@@ -149,9 +149,6 @@ class TcpHand(SensorBackend[TcpHandConfig]):
         limit = command.speed_limit_m_s
         self._command = (min(max(command.value, -limit), limit), command.effort_limit_n)
 
-    def tare(self, images):
-        """Do nothing: there are no cells."""
-
     def close(self):
         """Stop the fingers, and close the socket."""
         reader, self._reader = self._reader, None

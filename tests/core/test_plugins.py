@@ -389,7 +389,7 @@ def test_calls_of_hooks_are_traced_on_demand(site, capsys):
         (
             "from graspsense.plugin_api import SensorBackend\nclass Backend(SensorBackend):\n"
             "    def open(self, seed): ...\n    def read(self, timeout_s): ...\n    def close(self): ...",
-            "lab_driver:Backend does not implement apply, tare, which SensorBackend of plugin_api requires",
+            "lab_driver:Backend does not implement apply, which SensorBackend of plugin_api requires",
         ),
     ],
 )

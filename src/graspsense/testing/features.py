@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
+from copy import deepcopy
 from typing import Any, Final
 
 import numpy as np
@@ -21,7 +22,6 @@ from graspsense.testing.samples import (
     COLUMNS_OF_CHANNEL,
     an_event,
     arrays_of,
-    copied,
     shifted,
     squeeze,
     unusual_traces,
@@ -148,7 +148,7 @@ def same_trace_same_features(subject: Subject) -> None:
 
 def does_not_change_the_trace(subject: Subject) -> None:
     """`extract` does not change the trace."""
-    trace = copied(_whole(subject))
+    trace = deepcopy(_whole(subject))
     contents = {name: array.tobytes() for name, array in arrays_of(trace).items()}
     _features(subject, trace)
     changed = [name for name, array in arrays_of(trace).items() if array.tobytes() != contents[name]]
@@ -186,7 +186,7 @@ def views_and_copies_agree(subject: Subject) -> None:
     """A view of a longer trace gives the same features as a copy of its ticks."""
     view = _whole(subject).until(1.7)
     demand(
-        _same(_features(subject, view), _features(subject, copied(view))),
+        _same(_features(subject, view), _features(subject, deepcopy(view))),
         "a trace cut from a longer one gives other features than the same ticks by themselves: read the columns "
         "as they are, not the memory behind them",
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import inf, nan
 from typing import TYPE_CHECKING, Any, Final
 
@@ -156,9 +155,6 @@ class ModelGripper(SensorBackend[None]):
         self._gap += self._speed * DT_S
         if not 0.0 < self._gap < OPEN_M:
             self._gap, self._speed = min(max(self._gap, 0.0), OPEN_M), 0.0
-
-    def tare(self, images: Sequence[Pads]) -> None:
-        """Do nothing."""
 
     def close(self) -> None:
         """Do nothing."""

@@ -133,11 +133,6 @@ def shifted(trace: Trace, seconds: float) -> Trace:
     )
 
 
-def copied(trace: Trace) -> Trace:
-    """Return a trace with copied arrays."""
-    return deepcopy(trace)
-
-
 def arrays_of(trace: Trace) -> dict[str, NDArray[Any]]:
     """Return the arrays of a trace, and of its further channels, by their names in it."""
     arrays = {field.name: getattr(trace, field.name) for field in fields(Trace)}
@@ -171,7 +166,7 @@ def unusual_traces() -> dict[str, Trace]:
 
 
 def _holed(trace: Trace) -> Trace:
-    holed = copied(trace)
+    holed = deepcopy(trace)
     for names in COLUMNS_OF_CHANNEL.values():
         for name in names:
             if name != "pad_t_s":

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
-from math import inf, nan
+from math import inf
 from types import MappingProxyType
 from typing import Any, Final, final
 
@@ -27,7 +27,6 @@ from graspsense.plugin_api import (
     DeviceLost,
     Frame,
     NoDevice,
-    Pads,
     Reading,
     signal_type,
 )
@@ -131,18 +130,7 @@ class FrankaBackend(BackendWithEmulator[FrankaConfig]):
         start_s, start_m = self._recent[0]
         self._velocity_m_s = (state.width_m - start_m) / (t_s - start_s) if t_s > start_s else 0.0
         self._frames += 1
-        frame = Frame(
-            t_s=t_s,
-            dt_s=dt_s,
-            gap_m=state.width_m,
-            velocity_m_s=self._velocity_m_s,
-            effort_n=nan,
-            force_left_n=nan,
-            force_right_n=nan,
-            edge_left_n=nan,
-            edge_right_n=nan,
-            status=0,
-        )
+        frame = Frame(t_s, dt_s, state.width_m, self._velocity_m_s)
         made: Any = signal_type(self.channels)
         signals = made(float(state.grasped), state.temperature_c + KELVIN)
         return Reading(frame, NO_PADS, signals)
@@ -162,10 +150,6 @@ class FrankaBackend(BackendWithEmulator[FrankaConfig]):
             self._send(order)
         except HandGone as error:
             raise DeviceLost(f"the Franka Hand at {self.config.host} was lost: {error}") from error
-
-    def tare(self, images: Sequence[Pads]) -> None:
-        """Do nothing: there are no pads."""
-        del images
 
     def close(self) -> None:
         """Stop the fingers if the hand can be reached, and close the connection."""

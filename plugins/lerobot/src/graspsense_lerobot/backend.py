@@ -7,7 +7,8 @@ force is one of that distance, and a speed is that of a target that moves.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from contextlib import suppress
 from math import inf, nan
 from types import MappingProxyType
 from typing import Final, final
@@ -23,7 +24,6 @@ from graspsense.plugin_api import (
     DeviceInfo,
     DeviceLost,
     NoDevice,
-    Pads,
     Reading,
     SensorBackend,
 )
@@ -52,7 +52,6 @@ class LeRobotBackend(SensorBackend[LeRobotConfig]):
         self._motor: OneMotor | None = None
         self._polling = Polling(config.rate_hz, time, SLOPE_FRAMES)
         self._gap_m = self._target_m = self._effort_n = 0.0
-        self._retries = 0
         self.command_delay_s = 1.0 / config.rate_hz
 
     @property
@@ -66,10 +65,10 @@ class LeRobotBackend(SensorBackend[LeRobotConfig]):
         """Connect the robot; nothing moves. Raises NoDevice, ConfigError, PluginUnavailable."""
         self.close()
         config = self.config
-        self._retries = 0
+        self._polling = Polling(config.rate_hz, time, SLOPE_FRAMES)
         try:
             self._motor = OneMotor(config)
-            position, _ = self._motor.read()
+            position, _ = self._polling.tried(self._motor.read, NoAnswer)
         except NoAnswer as error:
             self.close()
             raise NoDevice(
@@ -77,7 +76,7 @@ class LeRobotBackend(SensorBackend[LeRobotConfig]):
                 "gripper.robot_config"
             ) from error
         self._gap_m = self._target_m = config.gap_m(position)
-        self._polling = Polling(config.rate_hz, time, SLOPE_FRAMES)
+        self._polling.begin()
         return self._described()
 
     def read(self, timeout_s: float) -> Reading | None:
@@ -85,7 +84,7 @@ class LeRobotBackend(SensorBackend[LeRobotConfig]):
         if not self._polling.wait(timeout_s):
             return None
         try:
-            position, load = self._opened().read()
+            position, load = self._polling.tried(self._opened().read, NoAnswer)
         except NoAnswer as error:
             raise self._lost(error) from error
         self._gap_m = self.config.gap_m(position)
@@ -97,24 +96,30 @@ class LeRobotBackend(SensorBackend[LeRobotConfig]):
         """Move the target on by the way of one frame, and send it. Raises DeviceLost."""
         self._target_m = self._next_target(command)
         try:
-            self._opened().send(self.config.position_at(self._target_m))
+            self._send(self._opened(), self.config.position_at(self._target_m))
         except NoAnswer as error:
             raise self._lost(error) from error
-
-    def tare(self, images: Sequence[Pads]) -> None:
-        """Do nothing: there are no pads."""
 
     def close(self) -> None:
         """Stop the fingers where they are, and disconnect the robot."""
         motor, self._motor = self._motor, None
-        if motor is not None:
-            motor.close(self.config.position_at(self._gap_m))
-            self._retries = motor.retries
+        if motor is None:
+            return
+        try:
+            position = self.config.position_at(self._gap_m)
+            with suppress(NoAnswer):
+                position, _ = self._polling.tried(motor.read, NoAnswer)
+            with suppress(NoAnswer):
+                self._send(motor, position)
+        finally:
+            motor.disconnect()
 
     def report(self) -> dict[str, float | int | str | bool]:
         """Return the number of frames, and of questions that were repeated."""
-        retries = self._retries if self._motor is None else self._motor.retries
-        return {"frames": self._polling.frames, "repeated": retries}
+        return {"frames": self._polling.frames, "repeated": self._polling.repeated}
+
+    def _send(self, motor: OneMotor, position: float) -> None:
+        self._polling.tried(lambda: motor.send(position), NoAnswer)
 
     def _next_target(self, command: Command) -> float:
         config = self.config

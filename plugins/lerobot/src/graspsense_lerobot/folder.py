@@ -361,14 +361,9 @@ def _text(place: Path, name: str) -> str:
 
 
 def _whole(row: Mapping[str, Any], key: str, where: str) -> int:
-    value = row.get(key)
-    if (
-        not isinstance(value, int | float)
-        or isinstance(value, bool)
-        or value != value
-        or not 0 <= value < 2**53
-    ):
-        raise DataDamaged(f"{where}: {key} is {str(value)[:40]}, not a whole number from 0 on")
-    if value != int(value):
-        raise DataDamaged(f"{where}: {key} is {value}, not a whole number from 0 on")
-    return int(value)
+    value: Any = row.get(key)
+    # NaN fails each comparison, so it never gets to int().
+    whole = isinstance(value, int | float) and 0 <= value < 2**53 and value == int(value)
+    if whole and not isinstance(value, bool):
+        return int(value)
+    raise DataDamaged(f"{where}: {key} is {str(value)[:40]}, not a whole number from 0 on")

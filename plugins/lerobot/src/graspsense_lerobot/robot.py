@@ -4,20 +4,28 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from math import isfinite
-from typing import Any, Final, final
+from typing import Any, final
 
 from graspsense.plugin_api import ConfigError, PluginUnavailable
 from graspsense_lerobot.robot_config import LeRobotConfig
 
-ATTEMPTS: Final = 3
-"""How often a robot is asked: an answer of a motor bus can be damaged."""
-
 
 class NoAnswer(Exception):
     """The robot gives no answer, or none with the gripper in it; the text says why."""
+
+
+@contextmanager
+def _named_errors() -> Iterator[None]:
+    """Raise NoAnswer for whatever the driver of a robot raises in this context."""
+    try:
+        yield
+    except NoAnswer:
+        raise
+    except Exception as error:
+        raise NoAnswer(f"{type(error).__name__}: {error}") from error
 
 
 @final
@@ -26,8 +34,6 @@ class OneMotor:
 
     def __init__(self, config: LeRobotConfig) -> None:
         self._config = config
-        self.retries = 0
-        """The number of questions that were repeated."""
         self._robot: Any = _made(config)
         self._require(self._robot.observation_features, "observation")
         self._require(self._robot.action_features, "action")
@@ -38,35 +44,29 @@ class OneMotor:
             )
         try:
             # Calibration asks the user to move the robot, so that it would not end.
-            self._robot.connect(calibrate=False)
-            if not self._robot.is_calibrated:
-                raise NoAnswer("it is not calibrated: run lerobot-calibrate for it")
-            self._accepts_the_motor_alone()
-        except Exception as error:
-            self._disconnect()
-            if isinstance(error, NoAnswer):
-                raise
-            raise NoAnswer(f"{type(error).__name__}: {error}") from error
+            with _named_errors():
+                self._robot.connect(calibrate=False)
+                if not self._robot.is_calibrated:
+                    raise NoAnswer("it is not calibrated: run lerobot-calibrate for it")
+                self._accepts_the_motor_alone()
         except BaseException:
-            self._disconnect()
+            self.disconnect()
             raise
 
     def read(self) -> tuple[float, float]:
         """Return the position and the load, each in its unit; the load is 0 where it is not read. Raises NoAnswer."""
-        answer: tuple[float, float] = self._asked(self._read)
-        return answer
+        with _named_errors():
+            return self._read()
 
     def send(self, position: float) -> None:
         """Command this position of the gripper, and of nothing else. Raises NoAnswer."""
-        self._asked(lambda: self._robot.send_action({self._config.key: position}))
+        with _named_errors():
+            self._robot.send_action({self._config.key: position})
 
-    def close(self, position: float) -> None:
-        """Stop the fingers where they are, by default at this position, and disconnect."""
-        with suppress(NoAnswer):
-            position, _ = self.read()
-        with suppress(NoAnswer):
-            self.send(position)
-        self._disconnect()
+    def disconnect(self) -> None:
+        """Let go of the robot, whatever it raises."""
+        with suppress(Exception):
+            self._robot.disconnect()
 
     def _accepts_the_motor_alone(self) -> None:
         """Command the gripper to where it is. Raises NoAnswer for a robot that wants, or moves, other motors too."""
@@ -94,16 +94,6 @@ class OneMotor:
             raise NoAnswer(f"{key} is {position}, {register} is {load}")
         return position, load
 
-    def _asked(self, question: Any) -> Any:
-        said = ""
-        for attempt in range(ATTEMPTS):
-            try:
-                return question()
-            except Exception as error:  # a robot's driver can raise anything
-                said = str(error) if isinstance(error, NoAnswer) else f"{type(error).__name__}: {error}"
-                self.retries += attempt < ATTEMPTS - 1
-        raise NoAnswer(said)
-
     def _require(self, features: Mapping[str, Any], what: str) -> None:
         key = self._config.key
         if key not in features:
@@ -112,10 +102,6 @@ class OneMotor:
                 f"no {what} of {self._config.robot} has {key!r}; there are {known}. Set gripper.motor or "
                 "gripper.position"
             )
-
-    def _disconnect(self) -> None:
-        with suppress(Exception):
-            self._robot.disconnect()
 
 
 def _made(config: LeRobotConfig) -> Any:

@@ -173,12 +173,8 @@ class FollowedGrasp:
             dt_s=dt_s,
             gap_m=gap_m,
             velocity_m_s=velocity,
-            effort_n=nan,
             force_left_n=left,
             force_right_n=right,
-            edge_left_n=nan,
-            edge_right_n=nan,
-            status=0,
         )
 
     def _understood(self, numbers: Mapping[str, float]) -> Meaning:

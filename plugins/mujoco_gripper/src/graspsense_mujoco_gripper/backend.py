@@ -354,7 +354,6 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             force_right_n=right,
             edge_left_n=edge_left,
             edge_right_n=edge_right,
-            status=0,
         )
         pads = NO_PADS
         if self._cells is not None:
@@ -393,9 +392,6 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             swing_n = min(abs(command.value), abs(self._command.value))
             self._swings += swing_n > SWING * self._drive.effort_limit_n
         self._command = command
-
-    def tare(self, images: Sequence[Pads]) -> None:
-        """Do nothing: the cells of a model have no offset."""
 
     def close(self) -> None:
         """Forget the model."""

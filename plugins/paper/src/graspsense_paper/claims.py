@@ -16,7 +16,6 @@ from typing import Any, Final
 from attrs import evolve, frozen
 
 from graspsense.experiment_api import (
-    ConditionResult,
     MeanDifference,
     OverSeeds,
     RecognitionResult,
@@ -137,11 +136,6 @@ def _points(difference: MeanDifference) -> str:
     return f"{100 * value:+.1f} points ({100 * low:+.1f} to {100 * high:+.1f})"
 
 
-def _seeds(condition: ConditionResult) -> str:
-    """Return the number of trials of a rate."""
-    return sample(condition.rate)
-
-
 def _approach_velocity(summary: Summary) -> Claim | None:
     slow = condition_result(summary, "approach_speed", "state", {SPEED: 0.005})
     fast = condition_result(summary, "approach_speed", "state", {SPEED: 0.02})
@@ -155,7 +149,7 @@ def _approach_velocity(summary: Summary) -> Claim | None:
         basis=basis(summary, "approach_speed", "approach_velocity"),
         verdict=within(gap.interval, -COUNTS, COUNTS),
         number=f"20 mm/s minus 5 mm/s: {_points(gap)}",
-        n=_seeds(slow),
+        n=sample(slow.rate),
     )
 
 
@@ -172,7 +166,7 @@ def _probing_force(summary: Summary) -> Claim | None:
         basis=basis(summary, "table_4", "authors_tree"),
         verdict=within(gap.interval, low=COUNTS),
         number=f"23 N minus 17 N: {_points(gap)}; printed: {_printed_rise()}",
-        n=_seeds(weak),
+        n=sample(weak.rate),
         follows_from=("table_4_17", "table_4_23"),
     )
 
@@ -205,7 +199,7 @@ def _worn(summary: Summary) -> Claim | None:
         "bottles",
         basis=basis(summary, "worn_bottles", "worn_bottles"),
         verdict=within(gap.interval, low=COUNTS),
-        n=_seeds(new),
+        n=sample(new.rate),
         number=f"new {percent(new.rate.mean)}, worn {percent(worn.rate.mean)}, new minus worn: {_points(gap)}",
     )
 
@@ -357,11 +351,6 @@ def _split(
     return OverSeeds(tuple(shares), n) if shares else None
 
 
-def _grasps(split: OverSeeds) -> str:
-    """Return the number of grasps of a separation."""
-    return sample(split)
-
-
 AT_23_N: Final[tuple[str, Mapping[str, Any]]] = ("table_4", {FORCE: 23.0})
 """Section III.F describes the features at this force."""
 
@@ -385,7 +374,7 @@ def _f_steady(summary: Summary) -> Claim | None:
         rule="the share that one threshold assigns correctly, Odwalla at 23 N, is above 90 %",
         basis=basis(summary, "table_4", "authors_tree"),
         verdict=within(split.interval, low=SPLITS),
-        n=_grasps(split),
+        n=sample(split),
         number=f"{percent(split.mean)} ({span(split.interval)}), by delta_t {percent(by_time.mean)}",
     )
 
@@ -406,7 +395,7 @@ def _p_steady(summary: Summary) -> Claim | None:
         rule="the share that one threshold assigns correctly, against the other Odwalla states at 23 N, is above 90 %",
         basis=basis(summary, "table_4", "authors_tree"),
         verdict=within(split.interval, low=SPLITS),
-        n=_grasps(split),
+        n=sample(split),
         number=f"{percent(split.mean)} ({span(split.interval)})",
     )
 
@@ -434,7 +423,7 @@ def _p_first(summary: Summary) -> Claim | None:
                 *(within(split.interval, low=SPLITS) for split in splits.values()),
             ]
         ),
-        n=_grasps(alike),
+        n=sample(alike),
         number=f"lowest other pair {worst} {percent(splits[worst].mean)} ({span(splits[worst].interval)}); "
         f"odwalla/naked {percent(alike.mean)} ({span(alike.interval)})",
     )
@@ -454,7 +443,7 @@ def _f_steady_classes(summary: Summary) -> Claim | None:
         rule="the share of the two that one threshold assigns correctly at 20 N is above 90 %",
         basis=basis(summary, "table_2", "section_3f", "table_2"),
         verdict=within(split.interval, low=SPLITS),
-        n=_grasps(split),
+        n=sample(split),
         number=f"{percent(split.mean)} ({span(split.interval)})",
     )
 
@@ -551,7 +540,7 @@ def _other_classifiers(summary: Summary) -> Claim | None:
         "lie between -10 and 5 points (corrected for five comparisons)",
         basis=basis(summary, "other_classifiers", "other_classifiers"),
         verdict=every([within(gaps[name].interval, -0.10, COUNTS) for name in AS_WEKA]),
-        n=_seeds(c45),
+        n=sample(c45.rate),
         number=", ".join(f"{name}: {_points(gap)}" for name, gap in gaps.items()),
     )
 

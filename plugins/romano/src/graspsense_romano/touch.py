@@ -222,7 +222,7 @@ def followed(trace: Trace) -> list[Signals]:
     coefficients, now, signals_by_frame = filters(), no_signals(), []
     fast = trace.signals.get("acceleration")
     counts = np.zeros(0, int) if fast is None else np.searchsorted(fast.t_s, trace.t_s, side="right")
-    nan, begun = float("nan"), 0
+    begun = 0
     dt_s = np.diff(trace.t_s, prepend=trace.t_s[0])
     for k in range(len(trace)):
         signals: Any = ()
@@ -235,12 +235,10 @@ def followed(trace: Trace) -> list[Signals]:
             dt_s=float(dt_s[k]),
             gap_m=float(trace.gap_m[k]),
             velocity_m_s=float(trace.velocity_m_s[k]),
-            effort_n=nan,
             force_left_n=float(trace.force_left_n[k]),
             force_right_n=float(trace.force_right_n[k]),
             edge_left_n=float(trace.edge_left_n[k]),
             edge_right_n=float(trace.edge_right_n[k]),
-            status=0,
         )
         now = updated(coefficients, now, Reading(frame, NO_PADS, signals))
         signals_by_frame.append(now)

@@ -21,7 +21,6 @@ from graspsense.plugin_api import (
     DeviceInfo,
     DeviceLost,
     NoDevice,
-    Pads,
     Reading,
     SensorBackend,
 )
@@ -144,9 +143,6 @@ class Ros2Backend(SensorBackend[Ros2Config]):
         if target != self._sent and now_s - self._sent_s >= GOAL_PERIOD_S:
             self._sent, self._sent_s = target, now_s
             self._action.want(target)
-
-    def tare(self, images: Sequence[Pads]) -> None:
-        """Do nothing: the topics give forces, whose zero is a matter of the driver."""
 
     def close(self) -> None:
         """Tell the fingers to open if they were not, and leave the network."""

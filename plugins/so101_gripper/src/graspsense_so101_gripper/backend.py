@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from math import inf, isnan
 from pathlib import Path
@@ -23,7 +23,6 @@ from graspsense.plugin_api import (
     DeviceInfo,
     DeviceLost,
     NoDevice,
-    Pads,
     Reading,
     signal_type,
 )
@@ -169,9 +168,6 @@ class So101Backend(BackendWithEmulator[So101Config]):
             goal, speed = (self._asked.goal_position if self._stopped else self._position), 0.0
         self._stopped = speed <= 0.0
         self._ask(self._asked_of(goal, speed or SPEED_LIMIT_M_S, force))
-
-    def tare(self, images: Sequence[Pads]) -> None:
-        """Do nothing: there are no pads."""
 
     def close(self) -> None:
         """Stop the jaw if the motor still responds, give it back as it was found, and close the bus."""

@@ -191,9 +191,12 @@ class SensorBackend(ABC, Generic[ConfigT]):
         `run.first_speed_m_s` (by default 12 N and 15 mm/s) until a pad touches, so a fast approach needs larger ones.
         """
 
-    @abstractmethod
     def tare(self, images: Sequence[Pads]) -> None:
-        """Set the zero of the pads from these cell images, taken with nothing touching. Raises TareRefused."""
+        """Set the zero of the pads from these cell images, taken with nothing touching. Raises TareRefused.
+
+        By default nothing is done, for a gripper whose forces have a zero.
+        """
+        del images
 
     @abstractmethod
     def close(self) -> None:

@@ -79,10 +79,6 @@ class Polling:
             gap_m=gap_m,
             velocity_m_s=velocity,
             effort_n=effort_n,
-            force_left_n=nan,
-            force_right_n=nan,
-            edge_left_n=nan,
-            edge_right_n=nan,
             status=status,
         )
 

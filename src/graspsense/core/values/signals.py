@@ -27,20 +27,20 @@ CHANNELS: Final = {
 class Frame(NamedTuple):
     """The measurements of one tick.
 
-    A channel that the backend lacks is NaN. Forces are tared. `edge_*` is the largest force on a single edge cell (0-6)
-    of that fingertip. `status` is a bit set whose meaning the backend defines; 0 means no error.
+    A channel that the backend lacks is NaN, which is the default. Forces are tared. `edge_*` is the largest force on a
+    single edge cell (0-6) of that fingertip. `status` is a bit set whose meaning the backend defines; 0 means no error.
     """
 
     t_s: float
     dt_s: float
-    gap_m: float
-    velocity_m_s: float
-    effort_n: float
-    force_left_n: float
-    force_right_n: float
-    edge_left_n: float
-    edge_right_n: float
-    status: int
+    gap_m: float = nan
+    velocity_m_s: float = nan
+    effort_n: float = nan
+    force_left_n: float = nan
+    force_right_n: float = nan
+    edge_left_n: float = nan
+    edge_right_n: float = nan
+    status: int = 0
 
 
 class Pads(NamedTuple):

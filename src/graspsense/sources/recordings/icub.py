@@ -15,7 +15,6 @@ ring and little finger together (https://icub-tech-iit.github.io/documentation, 
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -169,12 +168,8 @@ def relative_readings(grasp: IcubGrasp) -> tuple[Reading, ...]:
                 dt_s=1.0,
                 gap_m=float(gap_m[k]),
                 velocity_m_s=float(velocity[k]),
-                effort_n=math.nan,
                 force_left_n=sides[k][0],
                 force_right_n=sides[k][1],
-                edge_left_n=math.nan,
-                edge_right_n=math.nan,
-                status=0,
             ),
             NO_PADS,
             signals(*forces[k]),

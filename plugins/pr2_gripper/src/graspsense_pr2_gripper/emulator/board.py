@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Final, Literal, final
+from typing import Final, final
 
 from graspsense.gripper_api import EmulatedDevice
 from graspsense.plugin_api import NoDevice
@@ -22,7 +22,11 @@ APPEARS_S: Final = 5.0
 """Largest time to wait for the device node to appear."""
 JOIN_S: Final = 2.0
 
-Mood = Literal["well", "silent", "stalled"]
+MOODS: Final = {
+    "silent": "send no reports, but take commands",
+    "stalled": "complete nothing, in either direction",
+    "well": "behave again",
+}
 
 
 def emulate(config: object, wire: str, seed: int) -> EmulatedBoard:
@@ -48,7 +52,7 @@ class EmulatedBoard(EmulatedDevice):
         plug = Plug(config.vendor_id, config.product_id, identity.serial, PRODUCT)
         self._port = _PORTS[wire](self, plug)
         self._lock = threading.Lock()
-        self._mood: Mood = "well"
+        self._mood = "well"
         self._plugged = self._stop = False
         self._failed = ""
         self._sent = self._lost = self._sequence = self._commands = 0
@@ -68,15 +72,17 @@ class EmulatedBoard(EmulatedDevice):
         return {
             "unplug": "pull the plug; the board keeps its power",
             "plug": "plug it in again",
-            "silent": "send no reports, but take commands",
-            "stalled": "complete nothing, in either direction",
             "halt": "stall the reading endpoint until the host clears it (usb)",
-            "well": "behave again",
+            **MOODS,
         }
 
     def tell(self, word: str) -> None:
         """Execute one of the commands of `words`. Raises KeyError for any other, NoDevice if it cannot be connected."""
-        self._told()[word]()
+        actions = {"unplug": self._unplug, "plug": self._plug, "halt": self._port.halt}
+        if word in MOODS:
+            self._mood = word
+        else:
+            actions[word]()
 
     def state(self) -> Mapping[str, float | int | str | bool]:
         """Return the state of the fingers, and the numbers of sent and lost reports and of received commands."""
@@ -122,16 +128,6 @@ class EmulatedBoard(EmulatedDevice):
         with self._lock:
             return self._board.feature()
 
-    def _told(self) -> Mapping[str, Callable[[], object]]:
-        return {
-            "unplug": self._unplug,
-            "plug": self._plug,
-            "silent": lambda: self._be("silent"),
-            "stalled": lambda: self._be("stalled"),
-            "halt": self._port.halt,
-            "well": lambda: self._be("well"),
-        }
-
     def _plug(self) -> None:
         self._port.plug()
         self._plugged = True
@@ -146,9 +142,6 @@ class EmulatedBoard(EmulatedDevice):
     def _unplug(self) -> None:
         self._plugged = False
         self._port.unplug()
-
-    def _be(self, mood: Mood) -> None:
-        self._mood = mood
 
     def _run(self) -> None:
         try:

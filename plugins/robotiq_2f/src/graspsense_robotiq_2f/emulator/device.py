@@ -52,11 +52,6 @@ class EmulatedGripper(EmulatedSerial):
         return ",".join(port.where for port in self._tactile_ports)
 
     @property
-    def body_report(self) -> Mapping[str, float | int | str | bool]:
-        """What the body knows."""
-        return self._hand.fingers.body.report()
-
-    @property
     def words(self) -> Mapping[str, str]:
         """The words that `tell` understands, with their effects."""
         return {**super().words, RESTART: "cut the power of the gripper for a moment"}

@@ -34,11 +34,6 @@ class LockStepGripper:
         """What the body knows."""
         return self._hand.fingers.body.report()
 
-    @property
-    def going(self) -> bool:
-        """Whether the motor is asked to go to its target."""
-        return self._hand.going
-
     def monotonic(self) -> float:
         """Return the time (s) of the gripper."""
         return self._now_s
