@@ -298,16 +298,6 @@ def test_columns_without_names_have_numbers(tmp_path):
     assert column(recording, "gap_m") == pytest.approx(squeezing()[0], abs=1e-9)
 
 
-def test_npy_of_three_dimensions_has_a_grasp_for_each_index(tmp_path):
-    gap, force = squeezing()
-    np.save(tmp_path / "jar.npy", np.stack([np.column_stack([T_S, gap, k * force]) for k in (1, 2)]))
-    grasp, next_grasp = recordings(
-        tmp_path, 'files = "{label}.npy"\ntime = "c1"\ngap = "c2"\nforce = "c3"\norder = "{part}"'
-    )
-    assert (grasp.order, next_grasp.order) == (0.0, 1.0)
-    assert column(next_grasp, "force_left_n") == pytest.approx(2 * force)
-
-
 def test_a_ros_bag_with_topics_of_different_rates(tmp_path):
     pytest.importorskip("rosbags", reason="needs the extra ros")
     from rosbags.rosbag1 import Writer

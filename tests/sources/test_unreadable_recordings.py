@@ -158,13 +158,6 @@ def test_an_absolute_path_and_one_outside_are_read_and_a_wrong_row_is_of_its_own
         assert words in line
 
 
-def test_where_none_can_be_read_the_first_is_told(folder):
-    for path in folder.glob("*.npz"):
-        flipped_in_the_middle(path)
-    with pytest.raises(DataDamaged, match=r"none of 6 recordings.*can_2\.npz"):
-        load_trials(f"manifest:{folder / 'manifest.toml'}")
-
-
 # Recordings of our own with contents that no grasp has. Their checksums are right.
 
 
@@ -277,16 +270,6 @@ def test_of_a_store(tmp_path):
     assert code == 0, err
     (page,) = (tmp_path / "page").glob("*.html")
     assert "recordings cannot be read and are left out" in page.read_text()
-
-
-def test_of_icub(tmp_path):
-    encoders = " ".join(["10"] * 9)
-    frames = [encoders, " ".join(["20"] * 5), *[" ".join(["200"] * 12)] * 5]
-    for k in range(1, 5):
-        (tmp_path / f"can_{k}.txt").write_text("\n".join(["-10000", *frames * 5]) + "\n")
-    (tmp_path / "can_2.txt").write_bytes(b"\xff\x00")
-    grasps = list(readable_or_not("icub", str(tmp_path)))
-    assert [isinstance(recording, UnreadableRecording) for recording in grasps] == [False, True, False, False]
 
 
 def test_what_is_ours_passes_through_and_what_is_not_is_named():
