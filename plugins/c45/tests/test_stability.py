@@ -30,6 +30,12 @@ def table(values, labels, weights=None, n_classes=None):
     )
 
 
+def test_midpoint_of_two_huge_values_does_not_overflow():
+    tree = fit(table([[1.6e308]] * 4 + [[1.7e308]] * 4, [0] * 4 + [1] * 4), Options(actual_split_value=False))
+    assert 1.6e308 <= tree.to_dict()["threshold"] < 1.7e308
+    assert tree.node_count == 3
+
+
 def test_a_column_below_the_gap_never_splits():
     # J48's rule: neighbours must differ by more than 1e-5, whatever the scale.
     for tiny in (1e-300, 1e-9, 0.99e-5):
