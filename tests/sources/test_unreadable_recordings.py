@@ -158,6 +158,13 @@ def test_an_absolute_path_and_one_outside_are_read_and_a_wrong_row_is_of_its_own
         assert words in line
 
 
+def test_where_none_can_be_read_the_first_is_told(folder):
+    for path in folder.glob("*.npz"):
+        flipped_in_the_middle(path)
+    with pytest.raises(DataDamaged, match=r"none of 6 recordings.*can_2\.npz"):
+        load_trials(f"manifest:{folder / 'manifest.toml'}")
+
+
 # Recordings of our own with contents that no grasp has. Their checksums are right.
 
 
