@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import scipy
@@ -137,20 +138,28 @@ def ros_mcap(path: Path) -> None:
 
 
 def _write_hand(writer: object, ros1: bool) -> None:
+    forces = np.column_stack([FORCE_N, FORCE_N])
+    write_topics(writer, {"/hand/width": (T_S, GAP_M), "/hand/forces": (T_S, forces)}, ros1=ros1)
+
+
+def write_topics(writer: Any, topics: Mapping[str, tuple[Any, Any]], ros1: bool) -> None:
+    """Write topics of numbers, or of rows of numbers, into a bag: the times (s) and the values of each."""
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
-    name, several = "std_msgs/msg/Float64", "std_msgs/msg/Float64MultiArray"
     layout = store.types["std_msgs/msg/MultiArrayLayout"](dim=[], data_offset=0)
     encode = store.serialize_ros1 if ros1 else store.serialize_cdr
-    with writer:  # type: ignore[attr-defined]
-        width = writer.add_connection("/hand/width", name, typestore=store)  # type: ignore[attr-defined]
-        forces = writer.add_connection("/hand/forces", several, typestore=store)  # type: ignore[attr-defined]
-        for t_s, gap, force in zip(T_S, GAP_M, FORCE_N, strict=True):
-            stamp_ns = 10**18 + round(t_s * 1e9)
-            writer.write(width, stamp_ns, encode(store.types[name](gap), name))  # type: ignore[attr-defined]
-            message = store.types[several](layout, np.array([force, force]))
-            writer.write(forces, stamp_ns, encode(message, several))  # type: ignore[attr-defined]
+    messages = []
+    with writer:
+        for topic, (times_s, values) in topics.items():
+            kind = "std_msgs/msg/Float64" if np.ndim(values) == 1 else "std_msgs/msg/Float64MultiArray"
+            connection = writer.add_connection(topic, kind, typestore=store)
+            for t_s, value in zip(times_s, values, strict=True):
+                number = (value,) if np.ndim(values) == 1 else (layout, value)
+                data = encode(store.types[kind](*number), kind)
+                messages.append((10**18 + round(t_s * 1e9), connection, data))
+        for stamp_ns, connection, data in sorted(messages, key=lambda message: message[0]):
+            writer.write(connection, stamp_ns, data)
 
 
 def pr2_bag(path: Path) -> None:

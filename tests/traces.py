@@ -1,7 +1,22 @@
-"""Traces with known answers, for tests."""
+"""Traces and recordings with known answers, for tests."""
 
-from graspsense.core.values.signals import Frame, Phase
+from math import nan
+
+import numpy as np
+
+from graspsense.core.values.signals import NO_PADS, Frame, Phase, Reading
 from graspsense.core.values.trace import trace_of
+from graspsense.recording.replayable import Recording
+
+
+def made_recording(rate_hz, t_s, gap_m, left_n, right_n, **more):
+    """A recording of these columns, without effort and pads."""
+    columns = (np.asarray(column, float).tolist() for column in (t_s, gap_m, left_n, right_n))
+    readings = tuple(
+        Reading(Frame(t, 1.0 / rate_hz, gap, 0.0, nan, left, right, nan, nan, 0), NO_PADS)
+        for t, gap, left, right in zip(*columns, strict=True)
+    )
+    return Recording(name="squeeze", rate_hz=rate_hz, readings=readings, **more)
 
 
 def made_trace(rows, dt=0.001, phase=Phase.SQUEEZE, phases=None, units=None):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import scipy
 from commands import graspsense
+from recorded_files import write_topics
 from repository import ROOT
 
 from graspsense.sources.columns.channel_facts import channel_facts
@@ -71,20 +72,10 @@ def test_check_on_a_table_in_words(tmp_path):
 def test_check_on_a_bag_shows_a_topic_that_died(tmp_path):
     pytest.importorskip("rosbags", reason="needs the extra ros")
     from rosbags.rosbag1 import Writer
-    from rosbags.typesys import Stores, get_typestore
 
-    store = get_typestore(Stores.ROS1_NOETIC)
-    kind = "std_msgs/msg/Float64"
-    writer = Writer(tmp_path / "jar.bag")
-    with writer:
-        topics = {
-            name: writer.add_connection(name, kind, typestore=store) for name in ("/hand/gap", "/hand/force")
-        }
-        for k, t_s in enumerate(T_S):
-            for name, value, every in (("/hand/gap", GAP_MM[k], 1), ("/hand/force", FORCE_N[k], 2)):
-                if k % every == 0 and (name == "/hand/gap" or t_s < 1.2):
-                    message = store.serialize_ros1(store.types[kind](float(value)), kind)
-                    writer.write(topics[name], 10**18 + round(t_s * 1e9), message)
+    alive = np.flatnonzero(T_S < 1.2)[::2]
+    topics = {"/hand/gap": (T_S, GAP_MM), "/hand/force": (T_S[alive], FORCE_N[alive])}
+    write_topics(Writer(tmp_path / "jar.bag"), topics, ros1=True)
     by_name = {channel["name"]: channel for channel in checked(tmp_path / "jar.bag")[0]["channels"]}
     assert by_name["/hand/gap.data"]["rate_hz"] == pytest.approx(100.0)
     assert by_name["/hand/force.data"]["rate_hz"] == pytest.approx(50.0)

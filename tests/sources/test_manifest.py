@@ -11,6 +11,7 @@ import pytest
 import scipy
 from cases import every_case
 from commands import graspsense, printed
+from recorded_files import write_topics
 from repository import ROOT
 
 from graspsense.core.values.errors import ConfigError, DataDamaged
@@ -306,35 +307,14 @@ def test_columns_without_names_have_numbers(tmp_path):
     assert column(recording, "gap_m") == pytest.approx(squeezing()[0], abs=1e-9)
 
 
-def test_npy_of_three_dimensions_has_a_grasp_for_each_index(tmp_path):
-    gap, force = squeezing()
-    np.save(tmp_path / "jar.npy", np.stack([np.column_stack([T_S, gap, k * force]) for k in (1, 2)]))
-    grasp, next_grasp = recordings(
-        tmp_path, 'files = "{label}.npy"\ntime = "c1"\ngap = "c2"\nforce = "c3"\norder = "{part}"'
-    )
-    assert (grasp.order, next_grasp.order) == (0.0, 1.0)
-    assert column(next_grasp, "force_left_n") == pytest.approx(2 * force)
-
-
 def test_a_ros_bag_with_topics_of_different_rates(tmp_path):
     pytest.importorskip("rosbags", reason="needs the extra ros")
     from rosbags.rosbag1 import Writer
-    from rosbags.typesys import Stores, get_typestore
 
     gap, force = squeezing()
-    store = get_typestore(Stores.ROS1_NOETIC)
-    number, several = store.types["std_msgs/msg/Float64"], store.types["std_msgs/msg/Float64MultiArray"]
-    layout = store.types["std_msgs/msg/MultiArrayLayout"](dim=[], data_offset=0)
-    with Writer(tmp_path / "jar.bag") as writer:
-        width = writer.add_connection("/hand/width", "std_msgs/msg/Float64", typestore=store)
-        forces = writer.add_connection("/hand/forces", "std_msgs/msg/Float64MultiArray", typestore=store)
-        for k, t_s in enumerate(T_S):
-            stamp_ns = 10**18 + round(t_s * 1e9)
-            writer.write(width, stamp_ns, store.serialize_ros1(number(gap[k]), "std_msgs/msg/Float64"))
-            if k % 2 == 0:
-                message = several(layout, np.array([force[k], 2 * force[k]]))
-                encoded = store.serialize_ros1(message, "std_msgs/msg/Float64MultiArray")
-                writer.write(forces, stamp_ns, encoded)
+    forces = np.column_stack([force, 2 * force])
+    topics = {"/hand/width": (T_S, gap), "/hand/forces": (T_S[::2], forces[::2])}
+    write_topics(Writer(tmp_path / "jar.bag"), topics, ros1=True)
 
     (recording,) = recordings(
         tmp_path,

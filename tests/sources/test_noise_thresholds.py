@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from math import nan
-
 import numpy as np
 import pytest
 from attrs import evolve
 from cases import every_case
+from traces import made_recording
 
 from graspsense.core.control.contact import CONTACT_FORCE_N, REST_SPEED_M_S, REST_WINDOW_S, first_rest
 from graspsense.core.values.features import Features
-from graspsense.core.values.signals import NO_PADS, Frame, Reading
-from graspsense.recording.replayable import Recording
 from graspsense.sources.importing.import_outcomes import presses_on
 from graspsense.sources.recordings.noise_thresholds import thresholds_for
 
@@ -24,15 +21,7 @@ def squeeze(peak_n=8.0, force_noise_n=0.01, gap_noise_m=0.0, step_s=0.001, seed=
     gap = np.interp(times, [0.0, 1.0, 1.5], [0.08, 0.06, 0.055]) + gap_noise_m * rng.normal(size=len(times))
     force = np.interp(times, [0.0, 1.0, 1.5], [0.0, 0.0, peak_n])
     pads = force[:, np.newaxis] + force_noise_n * rng.normal(size=(len(times), 2))
-    return Recording(
-        name="squeeze",
-        rate_hz=1.0 / step_s,
-        readings=tuple(
-            Reading(Frame(t, step_s, g, 0.0, nan, left, right, nan, nan, 0), NO_PADS)
-            for t, g, (left, right) in zip(times.tolist(), gap.tolist(), pads.tolist(), strict=True)
-        ),
-        **more,
-    )
+    return made_recording(1.0 / step_s, times, gap, *pads.T, **more)
 
 
 def test_defaults_that_fit_are_kept_and_said():
@@ -73,11 +62,7 @@ def test_the_thresholds_of_rest_are_not_those_of_open_fingers():
     gap = np.interp(times, [0.0, 1.0, 3.0, 3.3, 3.6], [0.07, 0.06, 0.054, 0.054, 0.07])
     gap = np.round(gap / 5e-5) * 5e-5
     force = np.interp(times, [1.0, 3.0, 3.3, 3.4], [0.0, 8.0, 8.0, 0.0])
-    readings = [
-        Reading(Frame(t, 0.01, g, 0.0, nan, f, f, nan, nan, 0), NO_PADS)
-        for t, g, f in zip(times.tolist(), gap.tolist(), force.tolist(), strict=True)
-    ]
-    recording = Recording(name="squeeze", rate_hz=100.0, readings=tuple(readings))
+    recording = made_recording(100.0, times, gap, force, force)
     assert thresholds_for([recording]).settings["controller.rest_window_s"] <= 0.3
 
 
@@ -176,12 +161,7 @@ def slow_squeeze(hold_s, step_s=0.0222, seed=0):
     times = np.arange(0.0, 4.5 + hold_s, step_s)
     gap = np.interp(times, [0.0, 1.5, 4.5], [0.076, 0.064, 0.0616])
     force = np.interp(times, [1.5, 4.5], [0.0, 8.0]) + 0.004 * rng.normal(size=len(times))
-    frames = [
-        Frame(t, step_s, g, 0.0, nan, f, f, nan, nan, 0)
-        for t, g, f in zip(times.tolist(), gap.tolist(), force.tolist(), strict=True)
-    ]
-    readings = tuple(Reading(frame, NO_PADS) for frame in frames)
-    return Recording(name="slow", rate_hz=1.0 / step_s, readings=readings)
+    return made_recording(1.0 / step_s, times, gap, force, force)
 
 
 @every_case("step_s", [0.0222, 0.1])

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 from cases import every_case
+from traces import made_recording
 
-from graspsense.core.values.signals import NO_PADS, Frame, Reading
 from graspsense.recording.labelled_recording import LabelledRecording
-from graspsense.recording.replayable import Recording
 from graspsense.sources.columns.recording_notices import with_notices
 
 T_S = np.arange(300) * 0.01
@@ -20,12 +19,7 @@ NOISE_N = np.random.default_rng(0).normal(0.0, 0.01, (2, len(T_S)))
 
 def noticed(left: Any, right: Any, gap: Any = None, rate_hz: float = 100.0) -> tuple[str, ...]:
     gaps = np.full(len(left), 0.05) if gap is None else gap
-    frames = (
-        Frame(k / rate_hz, 1.0 / rate_hz, float(gap), 0.0, nan, float(a), float(b), nan, nan, 0)
-        for k, (gap, a, b) in enumerate(zip(gaps, left, right, strict=True))
-    )
-    readings = tuple(Reading(frame, NO_PADS) for frame in frames)
-    recording = Recording(name="squeeze", readings=readings, rate_hz=rate_hz)
+    recording = made_recording(rate_hz, np.arange(len(left)) / rate_hz, gaps, left, right)
     return with_notices(LabelledRecording(recording=recording, source="squeeze")).notices
 
 

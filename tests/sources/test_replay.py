@@ -365,15 +365,6 @@ def test_run_on_a_bad_file_is_no_traceback(tmp_path: Path) -> None:
         path.touch()
 
 
-@real_data
-def test_run_on_a_real_grasp_ends_steady_with_all_features() -> None:
-    done = run(f"icub:{os.environ['GRASPSENSE_ICUB']}/full_vitamin_water_1.txt")
-    assert done.returncode == 0, done.stderr
-    grasp = json.loads(done.stdout)
-    assert grasp["outcome"] == "steady"
-    assert None not in grasp["features"].values()
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "options",

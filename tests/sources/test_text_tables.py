@@ -8,9 +8,7 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 from cases import every_case
-from commands import printed
 
-from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import DataDamaged
 from graspsense.sources.columns.column_guess import guesses
 from graspsense.sources.formats.text_format import read_text
@@ -341,16 +339,6 @@ def test_labels_that_look_the_same_are_the_same(tmp_path):
     labelled = trials(tmp_path, lines, features=["p"])
     assert labelled.classes == ("1", "caf\u00e9")
     assert labels_of("cafe\u0301:1.0#2") == {"label": "caf\u00e9:1", "instance": "caf\u00e9#2"}
-    assert isinstance(labelled, Labelled)
-
-
-@pytest.mark.slow
-def test_evaluate_and_train_read_what_pandas_wrote(tmp_path):
-    path = tmp_path / "trials.csv"
-    path.write_text("\n".join([",what,p,q", *(f"{k},{trial}" for k, trial in enumerate(TRIALS))]) + "\n")
-    for command in (("evaluate", path), ("train", path, "--out", tmp_path / "m.json")):
-        printed(*command, "--label", "what")
-    assert "index" not in json.dumps(json.loads((tmp_path / "m.json").read_text())["features"])
 
 
 def test_rows_without_a_value_of_the_column_that_splits_are_left_out_and_told(tmp_path):

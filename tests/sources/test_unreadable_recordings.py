@@ -279,16 +279,6 @@ def test_of_a_store(tmp_path):
     assert "recordings cannot be read and are left out" in page.read_text()
 
 
-def test_of_icub(tmp_path):
-    encoders = " ".join(["10"] * 9)
-    frames = [encoders, " ".join(["20"] * 5), *[" ".join(["200"] * 12)] * 5]
-    for k in range(1, 5):
-        (tmp_path / f"can_{k}.txt").write_text("\n".join(["-10000", *frames * 5]) + "\n")
-    (tmp_path / "can_2.txt").write_bytes(b"\xff\x00")
-    grasps = list(readable_or_not("icub", str(tmp_path)))
-    assert [isinstance(recording, UnreadableRecording) for recording in grasps] == [False, True, False, False]
-
-
 def test_what_is_ours_passes_through_and_what_is_not_is_named():
     for error, expected in (
         (KeyError("x"), DataDamaged),

@@ -164,6 +164,7 @@ def test_labelled_trials_of_a_store_are_a_data_set(folder):
     assert trials.labels == ("can:full_open", "can:it's open")
     assert trials.instances == ("can#1", "can#2")
     assert trials.order == (0, 1)
+    assert trials.first_line is None  # that is of imports alone
     assert trials.table.names == ("p_first", "f_steady")
     assert trials.table.values[0].tolist() == [0.066, 5.5]
     assert math.isnan(trials.table.values[1, 1])

@@ -128,22 +128,6 @@ def test_a_feature_set_that_is_not_installed_does_not_lose_the_trial(store):
     assert "elsewhere/mine" in json.loads(store.query("SELECT missing FROM detail")[0][0])[""]
 
 
-def contents(store):
-    """Return label, outcome and features of each trial."""
-    return sorted((s.label, s.outcome, store.trial(s.id).result.features.values) for s in store.page())
-
-
-def test_a_lost_database_is_made_again_from_the_recordings(store):
-    numbers = [keep(store, label) for label in ("can:full_open", "can:empty_open", "toy")]
-    trials = contents(store)
-    store.close()
-    for path in store.folder.glob("store.sqlite*"):
-        path.rename(path.with_name("old-" + path.name))
-    with Store.open(store.folder) as new:
-        assert [recovered.what for recovered in recover_store(new)] == ["added"] * len(numbers)
-        assert contents(new) == trials
-
-
 def test_recordings_without_a_database_get_their_numbers_in_the_order_of_recording(store):
     for name, hour in (("c.mcap", 10), ("a.mcap", 11), ("b.mcap", 9)):
         record = evolve(ended(label=f"hour:{hour}"), made_at=f"2026-11-21T{hour:02}:00:00.000+00:00")

@@ -291,24 +291,6 @@ def test_a_store_on_a_read_only_disk_is_read_and_not_written(mounted, log):
         Store.open(disk)
 
 
-@pytest.mark.slow
-def test_a_disk_that_is_full_is_told_and_what_was_kept_stays(mounted):
-    disk = mounted("size=1500k")
-    with Store.open(disk) as store:
-        kept = 0
-        with pytest.raises((SaveFailed, OSError)) as told:  # noqa: PT012 - how many fit is the disk's business
-            while True:
-                keep(store, ticks=400)
-                kept += 1
-        assert "full" in str(told.value) or "No space" in str(told.value)
-        assert kept >= 1
-    with suppress(OSError):  # and every last byte
-        (disk / "filler").write_bytes(b"x" * 10_000_000)
-    findings = verify_store(disk)
-    assert (findings.trials, findings.problems) == (kept, ())
-    assert verify_file(disk / "store.sqlite").trials == kept
-
-
 def test_a_new_store_on_a_full_disk_is_not_called_damaged(mounted):
     disk = mounted("size=400k")
     with suppress(OSError):

@@ -61,12 +61,3 @@ def test_a_store_of_imports_has_a_first_line_and_no_order(tmp_path):
     assert table.values[0, :4].tolist() == [frame(0).gap_m, frame(0).velocity_m_s, frame(0).effort_n, 0.0]
     # The third import is damaged, and the fourth trial was not imported.
     assert (table.values[2:] != table.values[2:]).all()
-
-
-def test_grasps_of_our_own_have_an_order_and_no_first_line(tmp_path):
-    with Store.open(tmp_path / "trials") as store:
-        for label in ("can", "jar"):
-            keep(store, label)
-    labelled = labelled_store(str(tmp_path / "trials"))
-    assert labelled.order == (0, 1)
-    assert labelled.first_line is None

@@ -4,7 +4,6 @@ import numpy as np
 from cases import every_case
 
 from graspsense.plugin_api import FeatureTable
-from graspsense_c45 import Attribute, Schema, fit, make_table
 from graspsense_c45.plugin import C45, C45Config
 
 
@@ -37,13 +36,3 @@ def test_the_tree_is_the_same_in_every_unit(exponent):
 def test_what_varies_only_by_rounding_is_not_scaled():
     values = np.where(np.arange(40) % 2, 0.3, 0.1 + 0.2)
     assert len(fitted(values, ["a", "b"] * 20).tree()) == 1
-
-
-def test_the_library_cuts_as_j48_does():
-    values, labels = lengths()
-    table = make_table(
-        Schema((Attribute("c", "F"),), ("soft", "stiff")),
-        np.array(values)[:, None] * 1e-6,
-        [["soft", "stiff"].index(label) for label in labels],
-    )
-    assert fit(table).node_count == 1

@@ -373,15 +373,6 @@ def test_a_damaged_data_set_is_an_error_that_says_what_is_wrong(tmp_path, damage
     assert word in str(caught.value)
 
 
-@every_case("damage", [_remove(META), _cut(DATA), _episodes(length=[1, 2, 3])])
-def test_a_check_of_a_damaged_data_set_ends_with_an_error_of_ours(tmp_path, damage):
-    folder = write_set(tmp_path / "set", 3)
-    damage(folder)
-    done = CliRunner().invoke(cli, ["import", f"lerobot:{folder}", "--check", "--plot", f"{tmp_path}/p.png"])
-    assert isinstance(done.exception, GraspsenseError | SystemExit)
-    assert done.exit_code
-
-
 def _refusal(folder):
     """Raise the error of a data set, or of its first episode that cannot be read."""
     raise next(

@@ -128,20 +128,6 @@ def test_no_command_is_above_the_ceilings_whatever_the_board_allows(value, effor
         assert command.effort_un == pytest.approx(min(max(value, -most), most) * 1e6, abs=1.0)
 
 
-def test_effort_at_its_limit_is_not_clamped_by_the_board():
-    """20.0000006 N is 20 000 001 µN, and its limit is rounded down."""
-    backend = emulated()
-    backend.open(0)
-    statuses = []
-    for _ in range(3):
-        backend.apply(Command(EFFORT, 20.0000006, 20.0000006, 0.1))
-        reading = backend.read(0.1)
-        assert reading is not None
-        statuses.append(reading.frame.status)
-    backend.close()
-    assert statuses == [0, 0, 0]
-
-
 def test_specification_has_the_ranges_of_the_code():
     rows = re.findall(r"^\| (\w+) \| (\d+) to (\d+) \| ([^|]+) \|", SPECIFICATION.read_text(), re.M)
     ranges = {(number, int(least), int(most), unit) for number, least, most, unit in rows}

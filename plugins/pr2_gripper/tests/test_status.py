@@ -20,7 +20,6 @@ from graspsense_pr2_gripper.protocol import (
     LEFT_ABSENT,
     REFUSED,
     RIGHT_ABSENT,
-    Identity,
     InputReport,
 )
 from graspsense_pr2_gripper.status import (
@@ -37,12 +36,6 @@ from graspsense_pr2_gripper.stream import RawImage
 
 PAGE = Path(__file__).parents[3] / "docs" / "pr2.md"
 TIP = (3000.0,) * 22
-IDENTITY = Identity(
-    firmware=(1, 2, 3), serial="L7", transmission="pr2", pad_counts_per_n=1600, side_counts_per_n=400,
-    edge_counts_per_n=600, effort_limit_un=100_000_000, speed_limit_um_s=200_000, report_rate_hz=1000,
-    image_period_us=41_000, watchdog_ms=100, encoder_ticks_rev=1200, accelerometer_g=8,
-)  # fmt: skip
-"""The PR2 as published."""
 
 
 def report(**changes):
@@ -96,8 +89,8 @@ def test_opened_gripper_declares_the_bits_and_the_friction_of_its_drive():
     image=st.builds(dead, st.integers(0, 22), st.integers(0, 22)),
     swap=st.booleans(),
 )
-def test_no_frame_has_a_bit_that_is_not_declared(reported, image, swap):
-    frame = measure(IDENTITY, swap).reading(reported, image).frame
+def test_no_frame_has_a_bit_that_is_not_declared(reported, image, swap, device_identity):
+    frame = measure(device_identity(), swap).reading(reported, image).frame
     declared = sum(bit.mask for bit in status_bits(swap))
     assert frame.status & ~declared == 0
     assert frame.status & 0xFFFF == reported.status
@@ -107,17 +100,17 @@ def test_no_frame_has_a_bit_that_is_not_declared(reported, image, swap):
 
 
 @every_case(("result", "bit"), [(0, 0), (1, 0), (CLAMPED, COMMAND_CLAMPED), (REFUSED, COMMAND_REFUSED)])
-def test_result_of_a_command_is_in_the_frame(result, bit):
-    assert measure(IDENTITY).reading(report(command_result=result), None).frame.status == bit
+def test_result_of_a_command_is_in_the_frame(result, bit, device_identity):
+    assert measure(device_identity()).reading(report(command_result=result), None).frame.status == bit
 
 
 @every_case(
     ("rate_hz", "age_us", "old"),
     [(1000, 61_000, False), (1000, 62_000, True), (1000, 0xFFFF, True), (100, 0xFFFF, False)],
 )
-def test_image_is_old_half_a_period_after_the_next_one_was_due(rate_hz, age_us, old):
+def test_image_is_old_half_a_period_after_the_next_one_was_due(rate_hz, age_us, old, device_identity):
     """41 ms and a half of it; at 100 Hz the eleven slices of an image take 110 ms, which the field cannot say."""
-    slow = IDENTITY._replace(report_rate_hz=rate_hz)
+    slow = device_identity(report_rate_hz=rate_hz)
     frame = measure(slow).reading(report(image_age_us=age_us), None).frame
     assert frame.status == (OLD_IMAGE if old else 0)
     assert measure(slow).reading(report(image=0, image_age_us=age_us), None).frame.status == 0, (
@@ -125,20 +118,20 @@ def test_image_is_old_half_a_period_after_the_next_one_was_due(rate_hz, age_us, 
     )
 
 
-def test_pad_with_more_than_a_third_of_its_cells_dead_is_dead():
-    assert measure(IDENTITY).reading(report(), dead(left=5)).frame.status == BAD_CELL
-    assert measure(IDENTITY).reading(report(), dead(left=6)).frame.status == BAD_CELL | LEFT_DEAD
-    assert measure(IDENTITY).reading(report(), dead(right=15)).frame.status == BAD_CELL | RIGHT_DEAD
-    swapped = measure(IDENTITY, swap=True).reading(report(), dead(left=6)).frame
+def test_pad_with_more_than_a_third_of_its_cells_dead_is_dead(device_identity):
+    assert measure(device_identity()).reading(report(), dead(left=5)).frame.status == BAD_CELL
+    assert measure(device_identity()).reading(report(), dead(left=6)).frame.status == BAD_CELL | LEFT_DEAD
+    assert measure(device_identity()).reading(report(), dead(right=15)).frame.status == BAD_CELL | RIGHT_DEAD
+    swapped = measure(device_identity(), swap=True).reading(report(), dead(left=6)).frame
     assert swapped.status == BAD_CELL | RIGHT_DEAD
-    without_tare = Measure(IDENTITY, Pr2Config(), None, None).reading(report(), dead(left=15)).frame
+    without_tare = Measure(device_identity(), Pr2Config(), None, None).reading(report(), dead(left=15)).frame
     assert without_tare.status == BAD_CELL | LEFT_DEAD
 
 
 @pytest.mark.parametrize("transmission", sorted(LINKAGES))
-def test_angle_outside_of_the_stroke_is_implausible_though_it_has_a_gap(transmission):
+def test_angle_outside_of_the_stroke_is_implausible_though_it_has_a_gap(transmission, device_identity):
     """The map to the gap repeats itself: 2147483647 ticks are 69 mm."""
-    identity = IDENTITY._replace(transmission=transmission)
+    identity = device_identity(transmission=transmission)
     for gap_m, wrong in ((-0.011, True), (-0.009, False), (0.0, False), (0.09, False), (0.101, True)):
         ticks = round(revolutions_at(LINKAGES[transmission], gap_m) * 1200)
         frame = measure(identity).reading(report(encoder_ticks=ticks), None).frame
@@ -152,9 +145,9 @@ def test_angle_outside_of_the_stroke_is_implausible_though_it_has_a_gap(transmis
 @pytest.mark.parametrize(
     ("step_m", "time_us", "wrong"), [(-1e-3, 1000, True), (-1e-3, 3000, False), (-4e-4, 1, False)]
 )
-def test_gap_that_jumps_is_implausible_in_that_frame(step_m, time_us, wrong):
+def test_gap_that_jumps_is_implausible_in_that_frame(step_m, time_us, wrong, device_identity):
     """A millimetre in a millisecond is 1 m/s; over two lost reports it is 0.33 m/s."""
-    made = measure(IDENTITY)
+    made = measure(device_identity())
     ticks = [round(revolutions_at(LINKAGES["pr2"], 0.05 + gap_m) * 1200) for gap_m in (0.0, step_m, step_m)]
     times = (0, time_us, time_us + 1000)
     statuses = [
@@ -166,9 +159,9 @@ def test_gap_that_jumps_is_implausible_in_that_frame(step_m, time_us, wrong):
 
 @every_case("swap", [False, True])
 @every_case("bit", [LEFT_ABSENT, RIGHT_ABSENT])
-def test_words_name_the_pad_that_has_no_force(bit, swap):
+def test_words_name_the_pad_that_has_no_force(bit, swap, device_identity):
     (declared,) = [status for status in status_bits(swap) if status.mask == bit]
-    frame = measure(IDENTITY, swap).reading(report(status=bit), dead()).frame
+    frame = measure(device_identity(), swap).reading(report(status=bit), dead()).frame
     side = "left" if math.isnan(frame.force_left_n) else "right"
     assert declared.name == f"{side} fingertip absent"
     assert math.isnan(frame.force_left_n) != math.isnan(frame.force_right_n)

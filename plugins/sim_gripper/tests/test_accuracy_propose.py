@@ -20,7 +20,6 @@ from graspsense_sim_gripper.scene.library import find
 from graspsense_sim_gripper.scene.spec import ObjectSpec
 
 CONFIG = SimConfig(sensor="ideal", spread=False)
-SHELL = ("elastic", {"k1_n_m": 2000.0, "k3_n_m3": 2e6})
 
 
 def proposed(config, spec):

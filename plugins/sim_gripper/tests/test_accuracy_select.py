@@ -275,14 +275,6 @@ def test_a_threshold_that_is_met_at_a_tick_within_rounding_or_nearly_is_met_in_i
         assert deviation(course(config, met_n + off_n), expected)[0] <= config.accuracy, off_n
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("off_n", [1e-3, -1e-3, 0.08])
-def test_a_threshold_that_is_nearly_met_at_a_tick_is_decided_as_by_the_reference(stiff, off_n):
-    config, met_n = stiff
-    expected = course(evolve(config, fidelity="reference"), met_n + off_n)
-    assert deviation(course(config, met_n + off_n), expected)[0] <= config.accuracy
-
-
 @pytest.mark.slow
 def test_every_object_of_the_catalogue_has_a_model_of_ordinary_steps():
     for spec in catalogue().values():

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from attrs import evolve, fields
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -411,22 +412,16 @@ def test_a_batch_takes_the_run_settings_as_the_runner_does():
     assert alone.t_s[-1] - short.t_s[-1] == pytest.approx(0.25, abs=0.02)
 
 
-def test_a_law_that_never_ends_a_grasp_is_ended_as_by_the_runner():
-    law, run = Endless(HYBRID.config), RunConfig(seed=1, grasp_timeout_s=0.2, opening_timeout_s=0.2)
+@every_case(("step", "says"), [("endless", "grasp_timeout_s"), ("lost", "NaN")])
+def test_a_law_that_never_ends_or_commands_no_number_is_ended_as_by_the_runner(step, says):
+    law = {"endless": Endless, "lost": Lost}[step](HYBRID.config)
+    run = RunConfig(seed=1, grasp_timeout_s=0.2, opening_timeout_s=0.2)
     alone = run_grasp(SimBackend(SimConfig(object="none")), law, run)
     among = run_many(SimConfig(), law, ["none"], [1], run=run)[0]
     assert among.outcome == alone.outcome == Outcome.ABORTED
     assert among.reason == alone.reason
-    assert "grasp_timeout_s" in among.reason
+    assert says in among.reason
     assert bits(alone.trace) == bits(among.trace)
-
-
-def test_a_command_that_is_no_number_ends_a_grasp_of_many_as_one_alone():
-    law = Lost(HYBRID.config)
-    alone = run_grasp(SimBackend(SimConfig(object="none")), law, RunConfig(seed=1))
-    among = run_many(SimConfig(), law, ["none"], [1])[0]
-    assert among.outcome == alone.outcome == Outcome.ABORTED
-    assert among.reason == alone.reason
 
 
 @pytest.mark.usefixtures("apart")

@@ -100,9 +100,6 @@ def test_its_provenance_says_what_made_it():
     provenance = KEPT["provenance"]
 
     assert provenance["simulated"] is True
-    assert provenance["settings"]["controller"]["probing_force_n"] == 20.0
-    assert provenance["settings"]["controller"]["closing_speed_m_s"] == 0.01
-    assert provenance["settings"]["gripper"]["transmission"] == "pr2"
     assert provenance["trials"] == sum(provenance["by_label"].values())
     assert len(provenance["by_label"]) == 15
     assert provenance["components"].keys() == {"gripper", "controller", "features"}

@@ -88,19 +88,21 @@ def test_below_breakaway_nothing_moves_at_all(effort):
     assert after.motion.speed_rev_s == 0.0
 
 
-def test_above_breakaway_it_moves():
-    params = PlantParams(drive(), thing(*SPRING), FINE)
-    assert run(params, plant_at(0.06, (NoState(),)), 8.01, 1.0).motion.gap_m < 0.06 - 1e-5
-
-
 def test_a_loaded_gripper_is_stuck_by_as_much_as_its_load_adds():
     # At 10 N on the pads breakaway is 8 + 0.5 * 10 = 13 N to either side of the balance.
     params = PlantParams(drive(), thing(*SPRING), FINE)
     pressed = ContactState(0.005, 10.0, 2000.0, (NoState(),))
     loaded = plant_at(0.045, (NoState(),))._replace(contact=Contact(10.0, 10.0, 0.0, 1, pressed, ()))
-    for effort, moves in ((22.9, False), (23.1, True), (-2.9, False), (-3.1, True)):
-        after = run(params, loaded, effort, 0.2)
-        assert (after.motion.revolutions != loaded.motion.revolutions) == moves, effort
+    free = plant_at(0.06, (NoState(),))
+    for start, effort, moves in (
+        *(
+            (loaded, effort, moves)
+            for effort, moves in ((22.9, False), (23.1, True), (-2.9, False), (-3.1, True))
+        ),
+        (free, 8.01, True),
+    ):
+        after = run(params, start, effort, 0.2)
+        assert (after.motion.revolutions != start.motion.revolutions) == moves, effort
 
 
 @given(st.floats(-0.02, 0.02).filter(lambda v: abs(abs(v) - 0.009) > 1e-5))
@@ -145,17 +147,6 @@ def test_halving_the_tick_quarters_the_error_of_a_way_in_the_free(effort):
     coarse, fine = (np.abs(end(dt) - exact) for dt in (2e-3, 1e-3))
     assert (coarse > 1e-9 * np.abs(exact)).all()
     assert coarse / fine == pytest.approx([4.0, 4.0], rel=0.15)
-
-
-@pytest.mark.parametrize(
-    ("name", "closed_kg", "open_kg"), [("pr2", 73, 123), ("pr2_2009", 228, 315), ("pr2_paper", 87, 121)]
-)
-def test_the_reflected_mass_of_each_linkage(name, closed_kg, open_kg):
-    link = LINKAGES[name]
-    masses = [
-        4 * math.pi**2 * 4e-7 / gap_and_rate(link, revolutions_at(link, gap))[1] ** 2 for gap in (0.0, 0.086)
-    ]
-    assert masses == pytest.approx([closed_kg, open_kg], rel=0.02)
 
 
 def energy(params, state):
@@ -263,14 +254,6 @@ def test_no_moving_mass_is_too_light_for_the_stops(mass_share):
             assert -1e-9 <= state.motion.gap_m <= 0.086 + 1e-9
 
 
-def test_a_stuck_gripper_does_not_creep_over_a_long_hold():
-    params = PlantParams(drive(), thing(Elastic(2000.0, 0.0), Maxwell(250.0, 0.4)), FINE)
-    state = run(params, plant_at(0.0501, (NoState(), MaxwellState(0.0))), 23.0, 3.0, (elastic, maxwell))
-    after = run(params, state, 23.0, 1e6, (elastic, maxwell), dt=1e3)
-    assert after.motion.revolutions == state.motion.revolutions
-    assert after.contact.left.force_n == pytest.approx(2000.0 * state.contact.left.compression_m, rel=1e-9)
-
-
 def test_what_stands_is_looked_at_in_steps_no_longer_than_the_longest():
     # A light liquid behind soft covers swings some five times in the tick through which the fingers stand.
     body = ObjectModel(
@@ -338,15 +321,20 @@ def test_covers_and_object_carry_one_force_however_stiff_they_are(stiffness, ski
             assert now.force_n == 0.0
 
 
-@pytest.mark.slow
-@every_case(
+HELD = {
+    "foam": Foam(10.0, 0.01, 1.8, 200.0, 0.02, 100.0, 1.0),
+    "worn": Worn(2000.0, 2e6, 0.2, 0.4, 0.002),
+    "gas": Gas(1.2e-3, 0.02, 3e-5, 101325.0, 1.4, 1e-10, 1e-7, 2.0),
+    "slosh": Slosh(0.2, 4.0, 0.02),
+    "liquid": Liquid(1.2e-3, 5e-4, 0.08, 1e-10),
+}
+
+
+@pytest.mark.parametrize(
     ("name", "params"),
     [
-        ("foam", Foam(10.0, 0.01, 1.8, 200.0, 0.02, 100.0, 1.0)),
-        ("worn", Worn(2000.0, 2e6, 0.2, 0.4, 0.002)),
-        ("gas", Gas(1.2e-3, 0.02, 3e-5, 101325.0, 1.4, 1e-10, 1e-7, 2.0)),
-        ("slosh", Slosh(0.2, 4.0, 0.02)),
-        ("liquid", Liquid(1.2e-3, 5e-4, 0.08, 1e-10)),
+        ("maxwell", Maxwell(250.0, 0.4)),
+        *(pytest.param(*held, marks=pytest.mark.slow) for held in HELD.items()),
     ],
 )
 def test_a_stuck_gripper_does_not_creep_whatever_it_holds(name, params):
@@ -356,7 +344,10 @@ def test_a_stuck_gripper_does_not_creep_whatever_it_holds(name, params):
     assert state.motion.speed_rev_s == 0.0
     after = run(params, state, 23.0, 1e6, (elastic, term.law), dt=1e3)
     assert after.motion.revolutions == state.motion.revolutions
-    assert math.isfinite(after.contact.left.force_n)
+    left = after.contact.left
+    assert math.isfinite(left.force_n)
+    if name == "maxwell":  # its branch has relaxed
+        assert left.force_n == pytest.approx(2000.0 * left.compression_m, rel=1e-9)
 
 
 def a_step_per_tick():
