@@ -86,7 +86,6 @@ HEAVY = {
     "hid",
     "hidraw",
     "usb",
-    "rich",
     "cattrs",
 }
 
