@@ -49,7 +49,7 @@ from graspsense.report.html import figure as figure
 from graspsense.report.html import pair as pair
 from graspsense.report.html import panels as panels
 from graspsense.report.html import paragraph as paragraph
-from graspsense.report.matrix import confusion_table as confusion_table
+from graspsense.report.confusion import confusion_table as confusion_table
 from graspsense.report.svg import INKS as INKS
 from graspsense.report.svg import Picture as Picture
 from graspsense.report.svg import reaching as reaching

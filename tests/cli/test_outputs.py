@@ -87,12 +87,12 @@ def test_a_pipe_or_a_device_is_not_replaced(table, tmp_path, option):
 @every_case(
     ("name", "says"),
     [
-        (".", "picture"),
-        ("..", "picture"),
-        ("/", "picture"),
-        ("sub", "picture"),
-        ("pipe.png", "picture"),
-        ("grasp.svg", "picture"),
+        (".", "must end in .png"),
+        ("..", "must end in .png"),
+        ("/", "must end in .png"),
+        ("sub", "must end in .png"),
+        ("pipe.png", "is a pipe or a device"),
+        ("grasp.svg", "must end in .png"),
         ("no_such_folder/grasp.png", "there is no folder no_such_folder"),
     ],
 )

@@ -208,7 +208,7 @@ def test_pictures_show_a_dollar_as_it_is(tmp_path):
     from graspsense.evaluation.results import Confusion
     from graspsense.report.confusion import confusion_png
     from graspsense.report.grasp_picture import grasp_png
-    from graspsense.report.literal_text import show_literally
+    from graspsense.report.write import show_literally
 
     labels = tuple(MATHEMATICS)
     counts = tuple(tuple(3 * (i == k) for k in range(len(labels))) for i in range(len(labels)))

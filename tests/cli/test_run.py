@@ -170,7 +170,7 @@ def test_a_signal_ends_the_grasp_with_the_gripper_let_go(number):
     assert "Traceback" not in err
 
 
-HEAVY = ("rich", "scipy", "sklearn", "numba", "pandas", "matplotlib", "hid", "usb")
+HEAVY = ("scipy", "sklearn", "numba", "pandas", "matplotlib", "hid", "usb")
 
 
 @pytest.mark.slow

@@ -21,8 +21,9 @@ from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 
 from graspsense.core.values.errors import ConfigError, DataDamaged, TooLarge
+from graspsense.core.values.limits import UNPACKED_MB
 from graspsense.recording.reader import read_recorded
-from graspsense.recording.unpacked import LIMIT_VARIABLE, Unpacked, limit_mb
+from graspsense.recording.unpacked import Unpacked
 from graspsense.sources.formats.array_format import read_arrays
 from graspsense.sources.formats.numpy_files import npy_array, npz_arrays
 
@@ -67,7 +68,7 @@ def read_with_little_memory(call, memory=MEMORY):
 def assert_refused(told, path):
     assert told.startswith("TooLarge"), told
     assert str(path) in told
-    assert LIMIT_VARIABLE in told
+    assert UNPACKED_MB.variable in told
     assert "512 MB" in told
 
 
@@ -118,17 +119,17 @@ def compressed(kind, size):
 
 
 def test_the_limit_is_a_setting(monkeypatch):
-    assert limit_mb() == 512
-    monkeypatch.setenv(LIMIT_VARIABLE, "3")
+    assert UNPACKED_MB.most == 512
+    monkeypatch.setenv(UNPACKED_MB.variable, "3")
     unpacked = Unpacked("some.file")
     unpacked.add(2 * MB)
     unpacked.expect(MB)
-    with pytest.raises(TooLarge, match=rf"some\.file.*4 MB.*3 MB.*{LIMIT_VARIABLE}"):
+    with pytest.raises(TooLarge, match=rf"some\.file.*4 MB.*3 MB.*{UNPACKED_MB.variable}"):
         unpacked.add(2 * MB)
     for wrong in ("0", "many", "-1", "1e3", "9" * 40):
-        monkeypatch.setenv(LIMIT_VARIABLE, wrong)
-        with pytest.raises(ConfigError, match=LIMIT_VARIABLE):
-            limit_mb()
+        monkeypatch.setenv(UNPACKED_MB.variable, wrong)
+        with pytest.raises(ConfigError, match=UNPACKED_MB.variable):
+            Unpacked("some.file")
 
 
 @pytest.mark.parametrize("kind", ["zstd", "lz4", "bz2"])
@@ -140,7 +141,7 @@ def test_what_is_unpacked_is_what_was_packed_and_is_counted(kind, monkeypatch):
     assert unpacked.total == len(data)
     with pytest.raises((ValueError, zstandard.ZstdError, RuntimeError)):
         Unpacked("f").unpack(kind, packed[:-9])
-    monkeypatch.setenv(LIMIT_VARIABLE, "1")
+    monkeypatch.setenv(UNPACKED_MB.variable, "1")
     with pytest.raises(TooLarge):
         Unpacked("f").unpack(kind, packed)
 
@@ -148,10 +149,10 @@ def test_what_is_unpacked_is_what_was_packed_and_is_counted(kind, monkeypatch):
 def test_a_raised_limit_reads_the_file(tmp_path, monkeypatch):
     path = tmp_path / "a.npz"
     deflated_npz(path, 8 * MB)
-    monkeypatch.setenv(LIMIT_VARIABLE, "7")
+    monkeypatch.setenv(UNPACKED_MB.variable, "7")
     with pytest.raises(TooLarge, match=r"a\.npz"):
         npz_arrays(path)
-    monkeypatch.setenv(LIMIT_VARIABLE, "9")
+    monkeypatch.setenv(UNPACKED_MB.variable, "9")
     assert npz_arrays(path)["a"].shape == (MB,)
 
 
@@ -228,11 +229,11 @@ def test_mcap_of_ros(tmp_path, kind, declared):
 
 @pytest.mark.parametrize("declared", [None, 1000])
 def test_our_mcap(tmp_path, declared, monkeypatch):
-    monkeypatch.setenv(LIMIT_VARIABLE, "20")
+    monkeypatch.setenv(UNPACKED_MB.variable, "20")
     path = tmp_path / "bomb.mcap"
     chunked_mcap(path, "zstd", compressed("zstd", 30 * MB), declared if declared else 30 * MB)
     for salvage in (False, True):
-        with pytest.raises(TooLarge, match=rf"bomb\.mcap.*20 MB.*{LIMIT_VARIABLE}"):
+        with pytest.raises(TooLarge, match=rf"bomb\.mcap.*20 MB.*{UNPACKED_MB.variable}"):
             read_recorded(path, salvage=salvage)
 
 
@@ -240,7 +241,7 @@ def test_many_chunks_count_together(tmp_path, monkeypatch):
     path = tmp_path / "g.mcap"
     write_recording(path, 10_000, ended())
     read_recorded(path)
-    monkeypatch.setenv(LIMIT_VARIABLE, "1")  # 10 000 ticks of 155 bytes are 1.55 MB
+    monkeypatch.setenv(UNPACKED_MB.variable, "1")  # 10 000 ticks of 155 bytes are 1.55 MB
     with pytest.raises(TooLarge, match=r"2 MB"):
         read_recorded(path)
 
@@ -303,10 +304,10 @@ def test_mat(tmp_path, monkeypatch):
         path, {"t": np.arange(MB / 5.0), "cells": np.array([[1, "a"]], dtype=object)}, do_compression=True
     )
     assert read_arrays(path)[0].numbers["t"].shape == (MB // 5,)
-    monkeypatch.setenv(LIMIT_VARIABLE, "1")
+    monkeypatch.setenv(UNPACKED_MB.variable, "1")
     with pytest.raises(TooLarge, match=r"a\.mat"):
         read_arrays(path)
-    monkeypatch.setenv(LIMIT_VARIABLE, "100")
+    monkeypatch.setenv(UNPACKED_MB.variable, "100")
     # A variable of version 4 that says 10^9 rows.
     path.write_bytes(struct.pack("<IIIII", 0, 10**9, 1, 0, 2) + b"t\0" + bytes(80))
     with pytest.raises(DataDamaged, match=r"a\.mat"):
@@ -361,10 +362,10 @@ def test_ros2_bags(tmp_path, compression, monkeypatch):
 
     plugin = rosbag2.StoragePlugin.MCAP if compression == "STORAGE" else rosbag2.StoragePlugin.SQLITE3
     ros2_bag(tmp_path / "bag", compression=compression, writer={"storage_plugin": plugin})
-    monkeypatch.setenv(LIMIT_VARIABLE, "120")
+    monkeypatch.setenv(UNPACKED_MB.variable, "120")
     assert len(read_bag(tmp_path / "bag")[0]) == 3  # three messages of 3 MB
-    monkeypatch.setenv(LIMIT_VARIABLE, "7")
-    with pytest.raises(TooLarge, match=rf"bag.*7 MB.*{LIMIT_VARIABLE}"):
+    monkeypatch.setenv(UNPACKED_MB.variable, "7")
+    with pytest.raises(TooLarge, match=rf"bag.*7 MB.*{UNPACKED_MB.variable}"):
         read_bag(tmp_path / "bag")
 
 

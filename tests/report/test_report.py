@@ -29,8 +29,8 @@ from graspsense.experiments.results import Results
 from graspsense.experiments.run import run_experiment
 from graspsense.experiments.summary import summarise
 from graspsense.recording.recording_info import RecordingInfo
+from graspsense.report.confusion import confusion_table
 from graspsense.report.html import Page, table
-from graspsense.report.matrix import confusion_table
 from graspsense.report.rates import RateRow, rate_scale, rates_over, rates_picture
 from graspsense.report.store_page import store_page
 from graspsense.report.svg import GRID, GROUND, INKS, QUIET, TEXT, AxisScale

@@ -18,10 +18,10 @@ from graspsense.experiments.page import write_page
 from graspsense.experiments.results import Results
 from graspsense.experiments.run import run_experiment
 from graspsense.experiments.summary import summarise
+from graspsense.report.confusion import confusion_table
 from graspsense.report.further_channels import channel_figures
 from graspsense.report.grasp_curve import GraspCurve
 from graspsense.report.html import Page, Section, bullets, facts, panels
-from graspsense.report.matrix import confusion_table
 from graspsense.report.rates import RateRow, rates_over, rates_picture
 from graspsense.report.tactile import tactile_figures
 from graspsense.report.trial_curves import trial_curves

@@ -5,6 +5,7 @@ from __future__ import annotations
 import attrs
 import click
 
+from graspsense.cli.options import Seconds
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import echo, echo_table, state_style, talk
 
@@ -13,7 +14,7 @@ from graspsense.cli.terminal import echo, echo_table, state_style, talk
 @click.option(
     "--timeout",
     "timeout_s",
-    type=click.FloatRange(min=0.0, min_open=True),
+    type=Seconds(),
     default=2.0,
     show_default=True,
     help="Time limit for each plugin, in seconds.",
@@ -23,10 +24,6 @@ def devices(timeout_s: float, as_json: bool) -> None:
     """List connected grippers."""
     from graspsense.core.components.registry import installed
 
-    if timeout_s != timeout_s:
-        raise click.BadParameter(
-            "nan is not a number of seconds; give a number above 0", param_hint="--timeout"
-        )
     probes = installed().probe_devices(timeout_s)
     devices = [(probe.distribution, device) for probe in probes for device in probe.given]
     failed = {probe.distribution: probe.error for probe in probes if probe.error}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import attrs
 import click
 
-from graspsense.cli.options import GRIPPER_ALONE, pipeline_options, settings_of
+from graspsense.cli.options import GRIPPER_ALONE, Seconds, pipeline_options, settings_of
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, state_style
 from graspsense.core.values.errors import ExitCode
@@ -27,7 +27,7 @@ _MARK: Final = 11
 @click.option(
     "--timeout",
     "timeout_s",
-    type=click.FloatRange(min=0.0, min_open=True),
+    type=Seconds(),
     default=4.0,
     show_default=True,
     help="Measuring time for each plugin, in seconds.",

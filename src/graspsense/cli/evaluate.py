@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from graspsense.cli.options import target_option
+from graspsense.cli.options import Seconds, target_option
 from graspsense.cli.output import check_outputs, echo_json, file_to_write_as, page_to_write
 from graspsense.cli.sources import (
     SOURCES,
@@ -60,7 +60,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--tolerance",
-    type=click.FloatRange(0.0, 60.0, min_open=True),
+    type=Seconds(60.0),
     default=0.25,
     show_default=True,
     metavar="SECONDS",

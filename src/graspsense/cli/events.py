@@ -34,8 +34,6 @@ def evaluate_events(
     for name in _FOR_LABELS:
         if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
             raise click.UsageError(f"--{name.replace('_', '-')} has no meaning with --events", context)
-    if tolerance_s != tolerance_s:
-        raise click.BadParameter("nan is no time: give a number of seconds", param_hint="--tolerance")
     evaluation = _evaluated(source, tolerance_s, folds, given)
     if as_json:
         echo_json(to_json(evaluation))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from graspsense.cli.options import pipeline_options, settings_of
+from graspsense.cli.options import Seconds, pipeline_options, settings_of
 from graspsense.cli.terminal import talk
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ TO_GRASP_S: Final = 60.0
 @click.command()
 @click.option(
     "--seconds",
-    type=click.FloatRange(0.0, LONGEST_S, min_open=True),
+    type=Seconds(LONGEST_S),
     default=60.0,
     show_default=True,
     help="Time from the grip until the fingers open.",
@@ -42,8 +42,6 @@ def hold(seconds: float, **asked: Any) -> None:
 
     if any(option.partition("=")[0].strip() == "run.hold_s" for option in asked["options"]):
         raise click.UsageError("--seconds sets run.hold_s: leave out -o run.hold_s")
-    if seconds != seconds:
-        raise click.BadParameter("nan is no time: give a number of seconds", param_hint="--seconds")
     lasting = (f"run.hold_s={seconds}", f"run.grasp_timeout_s={max(seconds + TO_GRASP_S, 300.0)}")
     options = (*lasting, *asked["options"])
     settings = settings_of(**{**asked, "pipeline": asked["pipeline"] or PIPELINE, "options": options})

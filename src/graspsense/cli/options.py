@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
+from graspsense.cli.output import file_to_write_as
+
 if TYPE_CHECKING:
     from graspsense.core.settings.resolved import Settings
 
@@ -17,6 +19,20 @@ SEED: Final = click.IntRange(0, 2**32 - 1)
 """The seeds of trials and folds; simulated trials have seeds of their own, up to a million times as large."""
 GRIPPER_ALONE: Final = ("classifier.type=none",)
 """Before the options of a command that is about the gripper: a classifier that is missing must not stop it."""
+
+
+class Seconds(click.FloatRange):
+    """A time above 0 s, at most `longest_s`; NaN is none, which a range of click takes."""
+
+    def __init__(self, longest_s: float | None = None) -> None:
+        super().__init__(0.0, longest_s, min_open=True)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the time, or refuse it."""
+        seconds = float(super().convert(value, param, ctx))
+        if seconds != seconds:
+            self.fail("nan is no time: give a number of seconds", param, ctx)
+        return seconds
 
 
 def keys_option(
@@ -58,6 +74,24 @@ _OPTIONS: Final = (
     click.option("--seed", type=int, help="Seed of all random numbers. (run.seed)"),
     force_option,
 )
+
+
+def plot_option(command: CommandT) -> CommandT:
+    """Add --plot, the picture of a grasp; it is refused before the grasp if it cannot be drawn or written."""
+    return click.option(
+        "--plot",
+        metavar="FILE.png",
+        callback=_picture_to_write,
+        help="Draw the grasp: forces, gap, phases, features, prediction.",
+    )(command)
+
+
+def _picture_to_write(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+    if value is not None:
+        from graspsense.report.write import require_matplotlib
+
+        require_matplotlib()
+    return file_to_write_as(".png")(ctx, param, value)
 
 
 def pipeline_options(command: CommandT) -> CommandT:

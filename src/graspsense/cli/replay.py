@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from graspsense.cli.options import force_option, keys_option
+from graspsense.cli.options import force_option, keys_option, plot_option
 from graspsense.cli.output import echo_json
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 )
 @keys_option("Set a key of the pipeline: -o features.pads=left.")
 @force_option
-@click.option("--plot", metavar="FILE.png", help="Draw the grasp: forces, gap, phases, features, prediction.")
+@plot_option
 @click.option("--json", "as_json", is_flag=True, help="Print the trial as JSON.")
 def replay(
     recording: str,
@@ -44,10 +44,6 @@ def replay(
 
     settings = _settings(recording, pipeline, options, force)
     check(settings)
-    if plot is not None:
-        from graspsense.report.grasp_picture import require_picture
-
-        require_picture(Path(plot))
     trial = grasp_with(settings, installed())
     if as_json:
         echo_json(trial_as_json(trial))

@@ -11,7 +11,7 @@ import click
 from graspsense.cli.live import LiveOptions, live_options, shown_live, viewer_options
 from graspsense.cli.live_rows import LiveRows
 from graspsense.cli.model_table import print_model, print_not_verified, print_selection, print_without
-from graspsense.cli.options import contradiction, names_object, pipeline_options, settings_of
+from graspsense.cli.options import contradiction, names_object, pipeline_options, plot_option, settings_of
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import (
     LABEL_WIDTH,
@@ -65,7 +65,7 @@ MANY_GUARDED: Final = 0.1
     help="Grasp with a second gripper at the same time: its pipeline, by name or file. --seed, --object and -o are of "
     "the first.",
 )
-@click.option("--plot", metavar="FILE.png", help="Draw the grasp: forces, gap, phases, features, prediction.")
+@plot_option
 @click.option(
     "--picture",
     metavar="FILE.png",
@@ -115,7 +115,8 @@ def run(
     if dry_run:
         _say_what_would_be_done(settings, as_json)
         return
-    _check_outputs(label, save, plot)
+    if label is not None and save is None:
+        raise click.UsageError("--label goes with a trial that is kept: add --save DIR")
     if beside is not None:
         _run_beside(settings, beside, save, label, as_json)
         return
@@ -250,16 +251,6 @@ def draw_grasp(trial: Trial, path: Path) -> None:
 
     grasp_png(trial, path)
     talk(f"picture written to {path}")
-
-
-def _check_outputs(label: str | None, save: str | None, plot: str | None) -> None:
-    """Check before the grasp what is to be made of it."""
-    if label is not None and save is None:
-        raise click.UsageError("--label goes with a trial that is kept: add --save DIR")
-    if plot is not None:
-        from graspsense.report.grasp_picture import require_picture
-
-        require_picture(Path(plot))
 
 
 def _film(picture: str | None, video: str | None, viewer: bool) -> tuple[Film, ...]:

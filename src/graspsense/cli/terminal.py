@@ -16,7 +16,7 @@ import sys
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
-from typing import IO, Any, Final
+from typing import IO, Final
 
 import click
 
@@ -144,25 +144,40 @@ def echo_table(
         return
     header, *rows = [[in_one_line(cell) for cell in row] for row in (header, *rows)]
     columns = terminal_width(sys.stdout)
-    right = [_all_numbers([row[k] for row in rows]) for k in range(len(header))]
-    natural = [max(len(row[k]) for row in (header, *rows)) for k in range(len(header))]
-    if columns is None:
-        for row in (header, *rows):
-            cells = zip(row, natural, right, strict=True)
-            line = (" " * _GAP).join(
-                cell.rjust(width) if number else cell.ljust(width) for cell, width, number in cells
-            )
-            click.echo(line.rstrip())
-        return
-    styles = styles or {}
-    widths = _fitted(header, rows, natural, columns - _GAP * (len(header) - 1))
+    natural = [max(map(len, cells)) for cells in zip(header, *rows, strict=True)]
+    right = [_all_numbers(cells) for cells in zip(*rows, strict=True)]
+    of_column = [(styles or {}).get(name, _no_style) for name in header]
+
+    def printed(row: Sequence[str], widths: Sequence[int]) -> None:
+        looks = [
+            Style.HEADING if row is header else style(cell)
+            for style, cell in zip(of_column, row, strict=True)
+        ]
+        _write(_row_lines(row, widths, right, looks), None, err=False)
+
+    widths = (
+        natural if columns is None else _fitted(header, rows, natural, columns - _GAP * (len(header) - 1))
+    )
     if widths is not None:
-        lines = [line for block in _rich_rows(header, rows, widths, right, styles, columns) for line in block]
-        _write(lines, None, err=False)
-    elif sum(natural[:-1]) + _GAP * (len(header) - 2) <= columns and natural[-1] > _SHORT:
-        _echo_text_below(header, rows, natural, right, styles, columns)
+        for row in (header, *rows):
+            printed(row, widths)
+    elif (
+        columns is not None
+        and sum(natural[:-1]) + _GAP * (len(header) - 2) <= columns
+        and natural[-1] > _SHORT
+    ):
+        *_, last = of_column
+        for row in (header, *rows):
+            printed(row, natural[:-1])
+            if row is not header and row[-1]:
+                echo(f"    {row[-1]}", last(row[-1]))
     else:
-        _echo_blocks(header, rows, styles)
+        wide = max(map(len, header)) + 2 + _GAP
+        for row in rows:
+            echo(row[0] or "-", Style.HEADING)
+            for name, cell, style in list(zip(header, row, of_column, strict=True))[1:]:
+                if cell:
+                    echo_entry(f"  {name.lower()}", cell, style(cell), width=wide)
 
 
 def _lines(text: str) -> list[str]:
@@ -230,76 +245,28 @@ def _fitted(
     return least
 
 
-def _echo_blocks(header: Sequence[str], rows: Sequence[Sequence[str]], styles: Mapping[str, StyleOf]) -> None:
-    wide = max(map(len, header)) + 2 + _GAP
-    for row in rows:
-        echo(row[0] or "-", Style.HEADING)
-        for name, cell in zip(header[1:], row[1:], strict=True):
-            if cell:
-                echo_entry(f"  {name.lower()}", cell, _style(styles, name, cell), width=wide)
-
-
-def _echo_text_below(
-    header: Sequence[str],
-    rows: Sequence[Sequence[str]],
-    natural: Sequence[int],
-    right: Sequence[bool],
-    styles: Mapping[str, StyleOf],
-    columns: int,
-) -> None:
-    """Print the rows with the text of the last column below each."""
-    shown = [row[:-1] for row in rows]
-    title, *lines = _rich_rows(header[:-1], shown, natural[:-1], right[:-1], styles, columns)
-    _write(title, None, err=False)
-    for line, row in zip(lines, rows, strict=True):
-        _write(line, None, err=False)
-        if row[-1]:
-            echo(f"    {row[-1]}", _style(styles, header[-1], row[-1]))
-
-
-def _rich_rows(
-    header: Sequence[str],
-    rows: Sequence[Sequence[str]],
-    widths: Sequence[int],
-    right: Sequence[bool],
-    styles: Mapping[str, StyleOf],
-    columns: int,
-) -> list[list[str]]:
-    """Return the lines of the header and of each row."""
-    # Imported here: rich takes longer to import than the rest of a short command.
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
+def _row_lines(
+    row: Sequence[str], widths: Sequence[int], right: Sequence[bool], looks: Sequence[Style | None]
+) -> list[str]:
+    """Return the lines of a row, each cell wrapped to the width of its column; there may be fewer widths than cells."""
+    columns = []
     coloured = has_colour(sys.stdout)
-    console = Console(
-        width=columns,
-        color_system="standard" if coloured else None,
-        no_color=not coloured,
-        highlight=False,
-        force_terminal=coloured,
-        legacy_windows=False,
-    )
-    printed = []
-    for number, row in enumerate((header, *rows)):
-        table = Table(box=None, padding=(0, _GAP, 0, 0), pad_edge=False, show_header=False)
-        cells: list[Any] = []
-        for name, cell, width, at_right in zip(header, row, widths, right, strict=True):
-            table.add_column(width=width, justify="right" if at_right else "left", overflow="fold")
-            style = Style.HEADING if number == 0 else _style(styles, name, cell)
-            look = (
-                "" if style is None else " ".join(filter(None, ("bold" if style.bold else "", style.value)))
-            )
-            cells.append(Text(cell, style=look))
-        table.add_row(*cells)
-        with console.capture() as captured:
-            console.print(table)
-        printed.append([line.rstrip() for line in captured.get().rstrip("\n").split("\n")])
-    return printed
+    for cell, width, at_right, look in zip(row, widths, right, looks, strict=False):
+        parts = [cell] if len(cell) <= width else textwrap.wrap(cell, width, break_on_hyphens=False)
+        columns.append([
+            " " * (width - len(part)) * at_right
+            + (_coloured(part, look) if look and coloured and part else part)
+            + " " * (width - len(part)) * (not at_right)
+            for part in parts
+        ])  # fmt: skip
+    blanks = [" " * width for width in widths]
+    height = max(map(len, columns))
+    full = [parts + [blank] * (height - len(parts)) for parts, blank in zip(columns, blanks, strict=True)]
+    return [(" " * _GAP).join(line).rstrip() for line in zip(*full, strict=True)]
 
 
-def _style(styles: Mapping[str, StyleOf], name: str, cell: str) -> Style | None:
-    return styles[name](cell) if name in styles else None
+def _no_style(_text: str) -> None:
+    return None
 
 
 def outcome_style(outcome: str) -> Style:

@@ -7,7 +7,6 @@ unpacked, and what really comes out is counted, because a file can say anything.
 from __future__ import annotations
 
 import bz2
-import os
 import zlib
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -17,30 +16,17 @@ import lz4.frame
 import zstandard
 from attrs import define, field
 
-from graspsense.core.values.errors import ConfigError, TooLarge
+from graspsense.core.values.errors import TooLarge
+from graspsense.core.values.limits import UNPACKED_MB
 
-LIMIT_VARIABLE: Final = "GRASPSENSE_MAX_UNPACKED_MB"
-"""If this environment variable is set, it is the limit in megabytes."""
-DEFAULT_LIMIT_MB: Final = 512
-"""An hour of a gripper at 1 kHz, or 60 million numbers of another program."""
 _MB: Final = 1_000_000
 _PIECE: Final = 1 << 20
 _GZIP: Final = zlib.MAX_WBITS | 16
 
 
-def limit_mb() -> int:
-    """Return the limit on what a file may unpack to, in megabytes. Raises ConfigError."""
-    given = os.environ.get(LIMIT_VARIABLE, "").strip()
-    if not given:
-        return DEFAULT_LIMIT_MB
-    if not given.isdecimal() or not 0 < len(given) < 10 or int(given) == 0:
-        raise ConfigError(f"{LIMIT_VARIABLE} is {given[:20]!r}: give a number of megabytes, such as 4000")
-    return int(given)
-
-
 def limit_words() -> str:
     """Return the limit, and how it is raised, in words."""
-    return f"the limit is {limit_mb()} MB. If you trust the file, raise it: {LIMIT_VARIABLE}=MEGABYTES"
+    return f"the limit is {UNPACKED_MB.most} MB. If you trust the file, raise it: {UNPACKED_MB.variable}=MEGABYTES"
 
 
 @define
@@ -51,7 +37,7 @@ class Unpacked:
     allowance: int = 0
     """Bytes beside the limit, such as those of the file itself."""
     total: int = field(default=0, init=False)
-    _limit: int = field(factory=lambda: limit_mb() * _MB, init=False)
+    _limit: int = field(factory=lambda: UNPACKED_MB.most * _MB, init=False)
 
     def expect(self, size: int) -> None:
         """Raise TooLarge if so many bytes more would pass the limit."""

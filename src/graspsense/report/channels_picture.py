@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from graspsense.report.grasp_picture import DPI, require_picture
+from graspsense.report.grasp_picture import DPI
 from graspsense.report.write import new_figure, write_picture
 
 if TYPE_CHECKING:
@@ -25,9 +25,8 @@ def channels_png(
 ) -> None:
     """Draw times (s) and values of each channel as a PNG file; `squeezes` are shaded from begin to end (s).
 
-    Raises as `require_picture`, and ConfigError where `path` cannot be written.
+    Raises PluginUnavailable without matplotlib, ConfigError where `path` cannot be written.
     """
-    require_picture(path)
     shown = list(series.items())[:MOST_PANELS]
     figure = new_figure(8.5, PANEL_IN * max(len(shown), 2), DPI)
     panels: Any = figure.subplots(max(len(shown), 1), 1, sharex=True, squeeze=False)

@@ -8,8 +8,8 @@ from graspsense.core.values.tree import TreeNode
 from graspsense.evaluation.doubt import Reliability, SetCoverage
 from graspsense.evaluation.intervals import percent
 from graspsense.evaluation.results import Confusion
+from graspsense.report.confusion import confusion_table
 from graspsense.report.html import Section, bullets, figure, folded, pair, paragraph
-from graspsense.report.matrix import confusion_table
 from graspsense.report.rates import RateRow, rates_list, rates_picture, rates_table
 from graspsense.report.svg import INKS, QUIET, AxisScale, Picture
 from graspsense.report.tree import tree_list

@@ -6,11 +6,10 @@ from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Final
 
-from graspsense.core.values.errors import ConfigError, PluginUnavailable
 from graspsense.core.values.fingers import fingers_of
 from graspsense.core.values.units import display_unit
 from graspsense.report.trace_plot import draw_trace
-from graspsense.report.write import MATPLOTLIB_HINT, new_figure, require_writable, write_picture
+from graspsense.report.write import new_figure, write_picture
 
 if TYPE_CHECKING:
     from graspsense.core.values.trial import Trial
@@ -25,31 +24,11 @@ LINE_IN: Final = 0.18
 """Height of a line of text."""
 
 
-def require_picture(path: Path) -> None:
-    """Check before a grasp that its picture can be written to `path`.
-
-    Raises PluginUnavailable without matplotlib, ConfigError for another suffix than `.png`, and for a folder that is
-    missing or cannot be written to.
-    """
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError as error:
-        raise PluginUnavailable(f"{MATPLOTLIB_HINT} ({error})") from error
-    if not path.name or (path.exists() and not path.is_file()):
-        raise ConfigError(
-            f"the picture cannot be written to {path}, which is not a file: name a file FILE.png"
-        )
-    if path.suffix.lower() != ".png":
-        raise ConfigError(f"the picture is a PNG file: name it {path.with_suffix('.png')}, not {path}")
-    require_writable(path)
-
-
 def grasp_png(trial: Trial, path: Path) -> None:
     """Draw a trial as a PNG file, with its text as the `Description` of the file.
 
-    Raises as `require_picture`, and ConfigError where `path` cannot be written.
+    Raises PluginUnavailable without matplotlib, ConfigError where `path` cannot be written.
     """
-    require_picture(path)
     text = _words(trial)
     lines = [part for line in text for part in wrap(line, COLUMNS, subsequent_indent="      ") or [""]]
     height = max(HEIGHT_IN, LINE_IN * len(lines))

@@ -2,36 +2,40 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Sequence
-from html import escape
-from itertools import cycle
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
-
-import numpy as np
 
 from graspsense.core.values.display import sentence, table
 from graspsense.core.values.features import Features, Prediction, certainty_words
-from graspsense.core.values.trace import SampleTrace, Trace
+from graspsense.core.values.trace import Trace
 from graspsense.core.values.trial import Trial
-from graspsense.core.values.units import display_unit, quantity, without_underscores
-from graspsense.report.moments import array_images, contact_time, images_at, moments, phase_spans, shown_from
-from graspsense.report.svg import DASHES
+from graspsense.core.values.units import display_unit, quantity
+from graspsense.report.further_channels import channel_figures, envelope
+from graspsense.report.moments import contact_time, phase_spans, shown_from
+from graspsense.report.svg import INKS, AxisScale, Picture, reaching
+from graspsense.report.tactile import tactile_figures
 from graspsense.report.trace_plot import plot as plot
+from graspsense.report.traces import OTHER_PHASE, PHASES
 
 if TYPE_CHECKING:
-    from graspsense.core.values.trace import Floats
+    from graspsense.core.values.channel import Channel
 
-WIDTH, HEIGHT, LEFT_MARGIN, PANEL = 560.0, 264.0, 48.0, 92.0
-MOST_DRAWN = 256
-"""Of an array with more cells the means of groups of neighbours are drawn."""
-POINTS: Final = 300
-"""Largest number of points of a line."""
 LEAST_SHOWN: Final = 0.005
 """A class that is less probable than this is not listed."""
-INKS: Final = ("#3b8ad9", "#d9772b", "#8a8a8a")
-"""Left pad, right pad, gap: each stands out from white and from black."""
-PHASE_INKS: Final = {"squeeze": "#e8963c", "hold": "#4caf6a", "release": "#9a9a9a"}
+COLOURS: Final = {
+    "--text": "currentColor",
+    "--quiet": "currentColor",
+    "--ground": "transparent",
+    "--grid": "#8884",
+    "--ink0": "#3b8ad9",
+    "--ink1": "#d9772b",
+    "--ink2": "#8a8a8a",
+    "--approach": "transparent",
+    "--squeeze": "#e8963c33",
+    "--hold": "#4caf6a33",
+    "--phase": "#9a9a9a33",
+}
+"""The colours of pictures of a page, so that they stand out from white and from black."""
 
 
 def html(value: object) -> str:
@@ -83,12 +87,7 @@ def trial_html(trial: Trial) -> str:
     reason = f": {trial.reason}" if trial.reason else ""
     parts = [sentence(f"{trial.outcome.words}{reason}" + f" ({labels})" * bool(labels), strong=True)]
     parts += [sentence(f"warning: {warning}") for warning in trial.warnings]
-    parts += [
-        trace_svg(trial.trace),
-        samples_html(trial.trace),
-        arrays_html(trial.trace),
-        features_html(trial.features),
-    ]
+    parts += [_pictures(trial.trace, trial.device.channels), features_html(trial.features)]
     if trial.prediction is not None:
         parts.append(prediction_html(trial.prediction))
     components = ", ".join(trial.run.components.values())
@@ -98,130 +97,40 @@ def trial_html(trial: Trial) -> str:
 
 def trace_html(trace: Trace) -> str:
     """Return a trace in words, its curves and its arrays."""
-    return sentence(trace.words) + trace_svg(trace) + samples_html(trace) + arrays_html(trace)
+    return sentence(trace.words) + _pictures(trace, ())
 
 
-def trace_svg(trace: Trace) -> str:
+def _pictures(trace: Trace, channels: Sequence[Channel]) -> str:
+    """Return the curve of a grasp, its tactile arrays and its further channels, as a page draws them."""
+    figures = [_curve(trace), *tactile_figures(trace, channels), *channel_figures(trace, channels)]
+    style = ";".join(f"{name}:{colour}" for name, colour in COLOURS.items())
+    return f'<div style="{style};max-width:420px;font-family:sans-serif">{"".join(figures)}</div>'
+
+
+def _curve(trace: Trace) -> str:
     """Return pad forces and gap over time, with the phases behind them."""
-    start = shown_from(trace)
-    contact = contact_time(trace) or 0.0
-    t = trace.t_s[start:] - contact
-    shown, factor = display_unit(trace.units["gap"])
-    forces = [trace.force_left_n[start:], trace.force_right_n[start:]]
-    top, bottom = 24.0, 24.0 + PANEL + 22.0
-    parts = [
-        f'<text x="{LEFT_MARGIN}" y="14" fill="currentColor">force, {escape(trace.units["force_left"])}: '
-        f'<tspan fill="{INKS[0]}">left pad</tspan>, <tspan fill="{INKS[1]}">right pad</tspan></text>',
-        f'<text x="{LEFT_MARGIN}" y="{bottom - 6}" fill="currentColor">gap, {escape(shown)}</text>',
-        *_phases(trace, start, t, top, bottom + PANEL),
-        *_panel(t, forces, INKS[:2], top, least=1.0),
-        *_panel(t, [factor * trace.gap_m[start:]], INKS[2:], bottom),
-        *_time_labels(t, bottom + PANEL + 26, trace.units["t"]),
-    ]
-    return _svg(parts, HEIGHT, trace.words)
-
-
-def arrays_html(trace: Trace) -> str:
-    """Return the cells of every tactile array at contact, peak and rest: a row for each moment, darker for more."""
-    times = moments(trace)
-    parts = []
-    for name, images in array_images(trace).items():
-        shown = images_at(images, 1.0, times)
-        fewer = {moment: _means(cells) for moment, cells in shown.values.items()}
-        known = np.concatenate([cells[np.isfinite(cells)] for cells in fewer.values()] or [np.empty(0)])
-        if not len(known):
-            continue
-        low, high = float(known.min()), float(known.max())
-        cell = min(16.0, (WIDTH - LEFT_MARGIN) / max(map(len, fewer.values())))
-        change = "change since before contact" if shown.relative else "values"
-        words = f"{name}: {change}, by cell, {low:.4g} to {high:.4g}"
-        drawn = [f'<text x="0" y="11" fill="currentColor">{escape(words)}</text>']
-        for row, (moment, cells) in enumerate(fewer.items()):
-            y = 18.0 + 14.0 * row
-            drawn.append(f'<text x="0" y="{y + 10:g}" fill="currentColor">{moment}</text>')
-            drawn += [
-                f'<rect x="{LEFT_MARGIN + k * cell:.1f}" y="{y:g}" width="{cell:.1f}" height="13" fill="{INKS[0]}" '
-                f'fill-opacity="{(value - low) / ((high - low) or 1.0):.2f}" stroke="#8a8a8a" stroke-width="0.3"/>'
-                for k, value in enumerate(cells.tolist())
-                if math.isfinite(value)
-            ]
-        parts.append(_svg(drawn, 18.0 + 14.0 * len(shown.values) + 2.0, words))
-    return "".join(parts)
-
-
-def _means(cells: Floats) -> Floats:
-    """Return the cells, or the means of groups of neighbours where there are too many to draw each."""
-    if len(cells) <= MOST_DRAWN:
-        return cells
-    return np.array([part.mean() for part in np.array_split(cells, MOST_DRAWN)])
-
-
-def samples_html(trace: Trace) -> str:
-    """Return each fast channel over time, a line for each axis."""
-    parts = []
-    start = float(trace.t_s[shown_from(trace)]) if len(trace) else 0.0
-    for name, signal in trace.signals.items():
-        if isinstance(signal, SampleTrace) and len(signal.t_s):
-            shown = signal.t_s >= start
-            t, values = signal.t_s[shown] - (contact_time(trace) or 0.0), signal.values[shown]
-            if len(t):
-                words = f"{without_underscores(name)}, {signal.values.shape[1]} axes"
-                drawn = [f'<text x="{LEFT_MARGIN}" y="14" fill="currentColor">{escape(words)}</text>']
-                drawn += _panel(
-                    t, list(values.T), [INKS[k % len(INKS)] for k in range(values.shape[1])], 24.0
-                )
-                parts.append(_svg(drawn, 24.0 + PANEL + 6.0, words))
-    return "".join(parts)
-
-
-def _svg(drawn: Sequence[str], height: float, words: str) -> str:
-    return (
-        f'<svg viewBox="0 0 {WIDTH:g} {height:g}" role="img" aria-label="{escape(words)}" '
-        f'style="display:block;max-width:{WIDTH:g}px;font:11px sans-serif" xmlns="http://www.w3.org/2000/svg">'
-        f"{''.join(drawn)}</svg>"
-    )
-
-
-def _x(t: Floats, value: float) -> float:
-    span = float(t[-1] - t[0]) or 1.0
-    return LEFT_MARGIN + (WIDTH - LEFT_MARGIN - 8.0) * (value - float(t[0])) / span
-
-
-def _panel(
-    t: Floats, lines: Sequence[Floats], inks: Sequence[str], top: float, least: float = 0.0
-) -> Iterable[str]:
-    """Yield the lines of one panel, and the values at its lower and upper edge. `least`: its least upper edge."""
-    known = np.concatenate([line[~np.isnan(line)] for line in lines])
-    low, high = (float(known.min()), max(float(known.max()), least)) if len(known) else (0.0, 1.0)
-    for value, y in ((high, top + 8.0), (low, top + PANEL)):
-        yield f'<text x="{LEFT_MARGIN - 5}" y="{y:g}" text-anchor="end" fill="currentColor">{value:.3g}</text>'
-    every = np.linspace(0, len(t) - 1, min(len(t), POINTS)).round().astype(int)
-    for line, ink, dash in zip(lines, inks, cycle(DASHES), strict=False):
-        dashes = f' stroke-dasharray="{dash}"' if dash else ""
-        points = [
-            f"{_x(t, float(t[k])):.1f},{top + PANEL * (high - float(line[k])) / ((high - low) or 1.0):.1f}"
-            for k in every
-            if not np.isnan(line[k])
-        ]
-        if points:
-            yield f'<polyline points="{" ".join(points)}" fill="none" stroke="{ink}" stroke-width="1.6"{dashes}/>'
-
-
-def _phases(trace: Trace, start: int, t: Floats, top: float, bottom: float) -> Iterable[str]:
+    start, unit = shown_from(trace), trace.units
+    t = trace.t_s[start:] - (contact_time(trace) or 0.0)
+    shown, factor = display_unit(unit["gap"])
+    picture = Picture(314.0)
+    right = picture.width - 10.0
+    x = AxisScale(float(t[0]), float(t[-1]), 36.0, right) if len(t) else AxisScale(0.0, 1.0, 36.0, right)
     for phase, begin, end in phase_spans(t, trace.phase[start:]):
-        name, left, right = phase.name.lower(), _x(t, begin), _x(t, end)
-        if name in PHASE_INKS:
-            yield (
-                f'<rect x="{left:.1f}" y="{top:g}" width="{right - left:.1f}" height="{bottom - top:g}" '
-                f'fill="{PHASE_INKS[name]}" fill-opacity="0.18"><title>{name}</title></rect>'
-            )
-        if right - left > 7.0 * len(name):
-            middle = 0.5 * (left + right)
-            yield f'<text x="{middle:.1f}" y="{bottom + 13:g}" text-anchor="middle" fill="currentColor">{name}</text>'
-
-
-def _time_labels(t: Floats, y: float, unit: str) -> Iterable[str]:
-    if len(t):
-        for value, anchor in ((float(t[0]), "start"), (float(t[-1]), "end")):
-            text = f"{value:.3g} {escape(unit)}"
-            yield f'<text x="{_x(t, value):.1f}" y="{y:g}" text-anchor="{anchor}" fill="currentColor">{text}</text>'
+        name = phase.name.lower()
+        picture.band(x(begin), x(end), 30.0, 280.0, PHASES.get(name, OTHER_PHASE))
+        if x(end) - x(begin) > 7.0 * len(name):
+            picture.text((x(begin) + x(end)) / 2.0, 166.0, name, anchor="middle")
+    pads = {"left pad": trace.force_left_n[start:], "right pad": trace.force_right_n[start:]}
+    forces = [*pads["left pad"].tolist(), *pads["right pad"].tolist(), 1.0]
+    gaps = factor * trace.gap_m[start:]
+    force, gap = reaching(forces, 150.0, 30.0, zero=True), reaching(gaps.tolist(), 280.0, 186.0)
+    picture.x_axis(x, 30.0, 280.0, "")
+    picture.y_axis(force, 36.0, right, f"force, {unit['force_left']}")
+    picture.y_axis(gap, 36.0, right, f"gap, {shown}")
+    lines = [*((name, values, force) for name, values in pads.items()), ("gap", gaps, gap)]
+    for ink, (name, values, scale) in zip(INKS, lines, strict=False):
+        picture.line([(x(t_s), scale(value)) for t_s, value in envelope(t, values)], ink, name=name)
+    for place, name, ink in ((right - 70.0, "left pad", INKS[0]), (right, "right pad", INKS[1])):
+        picture.text(place, 14.0, name, anchor="end", ink=ink)
+    picture.text(right, 310.0, f"time, {unit['t']}", anchor="end")
+    return picture.svg(trace.words, unit["t"])

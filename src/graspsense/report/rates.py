@@ -8,6 +8,7 @@ from typing import Final
 
 from attrs import frozen
 
+from graspsense.evaluation.intervals import span
 from graspsense.report.html import facts, figure, table
 from graspsense.report.svg import (
     DASHES,
@@ -44,9 +45,7 @@ class RateRow:
     @property
     def interval_text(self) -> str:
         """The interval in per cent."""
-        if self.interval is None:
-            return "no interval"
-        return f"{100 * self.interval[0]:.1f} to {100 * self.interval[1]:.1f}"
+        return span(self.interval)
 
 
 ROW: Final = 34

@@ -6,18 +6,18 @@ import math
 from collections.abc import Mapping, Sequence
 from html import escape
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from attrs import frozen
 
-from graspsense.core.values.channel import Channel, TactileArray
+from graspsense.core.values.channel import FLOATS, Channel, TactileArray
 from graspsense.core.values.trace import ImageTrace
 from graspsense.core.values.units import display_unit, without_underscores
 from graspsense.report.camera import camera_figure, is_picture
 from graspsense.report.heat import COLOURS, HeatScale
 from graspsense.report.html import figure
-from graspsense.report.moments import images_at, moments, number_of_each
+from graspsense.report.moments import images_at, moments
 from graspsense.report.svg import QUIET, Picture, number
 
 if TYPE_CHECKING:
@@ -84,13 +84,20 @@ def tactile_figures(trace: Trace, channels: Sequence[Channel]) -> list[str]:
         if isinstance(signal, ImageTrace) and len(signal.t_s) and signal.cells[0].size:
             shape = declared.get(name)
             if shape is None or signal.cells.shape[1:] != shape.shape:
-                cells = len(number_of_each(signal, signal.cells[0]))
-                shape = TactileArray(name, "unknown", rows=1, columns=cells)
+                shape = _as_delivered(name, signal)
             if is_picture(shape):
                 pictures.append(camera_figure(without_underscores(name), signal, shape, moments(trace)))
                 continue
             arrays.append((without_underscores(name), {shape.finger: signal}, shape))
     return [*(_figure(title, images, shape, moments(trace)) for title, images, shape in arrays), *pictures]
+
+
+def _as_delivered(name: str, images: ImageTrace) -> TactileArray:
+    """Return an array that nobody has declared, as its images show it: floats in a row, other types by their shape."""
+    dtype: Any = str(images.cells.dtype)
+    sizes = images.cells.shape[1:]
+    rows, columns, components = (1, *sizes, 1)[:3] if dtype == FLOATS or len(sizes) < 2 else (*sizes, 1)[:3]
+    return TactileArray(name, "unknown", rows=rows, columns=columns, components=components, dtype=dtype)
 
 
 def _figure(

@@ -6,11 +6,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from graspsense.core.values.errors import PluginUnavailable
 from graspsense.core.values.signals import Phase
 from graspsense.core.values.trace import SampleTrace
 from graspsense.core.values.units import display_unit, without_underscores
-from graspsense.report.literal_text import show_literally
 from graspsense.report.moments import (
     array_images,
     contact_time,
@@ -20,7 +18,7 @@ from graspsense.report.moments import (
     phase_spans,
     shown_from,
 )
-from graspsense.report.write import MATPLOTLIB_HINT
+from graspsense.report.write import require_matplotlib, show_literally
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,10 +36,9 @@ LEFT, RIGHT, GAP = "#0b5fa5", "#b3400a", "#3d3d3d"
 
 def plot(trace: Trace) -> tuple[Any, Any]:
     """Draw a trace in a new figure of pyplot and return its axes. Raises PluginUnavailable without matplotlib."""
-    try:
-        from matplotlib import pyplot
-    except ImportError as error:
-        raise PluginUnavailable(f"{MATPLOTLIB_HINT} ({error})") from error
+    require_matplotlib()
+    from matplotlib import pyplot
+
     arrays = array_images(trace)
     fast = {
         name: signal

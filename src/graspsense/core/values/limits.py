@@ -59,6 +59,8 @@ CHANNEL_NUMBERS: Final = SizeLimit(
     "GRASPSENSE_MAX_CHANNEL_NUMBERS", 2**20, "numbers of a channel in one reading"
 )
 ENTRIES: Final = SizeLimit("GRASPSENSE_MAX_ENTRIES", 500, "entries of a key of a manifest")
+UNPACKED_MB: Final = SizeLimit("GRASPSENSE_MAX_UNPACKED_MB", 512, "megabytes that a file unpacks to")
+"""An hour of a gripper at 1 kHz, or 60 million numbers of another program."""
 MODEL_BYTES: Final = SizeLimit("GRASPSENSE_MAX_MODEL_BYTES", 256 * 2**20, "bytes of a model")
 CASES: Final = SizeLimit("GRASPSENSE_MAX_CASES", 1000, "cases of an experiment")
 RECORDINGS: Final = SizeLimit("GRASPSENSE_MAX_RECORDINGS", 20_000, "recordings of a data set")

@@ -15,8 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from graspsense.core.values.errors import DataDamaged, PluginUnavailable, TooLarge
+from graspsense.core.values.limits import UNPACKED_MB
 from graspsense.recording.readable import refuse_devices
-from graspsense.recording.unpacked import limit_mb, limit_words
+from graspsense.recording.unpacked import limit_words
 from graspsense.sources.formats.numpy_files import npz_arrays
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ def hdf5_arrays(path: Path, advice: str = "") -> dict[str, NDArray[Any]]:
             str(_CHILD),
             str(path.absolute()),
             str(copy),
-            str(limit_mb() * 1_000_000),
+            str(UNPACKED_MB.most * 1_000_000),
         ]
         # Filters of the file that are not part of the library would be loaded from a folder of the system.
         environment = {**os.environ, "HDF5_PLUGIN_PRELOAD": "::"}
