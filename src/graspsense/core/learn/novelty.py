@@ -49,7 +49,7 @@ class Novelty:
     featureless: bool
     """Whether a training trial had no feature at all, so that such a trial is not new."""
     complete: NDArray[np.bool_]
-    """Whether each training trial had the feature, shape (features,)."""
+    """Whether each training trial had the feature, shape (features,); False where it is not known."""
 
     def lacking(self, table: FeatureTable) -> list[str]:
         """Return for each trial of a table the features that it lacks, in words, although each training trial had them.
@@ -194,7 +194,7 @@ def novelty_from(
     lowest, highest = ends
     if (np.isnan(lowest) != np.isnan(highest)).any() or (lowest > highest).any():
         raise kept.refusal("ranges", "a feature has one end only, or its highest value is below the lowest")
-    complete = kept.texts("complete")
+    complete = kept.texts("complete") if "complete" in kept else ()
     spread = kept.numbers("spread", (len(names),), missing=True, least=0.0)
     if (np.isnan(spread) & ~np.isnan(lowest).all(axis=0)).any():
         raise kept.refusal("spread", "it is missing for a feature that has a range")
