@@ -9,10 +9,19 @@ therefore loads neither numpy nor a driver. The names stand in `plugin_api.pyi`,
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 from graspsense.core.components.lazy_names import LazyNames
 
 PUBLIC: Final = LazyNames(__name__)
 
 __all__ = PUBLIC.names
+
+
+def __getattr__(name: str) -> Any:
+    # An import statement asks for __path__, of a module that is no package too.
+    if name not in PUBLIC.names and not name.startswith("__"):
+        from graspsense.core.components.moved_names import refuse_moved
+
+        refuse_moved(name)
+    return PUBLIC.load(name)

@@ -63,13 +63,7 @@ def trained(name, **config):
         coverage=0.9, unit="trials", thresholds=thresholds, of_support=(0.1, 0.2), unknown=1, trials=15
     )
     classes = [
-        SupportClass(
-            least=least,
-            probabilities=(0.4, 0.9),
-            rates=(0.3, 0.7),
-            units=30.0,
-            intervals=((0.1, 0.5), (0.5, 0.9)),
-        )
+        SupportClass(least=least, probabilities=(0.4, 0.9), rates=(0.3, 0.7), units=30.0)
         for least in (0.0, 4.0)
     ]
     model = evolve(model, sets=sets, temperature=1.5, certainty=Certainty(classes=tuple(classes)))

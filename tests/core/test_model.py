@@ -218,10 +218,17 @@ def test_no_figure_is_given_that_was_not_measured_under_the_settings_of_the_gras
         assert said.as_json()["no_certainty"]
 
 
-def test_a_model_of_another_version_is_refused(file):
-    rewritten(file, version=1)
-    with pytest.raises(DataDamaged, match="has version 1"):
-        load_model(str(file), installed())
+def test_the_sets_of_an_earlier_version_are_left_out_and_it_says_what_to_do(file):
+    content = json.loads(file.read_text())
+    del content["certainty"]
+    file.write_text(json.dumps(content))
+    sets = {"coverage": 0.9, "unit": "trials", "reason": "", "thresholds": {"can:full": [0.1, 9, True]}}
+    rewritten(file, version=1, sets=sets)
+
+    said = load_model(str(file), installed()).predict(CAN)
+
+    assert (said.certainty, said.prediction_set) == (None, ())
+    assert "train it again" in said.no_certainty
 
 
 def test_a_model_of_other_features_is_refused_before_the_grasp_with_what_to_do():
@@ -254,7 +261,7 @@ def test_a_damaged_file_is_refused(file, spoil, says):
 @pytest.mark.parametrize(
     ("changes", "error", "says"),
     [
-        ({"version": 3}, DataDamaged, r"has version 3; this graspsense .* reads 2"),
+        ({"version": 3}, DataDamaged, r"has version 3; this graspsense .* reads up to 2"),
         *(
             (changes, DataDamaged, "is damaged")
             for changes in (

@@ -235,7 +235,9 @@ def test_a_disabled_plugin_is_not_even_imported(site, environ, loaded, reason):
         ),
         (
             "GRASPSENSE_API = (1, 0)",
-            "it is written for plugin API 1.0, graspsense 0.1.0 has 2.0: upgrade lab-a",
+            "it is written for plugin API 1.0, graspsense 0.1.0 has 2.0: upgrade lab-a. If it is yours: a controller's "
+            "step takes (params, state, reading), where reading.frame and reading.pads are what it took before; a "
+            "gripper declares its fingertips as TactileArray('pads', ...). All changes: docs/from-1-to-2.md",
         ),
     ],
 )

@@ -15,11 +15,9 @@ from source_code import parsed, statements
 
 import graspsense
 from graspsense import plugin_api
+from graspsense.core.components.moved_names import REPLACED, SPECIAL, new_form
 
 SOURCE = ROOT / "src" / "graspsense"
-
-SPECIAL = ("gripper_api", "classifier_api", "testing_api", "experiment_api", "simulator_api")
-"""The public modules beside `plugin_api`, each for the plugins that need it."""
 
 DOORS = ("plugin_api", *SPECIAL)
 """The modules that plugins may import from."""
@@ -346,6 +344,15 @@ def test_what_every_plugin_may_import_are_at_most_seventy_names_that_no_special_
     special = [name for door in PUBLIC_MODULES[2:] for name in door.__all__ if name != "structured"]
     assert len(special) == len(set(special))
     assert not set(special) & set(plugin_api.__all__)
+    assert not set(REPLACED) & {*special, *plugin_api.__all__}
+
+
+def test_a_name_that_moved_says_where_it_is_now():
+    with pytest.raises(ImportError, match=r"from graspsense\.gripper_api import tare"):
+        from graspsense.plugin_api import tare  # noqa: F401
+    with pytest.raises(ImportError, match="import RestState"):
+        from graspsense.plugin_api import Stillness  # noqa: F401
+    assert new_form("Channel") == ""
 
 
 def test_examples_need_nothing_of_the_simulators_module():

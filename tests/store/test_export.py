@@ -24,6 +24,7 @@ from graspsense.sources.importing.import_sources import recordings_to_import
 from graspsense.sources.trial_table.features_csv import read_labelled
 from graspsense.store.changes import set_aside
 from graspsense.store.dataset import labelled_store
+from graspsense.store.export_table import ABOUT_BEFORE
 from graspsense.store.store import Store
 
 
@@ -213,6 +214,20 @@ def test_evaluate_gives_the_same_figures_for_a_store_and_its_export(tmp_path):
     assert {"before_contact", "first_line", "recording_order"} <= stored["controls"].keys()
     assert all(stored["controls"][name]["rate"] for name in ("first_line", "recording_order", "width_only"))
     assert from_export == stored
+
+
+def test_an_export_of_an_earlier_version_still_opens(folder, tmp_path):
+    export(folder, tmp_path / "t.csv")
+    rows = rows_of(tmp_path / "t.csv")
+    names = [*ABOUT_BEFORE, "p_first [m]", "f_steady [N]"]
+    with (tmp_path / "old.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, names, extrasaction="ignore")
+        writer.writeheader()
+        writer.writerows(rows)
+    trials = read_labelled(tmp_path / "old.csv", "label")
+    assert trials.table.names == ("p_first", "f_steady")
+    assert (trials.labels, trials.order) == (("can:full_open", "can:it's open"), (0, 1))
+    assert trials.before_contact is None
 
 
 @every_case("ending", ["csv", "npz", "parquet"])

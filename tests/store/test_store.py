@@ -139,11 +139,11 @@ def test_a_newer_store_is_refused_and_not_a_byte_of_it_changes(store):
     keep(store)
     edited(
         store,
-        f"PRAGMA user_version = {schema.VERSION + 1}",
+        f"PRAGMA user_version = {schema.NEWEST + 1}",
         "ALTER TABLE trial ADD COLUMN mood TEXT",
     )
     contents = bytes_in(store.folder)
-    assert_refused(store, ConfigError, f"version {schema.VERSION + 1}.*Update graspsense")
+    assert_refused(store, ConfigError, f"version {schema.NEWEST + 1}.*Update graspsense")
     assert bytes_in(store.folder) == contents
 
 
@@ -152,15 +152,41 @@ def test_a_newer_version_that_only_the_log_knows_is_refused(store):
     store.close()
     with closing(sqlite3.connect(store.folder / "store.sqlite")) as writer:
         writer.execute("PRAGMA wal_autocheckpoint = 0")
-        writer.execute(f"PRAGMA user_version = {schema.VERSION + 1}")
+        writer.execute(f"PRAGMA user_version = {schema.NEWEST + 1}")
         writer.commit()
         assert_refused(store, ConfigError, "Update graspsense")
 
 
-def test_a_store_of_an_earlier_version_is_refused_and_can_be_built_again_from_its_recordings(store):
-    keep(store)
-    edited(store, f"PRAGMA user_version = {schema.VERSION - 1}")
-    assert_refused(store, DataDamaged, "graspsense recover")
+def test_an_older_store_is_brought_up_to_date_with_all_that_is_in_it(tmp_path, monkeypatch):
+    older = schema.VERSIONS
+    with Store.open(tmp_path / "trials") as store:
+        keep(store)
+    newer = (*older, ("ALTER TABLE trial ADD COLUMN mood TEXT", "CREATE INDEX by_mood ON trial (mood)"))
+    monkeypatch.setattr(schema, "VERSIONS", newer)
+    schema.tables_of_version.cache_clear()
+    monkeypatch.setattr(schema, "NEWEST", len(newer))
+    for module in ("store", "opening"):
+        monkeypatch.setattr(f"graspsense.store.{module}.NEWEST", len(newer))
+    with Store.read(tmp_path / "trials") as store:
+        assert store.trial(1).result.features.values == (0.066, 5.5)
+        assert store.query("SELECT mood FROM trial") == [(None,)]
+        assert store.query("PRAGMA user_version") == [(len(newer),)]
+    schema.tables_of_version.cache_clear()
+
+
+def test_a_migration_that_fails_leaves_the_store_as_it_was(tmp_path, monkeypatch):
+    with Store.open(tmp_path / "trials") as store:
+        keep(store)
+    newer = (*schema.VERSIONS, ("ALTER TABLE trial ADD COLUMN mood TEXT", "CREATE TABLE trial (id)"))
+    connection = sqlite3.connect(tmp_path / "trials" / "store.sqlite", isolation_level=None)
+    tables = schema.tables_in(connection)
+    monkeypatch.setattr(schema, "VERSIONS", newer)
+    monkeypatch.setattr(schema, "NEWEST", len(newer))
+    with pytest.raises(sqlite3.OperationalError, match="already exists"):
+        schema.migrate(connection, len(newer) - 1)
+    assert schema.tables_in(connection) == tables
+    assert connection.execute("PRAGMA user_version").fetchone() == (len(newer) - 1,)
+    connection.close()
 
 
 @pytest.mark.parametrize(
@@ -175,7 +201,7 @@ def test_a_store_of_an_earlier_version_is_refused_and_can_be_built_again_from_it
 def test_a_store_that_holds_more_or_less_than_ours_do_is_refused(store, statement):
     """A trigger would run at the next trial; nothing that a store brings along is run."""
     edited(store, statement)
-    assert_refused(store, DataDamaged, "its tables are not those of a store")
+    assert_refused(store, DataDamaged, "its tables are not those of version")
 
 
 def of_somebody_else():

@@ -4,6 +4,7 @@ import json
 import os
 import re
 import signal
+import sqlite3
 import subprocess
 import sys
 
@@ -223,6 +224,23 @@ def test_a_row_that_somebody_else_changed_is_not_made_valid_by_a_new_label(store
 
     with pytest.raises(DataDamaged, match="changed after it was written"):
         changes.relabel(store, [1], labels_of("block"), "")
+
+
+def test_a_store_of_the_first_version_keeps_what_was_set_aside_in_it(tmp_path):
+    with Store.open(tmp_path / "old") as store:
+        keep(store)
+        keep(store)
+    connection = sqlite3.connect(tmp_path / "old" / "store.sqlite")
+    connection.executescript(
+        "DROP TABLE change; UPDATE trial SET set_aside = 'undone by the operator' WHERE id = 1; PRAGMA user_version = 1"
+    )
+    connection.close()
+
+    with Store.read(tmp_path / "old") as store:
+        (change,) = changes.history(store)
+        assert (change.trial, change.words, change.why) == (1, "set aside", "undone by the operator")
+        assert [summary.id for summary in store.page()] == [2]
+    assert verify_store(tmp_path / "old").problems == ()
 
 
 def test_a_store_in_which_everything_is_set_aside_says_so(store, tmp_path):

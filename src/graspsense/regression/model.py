@@ -207,7 +207,7 @@ def is_regression(name: str) -> bool:
 def load_regression(name: str) -> RegressionModel:
     """Return the model in a file. Raises ConfigError if it cannot be read, DataDamaged if it is not such a model."""
     content = sealed_content(
-        name, parsed(name, model_bytes(name)), REGRESSION_FORMAT, VERSION, "model of a number"
+        name, parsed(name, model_bytes(name)), REGRESSION_FORMAT, (VERSION,), "model of a number"
     )
     try:
         return _restored(Path(name).stem, StoredValues(content))

@@ -33,7 +33,7 @@ class Change:
     """One change of a trial.
 
     `old` and `new` are labels as they are typed (`can:full_open#2`), or numbers to predict (`fill [ml]=250`), None
-    where there is none.
+    where there is none. `made_at` is empty for a trial that an earlier version of graspsense set aside.
     """
 
     id: int

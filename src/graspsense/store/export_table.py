@@ -42,6 +42,18 @@ ABOUT: Final = (
     "feature_set",
 )
 """Columns that describe a trial. `recorded_at` and `order` are those of an import that names them."""
+ABOUT_BEFORE: Final = (
+    "trial",
+    "made_at",
+    "label",
+    "instance",
+    "outcome",
+    "origin",
+    "device",
+    "simulated",
+    "recording",
+)
+"""The columns that describe a trial in the tables of earlier versions."""
 BEFORE, FIRST, VALUE = "before_contact.", "first_line.", "value."
 """What the name of a column of a CSV file begins with that holds a number of a control, or one to predict."""
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 from typing import Final
 
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.recording.reader import read_recorded
+from graspsense.recording.replayable import content_sha256
 from graspsense.store.store import Store
 
 CONTENT: Final = "content_sha256"
@@ -17,19 +19,26 @@ class AlreadyImported(ConfigError):
 
 
 class ImportedContents:
-    """The contents of the imported trials of a store that are not set aside."""
+    """The contents of the imported trials of a store that are not set aside.
+
+    A trial of an earlier version has no hash in its provenance; its recording is read.
+    """
 
     def __init__(self, store: Store) -> None:
         self._folder = store.folder
         self._trials: dict[str, int] = {}
         rows = store.query(
-            """SELECT trial.id, detail.provenance FROM trial JOIN detail ON detail.trial = trial.id
+            """SELECT trial.id, trial.recording, detail.provenance FROM trial JOIN detail ON detail.trial = trial.id
             WHERE trial.origin = 'import' AND trial.set_aside IS NULL ORDER BY trial.id"""
         )
-        for number, provenance in rows:
+        for number, recording, provenance in rows:
             sha256 = _stated(provenance)
-            if sha256 is not None:  # `graspsense verify` reports a damaged row
-                self._trials.setdefault(sha256, number)
+            if sha256 is None:
+                try:
+                    sha256 = content_sha256(read_recorded(store.recording_path(recording)).recording())
+                except (ConfigError, DataDamaged):
+                    continue  # `graspsense verify` reports it
+            self._trials.setdefault(sha256, number)
 
     def refuse(self, sha256: str, source: str) -> None:
         """Raise AlreadyImported if the store has this content already; `source` names what is imported."""

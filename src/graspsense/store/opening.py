@@ -16,7 +16,7 @@ from urllib.parse import quote
 from graspsense import __version__
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.recording.atomic_file import SaveFailed
-from graspsense.store.schema import APPLICATION_ID, VERSION, expected_tables, tables_in
+from graspsense.store.schema import APPLICATION_ID, NEWEST, tables_in, tables_of_version
 
 FILE: Final = "store.sqlite"
 RECORDINGS: Final = "recordings"
@@ -72,18 +72,19 @@ def is_new(folder: Path) -> bool:
     return False
 
 
-def check_tables(connection: sqlite3.Connection, folder: Path) -> None:
-    """Raise DataDamaged unless an open store has exactly the tables of a store, and ConfigError for another version.
+def checked_version(connection: sqlite3.Connection, folder: Path) -> int:
+    """Return the version of an open store whose tables are exactly those of its version.
 
-    Another table, trigger or view could make SQLite run code.
+    Raises DataDamaged otherwise: another table, trigger or view could make SQLite run code.
     """
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     _check_version(folder, version, application)
-    have, want = tables_in(connection), expected_tables()
+    have, want = tables_in(connection), tables_of_version(version)
     if have != want:
         names = sorted({str(name) for _, name, _ in have ^ want})
-        raise damaged(folder, f"its tables are not those of a store ({', '.join(names)[:200]})")
+        raise damaged(folder, f"its tables are not those of version {version} ({', '.join(names)[:200]})")
+    return int(version)
 
 
 def make_safe(connection: sqlite3.Connection) -> None:
@@ -153,13 +154,13 @@ def _check_version(folder: Path, version: int, application: int) -> None:
         raise DataDamaged(
             f"{folder / FILE} is not a store of graspsense: its application id is {application:#x}"
         )
-    if version > VERSION:
+    if version > NEWEST:
         raise ConfigError(
-            f"the store in {folder} has version {version}. This graspsense ({__version__}) knows version {VERSION} "
-            "and does not change it. Update graspsense"
+            f"the store in {folder} has version {version}. This graspsense ({__version__}) knows versions up to "
+            f"{NEWEST} and does not change it. Update graspsense"
         )
-    if version < VERSION:
-        raise DataDamaged(f"the store in {folder} has an unknown version. {_REPAIR.format(folder=folder)}")
+    if version < 1:
+        raise DataDamaged(f"the store in {folder} has no version. {_REPAIR.format(folder=folder)}")
 
 
 _REASONS: Final = {

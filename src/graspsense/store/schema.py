@@ -1,24 +1,26 @@
-"""The tables of the store's SQLite file."""
+"""The tables of the store's SQLite file, version by version.
+
+A version is a list of statements. Opening an older store runs the statements that it lacks, in one transaction. Once
+released, a statement never changes: a change is a new version.
+"""
 
 from __future__ import annotations
 
 import sqlite3
-from contextlib import closing, suppress
+from contextlib import suppress
 from functools import cache
 from typing import Final
 
 APPLICATION_ID: Final = 0x47525350
 """`GRSP`: the application id in the header of the SQLite file."""
 
-VERSION: Final = 2
-"""The version of these tables, stored in the header of the file."""
-
-STATEMENTS: Final = (
-    """CREATE TABLE feature_set (
+VERSIONS: Final[tuple[tuple[str, ...], ...]] = (
+    (
+        """CREATE TABLE feature_set (
             id INTEGER PRIMARY KEY,
             features TEXT NOT NULL UNIQUE
         ) STRICT""",
-    """CREATE TABLE trial (
+        """CREATE TABLE trial (
             id INTEGER PRIMARY KEY,
             made_at TEXT NOT NULL,
             origin TEXT NOT NULL,
@@ -39,7 +41,7 @@ STATEMENTS: Final = (
             recording_bytes INTEGER NOT NULL,
             sha256 TEXT NOT NULL
         ) STRICT""",
-    """CREATE TABLE detail (
+        """CREATE TABLE detail (
             trial INTEGER PRIMARY KEY REFERENCES trial (id),
             labels TEXT NOT NULL,
             settings TEXT NOT NULL,
@@ -51,8 +53,10 @@ STATEMENTS: Final = (
             details TEXT NOT NULL,
             recorder TEXT NOT NULL
         ) STRICT""",
-    "CREATE INDEX trial_by_label ON trial (label, id)",
-    """CREATE TABLE change (
+        "CREATE INDEX trial_by_label ON trial (label, id)",
+    ),
+    (
+        """CREATE TABLE change (
             id INTEGER PRIMARY KEY,
             trial INTEGER NOT NULL REFERENCES trial (id),
             made_at TEXT NOT NULL,
@@ -61,11 +65,12 @@ STATEMENTS: Final = (
             "after" TEXT,
             why TEXT NOT NULL
         ) STRICT""",
-    "CREATE INDEX change_by_trial ON change (trial, id)",
+        "CREATE INDEX change_by_trial ON change (trial, id)",
+        """INSERT INTO change (trial, made_at, "action", why)
+            SELECT id, '', 'aside', set_aside FROM trial WHERE set_aside IS NOT NULL ORDER BY id""",
+    ),
 )
-"""The statements that make the tables. A store is recognised by their text, spaces included.
-
-`trial` holds what is searched and read as a table, `detail` what is read for one trial.
+"""`trial` holds what is searched and read as a table, `detail` what is read for one trial.
 
 JSON is canonical. `"values"` and `before_contact` are little-endian float64 in the order of their feature set, with
 NaN for a missing value, so a table of a hundred thousand rows is read in a fraction of a second. `settings` is TOML,
@@ -75,17 +80,20 @@ and itself. `label` and `instance` are the current ones; the column `labels` of 
 `change` holds every change of them and of `set_aside` (`graspsense.store.changes`).
 """
 
+NEWEST: Final = len(VERSIONS)
 
-def create(connection: sqlite3.Connection) -> None:
-    """Make the tables of a new store in one transaction; raise sqlite3.Error and leave it empty if that fails."""
+
+def migrate(connection: sqlite3.Connection, version: int) -> None:
+    """Bring the tables from this version to the newest, or leave them unchanged and raise sqlite3.Error."""
     connection.execute("BEGIN IMMEDIATE")
     try:
-        # Another process may have made them while this one waited for the lock.
+        # Another process may have migrated the store while this one waited for the lock.
         (version,) = connection.execute("PRAGMA user_version").fetchone()
-        for statement in STATEMENTS if version == 0 else ():
-            connection.execute(statement)
+        for statements in VERSIONS[version:]:
+            for statement in statements:
+                connection.execute(statement)
         connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
-        connection.execute(f"PRAGMA user_version = {VERSION}")
+        connection.execute(f"PRAGMA user_version = {NEWEST}")
         connection.execute("COMMIT")
     except BaseException:
         # SQLite has rolled back by itself where the disk is full.
@@ -95,12 +103,16 @@ def create(connection: sqlite3.Connection) -> None:
 
 
 @cache
-def expected_tables() -> frozenset[tuple[str, str, str]]:
-    """Return type, name and SQL of every table and index of a store."""
-    with closing(sqlite3.connect(":memory:")) as connection:
-        for statement in STATEMENTS:
-            connection.execute(statement)
+def tables_of_version(version: int) -> frozenset[tuple[str, str, str]]:
+    """Return type, name and SQL of every table and index in a store of this version."""
+    connection = sqlite3.connect(":memory:")
+    try:
+        for statements in VERSIONS[:version]:
+            for statement in statements:
+                connection.execute(statement)
         return tables_in(connection)
+    finally:
+        connection.close()
 
 
 def tables_in(connection: sqlite3.Connection) -> frozenset[tuple[str, str, str]]:

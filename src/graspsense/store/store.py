@@ -28,7 +28,7 @@ from graspsense.store.opening import (
     BUSY_S,
     FILE,
     RECORDINGS,
-    check_tables,
+    checked_version,
     connect_read_only,
     damaged,
     is_new,
@@ -46,7 +46,7 @@ from graspsense.store.rows import (
     decoded,
     encoded,
 )
-from graspsense.store.schema import VERSION, create
+from graspsense.store.schema import NEWEST, migrate
 
 RECORDING_NAME: Final = re.compile(r"[\w.-]+\.mcap")
 NOT_ENDED: Final = ("aborted", "device lost", "recognised")
@@ -72,7 +72,7 @@ class Store:
 
     @classmethod
     def open(cls, folder: str | Path) -> Store:
-        """Open a store to write. Create it if there is none.
+        """Open a store to write. Create it if there is none, and migrate one of an older version.
 
         Raises SaveFailed if it cannot be written, ConfigError if its version is newer, DataDamaged.
         """
@@ -115,10 +115,14 @@ class Store:
             store = cls(folder, *connect_read_only(path))
             try:
                 make_safe(store._connection)
-                check_tables(store._connection, folder)
+                version = checked_version(store._connection, folder)
             except BaseException:
                 store.close()
                 raise
+        if version < NEWEST:
+            store.close()
+            cls.open(folder).close()
+            return cls.read(folder)
         return store
 
     def close(self) -> None:
@@ -282,13 +286,15 @@ def _prepare_to_write(connection: sqlite3.Connection, folder: Path, *, new: bool
     make_safe(connection)
     if new:
         # Before WAL mode, so that the file has its application id from the first byte on.
-        create(connection)
-    check_tables(connection, folder)
+        migrate(connection, 0)
+    version = checked_version(connection, folder)
+    if version < NEWEST:
+        migrate(connection, version)
     connection.execute("PRAGMA journal_mode = WAL")
     connection.execute("PRAGMA synchronous = FULL")
     # Write once, to learn before the grasp rather than after it that nothing can be written.
     connection.execute("BEGIN IMMEDIATE")
-    connection.execute(f"PRAGMA user_version = {VERSION}")
+    connection.execute(f"PRAGMA user_version = {NEWEST}")
     connection.execute("COMMIT")
 
 

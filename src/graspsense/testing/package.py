@@ -27,6 +27,7 @@ from graspsense.core.values.errors import GraspsenseError
 from graspsense.testing import reader
 from graspsense.testing.checks import Check, CheckFailed, CheckSkipped, checks_of, demand, raises_nothing
 from graspsense.testing.component import ADVICE_ON_IMPORTS
+from graspsense.testing.old_imports import old_imports
 from graspsense.testing.samples import a_trial, an_event
 from graspsense.testing.subject import Package
 
@@ -37,12 +38,16 @@ _ADVICE_ON_OBSERVERS: Final = ": an observer that raises is passed over from the
 
 def plugins_load(package: Package) -> None:
     """Every plugin of the distribution can be imported, is written for this API, and violates no rule."""
+    old = [line for path in _sources(package) for line in old_imports(path)]
+    names = f"\n    {len(old)} names moved:\n    " + "\n    ".join(old) if old else ""
     for status in package.statuses:
         demand(
             status.state == "loaded",
             f"{status.entry_point} = {status.module} is {status.state}: {status.reason}{_place(status.traceback)}"
-            + (f"\n    {ADVICE_ON_IMPORTS}" if "ModuleNotFoundError" in status.reason else ""),
+            + (f"\n    {ADVICE_ON_IMPORTS}" if "ModuleNotFoundError" in status.reason else "")
+            + names,
         )
+    demand(not old, f"it imports what is elsewhere now{names}")
 
 
 def _place(traceback: str) -> str:
@@ -225,6 +230,23 @@ def _modules_of(package: Package) -> Iterator[str]:
 def _lies_within(module: str, folder: Path) -> bool:
     origin = getattr(importlib.util.find_spec(module), "origin", None)
     return origin is not None and Path(origin).resolve().is_relative_to(folder)
+
+
+def _sources(package: Package) -> Iterator[Path]:
+    """Yield the Python files of a distribution; of an editable one also those beside its package, as its tests."""
+    folder = _editable_folder(package.distribution)
+    tops = {module.partition(".")[0] for module in _modules_of(package)} - {"graspsense"}
+    specs = [spec for top in sorted(tops) if (spec := importlib.util.find_spec(top)) is not None]
+    folders = [Path(location) for spec in specs for location in spec.submodule_search_locations or ()]
+    if folder is not None and tops:
+        folders = [folder]
+    elif not folders:
+        yield from (Path(spec.origin) for spec in specs if spec.origin)
+    for place in folders:
+        for path in sorted(place.rglob("*.py")):
+            inside = path.relative_to(place).parts
+            if "site-packages" not in inside and not any(part.startswith(".") for part in inside):
+                yield path
 
 
 def _files_of(top: str) -> list[str]:

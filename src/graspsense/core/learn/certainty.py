@@ -52,14 +52,14 @@ class SupportClass:
 
     `rates` rise; each holds for probabilities from the number in `probabilities` at its place on, the first for all
     smaller ones too. `units` is the number of units that they were computed from. `intervals` has the 95 % interval of
-    each rate.
+    each rate; it is empty in a model that was measured before these were kept.
     """
 
     least: float
     probabilities: tuple[float, ...]
     rates: tuple[float, ...]
     units: float
-    intervals: tuple[tuple[float, float], ...]
+    intervals: tuple[tuple[float, float], ...] = ()
 
 
 @frozen(kw_only=True)
@@ -85,11 +85,13 @@ class Certainty:
 
     def intervals(
         self, probability: NDArray[np.float64], support: NDArray[np.float64]
-    ) -> list[tuple[float, float]]:
-        """Return the 95 % interval of the rate of each answer."""
+    ) -> list[tuple[float, float] | None]:
+        """Return the 95 % interval of the rate of each answer; None where it was not kept."""
         chosen, steps = self._places(probability, support)
-        places = zip(chosen.tolist(), steps.tolist(), strict=True)
-        return [self.classes[k].intervals[step] for k, step in places]
+        kept = [
+            support_class.intervals or (None,) * len(support_class.rates) for support_class in self.classes
+        ]
+        return [kept[k][step] for k, step in zip(chosen.tolist(), steps.tolist(), strict=True)]
 
     def _places(
         self, probability: NDArray[np.float64], support: NDArray[np.float64]
@@ -127,8 +129,12 @@ def certainty_from(kept: Sequence[StoredValues]) -> Certainty:
             raise values.refusal("rates", "there is none, or one is above 1")
         if (np.diff(probabilities) <= 0.0).any():
             raise values.refusal("probabilities", "they do not rise")
-        intervals = values.numbers("intervals", (len(rates), 2), least=0.0)
-        if not ((intervals[:, 0] <= rates) & (rates <= intervals[:, 1])).all():
+        intervals = (
+            values.numbers("intervals", (len(rates), 2), least=0.0)
+            if "intervals" in values and len(values.items("intervals"))
+            else np.empty((0, 2))
+        )
+        if len(intervals) and not ((intervals[:, 0] <= rates) & (rates <= intervals[:, 1])).all():
             raise values.refusal("intervals", "one does not hold its rate")
         least = values.number("support", least=0.0)
         if classes and least <= classes[-1].least:

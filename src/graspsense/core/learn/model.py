@@ -192,7 +192,8 @@ class Model:
             # No answer counts as less certain than chance, however seldom such answers were right.
             own = calibrated[np.arange(len(table)), predicted].tolist()
             intervals = [
-                (min(low, sure), max(high, sure)) for (low, high), sure in zip(kept, own, strict=True)
+                interval and (min(interval[0], sure), max(interval[1], sure))
+                for interval, sure in zip(kept, own, strict=True)
             ]
             if self.sets is not None and self.sets.thresholds:
                 scores = scores_of(shares, self.novelty.closeness(table, classes))

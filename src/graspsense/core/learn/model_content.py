@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -58,16 +58,17 @@ def parsed(name: str, text: bytes) -> Any:
     return values
 
 
-def sealed_content(name: str, values: Any, form: str, version: int, what: str) -> dict[str, Any]:
-    """Return the content of a model of this format and version, whose hash is right.
+def sealed_content(name: str, values: Any, form: str, versions: Sequence[int], what: str) -> dict[str, Any]:
+    """Return the content of a model of this format and one of these versions, whose hash is right.
 
     `what` names the format in words. Raises DataDamaged.
     """
     if not isinstance(values, dict) or values.get("format") != form:
         raise DataDamaged(f'{name!r} is not a {what}: it lacks "format": "{form}"')
-    if values.get("version") != version:
+    if values.get("version") not in versions:
         raise DataDamaged(
-            f"model {name!r} has version {values.get('version')!r:.40}; this graspsense ({__version__}) reads {version}"
+            f"model {name!r} has version {values.get('version')!r:.40}; this graspsense ({__version__}) reads up to "
+            f"{versions[-1]}"
         )
     content = {key: value for key, value in values.items() if key != "sha256"}
     if values.get("sha256") != digest(content):

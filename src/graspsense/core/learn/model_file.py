@@ -15,7 +15,7 @@ from attrs import evolve
 
 from graspsense.core.components.entries import ModelEntry
 from graspsense.core.learn.certainty import TEMPERATURES, Certainty, certainty_from
-from graspsense.core.learn.conformal import PredictionSets, sets_from
+from graspsense.core.learn.conformal import COVERAGES, PredictionSets, sets_from
 from graspsense.core.learn.model import COMPARED_TABLES, EQUAL, Model, checkpoint_model, refuse_improbable
 from graspsense.core.learn.model_content import (
     REGRESSION_FORMAT,
@@ -47,6 +47,8 @@ if TYPE_CHECKING:
 
 FORMAT: Final = "graspsense model"
 VERSION: Final = 2
+_READ: Final = (1, VERSION)
+"""The versions that are read. Sets of the first one do not hold for answers from few trials, and are left out."""
 
 
 def write_model(path: Path, model: Model) -> None:
@@ -203,8 +205,8 @@ def _novelty_from(
 
 
 def _certainty_from(stored: StoredValues) -> Certainty | None:
-    """Return the certainty; None in a model without calibration. Raises DataDamaged."""
-    if stored.value("certainty") is None:
+    """Return the certainty; None in a model without calibration, or of an earlier version. Raises DataDamaged."""
+    if "certainty" not in stored or stored.value("certainty") is None:
         return None
     return certainty_from(stored.tables("certainty"))
 
@@ -213,6 +215,12 @@ def _sets_from(stored: StoredValues, classifier: Classifier[Any]) -> PredictionS
     """Return the prediction sets, if there are any. Raises DataDamaged."""
     if "sets" not in stored or stored.value("sets") is None:
         return None
+    if "certainty" not in stored:
+        old = stored.table("sets")
+        reason = "its file was written by an earlier version of graspsense: train it again"
+        return PredictionSets(
+            coverage=old.number("coverage", *COVERAGES), unit=old.text("unit"), thresholds={}, reason=reason
+        )
     certainty = _certainty_from(stored)
     return sets_from(
         stored.table("sets"), classifier.classes(), 0 if certainty is None else len(certainty.classes)
@@ -220,7 +228,7 @@ def _sets_from(stored: StoredValues, classifier: Classifier[Any]) -> PredictionS
 
 
 def _temperature_from(stored: StoredValues) -> float | None:
-    """Return the stored temperature; None in a model without one. Raises DataDamaged."""
+    """Return the stored temperature; None in a model of an earlier version. Raises DataDamaged."""
     if "temperature" not in stored or stored.value("temperature") is None:
         return None
     least, most = TEMPERATURES
@@ -299,4 +307,4 @@ def _content(name: str, text: bytes) -> dict[str, Any]:
         raise ConfigError(
             f"model {name!r} predicts a number, not a label: use it with graspsense predict {name} SOURCE"
         )
-    return sealed_content(name, content, FORMAT, VERSION, "model of graspsense")
+    return sealed_content(name, content, FORMAT, _READ, "model of graspsense")

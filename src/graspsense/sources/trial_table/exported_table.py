@@ -12,7 +12,7 @@ from attrs import evolve
 from graspsense.core.values.errors import DataDamaged, counted
 from graspsense.core.values.label_text import is_missing_label
 from graspsense.sources.formats.csv_columns import CsvColumns
-from graspsense.store.export_table import ABOUT, BEFORE, FIRST, VALUE
+from graspsense.store.export_table import ABOUT, ABOUT_BEFORE, BEFORE, FIRST, VALUE
 from graspsense.store.store import NOT_ENDED
 from graspsense.store.time_recorded import order_recorded
 
@@ -21,11 +21,12 @@ if TYPE_CHECKING:
 
 
 class ExportedTable:
-    """The columns of an exported store; `features` are those to learn from."""
+    """The columns of an exported store; `about` are those that describe a trial, `features` those to learn from."""
 
-    def __init__(self, columns: CsvColumns) -> None:
+    def __init__(self, columns: CsvColumns, about: Sequence[str]) -> None:
         self.columns = columns
-        further = columns.names[len(ABOUT) :]
+        self.about = tuple(about)
+        further = columns.names[len(about) :]
         self.features = [name for name in further if not name.startswith((BEFORE, FIRST, VALUE))]
 
     def keep_complete_trials(self, label: str | None, notes: list[str]) -> None:
@@ -41,30 +42,37 @@ class ExportedTable:
             rows = _kept(rows, [not is_missing_label(cell) for cell in cells], "they have no label", notes)
         ended = [outcome not in NOT_ENDED for outcome in columns.cells["outcome"]]
         rows = _kept(rows, ended, "they did not end by themselves", notes)
-        whole = [cell != "0" for cell in columns.cells["complete"]]
-        rows = _kept(rows, whole, "they are incomplete", notes)
+        if "complete" in self.about:
+            whole = [cell != "0" for cell in columns.cells["complete"]]
+            rows = _kept(rows, whole, "they are incomplete", notes)
         if not rows:
             raise DataDamaged(f"{columns.path} has no labelled trial that ended by itself")
-        sets = columns.cells["feature_set"]
-        newest = [feature_set == sets[rows[-1]] for feature_set in sets]
-        several = len({sets[i] for i in rows}) > 1
-        rows = _kept(rows, newest, "their features differ from those of the newest trial", notes)
-        columns.keep(rows)
-        if several:
-            self.features = [name for name in self.features if not columns.is_blank(name)]
+        if "feature_set" in self.about:
+            sets = columns.cells["feature_set"]
+            newest = [feature_set == sets[rows[-1]] for feature_set in sets]
+            several = len({sets[i] for i in rows}) > 1
+            rows = _kept(rows, newest, "their features differ from those of the newest trial", notes)
+            columns.keep(rows)
+            if several:
+                self.features = [name for name in self.features if not columns.is_blank(name)]
+        else:
+            columns.keep(rows)
 
     def order(self) -> tuple[tuple[int, ...] | None, str]:
         """Return the position of each trial in the order of recording, or None with the reason."""
         cells = self.columns.cells
-        keys = ("recorded_at", "order")
-        labels = [
-            json.dumps({key: cells[key][i] for key in keys if not is_missing_label(cells[key][i])})
-            for i in range(len(self.columns))
-        ]
+        if "recorded_at" not in self.about:
+            labels = ["{}"] * len(self.columns)
+        else:
+            keys = ("recorded_at", "order")
+            labels = [
+                json.dumps({key: cells[key][i] for key in keys if not is_missing_label(cells[key][i])})
+                for i in range(len(self.columns))
+            ]
         return order_recorded(cells["made_at"], cells["origin"], labels)
 
     def before_contact(self) -> FeatureTable | None:
-        """Return the features from before contact, None if there are none."""
+        """Return the features from before contact, None in a table of an earlier version."""
         return self._with_prefix(BEFORE)
 
     def first_line(self) -> FeatureTable | None:
@@ -86,7 +94,10 @@ class ExportedTable:
 
 def exported(columns: CsvColumns) -> ExportedTable | None:
     """Return the table that `graspsense export` wrote, None if these columns are not one."""
-    return ExportedTable(columns) if tuple(columns.names[: len(ABOUT)]) == ABOUT else None
+    for about in (ABOUT, ABOUT_BEFORE):
+        if tuple(columns.names[: len(about)]) == about:
+            return ExportedTable(columns, about)
+    return None
 
 
 def _kept(rows: list[int], wanted: Sequence[bool], why: str, notes: list[str]) -> list[int]:

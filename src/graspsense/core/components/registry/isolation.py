@@ -184,6 +184,14 @@ def imported(source: PluginSource) -> tuple[object, ImportCost]:
     return plugin, ImportCost(processor_s, waited_s, HEAVY.intersection(sys.modules) - present)
 
 
+_CHANGED: Final = (
+    ". If it is yours: a controller's step takes (params, state, reading), where reading.frame and reading.pads are "
+    "what it took before; a gripper declares its fingertips as TactileArray('pads', ...). All changes: "
+    "docs/from-1-to-2.md"
+)
+"""What a plugin of an earlier version has to change."""
+
+
 def check_api(plugin: object, source: PluginSource) -> None:
     """Refuse a plugin that is written for another version of the plugin API. Raises PluginRefused."""
     major, minor = hookspecs.API
@@ -199,7 +207,7 @@ def check_api(plugin: object, source: PluginSource) -> None:
         )
     if version[0] < major:
         raise PluginRefused(
-            f"it is written for plugin API {version[0]}.{version[1]}, {ours}: upgrade {source.distribution}"
+            f"it is written for plugin API {version[0]}.{version[1]}, {ours}: upgrade {source.distribution}{_CHANGED}"
         )
 
 

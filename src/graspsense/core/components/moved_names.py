@@ -1,0 +1,53 @@
+"""Where the names are now that `graspsense.plugin_api` no longer has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib import import_module
+from typing import Final
+
+SPECIAL: Final = ("gripper_api", "classifier_api", "testing_api", "experiment_api", "simulator_api")
+"""The public modules of graspsense beside `plugin_api`, each for the plugins that need it."""
+
+MOVED_TO_EXPERIMENTS: Final = ("ControlFeatures", "ExperimentEntry", "ExperimentKindEntry", "Labelled")
+"""The names of `experiment_api` that came from `plugin_api`; it had its others before."""
+
+REPLACED: Final = {
+    "CELLS": "the number of rows and columns of the TactileArray that the gripper declares",
+    "ClockLine": "the attributes of DeviceClock",
+    "CommandKind": "EFFORT, VELOCITY, POSITION and FORCE",
+    "ControllerState": "a NamedTuple with the fields phase and outcome",
+    "FIRST_PAD_CELL": "the number of the first cell on the gripping face, as an argument",
+    "FreeState": "the result of free_from of graspsense.simulator_api",
+    "FreeTicks": "the result of free_parts of graspsense.simulator_api",
+    "GuardParams": "the result of tick_params of graspsense.simulator_api",
+    "GuardState": "the result of first_state of graspsense.simulator_api",
+    "OPENING": "Phase.OPENING of graspsense.gripper_api",
+    "Schedule": "the result of tick_params of graspsense.simulator_api",
+    "StepLaw": "Controller.step",
+    "Stillness": "from graspsense.plugin_api import RestState",
+    "StoredValueError": "DataDamaged",
+    "UNKNOWN": 'the answer "unknown"',
+    "columns_of_ticks": "TickColumns of graspsense.simulator_api",
+    "watch": "from graspsense.plugin_api import update_rest",
+}
+"""Name that was public to what is used in its place."""
+
+
+def moved() -> Iterator[tuple[str, str]]:
+    """Yield each name that is in a special module now, with the import that brings it."""
+    for module in SPECIAL:
+        names = import_module(f"graspsense.{module}").PUBLIC.names
+        for name in MOVED_TO_EXPERIMENTS if module == "experiment_api" else names:
+            yield name, f"from graspsense.{module} import {name}"
+
+
+def new_form(name: str) -> str:
+    """Return what replaces the import of a name from `graspsense.plugin_api`; empty if it never had this name."""
+    return REPLACED.get(name) or dict(moved()).get(name, "")
+
+
+def refuse_moved(name: str) -> None:
+    """Raise an ImportError that says where a name of `graspsense.plugin_api` is now; do nothing for other names."""
+    if replacement := new_form(name):
+        raise ImportError(f"graspsense.plugin_api no longer has {name}; in its place: {replacement}")
