@@ -126,12 +126,10 @@ def test_text_for_an_unknown_name(site):
     site.install("lab-pr2", backend("pr2"))
     site.install("graspsense-hid", BROKEN)
 
-    assert refusal(site.discover(), "pr3") == (
-        "no sensor backend named 'pr3'. Known: pr2, replay. Did you mean 'pr2'?\n"
-        "  graspsense-hid 0.2 is installed but failed to load: "
-        "ModuleNotFoundError: No module named 'no_such_driver'\n"
-        "  (graspsense plugins show graspsense-hid)"
-    )
+    told = refusal(site.discover(), "pr3")
+    assert told.startswith("no sensor backend named 'pr3'. Known: pr2, replay. Did you mean 'pr2'?\n")
+    assert "graspsense-hid 0.2 is installed but failed to load: ModuleNotFoundError: " in told
+    assert told.endswith("(graspsense plugins show graspsense-hid)")
 
 
 def test_another_role_is_told_with_those_there_are():
