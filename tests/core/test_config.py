@@ -363,6 +363,7 @@ seed = true
     ):
         assert line.startswith(f"  {place}: ")
         assert said in line
+    assert "\n".join(told).count("give the number alone") == 1
 
 
 def test_a_misspelt_type_of_a_table_is_proposed_and_a_validator_keeps_its_words(plugins, write):
@@ -401,6 +402,8 @@ def test_nothing_is_coerced(plugins, write, option, said):
 
     assert told.startswith(f"-o {option}: ")
     assert said in told
+    # A date in quotes is no advice: nobody meant a text.
+    assert not said.endswith("(a date)") or told.endswith(said)
 
 
 @every_case(
