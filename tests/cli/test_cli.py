@@ -77,40 +77,23 @@ def test_version_is_that_of_the_distribution(run):
 @every_case(
     ("arguments", "said"),
     [
-        (
-            ["plugin"],
-            f"graspsense: no command named 'plugin'. Known: {', '.join(sorted(COMMANDS))}. Did you mean 'plugins'?\n",
-        ),
-        (["--jsn"], "graspsense: No such option '--jsn'.\n  graspsense --help shows what there is\n"),
-        (
-            ["config", "shwo"],
-            "graspsense: No such command 'shwo'. Did you mean 'show'?\n"
-            "  graspsense config --help shows what there is\n",
-        ),
+        (["plugin"], ["no command named 'plugin'. Known: ", "Did you mean 'plugins'?"]),
+        (["--jsn"], ["No such option '--jsn'", "graspsense --help shows"]),
+        (["config", "shwo"], ["Did you mean 'show'?", "graspsense config --help shows"]),
         (
             ["config", "show", "a.toml", "--pipeline", "b.toml"],
-            "graspsense: the pipeline is given twice: a.toml and --pipeline b.toml\n"
-            "  graspsense config show --help shows what there is\n",
+            ["a.toml and --pipeline b.toml", "show --help"],
         ),
-        (
-            ["config", "validate", "nosuch"],
-            "graspsense: no pipeline named 'nosuch'. Known: best, default.\n"
-            "  A file is given with its ending .toml\n",
-        ),
-        (
-            ["plugins", "show", "replai"],
-            "graspsense: no plugin or component named 'replai'. "
-            "Known: backprop, boosted, catch22, chitta, chitta-without-pads, contact-image, curve, ebm, extra-trees, "
-            "force, forest, graspsense, hybrid, knn, mlp, quant, quantiles, replay, send-and-watch, svm, tree, union, "
-            "velocity. "
-            "Did you mean 'replay'?\n",
-        ),
+        (["config", "validate", "nosuch"], ["no pipeline named 'nosuch'", "given with its ending .toml"]),
+        (["plugins", "show", "replai"], ["Known: backprop, ", "Did you mean 'replay'?"]),
     ],
 )
 def test_a_mistake_is_told_on_stderr_with_code_2(run, arguments, said):
     ran = run(*arguments)
 
-    assert (ran.returncode, ran.stdout, ran.stderr) == (2, "", said)
+    assert (ran.returncode, ran.stdout) == (2, "")
+    assert ran.stderr.startswith("graspsense: ")
+    assert [words for words in said if words not in ran.stderr] == []
 
 
 def test_with_json_an_error_is_an_object_on_stdout_too(run):

@@ -192,7 +192,6 @@ def test_features_are_kept(csv, tmp_path):
             "is not a source of trials: name a FILE.csv, recordings as manifest:FILE.toml, ",
         ),
         (["evaluate", "none.csv", "--label", "x"], "none.csv cannot be read"),
-        (["evaluate", "none.csv"], "none.csv cannot be read: there is no file of this name"),
         (["evaluate", "nosuch:x"], "no data set named 'nosuch'. Known: icub"),
         (["evaluate", "icub:"], "names no folder"),
         (["evaluate", "icub:nowhere"], "there is no folder nowhere"),

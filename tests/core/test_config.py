@@ -334,31 +334,36 @@ forse_n = 3
 [run]
 seed = true
 """
-    assert (
-        complaint(write(text), options=["features.type=nosuch", "nonsense"])
-        == """\
-15 errors in the settings:
-  -o nonsense: expected TABLE.KEY=VALUE, as in -o run.seed=3
-  lab.toml:12: controler: a pipeline has no table 'controler'. Did you mean 'controller'? \
-It has: gripper, controller, features, classifier, run
-  lab.toml:1: gripper: lab-parts/hand needs the key 'port', which is not given
-  lab.toml:3: gripper.rate_hz: expected a number, found '100 Hz' (text): \
-give the number alone, in the unit that the key ends with, or SI
-  lab.toml:4: gripper.retries: expected a whole number, found 2.5 (a number)
-  lab.toml:5: gripper.echo: expected true or false, found 'false' (text)
-  lab.toml:6: gripper.transport: expected one of 'usb', 'emulated', found 'ubs' (text). Did you mean 'usb'?
-  lab.toml:7: gripper.offsets_n[1]: expected a number, found 'two' (text)
-  lab.toml:7: gripper.offsets_n[2]: expected a number, found true (a boolean)
-  lab.toml:10: gripper.filter.cutof_hz: this table has no key 'cutof_hz'. Did you mean 'cutoff_hz'? \
-It has: cutoff_hz, order
-  lab.toml:19: controller.forse_n: lab-parts/law has no key 'forse_n'. Did you mean 'force_n'? \
-It has: force_n, low_n, speed_m_s
-  lab.toml:17: controller.force_n: 'force_n' must be >= 0.0: -1.0
-  lab.toml:18: controller.speed_m_s: 'speed_m_s' must be > 0.0: 0.0
-  -o features.type=nosuch: no feature set named 'nosuch'. Known: catch22, chitta, chitta-without-pads, \
-contact-image, curve, none-at-all, quant, quantiles, union.
-  lab.toml:22: run.seed: expected a whole number, found true (a boolean)"""
-    )
+    head, *told = complaint(write(text), options=["features.type=nosuch", "nonsense"]).splitlines()
+
+    assert head.startswith("15 errors")
+    for line, (place, said) in zip(
+        told,
+        [
+            ("-o nonsense", "expected TABLE.KEY=VALUE"),
+            ("lab.toml:12: controler", "Did you mean 'controller'?"),
+            ("lab.toml:1: gripper", "needs the key 'port'"),
+            (
+                "lab.toml:3: gripper.rate_hz",
+                "expected a number, found '100 Hz' (text): give the number alone",
+            ),
+            ("lab.toml:4: gripper.retries", "expected a whole number, found 2.5"),
+            ("lab.toml:5: gripper.echo", "expected true or false, found 'false' (text)"),
+            ("lab.toml:6: gripper.transport", "expected one of 'usb', 'emulated', found 'ubs'"),
+            ("lab.toml:7: gripper.offsets_n[1]", "expected a number, found 'two'"),
+            ("lab.toml:7: gripper.offsets_n[2]", "expected a number, found true"),
+            ("lab.toml:10: gripper.filter.cutof_hz", "Did you mean 'cutoff_hz'? It has: cutoff_hz, order"),
+            ("lab.toml:19: controller.forse_n", "Did you mean 'force_n'?"),
+            ("lab.toml:17: controller.force_n", "must be >= 0.0: -1.0"),
+            ("lab.toml:18: controller.speed_m_s", "must be > 0.0: 0.0"),
+            ("-o features.type=nosuch", "no feature set named 'nosuch'. Known: catch22, "),
+            ("lab.toml:22: run.seed", "expected a whole number, found true"),
+        ],
+        strict=True,
+    ):
+        assert line.startswith(f"  {place}: ")
+        assert said in line
+    assert "\n".join(told).count("give the number alone") == 1
 
 
 def test_a_misspelt_type_of_a_table_is_proposed_and_a_validator_keeps_its_words(plugins, write):
@@ -374,34 +379,31 @@ def test_a_misspelt_type_of_a_table_is_proposed_and_a_validator_keeps_its_words(
 @every_case(
     ("option", "said"),
     [
-        ("gripper.retries=3.0", "expected a whole number, found 3.0 (a number)"),
-        ("gripper.retries=true", "expected a whole number, found true (a boolean)"),
-        ("gripper.rate_hz=true", "expected a number, found true (a boolean)"),
+        ("gripper.retries=3.0", "expected a whole number, found 3.0"),
+        ("gripper.rate_hz=true", "expected a number, found true"),
         ("gripper.rate_hz=nan", "expected a number, found nan (not a number)"),
-        ("gripper.rate_hz=fast", "expected a number, found 'fast' (text)"),
-        ("gripper.echo=1", "expected true or false, found 1 (a whole number)"),
-        (
-            "gripper.port=5",
-            "expected text, found 5 (a whole number): put it in quotes, with -o as 'KEY=\"...\"'",
-        ),
+        ("gripper.echo=1", "expected true or false, found 1"),
+        ("gripper.port=5", "put it in quotes, with -o as 'KEY=\"...\"'"),
         ("gripper.port=2024-01-02", "expected text, found 2024-01-02 (a date)"),
-        ("gripper.offsets_n=5", "expected a list, found 5 (a whole number)"),
-        ("gripper.offsets_n=abc", "expected a list, found 'abc' (text)"),
-        ("gripper.filter=3", "expected a table, found 3 (a whole number)"),
-        ("gripper.gains={left = true}", "expected a number, found true (a boolean)"),
-        (
-            "gripper.serial=4",
-            "expected text, found 4 (a whole number): put it in quotes, with -o as 'KEY=\"...\"'",
-        ),
-        ("gripper.type=3", "expected text, found 3 (a whole number)"),
-        ("gripper=other", "expected a table, found 'other' (text): write gripper.type = \"other\""),
-        ("run=3", "expected a table, found 3 (a whole number)"),
+        ("gripper.offsets_n=5", "expected a list, found 5"),
+        ("gripper.offsets_n=abc", "expected a list, found 'abc'"),
+        ("gripper.filter=3", "expected a table, found 3"),
+        ("gripper.gains={left = true}", "expected a number, found true"),
+        ("gripper.serial=4", "expected text, found 4"),
+        ("gripper.type=3", "expected text, found 3"),
+        ("gripper=other", 'write gripper.type = "other"'),
+        ("run=3", "expected a table, found 3"),
         ("gripper.port.x=3", "expected text, found a table"),
-        ("gripper.port=\udcff", "expected UTF-8 text, found '\\udcff' (text)"),
+        ("gripper.port=\udcff", "expected UTF-8 text"),
     ],
 )
 def test_nothing_is_coerced(plugins, write, option, said):
-    assert complaint(write(BASE), options=[option]) == f"-o {option}: {said}"
+    told = complaint(write(BASE), options=[option])
+
+    assert told.startswith(f"-o {option}: ")
+    assert said in told
+    # A date in quotes is no advice: nobody meant a text.
+    assert not said.endswith("(a date)") or told.endswith(said)
 
 
 @every_case(

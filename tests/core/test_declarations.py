@@ -146,10 +146,6 @@ def test_what_features_and_laws_require_may_depend_on_their_settings():
     assert sided.declared_twice() == ()
 
 
-def test_what_entry_and_class_declare_is_told():
-    assert part(Summit, requires=()).declared_twice() == ("requires",)
-
-
 def test_the_result_has_the_declared_names_and_units():
     summit = Summit(PeakConfig())
     features = summit.extract(None)
