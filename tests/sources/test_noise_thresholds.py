@@ -189,11 +189,7 @@ def test_a_window_of_rest_that_ends_in_the_release_shows_none():
     opening = 40.0 * np.clip(t_s - 3.39, 0.0, None)
     gap = np.floor(np.clip(80.0 - 30.0 * (t_s - 0.3), 50.0, 80.0) - pressed + opening) * 1e-3
     force = np.maximum(5.0 * (pressed - opening), 0.0)
-    readings = tuple(
-        Reading(Frame(t, 0.01, g, 0.0, nan, f, f, nan, nan, 0), NO_PADS)
-        for t, g, f in zip(t_s.tolist(), gap.tolist(), force.tolist(), strict=True)
-    )
-    chosen = thresholds_for([Recording(name="squeeze", rate_hz=100.0, readings=readings)]).settings
+    chosen = thresholds_for([made_recording(100.0, t_s, gap, force, force)]).settings
     speed, window = chosen["controller.rest_speed_m_s"], chosen["controller.rest_window_s"]
     k = int((force >= CONTACT_FORCE_N).argmax())
     resting = first_rest(t_s[k:], gap[k:], np.ones(len(t_s) - k, dtype=bool), speed, window)
