@@ -56,6 +56,14 @@ def test_a_piped_table_keeps_whole_values_on_one_line_each():
     assert "\x1b" not in ran.stdout
 
 
+def test_columns_stand_below_each_other_under_wide_and_combining_characters(capsys):
+    terminal.echo_table(
+        ("LABEL", "RATE"), [("瓶子满", "66.7 %"), ("bu\u0308gel", "100.0 %"), ("can", "5.0 %")]
+    )
+    wide = "瓶子满   66.7 %"  # three characters that take six columns
+    assert capsys.readouterr().out == f"LABEL      RATE\n{wide}\nbu\u0308gel   100.0 %\ncan       5.0 %\n"
+
+
 def test_no_colour_where_it_is_not_wanted_or_not_understood_and_columns_override_the_width():
     for environment in ({"NO_COLOR": "1"}, {"TERM": "dumb"}):
         assert not in_terminal([TABLE], 80, program=[sys.executable, "-c"], **environment).coloured

@@ -17,6 +17,7 @@ import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
 from typing import IO, Final
+from unicodedata import combining, east_asian_width
 
 import click
 
@@ -144,7 +145,7 @@ def echo_table(
         return
     header, *rows = [[in_one_line(cell) for cell in row] for row in (header, *rows)]
     columns = terminal_width(sys.stdout)
-    natural = [max(map(len, cells)) for cells in zip(header, *rows, strict=True)]
+    natural = [max(map(_shown_width, cells)) for cells in zip(header, *rows, strict=True)]
     right = [_all_numbers(cells) for cells in zip(*rows, strict=True)]
     of_column = [(styles or {}).get(name, _no_style) for name in header]
 
@@ -252,17 +253,25 @@ def _row_lines(
     columns = []
     coloured = has_colour(sys.stdout)
     for cell, width, at_right, look in zip(row, widths, right, looks, strict=False):
-        parts = [cell] if len(cell) <= width else textwrap.wrap(cell, width, break_on_hyphens=False)
-        columns.append([
-            " " * (width - len(part)) * at_right
-            + (_coloured(part, look) if look and coloured and part else part)
-            + " " * (width - len(part)) * (not at_right)
-            for part in parts
-        ])  # fmt: skip
+        shown = _shown_width(cell)
+        parts = [cell]
+        if shown > width:
+            parts = textwrap.wrap(cell, max(width * len(cell) // shown, 1), break_on_hyphens=False)
+        lines = []
+        for part in parts:
+            blank = " " * (width - _shown_width(part))
+            text = _coloured(part, look) if look and coloured and part else part
+            lines.append(blank + text if at_right else text + blank)
+        columns.append(lines)
     blanks = [" " * width for width in widths]
     height = max(map(len, columns))
     full = [parts + [blank] * (height - len(parts)) for parts, blank in zip(columns, blanks, strict=True)]
     return [(" " * _GAP).join(line).rstrip() for line in zip(*full, strict=True)]
+
+
+def _shown_width(text: str) -> int:
+    """Return how many columns of a terminal a text takes: two for a wide character, none for a combining one."""
+    return sum(0 if combining(c) else 2 if east_asian_width(c) in "WF" else 1 for c in text)
 
 
 def _no_style(_text: str) -> None:
