@@ -55,6 +55,7 @@ from graspsense.core.grasp.calibration import masked as masked
 from graspsense.core.grasp.calibration import motor_at as motor_at
 from graspsense.core.grasp.calibration import pad_force as pad_force
 from graspsense.core.grasp.calibration import tare as tare
+from graspsense.core.grasp.calibration import zero_of as zero_of
 from graspsense.core.grasp.calibration_files import calibrations_of as calibrations_of
 from graspsense.core.grasp.calibration_files import stored_delivered_force as stored_delivered_force
 from graspsense.core.grasp.calibration_files import stored_friction as stored_friction

@@ -21,6 +21,7 @@ from graspsense.core.settings.layers import refuse_other_kind as refuse_other_ki
 from graspsense.core.files.toml_text import TomlError as TomlError
 from graspsense.core.files.toml_text import toml_values as toml_values
 from graspsense.core.values.errors import suggestion as suggestion
+from graspsense.core.settings.selected import recipe_of as recipe_of
 from graspsense.core.values.signals import CHANNELS as CHANNELS
 
 # Hooks of a plugin's own, and checks of what they return
