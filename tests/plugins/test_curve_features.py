@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from copy import deepcopy
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from hypothesis import strategies as st
 from graspsense.core.values.signals import Frame, Phase
 from graspsense.core.values.trace import SI_UNITS, Trace, trace_of
 from graspsense.plugins.features.curve import NAMES, CurveConfig, CurveFeatures
-from graspsense.testing.samples import copied, squeeze
+from graspsense.testing.samples import squeeze
 
 FEATURES = CurveFeatures(CurveConfig())
 HOLD_NAMES = {"relaxation", "relaxation_time", "creep", "hold_t25", "hold_t50", "hold_t75"}
@@ -163,7 +164,7 @@ def test_samples_on_the_lines_between_sparse_ones_change_little(seed, exponent):
 
 def test_repeated_forces_between_cell_images_do_not_shift_the_curve():
     """Forces that come every 41 ms and are repeated in between are not paired with the gaps in between."""
-    trace = copied(grasp(EVEN))
+    trace = deepcopy(grasp(EVEN))
     held = (np.arange(len(EVEN)) // 41) * 41
     trace = evolve(trace, force_left_n=trace.force_left_n[held], force_right_n=trace.force_right_n[held])
     stairs, even = FEATURES.extract(trace), FEATURES.extract(grasp(EVEN))

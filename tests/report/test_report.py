@@ -30,6 +30,7 @@ from graspsense.experiments.run import run_experiment
 from graspsense.experiments.summary import summarise
 from graspsense.recording.recording_info import RecordingInfo
 from graspsense.report.confusion import confusion_table
+from graspsense.report.found_table import FoundTable
 from graspsense.report.html import Page, table
 from graspsense.report.rates import RateRow, rate_scale, rates_over, rates_picture
 from graspsense.report.store_page import store_page
@@ -273,6 +274,12 @@ def test_ticks_are_round_and_within(low, high):
     assert 2 <= len(ticks) <= 7
     assert low - 1e-9 <= ticks[0] <= ticks[-1] <= high + 1e-9 * max(1.0, abs(high))
     assert len({f"{width:.3g}" for width in (b - a for a, b in pairwise(ticks))}) == 1
+
+
+def test_the_caption_of_a_table_below_its_own_heading_is_for_screen_readers_alone():
+    body = FoundTable(id="rates", title="Rates", header=("case",), rows=(("a",),)).section().body
+    assert 'aria-label="Rates, scrollable"' in body
+    assert re.sub("<[^>]*>", " ", body).split() == ["case", "a"]
 
 
 def test_words_in_backticks_are_code_and_names_cannot_make_elements():

@@ -28,7 +28,6 @@ from graspsense_pr2_gripper.link import LockStepLink
 from graspsense_pr2_gripper.protocol import (
     SAMPLES_MISSED,
     InputReport,
-    axes,
     decode_input,
     encode_input,
 )
@@ -50,8 +49,9 @@ def values(samples):
 
 
 def of_words(words):
-    """The accelerations that these words stand for, by the definition of the protocol."""
-    return np.array([[count * (8 * 9.81 / 512) for count in axes(word)] for word in words])
+    """The accelerations that these words stand for: x, y and z in 10 bits each, in two's complement."""
+    counts = np.array([[word >> shift & 1023 for shift in (0, 10, 20)] for word in words])
+    return np.where(counts < 512, counts, counts - 1024) * (8 * 9.81 / 512)
 
 
 class Sent(Wire):

@@ -17,7 +17,6 @@ from graspsense_pr2_gripper.protocol import (
     InputReport,
     OutputReport,
     ProtocolError,
-    axes,
     decode_identity,
     decode_input,
     decode_output,
@@ -195,11 +194,6 @@ def test_limits_are_rounded_down_and_infinity_is_the_devices_own():
     for wrong in (math.nan, -1.0):
         with pytest.raises(ProtocolError):
             limit(wrong)
-
-
-def test_accelerometer_words_hold_three_signed_axes():
-    assert axes(0) == (0, 0, 0)
-    assert axes(511 | (1024 - 512) << 10 | (1024 - 1) << 20) == (511, -512, -1)
 
 
 @every_case(

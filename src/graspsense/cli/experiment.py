@@ -160,7 +160,7 @@ def _counts(account: Account, problem: str) -> dict[str, object]:
 
 
 def _list(known: Iterable[str], as_json: bool) -> None:
-    from graspsense.experiments.duration import effort_of, measured_on
+    from graspsense.experiments.duration import ESTIMATED_FROM, effort_of
     from graspsense.experiments.experiment_file import read_experiment
 
     cores = os.cpu_count() or 1
@@ -179,7 +179,7 @@ def _list(known: Iterable[str], as_json: bool) -> None:
         for name, experiment in planned.items()
     ]
     echo_table(("EXPERIMENT", "TIME", "TASKS", "WHAT"), rows)
-    echo(f"\nTIME is for {cores} cores, {measured_on()}.")
+    echo(f"\nTIME is for {cores} cores, {ESTIMATED_FROM}.")
     echo(
         "The first experiment after an installation compiles the simulator as well, about a minute in each process."
     )
@@ -201,7 +201,7 @@ def _effort_as_json(effort: Effort) -> dict[str, object]:
 
 def _plan(planned: Planned, results: Results, workers: int, as_json: bool) -> None:
     """Print what the experiment consists of, what is done already, and how long it takes."""
-    from graspsense.experiments.duration import effort_of, measured_on
+    from graspsense.experiments.duration import ESTIMATED_FROM, effort_of
 
     effort = effort_of(planned)
     if as_json:
@@ -220,7 +220,7 @@ def _plan(planned: Planned, results: Results, workers: int, as_json: bool) -> No
     echo_entry("grasps" if effort.simulated else "trials", trials)
     if effort.trainings:
         echo_entry("trainings", f"{effort.trainings} models for the rates; controls add to them")
-    estimate = f"about {effort.time_on(workers)} with {workers} processes, {measured_on()}"
+    estimate = f"about {effort.time_on(workers)} with {workers} processes, {ESTIMATED_FROM}"
     echo_entry("time", "no estimate for this kind of data" if effort.seconds is None else estimate)
     echo_entry(
         "results", f"in {results.folder}" + (", where there are some already" if results.any() else "")

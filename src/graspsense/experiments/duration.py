@@ -16,7 +16,8 @@ from graspsense.experiments.experiment import Planned
 from graspsense.experiments.experiment_file import shipped
 from graspsense.experiments.kinds import kind_of
 
-MEASURED_ON: Final = "times measured on Intel(R) Xeon(R) Processor at 2.0 GHz on 2026-11-22"
+ESTIMATED_FROM: Final = "estimated from times measured on Intel(R) Xeon(R) Processor at 2.0 GHz on 2026-11-22"
+"""What the estimates rest on: the processor on which the times were measured, and the date."""
 
 
 @frozen(kw_only=True)
@@ -74,11 +75,6 @@ def effort_of(planned: Planned) -> Effort:
         trainings=trainings * seeds,
         seconds=seconds * seeds if known and estimated else None,
     )
-
-
-def measured_on() -> str:
-    """Return what the estimates rest on: the processor on which the times were measured, and the date."""
-    return f"estimated from {MEASURED_ON}"
 
 
 def duration_in_words(seconds: float) -> str:

@@ -26,7 +26,7 @@ class FoundTable:
         """Return the section of the table; `drawn` is the picture above it. Without rows it is the note alone."""
         body = (paragraph(self.note) if self.note else "") + drawn
         if self.rows:
-            body += table(self.title, self.header, self.rows, self.numbers, self.verdicts)
+            body += table(self.title, self.header, self.rows, self.numbers, self.verdicts, captioned=False)
         return Section(id=self.id, title=self.title, body=body)
 
     @property

@@ -123,11 +123,14 @@ def table(
     rows: Sequence[Sequence[str]],
     numbers: int = 99,
     verdicts: Collection[int] = (),
+    *,
+    captioned: bool = True,
 ) -> str:
     """Return a table of plain texts, the first cell of a row its heading; columns from `numbers` on are numbers.
 
     Cells of the columns `verdicts` get a mark and a colour, if they are among the words of `VERDICTS`. The table can be
-    sorted and filtered. It scrolls sideways if it is too wide, and on a phone each row stands by itself.
+    sorted and filtered. It scrolls sideways if it is too wide, and on a phone each row stands by itself. Without
+    `captioned`, the caption is for screen readers alone.
     """
     kinds = [' class="n"' if k >= numbers and k not in verdicts else "" for k in range(len(header))]
     head = "".join(
@@ -146,6 +149,7 @@ def table(
     return wide(
         caption,
         f'<table class="rows"><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>',
+        captioned=captioned,
     )
 
 
@@ -171,12 +175,14 @@ def marked(words: str) -> str:
     return f'<span class="{kind}">{mark} {escape(words)}</span>'
 
 
-def wide(label: str, body: str) -> str:
-    """Return a block that scrolls sideways if it is too wide, also by keyboard; `label` stands above it."""
-    return (
-        f'<p class="label">{escape(label)}</p>'
-        f'<div class="wide" tabindex="0" role="region" aria-label="{escape(label)}, scrollable">{body}</div>'
-    )
+def wide(label: str, body: str, *, captioned: bool = True) -> str:
+    """Return a block that scrolls sideways if it is too wide, also by keyboard; `label` names it.
+
+    It stands above the block if it is `captioned`.
+    """
+    caption = f'<p class="label">{escape(label)}</p>' if captioned else ""
+    name = f"{escape(label)}, scrollable"
+    return f'{caption}<div class="wide" tabindex="0" role="region" aria-label="{name}">{body}</div>'
 
 
 def code(text: str, label: str = "text") -> str:

@@ -148,7 +148,9 @@ class FollowedGrasp:
         if self._meaning is None:
             self._meaning = self._understood(numbers)
         meaning = self._meaning
-        sides = [*((name,) for name in meaning.forces), *(() if meaning.forces else _normals(meaning))]
+        sides: list[tuple[str, ...]] = [(name,) for name in meaning.forces] or [
+            cells.normal for cells in meaning.arrays
+        ]
         try:
             gap = float(numbers[meaning.gap[0]])
             forces = [sum(float(numbers[name]) for name in names) for names in sides]
@@ -190,10 +192,6 @@ class FollowedGrasp:
                 f"{', '.join(list(numbers)[:12])}"
             )
         return Meaning(gap=gap, forces=forces, arrays=meaning.arrays)
-
-
-def _normals(meaning: Meaning) -> list[tuple[str, ...]]:
-    return [cells.normal for cells in meaning.arrays]
 
 
 def _observations(rate_hz: float) -> DeviceInfo:

@@ -14,7 +14,7 @@ from random import Random
 from typing import Any, Final
 
 from graspsense.plugin_api import Channel, FastChannel, Samples, signal_type
-from graspsense_pr2_gripper.protocol import MAX_SAMPLES, axes
+from graspsense_pr2_gripper.protocol import MAX_SAMPLES
 
 RATE_HZ: Final = 3000.0
 """Nominal rate of the samples; the PR2's own driver accepts 2 to 4 kHz (wg06.cpp)."""
@@ -42,7 +42,7 @@ class Accelerometer:
 
     def __init__(self, range_g: int) -> None:
         scale = range_g * FREE_FALL_M_S2 / FULL_SCALE
-        self._m_s2 = tuple(axes(count)[0] * scale for count in range(2 * FULL_SCALE))
+        self._m_s2 = tuple(((count ^ FULL_SCALE) - FULL_SCALE) * scale for count in range(2 * FULL_SCALE))
 
     def signals(self, t_s: float, words: Sequence[int], sampled: int) -> Any:
         """Return `Reading.signals` with these samples, the last of them of time `t_s` and with number `sampled`."""

@@ -25,11 +25,6 @@ class BoardFaults:
 
     def __init__(self, faults: FaultConfig) -> None:
         self._faults = faults
-        self._changes_reports = faults.freeze_cell >= 0 or (
-            (faults.drift_counts_s, faults.pad_fault, faults.image_fault, faults.status_bits)
-            != (0.0, "none", "none", 0)
-            or (faults.effort_report_gain, faults.clock_rate) != (1.0, 1.0)
-        )
         self._kept: dict[int, int] = {}
         """The value that each stuck cell keeps."""
         self._image: tuple[int, int] | None = None
@@ -41,8 +36,6 @@ class BoardFaults:
 
     def altered(self, data: bytes, now_us: int) -> bytes:
         """Return the report as the faulty board sends it at this device time."""
-        if not self._changes_reports:
-            return data
         report, faults = decode_input(data), self._faults
         report = report._replace(cells=self._cells(report, now_us))
         status = report.status

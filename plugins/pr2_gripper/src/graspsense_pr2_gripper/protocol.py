@@ -250,12 +250,6 @@ def limit(value: float) -> int:
     return min(math.floor(value * 1e6), OWN_LIMIT) if value < math.inf else OWN_LIMIT
 
 
-def axes(word: int) -> tuple[int, int, int]:
-    """Return x, y and z of an accelerometer sample, -512 to 511 of full scale 512."""
-    x, y, z = word & 0x3FF, word >> 10 & 0x3FF, word >> 20 & 0x3FF
-    return (x ^ 512) - 512, (y ^ 512) - 512, (z ^ 512) - 512
-
-
 def _sealed(body: bytes) -> bytes:
     return body + _CRC.pack(crc32(body))
 

@@ -15,7 +15,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from math import inf
-from typing import Final, Literal, NamedTuple, final
+from typing import ClassVar, Final, Literal, NamedTuple, final
 
 from attrs import frozen
 
@@ -25,20 +25,35 @@ from graspsense.core.components.setting import setting
 class EmulatedDevice(ABC):
     """An emulated device, which exists from the first `plug` to the end of its process, however that ends.
 
-    `wire` is the interface of the operating system in use, `rate_hz` the rate of its reports.
+    `wire` is the interface of the operating system in use, `rate_hz` the rate of its reports, and `moods` the ways in
+    which it can be told to behave, with their effects. Unplugged, it keeps its power.
     """
 
     wire: str
     rate_hz: float
+    moods: ClassVar[Mapping[str, str]]
+    _told = ""
+    """The mood that it was told last."""
 
     @property
-    @abstractmethod
     def words(self) -> Mapping[str, str]:
-        """The words that `tell` understands, with their effects; at least `plug` and `unplug`."""
+        """The words that `tell` understands, with their effects."""
+        return {"plug": "plug it in", "unplug": "pull the plug; the gripper keeps its power", **self.moods}
 
-    @abstractmethod
     def tell(self, word: str) -> None:
         """Execute one of `words`. Raises KeyError for any other, NoDevice if it cannot be plugged in."""
+        if word in self.moods:
+            self._told = word
+        else:
+            {"plug": self.plug, "unplug": self.unplug}[word]()
+
+    @abstractmethod
+    def plug(self) -> None:
+        """Plug it in. Raises NoDevice if it cannot be."""
+
+    @abstractmethod
+    def unplug(self) -> None:
+        """Pull the plug; do nothing if it is pulled."""
 
     @abstractmethod
     def state(self) -> Mapping[str, float | int | str | bool]:
@@ -166,13 +181,6 @@ class EmulatedPort:
 
 KEEP_UP_S: Final = 0.02
 """How often the fingers move on without a request, so that the next one need not wait until they have."""
-MOODS: Final = {
-    "well": "behave again",
-    "silent": "take requests, but send no replies",
-    "damaged": "flip a bit of each reply",
-    "late": "send each reply late",
-    "repeated": "send each reply twice",
-}
 
 
 @frozen(kw_only=True)
@@ -219,11 +227,19 @@ class LateReply(NamedTuple):
 
 
 class EmulatedSerial(EmulatedDevice):
-    """A device behind an `EmulatedPort`, in the time (s) of the host since it was made. Unplugged, it keeps its power.
+    """A device behind an `EmulatedPort`, in the time (s) of the host since it was made.
 
     A subclass answers requests and moves its fingers; both are called under a lock, never at the same time. What they
     raise ends the device as a lost one, since the body of the fingers can be a user's code.
     """
+
+    moods: ClassVar[Mapping[str, str]] = {
+        "well": "behave again",
+        "silent": "take requests, but send no replies",
+        "damaged": "flip a bit of each reply",
+        "late": "send each reply late",
+        "repeated": "send each reply twice",
+    }
 
     def __init__(self, wire: str, faults: SerialFaults) -> None:
         self.wire = wire
@@ -231,7 +247,7 @@ class EmulatedSerial(EmulatedDevice):
         self._lock = threading.Lock()
         self._began_s = time.monotonic()
         self._port: EmulatedPort | None = None
-        self._told = self._failed = ""
+        self._failed = ""
         self._requests = 0
 
     @abstractmethod
@@ -270,27 +286,17 @@ class EmulatedSerial(EmulatedDevice):
         """What `gripper.port` has to be, empty while it is unplugged."""
         return "" if self._port is None else self._port.where
 
-    @property
-    def words(self) -> Mapping[str, str]:
-        """The words that `tell` understands, with their effects."""
-        return {
-            "plug": "plug it in, as a new port",
-            "unplug": "pull the plug; the gripper keeps its power",
-            **MOODS,
-        }
+    def plug(self) -> None:
+        """Plug it in, as a new port, unless it is."""
+        if self._port is None:
+            self.answer(b"", self._now_s())
+            self._port = EmulatedPort(self.wire, self._heard, self._moved_on, KEEP_UP_S)
 
-    def tell(self, word: str) -> None:
-        """Execute one of `words`. Raises KeyError for any other."""
-        if word == "plug":
-            if self._port is None:
-                self.answer(b"", self._now_s())
-                self._port = EmulatedPort(self.wire, self._heard, self._moved_on, KEEP_UP_S)
-        elif word == "unplug":
-            port, self._port = self._port, None
-            if port is not None:
-                port.close()
-        else:
-            self._told = {word: word for word in MOODS}[word]
+    def unplug(self) -> None:
+        """Pull the plug, unless it is pulled."""
+        port, self._port = self._port, None
+        if port is not None:
+            port.close()
 
     def state(self) -> Mapping[str, float | int | str | bool]:
         """Return where it is reached, and the state of its fingers."""
@@ -308,7 +314,7 @@ class EmulatedSerial(EmulatedDevice):
 
     def close(self) -> None:
         """Unplug it."""
-        self.tell("unplug")
+        self.unplug()
 
     def _now_s(self) -> float:
         return time.monotonic() - self._began_s
@@ -326,7 +332,7 @@ class EmulatedSerial(EmulatedDevice):
 
     def _fail(self, error: Exception) -> None:
         self._failed = f"{type(error).__name__}: {error}"
-        self.tell("unplug")
+        self.unplug()
 
     def _heard(self, data: bytes) -> bytes:
         with self._lock:
@@ -336,7 +342,7 @@ class EmulatedSerial(EmulatedDevice):
                 self._fail(error)
                 return b""
         if reply is None:
-            self.tell("unplug")
+            self.unplug()
             return b""
         if reply.late_s:
             threading.Event().wait(reply.late_s)

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from graspsense.sources.columns.usual_range import usual_range
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -21,8 +23,6 @@ MOST_S: Final = 0.05
 BEGUN: Final = 0.05
 LOADED: Final = 0.2
 """Shares of its range at which the force has begun, and at which that was no noise."""
-GLITCHES: Final = 0.01
-"""Share of the samples that can be glitches, at each end of the range of a force."""
 APPROACH_S: Final = (0.25, 0.06)
 """Begin and end of the approach, before the force begins (s)."""
 FEWEST: Final = 5
@@ -57,7 +57,7 @@ def _slows_after_force(t_s: Numbers, gap: Numbers, force: Numbers) -> float | No
     """Return how long after the begin of the force (s) the fingers slow down; None where they do not, or too rarely."""
     if not len(t_s):
         return None
-    low, high = np.quantile(force, [GLITCHES, 1.0 - GLITCHES])
+    low, high = usual_range(force)
     loaded = int(np.argmax(force > low + LOADED * (high - low)))
     free = np.flatnonzero(force[:loaded] < low + BEGUN * (high - low))
     if not len(free):

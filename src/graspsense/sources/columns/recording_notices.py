@@ -12,6 +12,7 @@ from attrs import evolve
 from graspsense.core.control.contact import CONTACT_FORCE_N
 from graspsense.recording.labelled_recording import LabelledRecording
 from graspsense.recording.replayable import Recording
+from graspsense.sources.columns.usual_range import usual_range
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -152,7 +153,7 @@ def _numb(
     t, gap, force, other = times[known], gap[known], force[known], other[known]
     if len(force) < FEWEST:
         return
-    low, span = float(np.quantile(other, 0.01)), float(np.ptp(other))
+    low, span = usual_range(other)[0], float(np.ptp(other))
     noise = max(float(np.median(np.abs(np.diff(part, 2)))) for part in (force, other))
     loaded = other > low + 0.5 * span
     begin = int(loaded.argmax())
@@ -250,7 +251,7 @@ def _bump(times: Numbers, gap: Numbers, force: Numbers, units: Mapping[str, str]
     if len(force) < FEWEST_IN_COURSE:
         return
     course = _course(force, 1)
-    low, span = float(np.quantile(course, 0.01)), float(np.ptp(course))
+    low, span = usual_range(course)[0], float(np.ptp(course))
     contact = FREE_GLITCH * span if "force_left" in units else min(FREE_GLITCH * span, CONTACT_FORCE_N)
     contact = max(contact, GLITCH_NOISE * float(np.median(np.abs(np.diff(force, 2)))))
     felt = course - low > contact

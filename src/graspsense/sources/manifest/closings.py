@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from graspsense.core.values.errors import counted
+from graspsense.sources.columns.usual_range import usual_range
 
 if TYPE_CHECKING:
     from graspsense.sources.columns.grasp_columns import GraspColumns, Numbers
 
-GLITCHES: Final = 0.01
-"""Share of the samples that can be glitches, at each end of the range of the gap."""
 CLOSED: Final = 0.4
 OPEN: Final = 0.6
 """Shares of its range below which the gap is closed, and above which it is open."""
@@ -28,7 +27,7 @@ def closings(gap: Numbers) -> list[tuple[int, int]]:
     known = np.flatnonzero(np.isfinite(gap))
     if not len(known):
         return []
-    low, high = np.quantile(gap[known], [GLITCHES, 1.0 - GLITCHES])
+    low, high = usual_range(gap[known])
     spans: list[tuple[int, int]] = []
     begin: int | None = None
     for k in known.tolist() if high > low else ():

@@ -12,6 +12,7 @@ from graspsense.core.control.contact import CONTACT_FORCE_N, both_touch
 from graspsense.core.values.errors import DataDamaged
 from graspsense.sources.columns.grasp_columns import GraspColumns
 from graspsense.sources.columns.recording_notices import FEWEST, STEADY, ZERO_SAMPLES, force_of_pads
+from graspsense.sources.columns.usual_range import usual_range
 from graspsense.sources.manifest.steps import NOISE, squeezes
 
 if TYPE_CHECKING:
@@ -33,8 +34,6 @@ STRONG_N: Final = 300.0
 """A force whose range is beyond that of the usual grippers is in another unit."""
 WIDEST_M: Final = 5e-4
 """No gripper opens less (m)."""
-GLITCHES: Final = 0.01
-"""Share of the samples that can be glitches, at each end of the range of a force."""
 _OFFSET: Final = ' If the fingers were free, the sensor has an offset: zero = "10 samples"'
 _FOUND: Final = 'split = "force" finds them, '
 
@@ -76,7 +75,7 @@ def _of_gap(columns: GraspColumns) -> Iterator[str]:
 def _of_unit(columns: GraspColumns) -> Iterator[str]:
     """Yield what tells that forces called newtons are in another unit."""
     pads = np.concatenate((columns.left_n, columns.right_n))
-    low, high = _usual_range(columns.force_n)
+    low, high = usual_range(columns.force_n)
     if high - low > 20.0 and bool((pads == np.round(pads)).all()):
         yield (
             "the forces are whole numbers, as counts of a sensor are: give a factor to newtons, or write "
@@ -91,9 +90,9 @@ def _of_unit(columns: GraspColumns) -> Iterator[str]:
 
 def _of_sign(columns: GraspColumns) -> Iterator[str]:
     """Yield that a force is negative where it is largest, and not all along."""
-    low, high = _usual_range(columns.force_n)
+    low, high = usual_range(columns.force_n)
     for name, pad in force_of_pads(columns.left_n, columns.right_n).items():
-        least, most = _usual_range(pad)
+        least, most = usual_range(pad)
         loaded = least < -OFFSET * (high - low) and abs(least) > abs(most)
         if _is_felt(pad) and loaded and 2.0 * abs(float(pad[:ZERO_SAMPLES].mean())) < abs(least):
             yield f"{name} is negative where it is largest: is it a pull? Turn its sign: -FORCE"
@@ -102,7 +101,7 @@ def _of_sign(columns: GraspColumns) -> Iterator[str]:
 def _of_zero(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
     """Yield what looks wrong in the zero of the forces, and whether a contact was before."""
     force = columns.force_n
-    low, high = _usual_range(force)
+    low, high = usual_range(force)
     felt = _is_felt(force)
     steady, touched = _is_steady(force), not columns.units.get("force") and _both_touch_at_first(columns)
     if _falls_on_contact(columns):
@@ -123,7 +122,7 @@ def _of_zero(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
             )
     elif not zeroed:
         for name, pad in force_of_pads(columns.left_n, columns.right_n).items():
-            least, most = _usual_range(pad)
+            least, most = usual_range(pad)
             offset = abs(float(pad[:ZERO_SAMPLES].mean()))
             if _is_felt(pad) and _is_steady(pad) and offset > OFFSET * (most - least):
                 yield f'{name} does not begin at zero: if the fingers were free then, write zero = "10 samples"'
@@ -161,15 +160,6 @@ def _of_holes(columns: GraspColumns) -> Iterator[str]:
             f"there are no samples from {begin:.4g} to {end:.4g} {t}, and the force changes from {force[k]:.3g} to "
             f"{force[k + 1]:.3g} {columns.units.get('force') or 'N'}: a contact or a rest in this time is seen too late"
         )
-
-
-def _usual_range(force: Numbers) -> tuple[float, float]:
-    """Return the least and the largest force, apart from one sample in a hundred, which may be a glitch."""
-    low, high = (
-        np.quantile(force, GLITCHES, method="higher"),
-        np.quantile(force, 1.0 - GLITCHES, method="lower"),
-    )
-    return float(low), float(high)
 
 
 def _falls_on_contact(columns: GraspColumns) -> bool:

@@ -3,21 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final, final
+from typing import ClassVar, final
 
 from graspsense.gripper_api import EmulatedDevice
 from graspsense_franka_hand.config import FrankaConfig
 from graspsense_franka_hand.emulator.hand import FrankaHand
 from graspsense_franka_hand.emulator.server import HandServer, real_time
 from graspsense_franka_hand.orders import RATE_HZ
-
-MOODS: Final = {
-    "well": "behave again",
-    "silent": "take commands, but send no states and no replies",
-    "damaged": "cut each state, and make each reply invalid",
-    "late": "send each state and reply late",
-    "old": "speak another version of the protocol with whoever connects",
-}
 
 
 def emulate(config: object, wire: str, seed: int) -> EmulatedHand:
@@ -29,40 +21,41 @@ def emulate(config: object, wire: str, seed: int) -> EmulatedHand:
 
 @final
 class EmulatedHand(EmulatedDevice):
-    """A hand behind port 1338 of an address of this machine. Unplugged, it keeps its power and what it was told."""
+    """A hand behind port 1338 of an address of this machine. Unplugged, it keeps what it was told."""
 
     wire = "network"
     rate_hz = RATE_HZ
+    moods: ClassVar[Mapping[str, str]] = {
+        "well": "behave again",
+        "silent": "take commands, but send no states and no replies",
+        "damaged": "cut each state, and make each reply invalid",
+        "late": "send each state and reply late",
+        "old": "speak another version of the protocol with whoever connects",
+    }
 
     def __init__(self, config: FrankaConfig, seed: int) -> None:
         self._config = config
         self.hand = FrankaHand(config, seed)
         self._clock = real_time()
         self._server: HandServer | None = None
-        self._told = self._failed = ""
+        self._failed = ""
 
     @property
     def where(self) -> str:
         """What `gripper.host` has to be, empty while it is unplugged."""
         return "" if self._server is None else self._server.where
 
-    @property
-    def words(self) -> Mapping[str, str]:
-        """The words that `tell` understands, with their effects."""
-        return {"plug": "plug it in", "unplug": "pull the plug; the hand keeps its power", **MOODS}
+    def plug(self) -> None:
+        """Plug it in, unless it is. Raises NoAddress if its port is taken everywhere."""
+        if self._server is None:
+            self._server = HandServer(self.hand, self._mood, self._config.faults.late_s, self._clock)
 
-    def tell(self, word: str) -> None:
-        """Execute one of `words`. Raises KeyError for any other, NoAddress if its port is taken everywhere."""
-        if word == "plug":
-            if self._server is None:
-                self._server = HandServer(self.hand, self._mood, self._config.faults.late_s, self._clock)
-        elif word == "unplug":
-            server, self._server = self._server, None
-            if server is not None:
-                server.close()
-                self._failed = self._failed or server.failed
-        else:
-            self._told = {word: word for word in MOODS}[word]
+    def unplug(self) -> None:
+        """Pull the plug, unless it is pulled."""
+        server, self._server = self._server, None
+        if server is not None:
+            server.close()
+            self._failed = self._failed or server.failed
 
     def state(self) -> Mapping[str, float | int | str | bool]:
         """Return where it is reached, and the state of its fingers."""
@@ -81,7 +74,7 @@ class EmulatedHand(EmulatedDevice):
 
     def close(self) -> None:
         """Unplug it and release the body."""
-        self.tell("unplug")
+        self.unplug()
         self.hand.close()
 
     def _mood(self) -> str:

@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final, final
+from typing import ClassVar, Final, final
 
 from graspsense.gripper_api import EmulatedDevice
 from graspsense.plugin_api import NoDevice
@@ -22,12 +22,6 @@ APPEARS_S: Final = 5.0
 """Largest time to wait for the device node to appear."""
 JOIN_S: Final = 2.0
 
-MOODS: Final = {
-    "silent": "send no reports, but take commands",
-    "stalled": "complete nothing, in either direction",
-    "well": "behave again",
-}
-
 
 def emulate(config: object, wire: str, seed: int) -> EmulatedBoard:
     """Return an emulated board that is not connected yet.
@@ -41,7 +35,13 @@ def emulate(config: object, wire: str, seed: int) -> EmulatedBoard:
 
 @final
 class EmulatedBoard(EmulatedDevice):
-    """Runs the firmware in its own thread, connected or not: an unplugged board keeps its power."""
+    """Runs the firmware in its own thread, connected or not."""
+
+    moods: ClassVar[Mapping[str, str]] = {
+        "silent": "send no reports, but take commands",
+        "stalled": "complete nothing, in either direction",
+        "well": "behave again",
+    }
 
     def __init__(self, config: Pr2Config, wire: str, seed: int) -> None:
         self._board = emulated_board(config, seed).wire
@@ -52,7 +52,7 @@ class EmulatedBoard(EmulatedDevice):
         plug = Plug(config.vendor_id, config.product_id, identity.serial, PRODUCT)
         self._port = _PORTS[wire](self, plug)
         self._lock = threading.Lock()
-        self._mood = "well"
+        self._told = "well"
         self._plugged = self._stop = False
         self._failed = ""
         self._sent = self._lost = self._sequence = self._commands = 0
@@ -64,25 +64,19 @@ class EmulatedBoard(EmulatedDevice):
     @property
     def stalled(self) -> bool:
         """Whether no transfer completes, in either direction."""
-        return self._mood == "stalled"
+        return self._told == "stalled"
 
     @property
     def words(self) -> Mapping[str, str]:
-        """The commands of `do`, with their meanings."""
-        return {
-            "unplug": "pull the plug; the board keeps its power",
-            "plug": "plug it in again",
-            "halt": "stall the reading endpoint until the host clears it (usb)",
-            **MOODS,
-        }
+        """The words that `tell` understands, with their effects."""
+        return {**super().words, "halt": "stall the reading endpoint until the host clears it (usb)"}
 
     def tell(self, word: str) -> None:
-        """Execute one of the commands of `words`. Raises KeyError for any other, NoDevice if it cannot be connected."""
-        actions = {"unplug": self._unplug, "plug": self._plug, "halt": self._port.halt}
-        if word in MOODS:
-            self._mood = word
+        """Execute one of `words`. Raises KeyError for any other, NoDevice if it cannot be plugged in."""
+        if word == "halt":
+            self._port.halt()
         else:
-            actions[word]()
+            super().tell(word)
 
     def state(self) -> Mapping[str, float | int | str | bool]:
         """Return the state of the fingers, and the numbers of sent and lost reports and of received commands."""
@@ -90,7 +84,7 @@ class EmulatedBoard(EmulatedDevice):
             firmware = self._board.firmware
             return {
                 "plugged": self._plugged,
-                "mood": self._mood,
+                "mood": self._told,
                 "node": self.node(),
                 "sequence": self._sequence,
                 "sent": self._sent,
@@ -128,7 +122,8 @@ class EmulatedBoard(EmulatedDevice):
         with self._lock:
             return self._board.feature()
 
-    def _plug(self) -> None:
+    def plug(self) -> None:
+        """Plug it in, and wait until its device node appears. Raises NoDevice if it does not."""
         self._port.plug()
         self._plugged = True
         give_up = time.monotonic() + APPEARS_S
@@ -139,7 +134,8 @@ class EmulatedBoard(EmulatedDevice):
                 f"the kernel accepted the device, but no device node appeared within {APPEARS_S:.0f} s"
             )
 
-    def _unplug(self) -> None:
+    def unplug(self) -> None:
+        """Pull the plug."""
         self._plugged = False
         self._port.unplug()
 
@@ -155,14 +151,14 @@ class EmulatedBoard(EmulatedDevice):
                 for report in reports:
                     self._hand_over(report)
                 if self._board.unplugged and self._plugged:
-                    self._unplug()
+                    self.unplug()
         except Exception as error:
             # The simulated fingers can be a user's code and fail; the host then sees a lost device.
             self._failed = f"{type(error).__name__}: {error}"
-            self._unplug()
+            self.unplug()
 
     def _hand_over(self, report: bytes) -> None:
-        if self._mood != "well" or not self._plugged:
+        if self._told != "well" or not self._plugged:
             return
         self._lost += self._port.send(report)
         self._sent += 1

@@ -1,0 +1,20 @@
+"""The range of a force or a gap without its glitches."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+GLITCHES: Final = 0.01
+"""Share of the samples that can be glitches, at each end of the range."""
+
+
+def usual_range(values: NDArray[np.float64]) -> tuple[float, float]:
+    """Return the least and the largest value, apart from one sample in a hundred at each end, which may be a glitch."""
+    low = np.quantile(values, GLITCHES, method="higher")
+    high = np.quantile(values, 1.0 - GLITCHES, method="lower")
+    return float(low), float(high)
