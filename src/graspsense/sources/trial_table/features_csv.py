@@ -63,10 +63,9 @@ def read_labelled(
 
     `instance` is the column that identifies the individual object, `order` a column of numbers that increase in the
     order of recording (default: the order of the lines). Both are known in a table that `graspsense export` wrote.
-    `features` are the columns to learn from, by default all columns of numbers that have no other meaning.
-    The columns of `known_before` are known before contact: the control from before contact uses them, and they are
-    features unless `features` leaves them out. With `value`, this column of numbers is the target; lines without it
-    are left out, and no label is needed.
+    `features` are the columns to learn from, by default all columns of numbers that have no other meaning. Those of
+    `known_before` are known before contact, for the control; they are features unless `features` leaves them out. With
+    `value`, this column of numbers is the target; lines without it are left out, and no label is needed.
 
     Raises ConfigError if a column does not exist or cannot be a label, DataDamaged if the file is not a valid table.
     """
