@@ -203,3 +203,33 @@ def test_a_table_without_labels(csv):
 
     assert trials.names == ("f_steady", "p_first")
     assert trials.values[0].tolist() == [6.0, 0.05]
+
+
+@every_case("word", ["mean", "Total", "Average:", "std", "median", "Summe", "Std. Dev."])
+def test_statistics_below_the_trials_are_left_out_and_told(csv, word):
+    for content in (GOOD + f"{word},0.05,6\n", GOOD + f"{word},0.05,6\nmax,0.07,7\n"):
+        trials = read_labelled(csv(content), "what")
+        assert trials.labels == ("a", "b") * 4
+        assert any(word in note for note in trials.notes)
+
+
+def test_a_mean_of_each_object_is_known_by_the_column_of_trial_numbers(csv):
+    lines = [f"{k},{what},{k * 0.31 % 1:.3f}" for what in ("can", "jar") for k in range(6)]
+    table = "\n".join(["trial,what,peak", *lines[:6], "mean,can,0.5", *lines[6:], "mean,jar,0.5", ""])
+    assert read_labelled(csv(table), "what").labels == ("can",) * 6 + ("jar",) * 6
+
+
+def test_an_object_may_have_the_name_of_a_statistic(csv):
+    assert set(read_labelled(csv(GOOD.replace("b,", "total,")), "what").labels) == {"a", "total"}
+
+
+def test_a_table_that_is_repeated_gives_the_notes_of_its_lines(csv):
+    rng = np.random.default_rng(0)
+    lines = [f"{'ab'[k % 2]},{rng.normal():.6f},{rng.integers(2):d},{1e3 * k:.0f}" for k in range(40)]
+    single, double = (
+        read_labelled(csv("\n".join(["what,peak,valid,clock", *(lines * times), ""])), "what")
+        for times in (1, 2)
+    )
+    assert double.table.names == single.table.names == ("peak", "valid")
+    assert double.notes == single.notes
+    assert len(double) == 2 * len(single)

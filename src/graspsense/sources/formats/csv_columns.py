@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from copy import copy
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Self
 
 import numpy as np
 
@@ -159,6 +160,12 @@ class CsvColumns:
         self._numbers = None
         self.lines = [self.lines[i] for i in rows]
         self.cells = {name: [cells[i] for i in rows] for name, cells in self.cells.items()}
+
+    def rows(self, rows: Sequence[int]) -> Self:
+        """Return the columns of these rows."""
+        chosen = copy(self)
+        chosen.keep(rows)
+        return chosen
 
     def table(self, names: Sequence[str]) -> FeatureTable:
         """Return these columns as a table of numbers. Raises ConfigError, DataDamaged."""

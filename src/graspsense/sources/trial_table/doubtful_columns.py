@@ -77,14 +77,13 @@ _PROPORTIONAL: Final = 1.0 - 1e-6
 def doubts(
     columns: CsvColumns,
     labels: Sequence[str],
-    names: Sequence[str],
     table: FeatureTable,
     target: Sequence[float] | None = None,
 ) -> list[str]:
-    """Return notes on those of these columns that are features and may reveal the labels, or the number to predict."""
+    """Return notes on those columns that are features and may reveal the labels, or the number to predict."""
     if target is not None:
         return _doubts_of_target(columns, target, table)
-    used = [name for name in names if set(columns.columns_of(name)) <= set(table.names)]
+    used = [name for name in columns.names if set(columns.columns_of(name)) <= set(table.names)]
     numbers = _numbers(columns, [name for name in used if not columns.is_nominal(name)])
     checks = (*_of_recording(columns, labels, used, table), *_of_time_and_digits(columns, labels, numbers))
     leave_out = f"leave it out ({option('features', python='columns')})"

@@ -7,6 +7,7 @@ describe a trial are never features, and every feature remains one even if no tr
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -29,7 +30,13 @@ from graspsense.sources.formats.arff_columns import ArffColumns
 from graspsense.sources.formats.csv_columns import CsvColumns
 from graspsense.sources.trial_table.doubtful_columns import doubts, not_held_out
 from graspsense.sources.trial_table.exported_table import ExportedTable, exported
-from graspsense.sources.trial_table.identifiers import identifies, names_a_recording, text_identifies
+from graspsense.sources.trial_table.identifiers import (
+    LEAST_LINES,
+    identifies,
+    names_a_recording,
+    text_identifies,
+)
+from graspsense.sources.trial_table.summary_lines import without_summaries
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -56,10 +63,9 @@ def read_labelled(
 
     `instance` is the column that identifies the individual object, `order` a column of numbers that increase in the
     order of recording (default: the order of the lines). Both are known in a table that `graspsense export` wrote.
-    `features` are the columns to learn from, by default all columns of numbers that have no other meaning.
-    `known_before` are the columns that are known before contact; the control from before contact uses them, and they
-    are features too unless `features` leaves them out. With `value`, this column of numbers is the target; lines
-    without it are left out, and the column of the label is not needed.
+    `features` are the columns to learn from, by default all columns of numbers that have no other meaning. Those of
+    `known_before` are known before contact, for the control; they are features unless `features` leaves them out. With
+    `value`, this column of numbers is the target; lines without it are left out, and no label is needed.
 
     Raises ConfigError if a column does not exist or cannot be a label, DataDamaged if the file is not a valid table.
     """
@@ -80,12 +86,16 @@ def read_labelled(
     instances = None if instance is None else tuple(columns.complete_column(instance, "the instance"))
     reserved = {name for name in (label, instance, order, value) if name}
     ranks, no_order = _order(columns, order, export, notes)
-    identified = partial(_identified, columns, labels, ranks) if export is None else _measured
+    lines = _lines_once(columns, {order, columns.index}, labels)
+    once, labels_once = columns.rows(lines), [labels[i] for i in lines]
+    ranks_once = None if ranks is None else [ranks[i] for i in lines]
+    identified = partial(_identified, once, labels_once, ranks_once) if export is None else _measured
     table = _feature_table(columns, features, reserved, identified, notes)
     if export is None:
-        others = [name for name in columns.names if name not in reserved]
-        notes += doubts(columns, labels, others, table, None if target is None else target.values)
-        notes += not_held_out(columns, [name for name in others if name not in table.names], instances)
+        values = None if target is None else [target.values[i] for i in lines]
+        notes += doubts(once, labels_once, table.rows(np.array(lines)), values)
+        others = [name for name in columns.names if name not in {*reserved, *table.names}]
+        notes += not_held_out(columns, others, instances)
     return Labelled(
         source=str(path),
         table=table,
@@ -99,6 +109,19 @@ def read_labelled(
         notes=tuple(notes),
         provenance={"simulated": export is not None and "1" in columns.cells["simulated"]},
     )
+
+
+def _lines_once(columns: CsvColumns, counted_by: set[str | None], labels: Sequence[str]) -> list[int]:
+    """Return the first of equal lines where a whole table is repeated, else all lines.
+
+    Its copies would hide what its columns are. `counted_by` are columns that number the lines. A table with few
+    different lines repeats them by chance.
+    """
+    cells = [texts for name, texts in columns.cells.items() if name not in counted_by]
+    lines = list(zip(*cells, strict=True))
+    originals = {line: i for i, line in reversed(list(enumerate(lines)))}
+    repeated = len(originals) >= LEAST_LINES * len(set(labels)) and len(set(Counter(lines).values())) == 1
+    return sorted(originals.values()) if repeated else list(range(len(lines)))
 
 
 def _controls(
@@ -150,7 +173,9 @@ def read_table(path: Path, names: Sequence[str]) -> tuple[FeatureTable, tuple[st
 
 def columns_of_file(path: Path) -> CsvColumns:
     """Return the columns of a table, which is an ARFF file if its name says so. Raises ConfigError, DataDamaged."""
-    return ArffColumns(path) if path.suffix.lower() == ".arff" else CsvColumns(path)
+    columns = ArffColumns(path) if path.suffix.lower() == ".arff" else CsvColumns(path)
+    without_summaries(columns)
+    return columns
 
 
 def write_labelled(path: Path, labelled: Labelled) -> None:
