@@ -11,7 +11,7 @@ the intervals that `benchmarks/interval_coverage.py` compares, it alone covers a
 
 Folds of a cross-validation share most of their training trials, so that their rates are too high or too low together.
 The variance of such a rate is multiplied by 1 + k / (k - 1) for k folds (C. Nadeau and Y. Bengio, Mach. Learn. 52
-(2003) 239). Without it, the interval of a tree contained the true rate in 79 to 92 %.
+(2003) 239).
 """
 
 from __future__ import annotations
