@@ -150,6 +150,16 @@ def test_files_that_a_file_names_count(tmp_path):
         assert_counts(part, {"gripper": {"file": str(tmp_path / "gripper.toml")}})
 
 
+@every_case("name", [r'"\u0067ripper.xml"', '"""gripper.xml"""', '"~/gripper.xml"'])
+def test_a_name_counts_in_whatever_form_a_file_has_it(tmp_path, monkeypatch, name):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    (tmp_path / "gripper.toml").write_text(f"model = {name}\n")
+    (tmp_path / "gripper.xml").write_text('<mujoco><mesh file="pad &amp; tip.stl"/></mujoco>')
+    (tmp_path / "pad & tip.stl").write_text("1")
+    for part in ("gripper.xml", "pad & tip.stl"):
+        assert_counts(tmp_path / part, {"gripper": {"file": str(tmp_path / "gripper.toml")}})
+
+
 def test_a_model_in_an_installed_package_counts(tmp_path, monkeypatch):
     models = tmp_path / "lab_models" / "grippers"
     models.mkdir(parents=True)

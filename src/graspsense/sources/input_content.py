@@ -8,8 +8,11 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import tomllib
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from functools import cache
+from html import unescape
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
@@ -169,19 +172,27 @@ def _named_files(path: str, folders: tuple[str, ...], known: set[str]) -> set[st
     """
     if not path.lower().endswith((".toml", ".xml")) or not os.path.isfile(path):
         return known
-    try:
-        texts = {text[1:-1] for text in _QUOTED.findall(Path(path).read_text(encoding="utf-8"))}
-    except (OSError, UnicodeDecodeError):
-        return known  # the task tells it
+    texts = _texts_in(path)
     folder = os.path.dirname(path)
     folders += (folder, *(place for text in texts if os.path.isdir(place := os.path.join(folder, text))))
-    places = {os.path.join(name, text) for name in folders for text in texts}
+    places = {os.path.join(name, os.path.expanduser(text)) for name in folders for text in texts}
     places |= {place for text in texts for place in _places_in_package(text)}
     for place in sorted(places - known - {path}):
         if os.path.isfile(place):
             known.add(place)
             _named_files(place, folders, known)
     return known
+
+
+def _texts_in(path: str) -> set[str]:
+    """Return the texts in a TOML file, or between quotes in another one; none of a file that cannot be read."""
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return set()  # the task tells it
+    with suppress(tomllib.TOMLDecodeError):
+        return set(_texts(tomllib.loads(text)))
+    return {unescape(quoted[1:-1]) for quoted in _QUOTED.findall(text)}
 
 
 def _places_in_package(text: str) -> Iterator[str]:
