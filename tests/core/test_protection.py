@@ -264,6 +264,17 @@ def test_commands_of_a_velocity_are_not_compared_but_fingers_that_open_on_one_th
         assert reversed_ or faults == [None] * 1000
 
 
+@every_case(("opens_m", "is_reversed"), [(0.0076, False), (0.02, True)])
+def test_fingers_that_rebound_from_what_they_met_in_the_approach_are_not_reversed(opens_m, is_reversed):
+    """The widest rebound of the simulated catalogue is 7.6 mm, of the block at 100 mm/s."""
+    motor, faults = Motor(reports_effort=False, rate_hz=100.0), []
+    for gap_m in (*np.linspace(0.08, 0.03, 200), *np.linspace(0.03, 0.03 + opens_m, 100)):
+        now = frame(0.01 * len(faults), gap=gap_m, dt=0.01)
+        faults.append(motor.see(now, APPROACH))
+        motor.apply(now, Command(POSITION, 0.0, 10.0, 0.035))
+    assert any(fault is not None and fault.relaxes for fault in faults) == is_reversed
+
+
 # ------------------------------------------------------------------------------------------------------- the status
 
 HOT = StatusBit(mask=1, name="hot", meaning="it is too hot")

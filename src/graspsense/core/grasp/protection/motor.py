@@ -50,6 +50,9 @@ WEAK_S: Final = 0.5
 """Time for which a motor may answer less than its command, which crushes nothing, before the grasp ends."""
 WRONG_WAY_M: Final = 0.003
 """Travel against the command from which on the motor turns the wrong way round."""
+REBOUND_M: Final = 0.012
+REBOUND_SHARE: Final = 0.5
+"""Travel for which fingers that met something rebound at most, and its share of the way that they had closed by."""
 RESTS_M_S: Final = 0.0005
 """Speed below which the fingers rest: while they are braked, their mass presses too."""
 MEAN_S: Final = 0.2
@@ -106,7 +109,7 @@ class Motor:
         self._strong_s = self._weak_s = self._reversed_s = 0.0
         self._wrong_way_s = 0.0
         self._phase = -1
-        self._extreme_m = nan
+        self._start_m = self._extreme_m = nan
 
     def apply(self, frame: Frame, command: Command) -> None:
         """Take the command that is applied after this frame."""
@@ -118,6 +121,7 @@ class Motor:
 
     def shift(self, step_m: float) -> None:
         """Let the gap jump by this (m), which is no motion of the fingers."""
+        self._start_m += step_m
         self._extreme_m += step_m
 
     def see(self, frame: Frame, phase: int) -> Fault | None:
@@ -165,15 +169,20 @@ class Motor:
         directions = {asked.direction for asked in self._commands}
         closes, opens = directions == {1}, directions == {-1}
         if phase != self._phase or not (closes or opens) or self._extreme_m != self._extreme_m:
-            self._phase, self._extreme_m, self._wrong_way_s = phase, frame.gap_m, 0.0
+            self._phase, self._wrong_way_s = phase, 0.0
+            self._start_m = self._extreme_m = frame.gap_m
             return None
+        allowed_m = WRONG_WAY_M
         if closes:
             self._extreme_m = min(self._extreme_m, frame.gap_m)
             travel_m = frame.gap_m - self._extreme_m
+            # Without pads, fingers meet the object in the approach, and a fast or heavy one throws them back.
+            rebound_m = REBOUND_SHARE * (self._start_m - self._extreme_m)
+            allowed_m = max(allowed_m, min(rebound_m, REBOUND_M))
         else:
             self._extreme_m = max(self._extreme_m, frame.gap_m)
             travel_m = self._extreme_m - frame.gap_m
-        wrong = travel_m >= WRONG_WAY_M
+        wrong = travel_m >= allowed_m
         self._wrong_way_s = self._wrong_way_s + frame.dt_s if wrong else 0.0
         # An object that springs back may open fingers that squeeze it.
         if self._wrong_way_s <= self._lasts_s or (closes and phase != APPROACH):
