@@ -250,7 +250,8 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
             effort_limit_n=model.forces_n[1],
             speed_limit_m_s=model.speeds_m_s[1],
             opening=Command(POSITION, model.stroke_m, inf, 0.05),
-            relaxed=Command(VELOCITY, 0.0, inf, inf),
+            # Where the encoder is wrong, a stop is a motion: with the least force.
+            relaxed=Command(VELOCITY, 0.0, self.least_force_n, inf),
             tare_images=TARE_IMAGES if self._fingertips is not None else 0,
             status_bits=STATUS_BITS,
             numbers={

@@ -274,7 +274,8 @@ class So101Backend(BackendWithEmulator[So101Config]):
             effort_limit_n=config.full_force_n * config.largest_load,
             speed_limit_m_s=SPEED_LIMIT_M_S,
             opening=Command(POSITION, self._jaw.stroke_m, inf, 0.05),
-            relaxed=Command(VELOCITY, 0.0, inf, inf),
+            # Where the encoder is wrong, a stop is a motion: with the least force.
+            relaxed=Command(VELOCITY, 0.0, self.least_force_n, inf),
             calibration={kind: calibration.sha256 for kind, calibration in stored.items()},
             numbers=numbers,
             status_bits=STATUS_BITS,
