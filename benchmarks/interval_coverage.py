@@ -68,15 +68,14 @@ def evaluated(k: int, repeats: int, classifier: str = "c45") -> dict[str, float]
     """Return the coverage for a classifier that is cross-validated on `k` instances, half of them full."""
     component = installed().find("classifier", classifier)
     learner = SelectedComponent(component, component.config_class()())
-    rates, intervals = [], []
+    measured = []
     for seed in range(repeats):
         rng = np.random.default_rng([1, k, seed])
         instance = np.repeat(np.arange(k), TRIALS)
         full = instance % 2
         shift = rng.normal(size=(k, 2))[instance]
-        values = (
-            3.0 * full[:, np.newaxis] * np.array([1.0, 0.6]) + shift + 0.5 * rng.normal(size=(k * TRIALS, 2))
-        )
+        noise = 0.5 * rng.normal(size=(k * TRIALS, 2))
+        values = 3.0 * full[:, np.newaxis] * np.array([1.0, 0.6]) + shift + noise
         trials = Labelled(
             source="normal features",
             table=FeatureTable(names=("a", "b"), units=("", ""), values=values),
@@ -86,13 +85,12 @@ def evaluated(k: int, repeats: int, classifier: str = "c45") -> dict[str, float]
         rate = evaluate(
             learner, trials, classifier=classifier, seed=seed, controls=False, learning_curve=False
         ).headline
-        rates.append(rate.rate)
-        intervals.append((wilson(rate.correct, rate.n), rate.interval or (0.0, 1.0)))
-    true = float(np.mean(rates))
+        measured.append((rate.rate, wilson(rate.correct, rate.n), rate.interval or (0.0, 1.0)))
+    true = float(np.mean([rate for rate, *_ in measured]))
     return {
         "rate": true,
-        "wilson": float(np.mean([low <= true <= high for (low, high), _ in intervals])),
-        "graspsense": float(np.mean([low <= true <= high for _, (low, high) in intervals])),
+        "wilson": float(np.mean([low <= true <= high for _, (low, high), _ in measured])),
+        "graspsense": float(np.mean([low <= true <= high for *_, (low, high) in measured])),
     }
 
 
