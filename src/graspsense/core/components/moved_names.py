@@ -29,9 +29,6 @@ REPLACED: Final = {
     "StoredValueError": "DataDamaged",
     "UNKNOWN": 'the answer "unknown"',
     "columns_of_ticks": "TickColumns of graspsense.simulator_api",
-    "fitted_results": "ObjectKind(fitted_to=...), with the ids of the results",
-    "given_claims": "ObjectKind(gives=...), with the ids of the claims",
-    "gives": "ObjectKind(gives=...), with the ids of the claims",
     "watch": "from graspsense.plugin_api import update_rest",
 }
 """Name that was public to what is used in its place."""
