@@ -4,6 +4,7 @@
 from graspsense.core.components.entries import ExperimentKindEntry as ExperimentKindEntry
 from graspsense.core.components.entries import ExperimentEntry as ExperimentEntry
 from graspsense.experiments.experiment import ExperimentCase as ExperimentCase
+from graspsense.core.components.setting import fitted_defaults as fitted_defaults
 from graspsense.core.settings.resolved import settings_from as settings_from
 from graspsense.core.components.strict import structured as structured
 

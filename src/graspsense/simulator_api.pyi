@@ -28,6 +28,11 @@ from graspsense.core.values.signals import CHANNELS as CHANNELS
 from graspsense.core.components.entries import ConformanceCheckEntry as ConformanceCheckEntry
 from graspsense.core.components.registry import collect as collect
 
+# Where figures come from
+from graspsense.core.components.setting import fitted_results as fitted_results
+from graspsense.core.components.setting import given_claims as given_claims
+from graspsense.core.components.setting import gives as gives
+
 # Identifying an object from recorded squeezes
 from graspsense.core.components.entries import IdentifierEntry as IdentifierEntry
 from graspsense.core.components.identification import CandidateScore as CandidateScore

@@ -11,10 +11,11 @@ from cases import every_case
 from unverified import sample
 
 from graspsense.plugin_api import UnknownName
+from graspsense.simulator_api import fitted_results
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.backend import SimBackend
 from graspsense_sim_gripper.scene.instance import cell_weights
-from graspsense_sim_gripper.scene.library import FITTED_TO, catalogue, find
+from graspsense_sim_gripper.scene.library import catalogue, find
 from graspsense_sim_gripper.scene.spec import PATCHES, ObjectSpec
 from graspsense_sim_gripper.scene.terms import NoState, Term
 from graspsense_sim_gripper.scene.terms.registry import TERMS
@@ -36,7 +37,6 @@ KEYS = {
     *("summary", "patch", "width_m", "width_spread_m", "stiffness_spread", "offset_spread_m"),
     *("share", "share_spread", "friction", "mass_kg"),
 }
-ORIGINS = {"measured", "datasheet", "published elsewhere", "assumed"}
 RESULTS = {"table_2", "table_3", "authors_tree", "section_3f", "fig_6_contact"}
 
 
@@ -58,9 +58,7 @@ def test_every_entry_is_whole_and_every_figure_has_its_origin_and_reason():
     for number in numbers:
         assert number.keys() == {"value", "origin", "reason"}
         assert len(number["reason"]) >= 5
-        plain, fitted, results = number["origin"].partition(FITTED_TO)
-        assert not plain if fitted else plain in ORIGINS
-        assert not fitted or set(results.split(", ")) <= RESULTS
+        assert set(fitted_results(number["origin"])) <= RESULTS
     for table in tables.values():
         for state in table.get("states", {"": {}}).values():
             assert {*table, *state} >= KEYS

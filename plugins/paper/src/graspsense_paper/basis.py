@@ -9,31 +9,32 @@ from graspsense.experiment_api import (
     SIMULATED,
     ExperimentCase,
     Summary,
+    fitted_defaults,
     groups_of,
     simulated_objects,
 )
 from graspsense.plugin_api import ObjectKind
+from graspsense.simulator_api import given_claims
 from graspsense_paper.cases import is_of
 
 Basis = Literal["predicted", "fitted", "built in"]
 BASES: Final[tuple[Basis, ...]] = ("predicted", "fitted", "built in")
-FRICTION: Final = ("coulomb_n", "breakaway_n")
-"""Settings of the gripper: unless they are 0, an effort below them moves nothing, which the claim `stiction` says."""
 
 
 def basis(summary: Summary, experiment: str, *about: str) -> Basis:
     """Return what results of an experiment rest on, where `about` has the ids of these results or of the claim.
 
     `built in` if a figure of an object or of the gripper gives the claim by itself; otherwise `fitted` if one was
-    fitted to one of the results; otherwise `predicted`. No setting of the gripper was fitted.
+    fitted to one of the results; otherwise `predicted`. A setting that was changed from its default was not fitted.
     """
     given: set[str] = set()
     fitted_to: set[str] = set()
     for case in summary.planned.cases:
         if not is_of(case, summary, experiment):
             continue
-        if any(getattr(case.settings.gripper.config, key, 0.0) for key in FRICTION):
-            given.add("stiction")
+        for component in case.settings.chosen:
+            given |= given_claims(component.config)
+            fitted_to |= fitted_defaults(component.config)
         for kind in _grasped(case):
             given |= kind.gives
             fitted_to |= kind.fitted_to

@@ -99,6 +99,7 @@ class SimConfig:
     coulomb_n: float = setting(
         default=7.0,
         origin="published elsewhere",
+        gives="stiction",
         unit="N",
         minimum=0.0,
         plausible=(0.0, 200.0),
@@ -115,6 +116,7 @@ class SimConfig:
     breakaway_n: float = setting(
         default=8.0,
         origin="assumed",
+        gives="stiction",
         unit="N",
         minimum=0.0,
         plausible=(0.0, 200.0),

@@ -26,6 +26,16 @@ from graspsense.core.values.units import display_unit, without_underscores
 _DECLARATION: Final = "graspsense.setting"
 _EFFECT: Final = "graspsense.effect"
 _FOLLOWS: Final = "graspsense.follows"
+_GIVES: Final = "graspsense.gives"
+
+ORIGINS: Final = ("measured", "datasheet", "published elsewhere", "assumed")
+"""The possible origins of a number of a model, besides a fit.
+
+What is compared with the paper follows these origins: a result that a number was fitted to is not predicted. Nor is a
+claim that a number gives by itself, such as static friction that a commanded force below it moves nothing.
+"""
+FITTED_TO: Final = "fitted to "
+"""Begins the origin of a fitted number; the ids of the results follow, separated by commas."""
 
 CHANGES_NO_RESULT: Final[Mapping[str, Any]] = {_EFFECT: "changes no result"}
 """Effect of a setting that changes what is reported, or how fast, but not the result beyond its stated accuracy."""
@@ -63,7 +73,7 @@ class Declaration:
     allowed: str = ""
     plausible: tuple[float, float] | None = None
     origin: str = ""
-    """Where the default of a number of a model comes from, in words."""
+    """Where the default of a number of a model comes from, as `fitted_results` takes it; empty for other settings."""
 
     @property
     def plausible_words(self) -> str:
@@ -90,6 +100,7 @@ def setting(
     effect: Mapping[str, Any] | None = None,
     follows: str = "",
     origin: str = "",
+    gives: str = "",
 ) -> Any:
     """Return the attrs field of a setting.
 
@@ -99,7 +110,8 @@ def setting(
     where it is the default. `validator` is a further validator of attrs. `effect` is `CHANGES_NO_RESULT` or
     `NAMES_INPUT`; a setting without either is part of the set-up: two grasps that differ in it are not comparable.
     `follows` names the setting that owns the value (`controller.contact_force_n`): where a pipeline does not give this
-    one, and has that one, their values are equal. `origin` says where the default of a number of a model comes from.
+    one, and has that one, their values are equal. `origin` is that of a number of a model (`fitted_results`). `gives`
+    is the id of a claim of the paper that the number gives by itself unless it is 0 (`given_claims`).
 
     Raises TypeError if the declaration contradicts itself.
 
@@ -114,6 +126,7 @@ def setting(
         raise TypeError("a setting has one default: give `default` or `factory`")
     limits = _Limits(minimum, above, maximum, below)
     _check_limits(limits, default)
+    _check_origin(origin)
     checks = _checks(limits, default, number=bool(unit) or plausible is not None or _is_number(default))
     if validator is not None:
         checks.append(validator)
@@ -125,6 +138,7 @@ def setting(
     )
     _check_plausible(declaration, default)
     metadata = {_DECLARATION: declaration, **(effect or {}), **({_FOLLOWS: follows} if follows else {})}
+    metadata |= {_GIVES: gives} if gives else {}
     if factory is not None:
         return attrs.field(factory=factory, validator=check, metadata=metadata)
     return attrs.field(default=default, validator=check, metadata=metadata)
@@ -137,6 +151,15 @@ def _check_plausible(declaration: Declaration, default: Any) -> None:
         raise TypeError(f"the plausible range {plausible} is empty: write (smallest, largest)")
     if implausible(declaration, default):
         raise TypeError(f"the default {default} is not in the plausible range {plausible}")
+
+
+def _check_origin(origin: str) -> None:
+    """Raise TypeError if the text is neither empty nor an origin."""
+    if origin:
+        try:
+            fitted_results(origin)
+        except ValueError as error:
+            raise TypeError(str(error)) from error
 
 
 class _Limits(NamedTuple):
@@ -213,6 +236,18 @@ def implausible(declaration: Declaration, value: Any) -> str:
     return f"{shown} is not plausible: the plausible range is {declaration.plausible_words}"
 
 
+def fitted_defaults(config: Any) -> frozenset[str]:
+    """Return the ids of the published results to which defaults were fitted that this config still has."""
+    if not attrs.has(type(config)):
+        return frozenset()
+    return frozenset(
+        result
+        for field in attrs.fields(type(config))
+        if (origin := declared(field).origin) and getattr(config, field.name) == field.default
+        for result in fitted_results(origin)
+    )
+
+
 def settings_marked(config_class: type, effect: Mapping[str, Any]) -> frozenset[str]:
     """Return the names of the settings of this class with the effect `CHANGES_NO_RESULT` or `NAMES_INPUT`.
 
@@ -223,6 +258,42 @@ def settings_marked(config_class: type, effect: Mapping[str, Any]) -> frozenset[
     wanted = effect[_EFFECT]
     return frozenset(
         field.name for field in attrs.fields(config_class) if field.metadata.get(_EFFECT) == wanted
+    )
+
+
+def fitted_results(origin: str) -> tuple[str, ...]:
+    """Return the ids of the results that a number of this origin was fitted to; none if it was not fitted.
+
+    Raises ValueError with the known origins if the text is not one.
+
+    >>> fitted_results("fitted to table_2, table_3")
+    ('table_2', 'table_3')
+    >>> fitted_results("assumed")
+    ()
+    """
+    if origin in ORIGINS:
+        return ()
+    results = tuple(origin.removeprefix(FITTED_TO).split(", "))
+    if not origin.startswith(FITTED_TO) or not all(result.isidentifier() for result in results):
+        raise ValueError(
+            f"{origin!r} is not an origin. Known: {', '.join(ORIGINS)}, or {FITTED_TO}the ids of published results"
+        )
+    return results
+
+
+def gives(claim: str) -> Mapping[str, str]:
+    """Return the metadata of the attrs field of a number which, unless it is 0, gives this claim by itself."""
+    return {_GIVES: claim}
+
+
+def given_claims(values: Any) -> frozenset[str]:
+    """Return the ids of the claims that numbers of this attrs instance give by themselves; none for other values."""
+    if not attrs.has(type(values)):
+        return frozenset()
+    return frozenset(
+        field.metadata[_GIVES]
+        for field in attrs.fields(type(values))
+        if _GIVES in field.metadata and getattr(values, field.name) != 0
     )
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Final
 
 from graspsense.plugin_api import ConfigError, ObjectKind, UnknownName
-from graspsense.simulator_api import suggestion
+from graspsense.simulator_api import fitted_results, given_claims, suggestion
 from graspsense_sim_gripper.scene.spec import (
     ObjectSpec,
     TomlTable,
@@ -28,8 +28,6 @@ CONTAINERS: Final = ("odwalla", "naked", "can", "water")
 """The containers of Chitta, Piccoli and Sturm (ICRA 2010), section III.E: trials are simulated with them by default."""
 LONGEST_SCENE: Final = 2**18
 """Limit on the characters of a scene file; those that are shipped have some thousand."""
-FITTED_TO: Final = "fitted to "
-"""Begins the origin of a fitted number; the ids of the published results follow, separated by commas."""
 SCENE_IN_MEMORY: Final = "scene in memory"
 """The name of an object that is given by the text of its scene."""
 
@@ -73,8 +71,7 @@ def object_kinds() -> tuple[ObjectKind, ...]:
         name, colon, state = full_name.partition(":")
         states.setdefault(name, []).extend([state] if colon else [])
         fitted_to[name] = fitted_to.get(name, frozenset()).union(spec.fitted_to)
-        off_centre = {"one_finger_first"} if spec.offset_m or spec.offset_spread_m else set()
-        given[name] = given.get(name, frozenset()) | off_centre
+        given[name] = given.get(name, frozenset()) | given_claims(spec)
     kinds = [
         ObjectKind(
             name=name,
@@ -180,8 +177,7 @@ def _entry(name: str, table: TomlTable) -> ObjectSpec:
         if "value" not in entry:
             return {key: plain(part, f"{where}.{key}") for key, part in entry.items()}
         reasons[where] = entry["reason"]
-        if entry["origin"].startswith(FITTED_TO):
-            fitted_to.update(entry["origin"].removeprefix(FITTED_TO).split(", "))
+        fitted_to.update(fitted_results(entry["origin"]))
         return entry["value"]
 
     values = plain(table, name)

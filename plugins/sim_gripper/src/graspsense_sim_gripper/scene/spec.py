@@ -14,7 +14,7 @@ from attrs import field, fields_dict, frozen
 from attrs.validators import ge, gt, in_, le
 
 from graspsense.plugin_api import ConfigError, UnknownName
-from graspsense.simulator_api import TomlError, refuse_other_kind, suggestion, toml_values
+from graspsense.simulator_api import TomlError, gives, refuse_other_kind, suggestion, toml_values
 from graspsense_sim_gripper.scene.identified import check_identified
 from graspsense_sim_gripper.scene.terms.liquid import GRAVITY_M_S2
 from graspsense_sim_gripper.scene.terms.registry import find_term, in_order
@@ -45,8 +45,9 @@ def _positive() -> float:
     return field(validator=gt(0.0))
 
 
-def _not_negative(default: float) -> float:
-    return field(default=default, validator=ge(0.0))
+def _not_negative(default: float, claim: str = "") -> float:
+    """Return the field of a number that is not negative; `claim`: the claim of the paper that it gives by itself."""
+    return field(default=default, validator=ge(0.0), metadata=gives(claim) if claim else None)
 
 
 class ParsedTerm(NamedTuple):
@@ -92,9 +93,9 @@ class ObjectSpec:
     width_spread_m: float = _not_negative(0.0)
     stiffness_spread: float = field(default=0.0, validator=[ge(0.0), le(MOST_SPREAD)])
     """Standard deviation of the logarithm of the stiffness."""
-    offset_m: float = 0.0
+    offset_m: float = field(default=0.0, metadata=gives("one_finger_first"))
     """Distance from the gripper's centre line, positive towards the right finger."""
-    offset_spread_m: float = _not_negative(0.0)
+    offset_spread_m: float = _not_negative(0.0, "one_finger_first")
     share: float = field(default=1.0, validator=[gt(0.0), le(1.0)])
     """The share of the force that lands on the fifteen cells of the gripping face."""
     share_spread: float = _not_negative(0.0)
