@@ -143,7 +143,6 @@ def test_instances_that_agree_give_no_interval_narrower_than_their_trials(counts
 
 
 def test_the_interval_of_a_cross_validated_rate_covers_the_rate_of_such_trials():
-    """Those without the training trials that folds share would contain the true rate too seldom."""
     assert interval_coverage.evaluated(12, 60)["graspsense"] >= 0.9
 
 
