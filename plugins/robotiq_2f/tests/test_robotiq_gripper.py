@@ -97,7 +97,7 @@ def test_every_model_closes_with_its_own_limits(model):
         MODELS[model].forces_n[1],
     )
     assert gripper.least_force_n == MODELS[model].forces_n[0]
-    # A stop at a gap that the encoder gets wrong is a motion.
+    # A gripper that is told to stop still has a target.
     assert byte_of(info.relaxed.effort_limit_n, MODELS[model].forces_n) == 0
     assert frames[0].gap_m - frames[-1].gap_m > 0.01
     assert frames[-1].gap_m > 0.005, "it holds the thing"

@@ -250,7 +250,7 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
             effort_limit_n=model.forces_n[1],
             speed_limit_m_s=model.speeds_m_s[1],
             opening=Command(POSITION, model.stroke_m, inf, 0.05),
-            # Where the encoder is wrong, a stop is a motion: with the least force.
+            # It still has a target to go to, where the encoder is wrong or the object yields.
             relaxed=Command(VELOCITY, 0.0, self.least_force_n, inf),
             tare_images=TARE_IMAGES if self._fingertips is not None else 0,
             status_bits=STATUS_BITS,

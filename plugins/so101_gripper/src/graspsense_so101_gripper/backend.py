@@ -274,7 +274,7 @@ class So101Backend(BackendWithEmulator[So101Config]):
             effort_limit_n=config.full_force_n * config.largest_load,
             speed_limit_m_s=SPEED_LIMIT_M_S,
             opening=Command(POSITION, self._jaw.stroke_m, inf, 0.05),
-            # Where the encoder is wrong, a stop is a motion: with the least force.
+            # It still has a target to go to, where the encoder is wrong or the object yields.
             relaxed=Command(VELOCITY, 0.0, self.least_force_n, inf),
             calibration={kind: calibration.sha256 for kind, calibration in stored.items()},
             numbers=numbers,
