@@ -6,7 +6,7 @@ import scipy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense_sim_gripper.run.drawing import image_noise
+from graspsense_sim_gripper.run.drawing import draw_image_noise, image_noise
 from graspsense_sim_gripper.scene.random_numbers import (
     IN_COMPILED_CODE,
     INTERVALS,
@@ -90,11 +90,13 @@ def test_compiled_numbers_are_the_same_to_the_bit(compiled_draws, seed, block, c
         assert made.tobytes() == expected.tobytes()
 
 
-def test_the_noise_of_an_image_is_compiled_too(compiled_draws):
-    rows, row = image_noise(key_of(5), 0, 200), np.empty(44)
-    for image in range(200):
-        compiled_draws[1](key_of(5), NOISE, 44 * image, 44, row)
-        assert row.tobytes() == rows[image].tobytes()
+@given(SEEDS, st.integers(0, 150), st.integers(1, 50))
+def test_the_noise_of_images_is_compiled_too(compiled_noise, seed, begin, count):
+    noise = np.zeros((200, 44))
+    compiled_noise(key_of(seed), begin, begin + count, noise)
+    assert noise[begin : begin + count].tobytes() == image_noise(key_of(seed), begin, count).tobytes()
+    assert not noise[:begin].any()
+    assert not noise[begin + count :].any()
 
 
 @pytest.fixture(scope="module")
@@ -106,6 +108,16 @@ def compiled_draws():
 
     units, normal = IN_COMPILED_CODE["draw_units"], bind_reachable(draw_normals, IN_COMPILED_CODE)
     return compile_function(units), compile_function(normal)
+
+
+@pytest.fixture(scope="module")
+def compiled_noise():
+    """Return `draw_image_noise` as compiled code calls it."""
+    pytest.importorskip("numba", reason="compiled numbers need the extra `fast`")
+    from graspsense.simulator_api import compile_function
+    from graspsense_sim_gripper.run.binding import bind_reachable
+
+    return compile_function(bind_reachable(draw_image_noise, IN_COMPILED_CODE))
 
 
 @pytest.mark.parametrize("seed", [-1, LARGEST_SEED + 1])

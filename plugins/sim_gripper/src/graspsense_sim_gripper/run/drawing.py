@@ -28,7 +28,6 @@ from graspsense_sim_gripper.scene.random_numbers import (
     GRASP,
     NOISE,
     Word,
-    draw_normals,
     draw_units,
     make_normal,
     normal_rows,
@@ -157,9 +156,12 @@ def draw_grasp(scene: SceneNumbers, key: Word, of_number: Any, buffers: DrawBuff
     return Drawn(coulomb_n, breakaway_n, placement, phase_s)
 
 
-def draw_image_noise(key: Word, image: int, numbers: Any) -> None:
-    """Write the noise of the cells in an image of a grasp."""
-    draw_normals(key, NOISE, NOISE_NUMBERS * image, NOISE_NUMBERS, numbers)
+def draw_image_noise(key: Word, begin: int, end: int, noise: Any) -> None:
+    """Write the noise of the cells in the images `begin` to `end` - 1 of a grasp to these rows of `noise` (k, 44)."""
+    numbers = noise[begin:end].reshape(-1)
+    draw_units(key, NOISE, NOISE_NUMBERS * begin, len(numbers), numbers)
+    for image in range(begin, end):
+        make_normal(noise[image], NOISE_NUMBERS)
 
 
 def image_noise(key: Word, begin: int, count: int) -> NDArray[np.float64]:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 Word = Any
 """An unsigned 64-bit number, or an array of these; in a counter and in a product it holds 32 bits."""
 
-LOW, HALF, ZERO = np.uint64(0xFFFFFFFF), np.uint64(32), np.uint64(0)
+LOW, HALF, ZERO, ONE = np.uint64(0xFFFFFFFF), np.uint64(32), np.uint64(0), np.uint64(1)
 FACTORS: Final = np.uint64(0xD2511F53), np.uint64(0xCD9E8D57)
 KEY_STEPS: Final = np.uint64(0x9E3779B9), np.uint64(0xBB67AE85)
 ROUNDS: Final = 10
@@ -63,8 +63,9 @@ def from_table(p: Any) -> Any:
     It is exact at the quantiles of the table, and linear between them: the distribution function is right to 1e-4.
     """
     place = p * INTERVALS
-    i = np.int64(place)
-    return QUANTILES[i] + (place - i) * (QUANTILES[i + 1] - QUANTILES[i])
+    # Compiled code looks whether a signed index is negative.
+    i = np.uint64(place)
+    return QUANTILES[i] + (place - np.float64(i)) * (QUANTILES[i + ONE] - QUANTILES[i])
 
 
 def tail(p: float) -> float:
@@ -95,19 +96,33 @@ def make_normal(numbers: Any, count: int) -> None:
 
 
 def draw_units_by_block(key: Word, stream: Word, begin: int, count: int, numbers: Any) -> None:
-    """Do what `draw_units` does, block by block; for compiled code."""
-    for block in range((count + BLOCK - 1) // BLOCK):
+    """Do what `draw_units` does, block by block; for compiled code, which computes several blocks at a time."""
+    n_whole = count // BLOCK
+    for block in range(n_whole):
         place = np.uint64(begin // BLOCK + block)
-        words = philox(place & LOW, place >> HALF, stream, ZERO, key & LOW, key >> HALF)
-        for i in range(min(BLOCK, count - BLOCK * block)):
-            numbers[BLOCK * block + i] = words[i] * TO_UNIT + MIDDLE
+        w0, w1, w2, w3 = philox(place & LOW, place >> HALF, stream, ZERO, key & LOW, key >> HALF)
+        numbers[BLOCK * block] = w0 * TO_UNIT + MIDDLE
+        numbers[BLOCK * block + 1] = w1 * TO_UNIT + MIDDLE
+        numbers[BLOCK * block + 2] = w2 * TO_UNIT + MIDDLE
+        numbers[BLOCK * block + 3] = w3 * TO_UNIT + MIDDLE
+    place = np.uint64(begin // BLOCK + n_whole)
+    words = philox(place & LOW, place >> HALF, stream, ZERO, key & LOW, key >> HALF)
+    for i in range(count - BLOCK * n_whole):
+        numbers[BLOCK * n_whole + i] = words[i] * TO_UNIT + MIDDLE
 
 
 def make_each_normal(numbers: Any, count: int) -> None:
-    """Do what `make_normal` does, number by number; for compiled code."""
+    """Do what `make_normal` does; for compiled code, which computes several numbers at a time where none is a tail."""
+    n_tails = 0
     for i in range(count):
-        p = numbers[i]
-        numbers[i] = tail(p) if abs(p - 0.5) >= IN_TABLE else from_table(p)
+        n_tails += abs(numbers[i] - 0.5) >= IN_TABLE
+    if n_tails == 0:
+        for i in range(count):
+            numbers[i] = from_table(numbers[i])
+    else:
+        for i in range(count):
+            p = numbers[i]
+            numbers[i] = tail(p) if abs(p - 0.5) >= IN_TABLE else from_table(p)
 
 
 IN_COMPILED_CODE: Final[Mapping[str, Callable[..., None]]] = {

@@ -85,8 +85,7 @@ def stored_grasp(
     while going:
         n = min(n, most)
         if noise.is_drawn == 1:
-            for image in range(drawn, n):
-                draw_image_noise(noise.key, image, of_images[image])
+            draw_image_noise(noise.key, drawn, n, of_images)
         if state.sensor.cells.images == 0:
             # The loop reads it as the image before the first one.
             images[n - 1] = math.nan
