@@ -229,11 +229,14 @@ def test_the_code_of_a_plugin_and_its_version_count(tmp_path, monkeypatch):
         module._hash_of_code.cache_clear()  # as in another process
         return module._hash_of_code(version, "my_plugin.law")
 
-    known = content("1.0")
-    assert content("1.0") == known
-    assert content("1.1") != known
-    law.write_text("a = 22")
-    assert content("1.0") != known
+    known = [content("1.0")]
+    assert content("1.0") in known
+    assert content("1.1") not in known
+    for changed in (law, tmp_path / "helper.py", tmp_path / "helpers" / "__init__.py"):
+        changed.parent.mkdir(exist_ok=True)
+        changed.write_text("a = 22")
+        assert content("1.0") not in known
+        known.append(content("1.0"))
 
 
 def test_the_components_of_a_task_are_inputs(tmp_path):

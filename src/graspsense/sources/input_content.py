@@ -12,6 +12,7 @@ import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from functools import cache
+from glob import escape, glob
 from html import unescape
 from importlib.util import find_spec
 from pathlib import Path
@@ -124,13 +125,26 @@ def _codes() -> dict[str, list[tuple[str, str]]]:
 
 @cache
 def _hash_of_code(version: str, module: str) -> str:
-    """Return a hash of a version and of all files of the package that a module is in."""
+    """Return a hash of a version and of all files of the package that a module is in, and of `_developed_beside`."""
     package = _OWN_PLUGINS if module.startswith(f"{_OWN_PLUGINS}.") else module.partition(".")[0]
     if package == FRAMEWORK:
         return version
     spec = find_spec(package)
     places = [] if spec is None else list(spec.submodule_search_locations or [spec.origin or ""])
+    places += [beside for place in places for beside in _developed_beside(place)]
     return _hash([version, *(_hash_of_tree(place) for place in places if os.path.exists(place))])
+
+
+def _developed_beside(place: str) -> list[str]:
+    """Return the other modules and packages in the folder of a package that is not installed there but developed.
+
+    The package may import them, and their versions say nothing of their content.
+    """
+    folder = os.path.dirname(place)
+    if os.path.basename(folder) in ("site-packages", "dist-packages"):
+        return []
+    others = {*glob(f"{escape(folder)}/*.py"), *map(os.path.dirname, glob(f"{escape(folder)}/*/__init__.py"))}
+    return sorted(others - {place})
 
 
 def _hash_of_store(folder: str) -> str:
