@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from attrs import evolve, field, frozen
 
-from graspsense.core.components.channels import cells_of, no_signals, signal_type
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.errors import DataDamaged, counted
 from graspsense.core.values.events import GraspEvent
 from graspsense.core.values.fingers import FingerForce, opposed_forces
-from graspsense.core.values.signals import NO_PADS, Frame, Image, Phase, Reading, Samples
+from graspsense.core.values.signals import NO_PADS, Frame, Phase, Reading, Samples
 from graspsense.recording.replayable import Recording
-from graspsense.sources.columns.fast_samples import latest_values, most_in_a_tick, sample_blocks
+from graspsense.sources.columns.fast_samples import most_in_a_tick, signals_in_ticks, values_in_ticks
 from graspsense.sources.formats.topic_clocks import Messages, common_clock
 
 if TYPE_CHECKING:
@@ -488,27 +487,6 @@ def _array(columns: GraspColumns, name: str, values: Numbers) -> Channel:
     return FastChannel(name, columns.units.get(name, "1"), rate_hz, samples=samples, axes=names)
 
 
-def _series(columns: GraspColumns, channel: Channel, values: Numbers) -> list[Any]:
-    """Return the value of a further channel in each tick."""
-    own, times = columns.times.get(channel.name), columns.t_s
-    if isinstance(channel, FastChannel):
-        if own is not None:
-            return sample_blocks(times, own, values, channel)
-        return _blocks(times.tolist(), values, channel)
-    sampled_s = times if own is None else own
-    rows: list[Any] = [] if isinstance(channel, TactileArray) else values.tolist()
-    nothing: Any = math.nan
-    if isinstance(channel, TactileArray):
-        rows = [
-            Image(t_s, k, cells_of(channel, row))
-            for k, (t_s, row) in enumerate(zip(sampled_s.tolist(), values, strict=True), 1)
-        ]
-        nothing = no_signals((channel,))[0]
-    if own is None:
-        return rows
-    return latest_values(times, own, rows, nothing)
-
-
 def _readings(
     columns: GraspColumns, steps: Numbers, velocities: Numbers, channels: Sequence[Channel]
 ) -> list[Reading]:
@@ -516,17 +494,19 @@ def _readings(
     absent = [math.nan] * n
     efforts = absent if columns.effort_n is None else columns.effort_n.tolist()
     times = columns.t_s.tolist()
-    further: list[Any] = [()] * n
-    if channels:
-        make = signal_type(channels)._make  # type: ignore[attr-defined]
-        every = (*columns.scalars.values(), *columns.arrays.values())
-        series = [_series(columns, channel, values) for channel, values in zip(channels, every, strict=True)]
-        further = list(map(make, zip(*series, strict=True)))
+    every = (*columns.scalars.values(), *columns.arrays.values())
+    series = [
+        _blocks(times, values, channel)
+        if isinstance(channel, FastChannel) and channel.name not in columns.times
+        else values_in_ticks(columns.t_s, columns.times.get(channel.name), values, channel)
+        for channel, values in zip(channels, every, strict=True)
+    ]
     frames = zip(
         times, steps.tolist(), columns.gap_m.tolist(), velocities.tolist(), efforts, columns.left_n.tolist(),
         columns.right_n.tolist(), absent, absent, [0] * n, strict=True,
     )  # fmt: skip
-    return [Reading(Frame(*frame), NO_PADS, signals) for frame, signals in zip(frames, further, strict=True)]
+    signals = signals_in_ticks(channels, series, n)
+    return [Reading(Frame(*frame), NO_PADS, own) for frame, own in zip(frames, signals, strict=True)]
 
 
 def _blocks(times: Sequence[float], values: Numbers, channel: FastChannel) -> list[Samples]:

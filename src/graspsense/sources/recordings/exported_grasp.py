@@ -13,20 +13,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from graspsense.core.components.channels import (
-    cells_of,
-    from_json,
-    further,
-    no_signals,
-    read_only,
-    signal_type,
-)
-from graspsense.core.values.channel import FLOATS, Channel, FastChannel, TactileArray
+from graspsense.core.components.channels import from_json, further
+from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.mounting import mounting_from_json
-from graspsense.core.values.signals import Frame, Image, Pads, Reading, no_pads
+from graspsense.core.values.signals import Frame, Pads, Reading, no_pads
 from graspsense.recording.readable import readable
 from graspsense.recording.replayable import REPLAY_NOTE, Recording
-from graspsense.sources.columns.fast_samples import latest_values, sample_blocks
+from graspsense.sources.columns.fast_samples import latest_values, signals_in_ticks, values_in_ticks
 from graspsense.sources.formats.numpy_files import npz_arrays
 from graspsense.sources.recordings.exported_grasp_tables import (
     TABLE_SUFFIXES,
@@ -79,7 +72,6 @@ def _readings(arrays: Arrays, channels: tuple[Channel, ...]) -> list[Reading]:
         Frame._make((*values[:-1], int(values[-1])))
         for values in zip(*(arrays[name].tolist() for name in Frame._fields), strict=True)
     ]
-    n = len(frames)
     cells = arrays["pad_left"].shape[1]
     images = [
         Pads(t_s, k, tuple(left), tuple(right))
@@ -88,26 +80,10 @@ def _readings(arrays: Arrays, channels: tuple[Channel, ...]) -> list[Reading]:
         )
     ]
     pads = latest_values(times, arrays["pad_t_s"], images, no_pads(cells))
-    signals: list[Any] = [()] * n
-    if channels:
-        make = signal_type(channels)._make  # type: ignore[attr-defined]
-        series = [_series(times, arrays, channel) for channel in channels]
-        signals = [make(values) for values in zip(*series, strict=True)]
+    series = []
+    for channel in channels:
+        name, own = f"signal_{channel.name}", isinstance(channel, TactileArray | FastChannel)
+        sampled_s = arrays[f"{name}_t_s"] if own else None
+        series.append(values_in_ticks(times, sampled_s, arrays[name], channel))
+    signals = signals_in_ticks(channels, series, len(frames))
     return [Reading(*values) for values in zip(frames, pads, signals, strict=True)]
-
-
-def _series(times: NDArray[np.float64], arrays: Arrays, channel: Channel) -> list[Any]:
-    """Return the value of a further channel in each tick."""
-    values = arrays[f"signal_{channel.name}"]
-    if isinstance(channel, TactileArray):
-        sampled_s = arrays[f"signal_{channel.name}_t_s"]
-        if channel.dtype != FLOATS:
-            values = read_only(values, channel.dtype)  # once, so that its images are passed by reference
-        images = [
-            Image(t_s, k, cells_of(channel, cells))
-            for k, (t_s, cells) in enumerate(zip(sampled_s.tolist(), values, strict=True), 1)
-        ]
-        return latest_values(times, sampled_s, images, no_signals((channel,))[0])
-    if isinstance(channel, FastChannel):
-        return sample_blocks(times, arrays[f"signal_{channel.name}_t_s"], values, channel)
-    return list(values.tolist())

@@ -14,7 +14,7 @@ import numpy as np
 from graspsense.core.components.channels import from_json, further
 from graspsense.core.files.csv_text import text_of_cell
 from graspsense.core.files.whole_file import first_bytes
-from graspsense.core.values.channel import FLOATS, Channel, FastChannel, TactileArray
+from graspsense.core.values.channel import FLOATS, FastChannel, TactileArray
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.limits import CELLS, CHANNEL_NUMBERS
 from graspsense.core.values.written_numbers import NotNumbers, columns_of_numbers
@@ -70,37 +70,39 @@ def _read(path: Path, declared: Path) -> tuple[Columns, str]:
         raise DataDamaged(f"{declared} is damaged: {type(error).__name__}: {error}") from error
     if too_many := CHANNEL_NUMBERS.exceeded(cells):
         raise DataDamaged(f"{declared} is damaged: the fingertips have {too_many}")
-    pads = _columns(beside(path, PADS_TOPIC)) if PADS_TOPIC in tables else {"t_s": np.empty(0)}
+
+    def table(topic: str) -> Columns:
+        return _columns(beside(path, topic)) if topic in tables else {"t_s": np.empty(0)}
+
+    pads = table(PADS_TOPIC)
     ticks["pad_t_s"] = pads["t_s"]
     for side in ("left", "right"):
-        ticks[f"pad_{side}"] = _numbered(pads, f"{side}_", cells)
-    scalars = _columns(beside(path, SCALARS_TOPIC)) if SCALARS_TOPIC in tables else {}
+        ticks[f"pad_{side}"] = _together(pads, [f"{side}_{i:02d}" for i in range(cells)])
+    scalars = table(SCALARS_TOPIC)
     for channel in channels:
-        _add_channel(ticks, path, channel, scalars, SIGNAL_TOPIC + channel.name in tables)
+        name, topic = f"signal_{channel.name}", SIGNAL_TOPIC + channel.name
+        if isinstance(channel, TactileArray) and channel.dtype != FLOATS:
+            nothing = {"t_s": np.empty(0), "cells": np.empty((0, *channel.shape))}
+            images = npz_arrays(images_beside(path, topic)) if topic in tables else nothing
+            ticks[f"{name}_t_s"], ticks[name] = images["t_s"], images["cells"]
+        elif isinstance(channel, TactileArray | FastChannel):
+            samples = table(topic)
+            fields = (
+                channel.axes
+                if isinstance(channel, FastChannel)
+                else [f"cells_{i:02d}" for i in range(channel.numbers)]
+            )
+            ticks[f"{name}_t_s"], ticks[name] = samples["t_s"], _together(samples, fields)
+        else:
+            ticks[name] = scalars[channel.name]
     return ticks, text
 
 
-def _add_channel(arrays: Columns, path: Path, channel: Channel, scalars: Columns, has_table: bool) -> None:
-    """Add the arrays of a further channel."""
-    name = f"signal_{channel.name}"
-    if not isinstance(channel, (TactileArray, FastChannel)):
-        arrays[name] = scalars[channel.name]
-        return
-    if isinstance(channel, TactileArray) and channel.dtype != FLOATS:
-        file = images_beside(path, SIGNAL_TOPIC + channel.name)
-        images = (
-            npz_arrays(file) if has_table else {"t_s": np.empty(0), "cells": np.empty((0, *channel.shape))}
-        )
-        arrays[f"{name}_t_s"], arrays[name] = images["t_s"], images["cells"]
-        return
-    table = _columns(beside(path, SIGNAL_TOPIC + channel.name)) if has_table else {"t_s": np.empty(0)}
-    arrays[f"{name}_t_s"] = table["t_s"]
-    if isinstance(channel, TactileArray):
-        arrays[name] = _numbered(table, "cells_", channel.numbers)
-    elif has_table:
-        arrays[name] = np.column_stack([table[axis] for axis in channel.axes])
-    else:
-        arrays[name] = np.empty((0, len(channel.axes)))
+def _together(table: Columns, names: Sequence[str]) -> NDArray[np.float64]:
+    """Return these columns side by side: (rows, columns)."""
+    if len(table["t_s"]) == 0:
+        return np.empty((0, len(names)))
+    return np.column_stack([table[name] for name in names])
 
 
 def refuse_table_of_store(path: Path, names: Iterable[str]) -> None:
@@ -115,13 +117,6 @@ def refuse_table_of_store(path: Path, names: Iterable[str]) -> None:
 
 _ABOUT_TRIALS: Final = ("trial", "made_at", "outcome", "recording")
 """Columns of every table of a store."""
-
-
-def _numbered(table: Columns, prefix: str, number: int) -> NDArray[np.float64]:
-    """Return the columns `prefix00`, `prefix01`, ... side by side: (rows, number)."""
-    if len(table["t_s"]) == 0:
-        return np.empty((0, number))
-    return np.column_stack([table[f"{prefix}{i:02d}"] for i in range(number)])
 
 
 def _names(path: Path) -> Sequence[str]:
