@@ -4,24 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import nan
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from graspsense.core.components.channels import cells_of, no_signals, read_only, signal_type
 from graspsense.core.values.channel import FLOATS, Channel, FastChannel, TactileArray
 from graspsense.core.values.signals import Image, Samples
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+from graspsense.sources.formats.table import Numbers
 
 T = TypeVar("T")
 
 
-def latest_values(
-    times: NDArray[np.float64], sampled_s: NDArray[np.float64], values: Sequence[T], nothing: T
-) -> list[T]:
+def latest_values(times: Numbers, sampled_s: Numbers, values: Sequence[T], nothing: T) -> list[T]:
     """Return the last of the values in each tick; `nothing` before the first."""
     counts = np.searchsorted(sampled_s, times, side="right").tolist()
     return [values[count - 1] if count else nothing for count in counts]
@@ -36,7 +32,7 @@ def signals_in_ticks(channels: Sequence[Channel], series: Sequence[Sequence[Any]
 
 
 def values_in_ticks(
-    times: NDArray[np.float64], sampled_s: NDArray[np.float64] | None, values: NDArray[Any], channel: Channel
+    times: Numbers, sampled_s: Numbers | None, values: NDArray[Any], channel: Channel
 ) -> list[Any]:
     """Return the value of a further channel in each tick, from what was sampled at `sampled_s`; None for each tick."""
     if isinstance(channel, FastChannel):
@@ -55,15 +51,15 @@ def values_in_ticks(
     return rows if sampled_s is None else latest_values(times, sampled_s, rows, nothing)
 
 
-def most_in_a_tick(times: NDArray[np.float64], sampled_s: Sequence[float] | NDArray[np.float64]) -> int:
+def most_in_a_tick(times: Numbers, sampled_s: Sequence[float] | Numbers) -> int:
     """Return the largest number of samples that are new in one tick."""
     return int(np.diff(np.searchsorted(sampled_s, times, side="right"), prepend=0).max(initial=0))
 
 
 def sample_blocks(
-    times: NDArray[np.float64],
-    sampled_s: NDArray[np.float64],
-    values: NDArray[np.float64],
+    times: Numbers,
+    sampled_s: Numbers,
+    values: Numbers,
     channel: FastChannel,
 ) -> list[Samples]:
     """Return the samples that are new in each tick, at most as many as the channel declares.

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from attrs import evolve, field, frozen
+from numpy.typing import NDArray
 
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.errors import DataDamaged, counted
@@ -16,12 +17,8 @@ from graspsense.core.values.fingers import FingerForce, opposed_forces
 from graspsense.core.values.signals import NO_PADS, Frame, Phase, Reading, Samples
 from graspsense.recording.replayable import Recording
 from graspsense.sources.columns.fast_samples import most_in_a_tick, signals_in_ticks, values_in_ticks
+from graspsense.sources.formats.table import Numbers
 from graspsense.sources.formats.topic_clocks import Messages, common_clock
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Numbers = NDArray[np.float64]
 
 Spans = tuple[tuple[float, float], ...]
 """Begin and end (s) of each of several events."""

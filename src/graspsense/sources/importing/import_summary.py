@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from attrs import frozen
@@ -13,14 +13,9 @@ from graspsense.core.values.channel import FLOATS
 from graspsense.core.values.signals import Frame, Image, Samples
 from graspsense.core.values.trace import SI_UNITS
 from graspsense.recording.labelled_recording import LabelledRecording
+from graspsense.recording.replayable import Recording
 from graspsense.sources.columns.channel_facts import ChannelFacts, channel_facts, together
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from graspsense.recording.replayable import Recording
-
-    Numbers = NDArray[np.float64]
+from graspsense.sources.formats.table import Numbers
 
 CHANNEL_OF: Final = {
     "gap_m": "gap",

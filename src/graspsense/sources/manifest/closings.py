@@ -11,7 +11,8 @@ from graspsense.core.values.errors import counted
 from graspsense.sources.columns.usual_range import usual_range
 
 if TYPE_CHECKING:
-    from graspsense.sources.columns.grasp_columns import GraspColumns, Numbers
+    from graspsense.sources.columns.grasp_columns import GraspColumns
+    from graspsense.sources.formats.table import Numbers
 
 CLOSED: Final = 0.4
 OPEN: Final = 0.6

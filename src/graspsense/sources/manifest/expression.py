@@ -14,7 +14,7 @@ from __future__ import annotations
 import ast
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final, NoReturn
+from typing import Any, Final, NoReturn
 
 import numpy as np
 from attrs import frozen
@@ -22,9 +22,7 @@ from attrs import frozen
 from graspsense.core.values.errors import ConfigError, listed, suggestion
 from graspsense.core.values.limits import CELLS
 from graspsense.sources.formats.patterns import PatternError, wildcard
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from graspsense.sources.formats.table import Numbers
 
 LARGEST: Final = 1e300
 """Limit on the magnitude of a number in an expression."""
@@ -89,7 +87,7 @@ class Expression:
             dict.fromkeys(name for node in _names(self.tree) for name in self._matching(node, known))
         )
 
-    def values(self, columns: Mapping[str, NDArray[np.float64]], rows: int) -> NDArray[np.float64]:
+    def values(self, columns: Mapping[str, Numbers], rows: int) -> Numbers:
         """Return its value in each of the rows: shape (rows,), or (rows, k) if it stands for several columns.
 
         Raises ExpressionError.
@@ -99,7 +97,7 @@ class Expression:
         shape = (rows, *value.shape[1:]) if value.ndim else (rows,)
         return np.array(np.broadcast_to(value, shape), dtype=np.float64)
 
-    def numbers(self, columns: Mapping[str, NDArray[np.float64]], rows: int) -> NDArray[np.float64]:
+    def numbers(self, columns: Mapping[str, Numbers], rows: int) -> Numbers:
         """Return its value in each of the rows as one column. Raises ExpressionError if it stands for several."""
         values = self.values(columns, rows)
         if values.ndim > 1:

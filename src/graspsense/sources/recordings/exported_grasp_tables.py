@@ -7,9 +7,10 @@ import io
 import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from graspsense.core.components.channels import from_json, further
 from graspsense.core.files.csv_text import text_of_cell
@@ -21,12 +22,10 @@ from graspsense.core.values.written_numbers import NotNumbers, columns_of_number
 from graspsense.recording.export_trace import beside, declared_beside, images_beside
 from graspsense.recording.layout import PADS_TOPIC, SCALARS_TOPIC, SIGNAL_TOPIC, TICK_FIELDS
 from graspsense.sources.formats.numpy_files import npz_arrays
+from graspsense.sources.formats.table import Numbers
 from graspsense.sources.formats.text_table import check_columns, check_lines, text_of
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Columns = dict[str, NDArray[Any]]
+Columns = dict[str, NDArray[Any]]
 
 TABLE_SUFFIXES: Final = (".csv", ".parquet")
 HEADER_BYTES: Final = 2**20
@@ -98,7 +97,7 @@ def _read(path: Path, declared: Path) -> tuple[Columns, str]:
     return ticks, text
 
 
-def _together(table: Columns, names: Sequence[str]) -> NDArray[np.float64]:
+def _together(table: Columns, names: Sequence[str]) -> Numbers:
     """Return these columns side by side: (rows, columns)."""
     if len(table["t_s"]) == 0:
         return np.empty((0, len(names)))

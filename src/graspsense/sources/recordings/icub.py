@@ -16,7 +16,7 @@ ring and little finger together (https://icub-tech-iit.github.io/documentation, 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from attrs import frozen
@@ -29,9 +29,7 @@ from graspsense.core.values.limits import TEXT_BYTES
 from graspsense.core.values.signals import NO_PADS, Frame, Reading
 from graspsense.recording.readable import not_opened
 from graspsense.recording.replayable import Recording
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from graspsense.sources.formats.table import Numbers
 
 FIRST_LINE: Final = "-10000"
 DATA_FOLDER: Final = "iCubGraspDataset"
@@ -67,9 +65,9 @@ class IcubGrasp:
     another time.
     """
 
-    encoders_deg: NDArray[np.float64]
-    maxima: NDArray[np.float64]
-    taxels: NDArray[np.float64]
+    encoders_deg: Numbers
+    maxima: Numbers
+    taxels: Numbers
 
     def __len__(self) -> int:
         """Return the number of frames."""

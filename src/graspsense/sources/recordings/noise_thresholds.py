@@ -22,7 +22,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from attrs import frozen
@@ -30,11 +30,8 @@ from attrs import frozen
 from graspsense.core.control.contact import CONTACT_FORCE_N, REST_SPEED_M_S, REST_WINDOW_S, first_rest
 from graspsense.core.grasp.gap_resolution import MARGIN, MEASURED, gap_resolution
 from graspsense.core.values.signals import NO_GAP
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from graspsense.recording.replayable import Recording
+from graspsense.recording.replayable import Recording
+from graspsense.sources.formats.table import Numbers
 
 THRESHOLDS: Final[tuple[str, ...]] = ("contact_force_n", "rest_speed_m_s", "rest_window_s")
 """The settings of controllers and features that are chosen here, and that a user may give instead."""
@@ -158,9 +155,9 @@ class _Scale:
 class _Noise:
     """What one recording says, in its own units."""
 
-    times: NDArray[np.float64]
-    gap: NDArray[np.float64]
-    both: NDArray[np.float64]
+    times: Numbers
+    gap: Numbers
+    both: Numbers
     """The force that both pads feel."""
     baseline: float
     """The force without contact."""
@@ -408,16 +405,14 @@ def _is_thin(noise: _Noise, contact: float) -> bool:
     return bool((noise.gap[noise.both >= contact] <= _CLOSED_M).any())
 
 
-def _loaded(force: NDArray[np.float64], baseline: float) -> int:
+def _loaded(force: Numbers, baseline: float) -> int:
     """Return the first sample with a fifth of the peak force."""
     if np.isnan(force).all():
         return 0
     return int((force >= baseline + _EARLY_SHARE * (np.nanmax(force) - baseline)).argmax())
 
 
-def _squeezing_speed(
-    times: NDArray[np.float64], gap: NDArray[np.float64], force: NDArray[np.float64], loaded: int
-) -> float:
+def _squeezing_speed(times: Numbers, gap: Numbers, force: Numbers, loaded: int) -> float:
     """Return the mean speed of the gap from a fifth of the peak force to 95 % of it; 0 if it does not close."""
     if np.isnan(force).all():
         return 0.0
@@ -428,7 +423,7 @@ def _squeezing_speed(
     return max(closed, 0.0) / float(times[top] - times[loaded]) if closed == closed else 0.0
 
 
-def _baseline(force: NDArray[np.float64]) -> float:
+def _baseline(force: Numbers) -> float:
     """Return the force without contact of a sensor whose zero is not known: that of the first samples below a fifth."""
     known = force[~np.isnan(force)]
     if not len(known):
@@ -437,7 +432,7 @@ def _baseline(force: NDArray[np.float64]) -> float:
     return float(np.median(early[: max(len(early) // 3, _FEW)]))
 
 
-def _free_force(force: NDArray[np.float64], baseline: float) -> float:
+def _free_force(force: Numbers, baseline: float) -> float:
     """Return the largest force that noise without contact explains."""
     known = force[~np.isnan(force)]
     if len(known) <= _FEW:
@@ -453,14 +448,14 @@ def _free_force(force: NDArray[np.float64], baseline: float) -> float:
     return abs(middle) + scatter if baseline == 0.0 else middle + scatter
 
 
-def _rises(force: NDArray[np.float64]) -> bool:
+def _rises(force: Numbers) -> bool:
     """Return whether a force grows by more than its noise explains, so that something is squeezed already."""
     a_third = max(len(force) // 3, 1)
     growth = float(np.median(force[-a_third:]) - np.median(force[:a_third]))
     return growth > _FORCE_SIGMAS * _scatter_of_differences(force)
 
 
-def _gap_at_rest(gap: NDArray[np.float64], force: NDArray[np.float64]) -> float:
+def _gap_at_rest(gap: Numbers, force: Numbers) -> float:
     """Return the distance within which a gap at rest stays by its noise, which shows best where the force is large."""
     known = np.isfinite(gap)
     if not np.isnan(force).all():
@@ -471,7 +466,7 @@ def _gap_at_rest(gap: NDArray[np.float64], force: NDArray[np.float64]) -> float:
     return _GAP_SIGMAS * _scatter_of_differences(gap[known])
 
 
-def _scatter_of_differences(values: NDArray[np.float64]) -> float:
+def _scatter_of_differences(values: Numbers) -> float:
     """Return the standard deviation of the noise of a smooth course, from its second differences."""
     curvature = np.diff(values, n=2)
     return _NORMAL * float(np.median(np.abs(curvature - np.median(curvature)))) / math.sqrt(6.0)
