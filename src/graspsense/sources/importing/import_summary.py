@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
@@ -65,11 +66,9 @@ class ImportSummary:
 def summary_of(recordings: Sequence[LabelledRecording]) -> ImportSummary:
     """Return the summary of at least one recording."""
     by_label: dict[str, list[LabelledRecording]] = {}
-    notices: dict[str, int] = {}
+    notices = Counter(notice for recording in recordings for notice in recording.notices)
     for recording in recordings:
         by_label.setdefault(recording.label, []).append(recording)
-        for notice in recording.notices:
-            notices[notice] = notices.get(notice, 0) + 1
     earliest = recordings[0].recording
     times = sorted(recording.recorded_at for recording in recordings)
     return ImportSummary(
@@ -80,7 +79,7 @@ def summary_of(recordings: Sequence[LabelledRecording]) -> ImportSummary:
         values=tuple(dict.fromkeys(name for recording in recordings for name in recording.values)),
         recorded=(times[0], times[-1]) if times[0] else None,
         notes=earliest.notes,
-        notices=tuple(sorted(notices.items(), key=lambda item: -item[1])),
+        notices=tuple(notices.most_common()),
         measured=_measured([recording.recording for recording in recordings]),
     )
 

@@ -6,6 +6,7 @@ graspsense was involved.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from functools import partial
 from typing import Any
@@ -68,7 +69,9 @@ def labelled_recordings(
     table = table_of(rows)
     notes = note_on(unreadable, len(facts) + len(unreadable) + unlabelled)
     notes += [f"{counted(unlabelled, 'recording')} left out: no label"] if unlabelled else []
-    notes += [*_counted(fact.notices for fact in facts), *threshold_notes]
+    counts = Counter(notice for fact in facts for notice in fact.notices)
+    notes += [f"{counted(count, 'recording')}: {notice}" for notice, count in counts.items()]
+    notes += threshold_notes
     units = {unit for fact in facts for unit in fact.recording.units.values()}
     if units:
         notes.append(f"units that are not SI units: {', '.join(sorted(units))}")
@@ -170,12 +173,3 @@ def _controls(table: FeatureTable, early: Sequence[Features], facts: Sequence[La
 def _why_missing(early: Sequence[Features]) -> str:
     """Return why trials have no features from before contact, empty if all have them."""
     return next((reason for features in early for reason in features.reasons.values()), "")
-
-
-def _counted(notices: Any) -> list[str]:
-    """Return each notice once, with the number of recordings that it is about."""
-    counts: dict[str, int] = {}
-    for of_one in notices:
-        for notice in of_one:
-            counts[notice] = counts.get(notice, 0) + 1
-    return [f"{counted(count, 'recording')}: {notice}" for notice, count in counts.items()]
