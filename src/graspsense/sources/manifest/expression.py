@@ -152,10 +152,10 @@ class Expression:
         if name in FOLDS:
             rows = max((len(values) for values in arguments if values.ndim), default=1)
             parts = [
-                np.broadcast_to(
-                    values if values.ndim == 2 else np.reshape(values, (-1, 1)), (rows, *_width(values))
+                np.broadcast_to(cells, (rows, cells.shape[1]))
+                for cells in (
+                    values if values.ndim == 2 else np.reshape(values, (-1, 1)) for values in arguments
                 )
-                for values in arguments
             ]
             together = np.column_stack(parts)
             if together.shape[1] < 2:
@@ -197,7 +197,8 @@ class Expression:
             what = (
                 f"no column matches {name!r}" if quoted and set("*?") & set(name) else f"no column {name!r}"
             )
-            self._refuse(node, f"{what}. Columns: {_listed(known) or 'none'}.{suggestion(name, known)}")
+            columns = listed([shown if shown.isidentifier() else f"'{shown}'" for shown in known])
+            self._refuse(node, f"{what}. Columns: {columns or 'none'}.{suggestion(name, known)}")
         return names
 
     def _refuse(self, node: ast.expr, why: str) -> NoReturn:
@@ -307,20 +308,12 @@ def _checked_call(node: ast.Call, text: str, offset: int) -> Sequence[ast.AST]:
     return node.args
 
 
-def _names(node: ast.expr) -> Iterator[ast.expr]:
+def _names(node: ast.AST) -> Iterator[ast.expr]:
     """Yield every node that names a column; the name of a function does not."""
     if isinstance(node, ast.Name) or (isinstance(node, ast.Constant) and isinstance(node.value, str)):
         yield node
-    elif isinstance(node, ast.Call):
-        for argument in node.args:
-            yield from _names(argument)
-    elif isinstance(node, ast.BinOp):
-        yield from _names(node.left)
-        yield from _names(node.right)
-    elif isinstance(node, ast.UnaryOp):
-        yield from _names(node.operand)
-    elif isinstance(node, ast.Subscript):
-        yield from _names(node.value)
+    for part in node.args if isinstance(node, ast.Call) else ast.iter_child_nodes(node):
+        yield from _names(part)
 
 
 def _name_in(node: ast.expr) -> str:
@@ -334,18 +327,6 @@ def _aligned(left: Values, right: Values) -> tuple[Values, Values]:
     elif right.ndim == 1 and left.ndim == 2:
         right = right[:, None]
     return left, right
-
-
-def _width(value: Values) -> tuple[int, ...]:
-    return (value.shape[1] if value.ndim == 2 else 1,)
-
-
-def _listed(names: Sequence[str]) -> str:
-    return listed([_shown(name) for name in names])
-
-
-def _shown(name: str) -> str:
-    return name if name.isidentifier() else f"'{name}'"
 
 
 def _error(text: str, offset: int, why: str) -> ExpressionError:
