@@ -320,6 +320,11 @@ def _finger_problems(keys: Manifest) -> Iterator[tuple[tuple[str, ...], str]]:
         yield ("fingers",), str(error)
 
 
+def quantity_of(key: str) -> str:
+    """Return the quantity that the expressions of a key give: a force for each side and each finger."""
+    return "force" if key in ("left", "right") or key.startswith(PREFIX) else key
+
+
 def texts_of(value: Text) -> tuple[str, ...]:
     """Return the texts of a key that holds one or several."""
     return (value,) if isinstance(value, str) else value
