@@ -112,6 +112,6 @@ def _refuse_below_zero(recordings: Sequence[ImportedRecording]) -> None:
         return
     raise ConfigError(
         f"the force of {below} of {len(recordings)} recordings is below zero throughout, so that no contact can be "
-        'found. If the fingers were free at the beginning, write zero = "10 samples" in the manifest; else subtract the '
-        'known zero of the sensor: force = "FORCE + OFFSET". If it falls on contact, turn its sign: -FORCE'
+        'found. If the fingers were free at the beginning, write zero = "10 samples" in the manifest; else subtract '
+        'the known zero of the sensor: force = "FORCE + OFFSET". If it falls on contact, turn its sign: -FORCE'
     )
