@@ -63,21 +63,20 @@ def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = F
             f"all grasps in {folder} are of {UNRELIABLE}, which the author calls unreliable: include them with "
             f"{option('unreliable', python='unreliable=True')}"
         )
-    total = len(paths)
     read = list(_each(paths))
     unreadable = [grasp for _, grasp in read if isinstance(grasp, UnreadableRecording)]
-    paths = [named for named, grasp in read if isinstance(grasp, IcubGrasp)]
-    grasps = [grasp for _, grasp in read if isinstance(grasp, IcubGrasp)]
+    known = {named: grasp for named, grasp in read if isinstance(grasp, IcubGrasp)}
+    grasps = list(known.values())
     if not grasps:
         raise error_of_all(unreadable)
-    recordings = [recording_of(grasp, path.name) for (path, *_), grasp in zip(paths, grasps, strict=True)]
+    recordings = [recording_of(grasp, path.name) for (path, *_), grasp in known.items()]
     check_recording(recorded_channels(recordings[0]), f"icub:{folder}", features)
     table = table_of([features.extract(trace_of_recording(recording)) for recording in recordings])
     notes = [
         "the data of the iCub hand have no time stamps: times are frame numbers (delta_t is in frames)",
         "metres and newtons are nominal, and relative to the first frame (docs/icub.md)",
         "class, object and session are the same here: no rate tells whether the squeeze or the session is recognised",
-        *note_on(unreadable, total),
+        *note_on(unreadable, len(read)),
     ]
     if left_out:
         notes.append(
@@ -97,10 +96,10 @@ def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = F
     return Labelled(
         source=f"icub:{folder}",
         table=table,
-        labels=tuple(label for _, label, _ in paths),
+        labels=tuple(label for _, label, _ in known),
         no_interval="every class is one object, recorded in one session",
         no_instances="every class of this data set is a single object, so none can be held out",
-        order=tuple(number for _, _, number in paths),
+        order=tuple(number for _, _, number in known),
         **controls(
             table,
             _first_frame(grasps),

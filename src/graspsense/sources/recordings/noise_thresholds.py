@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -111,10 +111,12 @@ def thresholds_for(
     resting, rest_words = _rest(measured, scale, contact, given or {})
     times, times_words = _timeouts(used, timeouts_s or {}, scale)
     ends, ends_words = _ends(measured, scale, contact)
-    settings = {**force, **resting, **times, **ends}
-    seen = _seen(measured, scale)
+    settings, seen = {**force, **resting, **times, **ends}, _seen(measured, scale)
     if not settings:
-        words = f"thresholds of contact and rest: the defaults, which fit the noise ({scale.defaults}{seen})"
+        defaults = (
+            f"contact {CONTACT_FORCE_N:g} N, rest below {REST_SPEED_M_S:g} m/s within {REST_WINDOW_S:g} s"
+        )
+        words = f"thresholds of contact and rest: the defaults, which fit the noise ({defaults}{seen})"
         return Thresholds(settings={}, words=words)
     words = "; ".join(filter(None, (force_words, rest_words, times_words, ends_words)))
     return Thresholds(settings=settings, words=f"thresholds chosen from the recordings: {words}{seen}")
@@ -145,10 +147,6 @@ class _Scale:
     def has_rest(self) -> bool:
         """Whether the default thresholds of rest have a meaning."""
         return (self.gap, self.t) == ("m", "s")
-
-    @property
-    def defaults(self) -> str:
-        return f"contact {CONTACT_FORCE_N:g} N, rest below {REST_SPEED_M_S:g} m/s within {REST_WINDOW_S:g} s"
 
 
 @frozen(kw_only=True)
@@ -236,9 +234,9 @@ def _contact_force(measured: Sequence[_Noise], scale: _Scale) -> tuple[dict[str,
     most = 0.5 * reached
     typical = _TYPICAL * (float(np.median(peaks)) - base)
     above = max(needed - base, min(typical, most), _LEAST_FORCE_N if si else 0.0)
-    chosen = base + (min(_rounded_up(above), _MOST_FORCE_N) if si else _rounded_up(above))
+    chosen = base + (min(_rounded(above), _MOST_FORCE_N) if si else _rounded(above))
     if not si and chosen > float(np.quantile(peaks, 1.0 - _REACHING, method="lower")):
-        chosen = max(_rounded_down(min(noise.baseline for noise in measured)), _LEAST_FORCE_N)
+        chosen = max(_rounded(min(noise.baseline for noise in measured), math.floor), _LEAST_FORCE_N)
         return {"controller.contact_force_n": chosen}, (
             f"contact_force_n {chosen:g} {scale.force}, so that recordings are in contact from the beginning (their "
             "forces at the beginning differ by more than they grow later; if the fingers were free then, write zero)"
@@ -259,9 +257,7 @@ def _rest(
 ) -> tuple[dict[str, float], str]:
     """Return the rest speed and window if the defaults do not fit, and why."""
     noise = float(np.quantile([noise_.noise for noise_ in measured], _REACHING))
-    step = float(np.quantile([recording.step for recording in measured], 0.9))
-    period = float(np.quantile([recording.period for recording in measured], 0.9))
-    sampled = float(np.median([recording.sampled for recording in measured]))
+    step, period, sampled = _steps(measured)
     closing = float(np.median([recording.closing for recording in measured]))
     squeezing = [recording.squeezing for recording in measured if recording.squeezing > 0.0]
     slowest = _SQUEEZE_SHARE * float(np.median(squeezing)) if squeezing else _SLOW_SHARE * closing
@@ -270,7 +266,8 @@ def _rest(
         REST_WINDOW_S if scale.t == "s" else 0.0, 0.0 if scale.has_rest else MEASURED * sampled
     )
     if not default_speed > 0.0:  # the gap does not move, or there is none
-        return ({} if scale.has_rest else _never(measured)), ""
+        longest = max(float(recording.times[-1] - recording.times[0]) for recording in measured)
+        return ({} if scale.has_rest else {"controller.rest_window_s": _rounded(2.0 * longest)}), ""
     travel = max(noise, MARGIN * step)
     # Between samples that are further apart than the window, the gap may move for as long as they are apart.
     fits = travel <= default_speed * max(default_window, sampled) and MEASURED * period <= default_window
@@ -289,7 +286,7 @@ def _rest(
         del candidates[1:]
     # Steps of a coarse gap pass for noise while it moves, so the step alone is tried first.
     travels = sorted({MARGIN * step, travel}) if step else [travel]
-    pairs = [(v, _window(x / v, least, scale)) for x in travels for v in map(_rounded_up, candidates)]
+    pairs = [(v, _window(x / v, least, scale)) for x in travels for v in map(_rounded, candidates)]
     resting = [sum(recording.rests(contact, *pair) for recording in tried) for pair in pairs]
     enough = _REACHING * sum(bool((recording.both >= contact).any()) for recording in tried)
     chosen = next((k for k, count in enumerate(resting) if count >= enough), int(np.argmax(resting)))
@@ -308,14 +305,8 @@ def _rest(
 
 
 def _window(needed: float, least: float, scale: _Scale) -> float:
-    window = max(least, _rounded_up(needed))
+    window = max(least, _rounded(needed))
     return min(window, max(_MOST_WINDOW_S, least)) if scale.t == "s" else window
-
-
-def _never(measured: Sequence[_Noise]) -> dict[str, float]:
-    """Return a window that no recording is long enough for: a gap that was not recorded shows no rest."""
-    longest = max(float(noise.times[-1] - noise.times[0]) for noise in measured)
-    return {"controller.rest_window_s": _rounded_up(2.0 * longest)}
 
 
 def _ends(measured: Sequence[_Noise], scale: _Scale, contact: float) -> tuple[dict[str, float], str]:
@@ -337,11 +328,11 @@ def _ends(measured: Sequence[_Noise], scale: _Scale, contact: float) -> tuple[di
     else:
         travels = [_travel(noise, contact) for noise in measured]
         close = sum(travel < _SOON_M for travel in travels)
-        thin = sum(_is_thin(noise, contact) for noise in measured)
+        thin = sum(bool((noise.gap[noise.both >= contact] <= _CLOSED_M).any()) for noise in measured)
         parts = []
         if close:
             grown = -min(0.0, *travels)
-            wide = -_rounded_up(grown) if grown else 0.0
+            wide = -_rounded(grown) if grown else 0.0
             chosen["controller.too_wide_m"] = wide
             parts.append(
                 f"too_wide_m {wide:g} m ({close} of {len(measured)} recordings touch within {_SOON_M * 1e3:g} mm of "
@@ -362,11 +353,19 @@ def _ends(measured: Sequence[_Noise], scale: _Scale, contact: float) -> tuple[di
     return chosen, words
 
 
+def _steps(measured: Sequence[_Noise]) -> tuple[float, float, float]:
+    """Return the least step of the gap, the time between its measurements, and that between samples."""
+    rows = np.array([(noise.step, noise.period, noise.sampled) for noise in measured])
+    return (
+        float(np.quantile(rows[:, 0], 0.9)),
+        float(np.quantile(rows[:, 1], 0.9)),
+        float(np.median(rows[:, 2])),
+    )
+
+
 def _seen(measured: Sequence[_Noise], scale: _Scale) -> str:
     """Return in words how finely the gap was measured."""
-    step = float(np.quantile([noise.step for noise in measured], 0.9))
-    period = float(np.quantile([noise.period for noise in measured], 0.9))
-    sampled = float(np.median([noise.sampled for noise in measured]))
+    step, period, sampled = _steps(measured)
     unit = "ms" if scale.t == "s" else scale.t
     factor = 1e3 if scale.t == "s" else 1.0
     words = f"; samples are {factor * sampled:.3g} {unit} apart"
@@ -386,7 +385,7 @@ def _timeouts(
     longest = max(
         recording.readings[-1].frame.t_s - recording.readings[0].frame.t_s for recording in recordings
     )
-    limit = min(_rounded_up(longest), _MOST_TIMEOUT_S) if scale.t == "s" else _rounded_up(longest)
+    limit = min(_rounded(longest), _MOST_TIMEOUT_S) if scale.t == "s" else _rounded(longest)
     chosen = {f"controller.{key}": limit for key, value in timeouts_s.items() if value < longest}
     if not chosen:
         return {}, ""
@@ -398,11 +397,6 @@ def _travel(noise: _Noise, contact: float) -> float:
     """Return how far the gap has closed when both pads touch; infinite if never, or from the first sample on."""
     touched = np.flatnonzero(noise.both >= contact)
     return float(noise.gap[0] - noise.gap[touched[0]]) if len(touched) and touched[0] else math.inf
-
-
-def _is_thin(noise: _Noise, contact: float) -> bool:
-    """Return whether both pads feel an object in a gap in which the fingers count as closed."""
-    return bool((noise.gap[noise.both >= contact] <= _CLOSED_M).any())
 
 
 def _loaded(force: Numbers, baseline: float) -> int:
@@ -472,17 +466,9 @@ def _scatter_of_differences(values: Numbers) -> float:
     return _NORMAL * float(np.median(np.abs(curvature - np.median(curvature)))) / math.sqrt(6.0)
 
 
-def _rounded_down(value: float) -> float:
-    """Return the value with two significant digits, not larger; 0 for one that is not positive."""
+def _rounded(value: float, whole: Callable[[float], int] = math.ceil) -> float:
+    """Return the value with two significant digits, not smaller unless `whole` rounds otherwise; at least 0."""
     if value <= 0.0:
         return 0.0
     digits = 1 - math.floor(math.log10(value))
-    return math.floor(round(value * 10.0**digits, 6)) / 10.0**digits
-
-
-def _rounded_up(value: float) -> float:
-    """Return the value with two significant digits, not smaller."""
-    if value <= 0.0:
-        return 0.0
-    digits = 1 - math.floor(math.log10(value))
-    return round(math.ceil(round(value * 10.0**digits, 6)) / 10.0**digits, max(digits, 0))
+    return round(whole(round(value * 10.0**digits, 6)) / 10.0**digits, max(digits, 0))
