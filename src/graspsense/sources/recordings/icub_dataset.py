@@ -55,9 +55,8 @@ def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = F
     With `unreliable`, the class that the author calls unreliable is included. A file that cannot be read is left out,
     with a note. Raises ConfigError if there are no grasps, DataDamaged if none can be read.
     """
-    paths = _grasps(folder)
-    left_out = [path for path, label, _ in paths if label == UNRELIABLE] if not unreliable else []
-    paths = [named for named in paths if named[0] not in left_out]
+    every = _grasps(folder)
+    paths = [named for named in every if unreliable or named[1] != UNRELIABLE]
     if not paths:
         raise ConfigError(
             f"all grasps in {folder} are of {UNRELIABLE}, which the author calls unreliable: include them with "
@@ -78,9 +77,9 @@ def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = F
         "class, object and session are the same here: no rate tells whether the squeeze or the session is recognised",
         *note_on(unreadable, len(read)),
     ]
-    if left_out:
+    if len(paths) < len(every):
         notes.append(
-            f"{counted(len(left_out), 'grasp')} of {UNRELIABLE} left out: their author calls them unreliable "
+            f"{counted(len(every) - len(paths), 'grasp')} of {UNRELIABLE} left out: their author calls them unreliable "
             f"(include them with {option('unreliable', python='unreliable=True')})"
         )
     without = int(np.isnan(table.values).all(axis=1).sum())
