@@ -230,7 +230,8 @@ def parse(text: str) -> Expression:
         ) from None
     except (ValueError, RecursionError, MemoryError):
         raise ExpressionError(f"{body[:60]!r} is not an expression, or is nested too deep") from None
-    _check(tree, body, 0)
+    for node, why in _refused(tree):
+        raise _error(body, getattr(node, "col_offset", 0), why)
     return Expression(text=body, unit=unit, tree=tree)
 
 
@@ -247,40 +248,35 @@ def _body_and_unit(text: str) -> tuple[str, str]:
     return (body.rstrip(), unit.strip()) if is_unit else (text, "")
 
 
-def _check(node: ast.AST, text: str, depth: int) -> None:
-    """Raise ExpressionError at the first node that is not in the closed list."""
-    offset = getattr(node, "col_offset", 0)
-    if depth > 50:
-        raise _error(text, offset, "it is nested too deep")
+def _refused(node: ast.AST, depth: int = 0) -> Iterator[tuple[ast.AST, str]]:
+    """Yield each node that is not in the closed list, and why."""
     inner: Sequence[ast.AST] = ()
-    if isinstance(node, ast.Constant):
+    if depth > 50:
+        yield node, "it is nested too deep"
+    elif isinstance(node, ast.Constant):
         if type(node.value) not in (int, float, str):
-            raise _error(text, offset, f"{node.value!r} is not a number")
-        if isinstance(node.value, int | float) and not abs(node.value) <= LARGEST:
-            raise _error(text, offset, f"a number is at most {LARGEST:g}")
+            yield node, f"{node.value!r} is not a number"
+        elif isinstance(node.value, int | float) and not abs(node.value) <= LARGEST:
+            yield node, f"a number is at most {LARGEST:g}"
     elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.UAdd | ast.USub):
         inner = (node.operand,)
     elif isinstance(node, ast.BinOp):
         if type(node.op) not in _OPERATORS:
-            raise _error(text, offset, "there are + - * /, and the functions " + ", ".join(FUNCTIONS))
+            yield node, "there are + - * /, and the functions " + ", ".join(FUNCTIONS)
         inner = (node.left, node.right)
     elif isinstance(node, ast.Subscript):
         if not _is_component(node.slice):
-            raise _error(
-                text,
-                offset,
-                "write the number of a component in brackets, counted from 0: force[2], or cells[2::3] for every third",
-            )
+            wanted = "force[2], or cells[2::3] for every third"
+            yield node, f"write the number of a component in brackets, counted from 0: {wanted}"
         inner = (node.value,)
     elif isinstance(node, ast.Call):
-        inner = _checked_call(node, text, offset)
+        yield from ((node, why) for why in _wrong_in_call(node))
+        inner = node.args
     elif not isinstance(node, ast.Name):
-        kind = type(node).__name__
-        raise _error(
-            text, offset, f"{kind} is not allowed here: there are numbers, columns, + - * / and functions"
-        )
+        allowed = "there are numbers, columns, + - * / and functions"
+        yield node, f"{type(node).__name__} is not allowed here: {allowed}"
     for child in inner:
-        _check(child, text, depth + 1)
+        yield from _refused(child, depth + 1)
 
 
 def _is_component(index: ast.expr) -> bool:
@@ -292,20 +288,16 @@ def _is_component(index: ast.expr) -> bool:
     return len(numbers) == len(parts) and numbers[0] >= 0 and all(step > 0 for step in numbers[1:])
 
 
-def _checked_call(node: ast.Call, text: str, offset: int) -> Sequence[ast.AST]:
+def _wrong_in_call(node: ast.Call) -> Iterator[str]:
     name = node.func.id if isinstance(node.func, ast.Name) else ""
     if name not in FUNCTIONS:
-        raise _error(
-            text,
-            offset,
-            f"no function {name or 'of this kind'}. There are {', '.join(FUNCTIONS)}.{suggestion(name, FUNCTIONS)}",
-        )
+        known = ", ".join(FUNCTIONS)
+        yield f"no function {name or 'of this kind'}. There are {known}.{suggestion(name, FUNCTIONS)}"
     if node.keywords or any(isinstance(argument, ast.Starred) for argument in node.args):
-        raise _error(text, offset, f"{name} takes columns, separated by commas")
+        yield f"{name} takes columns, separated by commas"
     if not node.args or (name not in FOLDS and len(node.args) != 1):
         wanted = "at least one argument" if name in FOLDS else "one argument"
-        raise _error(text, offset, f"{name} takes {wanted}, and here are {len(node.args)}")
-    return node.args
+        yield f"{name} takes {wanted}, and here are {len(node.args)}"
 
 
 def _names(node: ast.AST) -> Iterator[ast.expr]:

@@ -119,19 +119,15 @@ def read_grasp(path: Path) -> IcubGrasp:
     lines = text.splitlines()
     if not lines:
         raise DataDamaged(f"{path} is empty: a grasp of the iCub data set starts with the line {FIRST_LINE}")
+    frames, left_over = divmod(len(lines) - 1, len(_LINES))
     if lines[0].strip() != FIRST_LINE:
-        raise _damaged(
-            path, 1, f"it starts with {lines[0][:40]!r}, but a grasp starts with the line {FIRST_LINE}"
-        )
+        begins = f"it starts with {lines[0][:40]!r}, but a grasp starts with the line {FIRST_LINE}"
+        raise _damaged(path, 1, begins)
     if not text.endswith("\n"):
         raise _damaged(path, len(lines), "the file ends within this line: download it again")
-    frames, left_over = divmod(len(lines) - 1, len(_LINES))
     if left_over:
-        raise _damaged(
-            path,
-            len(lines),
-            f"the file ends after {left_over} of the {len(_LINES)} lines of frame {frames + 1}: download it again",
-        )
+        ends = f"the file ends after {left_over} of the {len(_LINES)} lines of frame {frames + 1}"
+        raise _damaged(path, len(lines), f"{ends}: download it again")
     if not frames:
         raise _damaged(path, 1, "there is no frame after the first line")
     rows = [_numbers(path, 2 + i, line, *_LINES[i % len(_LINES)]) for i, line in enumerate(lines[1:])]
