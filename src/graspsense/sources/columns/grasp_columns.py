@@ -368,9 +368,8 @@ def _advice_on_times(columns: GraspColumns) -> str:
             + split
         )
     stamps, begins = np.unique(t_s, return_index=True)
-    whole = (
-        slice(1, None) if len(stamps) > 2 else slice(None)
-    )  # the first stamp may have begun before the recording
+    # The first stamp may have begun before the recording.
+    whole = slice(1, None) if len(stamps) > 2 else slice(None)
     rate_hz = float(np.ptp(begins[whole]) / np.ptp(stamps[whole]))
     resolution = float(np.diff(stamps).min())
     return (
@@ -451,17 +450,11 @@ def _array(columns: GraspColumns, name: str, values: Numbers) -> Channel:
         samples, axes = max(most_in_a_tick(columns.t_s, columns.times[name]), 1), width
     else:
         samples, axes = down, across
-    names = (
-        ("value",)
-        if axes == 1
-        else ("x", "y", "z")[:axes]
-        if axes <= 3
-        else tuple(f"axis_{k}" for k in range(axes))
-    )
+    names = {1: ("value",), 2: ("x", "y"), 3: ("x", "y", "z")}.get(axes) or [f"axis_{k}" for k in range(axes)]
     t_s = columns.times.get(name, columns.t_s)
     a_row = 1 if name in columns.times else samples
     rate_hz = a_row / float(np.median(np.diff(t_s))) if len(t_s) > 1 else 0.0
-    return FastChannel(name, columns.units.get(name, "1"), rate_hz, samples=samples, axes=names)
+    return FastChannel(name, columns.units.get(name, "1"), rate_hz, samples=samples, axes=tuple(names))
 
 
 def _readings(
