@@ -12,33 +12,30 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from math import ceil
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 from attrs import Attribute, evolve, field, frozen
 
 from graspsense.core.components.caller import option
 from graspsense.core.components.compiled_features import CompiledExtraction, both, compiled_extraction
-from graspsense.core.components.roles import BatchBackend, FeatureSet
+from graspsense.core.components.roles import BatchBackend, FeatureSet, ObjectKind
 from graspsense.core.components.strict import plain
 from graspsense.core.grasp.runner import run_uninterrupted
 from graspsense.core.learn.checkpoints import with_checkpoints
 from graspsense.core.learn.labelled import Labelled, class_of
 from graspsense.core.pipeline.wiring import check
+from graspsense.core.settings.resolved import Settings
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ComponentFailed, ConfigError, counted, named
 from graspsense.core.values.features import FeatureRows, Features
 from graspsense.core.values.limits import CLASSES
+from graspsense.core.values.trace import Trace
 from graspsense.recording.before_contact import (
     before_contact,
     before_contact_compiled,
     contact_force_of,
 )
 from graspsense.recording.controls import controls
-
-if TYPE_CHECKING:
-    from graspsense.core.components.roles import ObjectKind
-    from graspsense.core.settings.resolved import Settings
-    from graspsense.core.values.trace import Trace
 
 OBJECTS_PER_SEED: Final = 1000
 TRIALS_PER_SEED: Final = 1_000_000

@@ -9,16 +9,14 @@ from __future__ import annotations
 import math
 import zipfile
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, Final
+from typing import IO, Any, Final
 
 from numpy.lib import format as npy
+from numpy.typing import NDArray
 
 from graspsense.core.values.errors import DataDamaged
 from graspsense.recording.readable import readable, refuse_devices
 from graspsense.recording.unpacked import Unpacked
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _COMPRESSIONS: Final = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 """Those that NumPy writes. Others allocate what the file asks for."""

@@ -9,9 +9,10 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from graspsense.core.components.channels import from_json, further
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
@@ -27,10 +28,7 @@ from graspsense.sources.recordings.exported_grasp_tables import (
     refuse_table_of_store,
 )
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Arrays = Mapping[str, NDArray[Any]]
+Arrays = Mapping[str, NDArray[Any]]
 
 DECLARED: Final = "declared"
 """The array of one JSON text with the channels, units and rate of the gripper."""
