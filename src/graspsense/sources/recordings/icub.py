@@ -15,6 +15,7 @@ ring and little finger together (https://icub-tech-iit.github.io/documentation, 
 
 from __future__ import annotations
 
+from math import nan
 from pathlib import Path
 from typing import Final
 
@@ -152,23 +153,11 @@ def relative_readings(grasp: IcubGrasp) -> tuple[Reading, ...]:
     flexion_deg = (thumb_deg + finger_deg) / 2.0
     gap_m = START_GAP_M - GAP_M_PER_DEG * (flexion_deg - flexion_deg[0])
     velocity = np.diff(gap_m, prepend=gap_m[0])
-    forces = [tuple(row) for row in pressure.tolist()]
-    sides = list(map(opposed_forces(HAND), forces))
-    signals = signal_type(HAND)
+    forces, signals, sides = pressure.tolist(), signal_type(HAND), opposed_forces(HAND)
+    motions = zip(gap_m.tolist(), velocity.tolist(), forces, strict=True)
     return tuple(
-        Reading(
-            Frame(
-                t_s=float(k),
-                dt_s=1.0,
-                gap_m=float(gap_m[k]),
-                velocity_m_s=float(velocity[k]),
-                force_left_n=sides[k][0],
-                force_right_n=sides[k][1],
-            ),
-            NO_PADS,
-            signals(*forces[k]),
-        )
-        for k in range(len(grasp))
+        Reading(Frame(float(k), 1.0, gap, speed, nan, *sides(force)), NO_PADS, signals(*force))
+        for k, (gap, speed, force) in enumerate(motions)
     )
 
 
