@@ -12,33 +12,30 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from math import ceil
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import Any, Final, Literal, NamedTuple
 
 from attrs import Attribute, evolve, field, frozen
 
 from graspsense.core.components.caller import option
 from graspsense.core.components.compiled_features import CompiledExtraction, both, compiled_extraction
-from graspsense.core.components.roles import BatchBackend, FeatureSet
+from graspsense.core.components.roles import BatchBackend, FeatureSet, ObjectKind
 from graspsense.core.components.strict import plain
 from graspsense.core.grasp.runner import run_uninterrupted
 from graspsense.core.learn.checkpoints import with_checkpoints
 from graspsense.core.learn.labelled import Labelled, class_of
 from graspsense.core.pipeline.wiring import check
+from graspsense.core.settings.resolved import Settings
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ComponentFailed, ConfigError, counted, named
 from graspsense.core.values.features import FeatureRows, Features
 from graspsense.core.values.limits import CLASSES
+from graspsense.core.values.trace import Trace
 from graspsense.recording.before_contact import (
     before_contact,
     before_contact_compiled,
     contact_force_of,
 )
 from graspsense.recording.controls import controls
-
-if TYPE_CHECKING:
-    from graspsense.core.components.roles import ObjectKind
-    from graspsense.core.settings.resolved import Settings
-    from graspsense.core.values.trace import Trace
 
 OBJECTS_PER_SEED: Final = 1000
 TRIALS_PER_SEED: Final = 1_000_000
@@ -70,8 +67,7 @@ def _check_trials(group: object, attribute: Attribute[Any], value: int | None) -
         raise ValueError(f"{value} trials: give at most {TRIALS_PER_SEED}")
 
 
-@frozen
-class PlannedTrial:
+class PlannedTrial(NamedTuple):
     """One trial to simulate: its label, the name of its object, and the number of the instance within its group."""
 
     label: str
@@ -105,26 +101,27 @@ class Group:
         """Return the number of its trials. Raises ConfigError."""
         if self.total is not None:
             return self.total
-        return self.trials * sum(map(len, self._instances(self._pairs(kinds))))
+        return self.trials * sum(len(instances) for *_, instances in self._states(kinds))
 
     def planned(self, kinds: Sequence[ObjectKind]) -> list[PlannedTrial]:
         """Return the trials of the group; `kinds` are those that the gripper can simulate. Raises ConfigError."""
-        pairs = self._pairs(kinds)
-        n, instances = len(pairs), self._instances(pairs)
+        states = self._states(kinds)
         if self.total is None:
             return [
                 PlannedTrial(label, name, i)
-                for k, (label, name) in enumerate(pairs)
-                for i in instances[k]
+                for label, name, instances in states
+                for i in instances
                 for _ in range(self.trials)
             ]
-        places = sorted(
-            (k % n, instances[k % n][(k // n) % len(instances[k % n])]) for k in range(self.total)
-        )
-        return [PlannedTrial(*pairs[k], i) for k, i in places]
+        dealt = (divmod(k, len(states)) for k in range(self.total))
+        places = sorted((state, states[state][2][turn % len(states[state][2])]) for turn, state in dealt)
+        return [PlannedTrial(*states[state][:2], i) for state, i in places]
 
-    def _pairs(self, kinds: Sequence[ObjectKind]) -> list[tuple[str, str]]:
-        """Return each label with the object that it stands for. Raises ConfigError."""
+    def _states(self, kinds: Sequence[ObjectKind]) -> list[tuple[str, str, range]]:
+        """Return each label, the object that it stands for, and the instances that are grasped of it.
+
+        Raises ConfigError, also if a label has no instances.
+        """
         known = {**{name: name for name in _full_names(self.objects, kinds)}, **self.named}
         if any("#" in name for name in (*known, *known.values())):
             raise ConfigError(
@@ -132,23 +129,21 @@ class Group:
             )
         if too_many := CLASSES.exceeded(len(known)):
             raise ConfigError(f"the objects to simulate: {too_many}")
-        return list(known.items())
-
-    def _instances(self, pairs: Sequence[tuple[str, str]]) -> list[range]:
-        """Return the instances that each label is grasped of. Raises ConfigError if there are none."""
-        return [self._instances_of(k, pairs) for k in range(len(pairs))]
-
-    def _instances_of(self, k: int, pairs: Sequence[tuple[str, str]]) -> range:
-        """Return the instances that label number `k` of these is grasped of. Raises ConfigError if there are none."""
         if self.states_per_instance == "all":
-            return range(self.instances)
-        same_class = [i for i, (label, _) in enumerate(pairs) if class_of(label) == class_of(pairs[k][0])]
-        if len(same_class) > self.instances:
+            return [(label, name, range(self.instances)) for label, name in known.items()]
+        of_class: dict[str, list[str]] = {}
+        for label in known:
+            of_class.setdefault(class_of(label), []).append(label)
+        most = next((len(labels) for labels in of_class.values() if len(labels) > self.instances), 0)
+        if most:
             raise ConfigError(
-                f"{self.instances} instances cannot be in one of {len(same_class)} states each: give at least "
-                f"{len(same_class)} instances"
+                f"{self.instances} instances cannot be in one of {most} states each: give at least {most} instances"
             )
-        return range(same_class.index(k), self.instances, len(same_class))
+        siblings = {label: of_class[class_of(label)] for label in known}
+        return [
+            (label, name, range(siblings[label].index(label), self.instances, len(siblings[label])))
+            for label, name in known.items()
+        ]
 
 
 @frozen(kw_only=True)

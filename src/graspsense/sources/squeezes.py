@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from attrs import evolve
 
@@ -13,11 +12,9 @@ from graspsense.core.components.caller import option
 from graspsense.core.components.identification import RecordedSqueeze
 from graspsense.core.learn.labelled import class_of
 from graspsense.core.values.errors import ConfigError, suggestion
+from graspsense.recording.recorded_grasp import RecordedGrasp
 from graspsense.store.naming import STORE, as_source
 from graspsense.store.stored_grasps import parse_trial_ref
-
-if TYPE_CHECKING:
-    from graspsense.recording.recorded_grasp import RecordedGrasp
 
 
 def recorded_squeezes(sources: Sequence[str], name: str | None = None) -> tuple[RecordedSqueeze, ...]:

@@ -5,24 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import Any, Final, Literal
 
 from attrs import evolve, field, fields_dict, frozen
 
+from graspsense.core.components.roles import FeatureSet
 from graspsense.core.components.strict import ValidationFailed, structured
 from graspsense.core.learn.checkpoints import with_checkpoints
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.settings.layers import KINDS, read_toml, toml_kind
+from graspsense.core.settings.resolved import Settings
 from graspsense.core.values.errors import ConfigError, PluginUnavailable
 from graspsense.core.values.label_text import alike_words, spelled_alike
+from graspsense.core.values.trace import Trace
 from graspsense.sources.identified import IDENTIFIED, gripper_flags, identified_scenes
 from graspsense.sources.simulated import Group, simulated
 from graspsense.store.naming import STORE, as_source
-
-if TYPE_CHECKING:
-    from graspsense.core.components.roles import FeatureSet
-    from graspsense.core.settings.resolved import Settings
-    from graspsense.core.values.trace import Trace
 
 SIMULATED: Final = "simulated"
 _OF_TOML: Final = {

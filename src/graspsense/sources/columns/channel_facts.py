@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from attrs import frozen
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Numbers = NDArray[np.float64]
+from graspsense.sources.formats.table import Numbers
 
 _ROUNDING: Final = 1e-9
 """Share of the range of a channel below which the step between two values is one of rounding."""

@@ -8,19 +8,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from attrs import frozen
 
+from graspsense.sources.formats.table import ColumnTable, Numbers
 from graspsense.sources.units import GRAM_FORCE, WITHOUT_UNIT, known_unit
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from graspsense.sources.formats.table import ColumnTable
-
-    Numbers = NDArray[np.float64]
 
 TIME_WORDS: Final = frozenset((
     "t", "time", "times", "timestamp", "stamp", "stamps", "seconds", "sec", "elapsed", "clock",

@@ -6,16 +6,12 @@ shows no such moment; then nothing in the recording tells a slow topic from a cl
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from graspsense.sources.columns.usual_range import usual_range
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Numbers = NDArray[np.float64]
+from graspsense.sources.formats.table import Numbers
 
 LEAST_S: Final = 0.015
 MOST_S: Final = 0.05

@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final
 
 import numpy as np
 from attrs import evolve, field, frozen
+from numpy.typing import NDArray
 
-from graspsense.core.components.channels import cells_of, no_signals, signal_type
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.errors import DataDamaged, counted
 from graspsense.core.values.events import GraspEvent
 from graspsense.core.values.fingers import FingerForce, opposed_forces
-from graspsense.core.values.signals import NO_PADS, Frame, Image, Phase, Reading, Samples
+from graspsense.core.values.signals import NO_PADS, Frame, Phase, Reading, Samples
 from graspsense.recording.replayable import Recording
-from graspsense.sources.columns.fast_samples import latest_values, most_in_a_tick, sample_blocks
+from graspsense.sources.columns.fast_samples import most_in_a_tick, signals_in_ticks, values_in_ticks
+from graspsense.sources.formats.table import Numbers
 from graspsense.sources.formats.topic_clocks import Messages, common_clock
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Numbers = NDArray[np.float64]
 
 Spans = tuple[tuple[float, float], ...]
 """Begin and end (s) of each of several events."""
@@ -43,6 +39,10 @@ PLAUSIBLE: Final = {
     "time between samples": (0.0, 1.0, "s", {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}),
 }
 """Quantity to its plausible range, the unit of that, and the units that a column out of range is most likely in."""
+
+
+_NAMES: Final = ("t_s", "gap_m", "left_n", "right_n", "effort_n", "velocity_m_s")
+"""The columns of a grasp that are no further channels."""
 
 
 @frozen(kw_only=True, eq=False)
@@ -102,15 +102,11 @@ class GraspColumns:
 
     def rows(self, which: Any, part: str = "") -> GraspColumns:
         """Return these samples (a slice, numbers, or a mask); `part` says in words which they are."""
+        named = {name: values[which] for name in _NAMES if (values := getattr(self, name)) is not None}
         return evolve(
             self,
             source=f"{self.source}, {part}" if part else self.source,
-            t_s=self.t_s[which],
-            gap_m=self.gap_m[which],
-            left_n=self.left_n[which],
-            right_n=self.right_n[which],
-            effort_n=None if self.effort_n is None else self.effort_n[which],
-            velocity_m_s=None if self.velocity_m_s is None else self.velocity_m_s[which],
+            **named,
             scalars=self._rows(self.scalars, which),
             arrays=self._rows(self.arrays, which),
             times=self._rows(self.times, which),
@@ -224,7 +220,8 @@ def checked_recording(columns: GraspColumns, *, rate_hz: float | None = None) ->
     another shape than `shapes` says, if most samples have no number, if a time does not increase, or if a value is in
     another unit. It names the column.
     """
-    _check_lengths(columns)
+    for misfit in _misfits(columns):
+        raise DataDamaged(f"{columns.source}: {misfit}")
     columns = _within_ticks(without_missing(columns))
     steps = _time_steps(columns, rate_hz)
     _check_complete(columns)
@@ -264,46 +261,46 @@ def _events(columns: GraspColumns) -> dict[str, tuple[GraspEvent, ...]]:
     }
 
 
-def _check_lengths(columns: GraspColumns) -> None:
-    """Raise DataDamaged for the first column without one row for each time, or with another number of dimensions."""
-    n = len(columns)
-    named = {
-        name: getattr(columns, name)
-        for name in ("t_s", "gap_m", "left_n", "right_n", "effort_n", "velocity_m_s")
-        if getattr(columns, name) is not None
-    }
+def _misfits(columns: GraspColumns) -> Iterator[str]:
+    """Yield how columns differ in length, number of dimensions or names from what is needed."""
     for name, time_s in columns.times.items():
         if name not in columns.scalars and name not in columns.arrays:
-            raise DataDamaged(
-                f"{columns.source}: `times` names {name!r}, which is neither a scalar nor an array"
-            )
+            yield f"`times` names {name!r}, which is neither a scalar nor an array"
         wrong = np.flatnonzero(~(np.diff(time_s) > 0.0)) if np.ndim(time_s) == 1 else np.zeros(1, int)
         if len(wrong) or not np.isfinite(time_s).all():
-            raise DataDamaged(
-                f"{columns.source}: the times of {name!r} do not increase at sample {_second(wrong)}"
-            )
+            place = str(int(wrong[0]) + 2) if len(wrong) else "that is no number"
+            yield f"the times of {name!r} do not increase at sample {place}"
+    named = {name: values for name in _NAMES if (values := getattr(columns, name)) is not None}
     for name, values in (*named.items(), *columns.scalars.items(), *columns.arrays.items()):
-        dimensions = 2 if name in columns.arrays else 1
+        dimensions, needed = (2, "row") if name in columns.arrays else (1, "number")
         if np.ndim(values) != dimensions:
-            raise DataDamaged(
-                f"{columns.source}: {name!r} has the shape {np.shape(values)}, and "
-                + (
-                    "one row for each sample is needed"
-                    if dimensions == 2
-                    else "one number for each sample is needed"
-                )
-            )
-        rows = len(columns.times[name]) if name in columns.times else n
-        if len(values) != rows:
-            wanted = f"`times` has {rows} for it" if name in columns.times else f"t_s has {rows}"
-            raise DataDamaged(f"{columns.source}: {name!r} has {len(values)} samples, and {wanted}")
+            yield f"{name!r} has the shape {np.shape(values)}, and one {needed} for each sample is needed"
+        place, rows = ("`times`", columns.times[name]) if name in columns.times else ("t_s", columns.t_s)
+        if len(values) != len(rows):
+            behind = " for it" if name in columns.times else ""
+            yield f"{name!r} has {len(values)} samples, and {place} has {len(rows)}{behind}"
     for finger in columns.fingers:
         if finger.name not in columns.scalars:
-            raise DataDamaged(f"{columns.source}: `fingers` names {finger.name!r}, which is not in `scalars`")
+            yield f"`fingers` names {finger.name!r}, which is not in `scalars`"
     for name in sorted(columns.fast - columns.arrays.keys()):
-        raise DataDamaged(f"{columns.source}: `fast` names {name!r}, which is not in `arrays`")
+        yield f"`fast` names {name!r}, which is not in `arrays`"
     for name, values in columns.arrays.items():
-        _check_shape(columns, name, values.shape[1])
+        yield from _misfits_of_shape(columns, name, values.shape[1])
+
+
+def _misfits_of_shape(columns: GraspColumns, name: str, width: int) -> Iterator[str]:
+    """Yield that a channel does not have the shape that `shapes` says, or needs one and has none."""
+    shape = columns.shapes.get(name)
+    own = name in columns.times
+    if name in columns.fast and shape is None and not own and width > 1:
+        yield (
+            f"the fast channel {name!r} has {width} numbers a sample, which can be axes or samples: write "
+            f"shapes={{{name!r}: (1, {width})}} for {width} axes, ({width}, 1) for {width} samples, or give the times "
+            "of its own samples in `times`"
+        )
+    per_row = 1 if shape is None else (shape[1] if own and name in columns.fast else math.prod(shape))
+    if shape is not None and per_row != width:
+        yield f"{name!r} has {width} numbers a sample, and `shapes` says {' x '.join(map(str, shape))}"
 
 
 def _within_ticks(columns: GraspColumns) -> GraspColumns:
@@ -323,27 +320,6 @@ def _within_ticks(columns: GraspColumns) -> GraspColumns:
             arrays[name], times[name] = arrays[name][within], time_s[within]
             notes.append(f"{int((~within).sum())} samples of {name} are before or after those of the gap")
     return evolve(columns, arrays=arrays, times=times, notes=tuple(notes))
-
-
-def _second(wrong: NDArray[np.int64]) -> str:
-    return str(int(wrong[0]) + 2) if len(wrong) else "that is no number"
-
-
-def _check_shape(columns: GraspColumns, name: str, width: int) -> None:
-    """Raise DataDamaged if a channel does not have the shape that `shapes` says, or needs one and has none."""
-    shape = columns.shapes.get(name)
-    own = name in columns.times
-    if name in columns.fast and shape is None and not own and width > 1:
-        raise DataDamaged(
-            f"{columns.source}: the fast channel {name!r} has {width} numbers a sample, which can be axes or samples: "
-            f"write shapes={{{name!r}: (1, {width})}} for {width} axes, ({width}, 1) for {width} samples, or give the "
-            "times of its own samples in `times`"
-        )
-    per_row = 1 if shape is None else (shape[1] if own and name in columns.fast else math.prod(shape))
-    if shape is not None and per_row != width:
-        raise DataDamaged(
-            f"{columns.source}: {name!r} has {width} numbers a sample, and `shapes` says {' x '.join(map(str, shape))}"
-        )
 
 
 def _time_steps(columns: GraspColumns, rate_hz: float | None) -> Numbers:
@@ -392,9 +368,8 @@ def _advice_on_times(columns: GraspColumns) -> str:
             + split
         )
     stamps, begins = np.unique(t_s, return_index=True)
-    whole = (
-        slice(1, None) if len(stamps) > 2 else slice(None)
-    )  # the first stamp may have begun before the recording
+    # The first stamp may have begun before the recording.
+    whole = slice(1, None) if len(stamps) > 2 else slice(None)
     rate_hz = float(np.ptp(begins[whole]) / np.ptp(stamps[whole]))
     resolution = float(np.diff(stamps).min())
     return (
@@ -475,38 +450,11 @@ def _array(columns: GraspColumns, name: str, values: Numbers) -> Channel:
         samples, axes = max(most_in_a_tick(columns.t_s, columns.times[name]), 1), width
     else:
         samples, axes = down, across
-    names = (
-        ("value",)
-        if axes == 1
-        else ("x", "y", "z")[:axes]
-        if axes <= 3
-        else tuple(f"axis_{k}" for k in range(axes))
-    )
+    names = {1: ("value",), 2: ("x", "y"), 3: ("x", "y", "z")}.get(axes) or [f"axis_{k}" for k in range(axes)]
     t_s = columns.times.get(name, columns.t_s)
     a_row = 1 if name in columns.times else samples
     rate_hz = a_row / float(np.median(np.diff(t_s))) if len(t_s) > 1 else 0.0
-    return FastChannel(name, columns.units.get(name, "1"), rate_hz, samples=samples, axes=names)
-
-
-def _series(columns: GraspColumns, channel: Channel, values: Numbers) -> list[Any]:
-    """Return the value of a further channel in each tick."""
-    own, times = columns.times.get(channel.name), columns.t_s
-    if isinstance(channel, FastChannel):
-        if own is not None:
-            return sample_blocks(times, own, values, channel)
-        return _blocks(times.tolist(), values, channel)
-    sampled_s = times if own is None else own
-    rows: list[Any] = [] if isinstance(channel, TactileArray) else values.tolist()
-    nothing: Any = math.nan
-    if isinstance(channel, TactileArray):
-        rows = [
-            Image(t_s, k, cells_of(channel, row))
-            for k, (t_s, row) in enumerate(zip(sampled_s.tolist(), values, strict=True), 1)
-        ]
-        nothing = no_signals((channel,))[0]
-    if own is None:
-        return rows
-    return latest_values(times, own, rows, nothing)
+    return FastChannel(name, columns.units.get(name, "1"), rate_hz, samples=samples, axes=tuple(names))
 
 
 def _readings(
@@ -516,17 +464,19 @@ def _readings(
     absent = [math.nan] * n
     efforts = absent if columns.effort_n is None else columns.effort_n.tolist()
     times = columns.t_s.tolist()
-    further: list[Any] = [()] * n
-    if channels:
-        make = signal_type(channels)._make  # type: ignore[attr-defined]
-        every = (*columns.scalars.values(), *columns.arrays.values())
-        series = [_series(columns, channel, values) for channel, values in zip(channels, every, strict=True)]
-        further = list(map(make, zip(*series, strict=True)))
+    every = (*columns.scalars.values(), *columns.arrays.values())
+    series = [
+        _blocks(times, values, channel)
+        if isinstance(channel, FastChannel) and channel.name not in columns.times
+        else values_in_ticks(columns.t_s, columns.times.get(channel.name), values, channel)
+        for channel, values in zip(channels, every, strict=True)
+    ]
     frames = zip(
         times, steps.tolist(), columns.gap_m.tolist(), velocities.tolist(), efforts, columns.left_n.tolist(),
         columns.right_n.tolist(), absent, absent, [0] * n, strict=True,
     )  # fmt: skip
-    return [Reading(Frame(*frame), NO_PADS, signals) for frame, signals in zip(frames, further, strict=True)]
+    signals = signals_in_ticks(channels, series, n)
+    return [Reading(Frame(*frame), NO_PADS, own) for frame, own in zip(frames, signals, strict=True)]
 
 
 def _blocks(times: Sequence[float], values: Numbers, channel: FastChannel) -> list[Samples]:

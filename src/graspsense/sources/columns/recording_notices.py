@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from attrs import evolve
@@ -13,11 +13,7 @@ from graspsense.core.control.contact import CONTACT_FORCE_N
 from graspsense.recording.labelled_recording import LabelledRecording
 from graspsense.recording.replayable import Recording
 from graspsense.sources.columns.usual_range import usual_range
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Numbers = NDArray[np.float64]
+from graspsense.sources.formats.table import Numbers
 
 FEWEST: Final = 20
 """Fewest samples from which on a force that has stopped is told from one that is steady."""

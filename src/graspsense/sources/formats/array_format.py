@@ -10,10 +10,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from attrs import evolve, frozen
+from numpy.typing import NDArray
 
 from graspsense.core.values.errors import ConfigError, DataDamaged, listed
 from graspsense.core.values.limits import RECORDINGS
@@ -23,10 +24,7 @@ from graspsense.sources.formats.numpy_files import npy_array, npz_arrays
 from graspsense.sources.formats.patterns import file_template
 from graspsense.sources.formats.table import ColumnTable, Numbers
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Arrays = Mapping[str, NDArray[Any]]
+Arrays = Mapping[str, NDArray[Any]]
 
 READERS: Final = {
     ".npz": npz_arrays,

@@ -12,16 +12,15 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
+
+from numpy.typing import NDArray
 
 from graspsense.core.values.errors import DataDamaged, PluginUnavailable, TooLarge
 from graspsense.core.values.limits import UNPACKED_MB
 from graspsense.recording.readable import refuse_devices
 from graspsense.recording.unpacked import limit_words
 from graspsense.sources.formats.numpy_files import npz_arrays
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 HDF5_HINT: Final = (
     'HDF5 needs h5py.\n  in a clone: pip install -e ".[hdf5]"     published: pip install "graspsense[hdf5]"'

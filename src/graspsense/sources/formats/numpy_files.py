@@ -9,24 +9,20 @@ from __future__ import annotations
 import math
 import zipfile
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, Final
+from typing import IO, Any, Final
 
-import numpy as np
 from numpy.lib import format as npy
+from numpy.typing import NDArray
 
 from graspsense.core.values.errors import DataDamaged
 from graspsense.recording.readable import readable, refuse_devices
 from graspsense.recording.unpacked import Unpacked
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _COMPRESSIONS: Final = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 """Those that NumPy writes. Others allocate what the file asks for."""
 _MEMBER: Final = ".npy"
 _END_BYTES: Final = 66_000
 """The largest end of an archive."""
-_PIECE: Final = 1 << 20
 
 
 def npy_array(path: Path) -> NDArray[Any]:
@@ -64,10 +60,10 @@ def _array(file: IO[bytes], size: int, source: str, unpacked: Unpacked) -> NDArr
     """Return the array in a file of so many bytes, or in a member of an archive."""
     version = npy.read_magic(file)
     if version == (1, 0):
-        shape, fortran, dtype = npy.read_array_header_1_0(file)
+        shape, _, dtype = npy.read_array_header_1_0(file)
     elif version in ((2, 0), (3, 0)):
         # Version 3 differs in the encoding of the names of fields only, and numbers have none.
-        shape, fortran, dtype = npy.read_array_header_2_0(file)
+        shape, _, dtype = npy.read_array_header_2_0(file)
     else:
         raise DataDamaged(f"{source} has version {version} of the NPY format, which is not known")
     if dtype.hasobject:
@@ -84,12 +80,6 @@ def _array(file: IO[bytes], size: int, source: str, unpacked: Unpacked) -> NDArr
     if expected != there:
         raise DataDamaged(f"{source} has {there} bytes of numbers, but its shape {shape} has {expected}")
     unpacked.add(expected)
-    data = np.empty(expected, dtype=np.uint8)
-    done = 0
-    while done < expected:
-        read = file.readinto(data[done : done + _PIECE])  # type: ignore[attr-defined]
-        if not read:
-            raise DataDamaged(f"{source} ends after {done} of {expected} bytes")
-        done += read
-    values: NDArray[Any] = data.view(dtype).reshape(shape, order="F" if fortran else "C")
+    file.seek(0)
+    values: NDArray[Any] = npy.read_array(file, allow_pickle=False)
     return values

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from typing import Final, Protocol
+from typing import Final
 
 import re2
 from attrs import frozen
@@ -28,27 +28,7 @@ class PatternError(ValueError):
     """A pattern that cannot be used, with the reason."""
 
 
-class Match(Protocol):
-    """Where a pattern matches a text, as of `re.Match`."""
-
-    def groupdict(self, default: str | None = None) -> dict[str, str]:
-        """Return the text of each named group."""
-        ...
-
-
-class RegularExpression(Protocol):
-    """A compiled regular expression, as of `re.Pattern`."""
-
-    def search(self, text: str) -> Match | None:
-        """Return the first match anywhere in a text."""
-        ...
-
-    def fullmatch(self, text: str) -> Match | None:
-        """Return the match of a whole text."""
-        ...
-
-
-def regular_expression(text: str) -> RegularExpression:
+def regular_expression(text: str) -> re.Pattern[str]:
     r"""Return the compiled regular expression. Raises PatternError that says why it cannot be used.
 
     >>> regular_expression(r"begin (?P<label>\w+)").search("begin jar").groupdict()
@@ -63,9 +43,9 @@ def _check_length(text: str) -> None:
         raise PatternError(f"a pattern has at most {LONGEST_PATTERN} characters, and this has {len(text)}")
 
 
-def _compiled(text: str) -> RegularExpression:
+def _compiled(text: str) -> re.Pattern[str]:
     try:
-        compiled: RegularExpression = re2.compile(text, _options())
+        compiled: re.Pattern[str] = re2.compile(text, _options())
     except (re2.error, UnicodeEncodeError) as error:
         said = error.args[0] if error.args else ""
         words = said.decode(errors="replace") if isinstance(said, bytes) else str(error)
@@ -78,7 +58,7 @@ def _compiled(text: str) -> RegularExpression:
     return compiled
 
 
-def wildcard(text: str) -> RegularExpression:
+def wildcard(text: str) -> re.Pattern[str]:
     """Return the pattern of names in which `*` stands for any text, `?` for any character and `[ab]` for a choice.
 
     Raises PatternError.
@@ -107,7 +87,7 @@ class FileTemplate:
     text: str
     pieces: tuple[tuple[str, str], ...]
     """The regular expression of each piece, with the name of its field, empty if it is none."""
-    whole: RegularExpression
+    whole: re.Pattern[str]
     """The pieces in a row, in which a field that is named again may have any value."""
 
     def fields(self, path: str) -> dict[str, str] | None:

@@ -1,37 +1,58 @@
-"""The tables in a file as they are, without a manifest."""
+"""The tables in a file: the one place that says which reader is for which ending."""
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import Final
 
+from attrs import field, frozen
+
 from graspsense.core.values.errors import ConfigError
 from graspsense.recording.readable import refuse_devices
+from graspsense.sources.formats.array_format import ARRAY_SUFFIXES, ArrayRules, read_arrays
 from graspsense.sources.formats.table import ColumnTable
 from graspsense.sources.formats.text_table import JSON_LINES, text_suffix
 
 TEXT_SUFFIXES: Final = (".csv", ".tsv", ".txt", ".dat", ".data", *JSON_LINES)
 BAG_SUFFIXES: Final = (".bag", ".mcap", ".db3")
 PARQUET_SUFFIXES: Final = (".parquet", ".pq")
+READ_SUFFIXES: Final = (*TEXT_SUFFIXES, *ARRAY_SUFFIXES, *BAG_SUFFIXES, *PARQUET_SUFFIXES)
 
 
-def raw_tables(path: Path) -> list[ColumnTable]:
-    """Return the tables in a file: one for each topic of a bag. Raises ConfigError, TooLarge, DataDamaged."""
+@frozen(kw_only=True)
+class TableRules:
+    """What a manifest says of the tables in its files: the line that begins each, their arrays, the topics of bags.
+
+    With no `topics`, all of a bag are read.
+    """
+
+    start: str = ""
+    arrays: ArrayRules = field(factory=ArrayRules)
+    topics: Collection[str] = ()
+
+
+def raw_tables(path: Path, rules: TableRules | None = None) -> list[ColumnTable]:
+    """Return the tables in a file. Without rules, they are as they come: one for each topic of a bag.
+
+    With rules, a file without an ending is a text. Raises ConfigError, PluginUnavailable, TooLarge, DataDamaged.
+    """
     refuse_devices(path)
-    suffix = path.suffix.lower()
+    suffix, given = path.suffix.lower(), rules or TableRules()
     if path.is_dir() or suffix in BAG_SUFFIXES:
-        from graspsense.sources.formats.ros_format import read_topics
+        from graspsense.sources.formats.ros_format import read_bag, read_topics
 
-        return read_topics(path)
+        return read_topics(path) if rules is None else read_bag(path, rules.topics)
     if suffix in PARQUET_SUFFIXES:
         from graspsense.sources.formats.parquet_format import read_parquet
 
         return read_parquet(path)
-    from graspsense.sources.formats.array_format import ARRAY_SUFFIXES, read_arrays
-    from graspsense.sources.formats.text_format import read_text
-
     if suffix in ARRAY_SUFFIXES:
-        return read_arrays(path)
-    if text_suffix(path) in TEXT_SUFFIXES:
-        return read_text(path)
-    raise ConfigError(f"{path}: no reader for {suffix or 'such'} files")
+        return read_arrays(path, given.arrays)
+    if text_suffix(path) in TEXT_SUFFIXES or (rules is not None and not text_suffix(path)):
+        from graspsense.sources.formats.text_format import read_text
+
+        return read_text(path, given.start)
+    raise ConfigError(
+        f"{path}: no reader for {suffix or 'such'} files. Files are read as {', '.join(READ_SUFFIXES)}"
+    )

@@ -11,7 +11,7 @@ import csv
 import json
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -373,19 +373,14 @@ def _cells_of(value: Any, name: str, depth: int) -> Iterator[tuple[str, str]]:
     """Yield the name and the text of each value in a JSON value: `pads.left`, `taxels.0`."""
     if depth > _MOST_JSON_PARTS:
         raise ValueError(f"it is nested deeper than {_MOST_JSON_PARTS}")
-    parts: Mapping[str, Any] | None = None
+    if isinstance(value, list):
+        value = {str(k): part for k, part in enumerate(value)}
     if isinstance(value, dict):
-        parts = value
-    elif isinstance(value, list):
-        parts = {str(k): inner for k, inner in enumerate(value)}
-    if parts is None:
-        yield (
-            name,
-            "" if value is None else str(int(value)) if isinstance(value, bool) else str(value).strip(),
-        )
-        return
-    for key, part in parts.items():
-        yield from _cells_of(part, f"{name}.{key}" if name else key, depth + 1)
+        for key, part in value.items():
+            yield from _cells_of(part, f"{name}.{key}" if name else key, depth + 1)
+    else:
+        text = str(int(value)) if isinstance(value, bool) else str(value).strip()
+        yield name, "" if value is None else text
 
 
 def _sample(lines: Sequence[Any]) -> list[Any]:

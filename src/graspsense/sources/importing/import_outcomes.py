@@ -104,17 +104,14 @@ def refuse_useless(
 
 def _refuse_below_zero(recordings: Sequence[ImportedRecording]) -> None:
     """Raise ConfigError if the forces of most recordings are below zero throughout."""
-    frames = [
-        [reading.frame for reading in recording.labelled.recording.readings] for recording in recordings
-    ]
-    below = sum(
-        max((min(each.force_left_n, each.force_right_n) for each in grasp), default=0.0) < 0.0
-        for grasp in frames
-    )
-    if len(frames) < FEWEST or 2 * below <= len(frames):
+    below = 0
+    for recording in recordings:
+        frames = (reading.frame for reading in recording.labelled.recording.readings)
+        below += max((min(each.force_left_n, each.force_right_n) for each in frames), default=0.0) < 0.0
+    if len(recordings) < FEWEST or 2 * below <= len(recordings):
         return
     raise ConfigError(
-        f"the force of {below} of {len(frames)} recordings is below zero throughout, so that no contact can be found. "
-        'If the fingers were free at the beginning, write zero = "10 samples" in the manifest; else subtract the known '
-        'zero of the sensor: force = "FORCE + OFFSET". If it falls on contact, turn its sign: -FORCE'
+        f"the force of {below} of {len(recordings)} recordings is below zero throughout, so that no contact can be "
+        'found. If the fingers were free at the beginning, write zero = "10 samples" in the manifest; else subtract '
+        'the known zero of the sensor: force = "FORCE + OFFSET". If it falls on contact, turn its sign: -FORCE'
     )

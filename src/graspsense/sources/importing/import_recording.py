@@ -5,33 +5,30 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from attrs import evolve
 
+from graspsense.core.components.registry import Plugins
 from graspsense.core.learn.labelled import class_of
 from graspsense.core.pipeline.pipeline import grasp_with
+from graspsense.core.settings.resolved import Settings
 from graspsense.core.values.errors import FAILURES
 from graspsense.core.values.events import LABELLED
+from graspsense.core.values.features import Features
 from graspsense.core.values.signals import Reading
+from graspsense.core.values.trace import Trace
+from graspsense.core.values.trial import Trial
 from graspsense.recording.atomic_file import SaveFailed
+from graspsense.recording.labelled_recording import LabelledRecording
 from graspsense.recording.layout import DEVICE, RESULT, START, TICK, pads_numbers, pads_topic, signal_topics
 from graspsense.recording.recorded_grasp import with_phases_of
-from graspsense.recording.replayable import content_sha256
+from graspsense.recording.replayable import Recording, content_sha256
 from graspsense.recording.trial_record import TrialRecord
 from graspsense.recording.writer import RecordingWriter
 from graspsense.sources.recordings.labelled_recordings import trace_of_recording
 from graspsense.store.imported_contents import CONTENT, ImportedContents
-
-if TYPE_CHECKING:
-    from graspsense.core.components.registry import Plugins
-    from graspsense.core.settings.resolved import Settings
-    from graspsense.core.values.features import Features
-    from graspsense.core.values.trace import Trace
-    from graspsense.core.values.trial import Trial
-    from graspsense.recording.labelled_recording import LabelledRecording
-    from graspsense.recording.replayable import Recording
-    from graspsense.store.store import Store
+from graspsense.store.store import Store
 
 
 def labels_of_recording(recording: LabelledRecording) -> dict[str, str]:

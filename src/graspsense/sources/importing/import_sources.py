@@ -22,7 +22,7 @@ from graspsense.sources.recordings.dataset_recordings import (
     readable_or_not,
 )
 from graspsense.sources.recordings.grasp_csv import named
-from graspsense.sources.recordings.replay import KINDS, how_to_get, kind_and_name, read_named
+from graspsense.sources.recordings.replay import KINDS, how_to_get, kind_and_name, known_kinds, read_named
 from graspsense.store.labels import labels_of
 
 CSV_SUFFIXES = (".csv", ".tsv", ".txt", *JSON_LINES)
@@ -100,7 +100,7 @@ def _named_by(
         yield ImportedRecording(source=source, name=name, labelled=_relabelled(numbered, label))
         return
     if kind not in KINDS:
-        kinds = ", ".join(f"{kind}:" for kind in dict.fromkeys((*KINDS, *datasets_with_recordings())))
+        kinds = ", ".join(f"{known}:" for known in known_kinds())
         raise ConfigError(
             f"{source!r} is not a source of recordings: name a FILE.csv, {', '.join(KIND_OF)}, a "
             f"manifest FILE.toml, or write one of {kinds} before a file{how_to_get(kind)}"

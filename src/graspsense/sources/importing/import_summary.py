@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from attrs import frozen
@@ -13,14 +14,9 @@ from graspsense.core.values.channel import FLOATS
 from graspsense.core.values.signals import Frame, Image, Samples
 from graspsense.core.values.trace import SI_UNITS
 from graspsense.recording.labelled_recording import LabelledRecording
+from graspsense.recording.replayable import Recording
 from graspsense.sources.columns.channel_facts import ChannelFacts, channel_facts, together
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from graspsense.recording.replayable import Recording
-
-    Numbers = NDArray[np.float64]
+from graspsense.sources.formats.table import Numbers
 
 CHANNEL_OF: Final = {
     "gap_m": "gap",
@@ -70,11 +66,9 @@ class ImportSummary:
 def summary_of(recordings: Sequence[LabelledRecording]) -> ImportSummary:
     """Return the summary of at least one recording."""
     by_label: dict[str, list[LabelledRecording]] = {}
-    notices: dict[str, int] = {}
+    notices = Counter(notice for recording in recordings for notice in recording.notices)
     for recording in recordings:
         by_label.setdefault(recording.label, []).append(recording)
-        for notice in recording.notices:
-            notices[notice] = notices.get(notice, 0) + 1
     earliest = recordings[0].recording
     times = sorted(recording.recorded_at for recording in recordings)
     return ImportSummary(
@@ -85,7 +79,7 @@ def summary_of(recordings: Sequence[LabelledRecording]) -> ImportSummary:
         values=tuple(dict.fromkeys(name for recording in recordings for name in recording.values)),
         recorded=(times[0], times[-1]) if times[0] else None,
         notes=earliest.notes,
-        notices=tuple(sorted(notices.items(), key=lambda item: -item[1])),
+        notices=tuple(notices.most_common()),
         measured=_measured([recording.recording for recording in recordings]),
     )
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from graspsense.core.values.errors import ConfigError, listed
+from graspsense.core.values.fingers import PREFIX
 from graspsense.core.values.written_numbers import number_in
 from graspsense.sources.formats.table import ColumnTable, Numbers
-from graspsense.sources.manifest.description import ReadManifest
+from graspsense.sources.manifest.description import ReadManifest, quantity_of
 from graspsense.sources.manifest.expression import Expression, ExpressionError
 from graspsense.sources.units import GRAM_FORCE, TO_SI, WITHOUT_UNIT, known_unit
 
@@ -25,17 +26,19 @@ class AvailableColumns(dict[str, Any]):
             if name not in self and (number := number_in(text)) is not None:
                 self[name] = np.full(len(table), number)
 
-    def value(self, key: str, parts: Sequence[Expression], quantity: str) -> tuple[Numbers, str] | None:
-        """Return the value of the first expression whose columns exist and its unit, None if there are none."""
-        if not parts:
+    def value(self, key: str) -> tuple[Numbers, str] | None:
+        """Return what the manifest gives for a key and its unit, None if it gives nothing."""
+        chosen, quantity = self.chosen(key), quantity_of(key)
+        if chosen is None:
             return None
-        chosen = self.chosen(parts)
-        values = self.computed(key, lambda: chosen.numbers(self, len(self.table)))
-        return self._in_si(key, values, self.unit(chosen, quantity), quantity)
+        place = f"fingers.{key.removeprefix(PREFIX)}" if key.startswith(PREFIX) else key
+        values = self.computed(place, lambda: chosen.numbers(self, len(self.table)))
+        return self._in_si(place, values, self.unit(chosen, quantity), quantity)
 
-    def chosen(self, parts: Sequence[Expression]) -> Expression:
-        """Return the first expression whose columns exist, or the first if there is none."""
-        return next((part for part in parts if self.has(part)), parts[0])
+    def chosen(self, key: str) -> Expression | None:
+        """Return the first expression of a key whose columns exist, or the first; None if the key has none."""
+        parts = self.manifest.expressions[key]
+        return next((part for part in parts if self.has(part)), next(iter(parts), None))
 
     def unit(self, expression: Expression, quantity: str) -> str:
         """Return the unit behind an expression, or the one that the file states for a column on its own.

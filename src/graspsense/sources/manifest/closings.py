@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from graspsense.core.values.errors import counted
+from graspsense.sources.columns.grasp_columns import GraspColumns
 from graspsense.sources.columns.usual_range import usual_range
-
-if TYPE_CHECKING:
-    from graspsense.sources.columns.grasp_columns import GraspColumns, Numbers
+from graspsense.sources.formats.table import Numbers
 
 CLOSED: Final = 0.4
 OPEN: Final = 0.6

@@ -180,40 +180,39 @@ def read_manifest(place: Path) -> ReadManifest:
     if problems:
         raise ConfigError("\n".join(problems))
 
-    def parsed(path: tuple[str | int, ...], text: str) -> Expression | None:
+    def parsed(text: str, *path: str) -> Expression:
         try:
             return parse(text)
         except ExpressionError as error:
-            problems.append(f"{layer.where(path)}: {'.'.join(str(part) for part in path)}: {error}")
-            return None
+            problems.append(f"{layer.where(path)}: {'.'.join(path)}: {error}")
+            return parse("0")  # for a manifest that is refused below
 
-    quantities: dict[str, Any] = {name: [] for name in QUANTITIES}
-    for name in QUANTITIES:
-        quantities[name] += [parsed((name,), text) for text in texts_of(getattr(keys, name))]
     value_files = {
         name: text for name, text in keys.values.items() if re.fullmatch(r"[^'\"*/+()]+\.(npy|txt|csv)", text)
     }
-    channels = {name: parsed(("channels", name), text) for name, text in keys.channels.items()}
-    values = {
-        name: parsed(("values", name), text) for name, text in keys.values.items() if name not in value_files
+    expressions = {
+        name: tuple(parsed(text, name) for text in texts_of(getattr(keys, name))) for name in QUANTITIES
     }
-    events = {name: parsed(("events", name), text) for name, text in keys.events.items()}
+    channels = {name: parsed(text, "channels", name) for name, text in keys.channels.items()}
+    values = {
+        name: parsed(text, "values", name) for name, text in keys.values.items() if name not in value_files
+    }
+    events = {name: parsed(text, "events", name) for name, text in keys.events.items()}
     for name, text in keys.fingers.items():
-        quantities[f"{PREFIX}{name}"] = [parsed(("fingers", name), text)]
-    problems += [
-        f"{layer.where(path)}: {why}" for path, why in (*_contradictions(keys), *_finger_problems(keys))
-    ]
+        expressions[f"{PREFIX}{name}"] = (parsed(text, "fingers", name),)
+    wrong = (*_contradictions(keys), *_finger_problems(keys))
+    problems += [f"{layer.where(path)}: {why}" for path, why in wrong]
     if problems:
         raise ConfigError("\n".join(problems))
     return ReadManifest(
         place=place,
-        base=place.parent
-        / os.path.expanduser(keys.folder),  # of pathlib, it raises where there is no such user
+        # expanded by os.path: pathlib raises where there is no such user
+        base=place.parent / os.path.expanduser(keys.folder),
         keys=keys,
-        expressions={name: tuple(parts) for name, parts in quantities.items()},
-        channels=channels,  # type: ignore[arg-type]
-        values=values,  # type: ignore[arg-type]
-        events=events,  # type: ignore[arg-type]
+        expressions=expressions,
+        channels=channels,
+        values=values,
+        events=events,
         value_files=value_files,
         fast=frozenset(texts_of(keys.fast)),
     )
@@ -318,6 +317,11 @@ def _finger_problems(keys: Manifest) -> Iterator[tuple[tuple[str, ...], str]]:
         hand_of(keys, "N")
     except ValueError as error:
         yield ("fingers",), str(error)
+
+
+def quantity_of(key: str) -> str:
+    """Return the quantity that the expressions of a key give: a force for each side and each finger."""
+    return "force" if key in ("left", "right") or key.startswith(PREFIX) else key
 
 
 def texts_of(value: Text) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from __future__ import annotations
 import ast
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final, NoReturn
+from typing import Any, Final, NoReturn
 
 import numpy as np
 from attrs import frozen
@@ -22,9 +22,7 @@ from attrs import frozen
 from graspsense.core.values.errors import ConfigError, listed, suggestion
 from graspsense.core.values.limits import CELLS
 from graspsense.sources.formats.patterns import PatternError, wildcard
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from graspsense.sources.formats.table import Numbers
 
 LARGEST: Final = 1e300
 """Limit on the magnitude of a number in an expression."""
@@ -89,7 +87,7 @@ class Expression:
             dict.fromkeys(name for node in _names(self.tree) for name in self._matching(node, known))
         )
 
-    def values(self, columns: Mapping[str, NDArray[np.float64]], rows: int) -> NDArray[np.float64]:
+    def values(self, columns: Mapping[str, Numbers], rows: int) -> Numbers:
         """Return its value in each of the rows: shape (rows,), or (rows, k) if it stands for several columns.
 
         Raises ExpressionError.
@@ -99,7 +97,7 @@ class Expression:
         shape = (rows, *value.shape[1:]) if value.ndim else (rows,)
         return np.array(np.broadcast_to(value, shape), dtype=np.float64)
 
-    def numbers(self, columns: Mapping[str, NDArray[np.float64]], rows: int) -> NDArray[np.float64]:
+    def numbers(self, columns: Mapping[str, Numbers], rows: int) -> Numbers:
         """Return its value in each of the rows as one column. Raises ExpressionError if it stands for several."""
         values = self.values(columns, rows)
         if values.ndim > 1:
@@ -154,10 +152,10 @@ class Expression:
         if name in FOLDS:
             rows = max((len(values) for values in arguments if values.ndim), default=1)
             parts = [
-                np.broadcast_to(
-                    values if values.ndim == 2 else np.reshape(values, (-1, 1)), (rows, *_width(values))
+                np.broadcast_to(cells, (rows, cells.shape[1]))
+                for cells in (
+                    values if values.ndim == 2 else np.reshape(values, (-1, 1)) for values in arguments
                 )
-                for values in arguments
             ]
             together = np.column_stack(parts)
             if together.shape[1] < 2:
@@ -199,7 +197,8 @@ class Expression:
             what = (
                 f"no column matches {name!r}" if quoted and set("*?") & set(name) else f"no column {name!r}"
             )
-            self._refuse(node, f"{what}. Columns: {_listed(known) or 'none'}.{suggestion(name, known)}")
+            columns = listed([shown if shown.isidentifier() else f"'{shown}'" for shown in known])
+            self._refuse(node, f"{what}. Columns: {columns or 'none'}.{suggestion(name, known)}")
         return names
 
     def _refuse(self, node: ast.expr, why: str) -> NoReturn:
@@ -231,7 +230,8 @@ def parse(text: str) -> Expression:
         ) from None
     except (ValueError, RecursionError, MemoryError):
         raise ExpressionError(f"{body[:60]!r} is not an expression, or is nested too deep") from None
-    _check(tree, body, 0)
+    for node, why in _refused(tree):
+        raise _error(body, getattr(node, "col_offset", 0), why)
     return Expression(text=body, unit=unit, tree=tree)
 
 
@@ -248,40 +248,35 @@ def _body_and_unit(text: str) -> tuple[str, str]:
     return (body.rstrip(), unit.strip()) if is_unit else (text, "")
 
 
-def _check(node: ast.AST, text: str, depth: int) -> None:
-    """Raise ExpressionError at the first node that is not in the closed list."""
-    offset = getattr(node, "col_offset", 0)
-    if depth > 50:
-        raise _error(text, offset, "it is nested too deep")
+def _refused(node: ast.AST, depth: int = 0) -> Iterator[tuple[ast.AST, str]]:
+    """Yield each node that is not in the closed list, and why."""
     inner: Sequence[ast.AST] = ()
-    if isinstance(node, ast.Constant):
+    if depth > 50:
+        yield node, "it is nested too deep"
+    elif isinstance(node, ast.Constant):
         if type(node.value) not in (int, float, str):
-            raise _error(text, offset, f"{node.value!r} is not a number")
-        if isinstance(node.value, int | float) and not abs(node.value) <= LARGEST:
-            raise _error(text, offset, f"a number is at most {LARGEST:g}")
+            yield node, f"{node.value!r} is not a number"
+        elif isinstance(node.value, int | float) and not abs(node.value) <= LARGEST:
+            yield node, f"a number is at most {LARGEST:g}"
     elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.UAdd | ast.USub):
         inner = (node.operand,)
     elif isinstance(node, ast.BinOp):
         if type(node.op) not in _OPERATORS:
-            raise _error(text, offset, "there are + - * /, and the functions " + ", ".join(FUNCTIONS))
+            yield node, "there are + - * /, and the functions " + ", ".join(FUNCTIONS)
         inner = (node.left, node.right)
     elif isinstance(node, ast.Subscript):
         if not _is_component(node.slice):
-            raise _error(
-                text,
-                offset,
-                "write the number of a component in brackets, counted from 0: force[2], or cells[2::3] for every third",
-            )
+            wanted = "force[2], or cells[2::3] for every third"
+            yield node, f"write the number of a component in brackets, counted from 0: {wanted}"
         inner = (node.value,)
     elif isinstance(node, ast.Call):
-        inner = _checked_call(node, text, offset)
+        yield from ((node, why) for why in _wrong_in_call(node))
+        inner = node.args
     elif not isinstance(node, ast.Name):
-        kind = type(node).__name__
-        raise _error(
-            text, offset, f"{kind} is not allowed here: there are numbers, columns, + - * / and functions"
-        )
+        allowed = "there are numbers, columns, + - * / and functions"
+        yield node, f"{type(node).__name__} is not allowed here: {allowed}"
     for child in inner:
-        _check(child, text, depth + 1)
+        yield from _refused(child, depth + 1)
 
 
 def _is_component(index: ast.expr) -> bool:
@@ -293,36 +288,24 @@ def _is_component(index: ast.expr) -> bool:
     return len(numbers) == len(parts) and numbers[0] >= 0 and all(step > 0 for step in numbers[1:])
 
 
-def _checked_call(node: ast.Call, text: str, offset: int) -> Sequence[ast.AST]:
+def _wrong_in_call(node: ast.Call) -> Iterator[str]:
     name = node.func.id if isinstance(node.func, ast.Name) else ""
     if name not in FUNCTIONS:
-        raise _error(
-            text,
-            offset,
-            f"no function {name or 'of this kind'}. There are {', '.join(FUNCTIONS)}.{suggestion(name, FUNCTIONS)}",
-        )
+        known = ", ".join(FUNCTIONS)
+        yield f"no function {name or 'of this kind'}. There are {known}.{suggestion(name, FUNCTIONS)}"
     if node.keywords or any(isinstance(argument, ast.Starred) for argument in node.args):
-        raise _error(text, offset, f"{name} takes columns, separated by commas")
+        yield f"{name} takes columns, separated by commas"
     if not node.args or (name not in FOLDS and len(node.args) != 1):
         wanted = "at least one argument" if name in FOLDS else "one argument"
-        raise _error(text, offset, f"{name} takes {wanted}, and here are {len(node.args)}")
-    return node.args
+        yield f"{name} takes {wanted}, and here are {len(node.args)}"
 
 
-def _names(node: ast.expr) -> Iterator[ast.expr]:
+def _names(node: ast.AST) -> Iterator[ast.expr]:
     """Yield every node that names a column; the name of a function does not."""
     if isinstance(node, ast.Name) or (isinstance(node, ast.Constant) and isinstance(node.value, str)):
         yield node
-    elif isinstance(node, ast.Call):
-        for argument in node.args:
-            yield from _names(argument)
-    elif isinstance(node, ast.BinOp):
-        yield from _names(node.left)
-        yield from _names(node.right)
-    elif isinstance(node, ast.UnaryOp):
-        yield from _names(node.operand)
-    elif isinstance(node, ast.Subscript):
-        yield from _names(node.value)
+    for part in node.args if isinstance(node, ast.Call) else ast.iter_child_nodes(node):
+        yield from _names(part)
 
 
 def _name_in(node: ast.expr) -> str:
@@ -336,18 +319,6 @@ def _aligned(left: Values, right: Values) -> tuple[Values, Values]:
     elif right.ndim == 1 and left.ndim == 2:
         right = right[:, None]
     return left, right
-
-
-def _width(value: Values) -> tuple[int, ...]:
-    return (value.shape[1] if value.ndim == 2 else 1,)
-
-
-def _listed(names: Sequence[str]) -> str:
-    return listed([_shown(name) for name in names])
-
-
-def _shown(name: str) -> str:
-    return name if name.isidentifier() else f"'{name}'"
 
 
 def _error(text: str, offset: int, why: str) -> ExpressionError:

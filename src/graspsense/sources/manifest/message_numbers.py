@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from attrs import field, frozen
+from numpy.typing import NDArray
 
 from graspsense.core.values.errors import ConfigError, listed
 from graspsense.sources.formats.ros_format import numbers_in
 from graspsense.sources.manifest.expression import OVER_TIME, Expression, parse
 from graspsense.sources.units import TO_SI
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 
 @frozen

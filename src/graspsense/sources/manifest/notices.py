@@ -16,7 +16,7 @@ from graspsense.sources.columns.usual_range import usual_range
 from graspsense.sources.manifest.steps import NOISE, squeezes
 
 if TYPE_CHECKING:
-    from graspsense.sources.columns.grasp_columns import Numbers
+    from graspsense.sources.formats.table import Numbers
 
 BEGINS_LOADED: Final = 0.25
 """Share of its range above which the force of the first sample is that of a contact, or of a wrong zero."""

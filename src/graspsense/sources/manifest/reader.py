@@ -6,7 +6,7 @@ import glob
 import math
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,13 +18,12 @@ from graspsense.core.values.errors import ConfigError, DataDamaged, counted, lis
 from graspsense.core.values.label_text import is_missing_label
 from graspsense.core.values.limits import RECORDINGS
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
-from graspsense.recording.readable import each_readable, refuse_devices
+from graspsense.recording.readable import each_readable
 from graspsense.recording.replayable import Recording
 from graspsense.sources.columns.grasp_columns import GraspColumns, checked_recording
-from graspsense.sources.formats.array_format import ARRAY_SUFFIXES, ArrayRules, read_arrays
-from graspsense.sources.formats.raw_tables import BAG_SUFFIXES, PARQUET_SUFFIXES, TEXT_SUFFIXES
+from graspsense.sources.formats.array_format import ArrayRules
+from graspsense.sources.formats.raw_tables import TableRules, raw_tables
 from graspsense.sources.formats.table import ColumnTable
-from graspsense.sources.formats.text_table import text_suffix
 from graspsense.sources.manifest.description import ReadManifest, axes_of, read_manifest, texts_of
 from graspsense.sources.manifest.facts import (
     FIELD,
@@ -77,9 +76,8 @@ def tables_of(manifest: ReadManifest, file: NamedFile) -> list[ColumnTable]:
     """Return the tables of a file, each with the facts of its path. Raises ConfigError, DataDamaged."""
     if file.problem:
         raise ConfigError(file.problem)
-    refuse_devices(file.path)
-    read = _format(manifest, file.path)
-    tables = [evolve(table.with_fields(file.fields), blank=file.blank) for table in read(file.path)]
+    read = raw_tables(file.path, _rules(manifest))
+    tables = [evolve(table.with_fields(file.fields), blank=file.blank) for table in read]
     for name in texts_of(manifest.keys.beside):
         tables = _joined(manifest, tables, file.path.parent / name)
     if file.rows is not None:
@@ -101,8 +99,7 @@ def tables_of(manifest: ReadManifest, file: NamedFile) -> list[ColumnTable]:
 
 def _joined(manifest: ReadManifest, tables: list[ColumnTable], path: Path) -> list[ColumnTable]:
     """Return the table of a file with the columns of one beside it. Raises ConfigError, DataDamaged."""
-    refuse_devices(path)
-    others = _format(manifest, path)(path)
+    others = raw_tables(path, _rules(manifest))
     rows = [len(table) for table in (*tables, *others)]
     if len(tables) != 1 or len(others) != 1 or rows[0] != rows[1]:
         raise DataDamaged(
@@ -187,42 +184,20 @@ def _checked(columns: GraspColumns, table: ColumnTable, rate_hz: float) -> Recor
         raise DataDamaged(f"{error} ({'; '.join(table.warnings)})") from error
 
 
-def _format(manifest: ReadManifest, path: Path) -> Callable[[Path], list[ColumnTable]]:
-    """Return the function that reads a file of this suffix. Raises ConfigError."""
-    suffix = path.suffix.lower()
-    if text_suffix(path) in (*TEXT_SUFFIXES, ""):
-        if path.is_dir():
-            return _bag(manifest)
-        from graspsense.sources.formats.text_format import read_text
-
-        return lambda file: read_text(file, manifest.keys.start)
-    if suffix in ARRAY_SUFFIXES:
-        parts = [
-            alternative for alternatives in manifest.expressions.values() for alternative in alternatives
-        ]
-        used = frozenset(name for part in parts for name in part.names)
-        rules = ArrayRules(pattern=manifest.keys.arrays, axes=axes_of(manifest.keys.axes), used=used)
-        return lambda file: read_arrays(file, rules)
-    if suffix in PARQUET_SUFFIXES:
-        from graspsense.sources.formats.parquet_format import read_parquet
-
-        return read_parquet
-    if suffix in BAG_SUFFIXES:
-        return _bag(manifest)
-    raise ConfigError(
-        f"{path}: no reader for {suffix} files. There are text files (.csv, .tsv, .txt, .dat, .jsonl), .npy, .npz, "
-        ".mat, .h5, .parquet, .mcap and ROS bags"
-    )
-
-
-def _bag(manifest: ReadManifest) -> Callable[[Path], list[ColumnTable]]:
-    from graspsense.sources.formats.ros_format import read_bag
-
-    texts = [part.text for parts in manifest.expressions.values() for part in parts]
+def _rules(manifest: ReadManifest) -> TableRules:
+    """Return what the manifest says of the tables in its files."""
+    parts = [part for alternatives in manifest.expressions.values() for part in alternatives]
     further = (*manifest.channels.values(), *manifest.values.values(), *manifest.events.values())
-    texts += [text.text for text in further]
-    topics = {match[1] for text in texts for match in re.finditer(r"['\"](/[^.'\"*?]+)\.", text)}
-    return lambda path: read_bag(path, topics)
+    texts = [part.text for part in (*parts, *further)]
+    return TableRules(
+        start=manifest.keys.start,
+        arrays=ArrayRules(
+            pattern=manifest.keys.arrays,
+            axes=axes_of(manifest.keys.axes),
+            used=frozenset(name for part in parts for name in part.names),
+        ),
+        topics={match[1] for text in texts for match in re.finditer(r"['\"](/[^.'\"*?]+)\.", text)},
+    )
 
 
 def _by_column(table: ColumnTable, column: str) -> list[ColumnTable]:

@@ -20,7 +20,7 @@ from graspsense.sources.columns.grasp_columns import GraspColumns, finger_sides,
 from graspsense.sources.formats.table import ColumnTable, Numbers
 from graspsense.sources.manifest.available import AvailableColumns
 from graspsense.sources.manifest.closings import without_number
-from graspsense.sources.manifest.description import ReadManifest, hand_of, samples_of
+from graspsense.sources.manifest.description import ReadManifest, hand_of, quantity_of, samples_of
 from graspsense.sources.manifest.events import labelled_events
 from graspsense.sources.manifest.expression import Expression
 from graspsense.sources.manifest.steps import without_duplicates
@@ -43,13 +43,13 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
     if not len(table):
         raise DataDamaged(f"{table.source} has no rows")
     notes = [f"{len(table)} samples of {table.source}", *table.notes]
-    t_s, origin_s, time_notes = _times(manifest, table, available)
+    t_s, origin_s, time_notes = _times(available)
     notes += time_notes
     events = labelled_events(available, t_s, origin_s)
     notes += [
         f"labelled in the recording: {len(spans)} times {name}" for name, spans in events.items() if spans
     ]
-    scalars, arrays, units = _channels(manifest, table, available)
+    scalars, arrays, units = _channels(available)
     zero = samples_of(keys.zero, t_s) if keys.zero else 0
     if zero:
         notes.append(f"zero of the forces: the mean of the first {zero} samples")
@@ -58,19 +58,17 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
                 values -= np.nanmean(values[:zero], axis=0)
     available.update(scalars)
     available.update(arrays)
-    expressions = manifest.expressions
-    gap = available.value("gap", expressions["gap"], "gap") or (np.zeros(len(table)), NO_GAP)
-    hand, each = _fingers(manifest, available, zero)
+    gap = available.value("gap") or (np.zeros(len(table)), NO_GAP)
+    hand, each = _fingers(available, zero)
     scalars |= each
     units |= {channel.name: channel.unit for channel in hand}
     if hand:
         left_n, right_n = finger_sides(hand, each)
         unit = "" if hand[0].unit == "N" else hand[0].unit
     else:
-        left_n, right_n, unit = _sides(manifest, available, zero)
+        left_n, right_n, unit = _sides(available, zero)
     notes += _folds(manifest)
-    effort = available.value("effort", expressions["effort"], "effort")
-    velocity = available.value("velocity", expressions["velocity"], "velocity")
+    effort, velocity = available.value("effort"), available.value("velocity")
     columns = GraspColumns(
         source=table.source,
         t_s=t_s,
@@ -82,16 +80,16 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
         scalars=scalars,
         fingers=hand,
         arrays=arrays,
-        shapes=_shapes(manifest, table, available, arrays),
+        shapes=_shapes(available, arrays),
         fast=manifest.fast,
         units={
             **units,
             "gap": gap[1],
             "force": unit,
-            "t": "" if _has_time(manifest, table, available) else "sample",
+            "t": "" if _has_time(available) else "sample",
         },
         notes=tuple(notes),
-        warnings=(*table.warnings, *_doubts(manifest, available, t_s, gap[0], (left_n, right_n))),
+        warnings=(*table.warnings, *_doubts(available, t_s, gap[0], (left_n, right_n))),
         lines=table.lines,
         events=events,
     )
@@ -99,18 +97,17 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
     return without_duplicates(whole) if keys.duplicates == "drop" else whole
 
 
-def _sides(manifest: ReadManifest, columns: AvailableColumns, zero: int) -> tuple[Numbers, Numbers, str]:
+def _sides(columns: AvailableColumns, zero: int) -> tuple[Numbers, Numbers, str]:
     """Return the forces of the two pads that a manifest names, and their unit. Raises ConfigError."""
-    expressions = manifest.expressions
-    both = columns.value("force", expressions["force"], "force")
-    left = both or columns.value("left", expressions["left"], "force")
-    right = both or columns.value("right", expressions["right"], "force") or left
+    both = columns.value("force")
+    left = both or columns.value("left")
+    right = both or columns.value("right") or left
     left = left or right
     assert left is not None  # the manifest was checked for them
     assert right is not None
     if left[1] != right[1]:
         raise ConfigError(
-            f"{manifest.place}: left is in {left[1] or 'N'} and right in {right[1] or 'N'}: use one unit"
+            f"{columns.manifest.place}: left is in {left[1] or 'N'} and right in {right[1] or 'N'}: use one unit"
         )
     return _zeroed(left[0], zero), _zeroed(right[0], zero), left[1]
 
@@ -120,15 +117,14 @@ def _zeroed(force: Numbers, zero: int) -> Numbers:
     return zeroed
 
 
-def _fingers(
-    manifest: ReadManifest, columns: AvailableColumns, zero: int
-) -> tuple[tuple[FingerForce, ...], dict[str, Numbers]]:
+def _fingers(columns: AvailableColumns, zero: int) -> tuple[tuple[FingerForce, ...], dict[str, Numbers]]:
     """Return the fingers that a manifest names, and the force of each by its channel. Raises ConfigError."""
+    manifest = columns.manifest
     forces: dict[str, Numbers] = {}
     units: dict[str, str] = {}
     for name in manifest.keys.fingers:
         key = f"{PREFIX}{name}"
-        given = columns.value(f"fingers.{name}", manifest.expressions[key], "force")
+        given = columns.value(key)
         assert given is not None  # each finger has an expression
         forces[key], units[name] = _zeroed(given[0], zero), given[1] or "N"
     if len(set(units.values())) > 1:
@@ -138,28 +134,23 @@ def _fingers(
 
 
 def _doubts(
-    manifest: ReadManifest,
-    columns: AvailableColumns,
-    t_s: Numbers,
-    gap: Numbers,
-    pads: tuple[Numbers, Numbers],
+    columns: AvailableColumns, t_s: Numbers, gap: Numbers, pads: tuple[Numbers, Numbers]
 ) -> Iterator[str]:
     """Yield a sentence for each unit that is most likely another one, and for topics that may be apart in time."""
-    yield from _doubtful_units(manifest, columns)
-    yield from _counted_time(manifest, columns)
-    if manifest.keys.split == "force":
+    yield from _doubtful_units(columns)
+    yield from _counted_time(columns)
+    if columns.manifest.keys.split == "force":
         yield from dict.fromkeys(text for force in pads for text in without_number(t_s, gap, force))
-    later_s = _later_s(manifest, columns)
-    if told := doubtful_delay(t_s, gap, pads[0] + pads[1], later_s):
+    if told := doubtful_delay(t_s, gap, pads[0] + pads[1], _later_s(columns)):
         yield told
 
 
-def _later_s(manifest: ReadManifest, columns: AvailableColumns) -> float:
+def _later_s(columns: AvailableColumns) -> float:
     """Return how much later the topics of the force are recorded, after their headers, than those of the gap (s)."""
     delays: dict[str, set[float]] = {"gap": set(), "force": set()}
-    for key, parts in manifest.expressions.items():
-        quantity = "force" if key in ("left", "right") or key.startswith(PREFIX) else key
-        chosen = columns.chosen(parts) if parts and quantity in delays else None
+    for key in columns.manifest.expressions:
+        quantity = quantity_of(key)
+        chosen = columns.chosen(key) if quantity in delays else None
         for name in chosen.names if chosen is not None else ():
             delays[quantity] |= {
                 delay for topic, delay in columns.table.delays_s.items() if name.startswith(f"{topic}.")
@@ -167,11 +158,10 @@ def _later_s(manifest: ReadManifest, columns: AvailableColumns) -> float:
     return max((force - gap for force in delays["force"] for gap in delays["gap"]), key=abs, default=0.0)
 
 
-def _doubtful_units(manifest: ReadManifest, columns: AvailableColumns) -> Iterator[str]:
+def _doubtful_units(columns: AvailableColumns) -> Iterator[str]:
     """Yield a sentence for each quantity whose unit the file or a name states otherwise than it is read."""
-    for key, parts in manifest.expressions.items():
-        quantity = "force" if key in ("left", "right") or key.startswith(PREFIX) else key
-        chosen = columns.chosen(parts) if parts else None
+    for key in columns.manifest.expressions:
+        quantity, chosen = quantity_of(key), columns.chosen(key)
         if chosen is None or not columns.has(chosen):
             continue
         stated = columns.stated(chosen)
@@ -200,10 +190,9 @@ def _not_read(key: str, chosen: Expression, stated: str, quantity: str) -> Itera
         )
 
 
-def _counted_time(manifest: ReadManifest, columns: AvailableColumns) -> Iterator[str]:
+def _counted_time(columns: AvailableColumns) -> Iterator[str]:
     """Yield that a time without a unit is most likely the number of the sample: it is whole, and rises by 1."""
-    parts = manifest.expressions["time"]
-    chosen = columns.chosen(parts) if parts else None
+    chosen = columns.chosen("time")
     if chosen is None or not columns.has(chosen) or columns.unit(chosen, "time"):
         return
     steps = np.diff(chosen.numbers(columns, len(columns.table)))
@@ -238,24 +227,21 @@ def _folds(manifest: ReadManifest) -> list[str]:
     return notes
 
 
-def _has_time(manifest: ReadManifest, table: ColumnTable, columns: AvailableColumns) -> bool:
-    return bool(
-        manifest.keys.rate_hz or table.t_s is not None or any(map(columns.has, manifest.expressions["time"]))
-    )
+def _has_time(columns: AvailableColumns) -> bool:
+    named = any(map(columns.has, columns.manifest.expressions["time"]))
+    return named or bool(columns.manifest.keys.rate_hz) or columns.table.t_s is not None
 
 
-def _times(
-    manifest: ReadManifest, table: ColumnTable, available: AvailableColumns
-) -> tuple[Numbers, float, tuple[str, ...]]:
+def _times(columns: AvailableColumns) -> tuple[Numbers, float, tuple[str, ...]]:
     """Return the time of each row (s), what was subtracted from it, and what was chosen for it, in words.
 
     Raises ConfigError.
     """
-    parts = manifest.expressions["time"]
-    missing = not any(map(available.has, parts))
-    given = None if missing and manifest.keys.rate_hz else available.value("time", parts, "time")
-    if given is not None:
-        unit = "" if available.unit(available.chosen(parts), "time") else _unit_since_1970(given[0])
+    manifest, table, chosen = columns.manifest, columns.table, columns.chosen("time")
+    missing = chosen is None or not columns.has(chosen)
+    given = None if missing and manifest.keys.rate_hz else columns.value("time")
+    if given is not None and chosen is not None:
+        unit = "" if columns.unit(chosen, "time") else _unit_since_1970(given[0])
         notes = (f"the time is in {unit} since 1970",) if unit else ()
         factor, origin = TO_SI["time"].get(unit, 1.0), _origin(given[0])
         return (given[0] - origin) * factor, origin * factor, notes
@@ -266,10 +252,9 @@ def _times(
         return np.arange(len(table)) / manifest.keys.rate_hz, 0.0, ()
     if len(table) == 1:
         return np.zeros(1), 0.0, ()
-    columns = listed(tuple(table.numbers))
     raise ConfigError(
         f'{manifest.place}: {table.source} has no time: write time = "COLUMN [ms]", or rate_hz = 100 where there is no '
-        f"such column. Columns: {columns}"
+        f"such column. Columns: {listed(tuple(table.numbers))}"
     )
 
 
@@ -286,10 +271,9 @@ def _unit_since_1970(times: Numbers) -> str:
     return ""
 
 
-def _channels(
-    manifest: ReadManifest, table: ColumnTable, columns: AvailableColumns
-) -> tuple[dict[str, Numbers], dict[str, Numbers], dict[str, str]]:
+def _channels(columns: AvailableColumns) -> tuple[dict[str, Numbers], dict[str, Numbers], dict[str, str]]:
     """Return the further channels with one number a sample, the arrays, and the units of both. Raises ConfigError."""
+    manifest = columns.manifest
     scalars: dict[str, Numbers] = {}
     arrays: dict[str, Numbers] = {}
     units: dict[str, str] = {}
@@ -299,7 +283,7 @@ def _channels(
                 f"{manifest.place}: channels: {name!r} cannot be the name of a channel: write small letters, digits "
                 "and underscores, a letter first, and no name of a channel of every gripper"
             )
-        values = columns.computed(f"channels.{name}", partial(expression.values, columns, len(table)))
+        values = columns.computed(f"channels.{name}", partial(expression.values, columns, len(columns.table)))
         if name in manifest.fast:
             values = values.reshape(len(values), -1)
         (scalars if values.ndim == 1 else arrays)[name] = values
@@ -307,18 +291,17 @@ def _channels(
     return scalars, arrays, units
 
 
-def _shapes(
-    manifest: ReadManifest, table: ColumnTable, available: AvailableColumns, arrays: Mapping[str, Numbers]
-) -> dict[str, tuple[int, ...]]:
+def _shapes(available: AvailableColumns, arrays: Mapping[str, Numbers]) -> dict[str, tuple[int, ...]]:
     """Return the shape of each channel that is computed from a column with a shape, such as an image.
 
     The numbers of a fast channel without one are samples of one axis.
     """
+    manifest, known_shapes = available.manifest, available.table.shapes
     shapes: dict[str, tuple[int, ...]] = {}
     for name, values in arrays.items():
         width = values.shape[1]
         columns = manifest.channels[name].columns(tuple(available))
-        known = [table.shapes[column] for column in columns if column in table.shapes]
+        known = [known_shapes[column] for column in columns if column in known_shapes]
         # An expression may have taken some of the cells.
         if known and math.prod(known[-1]) == width:
             shapes[name] = known[-1]

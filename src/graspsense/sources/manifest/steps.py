@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from attrs import evolve
@@ -20,10 +20,8 @@ from graspsense.sources.columns.grasp_columns import (
     finger_sides,
     only,
 )
+from graspsense.sources.formats.table import Numbers
 from graspsense.sources.manifest.closings import closings, without_rise
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 RUPTURE_FALL: Final = 0.3
 """Share of its peak by which the force falls when an object ruptures."""
@@ -99,9 +97,7 @@ def squeezes(columns: GraspColumns) -> list[GraspColumns]:
     return parts
 
 
-def _weak_runs(
-    columns: GraspColumns, force: NDArray[np.float64], runs: list[tuple[int, int]]
-) -> list[tuple[int, int]]:
+def _weak_runs(columns: GraspColumns, force: Numbers, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
     """Return where the force rises by less than a squeeze and comes back, while the fingers are closed."""
     held = np.zeros(len(force), dtype=bool)
     for begin, end in runs:
@@ -118,7 +114,7 @@ def _weak_runs(
     ]
 
 
-def _of_one_closing(gap: NDArray[np.float64], runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
+def _of_one_closing(gap: Numbers, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
     """Return the squeezes; those between which the fingers only close further are one, with a bump before it."""
     known = gap[np.isfinite(gap)]
     least = STAYS * float(np.ptp(known)) if len(known) else 0.0
@@ -133,9 +129,7 @@ def _of_one_closing(gap: NDArray[np.float64], runs: list[tuple[int, int]]) -> li
     return joined
 
 
-def _divided(
-    columns: GraspColumns, force: NDArray[np.float64], runs: list[tuple[int, int]]
-) -> Iterator[tuple[int, int]]:
+def _divided(columns: GraspColumns, force: Numbers, runs: list[tuple[int, int]]) -> Iterator[tuple[int, int]]:
     """Yield the squeezes, divided where the fingers are open and the force does not change while they move."""
     t_s, closed = columns.t_s, closings(columns.gap_m)
     for begin, end in runs:
@@ -153,7 +147,7 @@ def _divided(
         yield begin, end
 
 
-def _stays_closed(gap: NDArray[np.float64], end: int, begin: int) -> bool:
+def _stays_closed(gap: Numbers, end: int, begin: int) -> bool:
     """Return whether a gap that is recorded does not open between the end of a squeeze and the begin of the next."""
     known, between = gap[np.isfinite(gap)], gap[end:begin]
     span = float(np.ptp(known)) if len(known) else 0.0
@@ -162,15 +156,13 @@ def _stays_closed(gap: NDArray[np.float64], end: int, begin: int) -> bool:
     )
 
 
-def _middle(t_s: NDArray[np.float64], end: int, begin: int) -> int:
+def _middle(t_s: Numbers, end: int, begin: int) -> int:
     """Return the sample with which the next squeeze begins: the middle, or where the clock begins anew."""
     back = np.flatnonzero(np.diff(t_s[end - 1 : begin + 1]) < 0.0)
     return end + int(back[0]) if len(back) else (end + begin) // 2
 
 
-def _held_runs(
-    force: NDArray[np.float64], steps_s: NDArray[np.float64], weakest: float = WEAKEST
-) -> list[tuple[int, int]]:
+def _held_runs(force: Numbers, steps_s: Numbers, weakest: float = WEAKEST) -> list[tuple[int, int]]:
     """Return the first sample of each squeeze and the one after its last."""
     noise = NOISE * float(np.median(np.abs(np.diff(force, 2)))) if len(force) > 2 else 0.0
     around = np.pad(force, FEWEST - 1, mode="edge")
@@ -193,7 +185,7 @@ def _held_runs(
     return joined
 
 
-def _rises(force: NDArray[np.float64], rise: float, held_at_first: float) -> Iterator[tuple[int, int]]:
+def _rises(force: Numbers, rise: float, held_at_first: float) -> Iterator[tuple[int, int]]:
     """Yield where the force rises by `rise` above the least before it, up to where it has lost most of that.
 
     A recording that begins in a squeeze falls first, by `held_at_first`.
@@ -217,7 +209,7 @@ def _rises(force: NDArray[np.float64], rise: float, held_at_first: float) -> Ite
         yield begin, len(force)
 
 
-def _known_force(columns: GraspColumns) -> NDArray[np.float64]:
+def _known_force(columns: GraspColumns) -> Numbers:
     """Return the mean force, with the last plausible one in the place of every other."""
     force = columns.force_n
     known = np.isfinite(force)
@@ -247,7 +239,7 @@ def cut_at(columns: GraspColumns, where: str) -> GraspColumns:
     )
 
 
-def _rupture(force: NDArray[np.float64]) -> int | None:
+def _rupture(force: Numbers) -> int | None:
     floor = float(force.min())
     peaks = np.maximum.accumulate(force) - floor
     # Noise before the contact falls by a large share of itself.
@@ -256,7 +248,7 @@ def _rupture(force: NDArray[np.float64]) -> int | None:
     return int(np.argmax(force[: fallen[0]])) + 1 if len(fallen) else None
 
 
-def _release(force: NDArray[np.float64]) -> int | None:
+def _release(force: Numbers) -> int | None:
     peak = int(force.argmax())
     floor = float(force.min())
     released = np.flatnonzero(force[peak:] - floor < RELEASED * (force[peak] - floor))
@@ -283,13 +275,13 @@ def resampled(columns: GraspColumns, rate_hz: float) -> GraspColumns:
     contact = int((columns.force_n - columns.force_n.min() > LOADED * np.ptp(columns.force_n)).argmax())
     coarse = gap_resolution(t, columns.gap_m, contact).step_m > 0.0
 
-    def along(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def along(values: Numbers) -> Numbers:
         if values.ndim == 1:
-            column: NDArray[np.float64] = np.interp(times, t, values)
+            column: Numbers = np.interp(times, t, values)
             return column
         return np.column_stack([np.interp(times, t, column) for column in values.T])
 
-    def along_own(name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def along_own(name: str, values: Numbers) -> Numbers:
         return values if name in columns.times else along(values)
 
     scalars = {name: along_own(name, values) for name, values in columns.scalars.items()}

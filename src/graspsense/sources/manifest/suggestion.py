@@ -29,15 +29,12 @@ from graspsense.sources.formats.array_format import (
     TIME,
     ArrayRules,
     arrays_in,
-    read_arrays,
 )
-from graspsense.sources.formats.raw_tables import BAG_SUFFIXES, PARQUET_SUFFIXES, TEXT_SUFFIXES, raw_tables
+from graspsense.sources.formats.raw_tables import READ_SUFFIXES, TEXT_SUFFIXES, TableRules, raw_tables
 from graspsense.sources.formats.table import ColumnTable
-from graspsense.sources.formats.text_format import read_text
 from graspsense.sources.formats.text_table import read_lines, text_suffix
 from graspsense.sources.manifest.files import tree_below
 
-READ_SUFFIXES: Final = (*TEXT_SUFFIXES, *ARRAY_SUFFIXES, *BAG_SUFFIXES, *PARQUET_SUFFIXES)
 _DOCUMENTS: Final = frozenset({"readme", "license", "licence", "requirements", "changelog", "citation"})
 _STAMP: Final = re.compile(r"(?P<text>.*?)(?P<gap>[-_ ]?)(?P<stamp>\d{8}[T_-]?\d{6})(?P<end>)")
 _NUMBER: Final = re.compile(r"(?P<text>.*?)(?P<gap>[-_ ]?)(?P<number>\d+)(?P<end>)")
@@ -197,7 +194,8 @@ def _table_of(path: Path) -> tuple[ColumnTable, list[Guess]]:
             check = (
                 f"{start[1]} lines begin a grasp; the names of the fields are those of the words before them"
             )
-            return read_text(path, start[0])[0], [Guess(key="start", value=start[0], check=check)]
+            table = raw_tables(path, TableRules(start=start[0]))[0]
+            return table, [Guess(key="start", value=start[0], check=check)]
     if path.suffix.lower() in ARRAY_SUFFIXES:
         pattern, shape = _array_pattern(path)
         if pattern:
@@ -205,12 +203,8 @@ def _table_of(path: Path) -> tuple[ColumnTable, list[Guess]]:
             axes = _axes(shape)
             if axes:
                 lines.append(Guess(key="axes", value=", ".join(axes), check=f"what the axes of {shape} are"))
-            return read_arrays(path, ArrayRules(pattern=pattern, axes=axes))[0], lines
-    if path.is_dir() or path.suffix.lower() in BAG_SUFFIXES:
-        from graspsense.sources.formats.ros_format import read_bag
-
-        return read_bag(path)[0], []
-    tables = raw_tables(path)
+            return raw_tables(path, TableRules(arrays=ArrayRules(pattern=pattern, axes=axes)))[0], lines
+    tables = raw_tables(path, TableRules())
     return max(tables, key=lambda table: len(table.numbers)), []
 
 

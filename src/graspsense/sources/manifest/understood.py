@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from attrs import frozen
@@ -14,13 +13,8 @@ from graspsense.sources.columns.channel_facts import ChannelFacts, channel_facts
 from graspsense.sources.columns.column_guess import TO_S, force_columns, guesses, time_column
 from graspsense.sources.columns.grasp_columns import GraspColumns
 from graspsense.sources.formats.raw_tables import raw_tables
-from graspsense.sources.formats.table import ColumnTable
+from graspsense.sources.formats.table import ColumnTable, Numbers
 from graspsense.sources.manifest.steps import squeezes
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Numbers = NDArray[np.float64]
 
 
 @frozen(kw_only=True, eq=False)

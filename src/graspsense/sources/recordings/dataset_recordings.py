@@ -130,14 +130,11 @@ def handed_recording(name: str) -> Recording | None:
     return _handed.get(name)
 
 
-class handed_over:  # noqa: N801 - used as a context manager, like those of contextlib
+@contextmanager
+def handed_over(name: str, recording: Recording) -> Iterator[None]:
     """While a recording is imported, `handed_recording` returns it under its name, so that its file is read once."""
-
-    def __init__(self, name: str, recording: Recording) -> None:
-        self.name, self.recording = name, recording
-
-    def __enter__(self) -> None:
-        _handed[self.name] = self.recording
-
-    def __exit__(self, *_: object) -> None:
-        del _handed[self.name]
+    _handed[name] = recording
+    try:
+        yield
+    finally:
+        del _handed[name]

@@ -75,13 +75,7 @@ def event_recordings(source: str, only: str | None = None) -> EventRecordings:
         notes.append(
             f"{len(recordings) - len(labelled)} of {len(recordings)} recordings left out: no event is labelled"
         )
-    units = sorted(
-        {
-            recording.recording.units["force_left"]
-            for recording in labelled
-            if "force_left" in recording.recording.units
-        }
-    )
+    units = sorted({unit for each in labelled if (unit := each.recording.units.get("force_left"))})
     if units:
         notes.append(
             f"the forces are in {', '.join(units)}, for which thresholds in N have no meaning: see the fitted ones"

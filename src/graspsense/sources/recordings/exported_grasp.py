@@ -6,41 +6,43 @@ a file; the recording itself (.mcap) keeps it.
 
 from __future__ import annotations
 
+import csv
+import io
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from graspsense.core.components.channels import (
-    cells_of,
-    from_json,
-    further,
-    no_signals,
-    read_only,
-    signal_type,
-)
+from graspsense.core.components.channels import from_json, further
+from graspsense.core.files.csv_text import text_of_cell
+from graspsense.core.files.whole_file import first_bytes
 from graspsense.core.values.channel import FLOATS, Channel, FastChannel, TactileArray
+from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.core.values.limits import CELLS, CHANNEL_NUMBERS
 from graspsense.core.values.mounting import mounting_from_json
-from graspsense.core.values.signals import Frame, Image, Pads, Reading, no_pads
+from graspsense.core.values.signals import Frame, Pads, Reading, no_pads
+from graspsense.core.values.written_numbers import NotNumbers, columns_of_numbers
+from graspsense.recording.export_trace import beside, declared_beside, images_beside
+from graspsense.recording.layout import PADS_TOPIC, SCALARS_TOPIC, SIGNAL_TOPIC, TICK_FIELDS
 from graspsense.recording.readable import readable
 from graspsense.recording.replayable import REPLAY_NOTE, Recording
-from graspsense.sources.columns.fast_samples import latest_values, sample_blocks
+from graspsense.sources.columns.fast_samples import latest_values, signals_in_ticks, values_in_ticks
 from graspsense.sources.formats.numpy_files import npz_arrays
-from graspsense.sources.recordings.exported_grasp_tables import (
-    TABLE_SUFFIXES,
-    read_exported_tables,
-    refuse_table_of_store,
-)
+from graspsense.sources.formats.table import Numbers
+from graspsense.sources.formats.text_table import check_columns, check_lines, text_of
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Arrays = Mapping[str, NDArray[Any]]
+Columns = dict[str, NDArray[Any]]
 
 DECLARED: Final = "declared"
 """The array of one JSON text with the channels, units and rate of the gripper."""
+TABLE_SUFFIXES: Final = (".csv", ".parquet")
+HEADER_BYTES: Final = 2**20
+"""Bytes in which the first line of a file is looked for."""
+_ABOUT_TRIALS: Final = ("trial", "made_at", "outcome", "recording")
+"""Columns of every table of a store."""
 
 
 def read_exported(name: str) -> Recording:
@@ -51,7 +53,7 @@ def read_exported(name: str) -> Recording:
     """
     path = Path(name).expanduser()
     if path.suffix.lower() in TABLE_SUFFIXES:
-        arrays, declared = read_exported_tables(path)
+        arrays, declared = _tables(path)
     else:
         arrays = npz_arrays(path)
         refuse_table_of_store(path, arrays)
@@ -73,13 +75,12 @@ def read_exported(name: str) -> Recording:
         )
 
 
-def _readings(arrays: Arrays, channels: tuple[Channel, ...]) -> list[Reading]:
+def _readings(arrays: Columns, channels: tuple[Channel, ...]) -> list[Reading]:
     times = arrays["t_s"]
     frames = [
         Frame._make((*values[:-1], int(values[-1])))
         for values in zip(*(arrays[name].tolist() for name in Frame._fields), strict=True)
     ]
-    n = len(frames)
     cells = arrays["pad_left"].shape[1]
     images = [
         Pads(t_s, k, tuple(left), tuple(right))
@@ -88,26 +89,139 @@ def _readings(arrays: Arrays, channels: tuple[Channel, ...]) -> list[Reading]:
         )
     ]
     pads = latest_values(times, arrays["pad_t_s"], images, no_pads(cells))
-    signals: list[Any] = [()] * n
-    if channels:
-        make = signal_type(channels)._make  # type: ignore[attr-defined]
-        series = [_series(times, arrays, channel) for channel in channels]
-        signals = [make(values) for values in zip(*series, strict=True)]
+    series = []
+    for channel in channels:
+        name, own = f"signal_{channel.name}", isinstance(channel, TactileArray | FastChannel)
+        sampled_s = arrays[f"{name}_t_s"] if own else None
+        series.append(values_in_ticks(times, sampled_s, arrays[name], channel))
+    signals = signals_in_ticks(channels, series, len(frames))
     return [Reading(*values) for values in zip(frames, pads, signals, strict=True)]
 
 
-def _series(times: NDArray[np.float64], arrays: Arrays, channel: Channel) -> list[Any]:
-    """Return the value of a further channel in each tick."""
-    values = arrays[f"signal_{channel.name}"]
-    if isinstance(channel, TactileArray):
-        sampled_s = arrays[f"signal_{channel.name}_t_s"]
-        if channel.dtype != FLOATS:
-            values = read_only(values, channel.dtype)  # once, so that its images are passed by reference
-        images = [
-            Image(t_s, k, cells_of(channel, cells))
-            for k, (t_s, cells) in enumerate(zip(sampled_s.tolist(), values, strict=True), 1)
-        ]
-        return latest_values(times, sampled_s, images, no_signals((channel,))[0])
-    if isinstance(channel, FastChannel):
-        return sample_blocks(times, arrays[f"signal_{channel.name}_t_s"], values, channel)
-    return list(values.tolist())
+def _tables(path: Path) -> tuple[Columns, str]:
+    """Return the tables of an exported grasp as the arrays of its NPZ file, and the JSON text that declares them.
+
+    Raises ConfigError if a file is missing, DataDamaged if one is not as `graspsense export` writes it, and
+    PluginUnavailable for Parquet without pyarrow.
+    """
+    declared = declared_beside(path)
+    if path.exists() and not declared.exists():
+        refuse_table_of_store(path, _names(path))
+        raise ConfigError(
+            f"{declared.name} is missing beside {path}: `graspsense export` writes it together with the columns. For a "
+            "file of another program name its columns, or write a manifest (docs/import.md)"
+        )
+    try:
+        return _read_tables(path, declared)
+    except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
+        raise DataDamaged(
+            f"{path} is not as `graspsense export` writes it: {type(error).__name__}: {error}"
+        ) from error
+
+
+def _read_tables(path: Path, declared: Path) -> tuple[Columns, str]:
+    """Return the arrays, and the text that declares them. What does not fit ends in an error of Python."""
+    ticks = _columns(path)
+    missing = [name for name in TICK_FIELDS if name not in ticks]
+    if missing:
+        raise DataDamaged(f"{path} is not an exported grasp: it has no column {missing[0]!r}")
+    try:
+        text = text_of(declared)
+        about = json.loads(text)
+        channels = further(tuple(from_json(channel) for channel in about["channels"]))
+        tables = frozenset(about["tables"])
+        cells = int(about["cells"])
+    except (ConfigError, ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
+        raise DataDamaged(f"{declared} is damaged: {type(error).__name__}: {error}") from error
+    if too_many := CHANNEL_NUMBERS.exceeded(cells):
+        raise DataDamaged(f"{declared} is damaged: the fingertips have {too_many}")
+
+    def table(topic: str) -> Columns:
+        return _columns(beside(path, topic)) if topic in tables else {"t_s": np.empty(0)}
+
+    pads = table(PADS_TOPIC)
+    ticks["pad_t_s"] = pads["t_s"]
+    for side in ("left", "right"):
+        ticks[f"pad_{side}"] = _together(pads, [f"{side}_{i:02d}" for i in range(cells)])
+    scalars = table(SCALARS_TOPIC)
+    for channel in channels:
+        name, topic = f"signal_{channel.name}", SIGNAL_TOPIC + channel.name
+        if isinstance(channel, TactileArray) and channel.dtype != FLOATS:
+            nothing = {"t_s": np.empty(0), "cells": np.empty((0, *channel.shape))}
+            images = npz_arrays(images_beside(path, topic)) if topic in tables else nothing
+            ticks[f"{name}_t_s"], ticks[name] = images["t_s"], images["cells"]
+        elif isinstance(channel, TactileArray | FastChannel):
+            samples = table(topic)
+            fields = (
+                channel.axes
+                if isinstance(channel, FastChannel)
+                else [f"cells_{i:02d}" for i in range(channel.numbers)]
+            )
+            ticks[f"{name}_t_s"], ticks[name] = samples["t_s"], _together(samples, fields)
+        else:
+            ticks[name] = scalars[channel.name]
+    return ticks, text
+
+
+def _together(table: Columns, names: Sequence[str]) -> Numbers:
+    """Return these columns side by side: (rows, columns)."""
+    if len(table["t_s"]) == 0:
+        return np.empty((0, len(names)))
+    return np.column_stack([table[name] for name in names])
+
+
+def refuse_table_of_store(path: Path, names: Iterable[str]) -> None:
+    """Raise ConfigError if these are the columns of the table of a store, which has no ticks."""
+    if set(_ABOUT_TRIALS) <= set(names):
+        raise ConfigError(
+            f"{path} is the table of a store, with one row for each grasp, so there is no grasp to import. Learn from "
+            "it as FILE.csv: graspsense train FILE.csv --label label --out MODEL.json. Or export single grasps: "
+            f"graspsense export DIR#12 --to FILE{path.suffix.lower()}"
+        )
+
+
+def _names(path: Path) -> Sequence[str]:
+    """Return the names of the columns of a file."""
+    if path.suffix.lower() == ".parquet":
+        from graspsense.sources.formats.parquet_format import read_parquet
+
+        table = read_parquet(path)[0]
+        return (*table.numbers, *table.texts)
+    return header_of(path)
+
+
+def header_of(path: Path) -> Sequence[str]:
+    """Return the names in the first line of a CSV file; none if it cannot be read."""
+    try:
+        text = first_bytes(path, HEADER_BYTES).decode("utf-8", errors="replace")
+        return [text_of_cell(cell) for cell in next(csv.reader(io.StringIO(text, newline="")), ())]
+    except (OSError, ValueError, csv.Error):
+        return ()
+
+
+def _columns(path: Path) -> Columns:
+    """Return the columns of one file. Raises ConfigError, DataDamaged, PluginUnavailable."""
+    if path.suffix.lower() == ".parquet":
+        from graspsense.sources.formats.parquet_format import read_parquet
+
+        return dict(read_parquet(path)[0].numbers)
+    text = text_of(path)
+    check_lines(path, text)
+    try:
+        rows = csv.reader(io.StringIO(text, newline=""))
+        names = next(rows, [])
+        check_columns(path, names)
+        if too_many := CELLS.exceeded(text.count("\n") * len(names)):
+            raise DataDamaged(f"{path}: {too_many}")
+        cells = list(zip(*rows, strict=True)) or [()] * len(names)
+        columns = columns_of_numbers(
+            {text_of_cell(name): column for name, column in zip(names, cells, strict=True)}
+        )
+    except (ValueError, csv.Error) as error:
+        raise DataDamaged(f"{path} is not as `graspsense export` writes it: {error}") from error
+    numbers: Columns = {}
+    for name, parsed in columns.items():
+        if isinstance(parsed, NotNumbers):
+            raise DataDamaged(f"{path}, line {parsed.row + 2}: {name} is {parsed.words}")
+        numbers[name] = parsed
+    return numbers

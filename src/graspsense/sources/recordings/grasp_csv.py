@@ -24,7 +24,7 @@ from graspsense.sources.manifest.description import QUANTITIES as MAPPED
 from graspsense.sources.manifest.description import Manifest, ReadManifest
 from graspsense.sources.manifest.expression import Expression, ExpressionError, parse
 from graspsense.sources.manifest.samples import samples
-from graspsense.sources.recordings.exported_grasp_tables import header_of, refuse_table_of_store
+from graspsense.sources.recordings.exported_grasp import header_of, refuse_table_of_store
 
 REQUIRED: Final = ("time", "gap", "force")
 QUANTITIES: Final = (*REQUIRED, "effort", "velocity")

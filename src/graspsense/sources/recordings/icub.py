@@ -15,8 +15,9 @@ ring and little finger together (https://icub-tech-iit.github.io/documentation, 
 
 from __future__ import annotations
 
+from math import nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from attrs import frozen
@@ -29,9 +30,7 @@ from graspsense.core.values.limits import TEXT_BYTES
 from graspsense.core.values.signals import NO_PADS, Frame, Reading
 from graspsense.recording.readable import not_opened
 from graspsense.recording.replayable import Recording
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from graspsense.sources.formats.table import Numbers
 
 FIRST_LINE: Final = "-10000"
 DATA_FOLDER: Final = "iCubGraspDataset"
@@ -67,9 +66,9 @@ class IcubGrasp:
     another time.
     """
 
-    encoders_deg: NDArray[np.float64]
-    maxima: NDArray[np.float64]
-    taxels: NDArray[np.float64]
+    encoders_deg: Numbers
+    maxima: Numbers
+    taxels: Numbers
 
     def __len__(self) -> int:
         """Return the number of frames."""
@@ -121,19 +120,15 @@ def read_grasp(path: Path) -> IcubGrasp:
     lines = text.splitlines()
     if not lines:
         raise DataDamaged(f"{path} is empty: a grasp of the iCub data set starts with the line {FIRST_LINE}")
+    frames, left_over = divmod(len(lines) - 1, len(_LINES))
     if lines[0].strip() != FIRST_LINE:
-        raise _damaged(
-            path, 1, f"it starts with {lines[0][:40]!r}, but a grasp starts with the line {FIRST_LINE}"
-        )
+        begins = f"it starts with {lines[0][:40]!r}, but a grasp starts with the line {FIRST_LINE}"
+        raise _damaged(path, 1, begins)
     if not text.endswith("\n"):
         raise _damaged(path, len(lines), "the file ends within this line: download it again")
-    frames, left_over = divmod(len(lines) - 1, len(_LINES))
     if left_over:
-        raise _damaged(
-            path,
-            len(lines),
-            f"the file ends after {left_over} of the {len(_LINES)} lines of frame {frames + 1}: download it again",
-        )
+        ends = f"the file ends after {left_over} of the {len(_LINES)} lines of frame {frames + 1}"
+        raise _damaged(path, len(lines), f"{ends}: download it again")
     if not frames:
         raise _damaged(path, 1, "there is no frame after the first line")
     rows = [_numbers(path, 2 + i, line, *_LINES[i % len(_LINES)]) for i, line in enumerate(lines[1:])]
@@ -158,23 +153,11 @@ def relative_readings(grasp: IcubGrasp) -> tuple[Reading, ...]:
     flexion_deg = (thumb_deg + finger_deg) / 2.0
     gap_m = START_GAP_M - GAP_M_PER_DEG * (flexion_deg - flexion_deg[0])
     velocity = np.diff(gap_m, prepend=gap_m[0])
-    forces = [tuple(row) for row in pressure.tolist()]
-    sides = list(map(opposed_forces(HAND), forces))
-    signals = signal_type(HAND)
+    forces, signals, sides = pressure.tolist(), signal_type(HAND), opposed_forces(HAND)
+    motions = zip(gap_m.tolist(), velocity.tolist(), forces, strict=True)
     return tuple(
-        Reading(
-            Frame(
-                t_s=float(k),
-                dt_s=1.0,
-                gap_m=float(gap_m[k]),
-                velocity_m_s=float(velocity[k]),
-                force_left_n=sides[k][0],
-                force_right_n=sides[k][1],
-            ),
-            NO_PADS,
-            signals(*forces[k]),
-        )
-        for k in range(len(grasp))
+        Reading(Frame(float(k), 1.0, gap, speed, nan, *sides(force)), NO_PADS, signals(*force))
+        for k, (gap, speed, force) in enumerate(motions)
     )
 
 

@@ -10,7 +10,7 @@ squeezed yet. All of this was decided before any recognition rate was computed.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, Final
@@ -37,7 +37,6 @@ from graspsense.sources.recordings.icub import (
     THUMB_FLEXION,
     IcubGrasp,
     read_grasp,
-    read_recording,
     recording_of,
 )
 from graspsense.sources.recordings.labelled_recordings import trace_of_recording
@@ -45,6 +44,8 @@ from graspsense.sources.recordings.labelled_recordings import trace_of_recording
 UNRELIABLE: Final = "full_coke"
 """The class whose data the author of the data set calls unreliable in its README."""
 _FILE: Final = re.compile(r"(?P<label>[a-z_]+)_(?P<number>\d+)\.txt")
+GraspFile = tuple[Path, str, int]
+"""A file with the label and the number in its name."""
 _SHIFTED_BY: Final = {"p_first": "gap", "p_steady": "gap", "f_steady": "force"}
 
 
@@ -54,30 +55,31 @@ def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = F
     With `unreliable`, the class that the author calls unreliable is included. A file that cannot be read is left out,
     with a note. Raises ConfigError if there are no grasps, DataDamaged if none can be read.
     """
-    paths = _grasps(folder)
-    left_out = [path for path, label, _ in paths if label == UNRELIABLE] if not unreliable else []
-    paths = [named for named in paths if named[0] not in left_out]
+    every = _grasps(folder)
+    paths = [named for named in every if unreliable or named[1] != UNRELIABLE]
     if not paths:
         raise ConfigError(
             f"all grasps in {folder} are of {UNRELIABLE}, which the author calls unreliable: include them with "
             f"{option('unreliable', python='unreliable=True')}"
         )
-    total = len(paths)
-    paths, grasps, unreadable = _readable(paths)
+    read = list(_each(paths))
+    unreadable = [grasp for _, grasp in read if isinstance(grasp, UnreadableRecording)]
+    known = {named: grasp for named, grasp in read if isinstance(grasp, IcubGrasp)}
+    grasps = list(known.values())
     if not grasps:
         raise error_of_all(unreadable)
-    recordings = [recording_of(grasp, path.name) for (path, *_), grasp in zip(paths, grasps, strict=True)]
+    recordings = [recording_of(grasp, path.name) for (path, *_), grasp in known.items()]
     check_recording(recorded_channels(recordings[0]), f"icub:{folder}", features)
     table = table_of([features.extract(trace_of_recording(recording)) for recording in recordings])
     notes = [
         "the data of the iCub hand have no time stamps: times are frame numbers (delta_t is in frames)",
         "metres and newtons are nominal, and relative to the first frame (docs/icub.md)",
         "class, object and session are the same here: no rate tells whether the squeeze or the session is recognised",
-        *note_on(unreadable, total),
+        *note_on(unreadable, len(read)),
     ]
-    if left_out:
+    if len(paths) < len(every):
         notes.append(
-            f"{counted(len(left_out), 'grasp')} of {UNRELIABLE} left out: their author calls them unreliable "
+            f"{counted(len(every) - len(paths), 'grasp')} of {UNRELIABLE} left out: their author calls them unreliable "
             f"(include them with {option('unreliable', python='unreliable=True')})"
         )
     without = int(np.isnan(table.values).all(axis=1).sum())
@@ -93,10 +95,10 @@ def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = F
     return Labelled(
         source=f"icub:{folder}",
         table=table,
-        labels=tuple(label for _, label, _ in paths),
+        labels=tuple(label for _, label, _ in known),
         no_interval="every class is one object, recorded in one session",
         no_instances="every class of this data set is a single object, so none can be held out",
-        order=tuple(number for _, _, number in paths),
+        order=tuple(number for _, _, number in known),
         **controls(
             table,
             _first_frame(grasps),
@@ -114,33 +116,23 @@ def read_recordings(folder: str) -> Iterator[LabelledRecording | UnreadableRecor
 
     Raises ConfigError if there are none.
     """
-    for path, label, number in _grasps(folder):
-        if label != UNRELIABLE:
-            for recording in each_readable(path.name, lambda path=path: [read_recording(str(path))]):  # type: ignore[misc]
-                if isinstance(recording, UnreadableRecording):
-                    yield recording
-                else:
-                    yield LabelledRecording(
-                        recording=recording, source=path.name, label=label, order=float(number)
-                    )
+    for (path, label, number), grasp in _each(named for named in _grasps(folder) if named[1] != UNRELIABLE):
+        if isinstance(grasp, UnreadableRecording):
+            yield grasp
+        else:
+            yield LabelledRecording(
+                recording=recording_of(grasp, path.name), source=path.name, label=label, order=float(number)
+            )
 
 
-def _readable(
-    paths: list[tuple[Path, str, int]],
-) -> tuple[list[tuple[Path, str, int]], list[IcubGrasp], list[UnreadableRecording]]:
-    """Return the files that can be read, the grasps in them, and why the others cannot be."""
-    kept, grasps, unreadable = [], [], []
-    for named in paths:
+def _each(files: Iterable[GraspFile]) -> Iterator[tuple[GraspFile, IcubGrasp | UnreadableRecording]]:
+    """Yield each file with the grasp in it, or with why it cannot be read."""
+    for named in files:
         for grasp in each_readable(named[0].name, lambda path=named[0]: [read_grasp(path)]):  # type: ignore[misc]
-            if isinstance(grasp, UnreadableRecording):
-                unreadable.append(grasp)
-            else:
-                grasps.append(grasp)
-                kept.append(named)
-    return kept, grasps, unreadable
+            yield named, grasp
 
 
-def _grasps(folder: str) -> list[tuple[Path, str, int]]:
+def _grasps(folder: str) -> list[GraspFile]:
     """Return the path, label and number of every grasp, sorted by label and number."""
     given = Path(folder).expanduser()
     within = given / DATA_FOLDER

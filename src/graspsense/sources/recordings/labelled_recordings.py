@@ -6,6 +6,7 @@ graspsense was involved.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from functools import partial
 from typing import Any
@@ -40,35 +41,33 @@ def labelled_recordings(
     which they are. Raises ConfigError if there are none, and the first error if none can be read.
     """
     facts: list[LabelledRecording] = []
-    rows: list[Features] = []
-    early: list[Features] = []
-    unreadable: list[UnreadableRecording] = []
-    unlabelled = 0
+    rows: list[tuple[Features, Features]] = []
     read = list(readable_or_not(kind, place))
-    known = [recording.recording for recording in read if isinstance(recording, LabelledRecording)]
-    fitted, threshold_notes = _fitted(features, known)
+    unreadable: list[UnreadableRecording] = []
+    known = [recording for recording in read if isinstance(recording, LabelledRecording)]
+    fitted, threshold_notes = _fitted(features, [recording.recording for recording in known])
     features = with_checkpoints(fitted, checkpoints_s)
     for recording in read:
         if isinstance(recording, UnreadableRecording):
             unreadable.append(recording)
-        elif not recording.label:
-            unlabelled += 1
-        else:
-            for extracted in each_readable(recording.source, partial(_features_of, recording, features)):
-                if isinstance(extracted, UnreadableRecording):
-                    unreadable.append(extracted)
-                    continue
-                rows.append(extracted[0])
-                early.append(extracted[1])
+            continue
+        extract = partial(_features_of, recording, features)
+        for extracted in each_readable(recording.source, extract) if recording.label else ():
+            if isinstance(extracted, UnreadableRecording):
+                unreadable.append(extracted)
+            else:
+                rows.append(extracted)
                 facts.append(recording)
     if unreadable and not facts:
         raise error_of_all(unreadable)
     if not facts:
         raise ConfigError(f"{kind}:{place} has no recording with a label")
-    table = table_of(rows)
-    notes = note_on(unreadable, len(facts) + len(unreadable) + unlabelled)
+    table = table_of([features_of for features_of, _ in rows])
+    notes, unlabelled = note_on(unreadable, len(read)), sum(not recording.label for recording in known)
     notes += [f"{counted(unlabelled, 'recording')} left out: no label"] if unlabelled else []
-    notes += [*_counted(fact.notices for fact in facts), *threshold_notes]
+    counts = Counter(notice for fact in facts for notice in fact.notices)
+    notes += [f"{counted(count, 'recording')}: {notice}" for notice, count in counts.items()]
+    notes += threshold_notes
     units = {unit for fact in facts for unit in fact.recording.units.values()}
     if units:
         notes.append(f"units that are not SI units: {', '.join(sorted(units))}")
@@ -84,7 +83,7 @@ def labelled_recordings(
         order=order,
         no_order="" if order is not None else "the data set does not say when each trial was recorded",
         content=tuple(map(str, grasp_numbers([curve_bytes(fact.recording.readings) for fact in facts]))),
-        **_controls(table, early, facts),
+        **_controls(table, [early for _, early in rows], facts),
         notes=tuple(notes),
         provenance={"simulated": False},
     )
@@ -151,31 +150,15 @@ def _order(facts: Sequence[LabelledRecording]) -> tuple[int, ...] | None:
     return tuple(ranks[key] for key in keys)
 
 
-def _first_lines(facts: Sequence[LabelledRecording]) -> FeatureTable:
-    """Return the numbers of the first frame of each recording."""
-    values = np.array([numbers_of(fact.recording.readings[0].frame) for fact in facts], dtype=np.float64)
-    values[np.isinf(values)] = np.nan
-    return FeatureTable(names=NAMES, units=UNITS, values=values)
-
-
 def _controls(table: FeatureTable, early: Sequence[Features], facts: Sequence[LabelledRecording]) -> Controls:
-    measured = controls(
-        table, table_of(early), before_missing=_why_missing(early), first_line=_first_lines(facts)
+    """Return the controls: features from before contact, and the numbers of the first frame of each recording."""
+    opening = np.array([numbers_of(fact.recording.readings[0].frame) for fact in facts], dtype=np.float64)
+    opening[np.isinf(opening)] = np.nan
+    known_controls = controls(
+        table,
+        table_of(early),
+        before_missing=next((reason for features in early for reason in features.reasons.values()), ""),
+        first_line=FeatureTable(names=NAMES, units=UNITS, values=opening),
     )
-    return without_constant_gap(
-        measured, ([reading.frame.gap_m for reading in fact.recording.readings] for fact in facts)
-    )
-
-
-def _why_missing(early: Sequence[Features]) -> str:
-    """Return why trials have no features from before contact, empty if all have them."""
-    return next((reason for features in early for reason in features.reasons.values()), "")
-
-
-def _counted(notices: Any) -> list[str]:
-    """Return each notice once, with the number of recordings that it is about."""
-    counts: dict[str, int] = {}
-    for of_one in notices:
-        for notice in of_one:
-            counts[notice] = counts.get(notice, 0) + 1
-    return [f"{counted(count, 'recording')}: {notice}" for notice, count in counts.items()]
+    gaps = ([reading.frame.gap_m for reading in fact.recording.readings] for fact in facts)
+    return without_constant_gap(known_controls, gaps)

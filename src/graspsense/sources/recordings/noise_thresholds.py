@@ -21,8 +21,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable, Mapping, Sequence
+from typing import Final
 
 import numpy as np
 from attrs import frozen
@@ -30,11 +30,8 @@ from attrs import frozen
 from graspsense.core.control.contact import CONTACT_FORCE_N, REST_SPEED_M_S, REST_WINDOW_S, first_rest
 from graspsense.core.grasp.gap_resolution import MARGIN, MEASURED, gap_resolution
 from graspsense.core.values.signals import NO_GAP
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from graspsense.recording.replayable import Recording
+from graspsense.recording.replayable import Recording
+from graspsense.sources.formats.table import Numbers
 
 THRESHOLDS: Final[tuple[str, ...]] = ("contact_force_n", "rest_speed_m_s", "rest_window_s")
 """The settings of controllers and features that are chosen here, and that a user may give instead."""
@@ -114,10 +111,12 @@ def thresholds_for(
     resting, rest_words = _rest(measured, scale, contact, given or {})
     times, times_words = _timeouts(used, timeouts_s or {}, scale)
     ends, ends_words = _ends(measured, scale, contact)
-    settings = {**force, **resting, **times, **ends}
-    seen = _seen(measured, scale)
+    settings, seen = {**force, **resting, **times, **ends}, _seen(measured, scale)
     if not settings:
-        words = f"thresholds of contact and rest: the defaults, which fit the noise ({scale.defaults}{seen})"
+        defaults = (
+            f"contact {CONTACT_FORCE_N:g} N, rest below {REST_SPEED_M_S:g} m/s within {REST_WINDOW_S:g} s"
+        )
+        words = f"thresholds of contact and rest: the defaults, which fit the noise ({defaults}{seen})"
         return Thresholds(settings={}, words=words)
     words = "; ".join(filter(None, (force_words, rest_words, times_words, ends_words)))
     return Thresholds(settings=settings, words=f"thresholds chosen from the recordings: {words}{seen}")
@@ -149,18 +148,14 @@ class _Scale:
         """Whether the default thresholds of rest have a meaning."""
         return (self.gap, self.t) == ("m", "s")
 
-    @property
-    def defaults(self) -> str:
-        return f"contact {CONTACT_FORCE_N:g} N, rest below {REST_SPEED_M_S:g} m/s within {REST_WINDOW_S:g} s"
-
 
 @frozen(kw_only=True)
 class _Noise:
     """What one recording says, in its own units."""
 
-    times: NDArray[np.float64]
-    gap: NDArray[np.float64]
-    both: NDArray[np.float64]
+    times: Numbers
+    gap: Numbers
+    both: Numbers
     """The force that both pads feel."""
     baseline: float
     """The force without contact."""
@@ -239,9 +234,9 @@ def _contact_force(measured: Sequence[_Noise], scale: _Scale) -> tuple[dict[str,
     most = 0.5 * reached
     typical = _TYPICAL * (float(np.median(peaks)) - base)
     above = max(needed - base, min(typical, most), _LEAST_FORCE_N if si else 0.0)
-    chosen = base + (min(_rounded_up(above), _MOST_FORCE_N) if si else _rounded_up(above))
+    chosen = base + (min(_rounded(above), _MOST_FORCE_N) if si else _rounded(above))
     if not si and chosen > float(np.quantile(peaks, 1.0 - _REACHING, method="lower")):
-        chosen = max(_rounded_down(min(noise.baseline for noise in measured)), _LEAST_FORCE_N)
+        chosen = max(_rounded(min(noise.baseline for noise in measured), math.floor), _LEAST_FORCE_N)
         return {"controller.contact_force_n": chosen}, (
             f"contact_force_n {chosen:g} {scale.force}, so that recordings are in contact from the beginning (their "
             "forces at the beginning differ by more than they grow later; if the fingers were free then, write zero)"
@@ -262,9 +257,7 @@ def _rest(
 ) -> tuple[dict[str, float], str]:
     """Return the rest speed and window if the defaults do not fit, and why."""
     noise = float(np.quantile([noise_.noise for noise_ in measured], _REACHING))
-    step = float(np.quantile([recording.step for recording in measured], 0.9))
-    period = float(np.quantile([recording.period for recording in measured], 0.9))
-    sampled = float(np.median([recording.sampled for recording in measured]))
+    step, period, sampled = _steps(measured)
     closing = float(np.median([recording.closing for recording in measured]))
     squeezing = [recording.squeezing for recording in measured if recording.squeezing > 0.0]
     slowest = _SQUEEZE_SHARE * float(np.median(squeezing)) if squeezing else _SLOW_SHARE * closing
@@ -273,7 +266,8 @@ def _rest(
         REST_WINDOW_S if scale.t == "s" else 0.0, 0.0 if scale.has_rest else MEASURED * sampled
     )
     if not default_speed > 0.0:  # the gap does not move, or there is none
-        return ({} if scale.has_rest else _never(measured)), ""
+        longest = max(float(recording.times[-1] - recording.times[0]) for recording in measured)
+        return ({} if scale.has_rest else {"controller.rest_window_s": _rounded(2.0 * longest)}), ""
     travel = max(noise, MARGIN * step)
     # Between samples that are further apart than the window, the gap may move for as long as they are apart.
     fits = travel <= default_speed * max(default_window, sampled) and MEASURED * period <= default_window
@@ -292,7 +286,7 @@ def _rest(
         del candidates[1:]
     # Steps of a coarse gap pass for noise while it moves, so the step alone is tried first.
     travels = sorted({MARGIN * step, travel}) if step else [travel]
-    pairs = [(v, _window(x / v, least, scale)) for x in travels for v in map(_rounded_up, candidates)]
+    pairs = [(v, _window(x / v, least, scale)) for x in travels for v in map(_rounded, candidates)]
     resting = [sum(recording.rests(contact, *pair) for recording in tried) for pair in pairs]
     enough = _REACHING * sum(bool((recording.both >= contact).any()) for recording in tried)
     chosen = next((k for k, count in enumerate(resting) if count >= enough), int(np.argmax(resting)))
@@ -311,14 +305,8 @@ def _rest(
 
 
 def _window(needed: float, least: float, scale: _Scale) -> float:
-    window = max(least, _rounded_up(needed))
+    window = max(least, _rounded(needed))
     return min(window, max(_MOST_WINDOW_S, least)) if scale.t == "s" else window
-
-
-def _never(measured: Sequence[_Noise]) -> dict[str, float]:
-    """Return a window that no recording is long enough for: a gap that was not recorded shows no rest."""
-    longest = max(float(noise.times[-1] - noise.times[0]) for noise in measured)
-    return {"controller.rest_window_s": _rounded_up(2.0 * longest)}
 
 
 def _ends(measured: Sequence[_Noise], scale: _Scale, contact: float) -> tuple[dict[str, float], str]:
@@ -340,11 +328,11 @@ def _ends(measured: Sequence[_Noise], scale: _Scale, contact: float) -> tuple[di
     else:
         travels = [_travel(noise, contact) for noise in measured]
         close = sum(travel < _SOON_M for travel in travels)
-        thin = sum(_is_thin(noise, contact) for noise in measured)
+        thin = sum(bool((noise.gap[noise.both >= contact] <= _CLOSED_M).any()) for noise in measured)
         parts = []
         if close:
             grown = -min(0.0, *travels)
-            wide = -_rounded_up(grown) if grown else 0.0
+            wide = -_rounded(grown) if grown else 0.0
             chosen["controller.too_wide_m"] = wide
             parts.append(
                 f"too_wide_m {wide:g} m ({close} of {len(measured)} recordings touch within {_SOON_M * 1e3:g} mm of "
@@ -365,11 +353,19 @@ def _ends(measured: Sequence[_Noise], scale: _Scale, contact: float) -> tuple[di
     return chosen, words
 
 
+def _steps(measured: Sequence[_Noise]) -> tuple[float, float, float]:
+    """Return the least step of the gap, the time between its measurements, and that between samples."""
+    rows = np.array([(noise.step, noise.period, noise.sampled) for noise in measured])
+    return (
+        float(np.quantile(rows[:, 0], 0.9)),
+        float(np.quantile(rows[:, 1], 0.9)),
+        float(np.median(rows[:, 2])),
+    )
+
+
 def _seen(measured: Sequence[_Noise], scale: _Scale) -> str:
     """Return in words how finely the gap was measured."""
-    step = float(np.quantile([noise.step for noise in measured], 0.9))
-    period = float(np.quantile([noise.period for noise in measured], 0.9))
-    sampled = float(np.median([noise.sampled for noise in measured]))
+    step, period, sampled = _steps(measured)
     unit = "ms" if scale.t == "s" else scale.t
     factor = 1e3 if scale.t == "s" else 1.0
     words = f"; samples are {factor * sampled:.3g} {unit} apart"
@@ -389,7 +385,7 @@ def _timeouts(
     longest = max(
         recording.readings[-1].frame.t_s - recording.readings[0].frame.t_s for recording in recordings
     )
-    limit = min(_rounded_up(longest), _MOST_TIMEOUT_S) if scale.t == "s" else _rounded_up(longest)
+    limit = min(_rounded(longest), _MOST_TIMEOUT_S) if scale.t == "s" else _rounded(longest)
     chosen = {f"controller.{key}": limit for key, value in timeouts_s.items() if value < longest}
     if not chosen:
         return {}, ""
@@ -403,21 +399,14 @@ def _travel(noise: _Noise, contact: float) -> float:
     return float(noise.gap[0] - noise.gap[touched[0]]) if len(touched) and touched[0] else math.inf
 
 
-def _is_thin(noise: _Noise, contact: float) -> bool:
-    """Return whether both pads feel an object in a gap in which the fingers count as closed."""
-    return bool((noise.gap[noise.both >= contact] <= _CLOSED_M).any())
-
-
-def _loaded(force: NDArray[np.float64], baseline: float) -> int:
+def _loaded(force: Numbers, baseline: float) -> int:
     """Return the first sample with a fifth of the peak force."""
     if np.isnan(force).all():
         return 0
     return int((force >= baseline + _EARLY_SHARE * (np.nanmax(force) - baseline)).argmax())
 
 
-def _squeezing_speed(
-    times: NDArray[np.float64], gap: NDArray[np.float64], force: NDArray[np.float64], loaded: int
-) -> float:
+def _squeezing_speed(times: Numbers, gap: Numbers, force: Numbers, loaded: int) -> float:
     """Return the mean speed of the gap from a fifth of the peak force to 95 % of it; 0 if it does not close."""
     if np.isnan(force).all():
         return 0.0
@@ -428,7 +417,7 @@ def _squeezing_speed(
     return max(closed, 0.0) / float(times[top] - times[loaded]) if closed == closed else 0.0
 
 
-def _baseline(force: NDArray[np.float64]) -> float:
+def _baseline(force: Numbers) -> float:
     """Return the force without contact of a sensor whose zero is not known: that of the first samples below a fifth."""
     known = force[~np.isnan(force)]
     if not len(known):
@@ -437,7 +426,7 @@ def _baseline(force: NDArray[np.float64]) -> float:
     return float(np.median(early[: max(len(early) // 3, _FEW)]))
 
 
-def _free_force(force: NDArray[np.float64], baseline: float) -> float:
+def _free_force(force: Numbers, baseline: float) -> float:
     """Return the largest force that noise without contact explains."""
     known = force[~np.isnan(force)]
     if len(known) <= _FEW:
@@ -453,14 +442,14 @@ def _free_force(force: NDArray[np.float64], baseline: float) -> float:
     return abs(middle) + scatter if baseline == 0.0 else middle + scatter
 
 
-def _rises(force: NDArray[np.float64]) -> bool:
+def _rises(force: Numbers) -> bool:
     """Return whether a force grows by more than its noise explains, so that something is squeezed already."""
     a_third = max(len(force) // 3, 1)
     growth = float(np.median(force[-a_third:]) - np.median(force[:a_third]))
     return growth > _FORCE_SIGMAS * _scatter_of_differences(force)
 
 
-def _gap_at_rest(gap: NDArray[np.float64], force: NDArray[np.float64]) -> float:
+def _gap_at_rest(gap: Numbers, force: Numbers) -> float:
     """Return the distance within which a gap at rest stays by its noise, which shows best where the force is large."""
     known = np.isfinite(gap)
     if not np.isnan(force).all():
@@ -471,23 +460,15 @@ def _gap_at_rest(gap: NDArray[np.float64], force: NDArray[np.float64]) -> float:
     return _GAP_SIGMAS * _scatter_of_differences(gap[known])
 
 
-def _scatter_of_differences(values: NDArray[np.float64]) -> float:
+def _scatter_of_differences(values: Numbers) -> float:
     """Return the standard deviation of the noise of a smooth course, from its second differences."""
     curvature = np.diff(values, n=2)
     return _NORMAL * float(np.median(np.abs(curvature - np.median(curvature)))) / math.sqrt(6.0)
 
 
-def _rounded_down(value: float) -> float:
-    """Return the value with two significant digits, not larger; 0 for one that is not positive."""
+def _rounded(value: float, whole: Callable[[float], int] = math.ceil) -> float:
+    """Return the value with two significant digits, not smaller unless `whole` rounds otherwise; at least 0."""
     if value <= 0.0:
         return 0.0
     digits = 1 - math.floor(math.log10(value))
-    return math.floor(round(value * 10.0**digits, 6)) / 10.0**digits
-
-
-def _rounded_up(value: float) -> float:
-    """Return the value with two significant digits, not smaller."""
-    if value <= 0.0:
-        return 0.0
-    digits = 1 - math.floor(math.log10(value))
-    return round(math.ceil(round(value * 10.0**digits, 6)) / 10.0**digits, max(digits, 0))
+    return round(whole(round(value * 10.0**digits, 6)) / 10.0**digits, max(digits, 0))

@@ -153,9 +153,8 @@ class ReplayBackend(SensorBackend[ReplayConfig]):
 
     accepts = COMMAND_KINDS
 
-    _recording: Recording | None = None
     _kept: Recording | None = None
-    _commands: tuple[float, ...] | None = None
+    _is_open = False
     _next = 0
 
     @property
@@ -171,7 +170,7 @@ class ReplayBackend(SensorBackend[ReplayConfig]):
         Raises ConfigError if there is no such file, DataDamaged if it is not what it claims to be.
         """
         recording = self._read()
-        self._recording, self._commands, self._next = recording, recording.commands, 0
+        self._is_open, self._next = True, 0
         return DeviceInfo(
             name=recording.name,
             clock="virtual",
@@ -205,11 +204,11 @@ class ReplayBackend(SensorBackend[ReplayConfig]):
 
     def close(self) -> None:
         """Let go of the recording."""
-        self._recording = None
+        self._is_open = False
 
     def recorded_commands(self) -> Sequence[float] | None:
         """Return the commands of the recording, None where it does not hold them."""
-        return self._commands
+        return None if self._kept is None else self._kept.commands
 
     def report(self) -> Mapping[str, float | int | str | bool]:
         """Return which recording this is and how many of its frames were read."""
@@ -223,6 +222,6 @@ class ReplayBackend(SensorBackend[ReplayConfig]):
         return self._kept
 
     def _opened(self) -> Recording:
-        if self._recording is None:
+        if not self._is_open:
             raise DeviceLost("the recording is not open")
-        return self._recording
+        return self._read()

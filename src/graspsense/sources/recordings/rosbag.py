@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, NamedTuple, TypeVar
+from typing import Any, Final
 
 import numpy as np
 
@@ -37,7 +37,8 @@ from graspsense.recording.unpacked import Unpacked
 from graspsense.sources.columns.fast_samples import most_in_a_tick, sample_blocks
 from graspsense.sources.columns.force_and_gap import doubtful_delay
 from graspsense.sources.formats.ros_bags import opened_bag, stamp_ns
-from graspsense.sources.formats.topic_clocks import Messages, TopicTimes, common_clock
+from graspsense.sources.formats.table import Numbers
+from graspsense.sources.formats.topic_clocks import Messages, Nanoseconds, TopicTimes, common_clock
 
 SIDES: Final = {"l": "left", "r": "right"}
 TIP_FIELDS: Final = (("l_finger_tip", "r_finger_tip"), ("data0", "data1"))
@@ -75,29 +76,6 @@ _MESSAGE_BYTES: Final = 512
 _NAN: Final = float("nan")
 
 
-class _Motion(NamedTuple):
-    t_ns: int
-    gap_m: float
-    velocity_m_s: float
-    effort_n: float
-
-
-class _Sampled(NamedTuple):
-    """The samples of a message of the accelerometer, and the time of the last."""
-
-    t_ns: int
-    values: tuple[tuple[float, float, float], ...]
-
-
-class _Image(NamedTuple):
-    t_ns: int
-    left: Cells
-    right: Cells
-
-
-T = TypeVar("T", _Motion, _Sampled, _Image)
-
-
 def read_bag(name: str) -> Recording:
     """Return the recording in a bag: `FILE`, or `FILE#l` and `FILE#r` if it contains both grippers.
 
@@ -113,88 +91,85 @@ def read_bag(name: str) -> Recording:
         raise ConfigError(f"{name!r}: write l or r after #, for the left or the right gripper")
     kept = Unpacked(path)
     with opened_bag(path, DEFINITIONS) as bag, readable(path):
-        side = _side(path, side, bag.topics)
-        content = _Content(path, side, _source(path, side, bag.topics))
-        for topic, recorded_ns, message in bag.messages(content.times.__contains__):
+        messages = _Messages(path, _side(path, side, bag.topics), bag.topics)
+        for topic, recorded_ns, message in bag.messages(messages.values.__contains__):
             kept.add(_MESSAGE_BYTES)
-            content.add(topic, recorded_ns, message)
-    return _recording(path, content)
+            messages.add(topic, recorded_ns, message)
+    return _recording(path, messages)
 
 
-class _Content:
-    """The messages of a gripper in a bag, and when they came."""
+class _Messages:
+    """What is read of the messages of a gripper in a bag, by their topics, and when they came."""
 
-    def __init__(self, path: Path, side: str, source: str) -> None:
-        self.path, self.side, self.source = path, side, source
+    def __init__(self, path: Path, side: str, topics: Collection[str]) -> None:
+        self.gripper, self.joint = f"{SIDES[side]} gripper", f"{side}_gripper_joint"
         self.pressure, self.acceleration = PRESSURE.format(side), ACCELERATION.format(side)
-        self.images: list[_Image] = []
-        self.motions: list[_Motion] = []
-        self.samples: list[_Sampled] = []
-        self.times = {topic: Messages() for topic in (self.pressure, source, self.acceleration)}
+        self.source = _source(path, side, topics)
+        self.values: dict[str, list[Any]] = {
+            topic: [] for topic in (self.pressure, self.source, self.acceleration)
+        }
+        self.times = {topic: Messages() for topic in self.values}
+        self.path = path
 
     def add(self, topic: str, recorded_ns: int, message: Any) -> None:
         """Add a message, unless it is of other joints."""
         if topic == self.acceleration:
-            self.samples.append(
-                _Sampled(0, tuple((sample.x, sample.y, sample.z) for sample in message.samples))
-            )
-        elif topic == self.pressure:
-            self.images.append(_image(self.path, message))
-        elif (motion := _motion(message, f"{self.side}_gripper_joint")) is not None:
-            self.motions.append(motion)
+            value: Any = [(sample.x, sample.y, sample.z) for sample in message.samples]
         else:
-            return
-        self.times[topic].add(recorded_ns, stamp_ns(message))
+            value = _tips(self.path, message) if topic == self.pressure else _motion(message, self.joint)
+        if value is not None:
+            self.values[topic].append(value)
+            self.times[topic].add(recorded_ns, stamp_ns(message))
 
 
-def _recording(path: Path, content: _Content) -> Recording:
+def _recording(path: Path, messages: _Messages) -> Recording:
     """Return the recording that these messages are. Raises DataDamaged."""
-    pressure, source, gripper = content.pressure, content.source, f"{SIDES[content.side]} gripper"
-    if len(content.motions) < 2 or not content.images:
+    pressure, source, gripper = messages.pressure, messages.source, messages.gripper
+    motions, tips, samples = (messages.values[topic] for topic in (source, pressure, messages.acceleration))
+    if len(motions) < 2 or not tips:
         raise DataDamaged(
-            f"{path} contains {len(content.motions)} positions of the {gripper} on {source} and {len(content.images)} "
-            f"cell images on {pressure}: a grasp needs both"
+            f"{path} contains {len(motions)} positions of the {gripper} on {source} and {len(tips)} cell images on "
+            f"{pressure}: a grasp needs both"
         )
-    topics = {topic: stamps for topic, stamps in content.times.items() if stamps.recorded_ns}
+    topics = {topic: stamps for topic, stamps in messages.times.items() if stamps.recorded_ns}
     clock = common_clock(path.name, topics, (pressure, source))
-    moved = _timed(content.motions, clock.topics[source])
-    motions = [motion for motion in moved if clock.begin_ns <= motion.t_ns <= clock.end_ns]
-    duration_s = (motions[-1].t_ns - motions[0].t_ns) * 1e-9 if motions else 0.0
+    moved = clock.topics[source]
+    common = (moved.ns >= clock.begin_ns) & (moved.ns <= clock.end_ns)
+    ns = moved.ns[common]
+    duration_s = float(ns[-1] - ns[0]) * 1e-9 if len(ns) else 0.0
     if duration_s <= 0.0:
         raise DataDamaged(f"{path}: all positions on {source} have the same time")
     notes = [f"recorded on a PR2, {gripper}: gap from {source}, cells from {pressure}", *clock.notes]
-    images = clock.topics[pressure]
-    readings = tuple(_readings(motions, _timed(content.images, images), images, notes))
+    columns = np.array([motions[k] for k in moved.order[common]], dtype=np.float64).T
+    readings = _readings(
+        ns, columns, _images(tips, clock.topics[pressure], int(ns[0])), clock.topics[pressure], notes
+    )
     channels: tuple[Channel, ...] = ()
-    if any(sample.values for sample in content.samples):
-        timed = _timed(content.samples, clock.topics[content.acceleration])
-        channels, readings = _with_acceleration(readings, motions[0].t_ns, timed)
+    if any(samples):
+        sampled = clock.topics[messages.acceleration]
+        timed = [(t_ns, samples[k]) for t_ns, k in zip(sampled.ns.tolist(), sampled.order, strict=True)]
+        channels, readings = _with_acceleration(readings, int(ns[0]), timed)
+    later_ns = clock.delays_ns.get(pressure), clock.delays_ns.get(source)
     return Recording(
         name=f"{path.name}, {gripper}",
         readings=readings,
         channels=channels,
-        rate_hz=(len(motions) - 1) / duration_s,
+        rate_hz=(len(ns) - 1) / duration_s,
         notes=tuple(notes),
-        notices=(*clock.notices, *_doubts(readings, clock.delays_ns, content)),
+        notices=(*clock.notices, *_doubts(readings, *later_ns)),
     )
 
 
-def _doubts(readings: Sequence[Reading], delays_ns: Mapping[str, int], content: _Content) -> Iterator[str]:
-    """Yield a sentence if pads and gap may be apart in time."""
-    if delays_ns.keys() >= {content.pressure, content.source}:
+def _doubts(readings: Sequence[Reading], pads_ns: int | None, gap_ns: int | None) -> Iterator[str]:
+    """Yield a sentence if pads and gap may be apart in time; given are the delays of their messages, where known."""
+    if pads_ns is not None and gap_ns is not None:
         columns = [
             (frame.t_s, frame.gap_m, 0.5 * (frame.force_left_n + frame.force_right_n))
             for frame in (reading.frame for reading in readings)
         ]
-        later_s = (delays_ns[content.pressure] - delays_ns[content.source]) * 1e-9
         t_s, gap, force = np.array(columns).T
-        if told := doubtful_delay(t_s, gap, force, later_s):
+        if told := doubtful_delay(t_s, gap, force, (pads_ns - gap_ns) * 1e-9):
             yield told
-
-
-def _timed(messages: Sequence[T], times: TopicTimes) -> list[T]:
-    """Return the messages with their times on the common clock, in the order of time."""
-    return [messages[k]._replace(t_ns=ns) for ns, k in zip(times.ns.tolist(), times.order, strict=True)]
 
 
 def _side(path: Path, side: str, topics: Collection[str]) -> str:
@@ -223,49 +198,52 @@ def _source(path: Path, side: str, topics: Collection[str]) -> str:
     raise DataDamaged(f"{path} has no gap of the gripper: no topic {', '.join(wanted)}")
 
 
-def _image(path: Path, message: Any) -> _Image:
-    for left, right in TIP_FIELDS:
-        if hasattr(message, left) and hasattr(message, right):
-            tips = [
-                tuple(float(int(cell) & 0xFFFF) for cell in getattr(message, name)) for name in (left, right)
-            ]
-            if any(len(tip) != CELLS for tip in tips):
+def _tips(path: Path, message: Any) -> tuple[Cells, Cells]:
+    """Return the cells of the two tips in a message."""
+    for fields in TIP_FIELDS:
+        if all(hasattr(message, name) for name in fields):
+            left, right = (
+                tuple(float(int(cell) & 0xFFFF) for cell in getattr(message, name)) for name in fields
+            )
+            if len(left) != CELLS or len(right) != CELLS:
                 raise DataDamaged(
-                    f"{path}: a pressure message has {len(tips[0])} and {len(tips[1])} cells, not {CELLS}"
+                    f"{path}: a pressure message has {len(left)} and {len(right)} cells, not {CELLS}"
                 )
-            return _Image(0, *tips)
+            return left, right
     names = ", ".join(" and ".join(pair) for pair in TIP_FIELDS)
     raise DataDamaged(f"{path}: a pressure message has neither of the pairs of fields {names}")
 
 
-def _motion(message: Any, joint: str) -> _Motion | None:
-    """Return the motion of this joint in a message, None if the message is of other joints."""
+def _motion(message: Any, joint: str) -> tuple[float, float, float] | None:
+    """Return gap (m), its rate (m/s) and effort (N) of this joint in a message; None if it is of other joints."""
     if hasattr(message, "process_value"):
-        return _Motion(0, message.process_value, message.process_value_dot, -message.command)
+        return message.process_value, message.process_value_dot, -message.command
     if hasattr(message, "joint_position"):
         if message.joint_name not in ("", joint):
             return None
-        return _Motion(0, message.joint_position, message.joint_velocity, -message.joint_applied_effort)
+        return message.joint_position, message.joint_velocity, -message.joint_applied_effort
     if joint not in message.name:
         return None
     i = list(message.name).index(joint)
     velocity, effort = ([*column, *[_NAN] * (i + 1)][i] for column in (message.velocity, message.effort))
-    return _Motion(0, float(message.position[i]), float(velocity), -float(effort))
+    return float(message.position[i]), float(velocity), -float(effort)
+
+
+def _images(tips: Sequence[tuple[Cells, Cells]], times: TopicTimes, began_ns: int) -> list[Pads]:
+    """Return the last image at each message, which can repeat the one before: it has no clock of the board."""
+    images: list[Pads] = []
+    for ns, k in zip(times.ns.tolist(), times.order, strict=True):
+        last = images[-1] if images else Pads(0.0, 0, (), ())
+        same = tips[k] == (last.left, last.right)
+        images.append(last if same else Pads((ns - began_ns) * 1e-9, last.counter + 1, *tips[k]))
+    return images
 
 
 def _readings(
-    motions: Sequence[_Motion], images: Sequence[_Image], times: TopicTimes, notes: list[str]
-) -> Iterator[Reading]:
-    """Yield a reading for each motion, with the last image; its forces are missing where that is too old."""
-    began_ns = motions[0].t_ns
-    pads: list[Pads] = []
-    latest: list[Pads] = []
-    for image in images:
-        # A message can repeat the previous image, because it does not contain the clock of the board.
-        if not pads or image[1:] != (pads[-1].left, pads[-1].right):
-            pads.append(Pads((image.t_ns - began_ns) * 1e-9, len(pads) + 1, image.left, image.right))
-        latest.append(pads[-1])
-    unloaded = pads[:TARE_IMAGES]
+    ns: Nanoseconds, columns: Numbers, images: Sequence[Pads], times: TopicTimes, notes: list[str]
+) -> tuple[Reading, ...]:
+    """Return a reading for each motion, with the last image; its forces are missing where that is too old."""
+    unloaded = list(dict.fromkeys(images))[:TARE_IMAGES]
     try:
         zero = tare(unloaded, PAD_COUNTS_PER_N, FIRST_PAD_CELL)
     except TareRefused as refused:
@@ -274,40 +252,31 @@ def _readings(
             f"the zero of the pads is uncertain, because the first {len(unloaded)} images cannot be used "
             f"for it: {refused}"
         )
-    last, old = times.latest(np.array([motion.t_ns for motion in motions], dtype=np.int64))
-    previous: _Motion | None = None
-    for motion, n, is_old in zip(motions, last.tolist(), old.tolist(), strict=True):
-        dt_s = (motion.t_ns - previous.t_ns) * 1e-9 if previous else 0.0
-        velocity = motion.velocity_m_s
-        if velocity != velocity and previous is not None and dt_s > 0.0:
-            velocity = (motion.gap_m - previous.gap_m) / dt_s
-        seen = latest[n]
-        forces = (
-            ((_NAN, _NAN), (_NAN, _NAN))
-            if is_old
-            else (_forces(seen.left, zero[0]), _forces(seen.right, zero[1]))
-        )
-        (left, edge_left), (right, edge_right) = forces
-        yield Reading(
-            Frame(
-                t_s=(motion.t_ns - began_ns) * 1e-9,
-                dt_s=dt_s,
-                gap_m=motion.gap_m,
-                velocity_m_s=velocity,
-                effort_n=motion.effort_n,
-                force_left_n=left,
-                force_right_n=right,
-                edge_left_n=edge_left,
-                edge_right_n=edge_right,
-                status=0,
-            ),
-            seen,
-        )
-        previous = motion
+    gap, velocity, effort = columns
+    steps = np.diff(ns, prepend=ns[:1]) * 1e-9
+    with np.errstate(all="ignore"):
+        change = np.diff(gap, prepend=gap[:1]) / steps
+    velocity = np.where(np.isnan(velocity) & (steps > 0.0), change, velocity)
+    last, old = times.latest(ns)
+    measured = zip(
+        ((ns - ns[0]) * 1e-9).tolist(),
+        steps.tolist(),
+        *(v.tolist() for v in (gap, velocity, effort)),
+        strict=True,
+    )
+    readings = []
+    for motion, k, is_old in zip(measured, last.tolist(), old.tolist(), strict=True):
+        pads = images[k]
+        left, edge_left = (_NAN, _NAN) if is_old else _forces(pads.left, zero[0])
+        right, edge_right = (_NAN, _NAN) if is_old else _forces(pads.right, zero[1])
+        readings.append(Reading(Frame._make((*motion, left, right, edge_left, edge_right, 0)), pads))
+    return tuple(readings)
 
 
 def _with_acceleration(
-    readings: Sequence[Reading], began_ns: int, messages: Sequence[_Sampled]
+    readings: Sequence[Reading],
+    began_ns: int,
+    messages: Sequence[tuple[int, list[tuple[float, float, float]]]],
 ) -> tuple[tuple[Channel, ...], tuple[Reading, ...]]:
     """Return the channel of the accelerometer, and the readings with its samples.
 
