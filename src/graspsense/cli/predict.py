@@ -9,16 +9,22 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from graspsense.cli.output import echo_json
+from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import SOURCES, is_csv, source_argument, source_options, trials_of
+from graspsense.cli.target_value import predict_value
 from graspsense.cli.terminal import Style, correct_style, echo, echo_entry, echo_table, prediction_style
+from graspsense.core.components.entries import ModelEntry
+from graspsense.core.components.registry import installed
+from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.features import UNKNOWN, FeatureTable, Prediction, assumed_units
+from graspsense.evaluation.intervals import RecognitionRate, rate_of
+from graspsense.evaluation.json_codec import to_json
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from graspsense.core.learn.labelled import Labelled
     from graspsense.core.learn.model import Model
-    from graspsense.core.values.features import FeatureTable, Prediction
-    from graspsense.evaluation.intervals import RecognitionRate
 
 MOST_WITH_REASONS: Final = 1000
 """Largest number of trials whose predictions are given with reasons, which take about a millisecond each."""
@@ -39,17 +45,12 @@ MOST_WITH_REASONS: Final = 1000
 @click.option("--json", "as_json", is_flag=True, help="Print every prediction with its reasons as JSON.")
 def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     """Predict and print."""
-    from graspsense.core.components.registry import installed
     from graspsense.core.learn.copies import learned_from
     from graspsense.core.learn.model_file import load_model
-    from graspsense.core.values.features import assumed_units
-    from graspsense.evaluation.json_codec import to_json
     from graspsense.regression.model import is_regression
 
     _refuse_swapped(model, source)
     if is_regression(model):
-        from graspsense.cli.target_value import predict_value
-
         return predict_value(model, source, as_json, given)
     if given["target_value"]:
         raise click.UsageError(f"--target-value: model {model} predicts a label, not a number")
@@ -95,9 +96,6 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
 
 def _refuse_swapped(model: str, source: str) -> None:
     """Raise UsageError if the source was named first and the model second."""
-    from graspsense.core.components.entries import ModelEntry
-    from graspsense.core.components.registry import installed
-
     models = {entry.name for entry in installed().resources(ModelEntry)}
     if not model.endswith(".json") and model not in models and (source.endswith(".json") or source in models):
         raise click.UsageError(
@@ -109,8 +107,6 @@ def _trials(
     model: Model, source: str, given: Mapping[str, Any]
 ) -> tuple[FeatureTable, Labelled | None, tuple[str, ...]]:
     """Return the features of the trials, the trials with labels (None if the source has none), and notes."""
-    from graspsense.cli.progress import ProgressLine
-
     if is_csv(source) and not given["label"]:
         from graspsense.sources.trial_table.features_csv import read_table
 
@@ -128,8 +124,6 @@ def _trials(
 
 def _predictions(asked: Model, table: FeatureTable, provenance: Mapping[str, Any]) -> list[Prediction]:
     """Return the prediction of each trial, with reasons unless there are many. Raises ConfigError, DataDamaged."""
-    from graspsense.core.values.errors import ConfigError
-
     if mismatch := asked.misfit(table):
         raise ConfigError(mismatch)
     if len(table) > MOST_WITH_REASONS:
@@ -139,8 +133,6 @@ def _predictions(asked: Model, table: FeatureTable, provenance: Mapping[str, Any
 
 def _rate(predictions: Sequence[Prediction], labelled: Labelled, learned: str) -> RecognitionRate:
     """Return the rate of these predictions; `learned` says which trials were learned from, and leaves no interval."""
-    from graspsense.evaluation.intervals import rate_of
-
     right = [
         prediction.label == label for prediction, label in zip(predictions, labelled.labels, strict=True)
     ]
@@ -167,8 +159,6 @@ def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) ->
 
 
 def _known(prediction: Prediction) -> bool:
-    from graspsense.core.values.features import UNKNOWN
-
     return prediction.label != UNKNOWN
 
 

@@ -24,7 +24,15 @@ from graspsense.cli.terminal import (
     talk,
     warn,
 )
-from graspsense.core.values.errors import ExitCode
+from graspsense.core.components.entries import PipelineEntry
+from graspsense.core.components.registry import installed
+from graspsense.core.files.toml_text import toml_value
+from graspsense.core.pipeline.wiring import check
+from graspsense.core.values.errors import ExitCode, GraspsenseError
+from graspsense.core.values.signals import Outcome
+from graspsense.core.values.trial import Trial, trial_as_json
+from graspsense.core.values.units import display_unit, in_column, with_unit
+from graspsense.store.labels import agrees, check_label, labels_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -33,7 +41,6 @@ if TYPE_CHECKING:
     from graspsense.core.settings.resolved import Settings
     from graspsense.core.values.device import DeviceInfo
     from graspsense.core.values.features import Prediction
-    from graspsense.core.values.trial import Trial
     from graspsense.report.film import Film
 
 LARGEST_DRAWN_SEED: Final = 999_999
@@ -96,8 +103,6 @@ def run(
     Without options, a simulated gripper squeezes a full, closed bottle. Exit codes: 0 the grasp ended by itself,
     whatever its outcome; 2 wrong settings; 3 device not found; 4 grasp aborted or device lost.
     """
-    from graspsense.core.pipeline.wiring import check
-
     live = LiveOptions.taken_from(asked)
     if beside and any((plot, explain_model, dry_run, picture, video, viewer, live != LiveOptions())):
         raise click.UsageError(
@@ -156,7 +161,6 @@ def _run_beside(
     Ends the command with the exit code of the first trial that was not kept or did not end by itself.
     """
     from graspsense.cli.run_beside import grasp_beside
-    from graspsense.core.pipeline.wiring import check
 
     other = _labelled_settings(label, {"pipeline": pipeline})
     if save is not None and other.origins["run.seed"] == "default":
@@ -178,14 +182,11 @@ def _run_beside(
 
 def _as_json(trial: Trial, kept: Mapping[str, Any] | None) -> dict[str, Any]:
     """Return a trial as JSON values, with what is known of its place in a store."""
-    from graspsense.core.values.trial import trial_as_json
-
     return {**trial_as_json(trial), **({} if kept is None else {"kept": kept})}
 
 
 def grasped(settings: Settings, sinks: Sequence[Sink]) -> tuple[Trial, bool]:
     """Grasp, and return the trial and whether it was interrupted."""
-    from graspsense.core.components.registry import installed
     from graspsense.core.pipeline.pipeline import GraspInterrupted, grasp_with
 
     try:
@@ -196,8 +197,6 @@ def grasped(settings: Settings, sinks: Sequence[Sink]) -> tuple[Trial, bool]:
 
 def finish(trial: Trial, interrupted: bool, problem: str = "") -> None:
     """End the command with an exit code if the trial was not stored, did not end by itself, or was interrupted."""
-    from graspsense.core.values.signals import Outcome
-
     if problem:
         talk(f"graspsense: {problem}")
         raise click.exceptions.Exit(ExitCode.WRONG_USE)
@@ -209,9 +208,6 @@ def finish(trial: Trial, interrupted: bool, problem: str = "") -> None:
 
 def _print_better(settings: Settings, trial: Trial) -> None:
     """Name the pipeline that recognises more, if the plugin of this one declares it."""
-    from graspsense.core.components.entries import PipelineEntry
-    from graspsense.core.components.registry import installed
-
     shipped = {pipeline.entry.name: pipeline.entry for pipeline in installed().resources(PipelineEntry)}
     entry = shipped.get(settings.pipeline)
     if entry is not None and entry.better and trial.prediction is not None and trial.device.simulated:
@@ -233,8 +229,6 @@ def _print_model(trial: Trial) -> None:
 
 def _labelled_settings(label: str | None, asked: Mapping[str, Any]) -> Settings:
     """Return the settings of a grasp of what the label says, where the gripper can be told what it holds."""
-    from graspsense.store.labels import agrees, labels_of
-
     if label is not None:
         labels_of(label)  # what is not a label is refused as such
     settings = settings_of(**asked)
@@ -281,9 +275,7 @@ def _kept(
 
     Unless `changed`, settings and gripper must be those of the newest grasp in the store. Raises ConfigError.
     """
-    from graspsense.core.components.registry import installed
     from graspsense.store.comparable import check_device, check_settings, newest_grasp
-    from graspsense.store.labels import check_label, labels_of
     from graspsense.store.record_grasp import record_grasp
     from graspsense.store.store import Store
 
@@ -366,8 +358,6 @@ def _print_prediction(prediction: Prediction) -> None:
 
 
 def _shown(value: float, unit: str, reason: str) -> str:
-    from graspsense.core.values.units import display_unit, in_column, with_unit
-
     if value != value:
         return f"{'-':>9}  ({reason})"
     shown, factor = display_unit(unit)
@@ -384,7 +374,6 @@ def effort_words(kinds: Sequence[str], least_n: float, most_n: float) -> str:
 
 def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
     from graspsense.core.grasp.dry_run import dry_run
-    from graspsense.core.values.errors import GraspsenseError
 
     why_not = "nothing emulates this gripper"
     try:
@@ -401,7 +390,6 @@ def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
         }
         echo_json(plan)
         return
-    from graspsense.core.files.toml_text import toml_value
 
     echo("would open, tare, close, hold and release with:")
     for table, component in settings.components.items():

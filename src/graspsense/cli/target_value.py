@@ -6,19 +6,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
+from attrs import evolve
 
 from graspsense.cli.output import echo_found, echo_json
+from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import command_line, is_csv, keep_features, trials_of
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, echo_table, talk
+from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.features import FeatureTable, assumed_units
+from graspsense.evaluation.gathered_warnings import gathered_warnings
+from graspsense.evaluation.json_codec import to_json
+from graspsense.regression.results import RegressionEvaluation, error_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from graspsense.cli.progress import ProgressLine
     from graspsense.core.learn.labelled import Labelled
-    from graspsense.core.values.features import FeatureTable
     from graspsense.regression.model import PredictedValue, RegressionModel
-    from graspsense.regression.results import RegressionEvaluation
 
 _FOR_LABELS: Final = ("png", "target", "checkpoints")
 
@@ -41,8 +45,6 @@ def evaluate_value(
     source: str, estimator: str | None, folds: int, keep: str | None, as_json: bool, given: Mapping[str, Any]
 ) -> None:
     """Cross-validate the prediction of a number, and print it."""
-    from graspsense.cli.progress import ProgressLine
-    from graspsense.evaluation.json_codec import to_json
     from graspsense.regression.estimators import DEFAULT_ESTIMATOR
     from graspsense.regression.evaluate import evaluate_regression
 
@@ -63,9 +65,7 @@ def train_value(
     source: str, estimator: str | None, out: str, keep: str | None, as_json: bool, given: Mapping[str, Any]
 ) -> None:
     """Train a model of a number, write it, and print what it was trained on."""
-    from graspsense.cli.progress import ProgressLine
     from graspsense.core.learn.conformal import COVERAGE
-    from graspsense.evaluation.gathered_warnings import gathered_warnings
     from graspsense.regression.estimators import DEFAULT_ESTIMATOR
     from graspsense.regression.model import train_regression, write_regression
 
@@ -107,13 +107,8 @@ def train_value(
 
 def predict_value(model_name: str, source: str, as_json: bool, given: Mapping[str, Any]) -> None:
     """Predict a number for each trial, and compare it with the true one if --target-value names it."""
-    from attrs import evolve
-
     from graspsense.core.learn.copies import learned_from, row_hashes
-    from graspsense.core.values.features import assumed_units
-    from graspsense.evaluation.json_codec import to_json
     from graspsense.regression.model import load_regression
-    from graspsense.regression.results import error_of
 
     model = load_regression(model_name)
     table, labelled, notes = _to_predict(model, source, given)
@@ -176,9 +171,6 @@ def _to_predict(
     model: RegressionModel, source: str, given: Mapping[str, Any]
 ) -> tuple[FeatureTable, Labelled | None, tuple[str, ...]]:
     """Return the features of the trials, the trials (None if only their features are known), and notes."""
-    from graspsense.cli.progress import ProgressLine
-    from graspsense.core.values.errors import ConfigError
-
     if is_csv(source) and not given["target_value"] and not given["label"]:
         from graspsense.sources.trial_table.features_csv import read_table
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from graspsense.cli.output import echo_json
+from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import named_store
 from graspsense.cli.terminal import Style, echo, echo_entry
 from graspsense.core.values.errors import ExitCode, counted
@@ -20,7 +21,6 @@ def verify(source: str, as_json: bool) -> None:
 
     Exit code 5 means damage, and 2 that the disk could not be read.
     """
-    from graspsense.cli.progress import ProgressLine
     from graspsense.store.verify import verify_file, verify_store
 
     if Path(source).is_dir():
