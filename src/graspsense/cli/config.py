@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -12,11 +12,9 @@ from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_as_it_is
 from graspsense.core.components.registry import installed
 from graspsense.core.pipeline.wiring import check
+from graspsense.core.settings.resolved import Settings
 from graspsense.core.settings.settings_file import to_toml
 from graspsense.core.values.errors import ConfigError, WiringError
-
-if TYPE_CHECKING:
-    from graspsense.core.settings.resolved import Settings
 
 
 @click.group()

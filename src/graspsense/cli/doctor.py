@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import attrs
 import click
@@ -13,10 +13,8 @@ from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, stat
 from graspsense.core.components.entries import Finding
 from graspsense.core.components.registry import HookAnswer, Plugins, installed
 from graspsense.core.control.garbage_collection import no_collection
+from graspsense.core.settings.resolved import Settings
 from graspsense.core.values.errors import ExitCode, GraspsenseError
-
-if TYPE_CHECKING:
-    from graspsense.core.settings.resolved import Settings
 
 MARKS: Final = {"ok": "ok", "note": "note", "problem": "PROBLEM"}
 _MARK: Final = 11

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import inf, nan
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import click
 
@@ -11,10 +11,8 @@ from graspsense.cli.options import Seconds, pipeline_options, settings_of
 from graspsense.cli.run import finish, grasped, print_trial
 from graspsense.cli.terminal import talk
 from graspsense.core.pipeline.wiring import check
+from graspsense.core.values.events import GraspEvent
 from graspsense.core.values.signals import HOLD, Command, Reading
-
-if TYPE_CHECKING:
-    from graspsense.core.values.events import GraspEvent
 
 PIPELINE: Final = "hold"
 LONGEST_S: Final = 3500.0

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 from attrs import asdict
@@ -21,9 +22,6 @@ from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.errors import ConfigError
 from graspsense.recording.atomic_file import write_or_replace
 from graspsense.report.write import write_html
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 
 @click.command()
