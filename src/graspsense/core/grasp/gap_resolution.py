@@ -7,10 +7,11 @@ of a step at this speed, and a gap that was measured three times.
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 ROUNDING: Final = 1e-9
 """Share of a gap up to which a change is one of rounding."""
@@ -48,6 +49,8 @@ def gap_resolution(times_s: NDArray[np.float64], gaps_m: NDArray[np.float64], co
     >>> round(gap_resolution(np.arange(100) * 0.1, coarse, 0).step_m, 9)
     0.0001
     """
+    import numpy as np
+
     with np.errstate(invalid="ignore"):
         moved = gaps_m[1:] - gaps_m[:-1]
         changes_at = np.flatnonzero(np.abs(moved) > ROUNDING * np.abs(gaps_m[1:])) + 1

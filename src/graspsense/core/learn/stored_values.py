@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Final
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any, Final
 
 from graspsense.core.components.strict import shown
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.features import LARGEST_VALUE
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 LARGEST_SEED: Final = 2**32 - 1
 """The largest seed of a random generator of numpy's older kind, which scikit-learn uses."""
@@ -141,6 +142,8 @@ class StoredValues:
         Every length is compared with `shape` before the array is made; None is any length. With `missing`, null is
         NaN. A number is at least `least`, and not larger than `LARGEST_VALUE`.
         """
+        import numpy as np
+
         kinds = {int, float, type(None)} if missing else {int, float}
         given = self.items(key)
         self._refuse_shape(key, given, shape, kinds)

@@ -9,11 +9,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
-import numpy as np
 from attrs import frozen
-from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from graspsense.core.values.features import FeatureTable
 
 _IS: Final = "="
@@ -50,6 +51,8 @@ def splits_of(name: str) -> list[tuple[str, str]]:
 
 def with_codes(table: FeatureTable) -> tuple[tuple[CodedColumn, ...], NDArray[np.float64]]:
     """Return the features of a table with each nominal one as one column of places in `values`, NaN where missing."""
+    import numpy as np
+
     groups: dict[str, list[int]] = {}
     for i, name in enumerate(table.names):
         feature = name.partition(_IS)[0] if splits_of(name) else name
@@ -70,6 +73,8 @@ def with_codes(table: FeatureTable) -> tuple[tuple[CodedColumn, ...], NDArray[np
 
 def codes_of(columns: Sequence[CodedColumn], table: FeatureTable) -> NDArray[np.float64]:
     """Return these features of a table, nominal ones as places in their values."""
+    import numpy as np
+
     parts = [
         table.columns(column.columns).values
         if column.values is None
@@ -81,11 +86,15 @@ def codes_of(columns: Sequence[CodedColumn], table: FeatureTable) -> NDArray[np.
 
 def codes(part: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the place of the 1 in each row, NaN where a row has none."""
+    import numpy as np
+
     chosen = part == 1.0
     return np.where(chosen.any(axis=1), chosen.argmax(axis=1), np.nan)
 
 
 def _is_nominal(part: NDArray[np.float64]) -> bool:
+    import numpy as np
+
     known = ~np.isnan(part)
     whole = part[known.all(axis=1)]
     return bool(
