@@ -11,7 +11,7 @@ from attrs import evolve, frozen
 
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import is_csv, learner_of, trials_of
-from graspsense.cli.terminal import echo_as_it_is, echo_entry
+from graspsense.cli.terminal import echo_as_it_is, echo_entries, echo_entry
 from graspsense.core.components.registry import Component, installed
 from graspsense.core.components.strict import keys_of, plain
 from graspsense.core.files.toml_text import toml_key, toml_value
@@ -263,7 +263,6 @@ def say_chosen(chosen: Chosen, pipeline: str | None) -> None:
         "that it is predicted by",
     )
     echo_entry("as good", choice.ranking.equals)
-    for note in choice.ranking.notes:
-        echo_entry("note", note)
+    echo_entries("note", choice.ranking.notes)
     if pipeline is not None:
         echo_as_it_is(f"use it      graspsense run --pipeline {pipeline}")

@@ -20,7 +20,7 @@ from graspsense.cli.sources import (
     source_options,
     trials_of,
 )
-from graspsense.cli.terminal import Style, echo, echo_entry, echo_table
+from graspsense.cli.terminal import Style, echo, echo_entries, echo_entry, echo_table
 from graspsense.core.components.registry import installed
 from graspsense.core.values.errors import UnknownName
 from graspsense.evaluation.intervals import percent
@@ -135,8 +135,7 @@ def _print(ranking: Ranking) -> None:
     echo_table(
         ("CLASSIFIER", "FEATURES", *headings, "LOSS, IN POINTS", "STANDING", "SETS COVER", "TRAINING"), rows
     )
-    for note in ranking.notes:
-        echo_entry("note", note)
+    echo_entries("note", ranking.notes)
     default = next(
         (
             candidate

@@ -25,7 +25,7 @@ from graspsense.cli.sources import (
     trials_of,
 )
 from graspsense.cli.target_value import evaluate_value
-from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
+from graspsense.cli.terminal import Style, echo, echo_entries, echo_entry, echo_table, talk
 from graspsense.core.components.strict import plain
 from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.intervals import percent, percentages
@@ -208,8 +208,7 @@ def _print(evaluation: Evaluation) -> None:
     from graspsense.report.verdict import verdict
 
     echo(verdict(evaluation), Style.HEADING)
-    for warning in evaluation.warnings:
-        echo_entry("WARNING", warning, Style.CAUTION)
+    echo_entries("WARNING", evaluation.warnings, Style.CAUTION)
     echo()
     echo_entry("rate", f"{evaluation.headline.words}, by {evaluation.protocol}")
     for name, part in evaluation.by_features.items():
@@ -222,8 +221,7 @@ def _print(evaluation: Evaluation) -> None:
         "hardly more by a model of all trials",
     )
     _print_doubt(evaluation)
-    for note in evaluation.notes:
-        echo_entry("note", note)
+    echo_entries("note", evaluation.notes)
     echo()
     controls = {
         name: control for name, control in evaluation.controls.items() if name not in evaluation.protocols

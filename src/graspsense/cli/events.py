@@ -9,7 +9,7 @@ import click
 from graspsense.cli.output import echo_json
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import detector_of
-from graspsense.cli.terminal import Style, echo, echo_entry, echo_table
+from graspsense.cli.terminal import Style, echo, echo_entries, echo_entry, echo_table
 from graspsense.core.values.events import NOT_KNOWN
 from graspsense.evaluation.intervals import RecognitionRate, percent, percentages
 from graspsense.evaluation.json_codec import to_json
@@ -145,8 +145,7 @@ def _print(evaluation: EventsEvaluation) -> None:
                 "fitted",
                 f"{name}: all thresholds times {factors}, with each {evaluation.held_out} held out as a whole",
             )
-    for note in evaluation.notes:
-        echo_entry("note", note)
+    echo_entries("note", evaluation.notes)
     if evaluation.kinds:
         _print_tables(evaluation)
 

@@ -10,7 +10,7 @@ from graspsense.cli.options import keys_option
 from graspsense.cli.output import check_outputs, echo_json
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import keep_features, keep_option, named_store
-from graspsense.cli.terminal import echo, echo_entry, echo_table
+from graspsense.cli.terminal import echo, echo_entries, echo_entry, echo_table
 from graspsense.store.naming import STORE
 
 if TYPE_CHECKING:
@@ -65,8 +65,7 @@ def features(source: str, options: tuple[str, ...], keep: str | None, overwrite:
         ],
     )  # fmt: skip
     echo()
-    for note in after.notes:
-        echo_entry("note", note)
+    echo_entries("note", after.notes)
     if keep:
         echo_entry("written", keep)
 

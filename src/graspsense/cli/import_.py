@@ -16,7 +16,7 @@ from graspsense.cli.output import echo_json, file_to_write_as
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.run import draw_grasp
 from graspsense.cli.sources import named_source
-from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, echo_table
+from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entries, echo_entry, echo_table
 from graspsense.core.components.registry import installed
 from graspsense.core.pipeline.wiring import check_recording
 from graspsense.core.settings.layers import Flag
@@ -440,8 +440,7 @@ def _echo_summary(summary: ImportSummary) -> None:
     echo_table(header, rows)
     echo()
     echo_entry("grasps", str(summary.grasps))
-    for note in summary.notes:
-        echo_entry("", note)
+    echo_entries("", summary.notes)
     recorded = "unknown" if summary.recorded is None else f"{summary.recorded[0]} to {summary.recorded[1]}"
     echo_entry("recorded", recorded)
     if summary.channels:

@@ -9,7 +9,7 @@ import click
 from attrs import asdict
 
 from graspsense.cli.output import echo_json
-from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, echo_table, talk
+from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entries, echo_entry, echo_table, talk
 from graspsense.core.values.errors import GraspsenseError, PluginUnavailable
 from graspsense.core.values.units import display_unit
 from graspsense.recording.atomic_file import write_new
@@ -108,8 +108,7 @@ def _shown(value: float | None) -> str:
 
 def _echo_file(file: UnderstoodFile) -> None:
     echo_entry("file", str(file.path))
-    for note in file.notes:
-        echo_entry("", note)
+    echo_entries("", file.notes)
     echo_channels(file.channels)
     echo()
     if file.force:

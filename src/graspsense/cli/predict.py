@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from collections import Counter
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from graspsense.cli.output import echo_json
-from graspsense.cli.progress import ProgressLine
-from graspsense.cli.sources import SOURCES, is_csv, source_argument, source_options, trials_of
+from graspsense.cli.sources import SOURCES, source_argument, source_options, to_predict
 from graspsense.cli.target_value import predict_value
-from graspsense.cli.terminal import Style, correct_style, echo, echo_entry, echo_table, prediction_style
+from graspsense.cli.terminal import (
+    Style,
+    correct_style,
+    echo,
+    echo_entries,
+    echo_entry,
+    echo_table,
+    prediction_style,
+)
 from graspsense.core.components.entries import ModelEntry
 from graspsense.core.components.registry import installed
 from graspsense.core.values.errors import ConfigError
@@ -55,7 +61,8 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     if given["target_value"]:
         raise click.UsageError(f"--target-value: model {model} predicts a label, not a number")
     asked = load_model(model, installed())
-    table, labelled, notes = _trials(asked, source, given)
+    table, labelled, notes = to_predict(source, asked.names, given)
+    labelled = None if labelled is None else labelled.aimed(asked.target)
     predictions = _predictions(asked, table, {} if labelled is None else labelled.provenance)
     notes = (*notes, *assumed_units(asked.names, asked.units, table))
     if len(table) > MOST_WITH_REASONS:
@@ -88,10 +95,8 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     if rate is not None:
         echo_entry("rate", f"{rate.words}; unknown counts as wrong")
     echo_entry("model", asked.in_a_line)
-    for text in warnings:
-        echo_entry("warning", text, Style.CAUTION)
-    for text in notes:
-        echo_entry("note", text)
+    echo_entries("warning", warnings, Style.CAUTION)
+    echo_entries("note", notes)
 
 
 def _refuse_swapped(model: str, source: str) -> None:
@@ -101,25 +106,6 @@ def _refuse_swapped(model: str, source: str) -> None:
         raise click.UsageError(
             f"{model} is not a model, and {source} is one. The model comes first: graspsense predict {source} {model}"
         )
-
-
-def _trials(
-    model: Model, source: str, given: Mapping[str, Any]
-) -> tuple[FeatureTable, Labelled | None, tuple[str, ...]]:
-    """Return the features of the trials, the trials with labels (None if the source has none), and notes."""
-    if is_csv(source) and not given["label"]:
-        from graspsense.sources.trial_table.features_csv import read_table
-
-        table, notes = read_table(Path(source), model.names)
-        return table, None, notes
-    with ProgressLine() as progress:
-        labelled = trials_of(
-            source,
-            progress,
-            {**given, "features": given["features"] or model.names},
-            copies=True,
-        )
-    return labelled.table, labelled.aimed(model.target), labelled.notes
 
 
 def _predictions(asked: Model, table: FeatureTable, provenance: Mapping[str, Any]) -> list[Prediction]:

@@ -17,6 +17,7 @@ from graspsense.cli.terminal import (
     LABEL_WIDTH,
     Style,
     echo,
+    echo_entries,
     echo_entry,
     echo_table,
     outcome_style,
@@ -312,8 +313,7 @@ def print_trial(trial: Trial, *, events: bool = True) -> None:
     echo()
     reason = f": {trial.reason}" if trial.reason else ""
     echo_entry("outcome", f"{trial.outcome.words}{reason}", outcome_style(trial.outcome.words))
-    for warning in trial.warnings:
-        echo_entry("warning", warning, Style.CAUTION)
+    echo_entries("warning", trial.warnings, Style.CAUTION)
     features = trial.features
     rows, more = features.shown()
     wide = max([LABEL_WIDTH, *(len(name) + 1 for name, _, _ in rows)])
@@ -326,8 +326,7 @@ def print_trial(trial: Trial, *, events: bool = True) -> None:
         echo_entry("event", f"{event.what} at {event.t_s:.3f} {unit} ({event.phase.name.lower()})")
     if trial.prediction is not None:
         _print_prediction(trial.prediction)
-    for note in trial.device.notes:
-        echo_entry("note", note)
+    echo_entries("note", trial.device.notes)
     counts = trial.counts
     if counts.get("guarded"):
         why_limited = ""
@@ -353,8 +352,7 @@ def _print_prediction(prediction: Prediction) -> None:
     for i, reason in enumerate(prediction.because):
         echo_entry("" if i else "because", reason.words)
     echo_entry("model", prediction.model)
-    for warning in prediction.warnings:
-        echo_entry("warning", warning, Style.CAUTION)
+    echo_entries("warning", prediction.warnings, Style.CAUTION)
 
 
 def _shown(value: float, unit: str, reason: str) -> str:

@@ -11,6 +11,7 @@ import click
 
 from graspsense.cli.options import SEED, force_option, keys_option
 from graspsense.cli.output import file_to_write
+from graspsense.cli.progress import ProgressLine
 from graspsense.core.components.entries import TABLE_OF_ROLE
 from graspsense.core.components.registry import installed
 from graspsense.core.components.strict import ValidationFailed, nearest_path, structured
@@ -21,8 +22,8 @@ from graspsense.core.values.errors import ConfigError
 from graspsense.store.naming import STORE, as_source, store_folder
 
 if TYPE_CHECKING:
-    from graspsense.cli.progress import ProgressLine
     from graspsense.core.learn.labelled import Labelled
+    from graspsense.core.values.features import FeatureTable
 
 CommandT = TypeVar("CommandT", bound=Callable[..., Any])
 
@@ -241,6 +242,23 @@ def trials_of(
         ),
     )
     return trials if copies else without_copies(trials)
+
+
+def to_predict(
+    source: str, names: tuple[str, ...], given: Mapping[str, Any]
+) -> tuple[FeatureTable, Labelled | None, tuple[str, ...]]:
+    """Return the features of the trials, the trials (None if only their features are known), and notes.
+
+    A CSV has the features of these names.
+    """
+    if is_csv(source) and not given["label"] and not given["target_value"]:
+        from graspsense.sources.trial_table.features_csv import read_table
+
+        table, notes = read_table(Path(source), names)
+        return table, None, notes
+    with ProgressLine() as progress:
+        labelled = trials_of(source, progress, {**given, "features": given["features"] or names}, copies=True)
+    return labelled.table, labelled, labelled.notes
 
 
 def learner_of(source: str, classifier: str | None, given: Mapping[str, Any]) -> SelectedComponent:
