@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from threading import Condition
 from types import SimpleNamespace
 
 import pytest
@@ -11,8 +12,9 @@ from cases import every_case
 from commands import graspsense, printed
 from grippers import Scripted, bottle, squeezing
 
+from graspsense.core.components.roles import SensorBackend
 from graspsense.core.components.run_config import RunConfig
-from graspsense.core.grasp.pair import run_pair
+from graspsense.core.grasp.pair import Member, run_pair
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.values.errors import NoDevice
 from graspsense.core.values.signals import Outcome, Reading
@@ -144,6 +146,20 @@ def test_the_clock_of_a_device_is_shifted_to_the_common_axis_with_its_images():
     assert -100.1 < shifted.report["clock_offset_s"] < 0.0
     # Images follow the frames in which they came by less than their period.
     assert shifted.trace.pad_t_s[-1] == pytest.approx(shifted.trace.t_s[-1], abs=0.1)
+
+
+def test_a_gripper_of_a_pair_declares_what_it_declares_alone():
+    gripper = Scripted(squeezing, bottle)
+    gripper.command_delay_s, gripper.least_force_n, gripper.closes_itself = 0.25, 3.0, {"force": "at 20 mm/s"}
+
+    paired = Member(Condition()).gripper(gripper)
+
+    # Of the role, so that what a gripper may declare some day is here as well.
+    for name in (
+        name for name, value in vars(SensorBackend).items() if not callable(value) and name[0] != "_"
+    ):
+        if name != "channels":
+            assert getattr(paired, name) == getattr(gripper, name), name
 
 
 def test_a_gripper_that_is_not_there_is_told_and_the_other_is_closed():

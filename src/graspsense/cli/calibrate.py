@@ -4,18 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from datetime import UTC, datetime
+from math import isfinite
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import attrs
 import click
 
 from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import echo, echo_table, talk
+from graspsense.core.grasp.calibrating import Rig, breakaways, unloaded_images
+from graspsense.core.grasp.calibration import counts_per_newton, load_table, motor_table
+from graspsense.core.grasp.calibration_files import (
+    DIRECTIONS,
+    UNCALIBRATED,
+    Calibration,
+    calibration_path,
+    calibrations_of,
+    stored_zero,
+    write_calibration,
+)
+from graspsense.core.values.channel import TactileArray
+from graspsense.core.values.errors import ConfigError, DataDamaged
 
 if TYPE_CHECKING:
-    from graspsense.core.grasp.calibrating import Rig
-    from graspsense.core.grasp.calibration_files import Calibration
-    from graspsense.core.values.channel import TactileArray
     from graspsense.core.values.device import DeviceInfo
     from graspsense.sources.formats.csv_columns import CsvColumns
 
@@ -57,8 +71,6 @@ def calibrate() -> None:
 def tare(images: int, replace: bool, as_json: bool, **asked: Any) -> None:
     """Store the zero of the pads: the mean of cell images with open fingers that touch nothing."""
     from graspsense.core.grasp import calibration
-    from graspsense.core.grasp.calibrating import unloaded_images
-    from graspsense.core.grasp.calibration_files import stored_zero
 
     with _set_up(asked, replace) as setup:
         stored = stored_zero(setup.stored["tare"]) if "tare" in setup.stored else None
@@ -80,8 +92,6 @@ def gain(readings: str, replace: bool, as_json: bool, **asked: Any) -> None:
     READINGS is a CSV file with the columns side (left or right), cell (from 0 on), counts (over the zero of this cell)
     and load_n (force on this cell alone). Several loads a cell are fitted by a line through zero.
     """
-    from graspsense.core.grasp.calibration import counts_per_newton
-
     with _set_up(asked, replace) as setup:
         cells = _fingertips(setup).cells
         rows = _grouped(readings, "side", ("left", "right"), ("cell", "counts", "load_n"))
@@ -117,8 +127,6 @@ def delivered_force(readings: str, replace: bool, as_json: bool, **asked: Any) -
     READINGS is a CSV file with the columns asked_n (force sent to the gripper) and delivered_n (force of a load cell
     between the fingers). Readings at the same force are averaged, and neighbours until the delivered force rises.
     """
-    from graspsense.core.grasp.calibration import load_table
-
     with _set_up(asked, replace) as setup:
         columns = _columns(readings, "asked_n", "delivered_n")
         table = load_table(
@@ -142,8 +150,6 @@ def delivered_force(readings: str, replace: bool, as_json: bool, **asked: Any) -
 @_options
 def friction(gaps: int, narrowest_m: float, replace: bool, as_json: bool, **asked: Any) -> None:
     """Store the effort at which the fingers begin to move, closing and opening, over the stroke."""
-    from graspsense.core.grasp.calibrating import breakaways, unloaded_images
-
     with _set_up(asked, replace) as setup:
         if setup.info.tare_images:
             setup.backend.tare(unloaded_images(setup.rig, setup.info.tare_images, timeout_s=10.0))
@@ -169,11 +175,6 @@ def _set_up(asked: Mapping[str, Any], replace: bool) -> Iterator[_Setup]:
 
     Unless they are to be replaced, the stored calibrations must fit it.
     """
-    import attrs
-
-    from graspsense.core.grasp.calibrating import Rig
-    from graspsense.core.grasp.calibration_files import UNCALIBRATED, calibration_path, calibrations_of
-    from graspsense.core.values.errors import ConfigError
 
     settings = settings_of(**asked)
     component, config = settings.gripper.component, settings.gripper.config
@@ -207,10 +208,6 @@ def _set_up(asked: Mapping[str, Any], replace: bool) -> Iterator[_Setup]:
 
 
 def _store(setup: _Setup, kind: str, data: Mapping[str, Any], as_json: bool) -> None:
-    from datetime import UTC, datetime
-
-    from graspsense.core.grasp.calibration_files import Calibration, calibration_path, write_calibration
-
     made = Calibration(
         kind=kind,
         serial=setup.info.serial,
@@ -231,8 +228,6 @@ def _store(setup: _Setup, kind: str, data: Mapping[str, Any], as_json: bool) -> 
 
 def _cell(number: float) -> int:
     """Return the number of a cell. Raises ConfigError."""
-    from graspsense.core.values.errors import ConfigError
-
     if not number.is_integer():
         raise ConfigError(f"cell {number} is not a whole number: cells are numbered from 0 on")
     return int(number)
@@ -246,9 +241,6 @@ def _first_facing(setup: _Setup) -> int:
 
 def _fingertips(setup: _Setup) -> TactileArray:
     """Return the declared array of the fingertips. Raises ConfigError."""
-    from graspsense.core.values.channel import TactileArray
-    from graspsense.core.values.errors import ConfigError
-
     for channel in setup.backend.channels:
         if channel.name == "pads" and isinstance(channel, TactileArray):
             return channel
@@ -257,8 +249,6 @@ def _fingertips(setup: _Setup) -> TactileArray:
 
 def _counts_per_n(setup: _Setup) -> float:
     """Return the counts of the pad under one newton, which the gripper states. Raises ConfigError."""
-    from graspsense.core.values.errors import ConfigError
-
     counts = setup.info.numbers.get("pad_counts_per_n")
     if counts is None:
         raise ConfigError(
@@ -269,8 +259,6 @@ def _counts_per_n(setup: _Setup) -> float:
 
 
 def _tables(path: str, counts_per_n: float) -> dict[str, Any]:
-    from graspsense.core.grasp.calibration import load_table
-
     tables = {}
     for side, rows in _grouped(path, "side", ("left", "right"), ("pad_counts", "load_n")).items():
         table = load_table((pad_counts / counts_per_n, load_n) for pad_counts, load_n in rows)
@@ -279,9 +267,6 @@ def _tables(path: str, counts_per_n: float) -> dict[str, Any]:
 
 
 def _motor_tables(path: str) -> dict[str, Any]:
-    from graspsense.core.grasp.calibration import motor_table
-    from graspsense.core.grasp.calibration_files import DIRECTIONS
-
     tables = {}
     for direction, rows in _grouped(path, "direction", DIRECTIONS, ("motor", "load_n")).items():
         (motor, load_n), error_n = motor_table([(motor, load_n) for motor, load_n in rows])
@@ -296,8 +281,6 @@ def _grouped(
 
     Raises DataDamaged for a missing column, and for a value of the group that is not one of `values`.
     """
-    from graspsense.core.values.errors import DataDamaged
-
     columns = _columns(path, group, *names)
     readings_of: dict[str, list[tuple[float, ...]]] = {value: [] for value in values}
     for line, value, numbers in zip(
@@ -311,9 +294,6 @@ def _grouped(
 
 def _columns(path: str, *names: str) -> CsvColumns:
     """Return the columns of a CSV file, which has these. Raises DataDamaged."""
-    from pathlib import Path
-
-    from graspsense.core.values.errors import DataDamaged
     from graspsense.sources.formats.csv_columns import CsvColumns
 
     columns = CsvColumns(Path(path))
@@ -324,9 +304,6 @@ def _columns(path: str, *names: str) -> CsvColumns:
 
 def _rows(path: str, columns: CsvColumns, *names: str) -> Iterator[tuple[float, ...]]:
     """Yield the numbers of each row in these columns. Raises DataDamaged."""
-    from math import isfinite
-
-    from graspsense.core.values.errors import DataDamaged
 
     rows = zip(*map(columns.numbers, names), strict=True)
     for line, numbers in zip(columns.lines, rows, strict=True):

@@ -9,18 +9,24 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 from attrs import evolve, frozen
 
+from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import is_csv, learner_of, trials_of
-from graspsense.cli.terminal import echo_as_it_is, echo_entry
-from graspsense.core.values.errors import counted
+from graspsense.cli.terminal import echo_as_it_is, echo_entries, echo_entry
+from graspsense.core.components.registry import Component, installed
+from graspsense.core.components.strict import keys_of, plain
+from graspsense.core.files.toml_text import toml_key, toml_value
+from graspsense.core.settings.layers import read_toml, refuse_other_kind
+from graspsense.core.settings.selected import SelectedComponent, build
+from graspsense.core.values.errors import ConfigError, GraspsenseError, PluginUnavailable, counted
+from graspsense.core.values.features import FeatureTable
+from graspsense.evaluation.json_codec import to_json
+from graspsense.recording.provenance import recipe
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from graspsense.cli.progress import ProgressLine
-    from graspsense.core.components.registry import Component
     from graspsense.core.learn.labelled import Labelled
-    from graspsense.core.settings.selected import SelectedComponent
     from graspsense.evaluation.choosing import ChosenPipeline
 
 CLASSIFIERS: Final = ("c45", "knn", "svm", "forest", "extra-trees", "mlp")
@@ -43,8 +49,6 @@ class Chosen:
 
     def as_values(self) -> dict[str, Any]:
         """Return the choice as plain values."""
-        from graspsense.evaluation.json_codec import to_json
-
         best = self.choice.best
         shown = ("rate", "right", "chosen_in", "ranking")
         values = {name: to_json(getattr(self.choice, name)) for name in shown}
@@ -53,8 +57,6 @@ class Chosen:
 
 def pipeline_beside(model: str) -> str:
     """Return the file of the pipeline beside a model. Raises ConfigError if it is a TOML file of another kind."""
-    from graspsense.core.settings.layers import read_toml, refuse_other_kind
-
     path = Path(model).with_suffix(".toml")
     if path.is_file():
         refuse_other_kind(read_toml(path, str(path), "pipeline").values, "pipeline", str(path))
@@ -78,7 +80,6 @@ def chosen(
 
     Raises ConfigError.
     """
-    from graspsense.cli.progress import ProgressLine
     from graspsense.evaluation.choosing import choose
 
     names = (classifier or "given",) if classifier or _sets(given, "classifier.type") else CLASSIFIERS
@@ -136,9 +137,6 @@ def _tables(
     """
     import numpy as np
 
-    from graspsense.core.components.registry import installed
-    from graspsense.core.values.errors import ConfigError, GraspsenseError
-
     if is_csv(source):
         return {"columns": trials_of(source, progress, given)}
     if _sets(given, "features.type"):
@@ -186,8 +184,6 @@ def _tables(
 
 def _available(component: Component, notes: list[str]) -> bool:
     """Return whether the code of a feature set can be imported; `notes` gets the reason if it cannot."""
-    from graspsense.core.values.errors import PluginUnavailable
-
     try:
         component.declared()
     except PluginUnavailable as error:
@@ -207,9 +203,6 @@ def _with_union(
 
 def _config(united: Labelled, component: Component, **keys: Any) -> Any:
     """Return the config that a feature set has in the union; `keys` replace some of it."""
-    from graspsense.core.components.strict import keys_of
-    from graspsense.core.settings.selected import build
-
     known = keys_of(component.config_class())
     given = {**united.provenance.get("settings", {}).get("features", {}), **keys}
     return build(component, {key: value for key, value in given.items() if key in known})
@@ -217,9 +210,6 @@ def _config(united: Labelled, component: Component, **keys: Any) -> Any:
 
 def _part(united: Labelled, component: Component, columns: NDArray[np.int64], **keys: Any) -> Labelled:
     """Return the trials with the features of one set, which are these columns of the union."""
-    from graspsense.core.components.strict import plain
-    from graspsense.core.values.features import FeatureTable
-
     config = _config(united, component, **keys)
     table = FeatureTable(
         names=tuple(feature.name for feature in component.declared(config).features),
@@ -235,10 +225,6 @@ def _part(united: Labelled, component: Component, columns: NDArray[np.int64], **
 
 def pipeline_text(chosen: Chosen, model: str) -> str:
     """Return a pipeline file with what was chosen, and with the gripper and the controller of the trials."""
-    from graspsense.core.components.strict import plain
-    from graspsense.core.files.toml_text import toml_key, toml_value
-    from graspsense.recording.provenance import recipe
-
     settings = recipe(chosen.labelled.provenance.get("settings") or {})
     if settings.get("gripper", {}).get("type", "replay").endswith("replay"):
         settings.pop("gripper", None)  # that of the recordings is not known
@@ -277,7 +263,6 @@ def say_chosen(chosen: Chosen, pipeline: str | None) -> None:
         "that it is predicted by",
     )
     echo_entry("as good", choice.ranking.equals)
-    for note in choice.ranking.notes:
-        echo_entry("note", note)
+    echo_entries("note", choice.ranking.notes)
     if pipeline is not None:
         echo_as_it_is(f"use it      graspsense run --pipeline {pipeline}")

@@ -19,6 +19,14 @@ from graspsense.cli.options import (
 )
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo_as_it_is, echo_entry, talk
+from graspsense.core.components.registry import installed
+from graspsense.core.learn.target_value import value_label
+from graspsense.core.pipeline.wiring import check
+from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.units import in_words
+from graspsense.recording.atomic_file import SaveFailed
+from graspsense.store.changes import refuse_other_units
+from graspsense.store.labels import agrees
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -72,9 +80,6 @@ def collect(
     or killed. Ctrl-C opens the gripper, stores a running grasp as aborted, and stops. With a simulated gripper, the
     label selects the object. Answers can come from a file.
     """
-    from graspsense.core.components.registry import installed
-    from graspsense.core.learn.target_value import value_label
-    from graspsense.core.pipeline.wiring import check
     from graspsense.store.collecting import Collection, Wanted
     from graspsense.store.store import Store
 
@@ -114,8 +119,6 @@ def collect(
 
 def _run(collection: Collection, save: str, as_json: bool) -> None:
     """Run the collection and print what there is of each label, also if it is interrupted or a trial is not kept."""
-    from graspsense.recording.atomic_file import SaveFailed
-
     try:
         collection.run()
     except (KeyboardInterrupt, SaveFailed):
@@ -127,8 +130,6 @@ def _run(collection: Collection, save: str, as_json: bool) -> None:
 
 def _show(shown: Live, save: str, word: str, trial: Trial) -> None:
     """Show how a trial ended; print the faults that were seen, what was felt, and what the object is taken for."""
-    from graspsense.core.values.units import in_words
-
     shown.finished(trial, save)
     for warning in trial.warnings:
         if warning != trial.reason:
@@ -181,8 +182,6 @@ def _label_selects_object(settings: Settings, labels: Sequence[str], object_is_n
     Raises UsageError if the user names an object that contradicts a label, UnknownName if a label is to select an
     object that the gripper does not know.
     """
-    from graspsense.store.labels import agrees
-
     gripper = settings.gripper.create()
     if not gripper.objects():
         return False
@@ -199,9 +198,7 @@ def _has_model(settings: Settings) -> bool:
 
     A pipeline can name the model that is to be trained on these trials.
     """
-    from graspsense.core.components.registry import installed
     from graspsense.core.pipeline.pipeline import model_for
-    from graspsense.core.values.errors import ConfigError
 
     try:
         model_for(settings, installed())
@@ -213,8 +210,6 @@ def _has_model(settings: Settings) -> bool:
 
 def _prepare(store: Store, values: tuple[str, ...]) -> None:
     """Complete the trials of an interrupted run, and print what became of each. Raises ConfigError for other units."""
-    from graspsense.core.learn.target_value import value_label
-    from graspsense.store.changes import refuse_other_units
     from graspsense.store.recover import recover_store
 
     for recovered in recover_store(store):

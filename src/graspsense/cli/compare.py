@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from graspsense.cli.output import echo_json, file_to_write_as
+from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import (
     DEFAULT_CLASSIFIER,
     SOURCES,
@@ -18,12 +20,16 @@ from graspsense.cli.sources import (
     source_options,
     trials_of,
 )
-from graspsense.cli.terminal import Style, echo, echo_entry, echo_table
+from graspsense.cli.terminal import Style, echo, echo_entries, echo_entry, echo_table
+from graspsense.core.components.registry import installed
+from graspsense.core.values.errors import UnknownName
+from graspsense.evaluation.intervals import percent
+from graspsense.evaluation.json_codec import to_json
+from graspsense.report.write import write_html
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from graspsense.cli.progress import ProgressLine
     from graspsense.core.components.entries import Role
     from graspsense.core.learn.labelled import Labelled
     from graspsense.evaluation.ranking import Candidate, Ranking
@@ -64,10 +70,6 @@ def compare(
     **given: Any,
 ) -> None:
     """Measure, print, and write the page."""
-    from pathlib import Path
-
-    from graspsense.cli.progress import ProgressLine
-    from graspsense.evaluation.json_codec import to_json
     from graspsense.evaluation.ranking import rank
 
     if feature_sets and is_csv(source):
@@ -83,7 +85,6 @@ def compare(
         ranking = rank(learners, trials, folds=folds, seed=given["seed"], progress=progress)
     if out is not None:
         from graspsense.report.ranking_page import ranking_page
-        from graspsense.report.write import write_html
 
         write_html(Path(out), ranking_page(ranking, command_line(("out", "as_json"))))
     if as_json:
@@ -114,8 +115,6 @@ def compared_trials(
 
 
 def _print(ranking: Ranking) -> None:
-    from graspsense.evaluation.intervals import percent
-
     echo(ranking.verdict, Style.HEADING)
     echo_entry("trials", f"{ranking.trials} of {ranking.source}; compared by {ranking.protocol}")
     echo()
@@ -136,8 +135,7 @@ def _print(ranking: Ranking) -> None:
     echo_table(
         ("CLASSIFIER", "FEATURES", *headings, "LOSS, IN POINTS", "STANDING", "SETS COVER", "TRAINING"), rows
     )
-    for note in ranking.notes:
-        echo_entry("note", note)
+    echo_entries("note", ranking.notes)
     default = next(
         (
             candidate
@@ -155,17 +153,12 @@ def _print(ranking: Ranking) -> None:
 
 def _coverage(candidate: Candidate) -> str:
     """Return how many of the prediction sets contain the true label; empty if that was not measured."""
-    from graspsense.evaluation.intervals import percent
-
     sets = candidate.sets
     return "" if sets is None or sets.covered is None else percent(sets.covered.rate)
 
 
 def _names(text: str, option: str, role: Role) -> tuple[str, ...]:
     """Return the names of components of a role that an option lists. Raises UsageError for an unknown one."""
-    from graspsense.core.components.registry import installed
-    from graspsense.core.values.errors import UnknownName
-
     names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
     if not names:
         raise click.UsageError(f"{option} names nothing: give names with commas between them")

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_as_it_is
-
-if TYPE_CHECKING:
-    from graspsense.core.settings.resolved import Settings
+from graspsense.core.components.registry import installed
+from graspsense.core.pipeline.wiring import check
+from graspsense.core.settings.resolved import Settings
+from graspsense.core.settings.settings_file import to_toml
+from graspsense.core.values.errors import ConfigError, WiringError
 
 
 @click.group()
@@ -41,7 +43,6 @@ def show(name: str | None, as_json: bool, **asked: Any) -> None:
             }
         )
         return
-    from graspsense.core.settings.settings_file import to_toml
 
     echo_as_it_is(to_toml(settings, origins=True), end="")
 
@@ -52,11 +53,8 @@ def show(name: str | None, as_json: bool, **asked: Any) -> None:
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def validate(name: str | None, as_json: bool, **asked: Any) -> None:
     """Check that the settings are valid and the components fit together, without opening anything."""
-    from graspsense.core.components.registry import installed
     from graspsense.core.pipeline.anytime import anytime_of
     from graspsense.core.pipeline.pipeline import model_for
-    from graspsense.core.pipeline.wiring import check
-    from graspsense.core.values.errors import ConfigError, WiringError
 
     settings = _settings(name, asked)
     check(settings)

@@ -8,6 +8,7 @@ import click
 from graspsense.cli.options import Seconds
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import echo, echo_table, state_style, talk
+from graspsense.core.components.registry import installed
 
 
 @click.command()
@@ -22,8 +23,6 @@ from graspsense.cli.terminal import echo, echo_table, state_style, talk
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def devices(timeout_s: float, as_json: bool) -> None:
     """List connected grippers."""
-    from graspsense.core.components.registry import installed
-
     probes = installed().probe_devices(timeout_s)
     devices = [(probe.distribution, device) for probe in probes for device in probe.given]
     failed = {probe.distribution: probe.error for probe in probes if probe.error}

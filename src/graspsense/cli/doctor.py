@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import attrs
 import click
@@ -10,12 +10,11 @@ import click
 from graspsense.cli.options import GRIPPER_ALONE, Seconds, pipeline_options, settings_of
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, state_style
-from graspsense.core.values.errors import ExitCode
-
-if TYPE_CHECKING:
-    from graspsense.core.components.entries import Finding
-    from graspsense.core.components.registry import HookAnswer, Plugins
-    from graspsense.core.settings.resolved import Settings
+from graspsense.core.components.entries import Finding
+from graspsense.core.components.registry import HookAnswer, Plugins, installed
+from graspsense.core.control.garbage_collection import no_collection
+from graspsense.core.settings.resolved import Settings
+from graspsense.core.values.errors import ExitCode, GraspsenseError
 
 MARKS: Final = {"ok": "ok", "note": "note", "problem": "PROBLEM"}
 _MARK: Final = 11
@@ -48,9 +47,6 @@ def doctor(timeout_s: float, repetitions: int | None, as_json: bool, **asked: An
     Nothing moves without --latency. With --gripper and -o, it looks for that gripper (-o gripper.vendor_id=...,
     -o gripper.serial=...), and reports a problem if it is missing. Exit code 0: no problem; 1: a problem.
     """
-    from graspsense.core.components.registry import HookAnswer, installed
-    from graspsense.core.control.garbage_collection import no_collection
-
     plugins = installed()
     config = None
     settings = None
@@ -79,8 +75,6 @@ def _ourselves(plugins: Plugins) -> tuple[Finding, ...]:
     """Return what holds for every gripper: versions, and plugins that do not work."""
     import platform
     from importlib.metadata import PackageNotFoundError, version
-
-    from graspsense.core.components.entries import Finding
 
     findings = [
         Finding("system", "ok", f"Python {platform.python_version()} on {platform.platform()}",
@@ -115,9 +109,7 @@ def _ourselves(plugins: Plugins) -> tuple[Finding, ...]:
 
 def _latency(settings: Settings | None, repetitions: int) -> HookAnswer[Finding]:
     """Return the measured latencies of the gripper of these settings. It is left open, whatever happens."""
-    from graspsense.core.components.registry import HookAnswer
     from graspsense.core.grasp.latency import latency_findings
-    from graspsense.core.values.errors import GraspsenseError
 
     if settings is None:
         raise click.UsageError("--latency moves a gripper: name it by --gripper or --pipeline")

@@ -17,7 +17,10 @@ import click
 from graspsense.cli.options import GRIPPER_ALONE, pipeline_options, settings_of
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import talk
-from graspsense.core.values.errors import ExitCode
+from graspsense.core.components.entries import EmulatorEntry
+from graspsense.core.components.registry import installed
+from graspsense.core.control.garbage_collection import present_objects_kept
+from graspsense.core.values.errors import ConfigError, ExitCode, suggestion
 
 if TYPE_CHECKING:
     from graspsense.core.drivers.emulated_serial import EmulatedDevice
@@ -51,11 +54,6 @@ def emulate(
     The command reads commands such as unplug and plug from its standard input, one per line; `help` lists them. The
     device disappears with the process.
     """
-    from graspsense.core.components.entries import EmulatorEntry
-    from graspsense.core.components.registry import installed
-    from graspsense.core.control.garbage_collection import present_objects_kept
-    from graspsense.core.values.errors import ConfigError, suggestion
-
     if asked["gripper"] is not None:
         raise click.UsageError("the gripper is the argument: graspsense emulate NAME, without --gripper")
     emulator = installed().resource(EmulatorEntry, name)
@@ -131,8 +129,6 @@ def _lines() -> Iterator[str]:
 
 
 def _do(device: EmulatedDevice, word: str, as_json: bool) -> None:
-    from graspsense.core.values.errors import suggestion
-
     if word == "help":
         for command, what in device.words.items():
             talk(f"  {command:<10}{what}")

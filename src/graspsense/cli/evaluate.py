@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from graspsense.cli.events import evaluate_events
 from graspsense.cli.options import Seconds, target_option
 from graspsense.cli.output import check_outputs, echo_json, file_to_write_as, page_to_write
+from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import (
     SOURCES,
     checkpoints_option,
@@ -22,12 +24,18 @@ from graspsense.cli.sources import (
     source_options,
     trials_of,
 )
-from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
+from graspsense.cli.target_value import evaluate_value
+from graspsense.cli.terminal import Style, echo, echo_entries, echo_entry, echo_table, talk
+from graspsense.core.components.strict import plain
+from graspsense.core.values.errors import ConfigError
+from graspsense.evaluation.intervals import percent, percentages
+from graspsense.evaluation.json_codec import to_json
+from graspsense.report.confusion import confusion_png, confusion_text
+from graspsense.report.write import write_html
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from graspsense.cli.progress import ProgressLine
     from graspsense.core.learn.checkpoints import CheckpointTrials
     from graspsense.core.learn.labelled import Labelled
     from graspsense.core.settings.selected import SelectedComponent
@@ -84,11 +92,8 @@ def evaluate(
 ) -> None:
     """Measure and print."""
     if given["events"]:
-        from graspsense.cli.events import evaluate_events
-
         evaluate_events(source, given["tolerance"], folds, as_json, given)
         return
-    from graspsense.cli.progress import ProgressLine
     from graspsense.core.learn.checkpoints import checkpoints_of
 
     check_outputs(keep, overwrite=overwrite, sources=[source])
@@ -97,7 +102,6 @@ def evaluate(
     if given["target_value"]:
         if page is not None:
             raise click.UsageError("--report is for labels, and not for --target-value")
-        from graspsense.cli.target_value import evaluate_value
 
         evaluate_value(source, classifier, folds, keep, as_json, given)
         return
@@ -112,8 +116,6 @@ def evaluate(
     if page is not None:
         _write_page(page, evaluation, learner, labelled)
     if as_json:
-        from graspsense.evaluation.json_codec import to_json
-
         values = to_json(evaluation)
         echo_json(values if early is None else {**values, "early": to_json(early)})
     else:
@@ -131,7 +133,6 @@ def _measured(
     seed: int,
     progress: ProgressLine,
 ) -> tuple[Evaluation, EarlyRecognition | None]:
-    from graspsense.core.components.strict import plain
     from graspsense.evaluation.checkpoints import early_recognition
     from graspsense.evaluation.evaluate import evaluate as measure
 
@@ -148,8 +149,6 @@ def _measured(
 
 
 def _draw(evaluation: Evaluation, path: Path) -> None:
-    from graspsense.report.confusion import confusion_png
-
     title = f"{evaluation.source}\n{evaluation.protocol}: {evaluation.headline.words}"
     confusion_png(evaluation.confusion, title, path)
     talk(f"drawn in {path}")
@@ -157,7 +156,6 @@ def _draw(evaluation: Evaluation, path: Path) -> None:
 
 def _write_page(path: Path, evaluation: Evaluation, learner: SelectedComponent, labelled: Labelled) -> None:
     from graspsense.report.evaluation_page import evaluation_page
-    from graspsense.report.write import write_html
 
     command = command_line(("report", "as_json", "png", "keep", "overwrite"))
     write_html(path, evaluation_page(evaluation, learner, labelled, command))
@@ -169,7 +167,6 @@ def _parts(
 ) -> tuple[Labelled, tuple[CheckpointTrials, ...]]:
     """Return the trials, and the parts of them up to each checkpoint with the labels of the target."""
     from graspsense.core.learn.checkpoints import split_checkpoints
-    from graspsense.core.values.errors import ConfigError
 
     if not times:
         return labelled, ()
@@ -185,7 +182,6 @@ def _parts(
 
 def _print_early(recognition: EarlyRecognition) -> None:
     from graspsense.evaluation.checkpoints import SURE
-    from graspsense.evaluation.intervals import percent, percentages
 
     echo(f"\nanswers while the grasp goes on, by {recognition.protocol}")
     if recognition.reason:
@@ -209,13 +205,10 @@ def _print_early(recognition: EarlyRecognition) -> None:
 
 
 def _print(evaluation: Evaluation) -> None:
-    from graspsense.evaluation.intervals import percent, percentages
-    from graspsense.report.confusion import confusion_text
     from graspsense.report.verdict import verdict
 
     echo(verdict(evaluation), Style.HEADING)
-    for warning in evaluation.warnings:
-        echo_entry("WARNING", warning, Style.CAUTION)
+    echo_entries("WARNING", evaluation.warnings, Style.CAUTION)
     echo()
     echo_entry("rate", f"{evaluation.headline.words}, by {evaluation.protocol}")
     for name, part in evaluation.by_features.items():
@@ -228,8 +221,7 @@ def _print(evaluation: Evaluation) -> None:
         "hardly more by a model of all trials",
     )
     _print_doubt(evaluation)
-    for note in evaluation.notes:
-        echo_entry("note", note)
+    echo_entries("note", evaluation.notes)
     echo()
     controls = {
         name: control for name, control in evaluation.controls.items() if name not in evaluation.protocols
@@ -267,8 +259,6 @@ def _print(evaluation: Evaluation) -> None:
 
 
 def _print_doubt(evaluation: Evaluation) -> None:
-    from graspsense.evaluation.intervals import percent
-
     sets = evaluation.sets
     if sets is not None and (sets.covered is None or sets.single is None):
         echo_entry("sets", f"not measured ({sets.reason})")
@@ -295,8 +285,6 @@ def _print_doubt(evaluation: Evaluation) -> None:
 
 
 def _row(name: str, measured: Measurement, trials: int) -> tuple[str, ...]:
-    from graspsense.evaluation.intervals import percent, percentages
-
     assert measured.rate is not None
     rate = measured.rate
     return (

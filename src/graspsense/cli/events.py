@@ -7,14 +7,17 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from graspsense.cli.output import echo_json
+from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import detector_of
-from graspsense.cli.terminal import Style, echo, echo_entry, echo_table
+from graspsense.cli.terminal import Style, echo, echo_entries, echo_entry, echo_table
+from graspsense.core.values.events import NOT_KNOWN
+from graspsense.evaluation.intervals import RecognitionRate, percent, percentages
+from graspsense.evaluation.json_codec import to_json
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from graspsense.evaluation.events import EventScore, EventsEvaluation, LabelledEvents
-    from graspsense.evaluation.intervals import RecognitionRate
     from graspsense.recording.replayable import Recording
 
 _FOR_LABELS: Final = (
@@ -28,8 +31,6 @@ def evaluate_events(
     source: str, tolerance_s: float, folds: int, as_json: bool, given: Mapping[str, Any]
 ) -> None:
     """Score the events, and print how well each kind is told."""
-    from graspsense.evaluation.json_codec import to_json
-
     context = click.get_current_context()
     for name in _FOR_LABELS:
         if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
@@ -42,8 +43,6 @@ def evaluate_events(
 
 
 def _evaluated(source: str, tolerance_s: float, folds: int, given: Mapping[str, Any]) -> EventsEvaluation:
-    from graspsense.cli.progress import ProgressLine
-    from graspsense.core.values.events import NOT_KNOWN
     from graspsense.evaluation.events import STEPS, EventsEvaluation, evaluate_kind
     from graspsense.sources.recordings.event_recordings import (
         EventTeller,
@@ -146,8 +145,7 @@ def _print(evaluation: EventsEvaluation) -> None:
                 "fitted",
                 f"{name}: all thresholds times {factors}, with each {evaluation.held_out} held out as a whole",
             )
-    for note in evaluation.notes:
-        echo_entry("note", note)
+    echo_entries("note", evaluation.notes)
     if evaluation.kinds:
         _print_tables(evaluation)
 
@@ -212,16 +210,12 @@ def _row(score: EventScore) -> tuple[str, ...]:
 
 
 def _cells(rate: RecognitionRate | None) -> tuple[str, str]:
-    from graspsense.evaluation.intervals import percent, percentages
-
     if rate is None:
         return "-", "-"
     return percent(rate.rate), "none" if rate.interval is None else percentages(rate.interval)
 
 
 def _in_words(score: EventScore) -> str:
-    from graspsense.evaluation.intervals import percent
-
     recall, precision = (
         "unknown" if rate is None else percent(rate.rate) for rate in (score.recall, score.precision)
     )

@@ -13,8 +13,11 @@ import click
 from graspsense.cli.live import Live, LiveOptions, live_options, shown_live
 from graspsense.cli.options import force_option, keys_option
 from graspsense.cli.output import echo_found, echo_json
+from graspsense.cli.progress import ProgressLine
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
 from graspsense.core.values.errors import ExitCode, counted
+from graspsense.evaluation.intervals import percent, percentages
+from graspsense.recording.atomic_file import SaveFailed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -118,7 +121,6 @@ def _run(
     planned: Planned, results: Results, make: Callable[[], Executor], resume: bool, shown: Live
 ) -> Account:
     """Run the tasks, and show how many are done."""
-    from graspsense.cli.progress import ProgressLine
     from graspsense.experiments.run import run_experiment
 
     with ProgressLine() as line:
@@ -141,7 +143,6 @@ def _run(
 def _written_page(summary: Summary, results: Results) -> tuple[Path | None, str]:
     """Write the page and return its path, or None and why it could not be written."""
     from graspsense.experiments.page import write_page
-    from graspsense.recording.atomic_file import SaveFailed
 
     try:
         return write_page(summary, results), ""
@@ -263,8 +264,6 @@ def _print(summary: Summary, more: Findings | None, account: Account, page: str)
 
 
 def _print_rates(summary: Summary) -> None:
-    from graspsense.evaluation.intervals import percent, percentages
-
     rows = [
         (
             condition.name or "-",

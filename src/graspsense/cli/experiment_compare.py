@@ -8,6 +8,7 @@ import click
 
 from graspsense.cli.output import echo_found, echo_json, file_to_write_as
 from graspsense.cli.terminal import Style, echo
+from graspsense.report.write import write_html
 
 DEFAULT_PAGE = "comparison.html"
 
@@ -31,7 +32,6 @@ def compare(folders: tuple[str, ...], out: str, as_json: bool) -> None:
     """
     from graspsense.experiments.comparison import compare_experiments
     from graspsense.experiments.comparison_page import comparison_page, comparison_tables, doubts
-    from graspsense.report.write import write_html
 
     comparison = compare_experiments(folders)
     write_html(Path(out), comparison_page(comparison))

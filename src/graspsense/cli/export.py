@@ -11,6 +11,8 @@ import click
 from graspsense.cli.output import echo_json
 from graspsense.cli.sources import named_store
 from graspsense.cli.terminal import echo
+from graspsense.core.components.firstparty import provider
+from graspsense.core.values.errors import ConfigError
 
 
 @click.command()
@@ -34,8 +36,6 @@ def export(source: str, target: str, pictures: bool, as_json: bool) -> None:
     .mcap (a copy of the recording) and .toml (its settings). NAME:FOLDER is a data set that a plugin writes, as
     lerobot:FOLDER. Existing files are never overwritten.
     """
-    from graspsense.core.components.firstparty import provider
-    from graspsense.core.values.errors import ConfigError
     from graspsense.recording import export_trace
     from graspsense.recording.reader import read_recorded
     from graspsense.sources.recordings.dataset_recordings import datasets_to_write, write_dataset

@@ -8,8 +8,10 @@ import click
 
 from graspsense.cli.options import keys_option
 from graspsense.cli.output import check_outputs, echo_json
+from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import keep_features, keep_option, named_store
-from graspsense.cli.terminal import echo, echo_entry, echo_table
+from graspsense.cli.terminal import echo, echo_entries, echo_entry, echo_table
+from graspsense.store.naming import STORE
 
 if TYPE_CHECKING:
     import numpy as np
@@ -32,9 +34,7 @@ def features(source: str, options: tuple[str, ...], keep: str | None, overwrite:
     Each recording is replayed with the changed settings, as `graspsense replay` does. The store does not change.
     `train`, `predict` and `evaluate` take the same -o.
     """
-    from graspsense.cli.progress import ProgressLine
     from graspsense.store.dataset import labelled_store
-    from graspsense.store.naming import STORE
 
     check_outputs(keep, overwrite=overwrite)
     stored = labelled_store(source)
@@ -65,8 +65,7 @@ def features(source: str, options: tuple[str, ...], keep: str | None, overwrite:
         ],
     )  # fmt: skip
     echo()
-    for note in after.notes:
-        echo_entry("note", note)
+    echo_entries("note", after.notes)
     if keep:
         echo_entry("written", keep)
 

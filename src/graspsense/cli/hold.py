@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from math import inf, nan
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import click
 
 from graspsense.cli.options import Seconds, pipeline_options, settings_of
+from graspsense.cli.run import finish, grasped, print_trial
 from graspsense.cli.terminal import talk
-
-if TYPE_CHECKING:
-    from graspsense.core.values.events import GraspEvent
-    from graspsense.core.values.signals import Command, Reading
+from graspsense.core.pipeline.wiring import check
+from graspsense.core.values.events import GraspEvent
+from graspsense.core.values.signals import HOLD, Command, Reading
 
 PIPELINE: Final = "hold"
 LONGEST_S: Final = 3500.0
@@ -37,9 +37,6 @@ def hold(seconds: float, **asked: Any) -> None:
     Without --pipeline it is the pipeline hold of graspsense-romano, with a simulated gripper. The fingers open at the
     end, on Ctrl-C, and when the gripper is lost or the thing is. Exit codes are those of run.
     """
-    from graspsense.cli.run import finish, grasped, print_trial
-    from graspsense.core.pipeline.wiring import check
-
     if any(option.partition("=")[0].strip() == "run.hold_s" for option in asked["options"]):
         raise click.UsageError("--seconds sets run.hold_s: leave out -o run.hold_s")
     lasting = (f"run.hold_s={seconds}", f"run.grasp_timeout_s={max(seconds + TO_GRASP_S, 300.0)}")
@@ -66,8 +63,6 @@ class HoldRows:
 
     def take(self, reading: Reading, phase: int, command: Command) -> None:
         """Take one tick."""
-        from graspsense.core.values.signals import HOLD
-
         del command
         frame = reading.frame
         forces = [force_n for force_n in (frame.force_left_n, frame.force_right_n) if force_n == force_n]
@@ -79,8 +74,6 @@ class HoldRows:
 
     def event(self, event: GraspEvent) -> None:
         """Print how the fingers open, and an event of the controller; a slip each time, others once for each second."""
-        from graspsense.core.values.signals import HOLD
-
         if event.source == "runner" and event.what.startswith(LETTING_GO):
             self._row(event.t_s, event.what)
         if event.source != "controller":

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
+from attrs import asdict
 
 from graspsense.cli.options import keys_option
 from graspsense.cli.output import check_outputs, echo_found, echo_json, file_to_write_as
+from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import named_source
 from graspsense.cli.terminal import Style, echo, echo_entry, talk
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from graspsense.core.components.identification import Identification
+from graspsense.core.components.entries import IdentifierEntry
+from graspsense.core.components.identification import Identification, held_out_in_words, repeatability
+from graspsense.core.components.registry import installed
+from graspsense.core.settings.layers import Flag
+from graspsense.core.settings.resolved import resolve
+from graspsense.core.values.errors import ConfigError
+from graspsense.recording.atomic_file import write_or_replace
+from graspsense.report.write import write_html
 
 
 @click.command()
@@ -78,13 +84,6 @@ def identify(
 
     `graspsense run --object FILE.toml` grasps the object in simulation.
     """
-    from graspsense.cli.progress import ProgressLine
-    from graspsense.core.components.entries import IdentifierEntry
-    from graspsense.core.components.registry import installed
-    from graspsense.core.settings.layers import Flag
-    from graspsense.core.settings.resolved import resolve
-    from graspsense.core.values.errors import ConfigError
-    from graspsense.recording.atomic_file import write_or_replace
     from graspsense.sources.squeezes import recorded_squeezes
 
     check_outputs(out, page, overwrite=overwrite, sources=sources)
@@ -118,14 +117,12 @@ def identify(
 
 def _write_page(page: Path, result: Identification, scene: str) -> None:
     from graspsense.report.identification import identification_page
-    from graspsense.report.write import write_html
 
     write_html(page, identification_page(result, scene))
 
 
 def _print(result: Identification) -> None:
     """Print the identified object, the candidates, and what is not determined."""
-    from graspsense.core.components.identification import held_out_in_words, repeatability
     from graspsense.report.identification import identification_tables, percent_of_peak
 
     rms = [fit.rms_n for fit in result.fits]
@@ -157,10 +154,6 @@ def _print(result: Identification) -> None:
 
 
 def _as_values(out: str | None, result: Identification) -> dict[str, Any]:
-    from attrs import asdict
-
-    from graspsense.core.components.identification import repeatability
-
     def values(items: Sequence[Any]) -> list[dict[str, Any]]:
         return [asdict(item) for item in items]
 

@@ -8,19 +8,38 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
-from attrs import frozen
+from attrs import asdict, frozen
 
+from graspsense.cli.import_check import echo_channels, show_files, suggest_manifest
 from graspsense.cli.options import keys_option
 from graspsense.cli.output import echo_json, file_to_write_as
+from graspsense.cli.progress import ProgressLine
+from graspsense.cli.run import draw_grasp
 from graspsense.cli.sources import named_source
-from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, echo_table
-from graspsense.core.values.errors import counted
+from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entries, echo_entry, echo_table
+from graspsense.core.components.registry import installed
+from graspsense.core.pipeline.wiring import check_recording
+from graspsense.core.settings.layers import Flag
+from graspsense.core.settings.resolved import Settings, resolve
+from graspsense.core.settings.selected import ImplausibleSettings
+from graspsense.core.values.errors import (
+    ConfigError,
+    DataDamaged,
+    GraspsenseError,
+    PluginUnavailable,
+    WiringError,
+    counted,
+)
+from graspsense.core.values.units import display_unit
+from graspsense.recording.atomic_file import SaveFailed
+from graspsense.recording.labelled_recording import UnreadableRecording
+from graspsense.recording.readable import error_of_all, readable
+from graspsense.recording.replayable import recorded_channels
+from graspsense.store.labels import labels_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from graspsense.core.settings.resolved import Settings
-    from graspsense.recording.labelled_recording import UnreadableRecording
     from graspsense.sources.importing.import_sources import ImportedRecording
     from graspsense.sources.importing.import_summary import ImportSummary
 
@@ -89,10 +108,7 @@ def import_(
     MANIFEST.toml names the files, their labels and their columns (docs/import.md). A FILE.csv is one grasp and needs
     --time, --gap and --force. KIND:NAME is a file of another reader, or the folder of a data set.
     """
-    from graspsense.cli.import_check import show_files, suggest_manifest
-    from graspsense.core.values.errors import ConfigError, DataDamaged, GraspsenseError
     from graspsense.sources.importing.import_sources import is_csv, recordings_to_import
-    from graspsense.store.labels import labels_of
 
     if suggest is not None:
         suggest_manifest(sources, suggest)
@@ -140,8 +156,6 @@ class _Chosen:
     """The settings of an import: those of the pipeline, and thresholds from the recordings where none is given."""
 
     def __init__(self, pipeline: str, options: Sequence[str]) -> None:
-        from graspsense.core.settings.selected import ImplausibleSettings
-
         self._pipeline, self._options = pipeline, tuple(options)
         self._added: tuple[str, ...] = ()
         self._any_unit = False
@@ -160,9 +174,7 @@ class _Chosen:
 
         Raises WiringError for a model that the user has chosen.
         """
-        from graspsense.core.components.registry import installed
         from graspsense.core.pipeline.pipeline import model_for
-        from graspsense.core.values.errors import WiringError
 
         self._unpredicted = ""
         try:
@@ -177,8 +189,6 @@ class _Chosen:
     @contextmanager
     def doubted(self) -> Iterator[None]:
         """Tell a doubt about the settings if the recordings cannot be read, whose units would have decided it."""
-        from graspsense.core.values.errors import GraspsenseError
-
         try:
             yield
         except GraspsenseError:
@@ -186,8 +196,6 @@ class _Chosen:
             raise
 
     def _refuse_doubt(self) -> None:
-        from graspsense.core.values.errors import ConfigError
-
         if self._doubt is not None:  # whose own advice, --force, names a column here
             raise ConfigError(str(self._doubt))
 
@@ -198,12 +206,6 @@ class _Chosen:
 
         Raises WiringError if there is none.
         """
-        from graspsense.core.pipeline.wiring import check_recording
-        from graspsense.core.values.errors import WiringError
-        from graspsense.recording.labelled_recording import UnreadableRecording
-        from graspsense.recording.readable import error_of_all
-        from graspsense.recording.replayable import recorded_channels
-
         users, fitting = (self._settings.controller, self._settings.features), []
         for recording in recordings:
             try:
@@ -245,9 +247,6 @@ class _Chosen:
         return self._resolved(recording.name)
 
     def _resolved(self, name: str) -> Settings:
-        from graspsense.core.settings.layers import Flag
-        from graspsense.core.settings.resolved import resolve
-
         flags = (
             Flag("--gripper", "gripper.type", "replay"),
             Flag("SOURCE", "gripper.recording", name),
@@ -276,8 +275,6 @@ def _import(
     as_json: bool,
 ) -> None:
     """Import the recordings and print what became of each; those that cannot be replayed join `unreadable`."""
-    from graspsense.core.values.errors import ConfigError
-    from graspsense.recording.readable import error_of_all
     from graspsense.sources.importing.import_outcomes import refuse_useless, tried
 
     ends = tried(recordings, chosen.settings)
@@ -323,12 +320,6 @@ def _store(
     save: str, recordings: Sequence[ImportedRecording], unreadable: list[UnreadableRecording], chosen: _Chosen
 ) -> _Stored:
     """Store the recordings that the store does not have. Raises SaveFailed."""
-    from graspsense.cli.progress import ProgressLine
-    from graspsense.core.components.registry import installed
-    from graspsense.core.values.errors import GraspsenseError
-    from graspsense.recording.atomic_file import SaveFailed
-    from graspsense.recording.labelled_recording import UnreadableRecording
-    from graspsense.recording.readable import readable
     from graspsense.sources.importing.import_recording import import_recording
     from graspsense.sources.recordings.dataset_recordings import handed_over
     from graspsense.store.imported_contents import AlreadyImported, ImportedContents
@@ -385,14 +376,7 @@ def _show(
     as_json: bool,
 ) -> None:
     """Print what was understood of the recordings, and draw one of them. Raises ConfigError if most are useless."""
-    from attrs import asdict
-
-    from graspsense.cli.import_check import echo_channels
-    from graspsense.cli.run import draw_grasp
-    from graspsense.core.components.registry import installed
     from graspsense.core.pipeline.pipeline import grasp_with
-    from graspsense.core.values.errors import DataDamaged, PluginUnavailable
-    from graspsense.recording.readable import readable
     from graspsense.sources.importing.import_outcomes import refuse_useless, tried
     from graspsense.sources.recordings.dataset_recordings import handed_over
 
@@ -434,8 +418,6 @@ def _summary(recordings: Sequence[ImportedRecording]) -> ImportSummary:
 
 
 def _echo_summary(summary: ImportSummary) -> None:
-    from graspsense.core.values.units import display_unit
-
     gap, factor = display_unit(summary.units.get("gap", "m"))
     force = summary.units.get("force_left", "N")
     time = "Hz" if summary.units.get("t", "s") == "s" else f"per {summary.units['t']}"
@@ -458,8 +440,7 @@ def _echo_summary(summary: ImportSummary) -> None:
     echo_table(header, rows)
     echo()
     echo_entry("grasps", str(summary.grasps))
-    for note in summary.notes:
-        echo_entry("", note)
+    echo_entries("", summary.notes)
     recorded = "unknown" if summary.recorded is None else f"{summary.recorded[0]} to {summary.recorded[1]}"
     echo_entry("recorded", recorded)
     if summary.channels:

@@ -6,9 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from attrs import asdict
 
 from graspsense.cli.output import echo_json
-from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, echo_table, talk
+from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entries, echo_entry, echo_table, talk
+from graspsense.core.values.errors import GraspsenseError, PluginUnavailable
+from graspsense.core.values.units import display_unit
+from graspsense.recording.atomic_file import write_new
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,9 +26,6 @@ def show_files(sources: Sequence[str], picture: str, as_json: bool) -> bool:
 
     Returns False if the sources are other ones, or cannot be read. Raises ConfigError for the picture.
     """
-    from attrs import asdict
-
-    from graspsense.core.values.errors import GraspsenseError
     from graspsense.sources.importing.import_sources import is_plain_file
     from graspsense.sources.manifest.understood import understood_file
 
@@ -50,7 +51,6 @@ def show_files(sources: Sequence[str], picture: str, as_json: bool) -> bool:
 
 def suggest_manifest(sources: Sequence[str], name: str) -> None:
     """Write a manifest for a folder, and print it with what reading it says. Raises ConfigError, SaveFailed."""
-    from graspsense.recording.atomic_file import write_new
     from graspsense.sources.manifest.suggestion import suggested_manifest
 
     if len(sources) != 1:
@@ -69,8 +69,6 @@ def suggest_manifest(sources: Sequence[str], name: str) -> None:
 
 def echo_channels(channels: Sequence[ChannelFacts]) -> None:
     """Print a table of channels."""
-    from graspsense.core.values.units import display_unit
-
     header = (
         "Channel",
         "Unit",
@@ -110,8 +108,7 @@ def _shown(value: float | None) -> str:
 
 def _echo_file(file: UnderstoodFile) -> None:
     echo_entry("file", str(file.path))
-    for note in file.notes:
-        echo_entry("", note)
+    echo_entries("", file.notes)
     echo_channels(file.channels)
     echo()
     if file.force:
@@ -126,7 +123,6 @@ def _echo_file(file: UnderstoodFile) -> None:
 
 
 def _draw(file: UnderstoodFile, picture: Path) -> None:
-    from graspsense.core.values.errors import PluginUnavailable
     from graspsense.report.channels_picture import channels_png
 
     changing = {facts.name for facts in file.channels if facts.resolution is not None}

@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 import click
 
 from graspsense.cli.terminal import talk, warn
+from graspsense.core.components.entries import LiveObserverEntry
+from graspsense.core.components.registry import installed
+from graspsense.core.values.errors import ConfigError, GraspsenseError, PluginUnavailable
 
 if TYPE_CHECKING:
     from graspsense.core.values.trial import Trial
@@ -148,7 +151,6 @@ def _started(option: str, name: str, *arguments: str) -> LiveFeed:
     """Start the process of an option, and print its address."""
     from importlib.util import find_spec
 
-    from graspsense.core.values.errors import PluginUnavailable
     from graspsense.live.feeds import END_TIMEOUT_S, FILE_TIMEOUT_S, LiveFeed
 
     extra = option.removeprefix("--")
@@ -179,9 +181,6 @@ def _rerun_target(target: str) -> str:
 
 def _observers() -> list[LiveFeed]:
     """Start the observers of plugins, and print which cannot be."""
-    from graspsense.core.components.entries import LiveObserverEntry
-    from graspsense.core.components.registry import installed
-    from graspsense.core.values.errors import ConfigError
     from graspsense.live.feeds import LiveFeed
 
     feeds = []
@@ -211,7 +210,6 @@ def _host_and_port(address: str | None) -> tuple[str, int]:
 
 def _last_grasps(save: str) -> list[list[str]]:
     """Return number, label, outcome and prediction of the last grasps of a store; none where there is no store yet."""
-    from graspsense.core.values.errors import GraspsenseError
     from graspsense.store.store import Store
 
     rows = []

@@ -6,10 +6,10 @@ import sys
 from typing import TYPE_CHECKING, Final
 
 from graspsense.cli.terminal import talk, terminal_width
+from graspsense.core.values.signals import Command, Phase, Reading
 
 if TYPE_CHECKING:
     from graspsense.core.values.events import GraspEvent
-    from graspsense.core.values.signals import Command, Reading
 
 BAR: Final = 24
 """Characters of the bar of the widest gap, where the terminal has room for it."""
@@ -71,6 +71,4 @@ def _newtons(force_n: float) -> str:
 
 
 def _phase_name(phase: int) -> str:
-    from graspsense.core.values.signals import Phase
-
     return Phase(phase).name.lower()

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import Any, Final, TypeVar
 
 import click
 
 from graspsense.cli.output import file_to_write_as
-
-if TYPE_CHECKING:
-    from graspsense.core.settings.resolved import Settings
+from graspsense.core.settings.layers import Flag
+from graspsense.core.settings.resolved import Settings, resolve
+from graspsense.report.write import require_matplotlib
 
 CommandT = TypeVar("CommandT", bound=Callable[..., Any])
 
@@ -88,8 +88,6 @@ def plot_option(command: CommandT) -> CommandT:
 
 def _picture_to_write(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
     if value is not None:
-        from graspsense.report.write import require_matplotlib
-
         require_matplotlib()
     return file_to_write_as(".png")(ctx, param, value)
 
@@ -126,9 +124,6 @@ def settings_of(
     force: bool = False,
 ) -> Settings:
     """Return the settings that these options ask for. Raises ConfigError with every error at once."""
-    from graspsense.core.settings.layers import Flag
-    from graspsense.core.settings.resolved import resolve
-
     flags = (
         Flag("--gripper", "gripper.type", gripper),
         Flag("--object", "gripper.object", object_name),

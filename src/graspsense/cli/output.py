@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from graspsense.cli.terminal import StyleOf, echo_as_it_is, echo_table
+from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.json_values import json_ready
 
 if TYPE_CHECKING:
     from graspsense.report.found_table import FoundTable
@@ -24,9 +26,6 @@ def echo_json(value: object, long: bool = False) -> None:
 
     A long one comes in one line, which takes a fifth of the time.
     """
-    # Imported here: what is imported above is loaded by `graspsense --help`.
-    from graspsense.core.values.json_values import json_ready
-
     echo_as_it_is(
         json.dumps(json_ready(value), indent=None if long else 2, ensure_ascii=False, allow_nan=False)
     )
@@ -105,8 +104,6 @@ def check_outputs(*paths: str | None, overwrite: bool, sources: Sequence[str] = 
     Two of them must not be the same file, none may be a file that the command reads, and without `overwrite` none may
     exist.
     """
-    from graspsense.core.values.errors import ConfigError
-
     outputs: list[Path] = []
     for path in (Path(name) for name in paths if name is not None):
         if path.resolve() in (other.resolve() for other in outputs):

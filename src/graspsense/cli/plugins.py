@@ -4,17 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from textwrap import wrap
+from typing import Any
 
 import attrs
 import click
 
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, state_style
-from graspsense.core.values.errors import ExitCode
-
-if TYPE_CHECKING:
-    from graspsense.core.components.registry import Component, Plugins, PluginStatus
+from graspsense.core.components.entries import TABLE_OF_ROLE
+from graspsense.core.components.firstparty import DISTRIBUTION, SHIPPED
+from graspsense.core.components.registry import (
+    Component,
+    Plugins,
+    PluginStatus,
+    canonical,
+    installed,
+    installed_sources,
+)
+from graspsense.core.components.registry.discovery import disabled_in_config, write_disabled
+from graspsense.core.files.whole_file import write_whole
+from graspsense.core.settings.settings_file import key_facts
+from graspsense.core.values.errors import ConfigError, ExitCode, PluginUnavailable, UnknownName, suggestion
 
 
 @click.group()
@@ -26,8 +37,6 @@ def plugins() -> None:
 @click.option("--json", "as_json", is_flag=True, help="Print JSON: a list with one object per component.")
 def list_plugins(as_json: bool) -> None:
     """List all components and plugins, and report broken, outdated, slow and duplicate ones."""
-    from graspsense.core.components.registry import installed
-
     loaded = installed()
     rows = _rows(loaded)
     if as_json:
@@ -56,8 +65,6 @@ def list_plugins(as_json: bool) -> None:
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def show(name: str, as_json: bool) -> None:
     """Show a distribution or a component (NAME or DISTRIBUTION/NAME): hooks, keys, and why it fails."""
-    from graspsense.core.components.registry import canonical, installed
-
     loaded = installed()
     statuses = [status for status in loaded.statuses if status.distribution == canonical(name)]
     components = [
@@ -186,9 +193,6 @@ def new(name: str, roles: tuple[str, ...], folder: Path | None, model: str | Non
 
 def _write_gripper_file(name: str, roles: tuple[str, ...], folder: Path, model: str) -> None:
     """Write a gripper file for a MuJoCo model; say what was found, and what is left to fill in."""
-    from graspsense.core.components.registry import installed
-    from graspsense.core.files.whole_file import write_whole
-    from graspsense.core.values.errors import ConfigError
     from graspsense.scaffold.make import NAME
 
     if roles != ("sensor-backend",):
@@ -217,11 +221,6 @@ def _write_gripper_file(name: str, roles: tuple[str, ...], folder: Path, model: 
 @click.argument("distribution")
 def disable(distribution: str) -> None:
     """Switch the plugins of a distribution off: they are no longer imported."""
-    from graspsense.core.components.firstparty import DISTRIBUTION
-    from graspsense.core.components.registry import canonical, installed_sources
-    from graspsense.core.components.registry.discovery import disabled_in_config, write_disabled
-    from graspsense.core.values.errors import UnknownName, suggestion
-
     name = canonical(distribution)
     known = {source.distribution for source in installed_sources()} - {DISTRIBUTION}
     if name not in known:
@@ -237,10 +236,6 @@ def disable(distribution: str) -> None:
 @click.argument("distribution")
 def enable(distribution: str) -> None:
     """Switch the plugins of a distribution on again."""
-    from graspsense.core.components.registry import canonical
-    from graspsense.core.components.registry.discovery import disabled_in_config, write_disabled
-    from graspsense.core.values.errors import UnknownName
-
     name, names = canonical(distribution), {canonical(other) for other in disabled_in_config()}
     if name not in names:
         raise UnknownName(f"{name} is not disabled. Disabled are: {', '.join(sorted(names)) or 'none'}")
@@ -250,8 +245,6 @@ def enable(distribution: str) -> None:
 
 def _named_folder(option: str) -> tuple[str, str]:
     """Return the name and the folder in `NAME=FOLDER`. Raises ConfigError."""
-    from graspsense.core.values.errors import ConfigError
-
     name, mark, folder = option.partition("=")
     if not (name and mark and folder):
         raise ConfigError(
@@ -262,8 +255,8 @@ def _named_folder(option: str) -> tuple[str, str]:
 
 def _settings(options: Sequence[str]) -> dict[str, Any]:
     """Return the keys that options like `-o port=/dev/ttyUSB0` set. Raises ConfigError."""
+    # Imported here, as below: listing plugins needs no conversion of settings, which takes longer than all else.
     from graspsense.core.settings.layers import Merged, option_layers
-    from graspsense.core.values.errors import ConfigError
 
     layers, complaints = option_layers(options)
     if complaints:
@@ -281,9 +274,6 @@ def _settings(options: Sequence[str]) -> dict[str, Any]:
 
 def _rows(loaded: Plugins) -> list[dict[str, Any]]:
     """Return one row a component; one for a plugin without any; one for a component that is not installed."""
-    from graspsense.core.components.entries import TABLE_OF_ROLE
-    from graspsense.core.components.firstparty import SHIPPED
-
     advice: dict[str, tuple[str, ...]] = {}
     for status in loaded.statuses:
         advice[status.distribution] = (*advice.get(status.distribution, ()), *_advice(status))
@@ -434,8 +424,6 @@ def _component_text(component: Component) -> str:
 
 def _declared(component: Component) -> Any:
     """Return the entry with what the class declares; the entry alone where the class cannot be used here."""
-    from graspsense.core.values.errors import PluginUnavailable
-
     try:
         return component.declared()
     except PluginUnavailable:
@@ -443,10 +431,6 @@ def _declared(component: Component) -> Any:
 
 
 def _key_lines(keys: dict[str, dict[str, Any]], indent: str) -> list[str]:
-    from textwrap import wrap
-
-    from graspsense.core.settings.settings_file import key_facts
-
     lines = []
     for key, declaration in keys.items():
         facts = [
@@ -463,7 +447,6 @@ def _key_lines(keys: dict[str, dict[str, Any]], indent: str) -> list[str]:
 def _keys(component: Component) -> tuple[dict[str, dict[str, Any]], str]:
     """Return the keys of a component's config, or why they cannot be told."""
     from graspsense.core.components.strict import keys_of
-    from graspsense.core.values.errors import PluginUnavailable
 
     try:
         return keys_of(component.config_class()), ""

@@ -3,22 +3,34 @@
 from __future__ import annotations
 
 from collections import Counter
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from graspsense.cli.output import echo_json
-from graspsense.cli.sources import SOURCES, is_csv, source_argument, source_options, trials_of
-from graspsense.cli.terminal import Style, correct_style, echo, echo_entry, echo_table, prediction_style
+from graspsense.cli.sources import SOURCES, source_argument, source_options, to_predict
+from graspsense.cli.target_value import predict_value
+from graspsense.cli.terminal import (
+    Style,
+    correct_style,
+    echo,
+    echo_entries,
+    echo_entry,
+    echo_table,
+    prediction_style,
+)
+from graspsense.core.components.entries import ModelEntry
+from graspsense.core.components.registry import installed
+from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.features import UNKNOWN, FeatureTable, Prediction, assumed_units
+from graspsense.evaluation.intervals import RecognitionRate, rate_of
+from graspsense.evaluation.json_codec import to_json
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from graspsense.core.learn.labelled import Labelled
     from graspsense.core.learn.model import Model
-    from graspsense.core.values.features import FeatureTable, Prediction
-    from graspsense.evaluation.intervals import RecognitionRate
 
 MOST_WITH_REASONS: Final = 1000
 """Largest number of trials whose predictions are given with reasons, which take about a millisecond each."""
@@ -39,22 +51,18 @@ MOST_WITH_REASONS: Final = 1000
 @click.option("--json", "as_json", is_flag=True, help="Print every prediction with its reasons as JSON.")
 def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     """Predict and print."""
-    from graspsense.core.components.registry import installed
     from graspsense.core.learn.copies import learned_from
     from graspsense.core.learn.model_file import load_model
-    from graspsense.core.values.features import assumed_units
-    from graspsense.evaluation.json_codec import to_json
     from graspsense.regression.model import is_regression
 
     _refuse_swapped(model, source)
     if is_regression(model):
-        from graspsense.cli.target_value import predict_value
-
         return predict_value(model, source, as_json, given)
     if given["target_value"]:
         raise click.UsageError(f"--target-value: model {model} predicts a label, not a number")
     asked = load_model(model, installed())
-    table, labelled, notes = _trials(asked, source, given)
+    table, labelled, notes = to_predict(source, asked.names, given)
+    labelled = None if labelled is None else labelled.aimed(asked.target)
     predictions = _predictions(asked, table, {} if labelled is None else labelled.provenance)
     notes = (*notes, *assumed_units(asked.names, asked.units, table))
     if len(table) > MOST_WITH_REASONS:
@@ -87,17 +95,12 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     if rate is not None:
         echo_entry("rate", f"{rate.words}; unknown counts as wrong")
     echo_entry("model", asked.in_a_line)
-    for text in warnings:
-        echo_entry("warning", text, Style.CAUTION)
-    for text in notes:
-        echo_entry("note", text)
+    echo_entries("warning", warnings, Style.CAUTION)
+    echo_entries("note", notes)
 
 
 def _refuse_swapped(model: str, source: str) -> None:
     """Raise UsageError if the source was named first and the model second."""
-    from graspsense.core.components.entries import ModelEntry
-    from graspsense.core.components.registry import installed
-
     models = {entry.name for entry in installed().resources(ModelEntry)}
     if not model.endswith(".json") and model not in models and (source.endswith(".json") or source in models):
         raise click.UsageError(
@@ -105,31 +108,8 @@ def _refuse_swapped(model: str, source: str) -> None:
         )
 
 
-def _trials(
-    model: Model, source: str, given: Mapping[str, Any]
-) -> tuple[FeatureTable, Labelled | None, tuple[str, ...]]:
-    """Return the features of the trials, the trials with labels (None if the source has none), and notes."""
-    from graspsense.cli.progress import ProgressLine
-
-    if is_csv(source) and not given["label"]:
-        from graspsense.sources.trial_table.features_csv import read_table
-
-        table, notes = read_table(Path(source), model.names)
-        return table, None, notes
-    with ProgressLine() as progress:
-        labelled = trials_of(
-            source,
-            progress,
-            {**given, "features": given["features"] or model.names},
-            copies=True,
-        )
-    return labelled.table, labelled.aimed(model.target), labelled.notes
-
-
 def _predictions(asked: Model, table: FeatureTable, provenance: Mapping[str, Any]) -> list[Prediction]:
     """Return the prediction of each trial, with reasons unless there are many. Raises ConfigError, DataDamaged."""
-    from graspsense.core.values.errors import ConfigError
-
     if mismatch := asked.misfit(table):
         raise ConfigError(mismatch)
     if len(table) > MOST_WITH_REASONS:
@@ -139,8 +119,6 @@ def _predictions(asked: Model, table: FeatureTable, provenance: Mapping[str, Any
 
 def _rate(predictions: Sequence[Prediction], labelled: Labelled, learned: str) -> RecognitionRate:
     """Return the rate of these predictions; `learned` says which trials were learned from, and leaves no interval."""
-    from graspsense.evaluation.intervals import rate_of
-
     right = [
         prediction.label == label for prediction, label in zip(predictions, labelled.labels, strict=True)
     ]
@@ -167,8 +145,6 @@ def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) ->
 
 
 def _known(prediction: Prediction) -> bool:
-    from graspsense.core.values.features import UNKNOWN
-
     return prediction.label != UNKNOWN
 
 

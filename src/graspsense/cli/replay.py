@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from graspsense.cli.options import force_option, keys_option, plot_option
 from graspsense.cli.output import echo_json
-
-if TYPE_CHECKING:
-    from graspsense.core.settings.resolved import Settings
+from graspsense.cli.run import draw_grasp, print_trial
+from graspsense.core.components.registry import installed
+from graspsense.core.pipeline.wiring import check
+from graspsense.core.settings.layers import Flag
+from graspsense.core.settings.resolved import Settings, resolve
+from graspsense.core.values.trial import trial_as_json
 
 
 @click.command()
@@ -36,11 +39,7 @@ def replay(
     FILE.mcap is a recording of graspsense, DIR#NUMBER a trial of a store, and KIND:NAME a file of another reader, for
     example icub:FOLDER/full_vitamin_water_1.txt, or manifest:FILE.toml#3 for the third grasp of a manifest.
     """
-    from graspsense.cli.run import draw_grasp, print_trial
-    from graspsense.core.components.registry import installed
     from graspsense.core.pipeline.pipeline import grasp_with
-    from graspsense.core.pipeline.wiring import check
-    from graspsense.core.values.trial import trial_as_json
 
     settings = _settings(recording, pipeline, options, force)
     check(settings)
@@ -54,8 +53,6 @@ def replay(
 
 
 def _settings(recording: str, pipeline: str | None, options: tuple[str, ...], force: bool) -> Settings:
-    from graspsense.core.settings.layers import Flag
-    from graspsense.core.settings.resolved import resolve
     from graspsense.sources.recordings.replay import kind_and_name, known_kinds
     from graspsense.store.stored_grasps import recorded_settings
 

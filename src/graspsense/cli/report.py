@@ -8,8 +8,10 @@ import click
 
 from graspsense.cli.options import SEED, target_option
 from graspsense.cli.output import echo_json
+from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import folds_option, named_store
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, warn
+from graspsense.report.write import write_html
 
 
 @click.command()
@@ -47,12 +49,10 @@ def report(
 
     The page is one file without external resources.
     """
-    from graspsense.cli.progress import ProgressLine
     from graspsense.experiments.page import NAME, experiment_page
     from graspsense.experiments.results import EXPERIMENT, Results
     from graspsense.report.number_section import number_sections, with_numbers
     from graspsense.report.store_page import store_page
-    from graspsense.report.write import write_html
 
     path = Path(out or folder) / NAME
     if (Path(folder) / EXPERIMENT).is_file():

@@ -17,6 +17,7 @@ from graspsense.cli.terminal import (
     LABEL_WIDTH,
     Style,
     echo,
+    echo_entries,
     echo_entry,
     echo_table,
     outcome_style,
@@ -24,7 +25,15 @@ from graspsense.cli.terminal import (
     talk,
     warn,
 )
-from graspsense.core.values.errors import ExitCode
+from graspsense.core.components.entries import PipelineEntry
+from graspsense.core.components.registry import installed
+from graspsense.core.files.toml_text import toml_value
+from graspsense.core.pipeline.wiring import check
+from graspsense.core.values.errors import ExitCode, GraspsenseError
+from graspsense.core.values.signals import Outcome
+from graspsense.core.values.trial import Trial, trial_as_json
+from graspsense.core.values.units import display_unit, in_column, with_unit
+from graspsense.store.labels import agrees, check_label, labels_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -33,7 +42,6 @@ if TYPE_CHECKING:
     from graspsense.core.settings.resolved import Settings
     from graspsense.core.values.device import DeviceInfo
     from graspsense.core.values.features import Prediction
-    from graspsense.core.values.trial import Trial
     from graspsense.report.film import Film
 
 LARGEST_DRAWN_SEED: Final = 999_999
@@ -96,8 +104,6 @@ def run(
     Without options, a simulated gripper squeezes a full, closed bottle. Exit codes: 0 the grasp ended by itself,
     whatever its outcome; 2 wrong settings; 3 device not found; 4 grasp aborted or device lost.
     """
-    from graspsense.core.pipeline.wiring import check
-
     live = LiveOptions.taken_from(asked)
     if beside and any((plot, explain_model, dry_run, picture, video, viewer, live != LiveOptions())):
         raise click.UsageError(
@@ -156,7 +162,6 @@ def _run_beside(
     Ends the command with the exit code of the first trial that was not kept or did not end by itself.
     """
     from graspsense.cli.run_beside import grasp_beside
-    from graspsense.core.pipeline.wiring import check
 
     other = _labelled_settings(label, {"pipeline": pipeline})
     if save is not None and other.origins["run.seed"] == "default":
@@ -178,14 +183,11 @@ def _run_beside(
 
 def _as_json(trial: Trial, kept: Mapping[str, Any] | None) -> dict[str, Any]:
     """Return a trial as JSON values, with what is known of its place in a store."""
-    from graspsense.core.values.trial import trial_as_json
-
     return {**trial_as_json(trial), **({} if kept is None else {"kept": kept})}
 
 
 def grasped(settings: Settings, sinks: Sequence[Sink]) -> tuple[Trial, bool]:
     """Grasp, and return the trial and whether it was interrupted."""
-    from graspsense.core.components.registry import installed
     from graspsense.core.pipeline.pipeline import GraspInterrupted, grasp_with
 
     try:
@@ -196,8 +198,6 @@ def grasped(settings: Settings, sinks: Sequence[Sink]) -> tuple[Trial, bool]:
 
 def finish(trial: Trial, interrupted: bool, problem: str = "") -> None:
     """End the command with an exit code if the trial was not stored, did not end by itself, or was interrupted."""
-    from graspsense.core.values.signals import Outcome
-
     if problem:
         talk(f"graspsense: {problem}")
         raise click.exceptions.Exit(ExitCode.WRONG_USE)
@@ -209,9 +209,6 @@ def finish(trial: Trial, interrupted: bool, problem: str = "") -> None:
 
 def _print_better(settings: Settings, trial: Trial) -> None:
     """Name the pipeline that recognises more, if the plugin of this one declares it."""
-    from graspsense.core.components.entries import PipelineEntry
-    from graspsense.core.components.registry import installed
-
     shipped = {pipeline.entry.name: pipeline.entry for pipeline in installed().resources(PipelineEntry)}
     entry = shipped.get(settings.pipeline)
     if entry is not None and entry.better and trial.prediction is not None and trial.device.simulated:
@@ -233,8 +230,6 @@ def _print_model(trial: Trial) -> None:
 
 def _labelled_settings(label: str | None, asked: Mapping[str, Any]) -> Settings:
     """Return the settings of a grasp of what the label says, where the gripper can be told what it holds."""
-    from graspsense.store.labels import agrees, labels_of
-
     if label is not None:
         labels_of(label)  # what is not a label is refused as such
     settings = settings_of(**asked)
@@ -281,9 +276,7 @@ def _kept(
 
     Unless `changed`, settings and gripper must be those of the newest grasp in the store. Raises ConfigError.
     """
-    from graspsense.core.components.registry import installed
     from graspsense.store.comparable import check_device, check_settings, newest_grasp
-    from graspsense.store.labels import check_label, labels_of
     from graspsense.store.record_grasp import record_grasp
     from graspsense.store.store import Store
 
@@ -320,8 +313,7 @@ def print_trial(trial: Trial, *, events: bool = True) -> None:
     echo()
     reason = f": {trial.reason}" if trial.reason else ""
     echo_entry("outcome", f"{trial.outcome.words}{reason}", outcome_style(trial.outcome.words))
-    for warning in trial.warnings:
-        echo_entry("warning", warning, Style.CAUTION)
+    echo_entries("warning", trial.warnings, Style.CAUTION)
     features = trial.features
     rows, more = features.shown()
     wide = max([LABEL_WIDTH, *(len(name) + 1 for name, _, _ in rows)])
@@ -334,8 +326,7 @@ def print_trial(trial: Trial, *, events: bool = True) -> None:
         echo_entry("event", f"{event.what} at {event.t_s:.3f} {unit} ({event.phase.name.lower()})")
     if trial.prediction is not None:
         _print_prediction(trial.prediction)
-    for note in trial.device.notes:
-        echo_entry("note", note)
+    echo_entries("note", trial.device.notes)
     counts = trial.counts
     if counts.get("guarded"):
         why_limited = ""
@@ -361,13 +352,10 @@ def _print_prediction(prediction: Prediction) -> None:
     for i, reason in enumerate(prediction.because):
         echo_entry("" if i else "because", reason.words)
     echo_entry("model", prediction.model)
-    for warning in prediction.warnings:
-        echo_entry("warning", warning, Style.CAUTION)
+    echo_entries("warning", prediction.warnings, Style.CAUTION)
 
 
 def _shown(value: float, unit: str, reason: str) -> str:
-    from graspsense.core.values.units import display_unit, in_column, with_unit
-
     if value != value:
         return f"{'-':>9}  ({reason})"
     shown, factor = display_unit(unit)
@@ -384,7 +372,6 @@ def effort_words(kinds: Sequence[str], least_n: float, most_n: float) -> str:
 
 def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
     from graspsense.core.grasp.dry_run import dry_run
-    from graspsense.core.values.errors import GraspsenseError
 
     why_not = "nothing emulates this gripper"
     try:
@@ -401,7 +388,6 @@ def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
         }
         echo_json(plan)
         return
-    from graspsense.core.files.toml_text import toml_value
 
     echo("would open, tare, close, hold and release with:")
     for table, component in settings.components.items():

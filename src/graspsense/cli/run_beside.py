@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from graspsense.core.components.registry import installed
+from graspsense.core.values.signals import Outcome
+from graspsense.store.labels import labels_of
 
 if TYPE_CHECKING:
     from graspsense.core.grasp.pair import Member
@@ -23,7 +28,6 @@ def grasp_beside(
     They are not compared with those that are in the store.
     """
     from graspsense.core.grasp.pair import run_pair
-    from graspsense.core.values.signals import Outcome
 
     recordings = _reserved(save)
 
@@ -38,8 +42,6 @@ def grasp_beside(
 
 def _reserved(save: str | None) -> tuple[Path, ...]:
     """Return the paths of the two recordings of a pair; none where nothing is kept."""
-    from datetime import UTC, datetime
-
     from graspsense.store.store import Store
 
     if save is None:
@@ -53,9 +55,7 @@ def _beside(
     member: Member, settings: Settings, save: str | None, label: str | None, recordings: Sequence[Path]
 ) -> Ended:
     """Grasp as one of a pair, and store the trial if it is to be kept; `recordings`: of this gripper and the other."""
-    from graspsense.core.components.registry import installed
     from graspsense.core.pipeline.pipeline import GraspInterrupted, grasp_with
-    from graspsense.store.labels import labels_of
     from graspsense.store.record_grasp import Beside, record_grasp
     from graspsense.store.store import Store
 

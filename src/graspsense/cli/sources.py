@@ -11,12 +11,19 @@ import click
 
 from graspsense.cli.options import SEED, force_option, keys_option
 from graspsense.cli.output import file_to_write
+from graspsense.cli.progress import ProgressLine
+from graspsense.core.components.entries import TABLE_OF_ROLE
+from graspsense.core.components.registry import installed
+from graspsense.core.components.strict import ValidationFailed, nearest_path, structured
+from graspsense.core.settings.layers import Flag, Merged, option_layers, typed_path
+from graspsense.core.settings.resolved import Settings, default_paths, resolve
+from graspsense.core.settings.selected import SelectedComponent, build_plausible
+from graspsense.core.values.errors import ConfigError
+from graspsense.store.naming import STORE, as_source, store_folder
 
 if TYPE_CHECKING:
-    from graspsense.cli.progress import ProgressLine
     from graspsense.core.learn.labelled import Labelled
-    from graspsense.core.settings.resolved import Settings
-    from graspsense.core.settings.selected import SelectedComponent
+    from graspsense.core.values.features import FeatureTable
 
 CommandT = TypeVar("CommandT", bound=Callable[..., Any])
 
@@ -128,15 +135,11 @@ def source_argument(command: CommandT) -> CommandT:
 
 def named_source(_ctx: click.Context, _param: click.Parameter, value: Any) -> Any:
     """Callback of the argument for one source or several: a store by its folder becomes `store:DIR`."""
-    from graspsense.store.naming import as_source
-
     return tuple(map(as_source, value)) if isinstance(value, tuple) else as_source(value)
 
 
 def named_store(_ctx: click.Context, _param: click.Parameter, value: str) -> str:
     """Callback of the argument for the folder of a store, which may be named as `store:DIR` as well."""
-    from graspsense.store.naming import store_folder
-
     return store_folder(value)
 
 
@@ -196,9 +199,7 @@ def trials_of(
     are left out, unless `copies` is set. More `folds` than simulated trials are refused before the first grasp.
     Raises ConfigError, DataDamaged.
     """
-    from graspsense.core.components.strict import ValidationFailed, structured
     from graspsense.core.learn.copies import without_copies
-    from graspsense.core.values.errors import ConfigError
     from graspsense.sources.trial_source import TrialSource, groups_of, kind_of, labelled_trials
 
     kind = kind_of(source)
@@ -241,6 +242,23 @@ def trials_of(
         ),
     )
     return trials if copies else without_copies(trials)
+
+
+def to_predict(
+    source: str, names: tuple[str, ...], given: Mapping[str, Any]
+) -> tuple[FeatureTable, Labelled | None, tuple[str, ...]]:
+    """Return the features of the trials, the trials (None if only their features are known), and notes.
+
+    A CSV has the features of these names.
+    """
+    if is_csv(source) and not given["label"] and not given["target_value"]:
+        from graspsense.sources.trial_table.features_csv import read_table
+
+        table, notes = read_table(Path(source), names)
+        return table, None, notes
+    with ProgressLine() as progress:
+        labelled = trials_of(source, progress, {**given, "features": given["features"] or names}, copies=True)
+    return labelled.table, labelled, labelled.notes
 
 
 def learner_of(source: str, classifier: str | None, given: Mapping[str, Any]) -> SelectedComponent:
@@ -297,8 +315,6 @@ def _refuse_misplaced(kind: str) -> None:
 
 
 def _settings(source: str, given: Mapping[str, Any], classifier: str | None) -> Settings:
-    from graspsense.core.settings.layers import Flag
-    from graspsense.core.settings.resolved import resolve
     from graspsense.sources.identified import gripper_flags
 
     flags = gripper_flags(source)
@@ -314,15 +330,7 @@ def _settings(source: str, given: Mapping[str, Any], classifier: str | None) -> 
 
 def _alone(table: str, name: str, given: Mapping[str, Any], source: str) -> SelectedComponent:
     """Return a component outside of any pipeline, with the keys that options give it."""
-    from graspsense.core.components.entries import TABLE_OF_ROLE
-    from graspsense.core.components.registry import installed
-    from graspsense.core.components.strict import nearest_path
-    from graspsense.core.settings.layers import Merged, option_layers, typed_path
-    from graspsense.core.settings.resolved import default_paths
-    from graspsense.core.settings.selected import SelectedComponent, build_plausible
-    from graspsense.core.values.errors import ConfigError
     from graspsense.store.extract_again import CHANGEABLE
-    from graspsense.store.naming import STORE
 
     layers, complaints = option_layers(given["options"])
     merged = Merged()

@@ -6,19 +6,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
+from attrs import evolve
 
 from graspsense.cli.output import echo_found, echo_json
-from graspsense.cli.sources import command_line, is_csv, keep_features, trials_of
-from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, echo_table, talk
+from graspsense.cli.progress import ProgressLine
+from graspsense.cli.sources import command_line, keep_features, to_predict, trials_of
+from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entries, echo_entry, echo_table, talk
+from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.features import assumed_units
+from graspsense.evaluation.gathered_warnings import gathered_warnings
+from graspsense.evaluation.json_codec import to_json
+from graspsense.regression.results import RegressionEvaluation, error_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from graspsense.cli.progress import ProgressLine
     from graspsense.core.learn.labelled import Labelled
-    from graspsense.core.values.features import FeatureTable
     from graspsense.regression.model import PredictedValue, RegressionModel
-    from graspsense.regression.results import RegressionEvaluation
 
 _FOR_LABELS: Final = ("png", "target", "checkpoints")
 
@@ -41,8 +45,6 @@ def evaluate_value(
     source: str, estimator: str | None, folds: int, keep: str | None, as_json: bool, given: Mapping[str, Any]
 ) -> None:
     """Cross-validate the prediction of a number, and print it."""
-    from graspsense.cli.progress import ProgressLine
-    from graspsense.evaluation.json_codec import to_json
     from graspsense.regression.estimators import DEFAULT_ESTIMATOR
     from graspsense.regression.evaluate import evaluate_regression
 
@@ -63,9 +65,7 @@ def train_value(
     source: str, estimator: str | None, out: str, keep: str | None, as_json: bool, given: Mapping[str, Any]
 ) -> None:
     """Train a model of a number, write it, and print what it was trained on."""
-    from graspsense.cli.progress import ProgressLine
     from graspsense.core.learn.conformal import COVERAGE
-    from graspsense.evaluation.gathered_warnings import gathered_warnings
     from graspsense.regression.estimators import DEFAULT_ESTIMATOR
     from graspsense.regression.model import train_regression, write_regression
 
@@ -107,16 +107,17 @@ def train_value(
 
 def predict_value(model_name: str, source: str, as_json: bool, given: Mapping[str, Any]) -> None:
     """Predict a number for each trial, and compare it with the true one if --target-value names it."""
-    from attrs import evolve
-
     from graspsense.core.learn.copies import learned_from, row_hashes
-    from graspsense.core.values.features import assumed_units
-    from graspsense.evaluation.json_codec import to_json
     from graspsense.regression.model import load_regression
-    from graspsense.regression.results import error_of
 
     model = load_regression(model_name)
-    table, labelled, notes = _to_predict(model, source, given)
+    table, labelled, notes = to_predict(source, model.table.names, given)
+    value = None if labelled is None else labelled.value
+    if value is not None and model.target.unit and value.unit and model.target.unit != value.unit:
+        raise ConfigError(
+            f"model {model.name!r} predicts {model.target.name} in {model.target.unit}; {value.name} of {source} is "
+            f"in {value.unit}"
+        )
     provenance = None if labelled is None else labelled.provenance
     predictions = model.predict(table, provenance)
     notes = (*notes, *assumed_units(model.table.names, model.table.units, table))
@@ -124,8 +125,8 @@ def predict_value(model_name: str, source: str, as_json: bool, given: Mapping[st
     learned = learned_from(row_hashes(model.table), table.columns(model.table.names))
     if learned:
         warnings.append(f"{learned}: their predictions say nothing of other trials")
-    if labelled is not None and labelled.value is not None:
-        truth = labelled.value.values
+    if labelled is not None and value is not None:
+        truth = value.values
         errors = [prediction.value - true for prediction, true in zip(predictions, truth, strict=True)]
         error = error_of(errors, labelled.instances)
         if learned:
@@ -158,10 +159,8 @@ def predict_value(model_name: str, source: str, as_json: bool, given: Mapping[st
     if error is not None:
         echo_entry("error", f"{error.words(model.target.unit)} on average, in absolute value")
     echo_entry("model", model.in_a_line)
-    for text in warnings:
-        echo_entry("warning", text, Style.CAUTION)
-    for text in notes:
-        echo_entry("note", text)
+    echo_entries("warning", warnings, Style.CAUTION)
+    echo_entries("note", notes)
 
 
 def _trials(source: str, estimator: str | None, progress: ProgressLine, given: Mapping[str, Any]) -> Labelled:
@@ -170,30 +169,6 @@ def _trials(source: str, estimator: str | None, progress: ProgressLine, given: M
     if estimator is not None:
         check_estimator(estimator)
     return trials_of(source, progress, given)
-
-
-def _to_predict(
-    model: RegressionModel, source: str, given: Mapping[str, Any]
-) -> tuple[FeatureTable, Labelled | None, tuple[str, ...]]:
-    """Return the features of the trials, the trials (None if only their features are known), and notes."""
-    from graspsense.cli.progress import ProgressLine
-    from graspsense.core.values.errors import ConfigError
-
-    if is_csv(source) and not given["target_value"] and not given["label"]:
-        from graspsense.sources.trial_table.features_csv import read_table
-
-        table, notes = read_table(Path(source), model.table.names)
-        return table, None, notes
-    with ProgressLine() as progress:
-        named = given["features"] or (model.table.names if is_csv(source) else None)
-        labelled = trials_of(source, progress, {**given, "features": named}, copies=True)
-    value = labelled.value
-    if value is not None and model.target.unit and value.unit and model.target.unit != value.unit:
-        raise ConfigError(
-            f"model {model.name!r} predicts {model.target.name} in {model.target.unit}; {value.name} of {source} is "
-            f"in {value.unit}"
-        )
-    return labelled.table, labelled, labelled.notes
 
 
 def _print_predictions(
@@ -213,8 +188,7 @@ def _print_evaluation(evaluation: RegressionEvaluation) -> None:
     from graspsense.report.number_section import not_measured, number_table, number_verdict
 
     echo(number_verdict(evaluation), Style.HEADING)
-    for warning in evaluation.warnings:
-        echo_entry("WARNING", warning, Style.CAUTION)
+    echo_entries("WARNING", evaluation.warnings, Style.CAUTION)
     echo()
     echo_entry("error", f"{evaluation.headline.words(evaluation.unit)}, by {evaluation.protocol}")
     echo_entry(
@@ -233,8 +207,7 @@ def _print_evaluation(evaluation: RegressionEvaluation) -> None:
             f"{intervals.unit}; plus or minus {_with_unit(intervals.mean_half_width, evaluation.unit)} on average",
         )
     echo_entry("features", ", ".join(name for name, _ in evaluation.features))
-    for note in evaluation.notes:
-        echo_entry("note", note)
+    echo_entries("note", evaluation.notes)
     echo()
     echo_found(number_table(evaluation))
     for sentence in not_measured(evaluation):

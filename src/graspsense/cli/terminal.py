@@ -14,7 +14,7 @@ import os
 import re
 import sys
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import Enum
 from typing import IO, Final
 from unicodedata import combining, east_asian_width
@@ -110,6 +110,12 @@ def echo_entry(
     if style is not None and has_colour(stream):
         lines = [_coloured(line, style) for line in lines]
     _write([head + lines[0], *(" " * len(head) + line for line in lines[1:])], None, err)
+
+
+def echo_entries(label: str, texts: Iterable[str], style: Style | None = None) -> None:
+    """Print an entry with the same label for each text."""
+    for text in texts:
+        echo_entry(label, text, style)
 
 
 def echo_as_it_is(text: str, *, err: bool = False, end: str = "\n") -> None:

@@ -8,6 +8,7 @@ import click
 
 from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json
+from graspsense.cli.progress import ProgressLine
 from graspsense.cli.terminal import echo, echo_table
 from graspsense.cli.tradeoff_recognition import commands
 
@@ -54,7 +55,6 @@ def simulation(
     and halves its steps until nothing changes. Times are measured on the same grasps. Recognition is measured with the
     sensors of the gripper: a classifier learns grasps of each accuracy, and is tested on other grasps of the reference.
     """
-    from graspsense.cli.progress import ProgressLine
     from graspsense.experiments.simulation import SCENES, simulation_rows, trade_simulation
     from graspsense.experiments.simulation_recognition import conclusion, with_recognition
 

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
+from attrs import evolve
 
-from graspsense.cli.choosing import chosen, pipeline_beside, pipeline_text, refuse_with_choice, say_chosen
+from graspsense.cli.choosing import (
+    Chosen,
+    chosen,
+    pipeline_beside,
+    pipeline_text,
+    refuse_with_choice,
+    say_chosen,
+)
 from graspsense.cli.options import target_option
 from graspsense.cli.output import check_outputs, echo_json, file_to_write_as
+from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import (
     SOURCES,
     checkpoints_option,
@@ -23,15 +33,17 @@ from graspsense.cli.sources import (
     source_options,
     trials_of,
 )
+from graspsense.cli.target_value import train_value
 from graspsense.cli.terminal import echo, echo_as_it_is, echo_entry, talk
-from graspsense.core.values.errors import counted
+from graspsense.core.files.whole_file import write_whole
+from graspsense.core.learn.labelled import Labelled, class_of
+from graspsense.core.values.errors import ConfigError, counted
+from graspsense.evaluation.gathered_warnings import gathered_warnings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from graspsense.cli.choosing import Chosen
     from graspsense.core.learn.checkpoints import CheckpointTrials
-    from graspsense.core.learn.labelled import Labelled
     from graspsense.core.learn.model import Model
     from graspsense.core.settings.selected import SelectedComponent
 
@@ -87,12 +99,8 @@ def train(
     **given: Any,
 ) -> None:
     """Train a model, write it, and print what it was trained on."""
-    from functools import partial
-
-    from graspsense.core.files.whole_file import write_whole
     from graspsense.core.learn.checkpoints import checkpoints_of
     from graspsense.core.learn.model_file import write_model
-    from graspsense.evaluation.gathered_warnings import gathered_warnings
 
     pipeline = pipeline_beside(out) if choose and not is_csv(source) else None
     check_outputs(out, keep, pipeline, overwrite=overwrite, sources=[source])
@@ -100,8 +108,6 @@ def train(
     if choose:
         refuse_with_choice({**given, "checkpoints": times, "calibration_instances": calibration_instances})
     if given["target_value"]:
-        from graspsense.cli.target_value import train_value
-
         train_value(source, classifier, out, keep, as_json, given)
         return
     _refuse_single_scene(source)
@@ -137,8 +143,6 @@ def train(
 
 def _maker(learner: SelectedComponent, name: str, target: str, seed: int) -> Callable[[Labelled], Model]:
     """Return a function that trains a model of this name, without calibration."""
-    from functools import partial
-
     from graspsense.core.learn.training import train as trained
 
     return partial(
@@ -175,8 +179,6 @@ def _made(
 
     That of a choice, `trained`, is calibrated with the answers of the whole procedure.
     """
-    from attrs import evolve
-
     from graspsense.core.learn.checkpoints import split_checkpoints
     from graspsense.evaluation.checkpoints import checkpoint_models
     from graspsense.evaluation.doubt import calibrated, calibrated_by, calibrated_with
@@ -204,8 +206,6 @@ def _trials(
     calibration_instances: int | None,
 ) -> tuple[Labelled, Labelled | None]:
     """Return the trials to learn from, and those of further objects to calibrate with, if they are asked for."""
-    from graspsense.cli.progress import ProgressLine
-
     with ProgressLine() as progress:
         labelled = _with_target(trials_of(source, progress, given, times), target)
         if calibration_instances is None:
@@ -265,7 +265,6 @@ def _say_trained(out: str, model: Model) -> None:
 
 def _refuse_single_scene(source: str) -> None:
     """Raise ConfigError for a single identified scene, before squeezes of it are simulated."""
-    from graspsense.core.values.errors import ConfigError
     from graspsense.sources.identified import IDENTIFIED, identified_scenes
 
     scenes = identified_scenes(source) if source.startswith(IDENTIFIED) else ()
@@ -278,9 +277,6 @@ def _refuse_single_scene(source: str) -> None:
 
 def _with_target(labelled: Labelled, target: str) -> Labelled:
     """Return the trials with the labels that the target asks for. Raises ConfigError if a model cannot learn them."""
-    from graspsense.core.learn.labelled import class_of
-    from graspsense.core.values.errors import ConfigError
-
     classes = sorted({class_of(label) for label in labelled.labels})
     if target == "state" and len(classes) > 1:
         raise ConfigError(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
@@ -10,11 +11,13 @@ import click
 from graspsense.cli.output import echo_json
 from graspsense.cli.sources import named_store
 from graspsense.cli.terminal import echo, echo_table
+from graspsense.core.learn.target_value import value_label
+from graspsense.core.settings.resolved import settings_from
+from graspsense.core.values.errors import ConfigError, GraspsenseError
+from graspsense.store.changes import Change, history
+from graspsense.store.labels import agrees, labels_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from graspsense.store.changes import Change
     from graspsense.store.rows import StoredTrial
     from graspsense.store.store import Store
 
@@ -42,7 +45,6 @@ def trials() -> None:
 @_JSON
 def list_trials(folder: str, label: str | None, aside: bool | None, limit: int, as_json: bool) -> None:
     """List the newest trials of the store DIR, newest first."""
-    from graspsense.store.changes import history
     from graspsense.store.store import Store
 
     with Store.read(folder) as store:
@@ -78,7 +80,6 @@ def relabel(refs: Sequence[str], label: str | None, as_recorded: bool, why: str,
     A trial of a simulated gripper keeps the label of the object that was simulated.
     """
     from graspsense.store import changes
-    from graspsense.store.labels import labels_of
 
     if (label is None) != as_recorded:
         raise click.UsageError("give either --label CLASS:STATE or --as-recorded")
@@ -108,7 +109,6 @@ def change_value(
 
     `train`, `evaluate` and `report` use these numbers with --target-value.
     """
-    from graspsense.core.learn.target_value import value_label
     from graspsense.store import changes
 
     if (value is None) == (as_recorded is None):
@@ -146,9 +146,6 @@ def restore(refs: Sequence[str], why: str, as_json: bool) -> None:
 @_JSON
 def show_history(source: str, as_json: bool) -> None:
     """Print the changes of all trials of the store DIR, or of one trial, the oldest first."""
-    from pathlib import Path
-
-    from graspsense.store.changes import history
     from graspsense.store.store import Store
     from graspsense.store.stored_grasps import parse_trial_ref
 
@@ -170,7 +167,6 @@ def _row(change: Change) -> tuple[str, str, str, str]:
 
 def _change(refs: Sequence[str], change: Callable[[Store, Sequence[int]], None], as_json: bool) -> None:
     """Change trials of one store, all or none, and print what was done to each."""
-    from graspsense.store.changes import history
     from graspsense.store.store import Store
     from graspsense.store.stored_grasps import parse_trial_ref
 
@@ -197,10 +193,6 @@ def _change(refs: Sequence[str], change: Callable[[Store, Sequence[int]], None],
 
 def _refuse_contradiction(trial: StoredTrial, label: str) -> None:
     """Refuse a label that contradicts the object that was simulated. Raises ConfigError."""
-    from graspsense.core.settings.resolved import settings_from
-    from graspsense.core.values.errors import ConfigError, GraspsenseError
-    from graspsense.store.labels import agrees
-
     recorded: Mapping[str, Mapping[str, Any]] = trial.record.settings
     held = recorded.get("gripper", {}).get("object")
     if not trial.summary.simulated or held is None:

@@ -7,8 +7,9 @@ from pathlib import Path
 import click
 
 from graspsense.cli.output import echo_json
+from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import named_store
-from graspsense.cli.terminal import Style, echo, echo_entry
+from graspsense.cli.terminal import Style, echo, echo_entries
 from graspsense.core.values.errors import ExitCode, counted
 
 
@@ -20,7 +21,6 @@ def verify(source: str, as_json: bool) -> None:
 
     Exit code 5 means damage, and 2 that the disk could not be read.
     """
-    from graspsense.cli.progress import ProgressLine
     from graspsense.store.verify import verify_file, verify_store
 
     if Path(source).is_dir():
@@ -31,12 +31,9 @@ def verify(source: str, as_json: bool) -> None:
     if as_json:
         echo_json(verified.as_json())
     else:
-        for problem in verified.problems:
-            echo_entry("damaged", str(problem), Style.BAD)
-        for name in verified.unread:
-            echo_entry("not read", str(name), Style.CAUTION)
-        for name in verified.unfinished:
-            echo_entry("unfinished", str(name), Style.CAUTION)
+        echo_entries("damaged", map(str, verified.problems), Style.BAD)
+        echo_entries("not read", map(str, verified.unread), Style.CAUTION)
+        echo_entries("unfinished", map(str, verified.unfinished), Style.CAUTION)
         counts = (
             f"{counted(verified.trials, 'trial')}, {counted(verified.recordings, 'recording')}, "
             f"{len(verified.problems)} damaged"

@@ -8,6 +8,11 @@ from pathlib import Path
 
 import click
 
+from graspsense.core.components.entries import PipelineEntry
+from graspsense.core.components.registry import installed
+from graspsense.core.settings.layers import read_layer, toml_kind
+from graspsense.core.values.errors import GraspsenseError
+
 
 def advice(error: Exception, arguments: Sequence[str]) -> list[str]:
     """Return what to type instead of these arguments of the program, which were refused with this error."""
@@ -77,16 +82,11 @@ def _misplaced_words(context: click.Context, arguments: Sequence[str]) -> Iterat
 def _option_for(word: str) -> str:
     """Return the option whose value this word probably is."""
     if word.endswith(".toml"):
-        from graspsense.core.settings.layers import read_layer, toml_kind
-        from graspsense.core.values.errors import GraspsenseError
-
         with suppress(GraspsenseError):
             return "--object" if toml_kind(read_layer(Path(word)).values) == "scene" else "--pipeline"
         return "--pipeline"
     if "=" in word:
         return "-o"
-    from graspsense.core.components.entries import PipelineEntry
-    from graspsense.core.components.registry import installed
 
     if word in {component.name for component in installed().components("sensor-backend")}:
         return "--gripper"

@@ -12,7 +12,7 @@ from graspsense.core.learn.model import Model, checkpoint_model
 from graspsense.core.learn.training import train
 from graspsense.evaluation.crossval import columns_of, cross_validate
 from graspsense.evaluation.doubt import HeldOut, calibrated, calibrated_by, exchangeable_instances
-from graspsense.evaluation.folds import INSTANCE_HELD_OUT, held_out
+from graspsense.evaluation.folds import INSTANCE_HELD_OUT, Folds, held_out
 from graspsense.evaluation.intervals import RecognitionRate, rate_among
 
 if TYPE_CHECKING:
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from graspsense.core.learn.checkpoints import CheckpointTrials
     from graspsense.core.learn.labelled import Labelled
     from graspsense.core.settings.selected import SelectedComponent
-    from graspsense.evaluation.folds import Folds
 
 WHOLE: Final = "whole grasp"
 SURE: Final = "stop when sure"

@@ -16,15 +16,18 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
+from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import FAILURES, ConfigError, counted, named
+from graspsense.core.values.features import FeatureTable
 from graspsense.evaluation.chosen import ChosenRate
 from graspsense.evaluation.crossval import ClassifierFactory, Pooled, cross_validate, fit_and_predict
-from graspsense.evaluation.folds import INSTANCE_HELD_OUT
+from graspsense.evaluation.folds import INSTANCE_HELD_OUT, Folds
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.evaluation.intervals import RecognitionRate, rate_of
 from graspsense.evaluation.ranking import (
@@ -35,13 +38,6 @@ from graspsense.evaluation.ranking import (
     protocols_of,
     ranking_of,
 )
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from graspsense.core.learn.labelled import Labelled
-    from graspsense.core.values.features import FeatureTable
-    from graspsense.evaluation.folds import Folds
 
 FOLDS: Final = 5
 LEAST_FOLDS: Final = 3

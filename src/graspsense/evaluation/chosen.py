@@ -16,15 +16,13 @@ The lower end of its interval is that with which the rates of all candidates hol
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from attrs import field, frozen
+from numpy.typing import NDArray
 
 from graspsense.evaluation.intervals import Interval, percent, percentages, rate_of
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 DRAWS: Final = 2000
 """Number of bootstrap samples."""

@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from graspsense.core.learn.labelled import ControlFeatures
 from graspsense.core.values.errors import counted
 from graspsense.evaluation.crossval import FitRefused, Groups, Pooled
 from graspsense.evaluation.evaluator import Evaluator, Headline
-from graspsense.evaluation.folds import INSTANCE_HELD_OUT, commonest, in_order, instance_held_out
+from graspsense.evaluation.folds import INSTANCE_HELD_OUT, Folds, commonest, in_order, instance_held_out
 from graspsense.evaluation.intervals import RecognitionRate, percent, rate_among
 from graspsense.evaluation.results import Measurement
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from graspsense.evaluation.folds import Folds
-
 
 PERMUTATIONS: Final = 19
 """Number of permutations of the labels, or numbers: the smallest with which p can be 0.05."""

@@ -4,22 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from attrs import frozen
 
 from graspsense.core.learn.labelled import Labelled, Target, class_of
+from graspsense.core.values.features import FeatureTable
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, Groups, Pooled, cross_validate
 from graspsense.evaluation.doubt import HeldOut
-from graspsense.evaluation.folds import INSTANCE_HELD_OUT, instance_held_out, stratified, trials_by_class
+from graspsense.evaluation.folds import (
+    INSTANCE_HELD_OUT,
+    Folds,
+    instance_held_out,
+    stratified,
+    trials_by_class,
+)
 from graspsense.evaluation.intervals import Difference, RecognitionRate, difference, rate_among
 from graspsense.evaluation.results import CurvePoint, Measurement
-
-if TYPE_CHECKING:
-    from graspsense.core.values.features import FeatureTable
-    from graspsense.evaluation.folds import Folds
-
 
 SHARES: Final = (0.1, 0.2, 0.4, 0.7, 1.0)
 """Shares of the training trials at which the learning curve is measured."""

@@ -4,21 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from graspsense.core.components.caller import option
-from graspsense.core.learn.labelled import class_of
+from graspsense.core.learn.labelled import Target, class_of
 from graspsense.core.values.errors import ConfigError, counted
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from graspsense.core.learn.labelled import Target
-
-    Folds = NDArray[np.int64]
-
+Folds = NDArray[np.int64]
 
 INSTANCE_HELD_OUT: Final = "instance_held_out"
 """The name of the protocol with folds of whole instances."""

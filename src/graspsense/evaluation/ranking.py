@@ -10,23 +10,27 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 from attrs import evolve, frozen
 
+from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.features import FeatureTable
 from graspsense.evaluation.chosen import ChosenRate, comparisons_of, rate_of_chosen
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, cross_validate
 from graspsense.evaluation.doubt import HeldOut, SetCoverage, exchangeable_instances
-from graspsense.evaluation.folds import INSTANCE_HELD_OUT, commonest, in_order, instance_held_out, stratified
+from graspsense.evaluation.folds import (
+    INSTANCE_HELD_OUT,
+    Folds,
+    commonest,
+    in_order,
+    instance_held_out,
+    stratified,
+)
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.evaluation.intervals import Difference, RecognitionRate, difference, rate_among, rate_of
-
-if TYPE_CHECKING:
-    from graspsense.core.learn.labelled import Labelled
-    from graspsense.core.values.features import FeatureTable
-    from graspsense.evaluation.folds import Folds
 
 MARGIN: Final = 0.02
 """Largest loss of rate with which a candidate counts as equivalent to the best."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from attrs import frozen
 
@@ -14,14 +14,11 @@ from graspsense.core.components.strict import plain
 from graspsense.core.values.errors import ConfigError, DataDamaged, counted
 from graspsense.evaluation.intervals import Difference, unpaired_difference
 from graspsense.experiments.cases import shown
-from graspsense.experiments.experiment import PIPELINE_TABLES
+from graspsense.experiments.experiment import PIPELINE_TABLES, ExperimentCase
 from graspsense.experiments.results import EXPERIMENT, RESULTS, Results
 from graspsense.experiments.summary import ConditionResult, Summary, summarise
 from graspsense.report.verdict import in_hundred
 from graspsense.report.wording import TARGETS
-
-if TYPE_CHECKING:
-    from graspsense.experiments.experiment import ExperimentCase
 
 ABSENT: Final = "not set"
 NO_CASE: Final = "all trials"

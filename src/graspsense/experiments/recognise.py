@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import Any, Final, Literal
 
 from attrs import field, frozen
 from attrs.validators import ge, le
@@ -12,13 +12,17 @@ from attrs.validators import ge, le
 from graspsense.core.components.registry import installed
 from graspsense.core.components.strict import structured
 from graspsense.core.learn.copies import apart_from, without_copies
-from graspsense.core.learn.labelled import class_of
-from graspsense.core.settings.resolved import settings_from
+from graspsense.core.learn.labelled import Labelled, Target, class_of
+from graspsense.core.settings.resolved import Settings, settings_from
 from graspsense.core.settings.selected import SelectedComponent, build
 from graspsense.core.values.errors import ConfigError, counted, listed
+from graspsense.core.values.features import FeatureTable
+from graspsense.core.values.trace import Trace
+from graspsense.core.values.tree import TreeNode
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.evaluation.folds import trials_by_class
 from graspsense.evaluation.gathered_warnings import gathered_warnings
+from graspsense.evaluation.results import Evaluation
 from graspsense.experiments.task_results import (
     MOST_KEPT_GRASPS,
     ClassifierResult,
@@ -27,14 +31,6 @@ from graspsense.experiments.task_results import (
 )
 from graspsense.report.grasp_curve import GraspCurve, grasp_curve
 from graspsense.sources.trial_source import TrialSource, labelled_trials
-
-if TYPE_CHECKING:
-    from graspsense.core.learn.labelled import Labelled, Target
-    from graspsense.core.settings.resolved import Settings
-    from graspsense.core.values.features import FeatureTable
-    from graspsense.core.values.trace import Trace
-    from graspsense.core.values.tree import TreeNode
-    from graspsense.evaluation.results import Evaluation
 
 OTHER_TRIALS: Final = "other_trials"
 """The protocol that trains on one source and tests on another."""

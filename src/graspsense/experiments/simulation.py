@@ -14,7 +14,7 @@ from attrs import asdict, evolve, frozen
 
 from graspsense.core.components.roles import BatchBackend, Grasped, SimulationVariant
 from graspsense.core.values.errors import ConfigError
-from graspsense.evaluation.intervals import percent
+from graspsense.evaluation.intervals import Difference, RecognitionRate, percent
 from graspsense.experiments.versions import measured_on
 
 if TYPE_CHECKING:
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from graspsense.core.settings.resolved import Settings
     from graspsense.core.values.features import Features
     from graspsense.core.values.trace import Trace
-    from graspsense.evaluation.intervals import Difference, RecognitionRate
 
 HEADER: Final = ("METHOD", "FIDELITY", "STEP OR ACCURACY", "MS A GRASP", "SET-UP, S")
 RECOGNITION: Final = ("RECOGNISED", "REFERENCE LESS THIS")

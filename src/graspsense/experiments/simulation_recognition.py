@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Final
 
 from attrs import evolve
 
-from graspsense.core.components.roles import BatchBackend
+from graspsense.core.components.roles import BatchBackend, SimulationVariant
 from graspsense.evaluation.intervals import difference, rate_among
 from graspsense.experiments.recognise import TEST_SEED_OFFSET, true_and_predicted
 from graspsense.sources.simulated import Group, simulated
 
 if TYPE_CHECKING:
-    from graspsense.core.components.roles import SimulationVariant
     from graspsense.core.learn.labelled import Labelled
     from graspsense.core.settings.resolved import Settings
     from graspsense.experiments.simulation import SimulationTrade, VariantPoint

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import Any, Final, Protocol
 
 from attrs import field, frozen
 
-from graspsense.core.learn.labelled import Target
+from graspsense.core.learn.labelled import Labelled, Target
 from graspsense.core.values.tree import TreeNode
 from graspsense.evaluation.intervals import RecognitionRate, rate_among, rate_of
 from graspsense.evaluation.results import Confusion, Measurement, confusion
 from graspsense.report.grasp_curve import GraspCurve
-
-if TYPE_CHECKING:
-    from graspsense.core.learn.labelled import Labelled
-
 
 MOST_KEPT_GRASPS: Final = 1000
 """Limit on the grasps of each label whose curves are kept with a result."""

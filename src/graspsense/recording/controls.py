@@ -7,14 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Final, TypedDict
+from typing import Final, TypedDict
 
 from graspsense.core.components.registry import installed
 from graspsense.core.learn.labelled import ControlFeatures
+from graspsense.core.values.features import FeatureTable
 from graspsense.recording.before_contact import NAMES, SPAN_S
-
-if TYPE_CHECKING:
-    from graspsense.core.values.features import FeatureTable
 
 BEFORE_CONTACT: Final = f"the first {SPAN_S:g} s of the approach: gap, velocity, effort and pad forces"
 

@@ -11,13 +11,14 @@ import io
 import math
 import struct
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from attrs import define, frozen
 from mcap.records import Channel, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
+from numpy.typing import NDArray
 
 from graspsense import __version__
 from graspsense.core.components.caller import option
@@ -25,11 +26,7 @@ from graspsense.core.values.channel import TactileArray
 from graspsense.core.values.errors import ConfigError
 from graspsense.recording.layout import CDR_HEADER, PADS_TOPIC, SIGNAL_TOPIC
 from graspsense.recording.reader import largest_record
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from graspsense.recording.recorded_grasp import RecordedGrasp
+from graspsense.recording.recorded_grasp import RecordedGrasp
 
 PICTURE_TOPIC: Final = "/grasp/pictures/"
 """Before the name of an array; the fingertips are `pads_left` and `pads_right`."""

@@ -8,11 +8,12 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 from mcap.exceptions import McapError
 from mcap.records import Channel, Chunk, DataEnd, Footer, Header, McapRecord, Message, Metadata, Schema
+from numpy.typing import NDArray
 
 from graspsense.core.values.errors import ConfigError, DataDamaged, TooLarge, named
 from graspsense.core.values.limits import CHANNEL_NUMBERS
@@ -39,9 +40,6 @@ from graspsense.recording.readable import readable, refuse_devices
 from graspsense.recording.recorded_grasp import TICK_ROW, RecordedGrasp, TopicRows, row_type
 from graspsense.recording.trial_record import DeviceRecord
 from graspsense.recording.unpacked import Unpacked
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 
 def largest_record() -> int:

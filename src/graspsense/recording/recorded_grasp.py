@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from attrs import evolve, field, frozen
+from numpy.typing import NDArray
 
 from graspsense.core.components.channels import (
     cells_of,
@@ -39,9 +40,6 @@ from graspsense.recording.layout import (
 from graspsense.recording.readable import readable
 from graspsense.recording.replayable import REPLAY_NOTE, Recording
 from graspsense.recording.trial_record import DeviceRecord, TrialRecord
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _KINDS: Final = {kind: np.dtype(name).newbyteorder("<") for kind, name in KINDS.items()}
 TICK_ROW: Final = np.dtype(

@@ -24,7 +24,7 @@ from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.json_values import json_text
 from graspsense.core.values.mounting import Mounting, mounting_from_json
 from graspsense.core.values.signals import Outcome
-from graspsense.core.values.trial import trial_as_json
+from graspsense.core.values.trial import Trial, trial_as_json
 from graspsense.recording.before_contact import before_contact, contact_force_of
 from graspsense.recording.layout import DEVICE, RESULT, START, VERSION
 from graspsense.recording.provenance import provenance
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from graspsense.core.settings.resolved import Settings
     from graspsense.core.values.device import DeviceInfo
     from graspsense.core.values.features import Features
-    from graspsense.core.values.trial import Trial
 
 T = TypeVar("T")
 Origin = Literal["run", "collect", "import"]

@@ -9,17 +9,14 @@ Boström and U. Johansson, Proc. Mach. Learn. Res. 128 (2020) 24).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 from graspsense.core.learn.conformal import COVERAGE, calibrated_threshold, units_needed
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from graspsense.core.learn.stored_values import StoredValues
+from graspsense.core.learn.stored_values import StoredValues
 
 BAND_UNITS: Final = 10
 """Least number of units in a band, if there are as many."""

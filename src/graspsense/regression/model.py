@@ -11,12 +11,13 @@ import platform
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from attrs import frozen
 
 from graspsense import __version__
+from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.model import differences_from
 from graspsense.core.learn.model_content import (
     REGRESSION_FORMAT,
@@ -35,9 +36,6 @@ from graspsense.core.values.json_values import json_ready
 from graspsense.regression.estimators import ESTIMATORS, FittedRegression
 from graspsense.regression.evaluate import held_out_folds, held_out_predictions
 from graspsense.regression.intervals import PredictionIntervals, intervals_from, intervals_of
-
-if TYPE_CHECKING:
-    from graspsense.core.learn.labelled import Labelled
 
 VERSION: Final = 2
 FOLDS: Final = 10

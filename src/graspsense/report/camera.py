@@ -8,19 +8,16 @@ import struct
 import zlib
 from collections.abc import Mapping
 from html import escape
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from graspsense.core.values.channel import FLOATS, TactileArray
+from graspsense.core.values.trace import ImageTrace
 from graspsense.report.html import figure
 from graspsense.report.moments import last_image
 from graspsense.report.svg import QUIET, Picture, number
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from graspsense.core.values.trace import ImageTrace
 
 MOST_CELLS: Final = 1024
 """An array of more cells in rows and columns is drawn as a picture: a page has no room for a shape for each."""

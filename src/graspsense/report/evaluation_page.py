@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from graspsense import __version__
+from graspsense.core.learn.labelled import Labelled
 from graspsense.core.settings.selected import SelectedComponent
+from graspsense.evaluation.results import Evaluation
 from graspsense.report.evaluation_sections import (
     confusion_section,
     controls_section,
@@ -18,10 +19,6 @@ from graspsense.report.rates import RateRow
 from graspsense.report.traces import features_by_class
 from graspsense.report.verdict import headline, verdict
 from graspsense.report.wording import TARGETS, about_grasps, control_words, protocol_words
-
-if TYPE_CHECKING:
-    from graspsense.core.learn.labelled import Labelled
-    from graspsense.evaluation.results import Evaluation
 
 
 def evaluation_page(

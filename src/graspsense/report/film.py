@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from graspsense.core.control.tick import RELEASE
 from graspsense.core.values.errors import ConfigError, PluginUnavailable
+from graspsense.core.values.signals import Command, Reading
 from graspsense.report.write import require_writable
-
-if TYPE_CHECKING:
-    from graspsense.core.values.signals import Command, Reading
 
 FRAMES_HZ: Final = 25.0
 PACKAGES: Final = {".png": "PIL", ".gif": "PIL", ".webp": "PIL", ".mp4": "av"}

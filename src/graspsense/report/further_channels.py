@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from graspsense.core.values.channel import Channel, FastChannel
 from graspsense.core.values.errors import counted
 from graspsense.core.values.fingers import fingers_of
-from graspsense.core.values.trace import SampleTrace
+from graspsense.core.values.trace import Floats, SampleTrace, Trace
 from graspsense.core.values.units import display_unit, without_underscores
 from graspsense.report.heat import HeatScale, heat_rows
 from graspsense.report.html import figure
 from graspsense.report.moments import contact_time, shown_from
 from graspsense.report.svg import DASHES, INKS, AxisScale, Picture, number, reaching
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from graspsense.core.values.trace import Floats, Trace
 
 INTERVALS: Final = 150
 """A curve is drawn by the least and the greatest value of so many intervals, so that no peak is lost."""

@@ -5,24 +5,22 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from graspsense.core.components.identification import held_out_in_words, repeatability
+from graspsense.core.components.identification import (
+    Identification,
+    IdentifiedParameter,
+    PredictiveCheck,
+    SqueezeFit,
+    held_out_in_words,
+    repeatability,
+)
 from graspsense.report.found_table import FoundTable
 from graspsense.report.html import Page, Section, bullets, figure, panels, paragraph, table
 from graspsense.report.svg import INKS, QUIET, WIDTH, AxisScale, Picture, reaching
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from graspsense.core.components.identification import (
-        Identification,
-        IdentifiedParameter,
-        PredictiveCheck,
-        SqueezeFit,
-    )
 
 MAX_FITS: Final = 12
 MAX_PAIRS: Final = 6

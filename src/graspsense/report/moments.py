@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 from graspsense.core.values.signals import Phase
-from graspsense.core.values.trace import ImageTrace
+from graspsense.core.values.trace import Floats, ImageTrace, Integers, Trace
 from graspsense.core.values.units import without_underscores
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from graspsense.core.values.trace import Floats, Integers, Trace
-
 
 BEFORE_CONTACT_S: Final = 0.8
 """How much of the approach is shown where time is in seconds: the rest is motion through free air."""

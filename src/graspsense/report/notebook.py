@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
+from graspsense.core.values.channel import Channel
 from graspsense.core.values.display import sentence, table
 from graspsense.core.values.features import Features, Prediction, certainty_words
 from graspsense.core.values.trace import Trace
@@ -16,9 +17,6 @@ from graspsense.report.svg import INKS, AxisScale, Picture, reaching
 from graspsense.report.tactile import tactile_figures
 from graspsense.report.trace_plot import plot as plot
 from graspsense.report.traces import OTHER_PHASE, PHASES
-
-if TYPE_CHECKING:
-    from graspsense.core.values.channel import Channel
 
 LEAST_SHOWN: Final = 0.005
 """A class that is less probable than this is not listed."""

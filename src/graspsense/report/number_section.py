@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from attrs import evolve
 
@@ -11,13 +11,11 @@ from graspsense.core.learn.copies import without_copies
 from graspsense.core.values.errors import counted
 from graspsense.regression.estimators import DEFAULT_ESTIMATOR
 from graspsense.regression.evaluate import evaluate_regression
+from graspsense.regression.results import RegressionError, RegressionEvaluation, RegressionMeasurement
 from graspsense.report.found_table import FoundTable
 from graspsense.report.html import Page, Section, bullets, figure, pair, paragraph, table
 from graspsense.report.svg import INKS, QUIET, Picture, number, reaching
 from graspsense.store.dataset import labelled_store
-
-if TYPE_CHECKING:
-    from graspsense.regression.results import RegressionError, RegressionEvaluation, RegressionMeasurement
 
 MEASUREMENTS: Final = "grasp"
 """The section of the page of a store before which numbers stand."""

@@ -5,14 +5,16 @@ from __future__ import annotations
 import base64
 from collections import Counter
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from attrs import frozen
 
 from graspsense.core.learn.copies import without_copies
+from graspsense.core.learn.labelled import Target
 from graspsense.core.settings.selected import select_component
 from graspsense.core.values.errors import ConfigError, DataDamaged, counted
 from graspsense.evaluation.evaluate import evaluate
+from graspsense.evaluation.results import Evaluation
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.recording.provenance import commit_text
 from graspsense.recording.readable import note_on, readable
@@ -39,15 +41,10 @@ from graspsense.report.traces import features_table, one_grasp, traces_by_class
 from graspsense.report.trial_curves import trial_curves
 from graspsense.report.verdict import headline, verdict
 from graspsense.report.wording import TARGETS
-from graspsense.store.changes import history
+from graspsense.store.changes import Change, history
 from graspsense.store.dataset import labelled_store
+from graspsense.store.rows import StoredTrial, TrialSummary
 from graspsense.store.store import Store
-
-if TYPE_CHECKING:
-    from graspsense.core.learn.labelled import Target
-    from graspsense.evaluation.results import Evaluation
-    from graspsense.store.changes import Change
-    from graspsense.store.rows import StoredTrial, TrialSummary
 
 GRASPS: Final = 3
 """Grasps of each label that are drawn over each other."""

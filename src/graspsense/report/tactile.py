@@ -6,22 +6,19 @@ import math
 from collections.abc import Mapping, Sequence
 from html import escape
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from attrs import frozen
 
 from graspsense.core.values.channel import FLOATS, Channel, TactileArray
-from graspsense.core.values.trace import ImageTrace
+from graspsense.core.values.trace import Floats, ImageTrace, Trace
 from graspsense.core.values.units import display_unit, without_underscores
 from graspsense.report.camera import camera_figure, is_picture
 from graspsense.report.heat import COLOURS, HeatScale
 from graspsense.report.html import figure
 from graspsense.report.moments import images_at, moments
 from graspsense.report.svg import QUIET, Picture, number
-
-if TYPE_CHECKING:
-    from graspsense.core.values.trace import Floats, Trace
 
 GAP: Final = 14.0
 """Between two maps of a picture."""

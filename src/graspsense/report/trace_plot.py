@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from graspsense.core.values.signals import Phase
-from graspsense.core.values.trace import SampleTrace
+from graspsense.core.values.trace import Floats, ImageTrace, Integers, SampleTrace, Trace
 from graspsense.core.values.units import display_unit, without_underscores
 from graspsense.report.moments import (
     array_images,
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from graspsense.core.values.fingers import FingerForce
-    from graspsense.core.values.trace import Floats, ImageTrace, Integers, Trace
 
 PHASE_COLOURS: Final = {Phase.APPROACH: "#e9eff6", Phase.SQUEEZE: "#fbdcb4", Phase.HOLD: "#c9e6cf"}
 OTHER_PHASE: Final = "#f3f3f3"

@@ -9,13 +9,18 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from attrs import define, field, frozen
 
 from graspsense.core.components.caller import option
+from graspsense.core.components.registry import Plugins
+from graspsense.core.grasp.sinks import Sink
+from graspsense.core.settings.resolved import Settings
+from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError, NoDevice
 from graspsense.core.values.signals import Outcome
+from graspsense.core.values.trial import Trial
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.store.changes import set_aside
 from graspsense.store.comparable import check_device, check_settings, newest_grasp
@@ -23,13 +28,6 @@ from graspsense.store.labels import check_label, labels_of
 from graspsense.store.record_grasp import RecordedTrial, record_grasp
 from graspsense.store.rows import StoredTrial
 from graspsense.store.store import Store
-
-if TYPE_CHECKING:
-    from graspsense.core.components.registry import Plugins
-    from graspsense.core.grasp.sinks import Sink
-    from graspsense.core.settings.resolved import Settings
-    from graspsense.core.values.device import DeviceInfo
-    from graspsense.core.values.trial import Trial
 
 HELP: Final = (
     "keys: Enter grasps it, u undoes the last trial, r repeats the last trial, s skips this object, q stops, ? shows "

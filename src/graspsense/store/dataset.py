@@ -12,11 +12,13 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from datetime import datetime
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from attrs import evolve, fields_dict, frozen
+from numpy.typing import NDArray
 
+from graspsense.core.components.roles import FeatureSet
 from graspsense.core.components.strict import plain
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.target_value import TargetValue, values_of_labels
@@ -36,11 +38,6 @@ from graspsense.store.opening import decoded
 from graspsense.store.rows import StoredTrial
 from graspsense.store.store import COUNTS, Store
 from graspsense.store.time_recorded import order_recorded
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from graspsense.core.components.roles import FeatureSet
 
 Progress = Callable[[int, int], None]
 

@@ -8,7 +8,7 @@ Nothing in the store changes.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from attrs import evolve, frozen
@@ -30,8 +30,6 @@ from graspsense.recording.recorded_grasp import with_phases_of
 from graspsense.recording.trial_record import FeatureValues
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from graspsense.store.rows import StoredTrial
     from graspsense.store.store import Store
 

@@ -10,7 +10,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import Any, Final, Literal
 
 from attrs import asdict, evolve, frozen
 
@@ -18,6 +18,7 @@ from graspsense.core.components.registry import installed
 from graspsense.core.settings.selected import build
 from graspsense.core.values.errors import FAILURES, ConfigError, DataDamaged, GraspsenseError
 from graspsense.core.values.features import Features
+from graspsense.core.values.trace import Trace
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.before_contact import before_contact, contact_force_of
 from graspsense.recording.layout import DEVICE, PART, START, TICK
@@ -28,9 +29,6 @@ from graspsense.recording.trial_record import FeatureValues, TrialRecord, TrialR
 from graspsense.recording.writer import RecordingWriter
 from graspsense.store.opening import damaged
 from graspsense.store.store import Store, integrity
-
-if TYPE_CHECKING:
-    from graspsense.core.values.trace import Trace
 
 CUT: Final = ".cut"
 RECOVERED: Final = "-recovered.mcap"

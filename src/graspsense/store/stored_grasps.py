@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from attrs import frozen
 
@@ -12,14 +12,12 @@ from graspsense.core.settings.layers import Layer
 from graspsense.core.settings.resolved import NONE, without_followers
 from graspsense.core.values.channel import Channel
 from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.core.values.trace import Trace
 from graspsense.recording.reader import read_recorded
 from graspsense.recording.recorded_grasp import RecordedGrasp
 from graspsense.recording.replayable import Recording
 from graspsense.store.naming import store_folder
 from graspsense.store.store import Store
-
-if TYPE_CHECKING:
-    from graspsense.core.values.trace import Trace
 
 
 @frozen(kw_only=True)

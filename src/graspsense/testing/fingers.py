@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from math import isclose
-from typing import TYPE_CHECKING
 
 from graspsense.core.values.fingers import fingers_of, opposed_forces
 from graspsense.testing.checks import CheckFailed, demand
-
-if TYPE_CHECKING:
-    from graspsense.testing.subject import Subject
+from graspsense.testing.subject import Subject
 
 
 def fingers_are_those_declared(subject: Subject) -> None:

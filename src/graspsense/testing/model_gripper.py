@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from math import inf, nan
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
 from graspsense.core.components.channels import cells_of, declared_shape, further, no_signals
 from graspsense.core.components.roles import Controller, SensorBackend
+from graspsense.core.grasp.runner import Grasp
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.signals import (
@@ -24,9 +25,6 @@ from graspsense.core.values.signals import (
     Samples,
     no_pads,
 )
-
-if TYPE_CHECKING:
-    from graspsense.core.grasp.runner import Grasp
 
 DT_S: Final = 1e-3
 OPEN_M: Final = 0.08

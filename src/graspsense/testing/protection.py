@@ -13,7 +13,7 @@ from graspsense.core.control.contact import CONTACT_FORCE_N
 from graspsense.core.grasp.protection.effort_ceiling import effort_ceiling_n
 from graspsense.core.grasp.protection.touch import MOST_S
 from graspsense.core.grasp.runner import Grasp, run_grasp
-from graspsense.core.values.channel import Channel
+from graspsense.core.grasp.wrapped_gripper import WrappedGripper
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.signals import EFFORT, FORCE, Command, Outcome, Pads, Reading
 from graspsense.testing.checks import CheckSkipped, demand
@@ -28,33 +28,24 @@ FELT_AFTER_S: Final = 0.3
 PRESSED_N: Final = 20.0 * CONTACT_FORCE_N
 
 
-class Observed(SensorBackend[None]):
+class Observed(WrappedGripper):
     """A gripper whose commands are kept; with `silent`, its left pad stops feeling while the right one presses."""
 
     def __init__(self, gripper: SensorBackend[Any], silent: bool) -> None:
-        super().__init__(None)
-        self._gripper, self._silent = gripper, silent
+        super().__init__(gripper)
+        self._silent = silent
         self._tared_t_s = self._t_s = nan
         self.commands: list[Command] = []
         self.info: DeviceInfo | None = None
 
-    @property
-    def channels(self) -> tuple[Channel, ...]:
-        """The channels of the gripper."""
-        return tuple(self._gripper.channels)
-
-    def expect(self, controller: Controller[Any], run: RunConfig) -> None:
-        """Announce the grasp to the gripper."""
-        self._gripper.expect(controller, run)
-
     def open(self, seed: int) -> DeviceInfo:
         """Open the gripper and keep its description."""
-        self.info = self._gripper.open(seed)
+        self.info = super().open(seed)
         return self.info
 
     def read(self, timeout_s: float) -> Reading | None:
         """Return what the gripper measured, or what a silent pad and one that presses would."""
-        reading = self._gripper.read(timeout_s)
+        reading = super().read(timeout_s)
         if reading is None:
             return None
         frame = reading.frame
@@ -65,17 +56,13 @@ class Observed(SensorBackend[None]):
 
     def apply(self, command: Command) -> None:
         """Apply the command and keep it."""
-        self._gripper.apply(command)
+        super().apply(command)
         self.commands.append(command)
 
     def tare(self, images: Sequence[Pads]) -> None:
         """Tare the gripper, after which the fingers close."""
         self._tared_t_s = self._t_s
-        self._gripper.tare(images)
-
-    def close(self) -> None:
-        """Close the gripper."""
-        self._gripper.close()
+        self.gripper.tare(images)
 
 
 def _grasped(

@@ -6,12 +6,14 @@ from datetime import UTC, datetime
 from math import inf
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import Grasp, run_grasp
+from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import GraspsenseError
 from graspsense.core.values.signals import EFFORT, Command
 from graspsense.core.values.trace import (
@@ -31,12 +33,7 @@ from graspsense.recording.trial_record import TrialRecord
 from graspsense.sources.recordings.replay import read_named
 from graspsense.testing.checks import CheckFailed, demand
 from graspsense.testing.gentle import GentleController, kind_of
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from graspsense.core.values.device import DeviceInfo
-    from graspsense.testing.subject import Subject
+from graspsense.testing.subject import Subject
 
 
 def what_it_delivers_is_kept(subject: Subject) -> None:

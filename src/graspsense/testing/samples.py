@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from copy import deepcopy
 from math import nan
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from attrs import evolve, fields
+from numpy.typing import NDArray
 
 from graspsense.core.components.channels import further
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
@@ -20,9 +21,6 @@ from graspsense.core.values.signals import Frame as _Frame
 from graspsense.core.values.trace import PAD_COLUMNS, ImageTrace, SampleTrace, SignalTrace, Trace, trace_of
 from graspsense.core.values.trial import RunInfo, Trial
 from graspsense.testing.model_gripper import CELLS, FIRST_PAD_CELL
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 RATE_HZ: Final = 500.0
 COLUMNS_OF_CHANNEL: Final = {

@@ -11,17 +11,14 @@ none of that; a field that is given here is for a class that does not declare it
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
-from attrs import field, frozen
+from attrs import Attribute, field, frozen
 from attrs.validators import and_, deep_iterable, ge, instance_of, matches_re, min_len, optional
 
 from graspsense.core.values.channel import IS_NAME, Channel
 from graspsense.core.values.errors import suggestion
 from graspsense.core.values.signals import CommandKind
-
-if TYPE_CHECKING:
-    from attrs import Attribute
 
 Role = Literal["sensor-backend", "controller", "feature-set", "classifier"]
 

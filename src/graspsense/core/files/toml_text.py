@@ -9,7 +9,8 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from itertools import count
 from typing import Any, Final
 
 from graspsense.core.values.limits import SETTINGS_BYTES
@@ -89,17 +90,15 @@ def _check_bounds(values: Mapping[str, Any]) -> None:
 KeyPath = tuple[str | int, ...]
 """The path to a value: keys from the outermost table inwards, and integers for indices of arrays."""
 
-_BLANK: Final = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
-_SPACE: Final = re.compile(r"[ \t]*")
-_PART: Final = re.compile(r'"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\'|[A-Za-z0-9_-]+')
-_STRING: Final = re.compile(
+_TOKEN: Final = re.compile(
     r'"""(?:[^"\\]|\\.|"(?!""))*"{3,5}'
     r"|'''(?:[^']|'(?!''))*'{3,5}"
     r'|"(?:[^"\\\n]|\\.)*"'
-    r"|'[^'\n]*'",
+    r"|'[^'\n]*'"
+    r"|#[^\n]*|[\[\]{}=,\n]|[^\s\[\]{}=,#\"']+",
     re.DOTALL,
 )
-_BARE_VALUE: Final = re.compile(r"[^,\]}#\n]+")
+"""A string, a comment, a sign of TOML, the end of a line, or the letters of a key or of a value up to one of these."""
 
 
 def key_lines(text: str) -> dict[KeyPath, int]:
@@ -107,115 +106,109 @@ def key_lines(text: str) -> dict[KeyPath, int]:
 
     `tomllib` does not give these. The text must be valid: this only finds keys and the ends of values.
     """
-    return _Scanner(text).scan()
+    return _Scanner(text).lines
 
 
 class _Scanner:
     def __init__(self, text: str) -> None:
-        self.text = text
-        self.at = 0
-        self.counted = (0, 1)
+        line = 1
+        self.tokens: list[tuple[str, int]] = []
+        """The tokens that are left with their lines, the next one last."""
+        for match in _TOKEN.finditer(text):
+            if not match[0].startswith("#"):
+                self.tokens.append((match[0], line))
+            line += match[0].count("\n")
+        self.tokens.reverse()
         self.lines: dict[KeyPath, int] = {}
         self.arrays: dict[KeyPath, int] = {}
-
-    def scan(self) -> dict[KeyPath, int]:
         table: KeyPath = ()
-        self.skip(_BLANK)
-        while self.at < len(self.text):
-            if self.text.startswith("[[", self.at):
-                table = self.header(2)
-            elif self.text[self.at] == "[":
-                table = self.header(1)
+        while token := self.next_token():
+            if token == "[":
+                table = self.header()
             else:
                 self.pair(table)
-            self.skip(_BLANK)
-        return self.lines
 
-    def header(self, brackets: int) -> KeyPath:
-        line = self.line()
-        self.at += brackets
+    def next_token(self) -> str:
+        """Return the next token that is not the end of a line, and stay before it; empty at the end."""
+        while self.tokens and self.tokens[-1][0] == "\n":
+            self.tokens.pop()
+        return self.tokens[-1][0] if self.tokens else ""
+
+    def header(self) -> KeyPath:
+        line = self.tokens.pop()[1]
+        is_array = self.next_token() == "["
+        if is_array:
+            self.tokens.pop()
         path: KeyPath = ()
-        parts = self.key()
+        parts = self.key("]")
         for i, part in enumerate(parts):
             path = (*path, part)
             self.lines.setdefault(path, line)
-            if brackets == 2 and i == len(parts) - 1:
+            if is_array and i == len(parts) - 1:
                 self.arrays[path] = self.arrays.get(path, -1) + 1
             if path in self.arrays:
                 path = (*path, self.arrays[path])
                 self.lines.setdefault(path, line)
-        self.at += brackets
+        if is_array:
+            self.tokens.pop()
         return path
 
     def pair(self, table: KeyPath) -> None:
-        line = self.line()
-        path = table
-        for part in self.key():
+        path, line = table, self.tokens[-1][1]
+        for part in self.key("="):
             path = (*path, part)
             self.lines.setdefault(path, line)
-        self.at += 1  # the equals sign
-        self.skip(_SPACE)
         self.value(path)
 
     def value(self, path: KeyPath) -> None:
-        opening = self.text[self.at]
-        if opening == "[":
-            self.at += 1
-            self.skip(_BLANK)
-            index = 0
-            while self.text[self.at] != "]":
-                self.lines[(*path, index)] = self.line()
+        token, _ = self.tokens.pop()
+        if token == "[":
+            for index in self.members("]"):
+                self.lines[*path, index] = self.tokens[-1][1]
                 self.value((*path, index))
-                self.separator()
-                index += 1
-            self.at += 1
-        elif opening == "{":
-            self.at += 1
-            self.skip(_BLANK)
-            while self.text[self.at] != "}":
+        elif token == "{":
+            for _ in self.members("}"):
                 self.pair(path)
-                self.separator()
-            self.at += 1
-        elif opening in "\"'":
-            self.skip(_STRING)
-        else:
-            self.skip(_BARE_VALUE)
+        # A date may have a space before its time.
+        while self.tokens and self.tokens[-1][0] not in ("\n", ",", "]", "}"):
+            self.tokens.pop()
 
-    def separator(self) -> None:
-        self.skip(_BLANK)
-        if self.text[self.at] == ",":
-            self.at += 1
-            self.skip(_BLANK)
+    def members(self, end: str) -> Iterator[int]:
+        """Yield the number of each member of a list or a table, which is to be taken; take its end too."""
+        for number in count():
+            while (token := self.next_token()) == ",":
+                self.tokens.pop()
+            if token == end:
+                self.tokens.pop()
+                return
+            yield number
 
-    def key(self) -> list[str]:
-        """Read a dotted key, and set the position to its end."""
-        parts: list[str] = []
-        while True:
-            self.skip(_SPACE)
-            part = self.skip(_PART)
-            parts.append(_unquoted(part))
-            self.skip(_SPACE)
-            if self.text[self.at] != ".":
-                return parts
-            self.at += 1
-
-    def skip(self, pattern: re.Pattern[str]) -> str:
-        match = pattern.match(self.text, self.at)
-        assert match is not None, f"no TOML at character {self.at}"
-        self.at = match.end()
-        return match.group()
-
-    def line(self) -> int:
-        start, count = self.counted
-        self.counted = (self.at, count + self.text.count("\n", start, self.at))
-        return self.counted[1]
+    def key(self, end: str) -> list[str]:
+        """Take the parts of a dotted key, and the sign behind it."""
+        text = ""
+        while (token := self.tokens.pop()[0]) != end:
+            text += token
+        return key_parts(text)
 
 
-def _unquoted(part: str) -> str:
-    if part[0] not in "\"'":
-        return part
-    table: dict[str, Any] = tomllib.loads(f"key = {part}")
-    return str(table["key"])
+def key_parts(key: str) -> list[str]:
+    """Return the parts of a dotted key; none if it is not one."""
+    if _BARE.fullmatch(key):
+        return key.split(".")
+    try:
+        table: Any = toml_values(f"{key}=0")
+    except ValueError:
+        return []
+    parts = []
+    while isinstance(table, dict):
+        if len(table) != 1:
+            return []
+        part, table = next(iter(table.items()))
+        parts.append(part)
+    return parts
+
+
+_BARE: Final = re.compile(r"[A-Za-z0-9_-]+(?:\.[A-Za-z0-9_-]+)*")
 
 
 def toml_key(key: str) -> str:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from graspsense.core.components.entries import KINDS
-from graspsense.core.components.roles import Controller, FeatureSet, SensorBackend
+from graspsense.core.components.roles import Controller, SensorBackend
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_uninterrupted
+from graspsense.core.grasp.wrapped_gripper import WrappedGripper
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.events import GraspEvent
-from graspsense.core.values.signals import EFFORT, FORCE, VELOCITY, Command, Pads, Phase, Reading
+from graspsense.core.values.signals import EFFORT, FORCE, VELOCITY, Command, Phase, Reading
 
 
 class PhaseCommands(NamedTuple):
@@ -61,12 +61,12 @@ class _Tick(NamedTuple):
     limited: bool
 
 
-class _CommandRecorder(SensorBackend[None]):
+class _CommandRecorder(WrappedGripper):
     """A gripper that records what it is commanded in each phase."""
 
     def __init__(self, gripper: SensorBackend[Any], run: RunConfig) -> None:
-        super().__init__(None)
-        self._gripper, self._run = gripper, run
+        super().__init__(gripper)
+        self._run = run
         self._seen: dict[str, list[_Tick]] = {}
         self._now: list[_Tick] = []
         self._next = self._now
@@ -102,17 +102,9 @@ class _CommandRecorder(SensorBackend[None]):
             )
         return phases
 
-    def expect(self, controller: Controller[Any], run: RunConfig) -> None:
-        """Pass the controller and the settings on to the gripper."""
-        self._gripper.expect(controller, run)
-
-    def expect_features(self, feature_set: FeatureSet[Any]) -> None:
-        """Pass the feature set on to the gripper."""
-        self._gripper.expect_features(feature_set)
-
     def open(self, seed: int) -> DeviceInfo:
         """Open the gripper and note its limits."""
-        info = self._gripper.open(seed)
+        info = super().open(seed)
         self._rate_hz = info.rate_hz
         self._limits_n, self._limits_m_s = [info.effort_limit_n], [info.speed_limit_m_s]
         if info.clock == "device":
@@ -122,7 +114,7 @@ class _CommandRecorder(SensorBackend[None]):
 
     def read(self, timeout_s: float) -> Reading | None:
         """Read the gripper and note its speed."""
-        reading = self._gripper.read(timeout_s)
+        reading = super().read(timeout_s)
         if reading is not None:
             self._speed_m_s = abs(reading.frame.velocity_m_s)
         return reading
@@ -131,7 +123,7 @@ class _CommandRecorder(SensorBackend[None]):
         """Note the command and pass it on."""
         self._now.append(self._described(command))
         self._now = self._next
-        self._gripper.apply(command)
+        super().apply(command)
 
     def _described(self, command: Command) -> _Tick:
         """Return what `PhaseCommands` says of a command; the guard has limited it."""
@@ -146,11 +138,3 @@ class _CommandRecorder(SensorBackend[None]):
         """Return the command with no limits above those of the gripper, as for the opening, which has none."""
         kind, value, effort_n, speed_m_s = command
         return Command(kind, value, min(effort_n, self._limits_n[0]), min(speed_m_s, self._limits_m_s[0]))
-
-    def tare(self, images: Sequence[Pads]) -> None:
-        """Tare the gripper."""
-        self._gripper.tare(images)
-
-    def close(self) -> None:
-        """Close the gripper."""
-        self._gripper.close()

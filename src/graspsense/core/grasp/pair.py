@@ -8,15 +8,14 @@ gripper with a virtual clock takes its next tick only when the other one has rea
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from threading import Condition, Thread
 from typing import Any, Generic, TypeVar
 
 from attrs import define, evolve, field
 
-from graspsense.core.components.roles import Controller, FeatureSet, SensorBackend
-from graspsense.core.components.run_config import RunConfig
-from graspsense.core.values.channel import Channel
+from graspsense.core.components.roles import SensorBackend
+from graspsense.core.grasp.wrapped_gripper import WrappedGripper
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError, DeviceLost, ExitCode, GraspsenseError, named
 from graspsense.core.values.signals import Command, Image, Pads, Reading, Samples
@@ -95,34 +94,20 @@ class Member:
             raise OtherGripperFailed(f"{self.other.name} of this pair {self.other.failure}, so both let go")
 
 
-class PairedBackend(SensorBackend[Any]):
+class PairedBackend(WrappedGripper):
     """A gripper of a pair: the same readings and commands, on the common axis of time."""
 
     def __init__(self, backend: SensorBackend[Any], member: Member) -> None:
-        super().__init__(backend.config)
-        self._backend, self._member = backend, member
-        self.closes_itself = backend.closes_itself
+        super().__init__(backend)
+        self._member = member
         self._virtual, self._zero_s = False, 0.0
         self._offset_s: float | None = None
         self._pads: tuple[Pads | None, Pads | None] = (None, None)
         self._signals: tuple[Any, Any] = ((), ())
 
-    @property
-    def channels(self) -> tuple[Channel, ...]:
-        """The channels of the gripper."""
-        return self._backend.channels
-
-    def expect(self, controller: Controller[Any], run: RunConfig) -> None:
-        """Announce controller and settings to the gripper."""
-        self._backend.expect(controller, run)
-
-    def expect_features(self, feature_set: FeatureSet[Any]) -> None:
-        """Announce the feature set to the gripper."""
-        self._backend.expect_features(feature_set)
-
     def open(self, seed: int) -> DeviceInfo:
         """Open the gripper, and wait until the other one is open. Raises OtherGripperFailed, ConfigError, NoDevice."""
-        info = self._backend.open(seed)
+        info = super().open(seed)
         if info.units.get("t", "s") != "s":
             raise ConfigError(
                 f"{info.name} counts its time in {info.units['t']}: two grippers of one run need seconds"
@@ -137,7 +122,7 @@ class PairedBackend(SensorBackend[Any]):
         """Return the next reading, with its times on the common axis. Raises OtherGripperFailed."""
         self._member.may_go_on(waits=self._virtual)
         try:
-            reading = self._backend.read(timeout_s)
+            reading = super().read(timeout_s)
         except DeviceLost as error:
             self._member.fails(f"was lost ({error})")
             raise
@@ -170,26 +155,14 @@ class PairedBackend(SensorBackend[Any]):
     def apply(self, command: Command) -> None:
         """Command the gripper."""
         try:
-            self._backend.apply(command)
+            super().apply(command)
         except DeviceLost as error:
             self._member.fails(f"was lost ({error})")
             raise
 
-    def tare(self, images: Sequence[Pads]) -> None:
-        """Set the zero of the pads."""
-        self._backend.tare(images)
-
-    def close(self) -> None:
-        """Close the gripper."""
-        self._backend.close()
-
     def report(self) -> Mapping[str, Any]:
         """Return the report of the gripper, with the offset that was added to its clock (s)."""
-        return {**self._backend.report(), "clock_offset_s": self._offset_s or 0.0}
-
-    def recorded_commands(self) -> Sequence[float] | None:
-        """Return the commands of a recording."""
-        return self._backend.recorded_commands()
+        return {**self.gripper.report(), "clock_offset_s": self._offset_s or 0.0}
 
 
 @define(eq=False)

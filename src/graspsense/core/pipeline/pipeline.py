@@ -13,7 +13,7 @@ import numpy as np
 from attrs import frozen
 
 from graspsense.core.components.caller import set_option
-from graspsense.core.components.registry import Plugins, installed
+from graspsense.core.components.registry import Component, Plugins, installed
 from graspsense.core.components.roles import Controller, FeatureSet, SensorBackend
 from graspsense.core.control.garbage_collection import no_collection
 from graspsense.core.grasp.runner import Grasp, run_grasp
@@ -33,7 +33,6 @@ from graspsense.core.values.signals import Outcome
 from graspsense.core.values.trial import RunInfo, Trial
 
 if TYPE_CHECKING:
-    from graspsense.core.components.registry import Component
     from graspsense.core.grasp.pair import Member
 
 MODELS_KEPT: Final = 4

@@ -18,7 +18,7 @@ from graspsense.core.components.caller import set_option
 from graspsense.core.components.entries import TABLE_OF_ROLE, PipelineEntry
 from graspsense.core.components.registry import Plugins
 from graspsense.core.components.strict import InvalidValue, shown
-from graspsense.core.files.toml_text import KeyPath, TomlError, key_lines, toml_values
+from graspsense.core.files.toml_text import KeyPath, TomlError, key_lines, key_parts, toml_values
 from graspsense.core.files.whole_file import first_bytes
 from graspsense.core.values.errors import ConfigError, UnknownName
 from graspsense.core.values.limits import SETTINGS_BYTES
@@ -298,7 +298,7 @@ def option_layers(options: Sequence[str]) -> tuple[list[Layer], list[str]]:
     layers, complaints = [], []
     for option in options:
         key, equals, value = option.partition("=")
-        parts = _key_parts(key)
+        parts = key_parts(key)
         if not equals or not parts:
             complaints.append(
                 f"{set_option(option)}: expected TABLE.KEY=VALUE, as in {set_option('run.seed=3')}"
@@ -317,20 +317,6 @@ def typed_path(layer: Layer) -> KeyPath:
         ((key, values),) = values.items()
         path.append(key)
     return tuple(path)
-
-
-def _key_parts(key: str) -> list[str]:
-    try:
-        table: Any = toml_values(f"{key}=0")
-    except ValueError:
-        return []
-    parts = []
-    while isinstance(table, dict):
-        if len(table) != 1:
-            return []
-        part, table = next(iter(table.items()))
-        parts.append(part)
-    return parts
 
 
 def _toml_value(text: str) -> Any:

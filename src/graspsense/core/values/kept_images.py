@@ -6,14 +6,12 @@ import mmap
 import os
 import tempfile
 import weakref
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from graspsense.core.values.signals import Image
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 
 class KeptImages:

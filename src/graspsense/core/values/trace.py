@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from attrs import define, evolve, field, frozen
+from numpy.typing import NDArray
 
 from graspsense.core.values.display import html, plot
 from graspsense.core.values.kept_images import KeptImages
@@ -26,12 +27,10 @@ from graspsense.core.values.signals import (
 from graspsense.core.values.units import quantity
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from graspsense.core.values.events import GraspEvent
 
-    Floats = NDArray[np.float64]
-    Integers = NDArray[np.int64]
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 SI_UNITS: Final[Mapping[str, str]] = {"t": "s", **CHANNELS}
 

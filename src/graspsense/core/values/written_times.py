@@ -5,11 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+import numpy as np
+from numpy.typing import NDArray
 
 _TIME: Final = re.compile(
     r"(?P<day>[0-9]{4}-?[0-9]{2}-?[0-9]{2}[T ])?(?P<time>[0-9]{2}:?[0-9]{2}:?[0-9]{2}(?:[.,][0-9]{1,9})?)"
@@ -25,8 +24,6 @@ def seconds_since_first(cells: Sequence[str]) -> NDArray[np.float64] | None:
     Times with a zone are compared as instants; those without one are all taken to be of the same zone. A time of the
     day that is earlier by more than half a day than the one before is of the next day.
     """
-    import numpy as np
-
     times, dated = [], False
     for cell in cells:
         match = _TIME.fullmatch(cell)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from attrs import field, frozen
@@ -13,6 +13,7 @@ from graspsense.core.components.strict import structured
 from graspsense.core.learn.checkpoints import contact_of
 from graspsense.core.values.features import Features, table_of
 from graspsense.core.values.signals import Phase
+from graspsense.core.values.trace import Trace
 from graspsense.evaluation.crossval import cross_validate
 from graspsense.evaluation.folds import stratified, trials_by_class
 from graspsense.experiments.recognise import classifiers_of
@@ -26,10 +27,6 @@ from graspsense.experiments.trade.trade_task import (
     trial_groups,
 )
 from graspsense.sources.simulated import simulated
-
-if TYPE_CHECKING:
-    from graspsense.core.values.trace import Trace
-
 
 STRATIFIED: Final = f"stratified_{FOLDS}_fold"
 MOST_MOMENTS: Final = 100

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from attrs import field, frozen
 from attrs.validators import ge, le
+from numpy.typing import NDArray
 
 from graspsense.core.components.strict import structured
 from graspsense.core.learn.labelled import Labelled, Target
@@ -25,9 +26,6 @@ from graspsense.experiments.trade.trade_task import (
     trial_groups,
 )
 from graspsense.sources.simulated import simulated
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 MIN_PROBABILITY: Final = 1e-3
 """Lower bound on a probability: a label that a tree gives no trial may still be correct."""

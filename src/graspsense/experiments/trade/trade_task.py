@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from graspsense.core.components.strict import structured
-from graspsense.core.learn.labelled import Target, class_of
-from graspsense.core.settings.resolved import settings_from
+from graspsense.core.learn.labelled import Labelled, Target, class_of
+from graspsense.core.settings.resolved import Settings, settings_from
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
+from graspsense.sources.simulated import Group
 from graspsense.sources.trial_source import TrialSource, groups_of
-
-if TYPE_CHECKING:
-    from graspsense.core.learn.labelled import Labelled
-    from graspsense.core.settings.resolved import Settings
-    from graspsense.sources.simulated import Group
 
 FOLDS: Final = 10
 

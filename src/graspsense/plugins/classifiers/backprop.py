@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import Any, Final, Self
 
+import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 from graspsense.plugin_api import ClassifierConfig, setting
 from graspsense.plugins.classifiers.scikit import ScikitClassifier
 from graspsense.simulator_api import NotCompilable, compile_function, first_call
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 WEIGHT: Final = 0.05
 """The weights are uniformly distributed between minus and plus this number before the training."""
@@ -76,8 +74,6 @@ class SigmoidNetwork:
 
     def fit(self, values: NDArray[np.float64], labels: NDArray[np.str_]) -> Self:
         """Train on these trials, shape (trials, features)."""
-        import numpy as np
-
         rng, config = np.random.default_rng(self._seed), self._config
         self.classes_, numbers = np.unique(labels, return_inverse=True)
         self._low = values.min(axis=0)
@@ -97,8 +93,6 @@ class SigmoidNetwork:
 
     def predict_proba(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the outputs divided by their sum, shape (trials, classes)."""
-        import numpy as np
-
         hidden = _sigmoid(self._inputs(values) @ self._hidden.T)
         outputs = _sigmoid(np.column_stack((hidden, np.ones(len(hidden)))) @ self._output.T)
         total = outputs.sum(axis=1, keepdims=True)
@@ -108,14 +102,10 @@ class SigmoidNetwork:
 
     def _inputs(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the features in the range -1 to 1 of the training trials, and a column of ones for the bias."""
-        import numpy as np
-
         return np.column_stack(((values - self._low) / self._half - 1.0, np.ones(len(values))))
 
 
 def _sigmoid(x: Any) -> Any:
-    import numpy as np
-
     with np.errstate(over="ignore"):
         return 1.0 / (1.0 + np.exp(-x))
 

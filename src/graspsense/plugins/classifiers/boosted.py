@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 from graspsense.classifier_api import FeatureValue, Reason, contribution_reasons
 from graspsense.plugin_api import ClassifierConfig, setting
 from graspsense.plugins.classifiers.scikit import FittedEstimator, ScikitClassifier, most_likely
 from graspsense.plugins.classifiers.tree_contributions import means_from_leaves, path_contributions
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 
 @frozen(kw_only=True)

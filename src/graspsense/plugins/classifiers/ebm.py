@@ -9,10 +9,13 @@ training.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
+import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 from graspsense.classifier_api import FeatureValue, contribution_reasons, missing_feature
 from graspsense.plugin_api import (
@@ -25,10 +28,6 @@ from graspsense.plugin_api import (
     StoredValues,
     setting,
 )
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 HINT: Final = (
     'training an ebm needs interpret-core.\n  in a clone: pip install -e ".[ebm]"     published: '
@@ -90,8 +89,6 @@ class EbmTerm:
 
     def scores_of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the scores of trials, shape (trials, labels)."""
-        import numpy as np
-
         where = []
         for k, cuts in zip(self.features, self.cuts, strict=True):
             column = values[:, k]
@@ -112,8 +109,6 @@ class AdditiveModel:
 
     def log_odds(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the log-odds of each label up to a constant, shape (trials, labels)."""
-        import numpy as np
-
         total = np.tile(self.start, (len(values), 1))
         for term in self.terms:
             total += term.scores_of(values)
@@ -127,9 +122,6 @@ class Ebm(Classifier[EbmConfig]):
 
     def fit(self, table: FeatureTable, labels: Sequence[str], seed: int) -> None:
         """Fit the functions. Raises ValueError for fewer than two labels, PluginUnavailable without interpret."""
-        import warnings
-
-        import numpy as np
 
         if len(set(labels)) < 2:
             raise ValueError(f"all {len(labels)} trials have one label: there is nothing to tell apart")
@@ -160,8 +152,6 @@ class Ebm(Classifier[EbmConfig]):
 
     def probabilities(self, table: FeatureTable) -> NDArray[np.float64]:
         """Return the softmax of the log-odds, shape (trials, classes)."""
-        import numpy as np
-
         model = self._model()
         total = model.log_odds(table.columns(model.names).values)
         powers = np.exp(total - total.max(axis=1, keepdims=True))
@@ -169,8 +159,6 @@ class Ebm(Classifier[EbmConfig]):
 
     def explain(self, features: Features) -> Prediction:
         """Return the prediction with the contributions to the odds against the next most probable label."""
-        import numpy as np
-
         model = self._model()
         values = [features[name] for name in model.names]
         row = np.array([values])
@@ -252,7 +240,6 @@ def _model_of(boosting: Any, table: FeatureTable) -> AdditiveModel:
     Its intervals of a feature are coarser in a pair than alone. It has one more interval than are needed here, the
     last, for names of categories that training did not have; and for two labels it has the scores of the second only.
     """
-    import numpy as np
 
     def columns(scores: Any) -> NDArray[np.float64]:
         given = np.asarray(scores, dtype=np.float64)
@@ -277,8 +264,6 @@ def _model_of(boosting: Any, table: FeatureTable) -> AdditiveModel:
 
 
 def _term_from(kept: StoredValues, features: int, labels: int) -> EbmTerm:
-    import numpy as np
-
     tested = tuple(kept.wholes("features"))
     if any(k >= features for k in tested):
         raise kept.refusal("features", f"it does not fit: the model has {features} features")

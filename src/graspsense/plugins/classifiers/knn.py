@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 from graspsense.classifier_api import FeatureValue, Reason
 from graspsense.plugin_api import ClassifierConfig, setting
 from graspsense.plugins.classifiers.scikit import FittedEstimator, ScikitClassifier
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 
 @frozen(kw_only=True)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import Any, Final, Literal
 
+import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 from graspsense.plugin_api import StoredValues, setting
 from graspsense.plugins.classifiers.scikit import (
@@ -14,10 +16,6 @@ from graspsense.plugins.classifiers.scikit import (
     ScikitClassifier,
     restored,
 )
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 MOST_ROUNDS: Final = 500
 """Largest number of rounds of L-BFGS."""
@@ -65,8 +63,6 @@ class Mlp(ScikitClassifier[MlpConfig]):
 
     def shares(self, fitted: FittedEstimator, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the probabilities of preprocessed trials; they are not finite if the weights are too large."""
-        import numpy as np
-
         with np.errstate(over="ignore", invalid="ignore"):
             return super().shares(fitted, rows)
 
@@ -89,8 +85,6 @@ class Mlp(ScikitClassifier[MlpConfig]):
         if "weights" not in model:
             super().from_json(model)
             return
-        import numpy as np
-
         stored = StoredValues(model)
         names, units = stored.features("features")
         classes = stored.texts("classes", distinct=True)

@@ -10,11 +10,14 @@ through skops: nothing is unpickled, and with the same version of scikit-learn i
 from __future__ import annotations
 
 import math
+import warnings
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, TypeVar
+from typing import Any, ClassVar, Final, Literal, TypeVar
 
+import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 from graspsense.classifier_api import (
     LARGEST_SEED,
@@ -34,10 +37,7 @@ from graspsense.plugin_api import (
     StoredValues,
     setting,
 )
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+from graspsense.plugins.classifiers.shapley import shapley_values
 
 MOST_SCALED: Final = 1e30
 """The largest scaled feature; one that is farther away counts as this."""
@@ -72,8 +72,6 @@ class FittedEstimator:
 
     def ready(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return these trials filled and scaled."""
-        import numpy as np
-
         filled: NDArray[np.float64] = np.where(np.isnan(values), self.fill, values)
         with np.errstate(over="ignore"):
             scaled = (filled - self.mean) / self.scale
@@ -122,9 +120,6 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
 
         The arguments are those of `reasons`.
         """
-        import numpy as np
-
-        from graspsense.plugins.classifiers.shapley import shapley_values
 
         label = next(iter(shares))
         column = self.classes().index(label)
@@ -149,8 +144,6 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
 
     def shares(self, fitted: FittedEstimator, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the probabilities of preprocessed trials, in the order of the classes of the estimator."""
-        import numpy as np
-
         return np.asarray(fitted.estimator.predict_proba(rows), dtype=np.float64)
 
     def origin_and_scale(
@@ -164,9 +157,6 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
 
         Raises ValueError for fewer than two labels, and for settings with which the training would not end soon.
         """
-        import warnings
-
-        import numpy as np
 
         if len(set(labels)) < 2:
             raise ValueError(f"all {len(labels)} trials have one label: there is nothing to tell apart")
@@ -205,8 +195,6 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
 
     def explain(self, features: Features) -> Prediction:
         """Return the prediction with its reasons, and the values that replaced missing features."""
-        import numpy as np
-
         fitted = self._model()
         values = [features[name] for name in fitted.table.names]
         row = fitted.ready(np.array([values]))
@@ -264,8 +252,6 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
 
     def from_json(self, model: Mapping[str, Any]) -> None:
         """Restore the model. Raises DataDamaged or ValueError."""
-        import warnings
-
         from sklearn.exceptions import ConvergenceWarning
 
         stored = StoredValues(model)
@@ -326,8 +312,6 @@ def restored(
     stored: StoredValues, names: tuple[str, ...], units: tuple[str, ...], estimator: Any
 ) -> FittedEstimator:
     """Return an estimator that was stored with its preprocessing, without training trials. Raises DataDamaged."""
-    import numpy as np
-
     fill, mean, scale = (stored.numbers(name, (len(names),)) for name in ("fill", "mean", "scale"))
     if not (scale > 0.0).all():
         raise stored.refusal("scale", "a feature has the scale 0, or a negative one")

@@ -10,11 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import factorial
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+import numpy as np
+from numpy.typing import NDArray
 
 MOST_EXACT: Final = 8
 """Largest number of features for which all sets of known features are evaluated; 2^8 probabilities."""
@@ -34,8 +33,6 @@ def shapley_values(
     `trial` and `medians` are preprocessed, of shape (features,). The values are exact for up to `MOST_EXACT` features
     that differ from the median; for more, they are means over random orders, the same in every call.
     """
-    import numpy as np
-
     differing = np.flatnonzero(trial != medians)
     compute = _exact if len(differing) <= MOST_EXACT else _sampled
     start, values = compute(share, trial, medians, differing)
@@ -47,8 +44,6 @@ def shapley_values(
 def _exact(
     share: Share, trial: NDArray[np.float64], medians: NDArray[np.float64], differing: NDArray[np.int64]
 ) -> tuple[float, NDArray[np.float64]]:
-    import numpy as np
-
     n = len(differing)
     sets = np.arange(2**n)
     known = (sets[:, np.newaxis] >> np.arange(n)) & 1 == 1
@@ -65,8 +60,6 @@ def _exact(
 def _sampled(
     share: Share, trial: NDArray[np.float64], medians: NDArray[np.float64], differing: NDArray[np.int64]
 ) -> tuple[float, NDArray[np.float64]]:
-    import numpy as np
-
     rng, n = np.random.default_rng(SEED), len(differing)
     forwards = [rng.permutation(n) for _ in range(ORDERS)]
     orders = np.array([order for forward in forwards for order in (forward, forward[::-1])])
@@ -85,8 +78,6 @@ def _rows(
     known: NDArray[np.bool_],
 ) -> NDArray[np.float64]:
     """Return the trial with the medians in place of the features that are not known, a row for each set."""
-    import numpy as np
-
     rows = np.tile(medians, (len(known), 1))
     rows[:, differing] = np.where(known, trial[differing], medians[differing])
     return rows

@@ -13,6 +13,8 @@ from io import BytesIO
 from typing import Any, Final
 from zipfile import ZIP_STORED, BadZipFile, ZipFile
 
+import numpy as np
+
 from graspsense.plugin_api import PluginUnavailable
 from graspsense.plugins.classifiers.fitted_estimators import refuse_misfit
 
@@ -71,8 +73,6 @@ def _refuse_unpacking(data: bytes) -> None:
 
 def _refuse_array(data: bytes) -> None:
     """Raise ValueError for an array whose declared size is not that of its data."""
-    import numpy as np
-
     stream = BytesIO(data)
     version = np.lib.format.read_magic(stream)
     read_header = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}

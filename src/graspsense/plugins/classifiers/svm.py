@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import Any, Final, Literal
 
+import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 from graspsense.plugin_api import setting
 from graspsense.plugins.classifiers.scikit import FittedEstimator, KeptConfig, ScikitClassifier
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 MOST_ROUNDS: Final = 1_000_000
 """Largest number of steps of the solver: a large penalty needs some thousands; with a larger one it would not end."""
@@ -63,8 +61,6 @@ class Svm(ScikitClassifier[SvmConfig]):
 
     def shares(self, fitted: FittedEstimator, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the softmax of the decision values."""
-        import numpy as np
-
         values = np.asarray(fitted.estimator.decision_function(rows), dtype=np.float64)
         if values.ndim == 1:  # two classes: one value, positive for the second
             values = np.column_stack((-values, values)) / 2.0

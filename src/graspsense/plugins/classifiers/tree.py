@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
+import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 from graspsense.classifier_api import FeatureValue, Reason, SplitTest, leaf_reason, path_reasons
 from graspsense.plugin_api import FeatureTable, setting
 from graspsense.plugins.classifiers.scikit import FittedEstimator, KeptConfig, ScikitClassifier
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 
 @frozen(kw_only=True)
@@ -66,8 +64,6 @@ class Cart(ScikitClassifier[CartConfig]):
 
     def support(self, table: FeatureTable) -> NDArray[np.float64]:
         """Return the training trials in the leaf of each trial."""
-        import numpy as np
-
         fitted = self._model()
         rows = fitted.ready(table.columns(fitted.table.names).values)
         inner = fitted.estimator.tree_

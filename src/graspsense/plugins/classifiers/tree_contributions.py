@@ -8,11 +8,10 @@ S. M. Lundberg et al., Nat. Mach. Intell. 2 (2020) 56, discuss how it differs fr
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+import numpy as np
+from numpy.typing import NDArray
 
 
 def path_contributions(
@@ -23,8 +22,6 @@ def path_contributions(
     `trees` are the `tree_` of fitted trees of scikit-learn, `means` their outputs at each node; `row` is one
     preprocessed trial of shape (1, features).
     """
-    import numpy as np
-
     start, parts = 0.0, [0.0] * row.shape[1]
     trial = row.astype(np.float32)  # as the trees compare it with their thresholds
     for tree, mean in zip(trees, means, strict=True):

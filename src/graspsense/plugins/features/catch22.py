@@ -9,17 +9,14 @@ Time-series CHaracteristics", Data Mining and Knowledge Discovery 33 (2019) 1821
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 import pycatch22
 
-from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, missing
+from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, Trace, missing
 from graspsense.plugins.features.contact_curve import contact_curve, samples_of
 from graspsense.plugins.features.contact_threshold import ContactThreshold
-
-if TYPE_CHECKING:
-    from graspsense.plugin_api import Trace
 
 POINTS: Final = 128
 """Number of times at which the series is evaluated; a time scale below is a number of such points."""

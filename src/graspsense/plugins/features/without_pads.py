@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from attrs import evolve, frozen
+from numpy.typing import NDArray
 
-from graspsense.plugin_api import APPROACH, HOLD, Channel, Feature, Features, FeatureSet, create, setting
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from graspsense.plugin_api import Trace
+from graspsense.plugin_api import (
+    APPROACH,
+    HOLD,
+    Channel,
+    Feature,
+    Features,
+    FeatureSet,
+    Trace,
+    create,
+    setting,
+)
 
 START_M: Final = 1e-3
 """Travel before which the fingers are only set in motion."""

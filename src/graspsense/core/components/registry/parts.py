@@ -14,7 +14,8 @@ import inspect
 import re
 from abc import ABC, abstractmethod
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any, Final, Generic, Literal, TypeVar, get_args, get_origin
+from importlib.resources.abc import Traversable
+from typing import Any, Final, Generic, Literal, TypeVar, get_args, get_origin
 
 import attrs
 from attrs import frozen
@@ -32,9 +33,6 @@ from graspsense.core.components.entries import (
     Role,
 )
 from graspsense.core.values.errors import FAILURES, ConfigError, PluginUnavailable
-
-if TYPE_CHECKING:
-    from importlib.resources.abc import Traversable
 
 
 class NotDeclared(Exception):
