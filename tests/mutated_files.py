@@ -9,11 +9,15 @@ import io
 import json
 import random
 import re
+import resource
+import signal
 import sqlite3
 import struct
+import warnings
 import zipfile
 import zlib
-from contextlib import closing, suppress
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -483,3 +487,35 @@ def ros2_folder(path: Path, rng: random.Random) -> None:
         sqlite_file(file, rng)
     else:
         any_bytes(file, rng)
+
+
+MEMORY = 1_500_000_000
+"""Bytes that reading may take beside what the process has."""
+WORK_S = 60.0
+"""Seconds of the processor after which a reader is taken for one that does not end."""
+
+
+class DoesNotEndError(BaseException):
+    """A reader works longer than any file needs; not an Exception, so that no reader takes it for a damaged file."""
+
+
+@contextmanager
+def bounded(work_s: float = WORK_S, warned: str = "ignore") -> Iterator[None]:
+    """Limit memory and work of what runs here; warnings are ignored, or `error`s."""
+
+    def stop(number: int, frame: object) -> None:
+        raise DoesNotEndError
+
+    used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    handler = signal.signal(signal.SIGVTALRM, stop)
+    resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY, hard))
+    signal.setitimer(signal.ITIMER_VIRTUAL, work_s)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter(warned)
+            yield
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+        signal.signal(signal.SIGVTALRM, handler)
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))

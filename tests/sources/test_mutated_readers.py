@@ -10,12 +10,9 @@ from __future__ import annotations
 import json
 import os
 import random
-import resource
 import shutil
-import signal
 import warnings
 from collections.abc import Callable
-from contextlib import contextmanager
 from pathlib import Path
 
 import mutated_files as change
@@ -44,7 +41,6 @@ from graspsense.sources.trial_source import load_trials
 from graspsense.sources.trial_table.features_csv import read_labelled
 from graspsense.store.imported_contents import AlreadyImported, ImportedContents
 from graspsense.store.store import Store
-from graspsense.store.verify import verify_store
 from graspsense_c45.arff import ArffError, read_arff
 from graspsense_sim_gripper.scene.library import find
 
@@ -54,12 +50,8 @@ SLOWER = min(SLOW, 14)
 """Files of a format that takes long to open."""
 IMPORTED_OF = 4
 """One of so many of the recordings that can be read is imported as well."""
-MEMORY = 1_500_000_000
-"""Bytes that reading may take beside what the process has."""
-WORK_S = 60
-"""Seconds of the processor after which a reader is taken for one that does not end."""
 TEXT_WORK_S = 20
-"""The same of a text of some lines."""
+"""Seconds of the processor that reading a text of some lines may take."""
 
 
 @frozen
@@ -94,36 +86,10 @@ FORMATS = {
 }  # fmt: skip
 
 
-class DoesNotEndError(BaseException):
-    """A reader works longer than any file needs; not an Exception, so that no reader takes it for a damaged file."""
-
-
-@contextmanager
-def bounded(work_s=WORK_S, warned="ignore"):
-    """Limit memory and work of what runs here; warnings are ignored, or `error`s."""
-
-    def stop(number, frame):
-        raise DoesNotEndError
-
-    used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
-    handler = signal.signal(signal.SIGVTALRM, stop)
-    resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY, hard))
-    signal.setitimer(signal.ITIMER_VIRTUAL, work_s)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter(warned)
-            yield
-    finally:
-        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
-        signal.signal(signal.SIGVTALRM, handler)
-        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
-
-
 def error_of(read, file, *limits):
     """Return what an error of ours says of this file, empty if it is read. Any other error is raised with a note."""
     try:
-        with bounded(*limits):
+        with change.bounded(*limits):
             read()
     except (GraspsenseError, ArffError) as error:
         return str(error)
@@ -224,30 +190,6 @@ def test_many_of_each_format(name, tmp_path):
     pattern = pattern_of(name, tmp_path / "pattern")
     for number in numbers(name, FORMATS[name].many):
         check(name, number, pattern, tmp_path / "set")
-
-
-def check_store(number, pattern, folder):
-    shutil.rmtree(folder, ignore_errors=True)
-    shutil.copytree(pattern, folder)
-    rng = random.Random(f"store:{number}")
-    if rng.random() < 0.3:
-        change.mcap_file(rng.choice(sorted((folder / "recordings").iterdir())), rng)
-    else:
-        change.sqlite_file(folder / "store.sqlite", rng)
-    for read in (
-        lambda: verify_store(folder),
-        lambda: load_trials(f"store:{folder}"),
-        lambda: load_trials(f"store:{folder}", options=["features.force=left"]),
-    ):
-        told = error_of(read, f"store:{number}")
-        assert not told or str(folder) in told
-
-
-@pytest.mark.parametrize("count", [QUICK, pytest.param(SLOW, marks=pytest.mark.slow)])
-def test_stores(count, tmp_path):
-    write.store(tmp_path / "pattern")
-    for number in numbers("store", count):
-        check_store(number, tmp_path / "pattern", tmp_path / "set")
 
 
 # Texts. Each has a reader; one of its files is changed, and an error names one of them.
@@ -370,7 +312,7 @@ def test_icub_files(count, tmp_path):
         for k in (1, 2):
             write.icub(tmp_path / f"can_{k}.txt")
         change.text_file(tmp_path / "can_2.txt", random.Random(f"icub:{number}"))
-        with bounded():
+        with change.bounded():
             assert "can" in load_trials(f"icub:{tmp_path}").labels
             recordings, unreadable = recordings_to_import([f"icub:{tmp_path}"], {}, None)
         assert len(recordings) + len(unreadable) == 2
