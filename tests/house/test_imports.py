@@ -335,7 +335,7 @@ def test_every_name_of_a_door_can_be_imported(door):
     for name in door.__all__:
         assert getattr(door, name) is not None
         assert name in dir(door)
-    with pytest.raises(AttributeError, match="has no attribute 'nosuch'"):
+    with pytest.raises(AttributeError, match="'nosuch'"):
         door.nosuch  # noqa: B018
 
 

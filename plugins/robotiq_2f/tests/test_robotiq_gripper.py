@@ -323,7 +323,7 @@ def test_a_slow_velocity_is_a_target_that_moves():
     "port", ["/dev/nowhere", "socket:127.0.0.1:1", "socket:nonsense", "ur:127.0.0.1:1", "ur:127.0.0.1:x"]
 )
 def test_no_gripper_is_said_with_what_to_look_at(port):
-    with pytest.raises(NoDevice, match=r"no Robotiq 2F-85 at .*gripper\.port"):
+    with pytest.raises(NoDevice, match=r"2F-85.*gripper\.port"):
         create("sensor-backend", "robotiq", port=port).open(0)
 
 

@@ -512,9 +512,9 @@ def test_what_is_not_all_in_names_and_values_is_not_handed_over():
     altered = create("controller", "hybrid")
     numbers = altered.params()
     altered.params = lambda: numbers._replace(ramp_s=numbers.ramp_s + 1.0)
-    with pytest.raises(NotHandedOver, match="hybrid with its settings has other numbers"):
+    with pytest.raises(NotHandedOver, match="graspsense/hybrid"):
         PlainProcess(Scenes(job(altered)))
-    with pytest.raises(NotHandedOver, match="Endless is not a controller that a plugin declares"):
+    with pytest.raises(NotHandedOver, match=r"test_batch\.Endless"):
         PlainProcess(Scenes(job(Endless(HYBRID.config))))
 
 
@@ -537,11 +537,11 @@ def test_what_fails_in_another_process_is_said():
 
     with IsolatedPlugins(Here), PlainProcess(Scenes(job(Endless(HYBRID.config)))) as process:
         for _ in range(2):
-            with pytest.raises(NotHandedOver, match="no controller named 'graspsense-test/endless'"):
+            with pytest.raises(NotHandedOver, match="'graspsense-test/endless'"):
                 process.run("none", 0)
     with (
         PlainProcess(Scenes(job())) as process,
-        pytest.raises(NotHandedOver, match="UnknownName: no object named 'blok'"),
+        pytest.raises(NotHandedOver, match=r"UnknownName: .*'blok'"),
     ):
         process.run("blok", 0)
 
@@ -632,7 +632,7 @@ def test_an_option_nobody_knows_is_refused():
 
 def test_a_name_nobody_knows_is_refused_before_anything_runs():
     told = []
-    with pytest.raises(UnknownName, match="no object named 'blok'"):
+    with pytest.raises(UnknownName, match="'blok'"):
         run_many(
             SimConfig(),
             HYBRID,
