@@ -117,14 +117,6 @@ def jaco(path):
     return gap, force
 
 
-def test_an_ending_in_capitals_is_that_of_the_pattern(tmp_path):
-    gap, force = squeezing()
-    pandas_csv(tmp_path / "jar_1.CSV", {"t": T_S, "gap": gap, "F": force})
-    keys = "files = '{label}_{order:d}.csv'\ntime = 't'\ngap = 'gap'\nforce = 'F'"
-    (recording,) = recordings(tmp_path, keys)
-    assert (recording.label, recording.order) == ("jar", 1.0)
-
-
 def test_three_fingers_in_blocks_of_one_file_are_folded_and_kept(tmp_path):
     gap, force = jaco(tmp_path / "000_real_life_data.csv")
 
@@ -267,44 +259,22 @@ PLAIN = """
 """
 
 
-def texts(separator, decimal=".", comment=""):
+@every_case("ending", ["csv", "CSV", "tsv", "txt", "dat"])
+def test_a_text_file_is_known_by_its_ending(ending, tmp_path):
     gap, force = squeezing()
-    lines = [comment] if comment else []
-    lines.append(separator.join(("t", "gap", "F")))
-    for row in zip(T_S, gap * 1e3, force, strict=True):
-        lines.append(separator.join(f"{value:.6f}".replace(".", decimal) for value in row))
-    return "\n".join(lines) + "\n"
-
-
-@every_case(
-    ("name", "text"),
-    [
-        ("jar.csv", texts(",")),
-        ("jar.csv", texts(";", ",", "# written by a logger")),
-        ("jar.tsv", texts("\t", ",")),
-        ("jar.txt", texts("  ")),
-        ("jar.txt", texts("|")),
-        # As numpy.savetxt writes a header of two lines.
-        ("jar.txt", "# t gap F\n# s mm N\n" + texts(" ").partition("\n")[2]),
-        ("jar.dat", texts(" ", ",", "% MATLAB")),
-        ("jar.csv", "\ufeff" + texts(",").replace("\n", "\r\n")),
-    ],
-)
-def test_text_files_as_programs_write_them(name, text, tmp_path):
-    (tmp_path / name).write_text(text, newline="")
-    (recording,) = recordings(tmp_path, PLAIN)
-    gap, force = squeezing()
-    assert column(recording, "t_s") == pytest.approx(T_S)
-    assert column(recording, "gap_m") == pytest.approx(gap, abs=1e-9)
+    pandas_csv(tmp_path / f"jar.{ending}", {"t": T_S, "gap": gap * 1e3, "F": force})
+    (recording,) = recordings(tmp_path, PLAIN.replace("*", ending.lower()))
+    assert recording.label == "jar"
     assert column(recording, "force_right_n") == pytest.approx(force, abs=1e-6)
 
 
 def test_columns_without_names_have_numbers(tmp_path):
-    (tmp_path / "jar.txt").write_text("\n".join(texts(" ").splitlines()[1:]))
+    gap, force = squeezing()
+    np.savetxt(tmp_path / "jar.txt", np.column_stack([T_S, gap * 1e3, force]))
     (recording,) = recordings(
         tmp_path, PLAIN.replace('"t"', '"c1"').replace("gap [mm]", "c2 [mm]").replace('"F"', '"c3"')
     )
-    assert column(recording, "gap_m") == pytest.approx(squeezing()[0], abs=1e-9)
+    assert column(recording, "gap_m") == pytest.approx(gap, abs=1e-9)
 
 
 def test_a_ros_bag_with_topics_of_different_rates(tmp_path):

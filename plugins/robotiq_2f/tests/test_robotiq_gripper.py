@@ -12,6 +12,7 @@ from emulated_grippers import (
     assert_a_killed_program_lets_go,
     assert_lost_in_a_grasp,
     give_own_time,
+    plugged_in,
 )
 from pymodbus import FramerType
 from pymodbus.server import ModbusTcpServer
@@ -39,18 +40,10 @@ def own_time(monkeypatch):
 
 @pytest.fixture
 def emulated():
-    """Makes emulated grippers that are plugged in, and unplugs them."""
-    made = []
-
-    def make(wire="pty", **keys):
-        gripper = EmulatedGripper(RobotiqConfig(port="emulated", **keys), wire, 1)
-        made.append(gripper)
-        gripper.tell("plug")
-        return gripper
-
-    yield make
-    for gripper in made:
-        gripper.close()
+    with plugged_in(
+        lambda wire="pty", **keys: EmulatedGripper(RobotiqConfig(port="emulated", **keys), wire, 1)
+    ) as make:
+        yield make
 
 
 @pytest.mark.slow
