@@ -10,7 +10,7 @@ from math import inf
 import pytest
 from attrs import evolve
 from cases import every_case
-from commands import graspsense, printed
+from commands import graspsense, printed, python
 from grippers import Scripted, bottle, squeezing
 
 from graspsense import load_pipeline
@@ -180,7 +180,7 @@ def test_a_grasp_imports_nothing_heavy():
         "try:\n    main()\nexcept SystemExit as end:\n    assert not end.code, end.code\n"
         f"print(*[name for name in {HEAVY!r} if name in sys.modules], file=sys.stderr)"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    done = python("-c", program, check=True)
     assert done.stderr.splitlines()[-1] == ""
 
 

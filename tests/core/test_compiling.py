@@ -3,7 +3,6 @@
 import gc
 import math
 import os
-import subprocess
 import sys
 import textwrap
 import warnings
@@ -11,6 +10,7 @@ from enum import IntEnum
 
 import numpy as np
 import pytest
+from commands import python
 
 from graspsense.core.compiling import compiled_code_folder as folder_module
 from graspsense.core.compiling import compiling
@@ -279,12 +279,7 @@ COMPOSE = """
 
 
 def run(program, *arguments, **environment):
-    done = subprocess.run(
-        [sys.executable, str(program), *arguments],
-        capture_output=True,
-        text=True,
-        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1", **environment},
-    )
+    done = python(program, *arguments, env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1", **environment})
     assert done.returncode == 0, done.stderr
     return done.stdout.splitlines()
 

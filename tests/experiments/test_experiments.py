@@ -3,15 +3,13 @@
 import json
 import re
 import shutil
-import subprocess
-import sys
 from importlib.resources import files
 from pathlib import Path
 
 import pytest
 import wayward
 from cases import every_case
-from commands import graspsense, printed
+from commands import graspsense, printed, python
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -499,7 +497,7 @@ def test_what_there_is():
 
 def test_help_imports_nothing_heavy():
     code = "import sys; from graspsense.cli.experiment import experiment; print(*sys.modules)"
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    loaded = python("-c", code, check=True).stdout
     assert not {"numpy", "dask", "distributed", "matplotlib"} & set(loaded.split())
 
 

@@ -6,8 +6,6 @@ import math
 import os
 import signal
 import struct
-import subprocess
-import sys
 import time
 from collections import namedtuple
 from contextlib import contextmanager
@@ -15,6 +13,7 @@ from itertools import pairwise
 
 import pytest
 from cases import every_case
+from commands import python
 from kept import begun, command, ended, frame, pads, write_recording
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
@@ -245,5 +244,5 @@ def test_the_writer_s_process_is_light_and_starts_in_any_folder(tmp_path):
         "import sys; sys.argv = ['x']; import graspsense.recording.writer_process; "
         "print([m for m in ('numpy', 'scipy', 'sklearn', 'sqlite3') if m in sys.modules])"
     )
-    done = subprocess.run([sys.executable, "-P", "-c", program], capture_output=True, text=True, cwd=tmp_path)
+    done = python("-P", "-c", program, cwd=tmp_path)
     assert (done.stdout, done.stderr) == ("[]\n", "")

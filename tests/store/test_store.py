@@ -10,6 +10,7 @@ import threading
 from contextlib import closing, suppress
 
 import pytest
+from commands import python
 from kept import ended, keep, write_recording
 
 from graspsense.core.values.errors import ConfigError, DataDamaged
@@ -104,9 +105,7 @@ def test_readers_read_beside_a_writer_in_another_process(store):
     )
     with store.transaction() as connection:
         connection.execute("UPDATE trial SET set_aside = 'pending'")
-        done = subprocess.run(
-            [sys.executable, "-c", program, str(store.folder)], capture_output=True, text=True, timeout=300
-        )
+        done = python("-c", program, store.folder)
     assert (done.stdout.strip(), done.stderr) == ("1", "")
 
 

@@ -1,19 +1,16 @@
 """What importing costs: measured in fresh interpreters."""
 
 import json
-import subprocess
-import sys
 
 import pytest
+from commands import python
 
 from graspsense_c45 import Attribute, Schema, fit, make_table, to_json
 
 
 def modules_after(code, *arguments):
     listed = code + "\nimport json, sys\nprint(json.dumps(sorted(m.split('.')[0] for m in sys.modules)))"
-    done = subprocess.run(
-        [sys.executable, "-c", listed, *arguments], capture_output=True, text=True, check=True
-    )
+    done = python("-c", listed, *arguments, check=True)
     return set(json.loads(done.stdout.splitlines()[-1]))
 
 
