@@ -200,18 +200,22 @@ def control_of(values, **more):
     return ControlFeatures(table=table(values, names=("gap_at_start",)), what="the gap at the start", **more)
 
 
-def test_a_control_without_any_feature_is_not_measured_instead_of_passing():
-    """Sixty trials that begin in contact: their control from before contact would be chance, which proves nothing."""
+@every_case(
+    ("having", "missing", "reason"),
+    [
+        (0, "a pad felt a force", "0 of 60 trials have such features: a pad felt a force"),
+        (1, "", "1 of 60 trials have such features; these are too few to learn from"),
+    ],
+)
+def test_a_control_that_few_trials_have_is_not_measured_instead_of_passing(having, missing, reason):
+    """Trials that begin in contact: their control from before contact would be chance, which proves nothing."""
     labels, width, force = four_states(15)
-    control = control_of(np.full(60, np.nan), missing="a pad felt a force in the first 0.6 s of the approach")
+    control = control_of(np.where(np.arange(60) < having, 0.08, np.nan), missing=missing)
     evaluation = judged(labelled(labels, width, force, before_contact=control))
 
     measured = evaluation.controls["before_contact"]
-    assert measured.rate is None
-    assert measured.reason == (
-        "0 of 60 trials have such features: a pad felt a force in the first 0.6 s of the approach"
-    )
-    assert f"was not measured: {measured.reason}" in verdict(evaluation)
+    assert (measured.rate, measured.reason) == (None, reason)
+    assert f"was not measured: {reason}" in verdict(evaluation)
 
 
 def test_a_control_is_measured_on_the_trials_that_have_its_features():
@@ -225,16 +229,6 @@ def test_a_control_is_measured_on_the_trials_that_have_its_features():
     assert evaluation.what == "the gap at the start; 60 of 120 trials have such features: a pad felt a force"
     # The headline of the same sixty trials, of which it misses some.
     assert -0.5 < evaluation.difference.value < 0.0
-
-
-def test_too_few_trials_with_a_feature_are_not_measured():
-    labels, width, force = four_states()
-    sparse = np.where(np.arange(120) == 7, 0.08, np.nan)
-    control = judged(labelled(labels, width, force, before_contact=control_of(sparse))).controls[
-        "before_contact"
-    ]
-    assert control.rate is None
-    assert control.reason == "1 of 120 trials have such features; these are too few to learn from"
 
 
 @pytest.mark.parametrize("squeeze_adds", [True, False])
