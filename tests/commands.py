@@ -1,9 +1,10 @@
-"""The command line as a user types it, in this process: what it ends with and what it prints."""
+"""The command line as a user types it, in this process, and Python in one of its own: how it ends, what it prints."""
 
 from __future__ import annotations
 
 import io
 import json
+import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout
 from typing import Any, NamedTuple
@@ -42,3 +43,9 @@ def printed(*arguments: object) -> str:
     done = graspsense(*arguments)
     assert done.returncode == 0, done.stderr
     return done.stdout
+
+
+def python(*arguments: object, check: bool = False, **options: Any) -> subprocess.CompletedProcess[str]:
+    """Run Python with these arguments in a process of its own; return how it ended and what it printed."""
+    command = [sys.executable, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=3600, check=check, **options)

@@ -9,11 +9,15 @@ import io
 import json
 import random
 import re
+import resource
+import signal
 import sqlite3
 import struct
+import warnings
 import zipfile
 import zlib
-from contextlib import closing, suppress
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -22,44 +26,25 @@ import zstandard
 HOSTILE_NUMBERS = (0, 1, -1, 2, 99, 100, 255, 65535, 2**31 - 1, 2**32 - 1, 2**53, 2**63 - 1, -(2**63))
 HOSTILE_FLOATS = (0.0, -0.0, float("nan"), float("inf"), float("-inf"), 1e308, -1e308, 5e-324, 1e18, -1.0)
 HOSTILE_WORDS = (
-    *(
-        "",
-        "nan",
-        "inf",
-        "-1",
-        "0",
-        "1e999",
-        "9" * 400,
-        "1_0",
-        "null",
-        "None",
-        "true",
-        "\u0663",
-        "\ud7ff",
-        "a" * 3000,
-    ),
-    *(
-        "[]",
-        "{}",
-        "[[",
-        "(",
-        ")",
-        "'",
-        '"',
-        "*",
-        "%",
-        "#",
-        "\\",
-        ":",
-        ",",
-        "\x1b[2J",
-        "=1+1",
-        "../..",
-        "/etc/passwd",
-    ),
-    *("t", "gap", "F"),
-)
-_TOKEN = re.compile(r"[A-Za-z_]+|-?\d+\.?\d*(?:e-?\d+)?|\s+|.", re.DOTALL)
+    *'"\'\\[]{}()=,;#%*?./~|@:<>-+ \t\r\n\v\f\0',
+    "\ufeff", "\u2028", "\udcff", "é", "٣", "nan", "inf", "-inf", "1e400", "1e308", "-1e308", "5e-324", "-0", "1_0",
+    "1,5", "9223372036854775808", "-9223372036854775809", "9" * 5000, "0x" + "f" * 3000, "1e99999", "0", "-1", "1e9",
+    "true", "[]", "{}", '"""', "'''", "x" * 600, "F" * 3000, "9**9**9", "F/0", "'a'*9", "first(F)", "sum('*')", "F[9]",
+    "(a+)+$", "(?=a)", r"(\\w)\\1", "(?P<label>", "(?P<label>x)", "a{1000}{1000}", "((((((((a*)*)*)*)*)*)*)*)*$",
+    "**/", "{label}", "{label:d}", "{label}{label}", "../..", "~nobody", "store:", "#3", "1970-01-01", "[mm]", "[N]",
+    "a." * 200 + "a", "[" * 200, "{a=" * 200, "@data", "@attribute", "@attribute x {a,a}", "{0 1}", "= 1", "[[terms]]",
+    "[data]", "\n\n", ",,,", "null", "NaN", "[[[[[[[[[[", "=1+cmd|' /C calc'!A0", "\x1b[2J", "/etc/passwd",
+)  # fmt: skip
+TOML_NUMBERS = (
+    "0", "-1", "0.0", "-0.0", "1e308", "5e-324", "inf", "-inf", "nan", "9223372036854775807", "-9223372036854775808",
+    "9223372036854775808", "1e9", "1000000", "0.5", "3", "1" * 4000, "0x" + "f" * 3000, "4294967296", "1.0e-300",
+)  # fmt: skip
+TOML_KEYS = (
+    "files", "list", "folder", "start", "split", "time", "rate_hz", "gap", "force", "left", "effort", "velocity",
+    "channels", "fast", "zero", "cut", "resample_hz", "duplicates", "label", "instance", "recorded", "order", "values",
+    "seeds", "seed", "total", "trials", "instances", "folds", "grasps", "objects", "checkpoints_s", "type", "extends",
+    "parts", "variants", "sweep", "timeout_s", "width_m", "offset_m", "share", "held", "patch", "named", "groups",
+)  # fmt: skip
 
 
 def bytes_of(data: bytes, rng: random.Random) -> bytes:
@@ -102,18 +87,33 @@ def numbers_of(data: bytes, rng: random.Random) -> bytes:
 
 
 def tokens_of(text: str, rng: random.Random) -> str:
-    """Return the text with a token replaced, missing, twice there, or swapped with another."""
-    tokens = _TOKEN.findall(text) or [""]
-    for _ in range(rng.choice((1, 1, 2, 5))):
+    """Return the text with a few of its words, spaces and signs in disorder."""
+    tokens = re.findall(r"\w+|\s|[^\w\s]", text)
+    for _ in range(rng.choice((1, 1, 2, 3, 8))):
+        if not tokens:
+            break
         i, j = rng.randrange(len(tokens)), rng.randrange(len(tokens))
-        match rng.randrange(4):
-            case 0 | 1:
+        match rng.randrange(7):
+            case 0:
                 tokens[i] = rng.choice(HOSTILE_WORDS)
+            case 1:
+                tokens.insert(i, rng.choice(HOSTILE_WORDS))
             case 2:
-                tokens[i] = tokens[i] * rng.choice((0, 2, 2, 50))
-            case _:
+                del tokens[i : i + rng.choice((1, 1, 5))]
+            case 3:
+                tokens[i:i] = tokens[i : i + rng.choice((1, 3, 12))]
+            case 4:
+                tokens[i] *= rng.choice((2, 300))
+            case 5:
                 tokens[i], tokens[j] = tokens[j], tokens[i]
+            case _:
+                tokens[i] = tokens[j]
     return "".join(tokens)
+
+
+def _name(rng: random.Random) -> str:
+    """Return a word that UTF-8 can write."""
+    return rng.choice(HOSTILE_WORDS).encode("utf-8", "replace").decode()
 
 
 def _either(data: bytes, rng: random.Random) -> bytes:
@@ -124,11 +124,61 @@ def any_bytes(path: Path, rng: random.Random) -> None:
     path.write_bytes(_either(path.read_bytes(), rng))
 
 
+def _toml_value(rng: random.Random) -> str:
+    """Return a strange value that is TOML."""
+    match rng.randrange(6):
+        case 0:
+            return rng.choice(TOML_NUMBERS)
+        case 1:
+            return f"[{', '.join(rng.choices(TOML_NUMBERS, k=rng.choice((0, 1, 3, 20))))}]"
+        case 2:
+            return rng.choice(
+                ("true", "{}", "[]", "[[]]", "1979-05-27T07:32:00", "{ a = 1 }", '["a", 1]', "[{}, {}]")
+            )
+        case _:
+            return json.dumps(_name(rng), ensure_ascii=False)
+
+
+def _value_of(text: str, rng: random.Random) -> str:
+    """Return the text with a value of a key, a key, a cell or a row changed, still well formed."""
+    lines = text.split("\n")
+    place = rng.choice([k for k, line in enumerate(lines) if line])
+    key, equals, _ = lines[place].partition(" = ")
+    cells = lines[place].split(",")
+    if rng.randrange(8) == 0 and len(lines[place]) < 1000:
+        lines[place:place] = [lines[place]] * rng.choice((1, 400))
+    elif equals and rng.randrange(6):
+        lines[place] = f"{key} = {_toml_value(rng)}"
+    elif equals:
+        lines.insert(place, f"{rng.choice(TOML_KEYS)} = {_toml_value(rng)}")
+    else:
+        cells[rng.randrange(len(cells))] = re.sub(r'[,"\r\n]', "", rng.choice(HOSTILE_WORDS))
+        lines[place] = ",".join(cells)
+    return "\n".join(lines)
+
+
+def text_of(text: str, rng: random.Random) -> bytes:
+    """Return a changed text: two of three are still well formed, the others have tokens in disorder."""
+    if rng.randrange(3):
+        for _ in range(rng.choice((1, 1, 1, 2, 4))):
+            text = _value_of(text, rng)
+        return text.encode("utf-8", "surrogateescape")
+    data = tokens_of(text, rng).encode("utf-8", "surrogateescape")
+    match rng.randrange(12):
+        case 0:
+            data = data[: rng.randrange(len(data) + 1)]
+        case 1:
+            data = b"\xef\xbb\xbf" + data
+        case 2:
+            data = data.decode("utf-8", "replace").encode("utf-16")
+        case 3:
+            data = data.replace(b"\n", b"\r\n")
+    return data
+
+
 def text_file(path: Path, rng: random.Random) -> None:
-    if rng.random() < 0.2:
-        path.write_bytes(bytes_of(path.read_bytes(), rng))
-        return
-    path.write_text(tokens_of(path.read_text(), rng), errors="replace")
+    data = path.read_bytes()
+    path.write_bytes(bytes_of(data, rng) if rng.random() < 0.2 else text_of(data.decode(), rng))
 
 
 def npy_file(path: Path, rng: random.Random) -> None:
@@ -168,7 +218,7 @@ def npz_file(path: Path, rng: random.Random) -> None:
         case 1:
             members.append((name, content))
         case 2:
-            members[i] = (rng.choice(HOSTILE_WORDS) + ".npy", content)
+            members[i] = (_name(rng) + ".npy", content)
         case 3:
             kind = rng.choice((zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA))
         case 4 if b"{" in content[-4000:] and b"declared" in name.encode():
@@ -324,7 +374,7 @@ def parquet_file(path: Path, rng: random.Random) -> None:
     i = rng.randrange(len(names))
     match rng.randrange(7):
         case 0:
-            names[i] = rng.choice(HOSTILE_WORDS)
+            names[i] = _name(rng)
         case 1:
             del names[i], columns[i]
         case 2:
@@ -437,3 +487,35 @@ def ros2_folder(path: Path, rng: random.Random) -> None:
         sqlite_file(file, rng)
     else:
         any_bytes(file, rng)
+
+
+MEMORY = 1_500_000_000
+"""Bytes that reading may take beside what the process has."""
+WORK_S = 60.0
+"""Seconds of the processor after which a reader is taken for one that does not end."""
+
+
+class DoesNotEndError(BaseException):
+    """A reader works longer than any file needs; not an Exception, so that no reader takes it for a damaged file."""
+
+
+@contextmanager
+def bounded(work_s: float = WORK_S, warned: str = "ignore") -> Iterator[None]:
+    """Limit memory and work of what runs here; warnings are ignored, or `error`s."""
+
+    def stop(number: int, frame: object) -> None:
+        raise DoesNotEndError
+
+    used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    handler = signal.signal(signal.SIGVTALRM, stop)
+    resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY, hard))
+    signal.setitimer(signal.ITIMER_VIRTUAL, work_s)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter(warned)
+            yield
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+        signal.signal(signal.SIGVTALRM, handler)
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))

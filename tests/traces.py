@@ -19,11 +19,13 @@ def made_recording(rate_hz, t_s, gap_m, left_n, right_n, **more):
     return Recording(name="squeeze", rate_hz=rate_hz, readings=readings, **more)
 
 
-def made_trace(rows, dt=0.001, phase=Phase.SQUEEZE, phases=None, units=None):
-    """A trace of rows (gap_m, left_n, right_n), one a tick."""
+def made_trace(rows, dt=0.001, phase=Phase.SQUEEZE, phases=None, units=None, t_s=None):
+    """A trace of rows (gap_m, left_n, right_n), one a tick of `dt`, or at these times; other channels are 0."""
+    rows = np.asarray(list(rows), dtype=float).reshape(-1, 3).tolist()
+    times = [k * dt for k in range(len(rows))] if t_s is None else np.asarray(t_s, float).tolist()
     frames = [
-        Frame(k * dt, dt, gap, 0.0, 0.0, left, right, 0.0, 0.0, 0)
-        for k, (gap, left, right) in enumerate(rows)
+        Frame(t, dt, gap, 0.0, 0.0, left, right, 0.0, 0.0, 0)
+        for t, (gap, left, right) in zip(times, rows, strict=True)
     ]
     phases = [int(phase)] * len(frames) if phases is None else [int(p) for p in phases]
     arguments = (frames, phases, [0.0] * len(frames), [])

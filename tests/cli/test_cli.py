@@ -12,7 +12,7 @@ from importlib import import_module
 import click
 import pytest
 from cases import every_case
-from commands import graspsense
+from commands import graspsense, python
 from parts import implementing, offering
 from repository import ROOT
 
@@ -430,7 +430,7 @@ sys.meta_path.insert(0, Interrupting())
 from graspsense.cli.entry import main
 main()
 """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    done = python("-c", code)
 
     assert (done.returncode, done.stderr) == (130, "interrupted\n")
 

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
 
 import parts
 import pytest
-from commands import graspsense
+from commands import graspsense, python
 from mutants import MUTANTS
 
 from graspsense.core.components.registry import IsolatedPlugins
@@ -104,12 +102,8 @@ def test_imports_that_moved_are_printed_with_the_new_form_beside(tmp_path):
         "[graspsense.plugins]\nlab-old = lab_old.plugin\n"
     )
 
-    ran = subprocess.run(
-        [sys.executable, "-m", "graspsense", "plugins", "check", "lab-old"],
-        env={**os.environ, "PYTHONPATH": str(source)},
-        capture_output=True,
-        text=True,
-        timeout=300,
+    ran = python(
+        "-m", "graspsense", "plugins", "check", "lab-old", env={**os.environ, "PYTHONPATH": str(source)}
     )
 
     assert ran.returncode == 1, ran.stderr

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
 import sys
 
 import pytest
 from cases import every_case
-from commands import graspsense, printed
+from commands import graspsense, printed, python
 from hypothesis import given
 from hypothesis import strategies as st
 from terminals import in_terminal
@@ -46,9 +45,7 @@ def test_a_table_fits_the_terminal_and_keeps_every_word(width):
 
 
 def test_a_piped_table_keeps_whole_values_on_one_line_each():
-    ran = subprocess.run(
-        [sys.executable, "-c", TABLE], capture_output=True, text=True, check=True, env={"COLUMNS": "40"}
-    )
+    ran = python("-c", TABLE, check=True, env={"COLUMNS": "40"})
 
     lines = ran.stdout.splitlines()
     assert len(lines) == 3

@@ -168,7 +168,7 @@ def test_folds_are_refused_before_the_first_grasp(run, monkeypatch):
 def test_options_in_python_are_a_list():
     for ask in (load_pipeline, resolve):
         for options in ("run.seed=3", {"run.seed": 3}, [("run.seed", 3)]):
-            with pytest.raises(ConfigError, match="a list of texts"):
+            with pytest.raises(ConfigError, match=r"\['run\.seed=3'\]"):
                 ask(options=options)
 
 
@@ -205,7 +205,7 @@ def test_arguments_of_an_evaluation_that_are_something_else_are_refused():
             evaluate(*arguments)
     with pytest.raises(ConfigError, match="'state'"):
         evaluate("c45", trials, target="size")
-    with pytest.raises(ConfigError, match="no feature is defined in any of the 12 trials"):
+    with pytest.raises(ConfigError, match="12 trials"):
         evaluate("c45", some_trials([np.nan] * 12), folds=2)
     evaluation = evaluate("c45", trials, folds=2, permutations=1)
     assert evaluation.classifier.startswith("graspsense-c45/c45 ")

@@ -271,10 +271,10 @@ def test_only_a_model_with_checkpoints_and_sets_can_stop_a_squeeze(model):
     settings = resolve("default", options=("run.stop_when_sure=true",))
     with pytest.raises(ConfigError, match=r"has no checkpoints.*train .*--checkpoints"):
         anytime_of(evolve(model, checkpoints=()), curve(), settings)
-    with pytest.raises(ConfigError, match="there is no classifier"):
+    with pytest.raises(ConfigError, match=r"run\.stop_when_sure.*classifier\.model"):
         anytime_of(None, curve(), settings)
     unsure = tuple((after_s, evolve(part, sets=None)) for after_s, part in model.checkpoints)
-    with pytest.raises(ConfigError, match="no prediction sets"):
+    with pytest.raises(ConfigError, match=r"run.stop_when_sure: model 'test'"):
         anytime_of(evolve(model, checkpoints=unsure), curve(), settings)
     assert anytime_of(evolve(model, checkpoints=()), curve(), resolve("default")) is None
 
@@ -308,9 +308,9 @@ def of_grasps(traces, checkpoints, **more):
 
 def test_trials_without_traces_or_of_short_grasps_have_no_checkpoints(traces, trials):
     plain = split_checkpoints(trials, CHECKPOINTS)[-1].labelled
-    with pytest.raises(ConfigError, match="gives features and not the traces"):
+    with pytest.raises(ConfigError, match=r"model gripper .*checkpoints_s"):
         split_checkpoints(plain, CHECKPOINTS)
-    with pytest.raises(ConfigError, match="only 0 of 20 grasps still go on 60 s after the contact"):
+    with pytest.raises(ConfigError, match=r"0 of 20 .* 60 s"):
         split_checkpoints(of_grasps(traces, (60.0,)), (60.0,))
 
 

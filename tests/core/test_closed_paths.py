@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-import sys
 import tempfile
 import textwrap
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from commands import python
 
 from graspsense.core.files import closed_paths
 from graspsense.core.files.closed_paths import is_closed, make_closed, why_open
@@ -188,13 +188,11 @@ class Lab:
         self.program.write_text(textwrap.dedent(PROGRAM))
 
     def run(self, mask="022", cwd=None, **environ):
-        done = subprocess.run(
-            [sys.executable, "-P", str(self.program)],
+        done = python(
+            "-P",
+            self.program,
             env={**os.environ, "XDG_CACHE_HOME": str(self.folder / "mine"), "MASK": mask, **environ},
             cwd=cwd or self.program.parent,
-            capture_output=True,
-            text=True,
-            check=False,
         )
         assert done.returncode == 0, done.stderr
         return done.stdout.strip(), done.stderr

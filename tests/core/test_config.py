@@ -488,9 +488,9 @@ def test_a_layer_can_be_read_by_itself(plugins, write):
 def test_create_makes_a_component_as_strictly_as_a_file(plugins):
     controller = create("controller", "hybrid", probing_force_n=17)
     assert controller.config.probing_force_n == 17.0
-    with pytest.raises(ConfigError, match=r"^controller\.probing_forse_n: graspsense/hybrid has no key"):
+    with pytest.raises(ConfigError, match=r"^controller\.probing_forse_n: .*'probing_force_n'"):
         create("controller", "hybrid", probing_forse_n=17)
-    with pytest.raises(UnknownName, match="no controller named 'hybird'"):
+    with pytest.raises(UnknownName, match=r"'hybird'.*'hybrid'"):
         create("controller", "hybird")
     with pytest.raises(ConfigError, match="2 errors"):
         build(plugins.find("controller", "law"), {"force_n": -1, "speed_m_s": "x"})
@@ -508,7 +508,7 @@ def test_a_recipe_makes_the_same_component_again():
         class Own(type(made)):
             """Of a script."""
 
-        with pytest.raises(UnknownName, match="Own is not a controller that a plugin declares"):
+        with pytest.raises(UnknownName, match=r"<locals>\.Own "):
             recipe_of("controller", Own(made.config))
         made.config = evolve(made.config, probing_force_n=Decimal(17))
         with pytest.raises(ConfigError, match="probing_force_n"):

@@ -268,7 +268,7 @@ def test_every_classifier_has_sets_that_loading_keeps_exactly(name, tmp_path):
         assert said.coverage == 0.9
         assert said.set_in_words.endswith(", 90 % of all sets")
     model.classifier.to_json = lambda: {"means": np.zeros(2)}
-    with pytest.raises(ComponentFailed, match="Its to_json gives lists"):
+    with pytest.raises(ComponentFailed, match=rf"/{name} .*to_json"):
         write_model(tmp_path / "m.json", model)
 
 
@@ -312,7 +312,7 @@ def test_thresholds_of_other_labels_are_refused(tmp_path):
     other = evolve(model.sets, thresholds={"full": model.sets.thresholds["full"]})
     write_model(tmp_path / "m.json", evolve(model, sets=other))
 
-    with pytest.raises(DataDamaged, match="thresholds of its prediction sets"):
+    with pytest.raises(DataDamaged, match=r"sets\.thresholds"):
         load_model(str(tmp_path / "m.json"), installed())
 
 

@@ -6,8 +6,6 @@ import base64
 import copy
 import json
 import math
-import subprocess
-import sys
 from functools import cache
 from io import BytesIO
 from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
@@ -17,6 +15,7 @@ import parts
 import pytest
 from attrs import evolve
 from cases import every_case
+from commands import python
 from parts import Nearest
 from repository import TESTS
 from test_classifiers import trials
@@ -73,11 +72,7 @@ def trained(name, **config):
 def read_damaged(seed, places, damages, *files):
     """Run `damaged_models.py` on these files, and return how many damages it read."""
     script = TESTS / "damaged_models.py"
-    done = subprocess.run(
-        [sys.executable, script, str(seed), str(places), str(damages), *map(str, files)],
-        capture_output=True,
-        text=True,
-    )
+    done = python(script, seed, places, damages, *files)
     assert done.stdout.startswith("ok "), done.stderr[-3000:]
     return int(done.stdout.split()[1])
 

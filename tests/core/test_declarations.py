@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from math import inf, nan
 from typing import Literal
@@ -10,6 +9,7 @@ from typing import Literal
 import parts
 import pytest
 from attrs import field, frozen
+from commands import python
 from parts import GentleState, Hand, HandConfig, Peak, PeakConfig
 
 from graspsense.core.components.registry import Component, IsolatedPlugins
@@ -237,12 +237,10 @@ def test_a_law_with_the_numbers_of_its_config_is_compiled_once_and_then_loaded(t
         "        print(compiled(params_of(SlowConfig())), sum(compiled.stats.cache_hits.values()))\n"
     )
     said = [
-        subprocess.run(
-            [sys.executable, "lab_slow.py"],
+        python(
+            "lab_slow.py",
             cwd=tmp_path,
             env={"PATH": "", "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
-            capture_output=True,
-            text=True,
             check=True,
         ).stdout
         for _ in range(2)

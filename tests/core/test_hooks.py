@@ -191,7 +191,7 @@ def test_hook_graspsense_identifiers():
     assert plugins.resource(IdentifierEntry, "lab-sim").entry.target == "lab_sim.identification:identify"
     with pytest.raises(UnknownName, match=r"graspsense-identify:\n.*graspsense\[identify\]"):
         plugins.resource(IdentifierEntry, "sim")
-    with pytest.raises(UnknownName, match="Known: lab-sim"):
+    with pytest.raises(UnknownName, match=r"'replay'.*lab-sim"):
         plugins.resource(IdentifierEntry, "replay")
 
 

@@ -313,14 +313,27 @@ def test_metadata_that_cannot_be_read_is_a_broken_plugin(site):
     assert states(site.discover()) == {"graspsense": "loaded", "lab-a": "broken", "lab-b": "loaded"}
 
 
-def test_what_a_plugin_prints_when_imported_does_not_reach_stdout(site, capsys):
-    site.install("lab-a", HEAD + "    print('hello from the lab')")
+@pytest.mark.parametrize(
+    ("plugin", "environ", "told"),
+    [
+        (HEAD + "    print('hello from the lab')", {}, "hello from the lab"),
+        (
+            backend("a"),
+            {"GRASPSENSE_TRACE_PLUGINS": "1"},
+            "hook graspsense_sensor_backends() of lab-a:main returned ",
+        ),
+    ],
+)
+def test_what_a_plugin_prints_and_the_trace_of_its_hooks_do_not_reach_stdout(
+    site, capsys, plugin, environ, told
+):
+    site.install("lab-a", plugin)
 
-    site.discover()
+    site.discover(**environ)
 
     out, err = capsys.readouterr()
     assert out == ""
-    assert "hello from the lab" in err
+    assert told in err
 
 
 def test_strict_raises_the_plugins_own_error(site):
@@ -329,16 +342,6 @@ def test_strict_raises_the_plugins_own_error(site):
     with pytest.raises(ModuleNotFoundError) as caught:
         site.discover(GRASPSENSE_STRICT_PLUGINS="1")
     assert caught.value.__notes__ == ["while loading main of lab-a 0.2"]
-
-
-def test_calls_of_hooks_are_traced_on_demand(site, capsys):
-    site.install("lab-a", backend("a"))
-
-    site.discover(GRASPSENSE_TRACE_PLUGINS="1")
-
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert "hook graspsense_sensor_backends() of lab-a:main returned in " in err
 
 
 @pytest.mark.parametrize(

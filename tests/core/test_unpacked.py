@@ -7,8 +7,6 @@ import io
 import os
 import sqlite3
 import struct
-import subprocess
-import sys
 import zipfile
 
 import lz4.frame
@@ -16,6 +14,7 @@ import numpy as np
 import pytest
 import zstandard
 from cases import every_case
+from commands import python
 from kept import ended, write_recording
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
@@ -60,7 +59,7 @@ except GraspsenseError as error:
 def read_with_little_memory(call, memory=MEMORY):
     """Run a statement in a process with so much memory; return what it prints of an error of ours."""
     script = READ.format(call=call, memory=memory)
-    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    ran = python("-c", script)
     assert ran.returncode == 0, ran.stderr[-2000:]
     return ran.stdout
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import os
 import pwd
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from commands import python
 
 from graspsense.core.components.registry.discovery import disabled_in_config, write_disabled
 from graspsense.core.files.user_folders import cache_folder, config_folder, data_folder
@@ -40,14 +39,7 @@ def homeless(monkeypatch):
 def graspsense(folder, *arguments, code=0, **environ):
     """Return what a command says to a stranger without a home who stands in this folder."""
     kept = {name: value for name, value in os.environ.items() if name not in VARIABLES}
-    done = subprocess.run(
-        [sys.executable, "-c", STRANGER, *arguments],
-        env={**kept, "NO_COLOR": "1", **environ},
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = python("-c", STRANGER, *arguments, env={**kept, "NO_COLOR": "1", **environ}, cwd=folder)
     assert done.returncode == code, done.stderr
     return done.stdout + done.stderr
 

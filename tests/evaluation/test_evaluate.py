@@ -200,18 +200,22 @@ def control_of(values, **more):
     return ControlFeatures(table=table(values, names=("gap_at_start",)), what="the gap at the start", **more)
 
 
-def test_a_control_without_any_feature_is_not_measured_instead_of_passing():
-    """Sixty trials that begin in contact: their control from before contact would be chance, which proves nothing."""
+@every_case(
+    ("having", "missing", "reason"),
+    [
+        (0, "a pad felt a force", "0 of 60 trials have such features: a pad felt a force"),
+        (1, "", "1 of 60 trials have such features; these are too few to learn from"),
+    ],
+)
+def test_a_control_that_few_trials_have_is_not_measured_instead_of_passing(having, missing, reason):
+    """Trials that begin in contact: their control from before contact would be chance, which proves nothing."""
     labels, width, force = four_states(15)
-    control = control_of(np.full(60, np.nan), missing="a pad felt a force in the first 0.6 s of the approach")
+    control = control_of(np.where(np.arange(60) < having, 0.08, np.nan), missing=missing)
     evaluation = judged(labelled(labels, width, force, before_contact=control))
 
     measured = evaluation.controls["before_contact"]
-    assert measured.rate is None
-    assert measured.reason == (
-        "0 of 60 trials have such features: a pad felt a force in the first 0.6 s of the approach"
-    )
-    assert f"was not measured: {measured.reason}" in verdict(evaluation)
+    assert (measured.rate, measured.reason) == (None, reason)
+    assert f"was not measured: {reason}" in verdict(evaluation)
 
 
 def test_a_control_is_measured_on_the_trials_that_have_its_features():
@@ -225,16 +229,6 @@ def test_a_control_is_measured_on_the_trials_that_have_its_features():
     assert evaluation.what == "the gap at the start; 60 of 120 trials have such features: a pad felt a force"
     # The headline of the same sixty trials, of which it misses some.
     assert -0.5 < evaluation.difference.value < 0.0
-
-
-def test_too_few_trials_with_a_feature_are_not_measured():
-    labels, width, force = four_states()
-    sparse = np.where(np.arange(120) == 7, 0.08, np.nan)
-    control = judged(labelled(labels, width, force, before_contact=control_of(sparse))).controls[
-        "before_contact"
-    ]
-    assert control.rate is None
-    assert control.reason == "1 of 120 trials have such features; these are too few to learn from"
 
 
 @pytest.mark.parametrize("squeeze_adds", [True, False])
@@ -332,7 +326,7 @@ def test_few_trials_are_said_or_refused(n):
     few = trials.rows(np.array([i for i in range(120) if i < 4 * n or labels[i] != "can:full"]))
 
     assert "labels with fewer trials than folds (4): can:full" in judged(few).notes
-    with pytest.raises(ConfigError, match="cannot be split into 10 folds"):
+    with pytest.raises(ConfigError, match="10 folds"):
         judged(trials.rows(np.arange(8)), folds=10)
 
 
@@ -342,7 +336,7 @@ def test_a_label_of_one_trial_can_never_be_right_and_one_label_is_nothing():
 
     assert "labels with a single trial, which no fold can predict: egg" in alone.notes
     assert alone.by_class["egg"].correct == 0
-    with pytest.raises(ConfigError, match="has the label 'can': there is nothing to tell apart"):
+    with pytest.raises(ConfigError, match="'can'"):
         judged(labelled(["can"] * 120, width))
 
 
@@ -377,7 +371,7 @@ def test_a_fit_that_refuses_few_trials_costs_its_figure_only():
         "no point at 10% of the trials" in note and "60 trials are needed" in note
         for note in evaluation.notes
     )
-    with pytest.raises(ConfigError, match="refused 90 training trials of 4 labels: 1000 trials are needed"):
+    with pytest.raises(ConfigError, match=r" 90 .* 4 .*1000 trials are needed"):
         evaluate(Choosy(1000), trials, classifier="choosy", folds=4)
 
 
@@ -391,7 +385,7 @@ class Vague:
 
 
 def test_a_classifier_without_probabilities_is_named_and_not_scored():
-    with pytest.raises(ComponentFailed, match="Cart cannot be used: it gives no probabilities"):
+    with pytest.raises(ComponentFailed, match=r"tree.Cart "):
         evaluate(Vague(), labelled(*four_states()), classifier="vague", folds=4)
 
 

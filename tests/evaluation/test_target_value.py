@@ -218,7 +218,7 @@ def test_a_damaged_model_is_refused(tmp_path, change, says):
 def test_a_model_of_a_number_is_not_one_of_labels(tmp_path):
     path = tmp_path / "m.json"
     write_regression(path, train_regression("ridge", bottles(), name="m"))
-    with pytest.raises(ConfigError, match="predicts a number, not a label: use it with graspsense predict"):
+    with pytest.raises(ConfigError, match=r"m\.json.*graspsense predict"):
         load_model(str(path), installed())
 
 
@@ -330,6 +330,6 @@ def test_simulated_trials_have_no_numbers():
 
 @every_case("text", ["fill", "=3", "fill [ml]=", "fill=much", "label=3", "fill=inf"])
 def test_a_number_of_a_trial_is_name_and_number(text):
-    with pytest.raises(ConfigError, match="is not a number of a trial"):
+    with pytest.raises(ConfigError, match=r"NAME \[UNIT\]=NUMBER"):
         value_label(text)
     assert value_label("fill [ml] = 250") == ("fill [ml]", "250")

@@ -300,7 +300,7 @@ def test_what_is_no_file_is_no_input():
 )
 def test_a_sweep_without_effect_on_a_table_is_refused(tmp_path, sweep, key):
     (tmp_path / "t.csv").write_text(wayward.CSV)
-    with pytest.raises(ConfigError, match=f"{key} makes no difference"):
+    with pytest.raises(ConfigError, match=f"{key} .*t.csv"):
         read_experiment(experiment(tmp_path, "t.csv", more=f"[sweep]\n{sweep}\n"))
 
 
@@ -310,7 +310,7 @@ def test_pipelines_that_differ_in_nothing_that_a_table_depends_on_are_refused(tm
     file = experiment(tmp_path, "t.csv")
     text = 'pipelines = ["default", "p.toml"]\n'
     (tmp_path / "e.toml").write_text(text + (tmp_path / "e.toml").read_text())
-    with pytest.raises(ConfigError, match="pipeline makes no difference"):
+    with pytest.raises(ConfigError, match=r"pipeline .*t.csv"):
         read_experiment(file)
 
 

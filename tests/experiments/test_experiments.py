@@ -1,16 +1,15 @@
 """Experiments from a file: what it means, what is kept, what is done again."""
 
 import json
+import re
 import shutil
-import subprocess
-import sys
 from importlib.resources import files
 from pathlib import Path
 
 import pytest
 import wayward
 from cases import every_case
-from commands import graspsense, printed
+from commands import graspsense, printed, python
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -226,24 +225,24 @@ def test_one_run_at_a_time_writes_to_a_folder(file, tmp_path):
     ("text", "said"),
     [
         ('title = "x"\nsedes = 2', r"mine.toml:2: sedes: .*Did you mean 'seeds'"),
-        ('title = "x"\nseeds = 0', r"mine.toml:2: seeds: 0 seeds: give at least 1"),
-        ('title = "x"\nseeds = 1000000', "1000000 seeds: give at most 10000"),
+        ('title = "x"\nseeds = 0', r"mine.toml:2: seeds: 0 .*1"),
+        ('title = "x"\nseeds = 1000000', r"mine.toml:2: seeds: 1000000 .*10000;"),
         ('title = "x"\nparts = ["mine.toml"]', r"a part of itself: mine\.toml > mine\.toml"),
-        ('title = "x"\n[gripper]\ntype = "pr2"', "no objects that it can simulate, so it was not opened"),
+        ('title = "x"\n[gripper]\ntype = "pr2"', "graspsense-pr2-gripper/pr2 "),
         (
             'title = "x"\n[data]\nobjects = ["can:full_open", "can:empty_open"]\ntotal = 7',
             "mine.toml.*: judge.folds: 10 folds of 7 trials",
         ),
-        ('title = "x"\nkind = "juggle"', r"no kind of experiment named 'juggle'"),
+        ('title = "x"\nkind = "juggle"', r"'juggle'. Known: "),
         ('title = "x"\n[sweep]\n"controler.x" = [1]', r"mine.toml:3: sweep.controler.x: .*'controller'"),
-        ('title = "x"\n[sweep]\n"run.seed" = 3', r"mine.toml:3: sweep.run.seed: give a list of values"),
+        ('title = "x"\n[sweep]\n"run.seed" = 3', r"mine.toml:3: sweep.run.seed: "),
         ('title = "x"\n[sweep]\n"controller.probing_forse_n" = [1.0]', r"Did you mean 'probing_force_n'"),
-        ('title = "x"\nclassifiers = ["c46"]', r"mine.toml:2: .*no classifier named 'c46'"),
-        ('title = "x"\nclassifiers = ["c45", "c45"]', r"two classifiers are called 'c45'"),
+        ('title = "x"\nclassifiers = ["c46"]', r"mine.toml:2: .*'c46'"),
+        ('title = "x"\nclassifiers = ["c45", "c45"]', r"mine.toml:2: .*'c45'"),
         ('title = "x"\n[data]\ninstances = 0', r"mine.toml:3: data.instances: 0 instances"),
         ('title = "x"\n[judge]\nfolds = 1', r"mine.toml:3: judge.folds"),
-        ('title = "x"\npipelines = ["nosuch"]', r"no pipeline named 'nosuch'"),
-        ("seeds = 2", r"needs the key 'title'"),
+        ('title = "x"\npipelines = ["nosuch"]', r"'nosuch'"),
+        ("seeds = 2", r"'title'"),
     ],
 )
 def test_mistakes_in_a_file(tmp_path, text, said):
@@ -455,13 +454,13 @@ def test_an_experiment_is_not_a_part_of_its_part(tmp_path):
     (tmp_path / "a.toml").write_text('title = "x"\nparts = ["b.toml"]\n')
     (tmp_path / "b.toml").write_text('title = "x"\nparts = ["a.toml"]\n')
 
-    with pytest.raises(ConfigError, match=r"cannot be a part of itself: a\.toml > b\.toml > a\.toml"):
+    with pytest.raises(ConfigError, match=r"a\.toml > b\.toml > a\.toml"):
         read_experiment(str(tmp_path / "a.toml"))
 
 
 @every_case("option", ["data.source=t.csv", "gripper.rate_hz=250", 'classifiers=["knn"]'])
 def test_what_an_experiment_of_parts_would_ignore_is_refused(option):
-    with pytest.raises(ConfigError, match="set it in the parts"):
+    with pytest.raises(ConfigError, match=re.escape(option)):
         read_experiment("trade_sensing", [option])
 
 
@@ -469,7 +468,7 @@ def test_recorded_trials_are_not_simulated_in_silence(tmp_path):
     """A trade-off of classifiers simulated its own trials, whatever its source. It is refused before it runs."""
     table = tmp_path / "t.csv"
     table.write_text("what,a\n" + "x,1\ny,2\n" * 5)
-    with pytest.raises(ConfigError, match="has recorded trials"):
+    with pytest.raises(ConfigError, match=r"trade_squeezes:9: .*t\.csv"):
         read_experiment("trade_squeezes", [f'data.source="{table}"', 'data.label="what"', "seeds=1"])
 
 
@@ -498,7 +497,7 @@ def test_what_there_is():
 
 def test_help_imports_nothing_heavy():
     code = "import sys; from graspsense.cli.experiment import experiment; print(*sys.modules)"
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    loaded = python("-c", code, check=True).stdout
     assert not {"numpy", "dask", "distributed", "matplotlib"} & set(loaded.split())
 
 

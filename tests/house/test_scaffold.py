@@ -46,13 +46,13 @@ def test_a_package_is_whole(roles, tmp_path):
     [
         ("lab-thing", "features", r"Did you mean 'feature-set'\?.*sensor-backend .*how each grasp ended$"),
         ("Lab_Thing", "feature-set", "small letters, digits and single hyphens"),
-        ("graspsense-chitta", "feature-set", "name 'chitta' is taken by graspsense/chitta: choose another"),
+        ("graspsense-chitta", "feature-set", "'chitta' .* graspsense/chitta"),
         ("numpy", "feature-set", "numpy has a package numpy, which this one would hide"),
         ("json", "feature-set", "Python itself has a module json"),
         ("graspsense", "controller", "graspsense itself has it"),
         ("graspsense-c45", "classifier", "graspsense itself has it"),
         ("class", "observer", "class is a keyword of Python"),
-        ("hybrid", "controller", "name 'hybrid' is taken by graspsense/hybrid: choose another"),
+        ("hybrid", "controller", "'hybrid' .* graspsense/hybrid"),
         ("lab hand", "sensor-backend", "without spaces, as in lab-hand"),
         ("lab-hand ", "sensor-backend", "without spaces, as in lab-hand"),
         (" lab", "sensor-backend", "without spaces, as in lab-hand"),
@@ -66,7 +66,7 @@ def test_what_it_refuses(name, role, says, tmp_path):
 
 
 def test_a_role_is_given_once(tmp_path):
-    with pytest.raises(ConfigError, match="--role observer is given 2 times: give each role once"):
+    with pytest.raises(ConfigError, match=r"--role observer .*2 times"):
         make("lab-thing", ["observer", "controller", "observer"], tmp_path / "lab-thing")
 
 
@@ -118,7 +118,7 @@ def test_the_first_commands_find_the_scene_from_where_they_are_printed_and_from_
 def test_nothing_is_written_over(tmp_path):
     make("lab-thing", ["observer"], tmp_path / "lab-thing")
 
-    with pytest.raises(ConfigError, match="is there already: give another name, or --folder"):
+    with pytest.raises(ConfigError, match=r"lab-thing .*--folder"):
         make("lab-thing", ["observer"], tmp_path / "lab-thing")
 
 
@@ -138,9 +138,7 @@ def test_a_new_gripper_grasps_with_the_default_pipeline_at_once(tmp_path, monkey
         features = trial.features.as_dict()
         assert features["p_first"] == pytest.approx(0.05, abs=0.001)
         assert features["f_steady"] == pytest.approx(20.0, abs=1.0)  # the default probing force
-        with pytest.raises(
-            WiringError, match="commands effort, which gripper lab-hand/lab-hand does not take"
-        ):
+        with pytest.raises(WiringError, match=r"effort, .*lab-hand/lab-hand .*velocity"):
             load_pipeline(
                 options=["gripper.type=lab-hand", "classifier.type=none", "controller.sends=effort"],
                 plugins=plugins,

@@ -186,9 +186,9 @@ def test_one_part_is_found_by_name_and_a_wrong_name_by_likeness():
         f"feature-set graspsense-test/peak: {len(CHECKS['feature-set'])} checks: "
         f"{len(CHECKS['feature-set'])} passed; at least {MINIMUM_CHECKS['feature-set']} must run"
     )
-    with pytest.raises(Exception, match=r"no plugin or component named 'peek'.*Did you mean 'peak'\?"):
+    with pytest.raises(Exception, match=r"'peek'.*'peak'"):
         examine("peek", plugins=plugins)
-    with pytest.raises(Exception, match="no check named nosuch"):
+    with pytest.raises(Exception, match="nosuch"):
         examine("peak", plugins=plugins, expected_failures={"nosuch": "why"})
 
 

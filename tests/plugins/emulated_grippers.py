@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from types import SimpleNamespace
 
 from graspsense import load_pipeline
@@ -37,6 +38,21 @@ def give_own_time(monkeypatch, backend):
 
     monkeypatch.setattr(backend, "time", SimpleNamespace(monotonic=look, sleep=sleep))
     monkeypatch.setattr(emulated_serial, "time", SimpleNamespace(monotonic=lambda: now_s))
+
+
+@contextmanager
+def plugged_in(emulator):
+    """Give what makes emulated grippers, as `emulator` does, and plugs them in; at the end they are unplugged."""
+    made = []
+
+    def make(*arguments, **keys):
+        made.append(emulator(*arguments, **keys))
+        made[-1].tell("plug")
+        return made[-1]
+
+    yield make
+    for gripper in made:
+        gripper.close()
 
 
 def assert_a_killed_program_lets_go(backend, presses, force_n, told="number == 10", **settings):

@@ -5,14 +5,13 @@ What the role itself asks for, such as valid probabilities and reasons that fit 
 
 import json
 import math
-import subprocess
-import sys
 from functools import cache
 
 import numpy as np
 import pytest
 from attrs import evolve
 from cases import every_case
+from commands import python
 
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import Features, FeatureTable
@@ -209,7 +208,7 @@ table = FeatureTable(names=("a",), units=("",), values=np.arange(20.0)[:, None])
 classifier.fit(table, ["x"] * 10 + ["y"] * 10, 0)
 assert ("sklearn" in sys.modules) is {name != "c45"}
 """
-    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
+    ran = python("-c", code)
     assert ran.returncode == 0, ran.stderr
 
 

@@ -8,6 +8,7 @@ from attrs import evolve
 from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
+from traces import made_trace
 
 from graspsense.core.values.signals import Phase
 from graspsense.core.values.trace import ImageTrace
@@ -31,31 +32,9 @@ def bump(row, column, long, short, angle):
 
 def grasp(images, phases=(Phase.APPROACH, Phase.SQUEEZE, Phase.HOLD, Phase.RELEASE)):
     """A trace of four ticks, one image in each."""
-    trace = squeeze().until(-math.inf)
-    n = len(images)
-    columns = {
-        name: np.zeros(n)
-        for name in (
-            "gap_m",
-            "velocity_m_s",
-            "effort_n",
-            "force_left_n",
-            "force_right_n",
-            "edge_left_n",
-            "edge_right_n",
-            "command",
-        )
-    }
-    t_s = 0.1 * np.arange(n)
-    signals = {"tactile": ImageTrace(t_s=t_s, cells=np.asarray(images))}
-    return evolve(
-        trace,
-        **columns,
-        t_s=t_s,
-        status=np.zeros(n, np.int64),
-        phase=np.array(phases[:n], np.int64),
-        signals=signals,
-    )
+    t_s = 0.1 * np.arange(len(images))
+    trace = made_trace(np.zeros((len(images), 3)), phases=phases[: len(images)], t_s=t_s)
+    return evolve(trace, signals={"tactile": ImageTrace(t_s=t_s, cells=np.asarray(images))})
 
 
 def extract(images, phases=(Phase.APPROACH, Phase.SQUEEZE, Phase.HOLD, Phase.RELEASE), **settings):

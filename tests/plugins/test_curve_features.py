@@ -11,9 +11,10 @@ import pytest
 from attrs import evolve
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from traces import made_trace
 
-from graspsense.core.values.signals import Frame, Phase
-from graspsense.core.values.trace import SI_UNITS, Trace, trace_of
+from graspsense.core.values.signals import Phase
+from graspsense.core.values.trace import SI_UNITS
 from graspsense.plugins.features.curve import NAMES, CurveConfig, CurveFeatures
 from graspsense.testing.samples import squeeze
 
@@ -57,12 +58,7 @@ def grasp(
     phases = np.select(
         [t_s < 0.5, t_s < 1.0, t_s < 1.6], [Phase.APPROACH, Phase.SQUEEZE, Phase.HOLD], Phase.RELEASE
     )
-    steps = np.diff(t_s, prepend=t_s[:1])
-    frames = [
-        Frame(t, dt, g, 0.0, 0.0, left, right, math.nan, math.nan, 0)
-        for t, dt, g, left, right in zip(*(a.tolist() for a in (t_s, steps, gap, *pads)), strict=True)
-    ]
-    return trace_of(frames, phases.tolist(), [0.0] * len(frames), [], units)
+    return made_trace(np.column_stack((gap, *pads)), phases=phases, units=units, t_s=t_s)
 
 
 EVEN = np.arange(0.0, 2.2, 0.001)
@@ -131,11 +127,7 @@ def with_samples_between(trace, t_s):
     columns = [
         np.interp(t_s, trace.t_s, column) for column in (trace.gap_m, trace.force_left_n, trace.force_right_n)
     ]
-    rows = zip(*(a.tolist() for a in (t_s, np.diff(t_s, prepend=t_s[:1]), *columns)), strict=True)
-    frames = [
-        Frame(t, dt, gap, 0.0, 0.0, left, right, math.nan, math.nan, 0) for t, dt, gap, left, right in rows
-    ]
-    return trace_of(frames, trace.phase[later].tolist(), [0.0] * len(frames), [], trace.units)
+    return made_trace(np.column_stack(columns), phases=trace.phase[later], units=trace.units, t_s=t_s)
 
 
 @settings(max_examples=15, deadline=None)
@@ -269,12 +261,8 @@ def test_units_of_a_recording_carry_over():
     )
 )
 def test_every_trace_gives_numbers_or_reasons(rows):
-    t_s = np.cumsum([row[3] for row in rows])
-    frames = [
-        Frame(float(t), 0.001, gap, 0.0, 0.0, left, right, 0.0, 0.0, 0)
-        for t, (gap, left, right, _, _) in zip(t_s, rows, strict=True)
-    ]
-    trace: Trace = trace_of(frames, [row[4] for row in rows], [0.0] * len(rows), [])
+    times, phases = np.cumsum([row[3] for row in rows]), [row[4] for row in rows]
+    trace = made_trace([row[:3] for row in rows], phases=phases, t_s=times)
     f = FEATURES.extract(trace)
     for name, value in zip(f.names, f.values, strict=True):
         assert not math.isinf(value)

@@ -1,11 +1,11 @@
 """Explainable boosting: our prediction is that of interpret, and a model needs interpret for training only."""
 
 import json
-import subprocess
 import sys
 
 import numpy as np
 import pytest
+from commands import python
 from test_classifiers import fitted, trials
 
 from graspsense.core.values.errors import PluginUnavailable
@@ -53,7 +53,7 @@ table = FeatureTable(names={table.names!r}, units={table.units!r}, values=values
 assert again.probabilities(table).tolist() == json.load(open({str(tmp_path / "p.json")!r}))
 assert "pandas" not in sys.modules and "sklearn" not in sys.modules
 """
-    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
+    ran = python("-c", code)
 
     assert ran.returncode == 0, ran.stderr
 

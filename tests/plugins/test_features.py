@@ -206,7 +206,7 @@ def test_the_compiled_form_finds_contact_and_rest_where_the_search_in_the_interp
     gaps[rng.random(n) < 0.002] = math.nan
     forces = np.where(np.arange(n) > 40, rng.normal(2.0, 1.0, (2, n)), 0.0)
     phases = np.sort(rng.integers(int(Phase.APPROACH), int(Phase.RELEASE) + 1, n))
-    trace = made_trace(list(zip(gaps.tolist(), *forces.tolist(), strict=True)), phases=phases.tolist())
+    trace = made_trace(np.column_stack((gaps, *forces)), phases=phases)
     held = trace.until(float(trace.t_s[np.flatnonzero(trace.phase == Phase.RELEASE)[0]]))
     for choice in ("mean", "left", "right", "min", "sum"):
         features = ChittaFeatures(ChittaConfig(force=choice, rest_window_s=0.02))
@@ -252,7 +252,7 @@ def coarse_squeeze(rate_hz, step_m, hold_s, measured_hz=1e9):
     gap = np.interp(seen, [0.0, 1.5, 4.5], [0.076, 0.064, 0.0616])
     gap = np.round(gap / step_m) * step_m if step_m else gap
     force = np.interp(times, [1.5, 4.5], [0.0, 8.0])
-    return made_trace(zip(gap.tolist(), force.tolist(), force.tolist(), strict=True), dt=1.0 / rate_hz)
+    return made_trace(np.column_stack((gap, force, force)), dt=1.0 / rate_hz)
 
 
 @every_case("rate_hz", [10.0, 45.0, 1000.0])
@@ -283,8 +283,8 @@ def test_a_clock_that_was_set_within_a_squeeze_shows_no_rest(jump_s, ends):
     times = np.arange(0.0, 5.0 if ends else 3.0, 0.01)
     gap = np.interp(times, [0.0, 1.0, 3.5], [0.08, 0.05, 0.046])
     force = np.interp(times, [1.0, 3.5], [0.0, 6.0])
-    trace = made_trace(zip(gap.tolist(), force.tolist(), force.tolist(), strict=True), dt=0.01)
-    f = FEATURES.extract(evolve(trace, t_s=times + np.where(times > 1.8, jump_s, 0.0)))
+    told_s = times + np.where(times > 1.8, jump_s, 0.0)
+    f = FEATURES.extract(made_trace(np.column_stack((gap, force, force)), dt=0.01, t_s=told_s))
     assert f["f_steady"] == pytest.approx(6.0 if ends else math.nan, abs=0.05, nan_ok=True)
     assert ("clock" in f.reasons.get("f_steady", "")) == (not ends)
 
@@ -294,8 +294,7 @@ def test_a_hole_in_a_rest_is_a_part_of_it():
     times = times[(times < 3.6) | (times > 4.0)]
     gap = np.interp(times, [0.0, 1.0, 3.5], [0.08, 0.05, 0.046])
     force = np.interp(times, [1.0, 3.5], [0.0, 6.0])
-    trace = made_trace(zip(gap.tolist(), force.tolist(), force.tolist(), strict=True), dt=0.01)
-    f = FEATURES.extract(evolve(trace, t_s=times))
+    f = FEATURES.extract(made_trace(np.column_stack((gap, force, force)), dt=0.01, t_s=times))
     assert f["f_steady"] == pytest.approx(6.0)
     assert f["delta_t"] == pytest.approx(2.2, abs=0.1)
 
@@ -325,8 +324,7 @@ def test_a_contact_between_two_samples_is_said_to_be_unresolved(rate_hz, seen):
     times = np.arange(0.0, 4.0, 1.0 / rate_hz)
     gap = np.interp(times, [0.0, 1.53, 1.59], [0.08, 0.06, 0.058])
     force = np.interp(times, [1.53, 1.59], [0.0, 8.0])
-    rows = zip(gap.tolist(), force.tolist(), force.tolist(), strict=True)
-    f = FEATURES.extract(made_trace(rows, dt=1.0 / rate_hz))
+    f = FEATURES.extract(made_trace(np.column_stack((gap, force, force)), dt=1.0 / rate_hz))
     assert f["f_steady"] == pytest.approx(8.0)
     assert f["p_steady"] == pytest.approx(0.058, abs=1e-4)
     assert math.isfinite(f["delta_t"]) == seen

@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 from attrs import evolve
+from traces import made_trace
 
 from graspsense.core.values.features import SHOWN
-from graspsense.core.values.signals import NO_GAP, Frame, Phase
-from graspsense.core.values.trace import SI_UNITS, trace_of
+from graspsense.core.values.signals import NO_GAP, Phase
+from graspsense.core.values.trace import SI_UNITS
 from graspsense.plugin_api import create
 from graspsense.testing.samples import squeeze
 
@@ -18,13 +19,7 @@ def extract(trace):
 
 
 def trace(t_s, gap, left, right):
-    frames = [
-        Frame(t, 0.01, g, 0.0, 0.0, force_n, other, math.nan, math.nan, 0)
-        for t, g, force_n, other in zip(
-            t_s.tolist(), gap.tolist(), left.tolist(), right.tolist(), strict=True
-        )
-    ]
-    return trace_of(frames, [Phase.APPROACH] * len(frames), [0.0] * len(frames), [])
+    return made_trace(np.column_stack((gap, left, right)), phase=Phase.APPROACH, t_s=t_s)
 
 
 def ramp():

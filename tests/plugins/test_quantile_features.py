@@ -1,13 +1,12 @@
 """Quantiles of gap and forces over the contact: known curves, uneven samples, units, grasps without contact."""
 
-import math
-
 import numpy as np
 import pytest
 from attrs import evolve
+from traces import made_trace
 
-from graspsense.core.values.signals import Frame, Phase
-from graspsense.core.values.trace import SI_UNITS, trace_of
+from graspsense.core.values.signals import Phase
+from graspsense.core.values.trace import SI_UNITS
 from graspsense.plugin_api import create
 from graspsense.testing.samples import squeeze
 
@@ -26,12 +25,8 @@ def spring(t_s=EVEN, units=SI_UNITS):
     """
     x = np.interp(t_s, [0.0, 0.4, 0.8], [0.0, 0.004, 0.0])
     gap = 0.060 - x + np.maximum(t_s - 0.8, 0.0) * 0.01
-    frames = [
-        Frame(t, 0.001, g, 0.0, 0.0, 4000.0 * d, 3600.0 * d, math.nan, math.nan, 0)
-        for t, g, d in zip(t_s.tolist(), gap.tolist(), x.tolist(), strict=True)
-    ]
     phase = np.where(t_s < 0.4, Phase.SQUEEZE, Phase.RELEASE)
-    return trace_of(frames, phase.tolist(), [0.0] * len(frames), [], units)
+    return made_trace(np.column_stack((gap, 4000.0 * x, 3600.0 * x)), phases=phase, units=units, t_s=t_s)
 
 
 def test_a_spring_that_is_squeezed_and_released_at_constant_speed():

@@ -83,7 +83,7 @@ def test_a_recording_with_pictures_is_read_like_the_recording(recording, tmp_pat
 
 def test_without_tactile_images_there_is_nothing_to_draw(tmp_path):
     write_recording(tmp_path / "g.mcap", ticks=0)
-    with pytest.raises(ConfigError, match="has no tactile images: export it without pictures"):
+    with pytest.raises(ConfigError, match=r"g\.mcap "):
         write_pictures(tmp_path / "p.mcap", read_recorded(tmp_path / "g.mcap"))
 
 

@@ -6,8 +6,6 @@ import math
 import os
 import signal
 import struct
-import subprocess
-import sys
 import time
 from collections import namedtuple
 from contextlib import contextmanager
@@ -15,6 +13,7 @@ from itertools import pairwise
 
 import pytest
 from cases import every_case
+from commands import python
 from kept import begun, command, ended, frame, pads, write_recording
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
@@ -112,7 +111,7 @@ def test_our_reader_gives_each_tick_with_the_image_it_had(tmp_path):
 def test_a_recording_that_is_being_written_has_another_name(tmp_path):
     file = write_recording(tmp_path / "g.mcap", finish=False)
     assert [path.name for path in tmp_path.iterdir()] == ["g.mcap.part"]
-    with pytest.raises(ConfigError, match="was never finished: graspsense recover"):
+    with pytest.raises(ConfigError, match=r"g\.mcap\.part.*graspsense recover"):
         read_recorded(tmp_path / "g.mcap")
     file.finish()
     assert [path.name for path in tmp_path.iterdir()] == ["g.mcap"]
@@ -125,7 +124,7 @@ def test_a_recording_is_never_written_over_another(tmp_path):
         RecordingWriter(tmp_path / "g.mcap")
     recorder = Recorder(tmp_path / "g.mcap")
     recorder.take(Reading(frame(0), pads(0)), 3, command(0))
-    with pytest.raises(SaveFailed, match="the recording already exists"):
+    with pytest.raises(SaveFailed, match=r"g\.mcap "):
         recorder.finish()
     assert (tmp_path / "g.mcap").read_bytes() == content
 
@@ -221,7 +220,7 @@ def test_a_recording_of_a_newer_layout_is_refused(tmp_path):
     file = RecordingWriter(tmp_path / "g.mcap")
     file.metadata(START, {**begun().section(START), "version": "3"})
     file.finish()
-    with pytest.raises(DataDamaged, match="version '3'; this graspsense reads version 2"):
+    with pytest.raises(DataDamaged, match=r"g\.mcap .*'3'.* 2$"):
         read_recorded(tmp_path / "g.mcap")
 
 
@@ -234,7 +233,7 @@ def test_somebody_else_s_mcap_is_no_recording_of_ours(tmp_path):
         channel = writer.register_channel("/imu", "json", 0)
         writer.add_message(channel, 0, json.dumps({"x": 1}).encode(), 0)
         writer.finish()
-    with pytest.raises(DataDamaged, match="it is not a recording of graspsense"):
+    with pytest.raises(DataDamaged, match=r"g\.mcap .*graspsense recover"):
         read_recorded(tmp_path / "g.mcap")
 
 
@@ -245,5 +244,5 @@ def test_the_writer_s_process_is_light_and_starts_in_any_folder(tmp_path):
         "import sys; sys.argv = ['x']; import graspsense.recording.writer_process; "
         "print([m for m in ('numpy', 'scipy', 'sklearn', 'sqlite3') if m in sys.modules])"
     )
-    done = subprocess.run([sys.executable, "-P", "-c", program], capture_output=True, text=True, cwd=tmp_path)
+    done = python("-P", "-c", program, cwd=tmp_path)
     assert (done.stdout, done.stderr) == ("[]\n", "")

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from cases import every_case
 from commands import graspsense
-from repository import ROOT, TESTS
+from repository import ROOT
 
 from graspsense.core.components.channels import from_json
 from graspsense.core.files.toml_text import MOST_NESTED, TomlError, toml_values
@@ -501,21 +497,3 @@ def test_arff_out_of_bounds_is_told_with_its_line(text):
     with pytest.raises(ArffError, match=r"<text>:\d+") as refused:
         parse_arff(text)
     assert len(str(refused.value)) < 2000
-
-
-# Fuzzing
-
-
-@pytest.mark.parametrize(
-    ("seed", "number"),
-    [pytest.param(1, 200, marks=pytest.mark.slow), pytest.param(2, 400, marks=pytest.mark.long)],
-)
-def test_changed_texts_are_answered_by_a_result_or_an_error_that_names_the_file(seed, number):
-    # A program that reads so many changed texts of each format, with a limit on its memory.
-    done = subprocess.run(
-        [sys.executable, TESTS / "hostile_tables.py", str(seed), str(number)], capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr[-2000:]
-    answers = json.loads(done.stdout)
-    assert answers["read"] == 10 * number
-    assert answers["bad"] == []

@@ -83,10 +83,10 @@ def test_features_are_relative_to_the_first_frame_and_the_variant_adds_it_back(f
 
 
 def test_a_folder_without_grasps_and_a_damaged_file(folder, tmp_path):
-    with pytest.raises(ConfigError, match="there is no folder"):
+    with pytest.raises(ConfigError, match="nowhere"):
         read(tmp_path / "nowhere")
     (tmp_path / "empty").mkdir()
-    with pytest.raises(ConfigError, match="contains no file of the iCub Grasp Dataset"):
+    with pytest.raises(ConfigError, match="empty "):
         read(tmp_path / "empty")
     (folder / "can_2.txt").write_text((folder / "can_2.txt").read_text()[:-40])
     trials = read(folder)
@@ -96,7 +96,7 @@ def test_a_folder_without_grasps_and_a_damaged_file(folder, tmp_path):
     )
     for path in folder.glob("*.txt"):
         path.write_text("nothing\n")
-    with pytest.raises(DataDamaged, match=r"none of 6 .*_1\.txt, line"):
+    with pytest.raises(DataDamaged, match=r" 6 .*can_1\.txt, line 1"):
         read(folder)
 
 

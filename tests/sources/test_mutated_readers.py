@@ -7,14 +7,12 @@ files of each format in the slow run.
 
 from __future__ import annotations
 
+import json
 import os
 import random
-import resource
 import shutil
-import signal
 import warnings
 from collections.abc import Callable
-from contextlib import contextmanager
 from pathlib import Path
 
 import mutated_files as change
@@ -26,16 +24,25 @@ from graspsense.core.components.registry import installed
 from graspsense.core.settings.layers import Flag
 from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.errors import GraspsenseError
+from graspsense.experiments.experiment_file import read_experiment
 from graspsense.recording.atomic_file import SaveFailed
+from graspsense.recording.export_trace import declared_beside
+from graspsense.recording.labelled_recording import UnreadableRecording
+from graspsense.recording.layout import TICK_FIELDS
 from graspsense.sources.importing.import_recording import import_recording
 from graspsense.sources.importing.import_sources import recordings_to_import
 from graspsense.sources.importing.import_summary import summary_of
+from graspsense.sources.manifest.reader import read_recordings
 from graspsense.sources.recordings.dataset_recordings import handed_over
+from graspsense.sources.recordings.exported_grasp import read_exported
+from graspsense.sources.recordings.grasp_csv import read_squeeze
 from graspsense.sources.recordings.noise_thresholds import thresholds_for
 from graspsense.sources.trial_source import load_trials
+from graspsense.sources.trial_table.features_csv import read_labelled
 from graspsense.store.imported_contents import AlreadyImported, ImportedContents
 from graspsense.store.store import Store
-from graspsense.store.verify import verify_store
+from graspsense_c45.arff import ArffError, read_arff
+from graspsense_sim_gripper.scene.library import find
 
 QUICK = 1
 SLOW = int(os.environ.get("GRASPSENSE_MUTATIONS", "0")) or 40
@@ -43,10 +50,8 @@ SLOWER = min(SLOW, 14)
 """Files of a format that takes long to open."""
 IMPORTED_OF = 4
 """One of so many of the recordings that can be read is imported as well."""
-MEMORY = 1_500_000_000
-"""Bytes that reading may take beside what the process has."""
-WORK_S = 60
-"""Seconds of the processor after which a reader is taken for one that does not end."""
+TEXT_WORK_S = 20
+"""Seconds of the processor that reading a text of some lines may take."""
 
 
 @frozen
@@ -81,38 +86,12 @@ FORMATS = {
 }  # fmt: skip
 
 
-class DoesNotEndError(BaseException):
-    """A reader works longer than any file needs; not an Exception, so that no reader takes it for a damaged file."""
-
-
-@contextmanager
-def bounded():
-    """Limit memory and work of what runs here."""
-
-    def stop(number, frame):
-        raise DoesNotEndError
-
-    used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
-    handler = signal.signal(signal.SIGVTALRM, stop)
-    resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY, hard))
-    signal.setitimer(signal.ITIMER_VIRTUAL, WORK_S)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
-    finally:
-        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
-        signal.signal(signal.SIGVTALRM, handler)
-        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
-
-
-def error_of(read, file):
+def error_of(read, file, *limits):
     """Return what an error of ours says of this file, empty if it is read. Any other error is raised with a note."""
     try:
-        with bounded():
+        with change.bounded(*limits):
             read()
-    except GraspsenseError as error:
+    except (GraspsenseError, ArffError) as error:
         return str(error)
     except BaseException as error:
         error.add_note(f"it is made again by GRASPSENSE_MUTATED={file}")
@@ -213,48 +192,118 @@ def test_many_of_each_format(name, tmp_path):
         check(name, number, pattern, tmp_path / "set")
 
 
-def check_store(number, pattern, folder):
-    shutil.rmtree(folder, ignore_errors=True)
-    shutil.copytree(pattern, folder)
-    rng = random.Random(f"store:{number}")
-    if rng.random() < 0.3:
-        change.mcap_file(rng.choice(sorted((folder / "recordings").iterdir())), rng)
-    else:
-        change.sqlite_file(folder / "store.sqlite", rng)
-    for read in (
-        lambda: verify_store(folder),
-        lambda: load_trials(f"store:{folder}"),
-        lambda: load_trials(f"store:{folder}", options=["features.force=left"]),
-    ):
-        told = error_of(read, f"store:{number}")
-        assert not told or str(folder) in told
+# Texts. Each has a reader; one of its files is changed, and an error names one of them.
+
+ROWS = "".join(f"{k * 0.01:.2f},{60 - k},{max(0, k - 5)},jar\n" for k in range(12))
+GRASP = "t,g,F,kind\n" + ROWS
+FEATURES = "label,instance,p_first [m],force\n" + "".join(
+    f"{'ab'[k % 2]},i{k % 4},{k % 5}.5,{k % 3}\n" for k in range(12)
+)
+MANIFEST = """files = "*.csv"
+time = "t"
+gap = "g [mm]"
+force = "max(F, 2*F - first(F))"
+zero = "2 samples"
+resample_hz = 50.0
+label = "{kind}"
+channels = { twice = "F*2 [counts]" }
+values = { peak = "peak(F) [N]" }
+"""
+STARTED = """files = ["{name}.csv"]
+start = "grasp (?P<label>[a-z]+) (?P<order>[0-9]+)"
+time = ["s", "t"]
+gap = "0.06 - 0.001*abs(g)"
+left = "F"
+right = "norm('F', g)"
+rate_hz = 100
+"""
+LIST = "file,label,first_row,last_row,order\ngrasp.csv,jar:full,1,9,3\ngrasp.csv,can,2,12,4\n"
+BY_LIST = 'list = "list.txt"\ntime = "t"\ngap = "g [mm]"\nforce = "F"\n'
+ARFF = "@relation grasps\n@attribute width numeric\n@attribute 'soft one' {yes, no}\n@attribute label {a, b}\n@data\n"
+ARFF += "0.1, yes, a\n0.2, ?, b\n{0 0.3, 2 b}, {2}\n"
+PIPELINE = 'extends = "default"\n[controller]\ntype = "hybrid"\nprobing_force_n = 15.0\n[run]\nseed = 3\n'
+EXPERIMENT = """title = "forces"
+seeds = [1, 2]
+classifiers = ["tree", { type = "forest", trees = 5 }]
+[controller]
+probing_force_n = 15.0
+[sweep]
+"controller.closing_speed_m_s" = [0.01, 0.02]
+[data]
+instances = 2
+trials = 2
+total = 20
+[judge]
+folds = 2
+grasps = 1
+"""
+SCENE = 'width_m = 0.06\nmass_kg = 0.1\nsummary = "cup"\n[[terms]]\ntype = "maxwell"\nk_n_m = 900.0\ntau_s = 0.2\n'
+DECLARED = json.dumps(
+    {
+        "channels": [],
+        "tables": [],
+        "cells": 22,
+        "device": "x",
+        "units": {},
+        "rate_hz": 100.0,
+        "has_release": True,
+    }
+)
+TICKS = ",".join(TICK_FIELDS) + "\n"
+TICKS += "".join(f"{k * 0.01:.2f}" + ",1" * (len(TICK_FIELDS) - 1) + "\n" for k in range(6))
 
 
-@pytest.mark.parametrize("count", [QUICK, pytest.param(SLOW, marks=pytest.mark.slow)])
-def test_stores(count, tmp_path):
-    write.store(tmp_path / "pattern")
-    for number in numbers("store", count):
-        check_store(number, tmp_path / "pattern", tmp_path / "set")
+def read_manifest(folder, rng):
+    for recording in read_recordings(str(folder / "manifest.toml")):
+        if isinstance(recording, UnreadableRecording):
+            told = f"{recording.source} {recording.error}"
+            assert isinstance(recording.error, GraspsenseError)
+            assert any(name in told for name in ("manifest", "grasp", "list.txt"))
 
 
-@pytest.mark.parametrize("count", [QUICK, pytest.param(SLOW, marks=pytest.mark.slow)])
-def test_manifests_and_lists(count, tmp_path):
-    for number in numbers("manifest", count):
-        rng = random.Random(f"manifest:{number}")
-        folder = tmp_path / "set"
-        shutil.rmtree(folder, ignore_errors=True)
-        folder.mkdir()
-        for name in ("good_1.csv", "good_2.csv"):
-            write.text(folder / name)
-        (folder / "list.csv").write_text("file,label,order\ngood_1.csv,a,1\ngood_2.csv,b,2\n")
-        text = write.TEXT_MANIFEST.format(ending="csv")
-        if number % 2:
-            text = text.replace('files = "{label}_{order:d}.csv"', 'list = "list.csv"')
-        (folder / "manifest.toml").write_text(text)
-        change.text_file(folder / ("list.csv" if number % 4 == 1 else "manifest.toml"), rng)
-        place = f"manifest:{folder / 'manifest.toml'}"
-        told = error_of(lambda place=place: load_trials(place), f"manifest:{number}")
-        assert not told or str(folder) in told or "good_" in told
+def read_grasp(folder, rng):
+    read_squeeze(f"{folder}/grasp.csv?time=t&gap=g*0.001&force=F")
+
+
+def read_features(folder, rng):
+    read_labelled(folder / "features.csv", "label", instance=rng.choice((None, "instance")))
+
+
+TEXTS = {
+    "manifest": ({"manifest.toml": MANIFEST, "grasp.csv": GRASP}, read_manifest),
+    "start": (
+        {"manifest.toml": STARTED, "grasp.csv": f"grasp jar 1\n{GRASP}grasp can 2\n{GRASP}"},
+        read_manifest,
+    ),
+    "list": ({"manifest.toml": BY_LIST, "list.txt": LIST, "grasp.csv": GRASP}, read_manifest),
+    "grasp": ({"grasp.csv": GRASP}, read_grasp),
+    "features": ({"features.csv": FEATURES}, read_features),
+    "exported": (
+        {"grasp.csv": TICKS, declared_beside(Path("grasp.csv")).name: DECLARED},
+        lambda folder, rng: read_exported(str(folder / "grasp.csv")),
+    ),
+    "arff": ({"grasps.arff": ARFF}, lambda folder, rng: read_arff(folder / "grasps.arff")),
+    "pipeline": ({"pipeline.toml": PIPELINE}, lambda folder, rng: resolve(str(folder / "pipeline.toml"))),
+    "experiment": ({"e.toml": EXPERIMENT}, lambda folder, rng: read_experiment(str(folder / "e.toml"))),
+    "scene": ({"scene.toml": SCENE}, lambda folder, rng: find(str(folder / "scene.toml"))),
+}
+
+
+@pytest.mark.parametrize(
+    "count",
+    [QUICK, pytest.param(5 * SLOW, marks=pytest.mark.slow), pytest.param(400, marks=pytest.mark.long)],
+)
+@pytest.mark.parametrize("name", TEXTS)
+def test_texts(name, count, tmp_path):
+    files, read = TEXTS[name]
+    for number in numbers(name, count):
+        rng = random.Random(f"{name}:{number}")
+        one_changed = rng.choice(sorted(files))
+        for file, text in files.items():
+            (tmp_path / file).write_bytes(change.text_of(text, rng) if file == one_changed else text.encode())
+        told = error_of(lambda rng=rng: read(tmp_path, rng), f"{name}:{number}", TEXT_WORK_S, "error")
+        assert not told or str(tmp_path) in told or any(file in told for file in files), told[:200]
+        assert len(told) < 100_000
 
 
 @pytest.mark.parametrize("count", [QUICK, pytest.param(SLOW, marks=pytest.mark.slow)])
@@ -263,7 +312,7 @@ def test_icub_files(count, tmp_path):
         for k in (1, 2):
             write.icub(tmp_path / f"can_{k}.txt")
         change.text_file(tmp_path / "can_2.txt", random.Random(f"icub:{number}"))
-        with bounded():
+        with change.bounded():
             assert "can" in load_trials(f"icub:{tmp_path}").labels
             recordings, unreadable = recordings_to_import([f"icub:{tmp_path}"], {}, None)
         assert len(recordings) + len(unreadable) == 2

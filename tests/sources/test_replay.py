@@ -346,25 +346,6 @@ def test_run_ends_a_recorded_grasp_with_outcome_and_features(tmp_path: Path) -> 
     assert any("times are frame numbers" in note for note in grasp["device"]["notes"])
 
 
-def test_run_over_before_contact_says_so(tmp_path: Path) -> None:
-    done = run(f"icub:{write(tmp_path / 'g.txt', *[frame_lines()] * 4)}")
-    assert done.returncode == 0, done.stderr
-    grasp = json.loads(done.stdout)
-    assert grasp["outcome"] == "nothing there"
-    assert "the recording ended before" in grasp["reason"]
-    assert set(grasp["features"].values()) == {None}
-
-
-def test_run_on_a_bad_file_is_no_traceback(tmp_path: Path) -> None:
-    path = tmp_path / "g.txt"
-    for exit_code in (2, 5):  # it is not there, and then it is empty
-        done = run(f"icub:{path}")
-        assert done.returncode == exit_code
-        assert str(path) in done.stderr
-        assert "Traceback" not in done.stderr
-        path.touch()
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "options",

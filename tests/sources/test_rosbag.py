@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -260,11 +261,11 @@ def test_bag_of_both_grippers_must_be_told_which(tmp_path: Path) -> None:
             motion(bag, BEGAN_S + 0.041 * i, 0.05 if side == "l" else 0.07, side)
     bag.close()
     path = str(tmp_path / "a.bag")
-    with pytest.raises(ConfigError, match="#l for the left"):
+    with pytest.raises(ConfigError, match=r"a\.bag#l .*a\.bag#r"):
         read_bag(path)
     assert {reading.frame.gap_m for reading in read_bag(path + "#l").readings} == {0.05}
     assert read_bag(path + "#r").readings[-1].pads.left[0] == 3507
-    with pytest.raises(ConfigError, match="write l or r after #"):
+    with pytest.raises(ConfigError, match=r"a\.bag#x"):
         read_bag(path + "#x")
 
 
@@ -274,12 +275,14 @@ def test_what_is_no_bag_is_told_apart(tmp_path: Path) -> None:
     (tmp_path / "text.bag").write_text("this is no bag\n")
     (tmp_path / "empty").mkdir()
     for name in ("text.bag", "empty"):
-        with pytest.raises(DataDamaged, match="cannot be read as a ROS bag"):
+        with pytest.raises(DataDamaged, match=re.escape(str(tmp_path / name))):
             read_bag(str(tmp_path / name))
     bag = Bag(tmp_path / "a.bag", 1)
     motion(bag, BEGAN_S)
     bag.close()
-    with pytest.raises(DataDamaged, match=r"no fingertips.*It has: /pr2_gripper_controller/state"):
+    with pytest.raises(
+        DataDamaged, match=r"a\.bag .*/pressure/l_gripper_motor.*/pr2_gripper_controller/state"
+    ):
         read_bag(str(tmp_path / "a.bag"))
 
 

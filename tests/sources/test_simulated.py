@@ -78,9 +78,7 @@ def test_a_gripper_without_default_objects_names_those_that_can_be_given(monkeyp
         "graspsense.sources.simulated.simulated_objects", lambda settings: (ObjectKind(name="foam"),)
     )
     settings = load_pipeline(options=["gripper.type=sim", "classifier.type=none"]).settings
-    with pytest.raises(
-        ConfigError, match="no kind of object of this gripper is a default: name objects, any of foam"
-    ):
+    with pytest.raises(ConfigError, match=r"foam$"):
         plan_trials(settings, [Group(instances=2, trials=1)], 0)
 
 

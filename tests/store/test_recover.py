@@ -157,12 +157,12 @@ def test_a_damaged_file_alone_is_written_anew_as_far_as_it_can_be_read(tmp_path)
 
 def test_what_needs_no_recovery_or_cannot_be_recovered_is_told(tmp_path):
     write_recording(tmp_path / "g.mcap", 30, ended())
-    with pytest.raises(ConfigError, match="is complete: there is nothing to recover"):
+    with pytest.raises(ConfigError, match=r"g\.mcap"):
         recover_file(tmp_path / "g.mcap")
     (tmp_path / "other.mcap").write_bytes(b"t,gap\n")
-    with pytest.raises(DataDamaged, match="no tick can be read from"):
+    with pytest.raises(DataDamaged, match=r"other\.mcap"):
         recover_file(tmp_path / "other.mcap")
-    with pytest.raises(ConfigError, match="there is no recording"):
+    with pytest.raises(ConfigError, match=r"nowhere\.mcap"):
         recover_file(tmp_path / "nowhere.mcap")
 
 

@@ -1,6 +1,7 @@
 """The store: what is kept is there, beside other programs, and a store that is not ours or newer is left alone."""
 
 import json
+import re
 import sqlite3
 import struct
 import subprocess
@@ -9,6 +10,7 @@ import threading
 from contextlib import closing, suppress
 
 import pytest
+from commands import python
 from kept import ended, keep, write_recording
 
 from graspsense.core.values.errors import ConfigError, DataDamaged
@@ -86,10 +88,10 @@ def test_only_complete_grasps_that_ended_by_themselves_count(store):
 
 
 def test_a_number_that_is_not_there_says_which_are(store):
-    with pytest.raises(ConfigError, match="it is empty"):
+    with pytest.raises(ConfigError, match=r"trials .*trial 1"):
         store.trial(1)
     keep(store)
-    with pytest.raises(ConfigError, match="has no trial 5: its trials are 1 to 1"):
+    with pytest.raises(ConfigError, match=r"trial 5.* 1 to 1"):
         set_aside(store, [5], "why")
 
 
@@ -103,9 +105,7 @@ def test_readers_read_beside_a_writer_in_another_process(store):
     )
     with store.transaction() as connection:
         connection.execute("UPDATE trial SET set_aside = 'pending'")
-        done = subprocess.run(
-            [sys.executable, "-c", program, str(store.folder)], capture_output=True, text=True, timeout=300
-        )
+        done = python("-c", program, store.folder)
     assert (done.stdout.strip(), done.stderr) == ("1", "")
 
 
@@ -223,7 +223,7 @@ def test_what_is_no_store_is_told_and_left_alone(store, content):
 
 
 def test_reading_makes_no_store(tmp_path):
-    with pytest.raises(ConfigError, match="there is no store in"):
+    with pytest.raises(ConfigError, match=r"nowhere.*store.sqlite"):
         Store.read(tmp_path / "nowhere")
     assert list(tmp_path.iterdir()) == []
 
@@ -232,7 +232,7 @@ def test_reading_makes_no_store(tmp_path):
 def test_a_row_cannot_name_a_file_outside_of_the_store(store, name):
     number = keep(store)
     store._connection.execute("UPDATE trial SET recording = ? WHERE id = ?", (name, number))
-    with pytest.raises(DataDamaged, match="is not a name of a recording"):
+    with pytest.raises(DataDamaged, match=re.escape(repr(name))):
         store.trial(number)
     assert any("is not a name of a recording" in problem for problem in verify_store(store.folder).problems)
 
@@ -322,7 +322,7 @@ def test_a_word_says_class_state_and_thing():
     assert labels_of("can:full_open") == {"label": "can:full_open"}
     assert labels_of("ball") == {"label": "ball"}
     for word in ("", "a b", "can:", "can:full:open", "unknown", "unknown:x", "#2"):
-        with pytest.raises(ConfigError, match="is not a label"):
+        with pytest.raises(ConfigError, match=re.escape(repr(word.partition(":x")[0]))):
             labels_of(word)
 
 

@@ -222,7 +222,7 @@ def test_a_row_that_somebody_else_changed_is_not_made_valid_by_a_new_label(store
     keep(store, "toy", device=REAL)
     store._connection.execute("UPDATE trial SET outcome = 'slipped'")
 
-    with pytest.raises(DataDamaged, match="changed after it was written"):
+    with pytest.raises(DataDamaged, match=r"my trials .*trial 1 "):
         changes.relabel(store, [1], labels_of("block"), "")
 
 
@@ -247,7 +247,7 @@ def test_a_store_in_which_everything_is_set_aside_says_so(store, tmp_path):
     keep(store)
     changes.set_aside(store, [1], "x")
 
-    with pytest.raises(ConfigError, match=r"no trial to export that is not set aside \(1 are\)"):
+    with pytest.raises(ConfigError, match=r"my trials .*\(1 "):
         trial_table(store.folder)
 
 

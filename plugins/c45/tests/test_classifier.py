@@ -95,7 +95,7 @@ def test_declared_classes_enter_the_tree():
     classifier = graspsense_c45.C45Classifier(classes=["c", "b", "a"]).fit(x, y)
     assert classifier.classes_.tolist() == ["c", "b", "a"]
     assert classifier.predict_proba(x)[0].tolist() == [0.0, 1.0, 0.0]
-    with pytest.raises(ValueError, match=r"not among them: \['b'\]"):
+    with pytest.raises(ValueError, match=r"\['b'\]"):
         graspsense_c45.C45Classifier(classes=["a"]).fit(x, y)
 
 
@@ -152,7 +152,7 @@ def test_mixed_columns():
         graspsense_c45.C45Classifier(nominal=[True, False]).fit(
             np.array([["r", "big"], ["g", "small"]], dtype=object), ["a", "b"]
         )
-    with pytest.raises(ValueError, match="names no columns"):
+    with pytest.raises(ValueError, match=r"\['shape'\]"):
         graspsense_c45.C45Classifier(nominal=["shape"]).fit(frame, y)
 
 
@@ -183,12 +183,12 @@ def test_hold_out_by_rows_by_folds_and_shuffled():
     assert shuffled[0] == shuffled[1] != shuffled[2]
     with pytest.raises(ValueError, match="holdout"):
         graspsense_c45.C45Classifier.paper().fit(x, y, holdout=[150])
-    with pytest.raises(ValueError, match="held_out goes with"):
+    with pytest.raises(ValueError, match=r"'reduced_error'.*'pessimistic'"):
         graspsense_c45.C45Classifier().fit(x, y, holdout=mask)
 
 
 def test_an_unknown_engine_option_is_refused():
-    with pytest.raises(ValueError, match="criterion is 'gini'"):
+    with pytest.raises(ValueError, match="'gini'"):
         graspsense_c45.C45Classifier(criterion="gini").fit([[0.0], [1.0]], [0, 1])
-    with pytest.raises(ValueError, match="engine is 'gpu'"):
+    with pytest.raises(ValueError, match="'gpu'"):
         graspsense_c45.C45Classifier(engine="gpu").fit([[0.0], [1.0]], [0, 1])

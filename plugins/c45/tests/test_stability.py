@@ -94,7 +94,7 @@ def test_whole_weights_are_repeated_rows():
 
 @pytest.mark.parametrize("value", [np.inf, -np.inf])
 def test_infinite_values_are_refused(value):
-    with pytest.raises(ValueError, match=r"infinite value .* row 1, column x0"):
+    with pytest.raises(ValueError, match="row 1, column x0"):
         table([[1.0], [value], [2.0]], [0, 1, 0])
     tree = fit(table([[0.0], [1.0]] * 4, [0, 1] * 4))
     with pytest.raises(ValueError, match="infinite"):
@@ -210,7 +210,7 @@ def test_held_out_rows_need_reduced_error_pruning():
         fit(table([[0.0], [1.0]], [0, 1]), Options(), np.array([0]))
     with pytest.raises(ValueError, match="all rows are held out"):
         fit(table([[0.0], [1.0]], [0, 1]), Options(pruning="reduced_error"), np.array([0, 1]))
-    with pytest.raises(ValueError, match="cannot be cut into 3 folds"):
+    with pytest.raises(ValueError, match=r"n_samples=2 .* 3 folds"):
         fit(table([[0.0], [1.0]], [0, 1]), Options(pruning="reduced_error"))
 
 
@@ -256,5 +256,5 @@ def test_weights_of_any_size_give_a_tree(factor, missing):
 
 
 def test_weights_that_overflow_are_refused():
-    with pytest.raises(ValueError, match="weights add up to more than 1e"):
+    with pytest.raises(ValueError, match=r"1e\+150"):
         table([[0.0], [1.0]], [0, 1], [1e308, 1e308])

@@ -4,15 +4,16 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
-from attrs import evolve
 from cases import every_case
 from commands import graspsense
 from hypothesis import example, given
 from hypothesis import strategies as st
+from traces import made_trace
 
 from graspsense import WiringError, load_pipeline
 from graspsense.gripper_api import LoadTable, asked_force
 from graspsense.plugin_api import (
+    APPROACH,
     FORCE,
     POSITION,
     VELOCITY,
@@ -23,7 +24,7 @@ from graspsense.plugin_api import (
     PluginUnavailable,
     create,
 )
-from graspsense.testing_api import a_trial, parametrize_checks
+from graspsense.testing_api import parametrize_checks
 from graspsense_franka_hand import link
 from graspsense_franka_hand.config import FrankaConfig
 from graspsense_franka_hand.discovery import diagnose
@@ -86,26 +87,15 @@ def test_less_than_the_least_force_is_refused_before_anything_moves():
         load_pipeline("franka", options=["controller.approach_force_n=10"])
 
 
-def _trace(times, gaps, phases):
-    trace = a_trial().trace
-    n = len(times)
-    missing = "velocity_m_s effort_n force_left_n force_right_n edge_left_n edge_right_n command"
-    columns = {name: np.full(n, np.nan) for name in missing.split()}
-    return evolve(
-        trace,
-        t_s=np.asarray(times),
-        gap_m=np.asarray(gaps),
-        phase=np.asarray(phases),
-        status=np.zeros(n, int),
-        **columns,
-    )
+def _trace(times, gaps):
+    return made_trace([(gap, np.nan, np.nan) for gap in gaps], phase=APPROACH, t_s=times)
 
 
 def test_the_features_are_those_of_the_widths():
     times = np.arange(30) / 15.0
     # 20 mm/s for 1 s to 40 mm, 6 states there, two states to 38 mm, and rest until the end.
     gaps = [0.06 - 0.02 * t for t in times[:15]] + [0.04] * 6 + [0.039] + [0.038] * 8
-    features = create("feature-set", "width-and-time").extract(_trace(times, gaps, [2] * 30))
+    features = create("feature-set", "width-and-time").extract(_trace(times, gaps))
     assert features["p_first"] == pytest.approx(0.04)
     assert features["p_steady"] == pytest.approx(0.038)
     assert features["squeezed"] == pytest.approx(0.002)
@@ -116,7 +106,7 @@ def test_the_features_are_those_of_the_widths():
 def test_fingers_that_still_move_have_no_last_rest():
     times = np.arange(26) / 15.0
     gaps = [0.06 - 0.02 * t for t in times[:15]] + [0.04] * 6 + [0.039, 0.037, 0.035, 0.033, 0.031]
-    features = create("feature-set", "width-and-time").extract(_trace(times, gaps, [2] * 26))
+    features = create("feature-set", "width-and-time").extract(_trace(times, gaps))
     assert features["p_first"] == pytest.approx(0.04)
     assert set(features.reasons) == {"p_steady", "squeezed", "delta_t"}
 

@@ -6,7 +6,7 @@ from contextlib import nullcontext
 from threading import Thread
 
 import pytest
-from emulated_grippers import PATIENT_S, assert_a_killed_program_lets_go
+from emulated_grippers import PATIENT_S, assert_a_killed_program_lets_go, plugged_in
 
 from graspsense import load_pipeline
 from graspsense.plugin_api import POSITION, Command, DeviceLost, NoDevice, create
@@ -25,18 +25,8 @@ OPENING = Command(POSITION, 0.08, 40.0, 0.05)
 
 @pytest.fixture
 def emulated():
-    """Makes emulated hands that are plugged in, and unplugs them."""
-    made = []
-
-    def make(**keys):
-        hand = EmulatedHand(FrankaConfig(host="emulated", **keys), 1)
-        made.append(hand)
-        hand.tell("plug")
-        return hand
-
-    yield make
-    for hand in made:
-        hand.close()
+    with plugged_in(lambda **keys: EmulatedHand(FrankaConfig(host="emulated", **keys), 1)) as make:
+        yield make
 
 
 def _driver(hand):

@@ -80,6 +80,20 @@ def test_a_grasp_commands_the_gripper_alone_and_leaves_it_free():
     assert not arm.connected
 
 
+def greatest_force_n(command, ticks, **keys):
+    """Return the greatest force (N) of a gripper with these settings that is commanded for so many ticks."""
+    driver = gripper(**keys)
+    driver.open(1)
+    (arm,) = FakeArm.made
+    forces = []
+    for _ in range(ticks):
+        driver.read(0.1)
+        driver.apply(command)
+        forces.append(arm.force_n)
+    driver.close()
+    return max(forces)
+
+
 @pytest.mark.parametrize("load", ["none", "Present_Load"])
 @pytest.mark.parametrize(
     ("kind", "value"),
@@ -87,30 +101,13 @@ def test_a_grasp_commands_the_gripper_alone_and_leaves_it_free():
     ids=["position", "velocity", "force"],
 )
 def test_no_command_squeezes_harder_than_its_limit(kind, value, load):
-    driver = gripper(load=load)
-    driver.open(1)
-    (arm,) = FakeArm.made
-    forces = []
-    for _ in range(120):
-        driver.read(0.1)
-        driver.apply(Command(kind, value, 6.0, 0.05))
-        forces.append(arm.force_n)
-    driver.close()
-    assert 4.0 < max(forces) <= 6.01
+    assert 4.0 < greatest_force_n(Command(kind, value, 6.0, 0.05), 120, load=load) <= 6.01
 
 
 def test_a_stronger_servo_than_declared_is_held_back_by_the_measured_load():
-    driver = gripper(newtons_per_metre=200.0)
-    driver.open(1)
-    (arm,) = FakeArm.made
-    forces = []
-    for _ in range(200):
-        driver.read(0.1)
-        driver.apply(Command(POSITION, 0.0, 6.0, 0.01))
-        forces.append(arm.force_n)
-    driver.close()
+    most_n = greatest_force_n(Command(POSITION, 0.0, 6.0, 0.01), 200, newtons_per_metre=200.0)
     # It notices after a frame, in which the target moves by 0.33 mm.
-    assert max(forces) <= 6.0 + 2.0 * 1000.0 * 0.01 / 30.0
+    assert most_n <= 6.0 + 2.0 * 1000.0 * 0.01 / 30.0
 
 
 def test_close_stops_the_fingers_where_they_are():

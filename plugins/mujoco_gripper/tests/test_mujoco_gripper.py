@@ -211,7 +211,7 @@ def test_a_model_includes_nothing_outside_of_its_folder(tmp_path, include):
     inside.mkdir()
     (tmp_path / "secret.xml").write_text("<mujocoinclude/>")
     (inside / "m.xml").write_text(f"<mujoco><include\n file='{include}'/></mujoco>")
-    with pytest.raises(ConfigError, match="outside of its folder"):
+    with pytest.raises(ConfigError, match=r"m\.xml includes (\.\./secret\.xml|/etc/hostname)"):
         opened(gripper_file(inside, inside / "m.xml"))
 
 
@@ -239,7 +239,7 @@ def test_a_thing_that_is_wider_than_the_opening_is_refused(tmp_path):
         '<mujoco><worldbody><body name="wide" gravcomp="1"><freejoint/>'
         '<geom type="box" size="0.06 0.02 0.02" mass="1"/></body></worldbody></mujoco>'
     )
-    with pytest.raises(ConfigError, match="wider than the opening"):
+    with pytest.raises(ConfigError, match=r"wide\.xml .*90\.0 mm"):
         opened("", str(tmp_path / "wide.xml"))
 
 
@@ -307,7 +307,7 @@ def test_what_is_no_finger_can_be_left_out_of_the_contacts(tmp_path):
 
 def test_fingers_that_are_not_opposed_are_refused(tmp_path):
     both = gripper_file(tmp_path, right='{ geoms = ["left_pad"] }')
-    with pytest.raises(ConfigError, match="part of both fingers"):
+    with pytest.raises(ConfigError, match="left_pad"):
         opened(both)
     away = gripper_file(
         tmp_path,

@@ -188,7 +188,7 @@ def test_each_bottle_may_be_used_in_one_state_only():
     ]
     assert all(len(labels) == 1 for labels in labels_by_bottle[1].values())
     assert all(len(labels) >= 3 for labels in labels_by_bottle[0].values())
-    with pytest.raises(ConfigError, match="3 instances cannot be in one of 4 states each"):
+    with pytest.raises(ConfigError, match=r"3 instances .* 4 states"):
         Group(objects=("odwalla",), instances=3, states_per_instance="one").planned(
             simulated_objects(every.settings)
         )

@@ -12,6 +12,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 from attrs import evolve
+from cases import every_case
 
 from graspsense import load_pipeline
 from graspsense.core.grasp.runner import run_grasp
@@ -95,18 +96,17 @@ def test_lost_reports_and_samples_that_the_board_missed_are_counted():
     assert stream.sampled == 17, "at least one more than the report holds"
 
 
-def test_samples_of_a_report_that_was_skipped_come_with_the_next_one(fed):
-    link = LockStepLink(fed(report(1, (1, 2)), report(2, (3, 4))), 1e-3)
+@every_case(
+    ("sequence", "later", "words", "sampled"),
+    [(2, (3, 4), (1, 2, 3, 4), 4), (3, (5, 6), (5, 6), 6)],
+)
+def test_samples_of_a_report_that_was_skipped_come_with_the_next_one_but_not_over_a_gap(
+    fed, sequence, later, words, sampled
+):
+    link = LockStepLink(fed(report(1, (1, 2)), report(sequence, later)), 1e-3)
     arrival = link.next(1e-3)
     assert arrival is not None
-    assert (arrival.words, arrival.sampled) == ((1, 2, 3, 4), 4)
-
-
-def test_samples_before_a_gap_are_not_joined_to_those_after_it(fed):
-    link = LockStepLink(fed(report(1, (1, 2)), report(3, (5, 6))), 1e-3)
-    arrival = link.next(1e-3)
-    assert arrival is not None
-    assert (arrival.words, arrival.sampled) == ((5, 6), 6)
+    assert (arrival.words, arrival.sampled) == (words, sampled)
 
 
 @pytest.mark.slow

@@ -82,7 +82,7 @@ def test_feature_report_that_is_none_is_no_gripper(machine, board, monkeypatch, 
     machine.plug("/dev/hidraw3", board())
     device = type(sys.modules[LIBRARY].device())
     monkeypatch.setattr(device, "get_feature_report", lambda *given: answer)
-    with pytest.raises(NoDevice, match="does not answer as a PR2 gripper"):
+    with pytest.raises(NoDevice, match="1209:0001"):
         Pr2Backend(Pr2Config()).open(0)
     assert machine.open_handles == []
 

@@ -78,7 +78,7 @@ def test_a_stalled_write_is_a_loss_within_a_second(opened, machine, monkeypatch)
     stalled = threading.Event()
     monkeypatch.setattr(type(machine.open_handles[0]), "write", lambda self, data: stalled.wait(60.0) and -1)
     began = time.monotonic()
-    with pytest.raises(DeviceLost, match=r"not accepted within 0\.25 s"):
+    with pytest.raises(DeviceLost, match=r"/dev/hidraw3.*0\.25 s"):
         opened.apply(RELAX)
     assert time.monotonic() - began < 30.0  # not the minute that the write takes
     stalled.set()
@@ -98,7 +98,7 @@ def test_writes_that_never_arrive_are_noticed_by_their_echo(machine, board):
             following(backend, machine)
             backend.apply(RELAX)
 
-    with pytest.raises(DeviceLost, match="takes no commands"):
+    with pytest.raises(DeviceLost, match=r"101 .* 0\.1 s"):
         commanding()
     backend.close()
 
@@ -145,7 +145,7 @@ def test_waiting_for_a_lost_gripper_ends(machine, board):
     machine.unplug("/dev/hidraw3")
     with pytest.raises(DeviceLost):
         backend.read(60.0)
-    with pytest.raises(NoDevice, match="with serial number 'L7'"):
+    with pytest.raises(NoDevice, match=r"1209:0001 .*'L7'"):
         backend.open(0)
 
 
@@ -157,7 +157,7 @@ def test_first_opening_does_not_wait(machine):
 
 def test_serial_of_the_usb_string_must_be_the_boards_own(machine, board):
     machine.plug("/dev/hidraw3", board(serial="R2"), "L7")
-    with pytest.raises(NoDevice, match="'R2', but the settings ask for 'L7'"):
+    with pytest.raises(NoDevice, match=r"'R2'.*'L7'"):
         Pr2Backend(Pr2Config(serial="L7")).open(0)
 
 

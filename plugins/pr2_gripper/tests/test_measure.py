@@ -128,13 +128,13 @@ def test_load_table_gives_newtons_of_the_load_cell_and_says_where_it_ends(device
 def test_steady_load_is_refused_against_the_stored_tare(device_identity):
     measure = Measure(device_identity(), Pr2Config(), (TIP, TIP), None)
     loaded = tuple(c + 400.0 if i >= 7 else c for i, c in enumerate(TIP))  # 15 cells x 400 = 3.75 N
-    with pytest.raises(TareRefused, match=r"right pad is \+3.75 N off its stored tare"):
+    with pytest.raises(TareRefused, match=r"right pad .*\+3\.75 N.*3\.0 N"):
         measure.tare([Pads(0.0, 1, TIP, loaded)])
 
 
 def test_without_a_stored_tare_an_improbable_zero_is_refused(device_identity):
     heavy = (4700.0,) * 22
-    with pytest.raises(TareRefused, match="4700 counts per cell"):
+    with pytest.raises(TareRefused, match=r"right pad .*4700.*4500"):
         Measure(device_identity(), Pr2Config(), None, None).tare([Pads(0.0, 1, TIP, heavy)])
     Measure(device_identity(), Pr2Config(), (heavy, heavy), None).tare([Pads(0.0, 1, heavy, heavy)])
 

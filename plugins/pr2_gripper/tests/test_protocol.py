@@ -216,10 +216,10 @@ def test_identity_that_means_nothing_is_refused(changes, what, device_identity):
 def test_another_protocol_says_which(device_identity):
     body = bytearray(encode_identity(device_identity())[:60])
     body[5] = 2
-    with pytest.raises(ProtocolError, match="protocol version 2, this driver version 1"):
+    with pytest.raises(ProtocolError, match=r"version 2.*version 1"):
         decode_identity(bytes(body) + struct.pack("<I", crc32(body)))
     body[1:5] = b"ABCD"
-    with pytest.raises(ProtocolError, match="no gripper of ours"):
+    with pytest.raises(ProtocolError, match="b'ABCD'"):
         decode_identity(bytes(body) + struct.pack("<I", crc32(body)))
 
 

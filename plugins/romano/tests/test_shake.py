@@ -4,13 +4,15 @@ import math
 
 import numpy as np
 import pytest
+from attrs import evolve
 from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
+from traces import made_trace
 
 from graspsense import load_pipeline
 from graspsense.cli.main import main
-from graspsense.plugin_api import HOLD, SQUEEZE, Trace, create
+from graspsense.plugin_api import HOLD, SQUEEZE, create
 from graspsense.testing_api import SampleTrace
 from graspsense_romano.shake import Signal, decay_1_s, peak_hz, rms
 
@@ -33,7 +35,6 @@ def grasp(acceleration=True, shake=True, held_s=HELD_S, pad_hz=RATE_HZ):
 
     imaged_s = np.floor(t_s * pad_hz) / pad_hz
     difference_n = CARRIED_KG * moved(imaged_s) + wobble(imaged_s)
-    none = np.full(len(t_s), np.nan)
     signals = {}
     if acceleration:
         axes = np.stack(
@@ -42,23 +43,9 @@ def grasp(acceleration=True, shake=True, held_s=HELD_S, pad_hz=RATE_HZ):
         signals["acceleration"] = SampleTrace(t_s=fast_s, values=axes)
     if shake:
         signals["shake"] = 0.008 * moved(t_s)
-    return Trace(
-        t_s=t_s,
-        gap_m=np.full(len(t_s), 0.05),
-        velocity_m_s=none,
-        effort_n=none,
-        force_left_n=6.0 + 0.5 * difference_n,
-        force_right_n=6.0 - 0.5 * difference_n,
-        edge_left_n=none,
-        edge_right_n=none,
-        status=np.zeros(len(t_s), int),
-        phase=np.where(t_s <= held_s, int(HOLD), int(SQUEEZE)),
-        command=none,
-        pad_t_s=np.zeros(0),
-        pad_left=np.zeros((0, 0)),
-        pad_right=np.zeros((0, 0)),
-        signals=signals,
-    )
+    rows = np.column_stack((np.full(len(t_s), 0.05), 6.0 + 0.5 * difference_n, 6.0 - 0.5 * difference_n))
+    trace = made_trace(rows, phases=np.where(t_s <= held_s, int(HOLD), int(SQUEEZE)), t_s=t_s)
+    return evolve(trace, signals=signals)
 
 
 def shaken(trace):

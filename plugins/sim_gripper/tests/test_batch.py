@@ -82,6 +82,13 @@ def bits(trace):
     )
 
 
+def many(scenes, seeds=None, config=None, law=HYBRID, **options):
+    """Run grasps of these scenes, by default with the seeds from 0 on, the default config and the hybrid law."""
+    return run_many(
+        config or SimConfig(), law, scenes, range(len(scenes)) if seeds is None else seeds, **options
+    )
+
+
 def mixed(n):
     return [SCENES[k % len(SCENES)] for k in range(n)], range(100, 100 + n)
 
@@ -99,8 +106,7 @@ def test_the_number_of_workers_decides_nothing_to_the_bit():
     pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
     scenes, seeds = mixed(3 * SLICE + 1)
     with_1, with_2, with_5 = (
-        run_many(SimConfig(), HYBRID, scenes, seeds, compiled=True, workers=w, extract=FEATURES.extract)
-        for w in (1, 2, 5)
+        many(scenes, seeds, compiled=True, workers=w, extract=FEATURES.extract) for w in (1, 2, 5)
     )
     for a, b, c in zip(with_1, with_2, with_5, strict=True):
         assert bits(a.trace) == bits(b.trace) == bits(c.trace)
@@ -108,8 +114,8 @@ def test_the_number_of_workers_decides_nothing_to_the_bit():
         assert a.state == b.state == c.state
     # What stands in the common composition for terms that an object lacks changes no bit, and is not handed back.
     odd = ["odwalla:full_open", "egg", "none"]
-    alone = run_many(SimConfig(), HYBRID, odd, range(3), compiled=False)
-    common = run_many(SimConfig(), HYBRID, odd, range(3), compiled=True)
+    alone = many(odd, compiled=False)
+    common = many(odd, compiled=True)
     for a, b in zip(alone, common, strict=True):
         np.testing.assert_allclose(b.trace.force_left_n, a.trace.force_left_n, rtol=1e-9, atol=1e-12)
         assert [type(state) for state in b.state.contact.left.states] == [
@@ -121,10 +127,8 @@ def test_the_number_of_workers_decides_nothing_to_the_bit():
 def test_what_is_drawn_may_keep_a_column_of_the_trace():
     pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
     scenes, seeds = mixed(SLICE)
-    kept = run_many(
-        SimConfig(), HYBRID, scenes, seeds, compiled=True, extract=lambda trace: trace.gap_m, traces=False
-    )
-    whole = run_many(SimConfig(), HYBRID, scenes, seeds, compiled=True)
+    kept = many(scenes, seeds, compiled=True, extract=lambda trace: trace.gap_m, traces=False)
+    whole = many(scenes, seeds, compiled=True)
 
     for grasp, other in zip(kept, whole, strict=True):
         assert grasp.kept is None
@@ -144,7 +148,7 @@ def test_features_without_traces_are_those_of_the_traces():
     settings = ({}, {"run": RunConfig(grasp_timeout_s=0.4)}, {"run": RunConfig(hold_s=0.0)})
     for options in settings:
         compiled, traced = (
-            run_many(SimConfig(), HYBRID, scenes, seeds, compiled=True, extract=how, traces=False, **options)
+            many(scenes, seeds, compiled=True, extract=how, traces=False, **options)
             for how in (FEATURES.extract, from_traces)
         )
         for grasp, other in zip(compiled, traced, strict=True):
@@ -171,7 +175,7 @@ def test_grasps_that_compiled_code_draws_are_those_of_their_setups(sensor, monke
     )
 
     def told(workers):
-        done = run_many(config, HYBRID, names, range(len(names)), workers=workers, **options)
+        done = many(names, config=config, workers=workers, **options)
         for grasp, name in zip(done, names, strict=True):
             of_state = model_report(grasp.state, kinds_in(name))
             assert {key: grasp.report()[key] for key in of_state} == of_state
@@ -241,10 +245,8 @@ def test_a_batch_ends_when_it_is_interrupted():
 @pytest.mark.slow
 def test_a_named_tuple_that_is_measured_comes_back_as_one():
     pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
-    done = run_many(
-        SimConfig(), HYBRID, ["block"] * 3, range(3), traces=False, compiled=True, extract=Largest()
-    )
-    traced = run_many(SimConfig(), HYBRID, ["block"] * 3, range(3), compiled=True)
+    done = many(["block"] * 3, traces=False, compiled=True, extract=Largest())
+    traced = many(["block"] * 3, compiled=True)
     for grasp, other in zip(done, traced, strict=True):
         assert grasp.extracted == ("Found", max(other.trace.force_left_n), float(len(other.trace.t_s)))
 
@@ -272,7 +274,7 @@ k_n_m = 2000.0
 def test_the_state_before_a_failure_is_computed_once_before_its_buffers_are_used_again(monkeypatch):
     monkeypatch.setitem(TERMS, "failing", Term(name="failing", summary="", params=Failing, law=no_number))
     config = SimConfig(sensor="ideal", fidelity="scene")
-    (grasp,) = run_many(config, HYBRID, [FAILS], [0], compiled=False, traces=False)
+    (grasp,) = many([FAILS], config=config, compiled=False, traces=False)
     assert grasp.outcome == Outcome.ABORTED
     assert grasp.end() is grasp.end()
 
@@ -316,9 +318,9 @@ def test_a_compiled_form_that_raises_is_not_hidden_and_hides_no_events():
 
     def extracted(where):
         options = {"traces": False, "compiled": True, "extract": Raising(where)}
-        return run_many(SimConfig(), HYBRID, ["block"], [0], **options)[0].extracted
+        return many(["block"], **options)[0].extracted
 
-    (traced,) = run_many(SimConfig(), HYBRID, ["block"], [0], compiled=True)
+    (traced,) = many(["block"], compiled=True)
     assert extracted("no ticks") == pytest.approx(traced.trace.force_left_n.mean())
     assert extracted("measure") == len(traced.trace.events) > 0
     with pytest.raises(RuntimeError, match="not these numbers"):
@@ -327,7 +329,7 @@ def test_a_compiled_form_that_raises_is_not_hidden_and_hides_no_events():
 
 def test_a_seed_is_a_whole_number():
     with pytest.raises(TypeError, match="float"):
-        run_many(SimConfig(), HYBRID, ["block"], [2.7], traces=False)
+        many(["block"], [2.7], traces=False)
 
 
 @pytest.mark.slow
@@ -339,10 +341,8 @@ def test_features_that_cannot_be_compiled_are_extracted_from_traces():
 
     features = Uncompilable(FEATURES.config)
     with pytest.warns(UserWarning, match="features are extracted from traces, which takes longer"):
-        done = run_many(
-            SimConfig(), HYBRID, ["egg"], [3], compiled=True, extract=features.extract, traces=False
-        )
-    plain = run_many(SimConfig(), HYBRID, ["egg"], [3], compiled=True, extract=FEATURES.extract)
+        done = many(["egg"], [3], compiled=True, extract=features.extract, traces=False)
+    plain = many(["egg"], [3], compiled=True, extract=FEATURES.extract)
     assert done[0].extracted == plain[0].extracted
 
 
@@ -359,9 +359,7 @@ def test_plain_grasps_in_processes_are_those_of_this_one_to_the_bit():
     n = 8
     scenes, seeds = mixed(n)
     told = []
-    apart = run_many(
-        SimConfig(),
-        HYBRID,
+    apart = many(
         scenes,
         seeds,
         compiled=False,
@@ -370,7 +368,7 @@ def test_plain_grasps_in_processes_are_those_of_this_one_to_the_bit():
         extract=lambda trace: (len(told) >= 0, FEATURES.extract(trace)),
         progress=lambda done, total: told.append((done, total)),
     )
-    here = run_many(SimConfig(), HYBRID, scenes, seeds, compiled=False, extract=FEATURES.extract)
+    here = many(scenes, seeds, compiled=False, extract=FEATURES.extract)
     for a, b in zip(apart, here, strict=True):
         assert bits(a.trace) == bits(b.trace)
         assert repr(a.extracted) == repr((True, b.extracted))
@@ -383,16 +381,7 @@ def test_plain_grasps_in_processes_are_those_of_this_one_to_the_bit():
 def test_processes_end_held_grasps_with_their_hold_too_where_no_release_is_read():
     scenes, seeds = mixed(8)
     apart, here = (
-        run_many(
-            SimConfig(),
-            HYBRID,
-            scenes,
-            seeds,
-            compiled=False,
-            workers=workers,
-            extract=FEATURES.extract,
-            traces=False,
-        )
+        many(scenes, seeds, compiled=False, workers=workers, extract=FEATURES.extract, traces=False)
         for workers in (2, 1)
     )
     assert [repr((grasp.state, grasp.extracted)) for grasp in apart] == [
@@ -406,9 +395,9 @@ def test_a_batch_takes_the_run_settings_as_the_runner_does():
     run = RunConfig(seed=4, hold_s=0.5)
     config = SimConfig(object="toy", fidelity="fixed", open_gap_m=0.06)
     alone = run_grasp(SimBackend(config), HYBRID, run).trace
-    among = run_many(config, HYBRID, ["toy"], [4], run=run)[0].trace
+    among = many(["toy"], [4], config=config, run=run)[0].trace
     assert bits(alone) == bits(among)
-    short = run_many(config, HYBRID, ["toy"], [4])[0].trace
+    short = many(["toy"], [4], config=config)[0].trace
     assert alone.t_s[-1] - short.t_s[-1] == pytest.approx(0.25, abs=0.02)
 
 
@@ -417,7 +406,7 @@ def test_a_law_that_never_ends_or_commands_no_number_is_ended_as_by_the_runner(s
     law = {"endless": Endless, "lost": Lost}[step](HYBRID.config)
     run = RunConfig(seed=1, grasp_timeout_s=0.2, opening_timeout_s=0.2)
     alone = run_grasp(SimBackend(SimConfig(object="none")), law, run)
-    among = run_many(SimConfig(), law, ["none"], [1], run=run)[0]
+    among = many(["none"], [1], law=law, run=run)[0]
     assert among.outcome == alone.outcome == Outcome.ABORTED
     assert among.reason == alone.reason
     assert says in among.reason
@@ -432,7 +421,7 @@ def test_a_law_no_other_process_can_find_runs_here_and_the_warning_says_so():
     law, n = Local(HYBRID.config), 3
     run = RunConfig(grasp_timeout_s=0.01, opening_timeout_s=0.1)
     with pytest.warns(UserWarning, match="on one core"):
-        done = run_many(SimConfig(), law, ["none"] * n, range(n), run=run, compiled=False, workers=2)
+        done = many(["none"] * n, law=law, run=run, compiled=False, workers=2)
     assert [grasp.outcome for grasp in done] == [Outcome.ABORTED] * n
 
 
@@ -494,7 +483,7 @@ def test_a_process_that_is_killed_leaves_its_grasps_to_this_one(monkeypatch):
     monkeypatch.setattr(threads, "PlainProcess", Doomed)
     run, n = RunConfig(grasp_timeout_s=0.01, opening_timeout_s=0.1), 3
     with pytest.warns(UserWarning, match="on one core: the process for plain grasps has ended"):
-        done = run_many(SimConfig(), HYBRID, ["none"] * n, range(n), run=run, compiled=False, workers=2)
+        done = many(["none"] * n, run=run, compiled=False, workers=2)
     assert [bits(grasp.trace) for grasp in done[:2]] == [
         bits(plainly(job(run=run), "none", k).trace) for k in (0, 1)
     ]
@@ -512,9 +501,9 @@ def test_what_is_not_all_in_names_and_values_is_not_handed_over():
     altered = create("controller", "hybrid")
     numbers = altered.params()
     altered.params = lambda: numbers._replace(ramp_s=numbers.ramp_s + 1.0)
-    with pytest.raises(NotHandedOver, match="hybrid with its settings has other numbers"):
+    with pytest.raises(NotHandedOver, match="graspsense/hybrid"):
         PlainProcess(Scenes(job(altered)))
-    with pytest.raises(NotHandedOver, match="Endless is not a controller that a plugin declares"):
+    with pytest.raises(NotHandedOver, match=r"test_batch\.Endless"):
         PlainProcess(Scenes(job(Endless(HYBRID.config))))
 
 
@@ -537,11 +526,11 @@ def test_what_fails_in_another_process_is_said():
 
     with IsolatedPlugins(Here), PlainProcess(Scenes(job(Endless(HYBRID.config)))) as process:
         for _ in range(2):
-            with pytest.raises(NotHandedOver, match="no controller named 'graspsense-test/endless'"):
+            with pytest.raises(NotHandedOver, match="'graspsense-test/endless'"):
                 process.run("none", 0)
     with (
         PlainProcess(Scenes(job())) as process,
-        pytest.raises(NotHandedOver, match="UnknownName: no object named 'blok'"),
+        pytest.raises(NotHandedOver, match=r"UnknownName: .*'blok'"),
     ):
         process.run("blok", 0)
 
@@ -559,7 +548,7 @@ def test_without_numba_the_plain_loop_runs_and_says_so(numba, monkeypatch, tmp_p
     monkeypatch.setattr(threads, "WORTH_COMPILING", 2)
     run = RunConfig(grasp_timeout_s=0.01, opening_timeout_s=0.1)
     with pytest.warns(UserWarning, match=r"plain Python on one core.*numba is not installed"):
-        done = run_many(SimConfig(), HYBRID, ["none"] * 2, [1, 2], run=run)
+        done = many(["none"] * 2, [1, 2], run=run)
     assert len(done) == 2
 
 
@@ -574,7 +563,7 @@ def test_few_grasps_are_compiled_only_if_their_code_is_on_disk_or_others_came_be
         monkeypatch.setattr(threads, "is_kept", lambda composition, step: kept)
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            run_many(SimConfig(open_gap_m=0.005), HYBRID, ["none"] * n, range(n))
+            many(["none"] * n, config=SimConfig(open_gap_m=0.005))
         return any("numba is not installed" in str(warning.message) for warning in caught)
 
     assert not is_compiled(1, kept=True)
@@ -601,12 +590,12 @@ def test_drawing_and_measuring_are_compiled_for_many_grasps_or_if_their_code_is_
 
 
 def test_room_is_made_on_the_way_without_beginning_again(monkeypatch):
-    whole = run_many(SimConfig(), HYBRID, ["toy"], [3])[0]
+    whole = many(["toy"], [3])[0]
     assert whole.model.chosen.steps.macro_tolerance > 0.0
     for ticks, images in ((100, 64), (700, buffers.IMAGES)):
         monkeypatch.setattr(buffers, "TICKS", ticks)
         monkeypatch.setattr(buffers, "IMAGES", images)
-        parts = run_many(SimConfig(), HYBRID, ["toy"], [3])[0]
+        parts = many(["toy"], [3])[0]
         assert bits(parts.trace) == bits(whole.trace)
         assert parts.state == whole.state
 
@@ -632,14 +621,8 @@ def test_an_option_nobody_knows_is_refused():
 
 def test_a_name_nobody_knows_is_refused_before_anything_runs():
     told = []
-    with pytest.raises(UnknownName, match="no object named 'blok'"):
-        run_many(
-            SimConfig(),
-            HYBRID,
-            ["block"] * 3 + ["blok"],
-            range(4),
-            progress=lambda *counts: told.append(counts),
-        )
+    with pytest.raises(UnknownName, match="'blok'"):
+        many(["block"] * 3 + ["blok"], range(4), progress=lambda *counts: told.append(counts))
     assert told == []
 
 
@@ -714,7 +697,7 @@ def test_after_a_batch_with_a_whole_number_another_one_may_have_a_fraction():
     config = SimConfig(sensor="ideal", fidelity="fixed")
     for effort_n in (4, 4.75):
         fast, plain = (
-            run_many(config, Pressing(effort_n), [SHELL_IN_SHELL], [1], compiled=compiled)[0]
+            many([SHELL_IN_SHELL], [1], config=config, law=Pressing(effort_n), compiled=compiled)[0]
             for compiled in (True, False)
         )
         assert plain.trace.command.max() == effort_n

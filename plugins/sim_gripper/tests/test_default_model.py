@@ -2,13 +2,11 @@
 
 import json
 import shlex
-import subprocess
-import sys
 from importlib.resources import files
 from pathlib import Path
 
 import pytest
-from commands import printed
+from commands import printed, python
 
 pytest.importorskip("graspsense_c45", reason="the default model is a tree of graspsense-c45")
 
@@ -158,9 +156,7 @@ def test_a_figure_is_printed_only_for_the_force_at_which_it_was_measured(force_n
 @pytest.mark.parametrize("name", ["default", "best"])
 def test_what_is_printed_holds_on_a_thousand_new_grasps(name):
     """Certainty by support and tenth, and sets by support, size and label: no row is off by more than chance."""
-    done = subprocess.run(
-        [sys.executable, BENCHMARK, name, "--seed", "7201"], capture_output=True, text=True, check=False
-    )
+    done = python(BENCHMARK, name, "--seed", "7201")
     assert done.returncode == 0, done.stdout + done.stderr
     assert "sets of one label" in done.stdout
 

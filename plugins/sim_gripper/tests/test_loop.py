@@ -132,7 +132,7 @@ def test_a_sum_of_many_terms_is_the_sum_of_each():
 
 
 def test_bind_refuses_what_it_cannot_bind():
-    with pytest.raises(TypeError, match="has no part named"):
+    with pytest.raises(TypeError, match="'nobody'"):
         bind(plain_only, nobody=1)
-    with pytest.raises(TypeError, match="not a plain function"):
+    with pytest.raises(TypeError, match="<built-in function len>"):
         bind(len)

@@ -10,6 +10,7 @@ from emulated_grippers import (
     assert_a_killed_program_lets_go,
     assert_lost_in_a_grasp,
     give_own_time,
+    plugged_in,
 )
 
 from graspsense import WiringError, load_pipeline
@@ -41,18 +42,8 @@ def own_time(monkeypatch):
 
 @pytest.fixture
 def emulated():
-    """Makes emulated arms that are plugged in, and unplugs them."""
-    made = []
-
-    def make(**keys):
-        arm = EmulatedArm(So101Config(port="emulated", **keys), "pty", 1)
-        made.append(arm)
-        arm.tell("plug")
-        return arm
-
-    yield make
-    for arm in made:
-        arm.close()
+    with plugged_in(lambda **keys: EmulatedArm(So101Config(port="emulated", **keys), "pty", 1)) as make:
+        yield make
 
 
 def driver_of(arm, **keys):
