@@ -6,7 +6,8 @@ A missing feature is the median of the training trials. Features and target are 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from importlib import import_module
 from typing import Any, Final
 
 import numpy as np
@@ -21,51 +22,30 @@ MOST_SCALED: Final = 1e30
 """The largest scaled feature: trees compute with 32 bits, distances with squares."""
 
 
-def _forest(seed: int, trials: int) -> Any:
-    from sklearn.ensemble import RandomForestRegressor
-
-    return RandomForestRegressor(n_estimators=100, random_state=seed)
-
-
-def _knn(seed: int, trials: int) -> Any:
-    from sklearn.neighbors import KNeighborsRegressor
-
-    return KNeighborsRegressor(n_neighbors=min(5, trials))
-
-
-def _mlp(seed: int, trials: int) -> Any:
-    from sklearn.neural_network import MLPRegressor
-
-    return MLPRegressor(hidden_layer_sizes=(20,), solver="lbfgs", alpha=0.01, max_iter=500, random_state=seed)
-
-
-def _ridge(seed: int, trials: int) -> Any:
-    from sklearn.linear_model import Ridge
-
-    return Ridge(alpha=1.0)
-
-
-def _svm(seed: int, trials: int) -> Any:
-    from sklearn.svm import SVR
-
-    return SVR(C=10.0)
-
-
-def _tree(seed: int, trials: int) -> Any:
-    from sklearn.tree import DecisionTreeRegressor
-
-    return DecisionTreeRegressor(min_samples_leaf=2, random_state=seed)
-
-
-ESTIMATORS: Final[Mapping[str, Callable[[int, int], Any]]] = {
-    "forest": _forest,
-    "knn": _knn,
-    "mlp": _mlp,
-    "ridge": _ridge,
-    "svm": _svm,
-    "tree": _tree,
+ESTIMATORS: Final[Mapping[str, tuple[str, Mapping[str, Any]]]] = {
+    "forest": ("ensemble.RandomForestRegressor", {"n_estimators": 100}),
+    "knn": ("neighbors.KNeighborsRegressor", {"n_neighbors": 5}),
+    "mlp": (
+        "neural_network.MLPRegressor",
+        {"hidden_layer_sizes": (20,), "solver": "lbfgs", "alpha": 0.01, "max_iter": 500},
+    ),
+    "ridge": ("linear_model.Ridge", {"alpha": 1.0}),
+    "svm": ("svm.SVR", {"C": 10.0}),
+    "tree": ("tree.DecisionTreeRegressor", {"min_samples_leaf": 2}),
 }
-"""Name to the function that makes the estimator from a seed and the number of training trials."""
+"""Name to the class in scikit-learn and its settings."""
+
+
+def _unfitted(name: str, seed: int, trials: int) -> Any:
+    """Return an estimator for so many training trials, which draws by this seed if it draws."""
+    target, settings = ESTIMATORS[name]
+    module, _, cls = target.rpartition(".")
+    estimator = getattr(import_module(f"sklearn.{module}"), cls)(**settings)
+    if "random_state" in estimator.get_params():
+        estimator.set_params(random_state=seed)
+    if "n_neighbors" in settings:
+        estimator.set_params(n_neighbors=min(settings["n_neighbors"], trials))
+    return estimator
 
 
 class FittedRegression:
@@ -90,7 +70,7 @@ class FittedRegression:
             SimpleImputer(strategy="median", keep_empty_features=True), StandardScaler()
         )
         self._estimator = TransformedTargetRegressor(
-            regressor=ESTIMATORS[name](seed, len(values)), transformer=StandardScaler()
+            regressor=_unfitted(name, seed, len(values)), transformer=StandardScaler()
         )
         with one_thread():
             self._estimator.fit(self._scaling.fit_transform(features), values)

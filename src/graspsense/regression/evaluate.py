@@ -6,9 +6,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cached_property, partial
 
 import numpy as np
-from attrs import frozen
+from attrs import define, field, frozen
 from numpy.typing import NDArray
 
 from graspsense.core.components.caller import option
@@ -19,7 +20,7 @@ from graspsense.evaluation.controls import PERMUTATIONS
 from graspsense.evaluation.evaluator import Progress
 from graspsense.evaluation.folds import INSTANCE_HELD_OUT, Folds, in_order, instance_held_out, stratified
 from graspsense.evaluation.gathered_warnings import gathered_warnings
-from graspsense.evaluation.intervals import MIN_INSTANCES, rate_of
+from graspsense.evaluation.intervals import MIN_INSTANCES, Difference, rate_of
 from graspsense.regression.estimators import FittedRegression, check_estimator
 from graspsense.regression.intervals import intervals_of
 from graspsense.regression.results import (
@@ -75,8 +76,8 @@ def evaluate_regression(
         features=tuple(zip(table.names, table.units, strict=True)),
         folds=folds,
         seed=seed,
-        protocol=headline.protocol,
-        headline=evaluator.error(headline.predicted),
+        protocol=headline.name,
+        headline=evaluator.error(headline),
         explained=evaluator.explained(),
         protocols=evaluator.protocols,
         controls=evaluator.controls,
@@ -93,14 +94,15 @@ def held_out_predictions(
     values: NDArray[np.float64],
     folds: Folds,
     seed: int,
-    step: Callable[[], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> NDArray[np.float64]:
     """Return the prediction of each trial by an estimator that was fitted to the trials of the other folds.
 
     Folds whose training trials are fewer than two are predicted by their mean.
     """
     predicted = np.empty(len(values))
-    for fold in np.unique(folds).tolist():
+    numbers = np.unique(folds).tolist()
+    for done, fold in enumerate(numbers, 1):
         test = folds == fold
         if int((~test).sum()) < 2:
             predicted[test] = values[~test].mean() if (~test).any() else values.mean()
@@ -108,8 +110,8 @@ def held_out_predictions(
             predicted[test] = FittedRegression(estimator, features[~test], values[~test], seed).predict(
                 features[test]
             )
-        if step is not None:
-            step()
+        if progress is not None:
+            progress(done, len(numbers))
     return predicted
 
 
@@ -122,66 +124,63 @@ def held_out_folds(labelled: Labelled, k: int, seed: int) -> Folds:
 
 
 @frozen(eq=False)
-class _Headline:
-    """The predictions that the headline is about, with their protocol and folds."""
+class _HeldOut:
+    """Predictions of held-out trials: by which protocol or control, in which folds, and of which trials."""
 
-    protocol: str
+    name: str
     predicted: NDArray[np.float64]
     folds: Folds
+    rows: Sequence[int]
 
 
+@define(eq=False)
 class _Evaluator:
     """The measurements of one evaluation."""
 
-    def __init__(
-        self,
-        estimator: str,
-        trials: Labelled,
-        values: NDArray[np.float64],
-        k: int,
-        seed: int,
-        progress: Progress | None,
-    ) -> None:
-        self.estimator, self.trials, self.values = estimator, trials, values
-        self.k, self.seed, self.progress = k, seed, progress
-        several = trials.instances is not None and len(set(trials.instances)) > 1
-        self.instances = trials.instances if several else None
-        self.plain_name = f"{k}_fold"
-        self.protocols: dict[str, RegressionMeasurement] = {}
-        self.controls: dict[str, RegressionMeasurement] = {}
-        self._errors: dict[str, tuple[NDArray[np.float64], list[int]]] = {}
-        """The errors of the controls with other features and of the mean, and the trials that these are of."""
+    estimator: str
+    trials: Labelled
+    values: NDArray[np.float64]
+    k: int
+    seed: int
+    progress: Progress | None
+    held_out: dict[str, _HeldOut] = field(factory=dict)
+    protocols: dict[str, RegressionMeasurement] = field(factory=dict)
+    controls: dict[str, RegressionMeasurement] = field(factory=dict)
+    plain: _HeldOut = field(init=False)
+    headline: _HeldOut = field(init=False)
+    mean: _HeldOut = field(init=False)
+
+    @cached_property
+    def instances(self) -> tuple[str, ...] | None:
+        """The instances, where there are several."""
+        named = self.trials.instances
+        return None if named is None or len(set(named)) < 2 else named
 
     def measure_protocols(self) -> None:
         """Measure the error under each protocol. The headline holds out whole instances if they are known."""
         alike = [""] * len(self.values)
-        folds = stratified(alike, self.k, self.seed)
-        plain = self._predicted(self.plain_name, self.trials.table.values, folds)
-        self.plain = _Headline(self.plain_name, plain, folds)
+        self.plain = self.headline = self._predicted(f"{self.k}_fold", stratified(alike, self.k, self.seed))
         what = f"at most {self.k} folds of whole instances: no model was trained on the object that it is tested on"
         if self.instances is None:
-            self.headline = self.plain
             reason = self.trials.no_instances or "no instances are named"
             self.protocols[INSTANCE_HELD_OUT] = RegressionMeasurement(what=what, reason=reason)
         else:
-            held = instance_held_out(alike, self.instances, self.k, self.seed)
-            predicted = self._predicted(INSTANCE_HELD_OUT, self.trials.table.values, held)
-            self.headline = _Headline(INSTANCE_HELD_OUT, predicted, held)
-            self.protocols[INSTANCE_HELD_OUT] = self._against(what, predicted, self.plain)
-        self.protocols[self.plain_name] = RegressionMeasurement(
-            what=f"{self.k} folds of shuffled trials", error=self.error(plain)
+            folds = instance_held_out(alike, self.instances, self.k, self.seed)
+            self.headline = self._predicted(INSTANCE_HELD_OUT, folds)
+            self.protocols[INSTANCE_HELD_OUT] = self._against(what, self.headline, self.plain)
+        self.protocols[self.plain.name] = RegressionMeasurement(
+            what=f"{self.k} folds of shuffled trials", error=self.error(self.plain)
         )
 
     def measure_controls(self, permutations: int) -> None:
         """Measure what the number can be predicted from besides the squeeze."""
-        trials = self.trials
+        trials, folds = self.trials, self.headline.folds
         mean = np.empty(len(self.values))
-        for fold in np.unique(self.headline.folds).tolist():
-            test = self.headline.folds == fold
-            mean[test] = self.values[~test].mean()
-        self._errors["mean_only"] = (mean - self.values, list(range(len(mean))))
+        for fold in np.unique(folds).tolist():
+            mean[folds == fold] = self.values[folds != fold].mean()
+        self.mean = _HeldOut("mean_only", mean, folds, self.headline.rows)
         self.controls["mean_only"] = self._against(
-            "always the mean of the training trials", mean, self.headline
+            "always the mean of the training trials", self.mean, self.headline
         )
         self._other_features("width_only", trials.width, "the width alone", trials.no_width)
         self._other_features(
@@ -196,18 +195,17 @@ class _Evaluator:
         self._in_order()
         self._shuffled(permutations)
 
-    def error(self, predicted: NDArray[np.float64], rows: Sequence[int] | None = None) -> RegressionError:
-        """Return the error of these predictions, among these trials (default: all)."""
-        rows = range(len(self.values)) if rows is None else rows
-        errors = (predicted - self.values).tolist()
-        return error_of([errors[i] for i in rows], self._instances_of(rows), self.k)
+    def error(self, held: _HeldOut) -> RegressionError:
+        """Return the error of these predictions."""
+        errors = (held.predicted - self.values)[held.rows]
+        return error_of(errors.tolist(), self._instances_of(held.rows), self.k)
 
     def explained(self) -> float | None:
         """Return 1 minus the squared errors over those of the mean."""
-        mean = float((self._errors["mean_only"][0] ** 2).sum())
-        return (
-            None if mean == 0.0 else 1.0 - float(((self.headline.predicted - self.values) ** 2).sum()) / mean
+        ours, mean = (
+            float(((held.predicted - self.values) ** 2).sum()) for held in (self.headline, self.mean)
         )
+        return None if mean == 0.0 else 1.0 - ours / mean
 
     def interval_coverage(self) -> IntervalCoverage:
         """Return how often prediction intervals contain the true number; each fold is calibrated by the others."""
@@ -240,10 +238,10 @@ class _Evaluator:
             ("before_contact", "before contact"),
             ("first_line", "the first line of the recording"),
         ):
-            control = self.controls.get(name)
-            if control is not None and control.error is not None and self._beats_mean(name):
+            held = self.held_out.get(name)
+            if held is not None and self._difference(self.mean, held).is_positive:
                 texts.append(
-                    f"from {when} alone the error is {control.error.words(unit)}, below that of the mean: the "
+                    f"from {when} alone the error is {self.error(held).words(unit)}, below that of the mean: the "
                     "recording itself reveals the number"
                 )
         width = self.controls["width_only"]
@@ -261,49 +259,40 @@ class _Evaluator:
                 texts.append(f"the error of {name} is larger by {by.value:.4g} {unit}".rstrip() + f": {why}")
         return texts
 
-    def _beats_mean(self, name: str) -> bool:
-        errors, rows = self._errors[name]
-        mean = self._errors["mean_only"][0]
-        return difference_of_errors(
-            [mean[i] for i in rows], [errors[i] for i in rows], self._instances_of(rows)
-        ).is_positive
-
     def _instances_of(self, rows: Sequence[int]) -> list[str] | None:
         return None if self.instances is None else [self.instances[i] for i in rows]
 
     def _predicted(
         self,
         name: str,
-        features: NDArray[np.float64],
         folds: Folds,
-        values: NDArray[np.float64] | None = None,
-    ) -> NDArray[np.float64]:
-        total, done = len(np.unique(folds)), 0
-
-        def step() -> None:
-            nonlocal done
-            done += 1
-            if self.progress is not None:
-                self.progress(name, done, total)
-
-        given = self.values if values is None else values
-        return held_out_predictions(self.estimator, features, given, folds, self.seed, step)
-
-    def _against(
-        self,
-        what: str,
-        predicted: NDArray[np.float64],
-        other: _Headline,
+        features: NDArray[np.float64] | None = None,
         rows: Sequence[int] | None = None,
-    ) -> RegressionMeasurement:
-        """Return the error with its difference to another protocol, both on these trials (default: all)."""
-        rows = range(len(self.values)) if rows is None else rows
-        errors, others = predicted - self.values, other.predicted - self.values
-        by = difference_of_errors(
-            [errors[i] for i in rows], [others[i] for i in rows], self._instances_of(rows)
+        values: NDArray[np.float64] | None = None,
+    ) -> _HeldOut:
+        """Cross-validate and report progress under this name. `rows`: the trials that take part (default: all)."""
+        features = self.trials.table.values if features is None else features
+        values = self.values if values is None else values
+        rows = range(len(values)) if rows is None else rows
+        tell = None if self.progress is None else partial(self.progress, name)
+        predicted = np.full(len(values), np.nan)
+        predicted[rows] = held_out_predictions(
+            self.estimator, features[rows], values[rows], folds[rows], self.seed, tell
         )
+        held = self.held_out[name] = _HeldOut(name, predicted, folds, rows)
+        return held
+
+    def _difference(self, minuend: _HeldOut, subtrahend: _HeldOut) -> Difference:
+        """Return the difference of two errors, on the trials of which there are both predictions."""
+        rows = min(minuend.rows, subtrahend.rows, key=len)
+        errors, others = ((held.predicted - self.values)[rows] for held in (minuend, subtrahend))
+        return difference_of_errors(errors.tolist(), others.tolist(), self._instances_of(rows))
+
+    def _against(self, what: str, held: _HeldOut, other: _HeldOut) -> RegressionMeasurement:
+        """Return the error with its difference to another protocol."""
+        by = self._difference(held, other)
         return RegressionMeasurement(
-            what=what, error=self.error(predicted, rows), difference=by, difference_of=other.protocol
+            what=what, error=self.error(held), difference=by, difference_of=other.name
         )
 
     def _other_features(self, name: str, control: ControlFeatures | None, default: str, reason: str) -> None:
@@ -313,19 +302,18 @@ class _Evaluator:
                 what=default, reason=reason or "these trials have no such features"
             )
             return
-        having = control.having
-        n, total, words = int(having.sum()), len(having), control.having_words
-        folds = self.headline.folds[having]
-        if n == 0 or len(np.unique(folds)) < 2:
-            too_few = "; these are too few to learn from" if n else ""
+        rows, words, folds = (
+            np.flatnonzero(control.having).tolist(),
+            control.having_words,
+            self.headline.folds,
+        )
+        if not rows or len(np.unique(folds[rows])) < 2:
+            too_few = "; these are too few to learn from" if rows else ""
             self.controls[name] = RegressionMeasurement(what=control.what, reason=f"{words}{too_few}")
             return
-        predicted = np.full(total, np.nan)
-        predicted[having] = self._predicted(name, control.table.values[having], folds, self.values[having])
-        rows = np.flatnonzero(having).tolist()
-        self._errors[name] = (predicted - self.values, rows)
-        what = control.what if n == total else f"{control.what}; {words}"
-        self.controls[name] = self._against(what, predicted, self.headline, rows)
+        held = self._predicted(name, folds, control.table.values, rows)
+        what = control.what if len(rows) == len(self.values) else f"{control.what}; {words}"
+        self.controls[name] = self._against(what, held, self.headline)
 
     def _in_order(self) -> None:
         what = f"{self.k} folds; each is a block of trials in the order of recording"
@@ -334,8 +322,8 @@ class _Evaluator:
             self.controls["recording_order"] = RegressionMeasurement(what=what, reason=reason)
             return
         folds = in_order([""] * len(self.values), self.trials.order, self.k)
-        predicted = self._predicted("recording_order", self.trials.table.values, folds)
-        self.controls["recording_order"] = self._against(what, predicted, self.plain)
+        held = self._predicted("recording_order", folds)
+        self.controls["recording_order"] = self._against(what, held, self.plain)
 
     def _shuffled(self, permutations: int) -> None:
         """Measure the error on numbers that are exchanged among instances, and the permutation p of the headline."""
@@ -344,9 +332,9 @@ class _Evaluator:
         for k in range(permutations):
             values = self._permuted(rng)
             name = f"shuffled_values {k + 1}/{permutations}"
-            predicted = self._predicted(name, self.trials.table.values, self.headline.folds, values)
-            means.append(float(np.abs(predicted - values).mean()))
-        reached = self.error(self.headline.predicted).mean_absolute
+            held = self._predicted(name, self.headline.folds, values=values)
+            means.append(float(np.abs(held.predicted - values).mean()))
+        reached = self.error(self.headline).mean_absolute
         p = None
         if permutations >= PERMUTATIONS:
             p = (sum(mean <= reached for mean in means) + 1) / (len(means) + 1)

@@ -26,6 +26,17 @@ def of_protocol(summary: Summary, protocol: Protocol) -> Summary:
     )
 
 
+def by_protocol(
+    summary: Summary, experiment: str, target: str, settings: Mapping[str, Any] | None = None
+) -> dict[Protocol, ConditionResult]:
+    """Return the condition of a case under each protocol that there are results for."""
+    return {
+        protocol: condition
+        for protocol in PROTOCOLS
+        if (condition := condition_result(of_protocol(summary, protocol), experiment, target, settings))
+    }
+
+
 def condition_result(
     summary: Summary,
     experiment: str,

@@ -5,6 +5,9 @@ from __future__ import annotations
 import statistics
 from collections import Counter
 from collections.abc import Sequence
+from itertools import product
+
+from attrs import asdict
 
 from graspsense.experiment_api import (
     CONTROLS,
@@ -29,7 +32,7 @@ from graspsense.experiment_api import (
 )
 from graspsense_paper import claims as claimed
 from graspsense_paper.basis import BASES
-from graspsense_paper.cases import PROTOCOLS, condition_result, of_protocol
+from graspsense_paper.cases import PROTOCOLS, by_protocol
 from graspsense_paper.claims import Claim, claims, curve
 from graspsense_paper.grasp_result import grasp_results
 from graspsense_paper.published import Published, published
@@ -81,7 +84,7 @@ def findings(summary: Summary) -> Findings:
         sections=tuple(_sections(summary, paper)),
         values={
             "rows": [row.as_json() for row in held],
-            "claims": [claim.as_json() for claim in checked],
+            "claims": [asdict(claim) for claim in checked],
             "fitted_parameters": list(paper.fitted.parameters),
         },
     )
@@ -90,10 +93,9 @@ def findings(summary: Summary) -> Findings:
 def _people_tables(summary: Summary, paper: Published) -> list[FoundTable]:
     """Return the rate of each state: people, the robot of the paper, and ours; nothing if there are no results."""
     robots = [
-        (words, robot)
+        (PROTOCOLS[protocol], robot)
         for name in ("table_5", "table_6")
-        for protocol, words in PROTOCOLS.items()
-        if (robot := condition_result(of_protocol(summary, protocol), name, "state")) is not None
+        for protocol, robot in by_protocol(summary, name, "state").items()
     ]
     if not robots:
         return []
@@ -112,19 +114,14 @@ def _people_tables(summary: Summary, paper: Published) -> list[FoundTable]:
 def _answer(held: Sequence[RateComparison], checked: Sequence[Claim]) -> str:
     """Return how many rates and claims agree with the paper, for each basis. Nothing is counted twice."""
     parts = []
-    for basis in BASES:
-        by_protocol = []
-        for protocol, words in PROTOCOLS.items():
-            rates = [
-                row.verdict
-                for row in held
-                if row.basis == basis and row.protocol == protocol and not row.published.repeats
-            ]
-            if rates:
-                by_protocol.append(
-                    f"of {len(rates)} {basis} rates with each bottle in {words}, {counted(rates)}"
-                )
-        parts += by_protocol
+    for basis, (protocol, words) in product(BASES, PROTOCOLS.items()):
+        rates = [
+            row.verdict
+            for row in held
+            if row.basis == basis and row.protocol == protocol and not row.published.repeats
+        ]
+        if rates:
+            parts.append(f"of {len(rates)} {basis} rates with each bottle in {words}, {counted(rates)}")
     for basis in BASES:
         verdicts = [claim.verdict for claim in _counted_once(held, checked) if claim.basis == basis]
         if verdicts:
@@ -161,17 +158,14 @@ def _controls_table(summary: Summary, held: Sequence[RateComparison]) -> FoundTa
     lines: list[tuple[str, ...]] = []
     for row in held:
         published = row.published
-        condition = condition_result(
-            of_protocol(summary, row.protocol), published.experiment, published.target, published.settings
-        )
-        if condition is None or not condition.controls or published.repeats:
+        condition = by_protocol(summary, published.experiment, published.target, published.settings)[
+            row.protocol
+        ]
+        if not condition.controls or published.repeats:
             continue
-        key = (
+        line = (
             published.experiment,
             published.what.partition(", ")[2] if published.class_ else published.what,
-        )
-        line = (
-            *key,
             PROTOCOLS[row.protocol],
             sample(condition.rate),
             percent(condition.rate.mean),
@@ -204,17 +198,14 @@ def _matrix_tables(summary: Summary, paper: Published) -> list[FoundTable]:
             for label, row in zip(theirs.labels, theirs.confusion.counts, strict=True)
         ]
         ours = []
-        for protocol, words in PROTOCOLS.items():
-            condition = condition_result(of_protocol(summary, protocol), id_, target)
-            if condition is None or condition.case.data.states_per_instance != protocol:
-                continue
+        for protocol, condition in by_protocol(summary, id_, target).items():
             confusion, seeds = condition.confusion, len(condition.by_seed)
             place = {label.rpartition(":")[2]: k for k, label in enumerate(confusion.labels)}
-            if set(place) != set(theirs.labels):
+            if condition.case.data.states_per_instance != protocol or set(place) != set(theirs.labels):
                 continue
             ours += [
                 (
-                    f"ours, {words}",
+                    f"ours, {PROTOCOLS[protocol]}",
                     a.replace("_", " "),
                     *(f"{confusion.counts[place[a]][place[b]] / seeds:.1f}" for b in theirs.labels),
                 )
@@ -331,11 +322,6 @@ def _sections(summary: Summary, paper: Published) -> list[Section]:
 def _matrices(summary: Summary, paper: Published) -> str:
     body = []
     for id_, target in (("table_2", "class"), ("table_5", "state")):
-        conditions = [
-            (words, condition)
-            for protocol, words in PROTOCOLS.items()
-            if (condition := condition_result(of_protocol(summary, protocol), id_, target)) is not None
-        ]
         theirs = paper.matrix(id_)
         body += [
             pair(
@@ -344,12 +330,12 @@ def _matrices(summary: Summary, paper: Published) -> str:
                 ),
                 confusion_table(
                     condition.confusion,
-                    f"Ours, each bottle in {words}, {condition.confusion.n} predictions of "
+                    f"Ours, each bottle in {PROTOCOLS[protocol]}, {condition.confusion.n} predictions of "
                     f"{len(condition.by_seed)} seeds.",
                 ),
             )
             + paragraph(theirs.note)
-            for words, condition in conditions
+            for protocol, condition in by_protocol(summary, id_, target).items()
         ]
     if body:
         theirs = paper.matrix("table_6")

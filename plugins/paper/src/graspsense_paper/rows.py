@@ -8,9 +8,18 @@ from typing import Any, Final
 
 from attrs import frozen
 
-from graspsense.experiment_api import ConditionResult, OverSeeds, Summary, counted, percent, span, wilson
+from graspsense.experiment_api import (
+    ConditionResult,
+    Confusion,
+    OverSeeds,
+    Summary,
+    counted,
+    percent,
+    span,
+    wilson,
+)
 from graspsense_paper.basis import Basis, basis
-from graspsense_paper.cases import PROTOCOLS, Protocol, condition_result, of_protocol
+from graspsense_paper.cases import PROTOCOLS, Protocol, by_protocol
 from graspsense_paper.published import Published, PublishedRate
 from graspsense_paper.verdict import AGREES, DIFFERS, UNTOLD, Verdict, within
 
@@ -135,11 +144,9 @@ def rows(summary: Summary, paper: Published) -> list[RateComparison]:
     """Return a comparison for each published rate and protocol that there are results for."""
     compared = []
     for rate in paper.rates:
-        for protocol in PROTOCOLS:
-            condition = condition_result(
-                of_protocol(summary, protocol), rate.experiment, rate.target, rate.settings
-            )
-            if condition is None or condition.case.data.states_per_instance != protocol:
+        conditions = by_protocol(summary, rate.experiment, rate.target, rate.settings)
+        for protocol, condition in conditions.items():
+            if condition.case.data.states_per_instance != protocol:
                 continue
             rates = of_class(condition, rate.class_) if rate.class_ else condition.rate
             if rates is not None:
@@ -171,36 +178,29 @@ def people_beside_robot(paper: Published, robots: Sequence[ConditionResult]) -> 
     """Return one row per state: people (Table VI), the robot of the paper (Table V), and ours at 23 N by protocol."""
     people, theirs = paper.matrix("table_6").confusion, paper.matrix("table_5").confusion
     lines: list[tuple[str, ...]] = []
-    for i, state in enumerate(people.labels):
-        right, total = people.counts[i][i], sum(people.counts[i])
-        k = theirs.labels.index(state)
-        right2, of2 = theirs.counts[k][k], sum(theirs.counts[k])
-        ours = [_of_state(robot, state) for robot in robots]
-        lines.append(
-            (
-                state.replace("_", " "),
-                f"{right}/{total} = {percent(right / total)} ({span(wilson(right, total))})",
-                f"{right2}/{of2} = {percent(right2 / of2)} ({span(wilson(right2, of2))})",
-                *(f"{percent(rates.mean)} ({span(rates.interval)})" for rates in ours),
-            )
-        )
-    right, right2 = people.correct, theirs.correct
-    lines.append(
-        (
-            "all",
-            f"{right}/{people.n} = {percent(right / people.n)} ({span(wilson(right, people.n))})",
-            f"{right2}/{theirs.n} = {percent(right2 / theirs.n)} ({span(wilson(right2, theirs.n))})",
-            *(f"{percent(robot.rate.mean)} ({span(robot.rate.interval)})" for robot in robots),
-        )
-    )
-    return lines
+    for state in people.labels:
+        printed = [_counted_rate(*_row(matrix, state)) for matrix in (people, theirs)]
+        ours = [with_interval(_of_state(robot, state)) for robot in robots]
+        lines.append((state.replace("_", " "), *printed, *ours))
+    printed = [_counted_rate(matrix.correct, matrix.n) for matrix in (people, theirs)]
+    return [*lines, ("all", *printed, *(with_interval(robot.rate) for robot in robots))]
+
+
+def with_interval(rate: OverSeeds) -> str:
+    """Return a mean rate with its interval."""
+    return f"{percent(rate.mean)} ({span(rate.interval)})"
+
+
+def _counted_rate(right: int, n: int) -> str:
+    return f"{right}/{n} = {percent(right / n)} ({span(wilson(right, n))})"
+
+
+def _row(matrix: Confusion, state: str) -> tuple[int, int]:
+    """Return how many trials of a state are recognised, and how many there are."""
+    k = next(k for k, label in enumerate(matrix.labels) if label.endswith(state))
+    return matrix.counts[k][k], sum(matrix.counts[k])
 
 
 def _of_state(condition: ConditionResult, state: str) -> OverSeeds:
-    rates, n = [], 1
-    for result in condition.by_seed.values():
-        i = next(k for k, label in enumerate(result.confusion.labels) if label.endswith(state))
-        row = result.confusion.counts[i]
-        n = sum(row)
-        rates.append(row[i] / n)
-    return OverSeeds(tuple(rates), n)
+    of_seeds = [_row(result.confusion, state) for result in condition.by_seed.values()]
+    return OverSeeds(tuple(right / n for right, n in of_seeds), of_seeds[-1][1])

@@ -5,9 +5,11 @@ The states are those of the paper: close, load, lift and hold, replace, open.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from math import inf
 from typing import Any, ClassVar, Final, NamedTuple, TypeVar
+
+from attrs import asdict
 
 from graspsense.gripper_api import SLIPPED
 from graspsense.plugin_api import (
@@ -67,7 +69,7 @@ SLIP_BIT, PLACE_BIT, UNFELT_BIT, LIMIT_BIT = 8, 16, 128, 256
 
 
 class HoldingPlan(NamedTuple):
-    """What a controller does after the contact (0 or 1 each), with which forces (N) and times (s)."""
+    """What a controller does after the contact (0 or 1 each), with the settings of these names."""
 
     loads: int
     grabs: int
@@ -76,10 +78,10 @@ class HoldingPlan(NamedTuple):
     force_n: float
     hardness: float
     lightest_n: float
-    limit_n: float
+    force_limit_n: float
     close_speed_m_s: float
     closed_gap_m: float
-    deformation_m: float
+    deformation_limit_m: float
     force_tolerance_n: float
     speed_tolerance_m_s: float
     settle_s: float
@@ -163,7 +165,7 @@ def step(params: Params, state: State, reading: Reading) -> tuple[Command, State
     events = begun(state.conditions, now)
     if earlier.stage.number != KEEP:
         events &= ~SLIP_BIT
-    if progress.contact.target_n >= params.plan.limit_n > earlier.contact.target_n:
+    if progress.contact.target_n >= params.plan.force_limit_n > earlier.contact.target_n:
         events |= LIMIT_BIT
     if params.plan.places == 1:
         if (
@@ -246,10 +248,10 @@ def touching(plan: HoldingPlan, now: Progress, frame: Frame) -> Progress:
             phase, outcome = HOLD, STEADY
         else:
             stage, since, settling = LOAD, frame.t_s, frame.t_s
-            target_n = min(max(plan.force_n, plan.lightest_n), plan.limit_n)
+            target_n = min(max(plan.force_n, plan.lightest_n), plan.force_limit_n)
             if plan.grabs == 1:
                 target_n = grab_force(
-                    contact_n, plan.close_speed_m_s, plan.hardness, plan.lightest_n, plan.limit_n
+                    contact_n, plan.close_speed_m_s, plan.hardness, plan.lightest_n, plan.force_limit_n
                 )
     return Progress(
         phase, outcome, Stage(stage, since, settling), HeldContact(contact_m, contact_n, target_n)
@@ -283,7 +285,7 @@ def keeping(params: Params, now: Progress, signals: Signals, seen: TouchConditio
     if weaker_n < plan.lightest_n - 0.25 or frame.gap_m <= plan.closed_gap_m:
         return ended(now, SLIPPED)
     if plan.slips == 1:
-        target_n = raised_force(target_n, seen.slip, frame.dt_s, plan.limit_n)
+        target_n = raised_force(target_n, seen.slip, frame.dt_s, plan.force_limit_n)
     if plan.places == 1 and outcome == RUNNING and held_s >= plan.place_after_s:
         if placed(params.thresholds, seen, signals.acceleration.present):
             outcome = STEADY
@@ -301,7 +303,7 @@ def commanded(params: Params, now: Progress, wanted_m: float, frame: Frame) -> t
         rate = -plan.close_speed_m_s
     elif now.stage.number >= LOAD:
         rate = force_rate(params.servo, now.contact.target_n, frame.force_left_n, frame.force_right_n)
-        if rate < 0.0 and frame.gap_m <= now.contact.contact_m - plan.deformation_m:
+        if rate < 0.0 and frame.gap_m <= now.contact.contact_m - plan.deformation_limit_m:
             rate = 0.0
     bound, limit = params.position.bound_m, params.position.effort_limit_n
     wanted_m += rate * frame.dt_s
@@ -352,60 +354,24 @@ class _Romano(Controller[ConfigT]):
         return float(self.config.lightest_n - 0.25)
 
     def params(self) -> Params:
-        """Return the parameters of the step."""
-        config: Any = self.config
-        force = config if isinstance(config, ForceServoConfig) else ForceServoConfig()
-        place = config if isinstance(config, PlaceConfig) else PlaceConfig()
-        slip = config if isinstance(config, SlipServoConfig) else place
+        """Return the parameters of the step. Settings that only other laws have stand in it without an effect."""
+        config = PlaceConfig(**asdict(self.config))
+        own = {key: float(value) for key, value in asdict(config).items() if not isinstance(value, str)}
+        closing, opening = own["closing_gain_m_s_per_newton"], own["opening_gain_m_s_per_newton"]
         loads, grabs, slips, places = self.does
-        plan = HoldingPlan(
-            loads,
-            grabs,
-            slips,
-            places,
-            force_n=float(force.force_n),
-            hardness=float(config.hardness if isinstance(config, GrabConfig) else place.hardness),
-            lightest_n=float(config.lightest_n),
-            limit_n=float(config.force_limit_n),
-            close_speed_m_s=float(config.close_speed_m_s),
-            closed_gap_m=float(config.closed_gap_m),
-            deformation_m=float(force.deformation_limit_m),
-            force_tolerance_n=float(force.force_tolerance_n),
-            speed_tolerance_m_s=float(force.speed_tolerance_m_s),
-            settle_s=float(force.settle_s),
-            find_timeout_s=float(config.find_timeout_s),
-            force_timeout_s=float(force.force_timeout_s),
-            place_after_s=float(place.place_after_s),
-            place_timeout_s=float(place.place_timeout_s),
-        )
-        thresholds = EventThresholds(
-            lightest_n=float(config.lightest_n),
-            contact_high_n=float(config.contact_high_n),
-            slip_share=float(slip.slip_share),
-            least_n=float(slip.slip_least_n),
-            slip_low_n=float(slip.slip_low_n),
-            place_share=float(place.place_share),
-            side_n=float(config.side_n),
-            shock_m_s2=float(place.acceleration_m_s2),
-            place_by=PLACE_BY.index(place.place_by),
-        )
-        servo = Servo(
-            float(force.opening_gain_m_s_per_newton), float(force.closing_gain_m_s_per_newton), FASTEST_M_S
-        )
-        position = PositionServo(
-            stiffness_n_m=float(config.stiffness_n_m),
-            damping_n_s_m=float(config.damping_n_s_m),
-            friction_n=float(config.friction_n),
-            bound_m=BOUND_M,
-            effort_limit_n=EFFORT_SHARE * float(config.force_limit_n) + float(config.friction_n),
-        )
         return Params(
             kind=KINDS[config.sends],
-            plan=plan,
+            plan=HoldingPlan(loads, grabs, slips, places, **_of(HoldingPlan._fields, own)),
             filters=filters(),
-            thresholds=thresholds,
-            servo=servo,
-            position=position,
+            thresholds=EventThresholds(
+                **_of(EventThresholds._fields, own), place_by=PLACE_BY.index(config.place_by)
+            ),
+            servo=Servo(opening, closing, FASTEST_M_S),
+            position=PositionServo(
+                **_of(PositionServo._fields, own),
+                bound_m=BOUND_M,
+                effort_limit_n=EFFORT_SHARE * config.force_limit_n + config.friction_n,
+            ),
         )
 
     def init(self) -> State:
@@ -429,6 +395,11 @@ class _Romano(Controller[ConfigT]):
         if asked_n >= limit_n:
             return f"too heavy or too smooth for {limit_n:g} N (controller.force_limit_n)"
         return f"lost at {asked_n:.1f} N, before controller.force_limit_n ({limit_n:g} N) was reached"
+
+
+def _of(names: Iterable[str], own: Mapping[str, float]) -> dict[str, float]:
+    """Return the settings of these names, where there are any."""
+    return {name: own[name] for name in names if name in own}
 
 
 FASTEST_M_S: Final = 0.5

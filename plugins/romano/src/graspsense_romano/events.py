@@ -28,16 +28,16 @@ PLACE_LOW_BAND_N = 0.2
 
 
 class EventThresholds(NamedTuple):
-    """The thresholds of the events, in SI units."""
+    """The thresholds of the events, by the names of their settings, in SI units."""
 
     lightest_n: float
     contact_high_n: float
     slip_share: float
-    least_n: float
+    slip_least_n: float
     slip_low_n: float
     place_share: float
     side_n: float
-    shock_m_s2: float
+    acceleration_m_s2: float
     place_by: int
 
 
@@ -71,7 +71,7 @@ def slips(pad: PadSignal, share: float, least_n: float, low_n: float) -> bool:
 def conditions(params: EventThresholds, signals: Signals) -> TouchConditions:
     """Return the conditions that these signals meet."""
     left, right = signals.left, signals.right
-    share, least_n, low_n = params.slip_share, params.least_n, params.slip_low_n
+    share, least_n, low_n = params.slip_share, params.slip_least_n, params.slip_low_n
     slip = slips(left, share, least_n, low_n) or slips(right, share, least_n, low_n)
     share = params.place_share
     place = slips(left, share, least_n, PLACE_LOW_BAND_N) or slips(right, share, least_n, PLACE_LOW_BAND_N)
@@ -82,7 +82,7 @@ def conditions(params: EventThresholds, signals: Signals) -> TouchConditions:
         slip=int(slip),
         place_slip=int(place),
         side=int(side),
-        shock=int(signals.acceleration.norm_m_s2 > params.shock_m_s2),
+        shock=int(signals.acceleration.norm_m_s2 > params.acceleration_m_s2),
     )
 
 

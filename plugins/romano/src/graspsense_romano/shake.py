@@ -102,25 +102,24 @@ class ShakeFeatures(FeatureSet[ShakeConfig]):
                 f"no channel `shake` says that the gripper moved by {self.config.least_shake_m * 1e3:g} mm in the hold"
             )
         begin_s, end_s, last_s = times
-        values: dict[str, float] = {}
-        reasons: dict[str, str] = {}
-        signals: dict[str, Signal | str] = {}
+        values: dict[str, float | str] = {}
         for name in SIGNALS:
-            during = signals[name] = _signal(trace, name, begin_s, end_s)
-            after = _signal(trace, name, end_s, last_s)
+            during, after = _signal(trace, name, begin_s, end_s), _signal(trace, name, end_s, last_s)
             if last_s - end_s < self.config.least_after_s:
                 after = f"the hold ends {last_s - end_s:.2g} s after the shake"
             for when, signal in (("", during), ("_after", after)):
                 for band in BANDS_HZ:
-                    _add(f"{name}_{band}{when}", _rms_or_reason(signal, band), values, reasons)
-            _add(f"{name}_peak", after if isinstance(after, str) else peak_hz(after), values, reasons)
-            _add(f"{name}_decay", after if isinstance(after, str) else decay_1_s(after), values, reasons)
-        force, acceleration = values.get("pads_low"), values.get("acceleration_low")
-        mass: float | str = "the pads or the acceleration are missing, or not moved"
-        if force is not None and acceleration:
-            mass = force / acceleration
-        _add("moved_mass", mass, values, reasons)
-        return self.result(values, reasons)
+                    values[f"{name}_{band}{when}"] = _rms_or_reason(signal, band)
+            values[f"{name}_peak"] = after if isinstance(after, str) else peak_hz(after)
+            values[f"{name}_decay"] = after if isinstance(after, str) else decay_1_s(after)
+        force, acceleration = values["pads_low"], values["acceleration_low"]
+        values["moved_mass"] = "the pads or the acceleration are missing, or not moved"
+        if isinstance(force, float) and isinstance(acceleration, float) and acceleration:
+            values["moved_mass"] = force / acceleration
+        reasons = {name: reason for name, reason in values.items() if isinstance(reason, str)}
+        return self.result(
+            {name: value for name, value in values.items() if not isinstance(value, str)}, reasons
+        )
 
     def _times(self, trace: Trace) -> tuple[float, float, float] | None:
         """Return when the shake begins and ends, and the hold ends; None without a shake."""
@@ -134,13 +133,6 @@ class ShakeFeatures(FeatureSet[ShakeConfig]):
         shaken = held[moved_m > MOVED_SHARE * moved_m.max()]
         begin_s, end_s, last_s = trace.t_s[[shaken[0], shaken[-1], held[-1]]].tolist()
         return begin_s, end_s, last_s
-
-
-def _add(name: str, value: float | str, values: dict[str, float], reasons: dict[str, str]) -> None:
-    if isinstance(value, str):
-        reasons[name] = value
-    else:
-        values[name] = value
 
 
 def _signal(trace: Trace, name: str, begin_s: float, end_s: float) -> Signal | str:
