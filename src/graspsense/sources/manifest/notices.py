@@ -34,6 +34,8 @@ STRONG_N: Final = 300.0
 """A force whose range is beyond that of the usual grippers is in another unit."""
 WIDEST_M: Final = 5e-4
 """No gripper opens less (m)."""
+BELOW_ZERO_M: Final = -0.005
+"""No fingertips are pressed into each other so far (m)."""
 _OFFSET: Final = ' If the fingers were free, the sensor has an offset: zero = "10 samples"'
 _FOUND: Final = 'split = "force" finds them, '
 
@@ -64,6 +66,11 @@ def _of_gap(columns: GraspColumns) -> Iterator[str]:
         yield (
             f"the gap reaches {gap.max() * 1e3:.2g} mm only, which no gripper opens to: if it is in another unit, "
             "write that behind it, as [m] or [mm]"
+        )
+    if gap.min() < BELOW_ZERO_M and gap.max() > 0.0 and not columns.units.get("gap"):
+        yield (
+            f"the gap goes down to {gap.min() * 1e3:.3g} mm, and fingers meet at 0: is it measured from another zero? "
+            'Then add the difference: gap = "POSITION + 20 [mm]"'
         )
     if span > 0.0 and moved > 0.2 * span:
         yield (

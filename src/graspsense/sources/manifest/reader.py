@@ -190,9 +190,9 @@ def _checked(columns: GraspColumns, table: ColumnTable, rate_hz: float) -> Recor
 def _format(manifest: ReadManifest, path: Path) -> Callable[[Path], list[ColumnTable]]:
     """Return the function that reads a file of this suffix. Raises ConfigError."""
     suffix = path.suffix.lower()
+    if path.is_dir() or suffix in BAG_SUFFIXES:
+        return _bag(manifest)
     if text_suffix(path) in (*TEXT_SUFFIXES, ""):
-        if path.is_dir():
-            return _bag(manifest)
         from graspsense.sources.formats.text_format import read_text
 
         return lambda file: read_text(file, manifest.keys.start)
@@ -207,8 +207,6 @@ def _format(manifest: ReadManifest, path: Path) -> Callable[[Path], list[ColumnT
         from graspsense.sources.formats.parquet_format import read_parquet
 
         return read_parquet
-    if suffix in BAG_SUFFIXES:
-        return _bag(manifest)
     raise ConfigError(
         f"{path}: no reader for {suffix} files. There are text files (.csv, .tsv, .txt, .dat, .jsonl), .npy, .npz, "
         ".mat, .h5, .parquet, .mcap and ROS bags"
@@ -221,8 +219,8 @@ def _bag(manifest: ReadManifest) -> Callable[[Path], list[ColumnTable]]:
     texts = [part.text for parts in manifest.expressions.values() for part in parts]
     further = (*manifest.channels.values(), *manifest.values.values(), *manifest.events.values())
     texts += [text.text for text in further]
-    topics = {match[1] for text in texts for match in re.finditer(r"['\"](/[^.'\"*?]+)\.", text)}
-    return lambda path: read_bag(path, topics)
+    used = {name for text in texts for name in re.findall(r"['\"](/[^.'\"*?]+\.[^'\"]*)['\"]", text)}
+    return lambda path: read_bag(path, used)
 
 
 def _by_column(table: ColumnTable, column: str) -> list[ColumnTable]:
