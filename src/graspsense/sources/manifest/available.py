@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -14,9 +14,15 @@ from graspsense.sources.manifest.description import ReadManifest
 from graspsense.sources.manifest.expression import Expression, ExpressionError
 from graspsense.sources.units import GRAM_FORCE, TO_SI, WITHOUT_UNIT, known_unit
 
+MOST_NAMES: Final = 20
+"""A column with more different texts does not say what the values of another column are of."""
+
 
 class AvailableColumns(dict[str, Any]):
-    """The columns of a table that expressions can use: its numbers, its fields that are numbers, and channels."""
+    """The columns of a table that expressions can use: its numbers, its fields that are numbers, and channels.
+
+    A table with one column of values, and one that says what each is of, has a column for each of these names.
+    """
 
     def __init__(self, manifest: ReadManifest, table: ColumnTable) -> None:
         super().__init__(table.numbers)
@@ -24,6 +30,13 @@ class AvailableColumns(dict[str, Any]):
         for name, text in table.fields.items():
             if name not in self and (number := number_in(text)) is not None:
                 self[name] = np.full(len(table), number)
+        times = {name for part in manifest.expressions["time"] for name in part.names}
+        values = [name for name, column in table.numbers.items() if column.ndim == 1 and name not in times]
+        for cells in table.texts.values() if len(values) == 1 else ():
+            names = dict.fromkeys(cells)
+            for name in names if 1 < len(names) <= MOST_NAMES else ():
+                rows = np.array([cell == name for cell in cells])
+                self[f"{name}.{values[0]}"] = np.where(rows, table.numbers[values[0]], np.nan)
 
     def value(self, key: str, parts: Sequence[Expression], quantity: str) -> tuple[Numbers, str] | None:
         """Return the value of the first expression whose columns exist and its unit, None if there are none."""
