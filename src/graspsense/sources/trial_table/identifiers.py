@@ -258,10 +258,10 @@ def follow_lines(values: NDArray[np.float64], labels: Sequence[str]) -> bool:
     return abs(whole) >= _DRIFTS and whole * near > 0.0 and abs(near) >= _DRIFTS_NEAR
 
 
-def _correlation(first: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+def _correlation(ranks: NDArray[np.float64], places: NDArray[np.float64]) -> float:
     """Return the correlation of numbers whose means are zero; 0 if those of one do not differ."""
-    scale = math.sqrt(float(first @ first) * float(other @ other))
-    return float(first @ other) / scale if scale > 0.0 else 0.0
+    scale = math.sqrt(float(ranks @ ranks) * float(places @ places))
+    return float(ranks @ places) / scale if scale > 0.0 else 0.0
 
 
 def _ranks(values: NDArray[np.float64], codes: NDArray[np.int64]) -> NDArray[np.float64]:
