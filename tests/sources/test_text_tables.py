@@ -235,6 +235,7 @@ def test_a_clock_that_begins_anew_is_told_from_several_grasps(clock, tmp_path):
     [
         ("msec,MM,newtons,N", "", {"t_s": 1.99, "gap_m": 0.0485, "unit": ""}),
         ("ms,mm,mA,mA", "", {"t_s": 1.99, "gap_m": 0.0485, "unit": "mA"}),
+        ("ms,mm,kp,daN", "", {"t_s": 1.99, "gap_m": 0.0485, "unit": ""}),
         ("ms,deg,N,N", "", {"t_s": 1.99, "gap_m": 48.5, "unit": ""}),
         ("", 'gap = "pos [Millimeters]"', {"t_s": 1.99, "gap_m": 0.0485, "unit": ""}),
     ],
@@ -283,6 +284,7 @@ def test_a_unit_that_contradicts_the_file_is_told_and_the_unit_of_the_file_is_su
         ),
         (HEADER, "s,mm,N,mA", 'force = "f1"\neffort = "f2"', "states mA"),
         (HEADER, "s,mm,N,N", 'force = "f1 [mN]"', "states N"),
+        *((HEADER, f"s,mm,{unit},N", 'force = "f1"', "another column") for unit in ("mm", "s", "millimeter")),
     ],
 )
 def test_a_unit_that_the_file_states_is_used_or_told(tmp_path, header, units, keys, says):
