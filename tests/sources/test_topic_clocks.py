@@ -289,6 +289,7 @@ def test_messages_of_one_topic_are_divided_by_the_names_that_they_have(tmp_path:
     with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         joints = writer.add_connection("/joint_states", joint, typestore=store)
         values = writer.add_connection("/values", named, typestore=store)
+        single = writer.add_connection("/weight", named, typestore=store)
         for k, t_s in enumerate(T_S):
             ns = BEGAN_NS + round(t_s * S)
             header = store.types["std_msgs/msg/Header"](time(ns // S, ns % S), "")
@@ -298,10 +299,13 @@ def test_messages_of_one_topic_are_divided_by_the_names_that_they_have(tmp_path:
             for name, value in (("force", FORCE_N[k]), ("elsewhere", 7.0)):
                 message = store.types[named](name, value)
                 writer.write(values, ns, store.serialize_cdr(message, named))
+            message = store.types[named]("weight" if k else "", 2.0)  # the driver does not know it at first
+            writer.write(single, ns, store.serialize_cdr(message, named))
     numbers = read_bag(folder)[0].numbers
     assert np.array_equal(numbers["/joint_states.finger.position"], GAP_M)
     assert np.array_equal(numbers["/joint_states.elbow.position"], np.full(300, 1.5))
     assert np.array_equal(numbers["/values.force.value"], FORCE_N)
+    assert np.array_equal(numbers["/weight.value"], np.full(300, 2.0))
     (tmp_path / "m.toml").write_text(
         f"files = '{folder.name}'\nlabel = 'jar'\ngap = \"'/joint_states.finger.position'\"\n"
         "force = \"'/values.force.value'\"\n"

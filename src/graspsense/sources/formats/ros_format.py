@@ -86,9 +86,10 @@ def _collected(
     values: dict[str, list[dict[str, Any]]] = {}
     times: dict[str, Messages] = {}
     for topic, by_names in columns.items():
-        divided = 1 < len(by_names) <= MOST_NAMES
+        # A driver can send a first message without names.
+        divided = 1 < sum(map(bool, by_names)) <= MOST_NAMES
         for names, rows in by_names.items():
-            part = f"{topic}.{names}" if divided else topic
+            part = f"{topic}.{names}" if divided and names else topic
             values.setdefault(part, []).extend(
                 {f"{part}{k}": number for k, number in row.items()} for row in rows
             )

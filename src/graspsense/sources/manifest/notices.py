@@ -89,7 +89,8 @@ def falls_on_closing(columns: GraspColumns) -> str:
 
 def _of_gap(columns: GraspColumns) -> Iterator[str]:
     gap = columns.gap_m
-    moved, span = float(gap[int(columns.force_n.argmax())] - gap[0]), float(np.ptp(gap))
+    began = float(np.median(gap[:3]))  # the first sample can be from before the sensor was ready
+    moved, span = float(gap[int(columns.force_n.argmax())]) - began, float(np.ptp(gap))
     if span == 0.0 and not columns.units.get("gap"):
         yield "the gap does not change during the recording: is it another column?"
     if span > 0.0 and gap.min() > 0.0 and gap.max() < WIDEST_M and not columns.units.get("gap"):
