@@ -37,6 +37,10 @@ COUNTERS = {
     "dates of sessions": [20260101 + i // 15 for i in range(N)],
     "times": [20261126093000 + i % 30 + 100 * (i // 30) for i in range(N)],
     "a counter of each label": [*range(30), *range(30)],
+    "a counter of four bits": [(i + 5) % 16 for i in range(N)],
+    "a counter of a byte with lost numbers": np.cumsum(np.random.default_rng(1).integers(1, 9, N)) % 256,
+    "minutes of the hour": [(2 * i + 20) % 60 for i in range(N)],
+    "the number of the repetition": [i % 6 for i in range(N)],
 }
 ORDERS = {"as it is": list, "falling": lambda values: list(values)[::-1], "a swap": swapped, "a tie": tied}
 
@@ -232,8 +236,10 @@ def test_a_time_or_a_number_is_known_in_any_spelling_of_its_unit(unit):
     assert identifies("x", unit, rises, LABELS)
 
 
-def notes_on(path, column, values, labels=LABELS):
-    order = np.random.default_rng(6).permutation(N)  # so that no order of lines shows anything
+def notes_on(path, column, values, labels=LABELS, order=None):
+    order = (
+        np.random.default_rng(6).permutation(N) if order is None else order
+    )  # so that no order shows anything
     given = [(labels[i], values[i]) for i in order]
     lines = [f"{label},{value},{i * 7919 % 101 / 17:.4f}" for i, (label, value) in enumerate(given)]
     path.write_text("\n".join([f"object,{column},s", *lines]) + "\n")
@@ -269,6 +275,36 @@ DOUBTFUL = {
 @every_case("doubt", DOUBTFUL)
 def test_a_column_that_may_reveal_the_labels_is_told(doubt, tmp_path):
     assert notes_on(tmp_path / "t.csv", *DOUBTFUL[doubt])
+
+
+DRIFTS = {
+    "a battery": 12.6 - 0.01 * np.arange(N) + RNG.normal(0.0, 0.02, N),
+    "a noisy counter": np.arange(N) + RNG.normal(0.0, 2.0, N),
+    "a zero": 0.01 * np.arange(N) + RNG.normal(0.0, 0.02, N),
+    "a temperature in kelvin": 300.0 + 0.05 * np.arange(N) + RNG.normal(0.0, 0.1, N),
+    "months": ["January" if i < 15 else "February" if i < 40 else "March" for i in range(N)],
+    "a version": [1.2 if i < 27 else 1.3 for i in range(N)],
+    "a value far from all others": [*NOISE[:-1], 1e9],
+    "a single code for a missing value": [*NOISE[:-1], -9999.0],
+}
+
+
+@every_case("column", DRIFTS)
+def test_what_changes_with_the_lines_or_stands_alone_is_told(column, tmp_path):
+    heading = "kind" if column in ("months", "a version") else "kind [V]"
+    notes = notes_on(tmp_path / "t.csv", heading, DRIFTS[column], order=range(N))
+    assert [note for note in notes if "reveals" in note or "unlike all other values" in note]
+
+
+@given(
+    seed=st.integers(0, 10_000), objects=st.sampled_from([1, 3, 6]), spread=st.sampled_from([0.05, 0.3, 1.0])
+)
+def test_objects_that_come_one_after_the_other_do_not_drift(tmp_path_factory, seed, objects, spread):
+    """None of 2000 columns that were drawn so looked as if they did."""
+    rng = np.random.default_rng(seed)
+    widths = rng.normal(0.0, 2.0, 2).repeat(30) + rng.normal(0.0, 1.0, 2 * objects).repeat(30 // objects)
+    values = (widths + rng.normal(0.0, spread, N)).round(3)
+    assert not notes_on(tmp_path_factory.mktemp("blocks") / "t.csv", "width [mm]", values, order=range(N))
 
 
 @every_case("dead", [lambda f: -f, lambda f: 0.02 * f, lambda f: 1000.0 * f])

@@ -409,6 +409,39 @@ def test_a_closing_whose_force_was_not_measured_is_told(tmp_path, value, says):
     assert all(says in note for note in told)
 
 
+@every_case("turned", [lambda f: -f, lambda f: -f - 1.0, lambda f: 20.0 - f, lambda f: 999.0 - 40.0 * f])
+def test_a_force_that_falls_on_closing_is_not_divided_into_squeezes_of_free_fingers(tmp_path, turned):
+    gaps, force, time = repeated(1.0, 1.0, 1.0)
+    pandas_csv(tmp_path / "jar.csv", {"t": time, "gap": gaps * 1e3, "F": turned(force), "good": force})
+
+    def refused(columns):
+        text = f"files = '{{label}}.csv'\nsplit = 'force'\ntime = 't'\n{columns}"
+        (grasp, *_) = readable_or_not("manifest", str(manifest(tmp_path, text)))
+        return isinstance(grasp, UnreadableRecording) and "falls where the fingers close" in str(grasp.error)
+
+    gap = "gap = 'gap [mm]'\n"
+    assert refused(gap + "force = 'F [counts]'")
+    assert refused(gap + "left = 'good [counts]'\nright = 'F [counts]'")
+    assert refused("gap = '130 - gap [mm]'\nforce = 'good'")
+    assert not refused(gap + "force = 'good'")
+    assert not refused("force = 'good'")
+    assert refused("force = 'F [counts]'") == (turned(force)[0] <= 0.0)
+
+
+def test_files_with_a_text_where_a_pattern_wants_digits_are_told(tmp_path):
+    gap, force = squeezing()
+    for name in ("can_1", "can_2", "can_x", "notes", "can_list"):
+        pandas_csv(tmp_path / f"{name}.csv", {"t": T_S, "gap": gap * 1e3, "F": force})
+    text = PLAIN.replace("{label}", "{label}_{order:d}") + 'beside = "can_list.csv"\n'
+    told = [
+        notice for grasp in recordings(tmp_path, text) for notice in grasp.notices if "not used" in notice
+    ]
+    assert len(told) == 1
+    assert "can_x.csv" in told[0]
+    assert "can_list" not in told[0]
+    assert "notes" not in told[0]
+
+
 @every_case("height_n", [2.0, 10.0, 30.0])
 def test_a_bump_in_the_approach_is_no_squeeze_of_its_own_and_is_told(tmp_path, height_n):
     gaps, force, time = repeated(1.0, 1.0, 1.0)

@@ -270,3 +270,18 @@ def test_a_rest_before_most_of_the_force_is_doubted_also_where_the_gap_shows_no_
     names, units = ("p_first", "p_steady", "f_steady"), ("m", "m", "N")
     features = Features(names=names, values=(0.064, rest_mm / 1e3, rest_n), units=units)
     assert presses_on(features, squeezed) is goes_on
+
+
+@every_case(("rest_n", "goes_on"), [(5.0, True), (7.5, False)])
+def test_a_rest_of_a_rigid_object_before_much_of_its_force_is_doubted(rest_n, goes_on):
+    """The gap closes by 12 mm, and by 0.1 mm of them after the contact; the force goes on to 8 N."""
+    squeezed = slow_squeeze(hold_s=1.0)
+    frames = [reading.frame for reading in squeezed.readings]
+    stiff = iter(
+        [frame.gap_m if frame.gap_m >= 0.064 else 0.064 - (0.064 - frame.gap_m) / 24.0 for frame in frames]
+    )
+    rigid = reframed(squeezed, lambda frame: {"gap_m": next(stiff)})
+    names, units = ("p_first", "p_steady", "f_steady"), ("m", "m", "N")
+    narrowest = min(reading.frame.gap_m for reading in rigid.readings)
+    features = Features(names=names, values=(0.064, narrowest, rest_n), units=units)
+    assert presses_on(features, rigid) is goes_on

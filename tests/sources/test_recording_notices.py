@@ -223,6 +223,42 @@ def test_a_pad_that_feels_nothing_but_noise_while_the_other_is_loaded_is_noticed
     assert "while the other pad feels up to 6" in notice
 
 
+@every_case("from_s", [1.6, 2.0])
+@every_case("lasts_s", [0.05, 0.2])
+def test_a_pad_that_feels_nothing_for_a_moment_under_a_load_is_noticed(from_s: float, lasts_s: float) -> None:
+    failed = np.where((from_s < T_S) & (from_s + lasts_s > T_S), NOISE_N[1], RELEASED_N)
+    notices = noticed(failed, RELEASED_N, OPEN_AGAIN_M)
+    assert [notice for notice in notices if "left pad stays at" in notice]
+
+
+SHARES = {
+    "half": 0.5,
+    "a tenth": 0.1,
+    "half from the hold on": np.where(T_S < 2.0, 1.0, 0.5),
+    "less and less": np.clip(1.6 - 0.4 * T_S, 0.5, 1.0),
+    "exchanged": np.where(T_S < 2.0, 0.6, 1.0 / 0.6),
+    "a saturated sensor": np.minimum(1.0, 3.5 / np.maximum(LOAD_N, 0.1)),
+}
+
+
+@every_case("share", SHARES)
+@every_case("units", [{}, {"force_left": "counts", "force_right": "counts"}])
+def test_opposed_pads_that_bear_different_forces_are_noticed(share: str, units: dict[str, str]) -> None:
+    """Sensors in counts can be of different kinds, but what one is of the other stays."""
+
+    def told(left: Any, right: Any) -> bool:
+        recording = made_recording(100.0, T_S, OPEN_AGAIN_M, left, right, units=units)
+        labelled = with_notices(LabelledRecording(recording=recording, source="squeeze"))
+        return any("of the force of both" in notice for notice in labelled.notices)
+
+    released = RELEASED_N - NOISE_N[0]
+    left, right = SHARES[share] * released + NOISE_N[1], RELEASED_N
+    constant = np.ndim(SHARES[share]) == 0
+    assert told(left, right) == told(right, left) == (not units or not constant)
+    for sound in (0.9 * released, np.where(T_S < 1.1, 0.0, released), released + 0.3):
+        assert not told(sound + NOISE_N[1], right)
+
+
 def test_a_sound_pad_that_reads_low_or_feels_the_object_later_is_not_doubted() -> None:
     for low in (0.5 * RELEASED_N, 0.1 * RELEASED_N, np.where(T_S < 1.2, NOISE_N[1], RELEASED_N)):
         for pads in ((low, RELEASED_N), (RELEASED_N, low)):

@@ -49,6 +49,11 @@ def late(k):
     return datetime.fromtimestamp(86399.5 + k * 0.01, UTC).strftime("%H:%M:%S.%f")
 
 
+def noon(k, hours=0):
+    """Return a time around noon, or so many hours later: midnight between the second and the third of March."""
+    return datetime.fromtimestamp(1772452799.5 + 3600 * hours + k * 0.01, UTC)
+
+
 def read(path, **columns):
     given = {"time": ["t"], "gap": ["pos [mm]"], "force": ["f1", "f2"], **columns}
     return read_squeeze(named(str(path), given))
@@ -90,6 +95,11 @@ VARIANTS = {
     "Fortran": [HEADER, *(row.replace("0.0000", "0.0000D+00") for row in ROWS)],
     "zones": stamped(iso),
     "times of the day": stamped(lambda k: f"23:58:{k * 0.01:09.6f}"),
+    "morning and afternoon": stamped(lambda k: noon(k).strftime("%I:%M:%S.%f %p")),
+    "an American date": stamped(lambda k: noon(k, 12).strftime("%m/%d/%Y %I:%M:%S.%f %p")),
+    "a British date": stamped(lambda k: noon(k, 12).strftime("%d/%m/%Y %H:%M:%S.%f")),
+    "a German date": stamped(lambda k: noon(k).strftime("%d.%m.%Y %H:%M:%S.%f")),
+    "minutes over the hour": stamped(lambda k: noon(k).strftime("%M:%S.%f")),
     "milliseconds": stamped(lambda k: 1774749599000 + 10 * k),
     "nanoseconds": stamped(lambda k: 1774749599000000000 + 10_000_000 * k),
 }  # fmt: skip
@@ -209,11 +219,29 @@ def test_advice_on_repeated_times_is_tried_first(tmp_path):
     assert "leaves out 200 of 400" in str(repeated.error)
 
 
+BEGINS_ANEW = {
+    "a counter of a byte": (lambda k: (k + 100) % 256, "rate_hz"),
+    "milliseconds of the second": (lambda k: (10 * k + 300) % 1000, "rate_hz"),
+    "a clock of 32 bits": (lambda k: (4_294_000_000 + 10_000 * k) % 2**32, "rate_hz"),
+    "the last row first": (lambda k: 200 - k, "reverse order"),
+}
+
+
+@every_case("clock", BEGINS_ANEW)
+def test_a_clock_that_begins_anew_is_told_from_several_grasps(clock, tmp_path):
+    write, says = BEGINS_ANEW[clock]
+    (refused,) = recordings(tmp_path, stamped(write))
+    assert says in str(refused.error)
+    (several,) = recordings(tmp_path, [HEADER, *ROWS, *ROWS])
+    assert "rate_hz" not in str(several.error)
+
+
 @every_case(
     ("units", "keys", "si"),
     [
         ("msec,MM,newtons,N", "", {"t_s": 1.99, "gap_m": 0.0485, "unit": ""}),
         ("ms,mm,mA,mA", "", {"t_s": 1.99, "gap_m": 0.0485, "unit": "mA"}),
+        ("ms,mm,kp,daN", "", {"t_s": 1.99, "gap_m": 0.0485, "unit": ""}),
         ("ms,deg,N,N", "", {"t_s": 1.99, "gap_m": 48.5, "unit": ""}),
         ("", 'gap = "pos [Millimeters]"', {"t_s": 1.99, "gap_m": 0.0485, "unit": ""}),
     ],
@@ -262,6 +290,7 @@ def test_a_unit_that_contradicts_the_file_is_told_and_the_unit_of_the_file_is_su
         ),
         (HEADER, "s,mm,N,mA", 'force = "f1"\neffort = "f2"', "states mA"),
         (HEADER, "s,mm,N,N", 'force = "f1 [mN]"', "states N"),
+        *((HEADER, f"s,mm,{unit},N", 'force = "f1"', "another column") for unit in ("mm", "s", "millimeter")),
     ],
 )
 def test_a_unit_that_the_file_states_is_used_or_told(tmp_path, header, units, keys, says):

@@ -55,6 +55,9 @@ CLOCKS = {
     "0.5 % fast": T_S * 1.005,
     "1 % slow": T_S * 0.99,
     "coarse": np.floor(T_S / 0.05 + 1e-6) * 0.05,
+    "standing still": 0.0 * T_S,
+    "standing still from the contact on": np.minimum(T_S, 1.0),
+    "standing still for a moment": np.where((T_S > 1.0) & (T_S < 1.2), 1.0, T_S),
 }
 
 
@@ -77,6 +80,12 @@ def test_headers_of_another_clock_are_not_used(clock: str, swapped: bool) -> Non
     assert common.end_ns - common.begin_ns == pytest.approx(3.0 * S, rel=1e-6)
     assert len(common.notices) == 1
     assert "recorded" in common.notices[0]
+
+
+def test_headers_that_stand_still_in_every_topic_are_not_used() -> None:
+    """As of a simulation whose clock is not published."""
+    common = common_clock("bag", {"/hand": messages(T_S, 0.0 * T_S), "/tip": messages(T_S, 0.0 * T_S)})
+    assert common.end_ns - common.begin_ns == pytest.approx(3.0 * S, rel=1e-6)
 
 
 @every_case("ahead_s", [0.2, -0.2])
@@ -262,3 +271,44 @@ def test_a_value_that_is_the_same_after_a_silence_held(written: Any) -> None:
     recording = written((T_S < 0.3) | (T_S > 0.8))
     assert len(recording.recording.readings) == 300
     assert np.isfinite(frames(recording.recording, "force_left_n")).all()
+
+
+def test_messages_of_one_topic_are_divided_by_the_names_that_they_have(tmp_path: Path) -> None:
+    """An arm and a hand publish their joints in one topic, as is usual in ROS; and a logger its values with names."""
+    pytest.importorskip("rosbags", reason="needs the extra ros")
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    from graspsense.sources.formats.ros_format import read_bag
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    joint, named = "sensor_msgs/msg/JointState", "lab_msgs/msg/Named"
+    store.register(get_types_from_msg("string name\nfloat64 value\n", named))
+    time = store.types["builtin_interfaces/msg/Time"]
+    folder = tmp_path / "squeeze.2026-11-29"
+    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        joints = writer.add_connection("/joint_states", joint, typestore=store)
+        values = writer.add_connection("/values", named, typestore=store)
+        single = writer.add_connection("/weight", named, typestore=store)
+        for k, t_s in enumerate(T_S):
+            ns = BEGAN_NS + round(t_s * S)
+            header = store.types["std_msgs/msg/Header"](time(ns // S, ns % S), "")
+            for name, position in (("finger", GAP_M[k]), ("elbow", 1.5)):
+                state = store.types[joint](header, [name], np.array([position]), np.zeros(1), np.zeros(1))
+                writer.write(joints, ns, store.serialize_cdr(state, joint))
+            for name, value in (("force", FORCE_N[k]), ("elsewhere", 7.0)):
+                message = store.types[named](name, value)
+                writer.write(values, ns, store.serialize_cdr(message, named))
+            message = store.types[named]("weight" if k else "", 2.0)  # the driver does not know it at first
+            writer.write(single, ns, store.serialize_cdr(message, named))
+    numbers = read_bag(folder)[0].numbers
+    assert np.array_equal(numbers["/joint_states.finger.position"], GAP_M)
+    assert np.array_equal(numbers["/joint_states.elbow.position"], np.full(300, 1.5))
+    assert np.array_equal(numbers["/values.force.value"], FORCE_N)
+    assert np.array_equal(numbers["/weight.value"], np.full(300, 2.0))
+    (tmp_path / "m.toml").write_text(
+        f"files = '{folder.name}'\nlabel = 'jar'\ngap = \"'/joint_states.finger.position'\"\n"
+        "force = \"'/values.force.value'\"\n"
+    )
+    (recording,) = readable_or_not("manifest", str(tmp_path / "m.toml"))
+    assert len(recording.recording.readings) == 300

@@ -8,7 +8,16 @@ from typing import Final
 TO_SI: Final[Mapping[str, Mapping[str, float]]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
     "gap": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
-    "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3, "gf": 9.80665e-3, "kgf": 9.80665, "lbf": 4.4482216152605},
+    "force": {
+        "N": 1.0,
+        "mN": 1e-3,
+        "kN": 1e3,
+        "cN": 1e-2,
+        "daN": 10.0,
+        "gf": 9.80665e-3,
+        "kgf": 9.80665,
+        "lbf": 4.4482216152605,
+    },
     "effort": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
     "velocity": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
 }
@@ -29,6 +38,7 @@ _UNIT_WORDS: Final[Mapping[str, Mapping[str, str]]] = {
     },
     "force": {
         **dict.fromkeys(("newton", "newtons"), "N"),
+        "kp": "kgf",
         **dict.fromkeys(("counts", "count", "raw", "adc"), "counts"),
     },
 }

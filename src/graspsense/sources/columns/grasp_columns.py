@@ -27,6 +27,8 @@ LARGE_LOSS: Final = 0.05
 GLITCHES: Final = 0.03
 """Share of the samples up to which those that no gripper has are glitches, and not all in another unit."""
 FEWEST_AT_A_RATE: Final = 20
+GOES_ON: Final = 0.1
+"""Share of its range by which the gap changes at most where only the clock begins anew."""
 LONGEST_S: Final = 9e9
 """Longest time whose nanoseconds have 64 bits."""
 STEADY_RATE: Final = 2.0
@@ -350,7 +352,16 @@ def _advice_on_times(columns: GraspColumns) -> str:
     t_s = columns.t_s
     split = 'If the rows come from several grasps, split the file by a column: split = "COLUMN"'
     steps = np.diff(t_s)
-    if bool((steps < 0.0).any()):
+    back = steps < 0.0
+    if back.all():
+        return "The rows are in the reverse order of time: turn them round"
+    if back.any():
+        moved = np.abs(np.diff(columns.gap_m)[back])
+        if bool((moved <= GOES_ON * np.ptp(columns.gap_m)).all()):
+            return (
+                "The gap goes on there, as where a counter or a clock begins anew: leave time out and write rate_hz = "
+                "SAMPLES A SECOND. " + split
+            )
         return split
     if not t_s[-1] > t_s[0]:
         return (

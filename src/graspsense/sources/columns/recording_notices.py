@@ -10,6 +10,7 @@ import numpy as np
 from attrs import evolve
 
 from graspsense.core.control.contact import CONTACT_FORCE_N
+from graspsense.core.values.fingers import FingerForce
 from graspsense.recording.labelled_recording import LabelledRecording
 from graspsense.recording.replayable import Recording
 from graspsense.sources.columns.usual_range import usual_range
@@ -43,6 +44,10 @@ NUMB: Final = 0.02
 """Share of the range of the other pad up to which a pad feels nothing,"""
 NUMB_SHARE: Final = 0.1
 """and of the samples in which the other one is loaded, from which on that is told."""
+UNEQUAL: Final = 0.12
+"""Share of the force of both pads by which that of one is away from a half, or changes under load,"""
+UNEQUAL_REST: Final = 0.1
+"""without this share of the samples at each end, in which a pad can touch first or let go last."""
 FAR: Final = 2.0
 FAR_S: Final = 0.2
 FAR_SAMPLES: Final = 10
@@ -68,7 +73,7 @@ SELDOM_ROWS: Final = 5
 LARGE_CHANGE: Final = 0.2
 LARGE_STEP: Final = 0.1
 """Share of its range by which such a force, or such a gap, changes at once where contact and rest are seen too late."""
-FEWEST_CHANGES: Final = 5
+FEWEST_CHANGES: Final = 2
 SELDOM_SHARE: Final = 0.1
 """Share of the changes of such a force that may be closer to the one before."""
 FREE: Final = 0.2
@@ -99,10 +104,12 @@ def signal_notices(recording: Recording) -> Iterator[str]:
     right = np.array([reading.frame.force_right_n for reading in recording.readings])
     pads = force_of_pads(left, right)
     told = [text for what, force in pads.items() for text in _of_sensor(what, times, force, recording.units)]
-    yield from told
     if not told and len(pads) > 1:
         for what, other in zip(pads, (right, left), strict=True):
-            yield from _numb(what, times, gap, pads[what], other, recording.units)
+            told += _numb(what, times, gap, pads[what], other, recording.units)
+        hand = any(isinstance(channel, FingerForce) for channel in recording.channels)
+        told += _unequal(left, right, recording.units) if not told and not hand else ()
+    yield from told
     for what, force in pads.items():
         known = np.isfinite(force)
         if int(known.sum()) >= FEWEST:
@@ -144,7 +151,10 @@ def _of_sensor(what: str, times: Numbers, force: Numbers, units: Mapping[str, st
 def _numb(
     what: str, times: Numbers, gap: Numbers, force: Numbers, other: Numbers, units: Mapping[str, str]
 ) -> Iterator[str]:
-    """Yield that a pad feels nothing but its noise while the other one is loaded, and the gap has not opened."""
+    """Yield that a pad feels nothing but its noise while the other one is loaded, and the gap has not opened.
+
+    One that touches the object late does so for a while; one that felt it before and feels it again had failed.
+    """
     known = np.isfinite(force) & np.isfinite(other)
     t, gap, force, other = times[known], gap[known], force[known], other[known]
     if len(force) < FEWEST:
@@ -159,12 +169,46 @@ def _numb(
     loaded &= gap <= gap[begin]
     zero = float(np.median(force[free]))
     numb = np.flatnonzero(loaded & (np.abs(force - zero) < max(GLITCH_NOISE * noise, NUMB * span)))
-    if len(numb) >= FEWEST and len(numb) > NUMB_SHARE * np.count_nonzero(loaded):
+    felt = np.flatnonzero(np.abs(force - zero) > FREE * span)
+    lost = numb[(numb > felt[0]) & (numb < felt[-1])] if len(felt) else felt
+    if len(numb) < FEWEST or len(numb) <= NUMB_SHARE * np.count_nonzero(loaded):
+        numb = lost
+    if len(numb) > GLITCH_SAMPLES:
         yield (
             f"{what} stays at {zero:.3g} {units.get('force_left', 'N')} from {t[numb[0]]:.4g} to {t[numb[-1]]:.4g} "
             f"{units.get('t', 's')}, while the other pad feels up to {other[numb].max():.3g}: does its fingertip not "
             "answer, or did one finger alone touch?"
         )
+
+
+def _unequal(left: Numbers, right: Numbers, units: Mapping[str, str]) -> Iterator[str]:
+    """Yield that two pads do not bear the same force, or not all the time: as opposed pads they have to.
+
+    Counts of two sensors need not be the same, but what they are of each other stays.
+    """
+    known = np.isfinite(left) & np.isfinite(right)
+    left, right = left[known], right[known]
+    if len(left) < FEWEST or not any(map(_is_clear, (left, right))):
+        return
+    left, right = (force - np.median(force[:ZERO_SAMPLES]) for force in (left, right))
+    magnitude = np.abs(left) + np.abs(right)
+    low, high = usual_range(magnitude)
+    loaded = magnitude > low + 0.5 * (high - low)
+    if np.count_nonzero(loaded) < FEWEST:
+        return
+    least, usual, most = np.quantile(
+        right[loaded] / magnitude[loaded], (UNEQUAL_REST, 0.5, 1.0 - UNEQUAL_REST)
+    )
+    if most - least > UNEQUAL or (abs(usual - 0.5) > UNEQUAL and "force_left" not in units):
+        yield (
+            f"the right pad bears {least:.0%} to {most:.0%} of the force of both under load, and half is due: were the "
+            "pads exchanged, does one read wrong, or did the object lie on one of them only in part?"
+        )
+
+
+def _is_clear(force: Numbers) -> bool:
+    """Return whether a force is far above its noise."""
+    return bool(np.ptp(force) > GLITCH_NOISE * np.median(np.abs(np.diff(force, 2))))
 
 
 def _glitches(what: str, times: Numbers, force: Numbers, units: Mapping[str, str]) -> Iterator[str]:

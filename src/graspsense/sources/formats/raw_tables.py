@@ -22,14 +22,14 @@ READ_SUFFIXES: Final = (*TEXT_SUFFIXES, *ARRAY_SUFFIXES, *BAG_SUFFIXES, *PARQUET
 
 @frozen(kw_only=True)
 class TableRules:
-    """What a manifest says of the tables in its files: the line that begins each, their arrays, the topics of bags.
+    """What a manifest says of the tables in its files: the line that begins each, their arrays, the columns of bags.
 
-    With no `topics`, all of a bag are read.
+    With no `used` columns, all topics of a bag are read.
     """
 
     start: str = ""
     arrays: ArrayRules = field(factory=ArrayRules)
-    topics: Collection[str] = ()
+    used: Collection[str] = ()
 
 
 def raw_tables(path: Path, rules: TableRules | None = None) -> list[ColumnTable]:
@@ -42,7 +42,7 @@ def raw_tables(path: Path, rules: TableRules | None = None) -> list[ColumnTable]
     if path.is_dir() or suffix in BAG_SUFFIXES:
         from graspsense.sources.formats.ros_format import read_bag, read_topics
 
-        return read_topics(path) if rules is None else read_bag(path, rules.topics)
+        return read_topics(path) if rules is None else read_bag(path, rules.used)
     if suffix in PARQUET_SUFFIXES:
         from graspsense.sources.formats.parquet_format import read_parquet
 

@@ -19,7 +19,7 @@ from graspsense.recording.mcap_records import records_in, records_of
 from graspsense.recording.readable import readable, refuse_devices
 from graspsense.recording.unpacked import Unpacked
 from graspsense.sources.formats.ros_bags import Definitions, opened_bag, stamp_ns
-from graspsense.sources.formats.table import ColumnTable, Numbers
+from graspsense.sources.formats.table import MOST_NAMES, ColumnTable, Numbers
 from graspsense.sources.formats.topic_clocks import (
     Messages,
     Nanoseconds,
@@ -38,14 +38,15 @@ SAME: Final = 0.02
 """Share of the range of a value within which it is the same before and after a silence of its topic."""
 
 
-def read_bag(path: Path, topics: Collection[str] = ()) -> list[ColumnTable]:
+def read_bag(path: Path, used: Collection[str] = ()) -> list[ColumnTable]:
     """Return the numbers in a ROS 1 bag, a folder of a ROS 2 bag, or an MCAP file.
 
-    `topics` are those to read; with none, all. Raises PluginUnavailable without rosbags, ConfigError, DataDamaged.
+    Of the columns that are `used`, the topics are read; with none, all. Raises PluginUnavailable without rosbags,
+    ConfigError, DataDamaged.
     """
     if not path.exists():
         raise ConfigError(f"{path} cannot be read: there is no such file")
-    values, times = _collected(path, topics)
+    values, times = _collected(path, used)
     clock = common_clock(path.name, times)
     rows_ns = clock.topics[max(values, key=lambda topic: len(values[topic]))].ns
     rows_ns = rows_ns[(rows_ns >= clock.begin_ns) & (rows_ns <= clock.end_ns)]
@@ -65,21 +66,46 @@ def read_bag(path: Path, topics: Collection[str] = ()) -> list[ColumnTable]:
 
 
 def _collected(
-    path: Path, topics: Collection[str]
+    path: Path, used: Collection[str]
 ) -> tuple[dict[str, list[dict[str, Any]]], dict[str, Messages]]:
-    """Return the numbers in the messages of each topic that has any, and when the messages came. Raises DataDamaged."""
+    """Return the numbers in the messages of each topic that has any, and when the messages came.
+
+    A topic whose messages name different things is one topic for each, such as `/joint_states.finger`. Raises
+    DataDamaged.
+    """
+    columns: dict[str, dict[str, list[dict[str, Any]]]] = {}
+    came: dict[tuple[str, str], Messages] = {}
+    kept = Unpacked(path)
+    for topic, recorded_ns, message in _messages(path, {name.partition(".")[0] for name in used}):
+        numbers, names = dict(numbers_in(message, "")), _names_in(message)
+        kept.add(sum(_NUMBER_BYTES + 8 * np.size(column) for column in numbers.values()))
+        columns.setdefault(topic, {}).setdefault(names, []).append(numbers)
+        came.setdefault((topic, names), Messages()).add(recorded_ns, stamp_ns(message))
     values: dict[str, list[dict[str, Any]]] = {}
     times: dict[str, Messages] = {}
-    kept = Unpacked(path)
-    for topic, recorded_ns, message in _messages(path, topics):
-        columns = dict(numbers_in(message, topic))
-        kept.add(sum(_NUMBER_BYTES + 8 * np.size(column) for column in columns.values()))
-        values.setdefault(topic, []).append(columns)
-        times.setdefault(topic, Messages()).add(recorded_ns, stamp_ns(message))
+    for topic, by_names in columns.items():
+        # A driver can send a first message without names.
+        divided = 1 < sum(map(bool, by_names)) <= MOST_NAMES
+        for names, rows in by_names.items():
+            part = f"{topic}.{names}" if divided and names else topic
+            values.setdefault(part, []).extend(
+                {f"{part}{k}": number for k, number in row.items()} for row in rows
+            )
+            of_part = times.setdefault(part, Messages())
+            of_part.recorded_ns.extend(came[topic, names].recorded_ns)
+            of_part.stamped_ns.extend(came[topic, names].stamped_ns)
     values = {topic: value for topic, value in values.items() if value[0]}
+    wanted = [topic for topic in values if any(name.startswith(f"{topic}.") for name in used)]
+    values = {topic: values[topic] for topic in wanted or values}
     if not values:
         raise DataDamaged(f"{path} has no messages with numbers")
     return values, {topic: times[topic] for topic in values}
+
+
+def _names_in(message: Any) -> str:
+    """Return what a message says that its numbers are of, such as the names of joints."""
+    names = getattr(message, "name", "")
+    return names if isinstance(names, str) else "+".join(map(str, names))
 
 
 def _held(times: TopicTimes, messages: Sequence[dict[str, Any]], rows_ns: Nanoseconds) -> dict[str, Numbers]:

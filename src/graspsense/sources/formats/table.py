@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from attrs import evolve, field, frozen
@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from graspsense.core.values.errors import DataDamaged
 
 Numbers = NDArray[np.float64]
+
+MOST_NAMES: Final = 20
+"""A text column or a topic with more different names does not say by them what its numbers are of."""
 
 
 @frozen(kw_only=True, eq=False)

@@ -31,7 +31,8 @@ GZIP: Final = ".gz"
 UNITS: Final = frozenset((
     "s", "sec", "secs", "seconds", "ms", "msec", "us", "\u00b5s", "\u03bcs", "ns", "min", "m", "cm", "mm",
     "um", "\u00b5m", "\u03bcm", "in", "inch", "n", "mn", "kn", "g", "gram", "grams", "kg", "gf", "kgf", "lb",
-    "lbf", "v", "mv", "a", "ma", "hz", "khz", "c", "\u00b0c", "degc", "k", "deg", "\u00b0", "rad", "%", "-",
+    "lbf", "lbs", "kp", "cn", "dan", "ozf", "n/m", "n/mm",
+    "v", "mv", "a", "ma", "hz", "khz", "c", "\u00b0c", "degc", "k", "deg", "\u00b0", "rad", "%", "-",
     "1", "pa", "kpa", "mpa", "bar", "psi", "nm", "n\u00b7m", "n*m", "m/s", "cm/s", "mm/s", "m/s2", "m/s^2",
     "millisecond", "milliseconds", "millimeter", "millimeters", "millimetre", "millimetres", "inches", "newton",
     "newtons", "m/s\u00b2", "rad/s", "deg/s", "counts", "count", "raw", "adc", "a.u.", "au", "step", "steps",

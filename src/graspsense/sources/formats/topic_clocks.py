@@ -47,10 +47,8 @@ RATES_APART_NS: Final = 10_000_000
 """Share of the recording, and time, by which one clock gets ahead of another that runs at another rate."""
 EVENLY: Final = 0.95
 """Least correlation with time of the delays of such a clock."""
-COARSE_NS: Final = 5_000_000
 COARSE_SHARE: Final = 0.2
-"""Least step of the times in headers, and share of the messages that share their time with the one before, where these
-times are coarse."""
+"""Share of the messages that have the time of the one before in their headers where these times are coarse."""
 BURST: Final = 5.0
 """Messages with so many times the usual step between them are of different bursts,"""
 BURST_NS: Final = 20_000_000
@@ -233,7 +231,7 @@ def _apart(stamped: Mapping[str, Nanoseconds], recorded: Mapping[str, Nanosecond
     elif drifting := _drifting(recorded, least):
         yield f"the clock in the headers of {drifting} runs at another rate than that of another topic: {used}"
     elif coarse := [topic for topic in stamped if _coarse(recorded[topic], stamped[topic])]:
-        yield f"the times in the headers of {', '.join(coarse)} have coarse steps: {used}"
+        yield f"the times in the headers of {', '.join(coarse)} have coarse steps, or stand still: {used}"
     elif apart > CLOCKS_APART_NS:
         yield (
             f"the times in the headers of {behind} are behind those of another topic, from another clock: {used}"
@@ -321,13 +319,16 @@ def _was_set(recorded: Nanoseconds, stamped: Nanoseconds) -> bool:
 
 
 def _coarse(recorded: Nanoseconds, stamped: Nanoseconds) -> bool:
-    """Return whether the times in headers are multiples of a step, and many messages have that of the one before."""
+    """Return whether many messages have the time of the one before in their headers, or several for a long time."""
     order = np.argsort(recorded, kind="stable")
-    steps, stamp_steps = np.diff(recorded[order]), np.diff(stamped[order])
-    if not len(steps) or int(np.gcd.reduce(stamp_steps)) < COARSE_NS:
+    written, stamps = recorded[order], stamped[order]
+    steps = np.diff(written)
+    if not len(steps):
         return False
-    same = (stamp_steps == 0) & (steps > 0.5 * np.median(steps))
-    return bool(same.mean() > COARSE_SHARE)
+    same = (np.diff(stamps) == 0) & (steps > 0.5 * np.median(steps))
+    begins = np.flatnonzero(np.concatenate(([True], ~same)))
+    ends = np.append(begins[1:], len(written)) - 1
+    return bool(same.mean() > COARSE_SHARE or (written[ends] - written[begins]).max() > LEAST_HOLD_NS)
 
 
 def _in_bursts(topics: Mapping[str, Nanoseconds]) -> Iterator[str]:

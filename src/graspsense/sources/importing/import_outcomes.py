@@ -30,6 +30,10 @@ MOST_TRAVEL: Final = 0.5
 """Share of the travel of a squeeze after a rest, and"""
 PRESSED: Final = 2.0
 """ratio of a later force to that of the rest, from which on most of the squeeze comes after it."""
+RIGID: Final = 0.01
+PRESSED_RIGID: Final = 1.4
+"""Share of its range by which the gap closes at most on a rigid object, whose squeeze is that of the force alone, and
+the same ratio there."""
 
 
 @frozen
@@ -45,8 +49,8 @@ class TriedRecordings:
         if not self.pressing_on:
             return ""
         return (
-            f"{self.pressing_on} of {counted(self.outcomes.total(), 'grasp')} tried: most of a squeeze, and "
-            "most of its force, comes after the rest that p_steady, f_steady and delta_t are of. If the fingers only "
+            f"{self.pressing_on} of {counted(self.outcomes.total(), 'grasp')} tried: most of a squeeze, or "
+            "much of its force, comes after the rest that p_steady, f_steady and delta_t are of. If the fingers only "
             f"stuck there, or a sensor stopped, ask for a longer rest: {set_option('controller.rest_window_s=SECONDS')}"
         )
 
@@ -79,8 +83,11 @@ def presses_on(features: Features, recording: Recording) -> bool:
     if not later:  # also without a rest, or without a gap
         return False
     narrowest = min(frame.gap_m for frame in later)
+    widest = max(reading.frame.gap_m for reading in recording.readings)
     force = max((frame.force_left_n + frame.force_right_n) / 2.0 for frame in later)
-    return p_steady - narrowest >= MOST_TRAVEL * (p_first - narrowest) and force > PRESSED * f_steady
+    travels_on = p_steady - narrowest >= MOST_TRAVEL * (p_first - narrowest)
+    rigid = p_first - narrowest < RIGID * (widest - narrowest)
+    return (rigid and force > PRESSED_RIGID * f_steady) or (travels_on and force > PRESSED * f_steady)
 
 
 def refuse_useless(

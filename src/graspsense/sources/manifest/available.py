@@ -10,14 +10,17 @@ import numpy as np
 from graspsense.core.values.errors import ConfigError, listed
 from graspsense.core.values.fingers import PREFIX
 from graspsense.core.values.written_numbers import number_in
-from graspsense.sources.formats.table import ColumnTable, Numbers
+from graspsense.sources.formats.table import MOST_NAMES, ColumnTable, Numbers
 from graspsense.sources.manifest.description import ReadManifest, quantity_of
 from graspsense.sources.manifest.expression import Expression, ExpressionError
 from graspsense.sources.units import GRAM_FORCE, TO_SI, WITHOUT_UNIT, known_unit
 
 
 class AvailableColumns(dict[str, Any]):
-    """The columns of a table that expressions can use: its numbers, its fields that are numbers, and channels."""
+    """The columns of a table that expressions can use: its numbers, its fields that are numbers, and channels.
+
+    A table with one column of values, and one that says what each is of, has a column for each of these names.
+    """
 
     def __init__(self, manifest: ReadManifest, table: ColumnTable) -> None:
         super().__init__(table.numbers)
@@ -25,6 +28,13 @@ class AvailableColumns(dict[str, Any]):
         for name, text in table.fields.items():
             if name not in self and (number := number_in(text)) is not None:
                 self[name] = np.full(len(table), number)
+        times = {name for part in manifest.expressions["time"] for name in part.names}
+        values = [name for name, column in table.numbers.items() if column.ndim == 1 and name not in times]
+        for cells in table.texts.values() if len(values) == 1 else ():
+            names = dict.fromkeys(cells)
+            for name in names if 1 < len(names) <= MOST_NAMES else ():
+                rows = np.array([cell == name for cell in cells])
+                self[f"{name}.{values[0]}"] = np.where(rows, table.numbers[values[0]], np.nan)
 
     def value(self, key: str) -> tuple[Numbers, str] | None:
         """Return what the manifest gives for a key and its unit, None if it gives nothing."""

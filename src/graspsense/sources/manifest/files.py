@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from attrs import frozen
 
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.errors import ConfigError, listed
 from graspsense.core.values.label_text import is_missing_label
 from graspsense.sources.formats.csv_columns import CsvColumns
 from graspsense.sources.formats.patterns import FileTemplate, PatternError, file_template
@@ -40,7 +40,7 @@ def files_of(manifest: ReadManifest) -> list[NamedFile]:
             f"{manifest.place}: there is no folder {manifest.base}. The key folder is relative to the manifest"
         )
     keys = manifest.keys
-    files = list(_listed(manifest)) if keys.list else list(_matching(manifest))
+    files = list(_listed(manifest)) if keys.list else list(_matching(manifest, texts_of(keys.files)))
     if not files:
         some = [name for name, _ in tree_below(manifest.base)][:5]
         raise ConfigError(
@@ -50,8 +50,25 @@ def files_of(manifest: ReadManifest) -> list[NamedFile]:
     return files
 
 
-def _matching(manifest: ReadManifest) -> Iterator[NamedFile]:
-    templates = _templates(manifest)
+def left_out(manifest: ReadManifest) -> Iterator[str]:
+    """Yield that files are not used because they have another text where a pattern wants digits. Raises ConfigError."""
+    patterns = texts_of(manifest.keys.files)
+    wider = [pattern.replace(":d}", "}") for pattern in patterns if ":d}" in pattern]
+    if manifest.keys.list or not wider:
+        return
+    used = {file.name for file in _matching(manifest, patterns)}
+    beside = {Path(name).name for name in (*texts_of(manifest.keys.beside), *manifest.value_files.values())}
+    others = [
+        file.name
+        for file in _matching(manifest, wider)
+        if file.name not in used and not {file.path.name} & beside
+    ]
+    if others:
+        yield f"not used: {listed(others)}, which have a text where {' or '.join(map(repr, patterns))} wants digits"
+
+
+def _matching(manifest: ReadManifest, patterns: Sequence[str]) -> Iterator[NamedFile]:
+    templates = _templates(manifest, patterns)
     for name, path in tree_below(manifest.base):
         if path.name == manifest.place.name and path.resolve() == manifest.place.resolve():
             continue
@@ -65,10 +82,10 @@ def _matching(manifest: ReadManifest) -> Iterator[NamedFile]:
             yield NamedFile(path=path, name=name, fields=fields)
 
 
-def _templates(manifest: ReadManifest) -> list[FileTemplate]:
+def _templates(manifest: ReadManifest, patterns: Sequence[str]) -> list[FileTemplate]:
     """Return the patterns of the files. Raises ConfigError."""
     try:
-        return [file_template(pattern) for pattern in texts_of(manifest.keys.files)]
+        return [file_template(pattern) for pattern in patterns]
     except PatternError as error:
         raise ConfigError(f"{manifest.place}: files: {error}") from None
 

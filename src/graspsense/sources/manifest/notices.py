@@ -13,6 +13,7 @@ from graspsense.core.values.errors import DataDamaged
 from graspsense.sources.columns.grasp_columns import GraspColumns
 from graspsense.sources.columns.recording_notices import FEWEST, STEADY, ZERO_SAMPLES, force_of_pads
 from graspsense.sources.columns.usual_range import usual_range
+from graspsense.sources.manifest.closings import CLOSED, OPEN
 from graspsense.sources.manifest.steps import NOISE, squeezes
 
 if TYPE_CHECKING:
@@ -34,6 +35,12 @@ STRONG_N: Final = 300.0
 """A force whose range is beyond that of the usual grippers is in another unit."""
 WIDEST_M: Final = 5e-4
 """No gripper opens less (m)."""
+NO_GLITCH: Final = 0.05
+"""Share of the samples with closed, and with open fingers, from which on these are no glitches of the gap."""
+TURNED: Final = 0.3
+"""Share of its range by which a force is less with closed fingers than with open ones if its sign is turned."""
+BELOW_ZERO_M: Final = -0.005
+"""No fingertips are pressed into each other so far (m)."""
 _OFFSET: Final = ' If the fingers were free, the sensor has an offset: zero = "10 samples"'
 _FOUND: Final = 'split = "force" finds them, '
 
@@ -55,15 +62,46 @@ def notices_of(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
         yield from _of_holes(columns)
 
 
+def falls_on_closing(columns: GraspColumns) -> str:
+    """Return a sentence if the force of a pad is less where the fingers are closed than where they are open.
+
+    Without a gap, if it is negative where it is largest by far.
+    """
+    gap = columns.gap_m
+    known = np.isfinite(gap) & np.isfinite(columns.force_n)
+    low, high = usual_range(gap[known]) if known.any() else (0.0, 0.0)
+    closed, free = known & (gap < low + CLOSED * (high - low)), known & (gap > low + OPEN * (high - low))
+    for name, pad in force_of_pads(columns.left_n, columns.right_n).items():
+        if not known.any() or not _is_felt(pad[known]):
+            continue
+        least, most = usual_range(pad[known])
+        if min(closed.mean(), free.mean()) > NO_GLITCH:
+            turned = float(np.median(pad[closed]) - np.median(pad[free])) < -TURNED * (most - least)
+        else:
+            turned = least < -2.0 * abs(most) and 2.0 * abs(float(pad[known][:ZERO_SAMPLES].mean())) < -least
+        if turned:
+            return (
+                f"{name} falls where the fingers close. Turn its sign, -FORCE, or that of a position that grows on "
+                'closing: gap = "OPENING - POSITION"'
+            )
+    return ""
+
+
 def _of_gap(columns: GraspColumns) -> Iterator[str]:
     gap = columns.gap_m
-    moved, span = float(gap[int(columns.force_n.argmax())] - gap[0]), float(np.ptp(gap))
+    began = float(np.median(gap[:3]))  # the first sample can be from before the sensor was ready
+    moved, span = float(gap[int(columns.force_n.argmax())]) - began, float(np.ptp(gap))
     if span == 0.0 and not columns.units.get("gap"):
         yield "the gap does not change during the recording: is it another column?"
     if span > 0.0 and gap.min() > 0.0 and gap.max() < WIDEST_M and not columns.units.get("gap"):
         yield (
             f"the gap reaches {gap.max() * 1e3:.2g} mm only, which no gripper opens to: if it is in another unit, "
             "write that behind it, as [m] or [mm]"
+        )
+    if gap.min() < BELOW_ZERO_M and gap.max() > 0.0 and not columns.units.get("gap"):
+        yield (
+            f"the gap goes down to {gap.min() * 1e3:.3g} mm, and fingers meet at 0: is it measured from another zero? "
+            'Then add the difference: gap = "POSITION + 20 [mm]"'
         )
     if span > 0.0 and moved > 0.2 * span:
         yield (

@@ -17,6 +17,7 @@ from attrs import evolve
 from graspsense.core.values.errors import ConfigError, DataDamaged, counted, listed
 from graspsense.core.values.label_text import is_missing_label
 from graspsense.core.values.limits import RECORDINGS
+from graspsense.core.values.written_times import seconds_since_first
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import each_readable
 from graspsense.recording.replayable import Recording
@@ -24,6 +25,7 @@ from graspsense.sources.columns.grasp_columns import GraspColumns, checked_recor
 from graspsense.sources.formats.array_format import ArrayRules
 from graspsense.sources.formats.raw_tables import TableRules, raw_tables
 from graspsense.sources.formats.table import ColumnTable
+from graspsense.sources.formats.topic_clocks import NOTICED, PERIODS
 from graspsense.sources.manifest.description import ReadManifest, axes_of, read_manifest, texts_of
 from graspsense.sources.manifest.facts import (
     FIELD,
@@ -33,8 +35,8 @@ from graspsense.sources.manifest.facts import (
     recorded_at_of,
     values_of,
 )
-from graspsense.sources.manifest.files import NamedFile, files_of
-from graspsense.sources.manifest.notices import notices_of
+from graspsense.sources.manifest.files import NamedFile, files_of, left_out
+from graspsense.sources.manifest.notices import falls_on_closing, notices_of
 from graspsense.sources.manifest.samples import samples
 from graspsense.sources.manifest.steps import cut_at, resampled, squeezes
 
@@ -45,12 +47,14 @@ def read_recordings(place: str) -> Iterator[LabelledRecording | UnreadableRecord
     Raises ConfigError if the manifest itself cannot be used.
     """
     manifest = read_manifest(Path(place).expanduser())
+    told = tuple(left_out(manifest))
     for file in files_of(manifest):
         for table in each_readable(file.name, partial(tables_of, manifest, file)):
             if isinstance(table, UnreadableRecording):
                 yield table
-            else:
-                yield from each_readable(table.source, partial(grasps_in, manifest, file, table))
+                continue
+            named, told = evolve(table, warnings=(*table.warnings, *told)), ()
+            yield from each_readable(table.source, partial(grasps_in, manifest, file, named))
 
 
 def manifest_files(place: str) -> list[Path]:
@@ -98,15 +102,25 @@ def tables_of(manifest: ReadManifest, file: NamedFile) -> list[ColumnTable]:
 
 
 def _joined(manifest: ReadManifest, tables: list[ColumnTable], path: Path) -> list[ColumnTable]:
-    """Return the table of a file with the columns of one beside it. Raises ConfigError, DataDamaged."""
+    """Return the table of a file with the columns of one beside it. Raises ConfigError, DataDamaged.
+
+    Files with other numbers of rows are joined by their time, if both have the column that is the time.
+    """
     others = raw_tables(path, _rules(manifest))
     rows = [len(table) for table in (*tables, *others)]
-    if len(tables) != 1 or len(others) != 1 or rows[0] != rows[1]:
+    times = [name for part in manifest.expressions["time"] for name in part.names]
+    time = next((name for name in times if all(name in part.numbers for part in (*tables, *others))), None)
+    if len(tables) != 1 or len(others) != 1 or (rows[0] != rows[1] and time is None):
         raise DataDamaged(
             f"{tables[0].source} and {path} beside it have {listed(list(map(str, rows)))} rows: each needs one table, "
-            "with as many"
+            "with as many, or with the column of the time in both"
         )
     (table,), (other,) = tables, others
+    warnings = (
+        tuple(_other_times(table, other, path, time)) if rows[0] == rows[1] and time is not None else ()
+    )
+    if rows[0] != rows[1] and time is not None:
+        table, other = _by_time(table, other, time)
 
     def named(columns: Mapping[str, Any]) -> dict[str, Any]:
         return {f"{path.stem}.{name}": column for name, column in columns.items()}
@@ -118,22 +132,63 @@ def _joined(manifest: ReadManifest, tables: list[ColumnTable], path: Path) -> li
             texts={**table.texts, **named(other.texts)},
             units={**table.units, **named(other.units)},
             shapes={**table.shapes, **named(other.shapes)},
-            warnings=(*table.warnings, *_other_times(manifest, table, other, path)),
+            warnings=(*table.warnings, *warnings),
         )
     ]
 
 
-def _other_times(manifest: ReadManifest, table: ColumnTable, other: ColumnTable, path: Path) -> Iterator[str]:
-    """Yield that rows that are used together have different times, if both files have the column of the time."""
-    names = {name for part in manifest.expressions["time"] for name in part.names}
-    for name in names & table.numbers.keys() & other.numbers.keys():
-        apart = np.abs(other.numbers[name] - table.numbers[name])
-        largest = float(np.max(apart, initial=0.0, where=np.isfinite(apart)))
-        if len(table) > 1 and largest * (len(table) - 1) > np.ptp(table.numbers[name]):
-            yield (
-                f"{path.name} is used row by row, and its {name} differs by up to {largest:.4g} from "
-                f"that of {table.source}: if these are times of one clock, its rows belong elsewhere"
-            )
+def _by_time(table: ColumnTable, other: ColumnTable, time: str) -> tuple[ColumnTable, ColumnTable]:
+    """Return two tables at the times of the one with more rows, each with its last values. Raises DataDamaged."""
+    times = [part.numbers[time] for part in (table, other)]
+    if table.units.get(time) == other.units.get(time) == "s" and time in table.texts and time in other.texts:
+        # Times in words count from the first one of their file.
+        between = seconds_since_first([table.texts[time][0], other.texts[time][0]])
+        times[1] = times[1] + (0.0 if between is None else between[1])
+    if not all(len(at_s) > 1 and (np.diff(at_s) > 0.0).all() for at_s in times):
+        raise DataDamaged(
+            f"{table.source} and {other.source} are joined by {time}, which has to increase in both"
+        )
+    usual = [float(np.median(np.diff(at_s))) for at_s in times]
+    begin, end = (
+        max(at_s[0] for at_s in times),
+        min(at_s[-1] + step for at_s, step in zip(times, usual, strict=True)),
+    )
+    most = times[0] if len(times[0]) >= len(times[1]) else times[1]
+    rows = most[(most >= begin) & (most <= end)]
+    if not len(rows):
+        raise DataDamaged(f"{table.source} and {other.source} have no {time} in common: check their clocks")
+    last = [np.searchsorted(at_s, rows, side="right") - 1 for at_s in times]
+    old = [(rows - at_s[k]).max() > PERIODS * step for at_s, k, step in zip(times, last, usual, strict=True)]
+    told = [
+        f"{part.source} has no values for more than {PERIODS:g} of its usual periods: the last one is used"
+        for part, is_old in zip((table, other), old, strict=True)
+        if is_old
+    ]
+    lost = 1.0 - len(rows) / len(most)
+    told += [f"{lost:.0%} of the rows are left out: {other.source} begins later or ends earlier"] * (
+        lost > NOTICED
+    )
+    joined = table.rows(last[0])
+    return (
+        evolve(
+            joined,
+            numbers={**joined.numbers, time: rows},
+            notes=(*table.notes, f"{other.source} is joined by {time}: the last value of each file is used"),
+            warnings=(*table.warnings, *told),
+        ),
+        other.rows(last[1]),
+    )
+
+
+def _other_times(table: ColumnTable, other: ColumnTable, path: Path, time: str) -> Iterator[str]:
+    """Yield that rows that are used together have different times."""
+    apart = np.abs(other.numbers[time] - table.numbers[time])
+    largest = float(np.max(apart, initial=0.0, where=np.isfinite(apart)))
+    if len(table) > 1 and largest * (len(table) - 1) > np.ptp(table.numbers[time]):
+        yield (
+            f"{path.name} is used row by row, and its {time} differs by up to {largest:.4g} from "
+            f"that of {table.source}: if these are times of one clock, its rows belong elsewhere"
+        )
 
 
 def grasps_in(
@@ -149,6 +204,8 @@ def grasps_in(
     if manifest.keys.split != "force":
         yield from _grasps(manifest, file, table, columns)
         return
+    if turned := falls_on_closing(columns):
+        raise DataDamaged(f"{columns.source}: no squeeze can be found: {turned}")
     for part in squeezes(columns):
         yield from each_readable(part.source, partial(_grasps, manifest, file, table, part))
 
@@ -196,7 +253,7 @@ def _rules(manifest: ReadManifest) -> TableRules:
             axes=axes_of(manifest.keys.axes),
             used=frozenset(name for part in parts for name in part.names),
         ),
-        topics={match[1] for text in texts for match in re.finditer(r"['\"](/[^.'\"*?]+)\.", text)},
+        used={name for text in texts for name in re.findall(r"['\"](/[^.'\"*?]+\.[^'\"]*)['\"]", text)},
     )
 
 

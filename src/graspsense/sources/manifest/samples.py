@@ -32,6 +32,8 @@ EARLIEST_DATE_S: Final = 946_684_800.0
 """The year 2000, in seconds since 1970."""
 LATEST_DATE_S: Final = 4_102_444_800.0
 """The year 2100, in seconds since 1970."""
+QUANTITIES: Final = ("time", "gap", "force")
+"""The quantities whose units are not those of another one."""
 _NAME: Final = re.compile(r"[a-z][a-z0-9_]*")
 _TAKEN: Final = frozenset({*CHANNELS, "force", "t"})
 
@@ -170,6 +172,10 @@ def _doubtful_units(columns: AvailableColumns) -> Iterator[str]:
                 f"{key}: the unit or the name of the column is that of a mass, as of a scale: for gram-force write "
                 f'{key} = "{chosen.text} [{grams}]"'
             )
+            continue
+        others = [what for what in QUANTITIES if what != quantity and known_unit(stated, what) in TO_SI[what]]
+        if quantity in QUANTITIES and others and stated not in WITHOUT_UNIT:
+            yield f"{key}: the file states {stated}, which is no unit of a {quantity}: is it another column?"
             continue
         said, written = (known_unit(unit, quantity) or unit for unit in (stated, chosen.unit))
         if chosen.unit and stated not in WITHOUT_UNIT and said != written:

@@ -9,16 +9,18 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Hashable, Iterator, Sequence
 from decimal import Decimal
+from itertools import groupby
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from graspsense.core.components.caller import option
-from graspsense.core.values.errors import listed
+from graspsense.core.values.errors import counted, listed
 from graspsense.core.values.features import LARGEST_VALUE
 from graspsense.sources.trial_table.identifiers import (
     LEAST_LINES,
     TIMES,
+    follow_lines,
     groups_trials,
     is_count,
     is_time,
@@ -57,6 +59,8 @@ _TEMPERATURES: Final = frozenset({"C", "\u00b0C", "degC"})
 """What can be the same, or drift, in a whole session; by the name of a column, or by its unit."""
 _OFTEN: Final = 3
 """Lines with the same value from which on it may stand for something else than a measurement."""
+_LONE: Final = 100.0
+"""How many times the span of all others a single value is away from them, if it is no measurement."""
 _FEW: Final = 0.1
 """Share of the lines of a label that may differ from the others in whether they have a value."""
 _ROUNDED: Final = 6
@@ -131,6 +135,17 @@ def _of_recording(
             "If it names sessions, devices or objects, or was measured once for each, it reveals the labels: ",
         ),
         (
+            "each of its values is that of consecutive lines, as a month, a session or a version is",
+            [
+                name
+                for name in used
+                if name not in same
+                and (columns.is_nominal(name) or is_count(columns.units[name]))
+                and in_one_block_each(columns.cells[name], labels)
+            ],
+            "If it tells when or how a trial was recorded, it reveals the labels: ",
+        ),
+        (
             "some labels have nearly all of its values, and others hardly any",
             [name for name in used if says_of_labels(missing[name].tolist(), labels)],
             "If the recording is the reason, and not the object, it reveals the labels: ",
@@ -149,6 +164,15 @@ def _of_time_and_digits(
             "every line has more than the one before, or every line less",
             rising,
             "If it is a time or a counter it reveals the labels: ",
+        ),
+        (
+            "its values follow the lines within each label, as a zero that drifts, a battery or a clock does",
+            [
+                name
+                for name, values in numbers.items()
+                if name not in rising and differs_by_label(values, labels) and follow_lines(values, labels)
+            ],
+            "If it tells when a trial was recorded, it reveals the labels: ",
         ),
         (
             "its name is that of a time",
@@ -255,6 +279,14 @@ def values_have_one_label(values: Sequence[str], labels: Sequence[str]) -> bool:
     return len(set(labels)) < different == len(set(given)) and _OFTEN * different <= len(given)
 
 
+def in_one_block_each(values: Sequence[str], labels: Sequence[str]) -> bool:
+    """Return whether the lines of each value, which are several, come one after the other, and tell of the label."""
+    blocks = [len(list(lines)) for _, lines in groupby(values)]
+    different = len(set(values))
+    told = len(set(zip(values, labels, strict=True))) < different * len(set(labels))
+    return 1 < different == len(blocks) and min(blocks) >= LEAST_LINES and told
+
+
 def passes_without_a_gap(values: Numbers, labels: Sequence[str]) -> bool:
     """Return whether each label has a range of its own, and no two ranges are farther apart than values within one.
 
@@ -313,8 +345,8 @@ def _mixed(numbers: dict[str, Numbers]) -> list[str]:
         if stand_in is not None:
             times = int((known == stand_in).sum())
             notes.append(
-                f"{name} is {stand_in:g} in {times} trials, unlike all other values: if it stands for a missing "
-                "value, or a sensor had stopped or was at the end of its range, leave the cell empty"
+                f"{name} is {stand_in:g} in {counted(times, 'trial')}, unlike all other values: if it stands for a "
+                "missing value, or a sensor had stopped or was at the end of its range, leave the cell empty"
             )
         elif unit_changes(known):
             notes.append(
@@ -342,18 +374,20 @@ def _pads_apart(numbers: dict[str, Numbers]) -> Iterator[str]:
 def stand_in_of(known: Numbers) -> float | None:
     """Return the value that several lines have and that is farther from all others than these are from each other.
 
-    Or the one that is repeated by far more often than any other one, where the others hardly repeat. A zero can be
-    measured so often.
+    Or a single one that is a hundred times as far. Or the one that is repeated by far more often than any other one,
+    where the others hardly repeat. A zero can be measured so often.
     """
     if len(known) < 2 * LEAST_LINES:
         return None
     value, times = Counter(known.tolist()).most_common(1)[0]
+    if times < _OFTEN:
+        value = float(known[np.abs(known - np.median(known)).argmax()])
     others = known[known != value]
-    if times < _OFTEN or len(np.unique(others)) < LEAST_LINES:
+    if len(np.unique(others)) < LEAST_LINES:
         return None
-    span = float(others.max() - others.min())
+    span = float(others.max() - others.min()) * (1.0 if times >= _OFTEN else _LONE)
     far = value < others.min() - span or value > others.max() + span
-    stuck = value != 0.0 and times >= LEAST_LINES and _mostly_different(others)
+    stuck = times >= _OFTEN and value != 0.0 and times >= LEAST_LINES and _mostly_different(others)
     return float(value) if far or stuck else None
 
 

@@ -49,7 +49,12 @@ LEAST_LINES: Final = 5
 """Lines from which on the values of a column can show that it is an identifier."""
 _FOLLOWS: Final = 0.95
 """Rank correlation with the lines, within each label, of a counter or a clock."""
+_DRIFTS: Final = 0.7
+_DRIFTS_NEAR: Final = 0.35
+"""The same of a drift with noise, and that within a few lines."""
 _TIES: Final = 0.2
+_COUNTING: Final = 15
+"""Number of steps from which on so many in one direction show a counter: of random values, one in ten thousand does."""
 _BY_CHANCE: Final = 0.005
 _ORDERS: Final = 10_000
 """Number of orders of the lines within the labels from which on a rank correlation is no chance."""
@@ -121,9 +126,12 @@ def identifies(
     cells = cells_in_range(values_of) + 1.0
     if cells < len(values_of):  # a value far from the others hides their grid
         cells = math.inf
+    named = bool(_NAMES & set(words_in(name)))
+    orders = (given, None if order is None else np.array(order)[given])
+    if (whole or named) and any(lines is not None and _begins_anew(column, lines) for lines in orders):
+        return "follow the order of the lines as a counter or a time does"
     if len(set(zip(column.tolist(), known, strict=True))) >= (1.0 - _TIES) * len(column):
-        named = bool(_NAMES & set(words_in(name)))
-        for lines in (given, None if order is None else np.array(order)[given]):
+        for lines in orders:
             if lines is not None and (
                 (_follows(column, lines, known) and (whole or named or _is_regular(values_of)))
                 or (is_time(unit) and _follows_in_labels(column, lines, known))
@@ -216,6 +224,12 @@ def _follows(column: NDArray[np.float64], lines: NDArray[np.int64], labels: Sequ
     return bool((steps > 0.0).all() or (steps < 0.0).all()) or _follows_in_labels(column, lines, labels)
 
 
+def _begins_anew(column: NDArray[np.float64], lines: NDArray[np.int64]) -> bool:
+    """Return whether nearly all values are larger, or smaller, than the one before, as those of a counter of a byte."""
+    steps = np.diff(column[np.argsort(lines)])
+    return len(steps) >= _COUNTING and max((steps > 0.0).mean(), (steps < 0.0).mean()) >= 1.0 - _TIES
+
+
 def _follows_in_labels(column: NDArray[np.float64], lines: NDArray[np.int64], labels: Sequence[str]) -> bool:
     """Return whether the values rise, or fall, with these positions within each label, which is no chance."""
     codes = np.unique(np.array(labels), return_inverse=True)[1]
@@ -223,8 +237,31 @@ def _follows_in_labels(column: NDArray[np.float64], lines: NDArray[np.int64], la
     if sum(times * math.lgamma(size + 1) for size, times in sizes.items()) < math.log(_ORDERS):
         return False
     ranks, places = _ranks(column, codes), _ranks(lines.astype(np.float64), codes)
+    return abs(_correlation(ranks, places)) >= _FOLLOWS
+
+
+def follow_lines(values: NDArray[np.float64], labels: Sequence[str]) -> bool:
+    """Return whether values drift with the lines: over each label, and within a few lines of it.
+
+    Objects that come one after the other differ from each other, and not within their lines.
+    """
+    given = np.flatnonzero(~np.isnan(values))
+    codes = np.unique(np.array(labels)[given], return_inverse=True)[1]
+    column, lines = values[given], given.astype(np.float64)
+    if len(given) < _SPACED or not np.ptp(column):
+        return False
+    counts = np.bincount(codes)
+    within = (_ranks(lines, codes) + (counts[codes] - 1) / 2.0).astype(np.int64)
+    parts = codes * len(given) + within // LEAST_LINES
+    parts = np.unique(parts, return_inverse=True)[1]
+    whole, near = (_correlation(_ranks(column, groups), _ranks(lines, groups)) for groups in (codes, parts))
+    return abs(whole) >= _DRIFTS and whole * near > 0.0 and abs(near) >= _DRIFTS_NEAR
+
+
+def _correlation(ranks: NDArray[np.float64], places: NDArray[np.float64]) -> float:
+    """Return the correlation of numbers whose means are zero; 0 if those of one do not differ."""
     scale = math.sqrt(float(ranks @ ranks) * float(places @ places))
-    return scale > 0.0 and abs(float(ranks @ places)) >= _FOLLOWS * scale
+    return float(ranks @ places) / scale if scale > 0.0 else 0.0
 
 
 def _ranks(values: NDArray[np.float64], codes: NDArray[np.int64]) -> NDArray[np.float64]:
