@@ -193,7 +193,8 @@ def test_open_fingers_are_as_wide_after_a_grasp_as_before_it(end_m, is_told):
     watch.before_closing(frame(0, 0.08))
     for k, gap_m in enumerate([0.08, 0.06, 0.05]):
         watch.see(frame(k, gap_m), SQUEEZE)
-    watch.see(frame(4, 0.06), Phase.RELEASE)
+    for k, gap_m in enumerate([0.05, 0.06], 3):
+        watch.see(frame(k, gap_m), Phase.RELEASE)
     assert (watch.released(frame(5, end_m)) is not None) is is_told
 
 

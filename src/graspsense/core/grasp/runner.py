@@ -420,7 +420,7 @@ class _Grasp:
     def _not_yet_at_rest(self, state: TickState) -> TickState:
         """Return a state in which fingers that open rest at the earliest when the gripper has acted on the command.
 
-        Those that stand still until then, or still close, would otherwise count as open, and be stopped before they move.
+        Those that stand still until then, or still close, would otherwise count as open, and be stopped there.
         """
         if state.phase not in (Phase.OPENING, RELEASE):
             return state

@@ -14,8 +14,8 @@ from graspsense.core.values.signals import APPROACH, EFFORT, Command, Frame, Pha
 
 WRONG_SIGN_S: Final = 0.3
 """Time for which the effort of fingers that press may have the sign of opening ones."""
-OPENED_M: Final = 0.003
-"""Way by which fingers open under another effort than that with which they held."""
+OPENED_M: Final = 0.005
+"""Way from which on the effort of fingers that open, and then rest, is not always that with which they held."""
 
 
 class ReportedEffort:
@@ -35,9 +35,9 @@ class ReportedEffort:
         """Take the frame of a tick and return what its effort shows."""
         if phase < APPROACH:
             return None
-        return self._stuck(frame) if phase == Phase.RELEASE else self._reversed(frame)
-
-    def _reversed(self, frame: Frame) -> Fault | None:
+        if phase == Phase.RELEASE:
+            self._changed = self._changed or frame.effort_n != self._effort_n
+            return None
         if frame.effort_n != self._effort_n:
             self._effort_n, self._since_s = frame.effort_n, frame.t_s
         self._gap_m = frame.gap_m
@@ -51,9 +51,11 @@ class ReportedEffort:
             "sign of its scale; what follows from it is wrong or missing",
         )
 
-    def _stuck(self, frame: Frame) -> Fault | None:
-        """The motor turns round to open the fingers, so its effort changes."""
-        self._changed = self._changed or frame.effort_n != self._effort_n
+    def released(self, frame: Frame) -> Fault | None:
+        """Take the last frame of the release; return whether the effort has stood still since the fingers held.
+
+        An effort without a sign can be the same for a while, where the motor holds and opens at the same limit.
+        """
         if self._changed or not frame.gap_m - self._gap_m >= OPENED_M:
             return None
         return Fault(

@@ -74,12 +74,14 @@ class Opening:
                 self._widest_m = max(self._widest_m, frame.gap_m)
                 self._start_m, self._start_s = frame.gap_m, frame.t_s
             return None
-        if self._opened or not self._widest_m - self._start_m >= LEAST_TRAVEL_M:
+        if self._opened:
             return None
-        elapsed_s = frame.t_s - self._start_s
+        closed_m, elapsed_s = self._widest_m - self._start_m, frame.t_s - self._start_s
         # A gap that is late closes on for a while.
         self._start_m = min(self._start_m, frame.gap_m)
         self._opened = frame.gap_m - self._start_m >= OPENED_M
+        if not closed_m >= LEAST_TRAVEL_M:
+            return None
         if self._opened:
             return None if elapsed_s <= self._late_s else self._late(elapsed_s)
         if elapsed_s < self.stands_s:

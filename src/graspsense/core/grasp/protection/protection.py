@@ -167,6 +167,8 @@ class Protection:
     def released(self, frame: Frame) -> None:
         """Take the last frame of the release."""
         self._see(self.opening.released(frame), RELEASE)
+        if self._effort is not None:
+            self._see(self._effort.released(frame), RELEASE)
 
     def opens_with(self, command: Command) -> Command:
         """Return the command that opens the fingers at last, with no more effort than in a release."""
