@@ -3,12 +3,15 @@
 from math import inf, nan
 
 import numpy as np
+from attrs import evolve
 from cases import every_case
 from grippers import REST_S, Scripted, bottle, squeezing
 
 from graspsense.core.components.run_config import RunConfig
+from graspsense.core.grasp.protection.absence import GAP_ABSENT, Absence
 from graspsense.core.grasp.protection.motor import Motor
-from graspsense.core.grasp.protection.speed import GapAbsent, GapJump, Opening
+from graspsense.core.grasp.protection.opening import Opening
+from graspsense.core.grasp.protection.speed import GapJump
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.values.signals import (
     EFFORT,
@@ -68,12 +71,23 @@ def test_a_gap_that_changes_faster_than_the_fingers_were_told_jumps(command, gap
     assert jumps(command, gap_of) == seen
 
 
-@every_case(("absent_from", "absent_to", "ends"), [(50, 55, False), (50, 100, True), (0, 100, False)])
-def test_a_gap_that_was_known_and_is_none_for_a_tenth_of_a_second_ends_the_grasp(
-    absent_from, absent_to, ends
-):
-    watch = GapAbsent(RATE_HZ)
-    faults = [watch.see(frame(k, nan if absent_from <= k < absent_to else 0.05)) for k in range(100)]
+@every_case(
+    ("absent_from", "absent_to", "expected", "ends"),
+    [
+        (50, 55, False, False),
+        (50, 100, False, True),
+        # Never known: only a gap that was declared is missed.
+        (0, 100, False, False),
+        (0, 100, True, True),
+        (0, 8, True, False),
+    ],
+)
+def test_a_gap_that_is_none_for_a_tenth_of_a_second_ends_the_grasp(absent_from, absent_to, expected, ends):
+    watch = Absence(GAP_ABSENT, RATE_HZ, expected=expected)
+    faults = [
+        watch.see(now.gap_m, now)
+        for now in (frame(k, nan if absent_from <= k < absent_to else 0.05) for k in range(100))
+    ]
     assert any(fault is not None and fault.ends for fault in faults) is ends
 
 
@@ -90,9 +104,12 @@ def test_a_gap_that_jumps_is_no_motor_that_turns_the_wrong_way():
     assert jump.jumps == 3
 
 
+OPENS = Command(POSITION, 0.08, inf, 0.05)
+
+
 def opened(gap_of, start_m=0.08, delay_s=0.02):
     """Return the names of the faults in a release of a second, after a squeeze at 50 mm."""
-    watch = Opening(RATE_HZ, delay_s)
+    watch = Opening(RATE_HZ, delay_s, OPENS, tells_gap=True)
     gaps = [*np.linspace(start_m, 0.05, 100), *(gap_of(k / RATE_HZ) for k in range(100))]
     phases = [SQUEEZE] * 100 + [Phase.RELEASE] * 100
     faults = [
@@ -109,6 +126,8 @@ def opened(gap_of, start_m=0.08, delay_s=0.02):
         (lambda t: 0.05 + 0.05 * max(t - 0.3, 0.0), 0.08, ["gap late"]),
         (lambda t: 0.05, 0.08, ["fingers did not open"]),
         (lambda t: nan, 0.08, ["fingers did not open"]),
+        # Frames that come late tell the end of the squeeze first, which is no opening.
+        (lambda t: 0.05 - 0.01 * min(t, 0.2) + 0.05 * max(t - 0.3, 0.0), 0.08, ["gap late"]),
         # Fingers that never closed need not open.
         (lambda t: 0.05, 0.051, []),
     ],
@@ -140,3 +159,79 @@ def test_a_gap_that_follows_late_or_never_is_told_and_the_fingers_open_neverthel
     assert gripper.commands[-1].value == 0.0
     if late_s < inf:
         assert grasp.trace.gap_m[-1] > 0.078
+
+
+@every_case(
+    ("gap_m", "refused", "told"),
+    [
+        (0.08, False, []),
+        (0.077, False, []),
+        (0.06, False, ["opened to another width"]),
+        (0.09, False, ["opened to another width"]),
+        (0.0, True, ["fingers not open"]),
+        (nan, True, ["fingers not open"]),
+    ],
+)
+def test_fingers_that_are_not_as_open_as_they_were_told_are_named_before_they_close(gap_m, refused, told):
+    watch = Opening(RATE_HZ, 0.02, OPENS, tells_gap=True)
+    fault = watch.before_closing(frame(0, gap_m))
+    assert [fault.name for fault in (fault,) if fault is not None] == told
+    assert (fault is not None and fault.ends) is refused
+
+
+def test_a_gripper_without_a_gap_or_a_told_width_may_close():
+    assert Opening(RATE_HZ, 0.02, OPENS, tells_gap=False).before_closing(frame(0, nan)) is None
+    by_effort = Opening(RATE_HZ, 0.02, Command(EFFORT, -20.0, inf, inf), tells_gap=True)
+    assert by_effort.before_closing(frame(0, 0.03)) is None
+
+
+@every_case(
+    ("end_m", "is_told"), [(0.08, False), (0.0789, False), (0.077, True), (0.085, True), (nan, False)]
+)
+def test_open_fingers_are_as_wide_after_a_grasp_as_before_it(end_m, is_told):
+    watch = Opening(RATE_HZ, 0.02, OPENS, tells_gap=True)
+    watch.before_closing(frame(0, 0.08))
+    for k, gap_m in enumerate([0.08, 0.06, 0.05]):
+        watch.see(frame(k, gap_m), SQUEEZE)
+    for k, gap_m in enumerate([0.05, 0.06], 3):
+        watch.see(frame(k, gap_m), Phase.RELEASE)
+    assert (watch.released(frame(5, end_m)) is not None) is is_told
+
+
+class ByPosition(Scripted):
+    """A strong gripper that opens to a width; its gap is no number from then on, and `late_s` late (s)."""
+
+    def __init__(self, path, none_from_s=inf, late_s=0.0):
+        super().__init__(path, bottle)
+        self.none_from_s, self.late_s = none_from_s, late_s
+
+    def open(self, seed):
+        return evolve(super().open(seed), opening=OPENS, effort_limit_n=235.0)
+
+    def apply(self, command):
+        opens = command.kind == POSITION
+        super().apply(command._replace(kind=EFFORT, value=-1.0) if opens else command)
+        self.commands[-1] = command
+
+    def gap_m(self, t):
+        return nan if t >= self.none_from_s else super().gap_m(t - self.late_s)
+
+    def opening_effort_n(self):
+        return max(command.effort_limit_n for command in self.commands if command.kind == POSITION)
+
+
+def test_a_fault_opens_the_fingers_with_no_more_effort_than_a_release():
+    sound, failing = ByPosition(squeezing), ByPosition(squeezing, none_from_s=REST_S)
+    controller = HybridController(HybridConfig())
+    assert run_grasp(sound, controller, RunConfig()).outcome is Outcome.STEADY
+    assert run_grasp(failing, controller, RunConfig()).outcome is Outcome.ABORTED
+    assert failing.opening_effort_n() == sound.opening_effort_n() == 1.25 * HybridConfig().probing_force_n
+
+
+def test_fingers_that_still_close_when_they_are_told_to_open_are_not_open_where_they_end():
+    """They stand at the end of the stroke until they turn round, which is no rest of open fingers."""
+    gripper = ByPosition(lambda t: max(0.08 - 0.04 * max(t - 0.3, 0.0), 0.0), late_s=0.3)
+    gripper.felt = lambda t: (0.0, 0.0)
+    grasp = run_grasp(gripper, HybridController(HybridConfig()), RunConfig())
+    assert grasp.outcome is Outcome.NOTHING_THERE
+    assert grasp.trace.gap_m[-1] > 0.075

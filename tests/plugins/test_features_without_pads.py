@@ -62,6 +62,13 @@ def test_an_effort_that_rises_with_the_resistance_tells_the_contact(effort_of):
     assert features["p_first"] == pytest.approx(CONTACT_M, abs=1e-3)
 
 
+def test_an_effort_that_shows_a_contact_only_after_the_fingers_have_stopped_tells_none():
+    """With half the scale, the 10.5 N of a contact are reached under the 25 N of the squeeze, at 50 mm."""
+    features = FEATURES.extract(grasp(lambda effort_n, gap_m: 0.5 * effort_n))
+    assert set(features.reasons) == {"p_first", "delta_t", "dp_dt"}
+    assert features["p_steady"] == pytest.approx(REST_M, abs=4e-4)
+
+
 def test_an_effort_at_the_limit_of_the_approach_need_not_rise_before_the_squeeze():
     """A soft object takes all of 11 N from 60 mm on, and the fingers move on to 50 mm; the squeeze allows 25 N."""
     features = FEATURES.extract(

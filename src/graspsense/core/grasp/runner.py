@@ -365,7 +365,7 @@ class _Grasp:
                 self.first_t_s = frame.t_s
             acted = self._acted(state)
             command, state = advance(params, state, reading)
-            self.state = state
+            self.state = state = self._not_yet_at_rest(state)
             stepped, same_phase = phase != TARING, state.phase == phase
             if not stepped and pads.counter > newest:
                 newest = pads.counter
@@ -373,7 +373,7 @@ class _Grasp:
             if not same_phase:
                 if phase == TARING and not self._tared(images, frame):
                     return
-                self.state = state = self._not_yet_at_rest(self._known(state, frame), frame)
+                self.state = state = self._known(state, frame)
                 phase, newest = state.phase, pads.counter
                 self._event(frame.t_s, Phase(phase), Phase(phase).name.lower())
             if state.guard is not watcher:
@@ -417,10 +417,10 @@ class _Grasp:
         self.state = stopped(self.params.schedule, state, frame)
         raise StepFailed(f"the controller gave the phase {state.phase}: it has APPROACH, SQUEEZE and HOLD")
 
-    def _not_yet_at_rest(self, state: TickState, frame: Frame) -> TickState:
-        """Return the state of a phase that begins: fingers that open rest at the earliest when the gripper has acted.
+    def _not_yet_at_rest(self, state: TickState) -> TickState:
+        """Return a state in which fingers that open rest at the earliest when the gripper has acted on the command.
 
-        Those that stand still until then would otherwise count as open, and be stopped before they move.
+        Those that stand still until then, or still close, would otherwise count as open, and be stopped there.
         """
         if state.phase not in (Phase.OPENING, RELEASE):
             return state
@@ -428,9 +428,10 @@ class _Grasp:
         if state.phase == RELEASE and self.protection is not None:
             # A gap that is told late stands still for longer.
             delay_s = self.protection.opening.stands_s
-        if not delay_s:
+        still, earliest_s = state.still, state.since_t_s + delay_s
+        if still.since_t_s >= earliest_s:
             return state
-        return state._replace(still=RestState(frame.t_s + delay_s, frame.gap_m))
+        return state._replace(still=RestState(earliest_s, still.gap_m))
 
     def _most_ticks(self) -> float:
         """Return the number of ticks that a grasp may take; a recording ends by itself.
@@ -455,7 +456,12 @@ class _Grasp:
 
     def _protected(self, reading: Reading, phase: int, command: Command) -> Command:
         """Return the command that the protection allows, if this gripper can hurt something."""
-        return command if self.protection is None else self.protection.limit(reading, phase, command)
+        if self.protection is None:
+            return command
+        command = self.protection.limit(reading, phase, command)
+        if self.state.done:
+            self.protection.released(reading.frame)
+        return command
 
     def _tared(self, images: list[Pads], frame: Frame) -> bool:
         """Set the zero of the pads; return whether the fingers may close."""
@@ -570,6 +576,8 @@ class _Grasp:
         still, began_s = RestState(last.t_s + self.backend.command_delay_s, last.gap_m), last.t_s
         give_up = time.perf_counter() + run.opening_timeout_s
         fresh = GuardState(1, 0, 0)
+        if self.protection is not None:
+            opening = self.protection.opens_with(opening)
         # After a second Ctrl-C, only relax.
         while time.perf_counter() < give_up and self.interrupts.count < 2:
             command, fresh = guard(self.params.guard, fresh, last, opening)

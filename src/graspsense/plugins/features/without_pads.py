@@ -84,7 +84,7 @@ class WithoutPads(FeatureSet[WithoutPadsConfig]):
         ).extract(evolve(trace, force_left_n=effort_n, force_right_n=effort_n))
         names = [feature.name for feature in self.features]
         reasons = {name: six.reasons[name] for name in names if name in six.reasons}
-        doubt = _doubt(trace, effort_n, config.contact_effort_n)
+        doubt = _doubt(trace, effort_n, config.contact_effort_n) or _after_stop(trace, effort_n, config)
         if doubt:
             # The rest of the hold does not depend on the contact.
             holds = bool((trace.phase == HOLD).any())
@@ -133,6 +133,21 @@ def _doubt(trace: Trace, effort_n: NDArray[np.float64], contact_n: float) -> str
         return f"{where} and falls again, while the fingers move on by {max(eased_m, fallen_m) * 1e3:.1f} mm"
     flat = _is_flat(trace, effort_n, contact, stop, contact_n)
     return f"{where} and does not rise, while the fingers move on" if flat else ""
+
+
+def _after_stop(trace: Trace, effort_n: NDArray[np.float64], config: WithoutPadsConfig) -> str:
+    """Return why a contact is too late: the fingers had already stopped at the object; empty if it is not."""
+    contact = int(np.argmax(trace.closing & (effort_n >= config.contact_effort_n))) if len(trace) else 0
+    stop = int(np.argmax(trace.phase > APPROACH)) if len(trace) else 0
+    if stop == 0 or contact < stop:
+        return ""
+    window = trace.t_s[: stop + 1] >= trace.t_s[stop] - config.rest_window_s
+    if not np.ptp(trace.gap_m[: stop + 1][window]) <= config.rest_speed_m_s * config.rest_window_s:
+        return ""
+    return (
+        f"contact not certain: the effort is {effort_n[contact]:.1f} N only after the fingers had stopped at "
+        f"{trace.gap_m[stop] * 1e3:.1f} mm; it was at its limit from the beginning, or its scale is wrong"
+    )
 
 
 def _is_flat(trace: Trace, effort_n: NDArray[np.float64], contact: int, stop: int, contact_n: float) -> bool:

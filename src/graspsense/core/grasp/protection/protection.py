@@ -14,13 +14,17 @@ from attrs import evolve
 
 from graspsense.core.components.roles import Controller
 from graspsense.core.components.run_config import RunConfig
+from graspsense.core.grasp.protection.absence import EFFORT_ABSENT, GAP_ABSENT, Absence
 from graspsense.core.grasp.protection.cells import Fingertips
 from graspsense.core.grasp.protection.drift import Drift
+from graspsense.core.grasp.protection.effort import ReportedEffort
 from graspsense.core.grasp.protection.effort_ceiling import asked_effort_n, effort_ceiling_n, limited
+from graspsense.core.grasp.protection.kept_speed import KeptSpeed
 from graspsense.core.grasp.protection.motor import FeltForce, FreeEffort, Motor
+from graspsense.core.grasp.protection.opening import Opening
 from graspsense.core.grasp.protection.pad_forces import EmptyForce, EmptyHold, PadBalance, StuckForce
-from graspsense.core.grasp.protection.reports import Reports, StatusWatch
-from graspsense.core.grasp.protection.speed import GapAbsent, GapJump, GapSpeed, Opening, Rush, Standstill
+from graspsense.core.grasp.protection.reports import Repeats, Reports, StatusWatch
+from graspsense.core.grasp.protection.speed import GapJump, GapSpeed, Rush, Standstill
 from graspsense.core.grasp.protection.touch import Touch
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.faults import LIMITED, Fault
@@ -60,6 +64,7 @@ class Protection:
         self._told: dict[str, Fault] = {}
         self.ending: Fault | None = None
         self.acted = 0
+        self._closing = False
         rates = {channel.name: channel.rate_hz for channel in info.channels}
         self.ceiling_n = effort_ceiling_n(info, controller, run)
         self._effort_limit_n = info.effort_limit_n
@@ -84,14 +89,14 @@ class Protection:
         self._free_effort = FreeEffort(info.friction_n)
         self._fingertips = Fingertips()
         self._motor = Motor("effort" in rates, info.rate_hz)
+        self._effort = ReportedEffort() if "effort" in rates else None
+        self._effort_absence = Absence(EFFORT_ABSENT, info.rate_hz, expected="effort" in rates)
+        self._gap_absence = Absence(GAP_ABSENT, info.rate_hz, expected="gap" in rates)
         self._status = StatusWatch(info.status_bits)
         first_m_s = run.first_speed_m_s if info.clock == "device" else inf
-        self._standstill, self._jump, self._absent = (
-            Standstill(),
-            GapJump(info.speed_limit_m_s),
-            GapAbsent(info.rate_hz),
-        )
-        self.opening = Opening(info.rate_hz, command_delay_s)
+        self._standstill, self._jump = Standstill(), GapJump(info.speed_limit_m_s)
+        self._kept_speed, self._repeats = KeptSpeed(info.rate_hz), Repeats()
+        self.opening = Opening(info.rate_hz, command_delay_s, info.opening, tells_gap="gap" in rates)
         self._rush = Rush(min(first_m_s, info.speed_limit_m_s), info.rate_hz)
         self._reports = Reports(info.rate_hz, rates.get("pads", 0.0))
 
@@ -114,15 +119,20 @@ class Protection:
         if self._jump.jumps <= FEW_JUMPS:
             self._motor.shift(self._jump.step_m)
         self._see(self._motor.see(frame, phase), phase)
-        if phase == APPROACH and self._touch.free():
-            self._see(self._rush.see(frame))
         if not self._declared and frame.force_left_n == frame.force_left_n:
             self._has_pads = True
         closing = phase in (APPROACH, SQUEEZE, HOLD)
+        if closing or self._closing:
+            # Also the jump with which the law has ended the grasp in this tick.
+            self._see(jump)
+        self._closing = closing
         if closing:
             self._see(self._gap_speed.see(frame))
-            self._see(jump)
-            self._see(self._absent.see(frame))
+            self._see(self._gap_absence.see(frame.gap_m, frame))
+            self._see(self._effort_absence.see(frame.effort_n, frame))
+        self._see_free_motion(frame, phase)
+        if self._effort is not None:
+            self._see(self._effort.see(frame, phase), phase)
         self._see(self.opening.see(frame, phase), phase)
         if self._has_pads:
             self._see_pads(reading, phase, command)
@@ -136,16 +146,33 @@ class Protection:
         self.acted += allowed.value != command.value or self._gives(command) > asked_effort_n(allowed)
         self._motor.apply(frame, allowed)
         self._jump.apply(frame, allowed)
+        self._kept_speed.apply(frame, allowed, jumped=jump is not None)
+        if self._effort is not None:
+            self._effort.apply(frame, allowed)
         return allowed
 
     def before_closing(self, frame: Frame) -> Fault | None:
         """Return the fault for which the fingers must not close, if there is one."""
+        width = self.opening.before_closing(frame)
+        self._see(width)
         faults = self._status.before_closing(frame)
+        if width is not None and width.ends:
+            faults.append(width)
         if self._has_pads:
             faults += [fault for fault in self._fingertips.faults() if fault.ends]
         for fault in faults:
             self._see(fault)
         return faults[0] if faults else None
+
+    def released(self, frame: Frame) -> None:
+        """Take the last frame of the release."""
+        self._see(self.opening.released(frame), RELEASE)
+        if self._effort is not None:
+            self._see(self._effort.released(frame), RELEASE)
+
+    def opens_with(self, command: Command) -> Command:
+        """Return the command that opens the fingers at last, with no more effort than in a release."""
+        return limited(command, self.ceiling_n, self._opening_n)
 
     def opens_wrongly(self, reading: Reading, command: Command) -> bool:
         """Take a reading, and the command that opens the fingers at last; return whether the motor closes them."""
@@ -153,6 +180,15 @@ class Protection:
         self._see(fault, RELEASE)
         self._motor.apply(reading.frame, command)
         return fault is not None and fault.relaxes
+
+    def _see_free_motion(self, frame: Frame, phase: int) -> None:
+        """Take the frame of a tick in which the fingers may move freely."""
+        if phase == APPROACH and self._touch.free():
+            self._see(self._rush.see(frame))
+            self._see(self._repeats.see(frame))
+            self._see(self._kept_speed.see(frame, phase))
+        elif phase == RELEASE:
+            self._see(self._kept_speed.see(frame, phase), phase)
 
     def _see_pads(self, reading: Reading, phase: int, command: Command) -> None:
         frame = reading.frame

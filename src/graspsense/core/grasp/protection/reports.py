@@ -1,4 +1,4 @@
-"""Whether frames and cell images keep coming (clock, lost frames, images), and what the bits of the status say."""
+"""Whether frames and cell images keep coming (clock, lost and repeated frames), and what the bits of the status say."""
 
 from __future__ import annotations
 
@@ -21,6 +21,10 @@ ENDS_SHARE: Final = 0.5
 """Share of lost frames that ends the grasp: a controller that sees half of them does not control."""
 FEWEST: Final = 200
 """Frames, with the lost ones, after which a share is told."""
+REPEATS: Final = 3
+"""Standstills of a single approach from which on the way after them is compared."""
+CATCH_UP: Final = 1.5
+"""Way of the gap in a frame after a standstill, over that after motion, from which on frames have come twice."""
 IMAGES_LATE: Final = 5.0
 """Periods of the cell images without a new one after which the forces are out of date."""
 IMAGES_LATE_S: Final = 0.1
@@ -76,6 +80,39 @@ class Reports:
             f"{lost / self._expected * 100:.0f} % of the frames are missing: rates and times are less exact; check the "
             "connection and the load of this computer",
             ends=lost >= ENDS_SHARE * self._expected,
+        )
+
+
+class Repeats:
+    """Watches the gap of fingers that approach for frames that come twice: it stands still, and then makes up for it.
+
+    A gap in coarse steps, or one that is measured for each n-th frame only, stands still too, but then moves no further
+    than after a motion.
+    """
+
+    def __init__(self) -> None:
+        self._gap_m = self._way_m = nan
+        self._counts, self._ways_m = [0, 0], [0.0, 0.0]
+
+    def see(self, frame: Frame) -> Fault | None:
+        """Take the frame of a tick of the approach; return the fault if frames have come twice."""
+        way_m, earlier_m = self._gap_m - frame.gap_m, self._way_m
+        self._gap_m, self._way_m = frame.gap_m, way_m
+        if not (way_m > 0.0 and earlier_m >= 0.0):
+            return None
+        stood = earlier_m == 0.0
+        self._counts[stood] += 1
+        self._ways_m[stood] += way_m
+        moving, standing = self._counts
+        if not stood or moving < REPEATS or standing < REPEATS:
+            return None
+        ratio = self._ways_m[1] / standing * moving / self._ways_m[0]
+        if ratio < CATCH_UP:
+            return None
+        return Fault(
+            "frames repeated",
+            f"the gap stood still {standing} times in the approach, and then moved {ratio:.1f} times as far as in "
+            "other frames: some frames come twice, so that a standstill may be none; check the connection",
         )
 
 

@@ -1,8 +1,6 @@
 """Whether the gap moves as the velocity says, and whether the fingers approach too fast, not at all, or in a jump.
 
-An encoder can stand still, and a gripper that closes by itself may take no limit of the speed. A gap that stands still
-in a squeeze may be at rest; when the fingers are told to open after the hold, it has to change, as soon as the gripper
-acts on a command.
+An encoder can stand still, and a gripper that closes by itself may take no limit of the speed.
 """
 
 from __future__ import annotations
@@ -13,7 +11,7 @@ from typing import Final
 from graspsense.core.grasp.protection.motor import direction_of
 from graspsense.core.grasp.protection.touch import CLOSED_M
 from graspsense.core.values.faults import Fault
-from graspsense.core.values.signals import APPROACH, EFFORT, FORCE, POSITION, VELOCITY, Command, Frame, Phase
+from graspsense.core.values.signals import EFFORT, FORCE, POSITION, VELOCITY, Command, Frame
 
 MEMORY_S: Final = 0.5
 """Time constant over which travels are summed."""
@@ -36,8 +34,6 @@ JUMP: Final = 3.0
 """Speed over the commanded one that fingers can have between two frames, whose times are those of their arrival."""
 JUMP_M: Final = 0.001
 """Change of the gap between two frames that is no jump: a few steps of a coarse encoder."""
-ABSENT_S: Final = 0.1
-"""Time for which the gap may be no number while the fingers close; at least three frames."""
 
 
 class GapSpeed:
@@ -108,7 +104,7 @@ class Standstill:
 
     def see(self, frame: Frame, command: Command) -> Fault | None:
         """Take a frame of the approach with its command, and return the fault if the fingers stand still."""
-        closing_m_s = closing_speed_m_s(frame, command)
+        closing_m_s = told_speed_m_s(frame, command)
         if not closing_m_s > 0.0 or frame.gap_m <= CLOSED_M or not abs(frame.gap_m - self._gap_m) < STILL_M:
             self._gap_m, self._since_s = frame.gap_m, frame.t_s
             return None
@@ -163,80 +159,13 @@ class GapJump:
         )
 
 
-class GapAbsent:
-    """Watches for a gap that is no number any more, with frames at this rate (Hz)."""
-
-    def __init__(self, rate_hz: float) -> None:
-        self._allowed_s = max(ABSENT_S, 3.0 / rate_hz)
-        self._known_s = nan
-
-    def see(self, frame: Frame) -> Fault | None:
-        """Take the frame of a tick while the fingers close or hold; a gap that was never known shows nothing."""
-        if frame.gap_m == frame.gap_m:
-            self._known_s = frame.t_s
-        if not frame.t_s - self._known_s > self._allowed_s:
-            return None
-        return Fault("gap absent", "the gripper does not tell its gap any more: check its encoder", ends=True)
-
-
-def closing_speed_m_s(frame: Frame, command: Command) -> float:
-    """Return the speed at which this command tells the fingers to close; 0 where it does not say."""
+def told_speed_m_s(frame: Frame, command: Command) -> float:
+    """Return the speed at which this command tells the fingers to move, below 0 to open; 0 where it does not say."""
     kind, value, _, speed_limit_m_s = command
     if kind == EFFORT:
         return 0.0
     if kind == POSITION:
-        return speed_limit_m_s if value < frame.gap_m else 0.0
+        return speed_limit_m_s if value < frame.gap_m else -speed_limit_m_s if value > frame.gap_m else 0.0
     if kind == FORCE:
         return speed_limit_m_s if value > 0.0 else 0.0
-    return min(-value, speed_limit_m_s)
-
-
-LEAST_TRAVEL_M: Final = 0.003
-"""Travel of the closing from which on the opening must show."""
-OPENED_M: Final = 0.001
-"""Change of the gap that shows it."""
-LATE_S: Final = 0.2
-"""Time beyond the delay of a command after which the gap is late; at least four frames."""
-STANDS_S: Final = 0.5
-"""Time beyond it after which the fingers count as not opened; at least six frames."""
-
-
-class Opening:
-    """Watches the gap in the release of a gripper with this rate of frames (Hz) and delay of commands (s)."""
-
-    def __init__(self, rate_hz: float, command_delay_s: float) -> None:
-        self._late_s = command_delay_s + max(LATE_S, 4.0 / rate_hz)
-        self.stands_s = command_delay_s + max(STANDS_S, 6.0 / rate_hz)
-        """Time (s) after which fingers that stand still have not opened."""
-        self._widest_m = -inf
-        self._start_m = self._start_s = nan
-        self._opened = False
-
-    def see(self, frame: Frame, phase: int) -> Fault | None:
-        """Take the frame of a tick; return what is wrong with the opening."""
-        if phase != Phase.RELEASE:
-            if phase >= APPROACH:
-                self._widest_m = max(self._widest_m, frame.gap_m)
-                self._start_m, self._start_s = frame.gap_m, frame.t_s
-            return None
-        if self._opened or not self._widest_m - self._start_m >= LEAST_TRAVEL_M:
-            return None
-        elapsed_s = frame.t_s - self._start_s
-        self._opened = abs(frame.gap_m - self._start_m) >= OPENED_M
-        if self._opened:
-            return None if elapsed_s <= self._late_s else self._late(elapsed_s)
-        if elapsed_s < self.stands_s:
-            return None
-        return Fault(
-            "fingers did not open",
-            f"the gap still is {frame.gap_m * 1e3:.1f} mm, {elapsed_s:.1f} s after they were told to: they hold on, or "
-            "the gap has stood still for longer, so that what follows from it is wrong; look at the fingers and the "
-            "encoder",
-        )
-
-    def _late(self, elapsed_s: float) -> Fault:
-        return Fault(
-            "gap late",
-            f"it changed only {elapsed_s:.2f} s after the fingers were told to open: times and rates of the "
-            "squeeze can be off by that; check the connection",
-        )
+    return min(max(-value, -speed_limit_m_s), speed_limit_m_s)

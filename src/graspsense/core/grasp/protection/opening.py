@@ -1,0 +1,121 @@
+"""The opening of the fingers: how wide they are before they close, when they open again, and how wide they are then.
+
+A gap that is wrong while the fingers close, because its encoder stands still, drifts or has jumped, seldom comes back
+to the width from which it began.
+"""
+
+from __future__ import annotations
+
+from math import inf, nan
+from typing import Final
+
+from graspsense.core.grasp.protection.touch import CLOSED_M
+from graspsense.core.values.faults import Fault
+from graspsense.core.values.signals import APPROACH, POSITION, Command, Frame, Phase
+
+LEAST_TRAVEL_M: Final = 0.0015
+"""Travel of the closing from which on the opening must show."""
+OPENED_M: Final = 0.001
+"""Change of the gap that shows it."""
+LATE_S: Final = 0.2
+"""Time beyond the delay of a command after which the gap is late; at least four frames."""
+STANDS_S: Final = 0.5
+"""Time beyond it after which the fingers count as not opened; at least six frames."""
+TARGET_M: Final = 0.002
+TARGET_SHARE: Final = 0.05
+"""By how much open fingers may miss the width that they were told, at least and as a share of it."""
+AGAIN_M: Final = 0.001
+AGAIN_SHARE: Final = 0.02
+"""By how much their width after a grasp may differ from that before it, at least and as a share of it."""
+
+
+class Opening:
+    """Watches the gap of a gripper with this rate of frames (Hz) and delay of commands (s), which this command opens.
+
+    `tells_gap` says whether the frames have a gap at all.
+    """
+
+    def __init__(
+        self, rate_hz: float, command_delay_s: float, opening: Command | None, tells_gap: bool
+    ) -> None:
+        self._late_s = command_delay_s + max(LATE_S, 4.0 / rate_hz)
+        self.stands_s = command_delay_s + max(STANDS_S, 6.0 / rate_hz)
+        """Time (s) after which fingers that stand still have not opened."""
+        self._target_m = opening.value if opening is not None and opening.kind == POSITION else nan
+        self._tells_gap = tells_gap
+        self._first_m = nan
+        self._widest_m = -inf
+        self._start_m = self._start_s = nan
+        self._opened = False
+
+    def before_closing(self, frame: Frame) -> Fault | None:
+        """Take the frame in which the fingers are open; return what is wrong with their width."""
+        gap_m = self._first_m = frame.gap_m
+        if gap_m <= CLOSED_M or (gap_m != gap_m and self._tells_gap):
+            is_told = "is no number" if gap_m != gap_m else f"is {gap_m * 1e3:.1f} mm"
+            return Fault(
+                "fingers not open",
+                f"their gap {is_told} after they were told to open: something holds them, or the encoder fails; look "
+                "at the fingers and the encoder",
+                ends=True,
+            )
+        if not abs(gap_m - self._target_m) > max(TARGET_M, TARGET_SHARE * self._target_m):
+            return None
+        return Fault(
+            "opened to another width",
+            f"the fingers were told to open to {self._target_m * 1e3:.1f} mm, and their gap is {gap_m * 1e3:.1f} mm: "
+            "something holds them, or all gaps are off by as much; look at the fingers, and at the zero of the encoder",
+        )
+
+    def see(self, frame: Frame, phase: int) -> Fault | None:
+        """Take the frame of a tick; return what is wrong with the opening after the grasp."""
+        if phase != Phase.RELEASE:
+            if phase >= APPROACH:
+                self._widest_m = max(self._widest_m, frame.gap_m)
+                self._start_m, self._start_s = frame.gap_m, frame.t_s
+            return None
+        if self._opened:
+            return None
+        closed_m, elapsed_s = self._widest_m - self._start_m, frame.t_s - self._start_s
+        # A gap that is late closes on for a while.
+        self._start_m = min(self._start_m, frame.gap_m)
+        self._opened = frame.gap_m - self._start_m >= OPENED_M
+        if not closed_m >= LEAST_TRAVEL_M:
+            return None
+        if self._opened:
+            return None if elapsed_s <= self._late_s else self._late(elapsed_s)
+        if elapsed_s < self.stands_s:
+            return None
+        return Fault(
+            "fingers did not open",
+            f"the gap still is {frame.gap_m * 1e3:.1f} mm, {elapsed_s:.1f} s after they were told to: they hold on, or "
+            "the gap has stood still for longer, so that what follows from it is wrong; look at the fingers and the "
+            "encoder",
+        )
+
+    def released(self, frame: Frame) -> Fault | None:
+        """Take the last frame of the release; return what is wrong with the width of the open fingers.
+
+        Fingers that are opened by an effort or a velocity may end anywhere.
+        """
+        first_m, gap_m = self._first_m, frame.gap_m
+        # Fingers that are seen not to open have a fault of their own.
+        if (
+            not self._opened
+            or self._target_m != self._target_m
+            or not abs(gap_m - first_m) > max(AGAIN_M, AGAIN_SHARE * first_m)
+        ):
+            return None
+        return Fault(
+            "gap not as before",
+            f"open fingers are at {gap_m * 1e3:.1f} mm, and were at {first_m * 1e3:.1f} mm before the grasp: something "
+            "holds them, or the gap drifts or has jumped, so that what follows from it is wrong; look at the fingers "
+            "and the encoder",
+        )
+
+    def _late(self, elapsed_s: float) -> Fault:
+        return Fault(
+            "gap late",
+            f"it changed only {elapsed_s:.2f} s after the fingers were told to open: times and rates of the "
+            "squeeze can be off by that; check the connection",
+        )

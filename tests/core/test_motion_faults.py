@@ -1,0 +1,127 @@
+"""Faults that the motion of fingers shows that a command has told a speed, and that their effort shows."""
+
+from math import inf, nan
+
+from cases import every_case
+
+from graspsense.core.grasp.protection.effort import ReportedEffort
+from graspsense.core.grasp.protection.kept_speed import KeptSpeed
+from graspsense.core.grasp.protection.reports import Repeats
+from graspsense.core.values.signals import APPROACH, HOLD, POSITION, SQUEEZE, Command, Frame, Phase
+
+RATE_HZ = 100.0
+CLOSES, OPENS = Command(POSITION, 0.0, 20.0, 0.02), Command(POSITION, 0.08, 20.0, 0.05)
+
+
+def frame(k, gap_m, effort_n=nan, velocity_m_s=0.0):
+    return Frame(k / RATE_HZ, 1.0 / RATE_HZ, gap_m, velocity_m_s, effort_n)
+
+
+def in_steps(way_m, step_m):
+    return round(way_m / step_m) * step_m
+
+
+def accelerating(t):
+    """Fingers that reach 20 mm/s after 2 s only."""
+    return 0.5 * 0.01 * t**2
+
+
+@every_case(
+    ("command", "phase", "way_m", "is_told"),
+    [
+        (CLOSES, APPROACH, lambda t: 0.02 * t, False),
+        (CLOSES, APPROACH, lambda t: in_steps(0.02 * t, 0.0004), False),
+        (CLOSES, APPROACH, accelerating, False),
+        # The scale of the gap is half, or that of the time.
+        (CLOSES, APPROACH, lambda t: 0.01 * t, True),
+        (CLOSES, APPROACH, lambda t: in_steps(0.01 * t, 0.0002), True),
+        (CLOSES, APPROACH, lambda t: 0.04 * t, True),
+        # Something slows them that they press; a jump is told elsewhere.
+        (CLOSES, APPROACH, lambda t: 0.02 * min(t, 0.5) + 0.005 * max(t - 0.5, 0.0), False),
+        (CLOSES, APPROACH, lambda t: 0.02 * t + 0.01 * (t >= 0.5), False),
+        (CLOSES, APPROACH, lambda t: 0.0, False),
+        (OPENS, Phase.RELEASE, lambda t: -0.05 * min(t, 1.0), False),
+        (OPENS, Phase.RELEASE, lambda t: -0.02 * t, False),
+        (OPENS, Phase.RELEASE, lambda t: -0.1 * min(t, 0.5), True),
+        (Command(POSITION, 0.0, 20.0, inf), APPROACH, lambda t: 0.01 * t, False),
+    ],
+)
+def test_fingers_that_do_not_move_at_the_speed_of_their_command_are_named(command, phase, way_m, is_told):
+    watch, told = KeptSpeed(RATE_HZ), set()
+    start_m = 0.06 if command is not OPENS else 0.02
+    last_m = start_m
+    for k in range(150):
+        now = frame(k, start_m - way_m(k / RATE_HZ))
+        fault = watch.see(now, phase)
+        if fault is not None:
+            assert not fault.ends
+            told.add(fault.name)
+        watch.apply(now, command, jumped=abs(now.gap_m - last_m) > 0.005)
+        last_m = now.gap_m
+    assert told == ({"not the commanded speed"} if is_told else set())
+
+
+def approach(k):
+    """A way at 20 mm/s that begins slowly and ends at an object."""
+    return 0.02 * min(max(k - 10, 0), 90) / RATE_HZ
+
+
+@every_case(
+    ("way_m", "is_told"),
+    [
+        (approach, False),
+        # Steps of a coarse encoder, and a gap that is measured for each third frame.
+        (lambda k: in_steps(approach(k), 0.00037), False),
+        (lambda k: in_steps(approach(k), 0.004), False),
+        (lambda k: approach(k - k % 3), False),
+        # Each fifth frame is that before it.
+        (lambda k: approach(k - (k % 5 == 0)), True),
+        (lambda k: approach(k - (k == 50)), False),
+    ],
+)
+def test_frames_that_come_twice_show_in_what_the_gap_makes_up_for(way_m, is_told):
+    watch = Repeats()
+    faults = [watch.see(frame(k, 0.08 - way_m(k))) for k in range(120)]
+    assert any(fault is not None for fault in faults) is is_told
+
+
+def grasp_with(effort):
+    """Return the names of what a grasp shows that has this effort (N), a function of the sound one.
+
+    The motor holds at its limit, begins to open at the same one, and needs less while the fingers move.
+    """
+    watch, names, gap_m, k = ReportedEffort(), set(), 0.08, 0
+    for phase, ticks, speed_m_s, effort_n in (
+        (APPROACH, 100, -0.02, 4.0),
+        (SQUEEZE, 50, 0.0, 10.0),
+        (HOLD, 25, 0.0, 10.0),
+        (Phase.RELEASE, 20, 0.05, -10.0),
+        (Phase.RELEASE, 40, 0.05, -6.0),
+    ):
+        command = OPENS if phase == Phase.RELEASE else CLOSES
+        for _ in range(ticks):
+            k += 1
+            gap_m += speed_m_s / RATE_HZ
+            now = frame(k, gap_m, effort(effort_n), speed_m_s)
+            names.add(watch.see(now, phase))
+            watch.apply(now, command)
+    names.add(watch.released(now))
+    faults = names - {None}
+    assert not any(fault.ends for fault in faults)
+    return {fault.name for fault in faults}
+
+
+@every_case(
+    ("effort", "names"),
+    [
+        (lambda effort_n: effort_n, set()),
+        # Many grippers have a current without a sign.
+        (abs, set()),
+        (lambda effort_n: 0.5 * effort_n, set()),
+        (lambda effort_n: -effort_n, {"effort has the wrong sign"}),
+        (lambda effort_n: 0.0, {"effort stuck"}),
+        (lambda effort_n: 60.0, {"effort stuck"}),
+    ],
+)
+def test_an_effort_that_cannot_be_that_of_the_motor_is_named(effort, names):
+    assert grasp_with(effort) == names
