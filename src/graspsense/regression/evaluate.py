@@ -270,7 +270,7 @@ class _Evaluator:
         errors, rows = self._errors[name]
         mean = self._errors["mean_only"][0]
         return difference_of_errors(
-            [mean[i] for i in rows], [errors[i] for i in rows], self._instances_of(rows)
+            [mean[i] for i in rows], [errors[i] for i in rows], self._instances_of(rows), self.k
         ).is_positive
 
     def _instances_of(self, rows: Sequence[int]) -> list[str] | None:
@@ -305,7 +305,7 @@ class _Evaluator:
         rows = range(len(self.values)) if rows is None else rows
         errors, others = predicted - self.values, other.predicted - self.values
         by = difference_of_errors(
-            [errors[i] for i in rows], [others[i] for i in rows], self._instances_of(rows)
+            [errors[i] for i in rows], [others[i] for i in rows], self._instances_of(rows), self.k
         )
         return RegressionMeasurement(
             what=what, error=self.error(predicted, rows), difference=by, difference_of=other.protocol
