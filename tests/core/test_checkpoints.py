@@ -76,7 +76,7 @@ def curve():
 
 @pytest.fixture(scope="module")
 def traces():
-    """Ten soft and ten stiff objects of the same width: two grasps of each, whose forces differ by some percent."""
+    """Fifteen soft and fifteen stiff objects of the same width, whose forces differ by some percent."""
     rng = np.random.default_rng(1)
     grasped = {
         label: [grasp_of(Watched(0.07, stiffness_n_m * factor)).trace for factor in (0.95, 1.05)]
@@ -85,7 +85,7 @@ def traces():
     return [
         (label, _with_forces(traces[k % 2], rng.uniform(0.95, 1.05)))
         for label, traces in grasped.items()
-        for k in range(10)
+        for k in range(15)
     ]
 
 
@@ -310,7 +310,7 @@ def test_trials_without_traces_or_of_short_grasps_have_no_checkpoints(traces, tr
     plain = split_checkpoints(trials, CHECKPOINTS)[-1].labelled
     with pytest.raises(ConfigError, match=r"model gripper .*checkpoints_s"):
         split_checkpoints(plain, CHECKPOINTS)
-    with pytest.raises(ConfigError, match=r"0 of 20 .* 60 s"):
+    with pytest.raises(ConfigError, match=r"0 of 30 .* 60 s"):
         split_checkpoints(of_grasps(traces, (60.0,)), (60.0,))
 
 
@@ -333,7 +333,7 @@ def test_recognition_against_seconds_and_newtons(trials, learner):
 
 
 def test_trials_without_enough_instances_have_rates_but_no_sets(trials, learner):
-    few = trials.rows(np.array([0, 1, 2, 10, 11, 12]))
+    few = trials.rows(np.array([0, 1, 2, 15, 16, 17]))
     recognition = early_recognition(learner, split_checkpoints(few, CHECKPOINTS), folds=3)
     assert [row.name for row in recognition.rows] == ["0.02 s", "0.05 s", WHOLE]
     assert "90 % needs 9" in recognition.reason

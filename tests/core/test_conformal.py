@@ -317,7 +317,7 @@ def test_thresholds_of_other_labels_are_refused(tmp_path):
 
 
 def test_evaluate_measures_coverage_size_and_reliability_with_instances_held_out():
-    evaluation = judged(bottles(20, spread=0.7), "knn", controls=False)
+    evaluation = judged(bottles(40, spread=0.5), "knn", controls=False)
     again = from_json(to_json(evaluation), Evaluation)
 
     assert again == evaluation
@@ -325,7 +325,7 @@ def test_evaluate_measures_coverage_size_and_reliability_with_instances_held_out
     assert evaluation.sets.covered.rate >= 0.85
     assert evaluation.sets.covered.rate >= evaluation.headline.rate
     assert 1.0 < evaluation.sets.mean_size < 2.0
-    assert sum(point.rate.n for point in evaluation.reliability.curve) == 120
+    assert sum(point.rate.n for point in evaluation.reliability.curve) == 240
     assert 0.0 < evaluation.reliability.brier < 0.5
     assert evaluation.reliability.calibration_error < 0.15
 
@@ -421,8 +421,10 @@ def test_a_probability_that_tells_nothing_gives_hardly_more_certainty(n):
     for seed in range(100):
         rng = np.random.default_rng(seed)
         probability, right = rng.uniform(0.3, 1.0, n), rng.uniform(size=n) < 0.6
-        certainty = certainty_of(probability, np.full(n, np.nan), right.tolist(), [str(i) for i in range(n)])
-        highest.append(certainty.rate(np.array([1.0]), np.array([np.nan]))[0])
+        certainty = certainty_of(
+            probability, np.full(n, np.nan), ["can"] * n, right.tolist(), [str(i) for i in range(n)]
+        )
+        highest.append(certainty.rate(np.array([1.0]), np.array([np.nan]), ["can"])[0])
     # Of 60 %; chance alone makes the highest of several rates higher, by 6 points if they were not drawn together.
     assert np.mean(highest) < 0.63
 
@@ -445,8 +447,10 @@ def test_the_interval_of_a_certainty_holds_for_new_answers(rate_of, n):
     for _ in range(100):
         probability = rng.uniform(0.4, 1.0, n)
         right = rng.uniform(size=n) < rate_of(probability)
-        certainty = certainty_of(probability, np.full(n, np.nan), right.tolist(), [str(i) for i in range(n)])
-        intervals = np.array(certainty.intervals(fresh, no_support))
+        certainty = certainty_of(
+            probability, np.full(n, np.nan), ["can"] * n, right.tolist(), [str(i) for i in range(n)]
+        )
+        intervals = np.array(certainty.intervals(fresh, no_support, ["can"] * 200))
         for low, high in np.unique(intervals, axis=0):
             rests_on_as_much = intervals[:, 0] == low
             held += [low <= rate_of(fresh[rests_on_as_much]).mean() <= high] * int(rests_on_as_much.sum())
@@ -535,3 +539,45 @@ def test_the_coverage_of_sets_is_that_of_all_sizes_together():
     assert all(covered[3])
     assert 0.88 < np.mean([*covered.get(1, ()), *covered[2], *covered[3]]) < 0.96
     assert 0.8 < np.mean(covered[2]) < 0.9
+
+
+def test_the_certainty_of_a_rare_label_is_not_that_of_the_frequent_one():
+    """Where a cup is as probable as a can but rare, it is right in 12 of 20 answers, the can in 95 of 100."""
+    labels = ["can"] * 100 + ["cup"] * 20 + ["jar"] * 4
+    right = [k < 95 for k in range(100)] + [k < 12 for k in range(20)] + [True] * 4
+    n, units = len(labels), [str(i) for i in range(len(labels))]
+    certainty = certainty_of(np.full(n, 0.9), np.full(n, np.nan), labels, right, units)
+
+    asked = (np.full(4, 0.9), np.full(4, np.nan), ["can", "cup", "jar", "pan"])
+    can, cup, jar, pan = certainty.rate(*asked)
+    assert 0.88 < can < 0.96
+    assert cup == pytest.approx(0.6)
+    assert np.isnan([jar, pan]).all(), "four answers do not tell, nor does none"
+    (low, high), (lowest, highest) = certainty.intervals(*asked)[:2]
+    assert low < can < high
+    assert lowest < 0.45 < 0.75 < highest, "the interval is that of 20 answers"
+
+
+def test_answers_of_a_cross_validation_count_for_less():
+    right, none, labels, units = [True] * 20, np.full(20, np.nan), ["can"] * 20, [str(i) for i in range(20)]
+    said = [
+        certainty_of(np.ones(20), none, labels, right, units, effect).rate(np.ones(1), none[:1], ["can"])[0]
+        for effect in (1.0, 2.0)
+    ]
+    assert said == [pytest.approx(21 / 22), pytest.approx(11 / 12)]
+
+
+def test_an_answer_that_is_seldom_given_has_no_certainty_and_no_set_of_its_own(tmp_path):
+    rng = np.random.default_rng(0)
+    force = np.concatenate([rng.normal(0.0, 1.0, 60), rng.normal(12.0, 1.0, 3)])
+    trials = labelled(["full"] * 60 + ["empty"] * 3, force, rng.normal(size=63))
+    write_model(tmp_path / "m.json", model_of(trials, "tree"))
+    model = load_model(str(tmp_path / "m.json"), installed())
+    full, empty = model.predictions(trials.table.rows(np.array([0, 62])))
+
+    assert (full.label, empty.label) == ("full", "empty")
+    assert full.certainty is not None
+    assert (empty.certainty, empty.certainty_interval) == (None, None)
+    assert "5 held-out trials were called empty" in empty.no_certainty
+    assert len(empty.prediction_set) == 2
+    assert model.predict(trials.table.row(62)).certainty is None

@@ -21,7 +21,7 @@ from repository import TESTS
 from test_classifiers import trials
 
 from graspsense.core.components.registry import Component, installed
-from graspsense.core.learn.certainty import Certainty, SupportClass
+from graspsense.core.learn.certainty import Certainty, LabelShare, SupportClass
 from graspsense.core.learn.conformal import LabelThreshold, PredictionSets
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.model import checkpoint_model
@@ -65,7 +65,9 @@ def trained(name, **config):
         SupportClass(least=least, probabilities=(0.4, 0.9), rates=(0.3, 0.7), units=30.0)
         for least in (0.0, 4.0)
     ]
-    model = evolve(model, sets=sets, temperature=1.5, certainty=Certainty(classes=tuple(classes)))
+    of_label = {label: LabelShare(share=0.9, low=0.7, high=1.1) for label in model.classifier.classes()}
+    certainty = Certainty(classes=tuple(classes), of_label=of_label)
+    model = evolve(model, sets=sets, temperature=1.5, certainty=certainty)
     return evolve(model, checkpoints=((0.2, checkpoint_model(model, 0.2, model)),))
 
 
@@ -175,6 +177,8 @@ def test_what_is_no_strict_json_is_refused(tmp_path, text, says):
         ("certainty.0.rates", [0.3, 1.7]),
         ("certainty.0.probabilities", [0.9, 0.4]),
         ("certainty.1.support", 0.0),
+        ("certainty_of_label.bottle:empty", [0.95, 0.9, 1.1]),
+        ("certainty_of_label.bottle:empty", [0.9, 1.2, 1.3]),
         ("checkpoints.0.certainty", [{}]),
         ("sets.unknown", 16),
         ("temperature", 1e-300),

@@ -151,3 +151,18 @@ def test_folds_that_share_their_training_trials_widen_an_interval():
     effect = 1.0 + 10.0 / 9.0
     right = [True] * 30 + [False] * 10
     assert rate_of(right, folds=10).interval == pytest.approx(wilson(30 / effect, 40 / effect))
+
+
+def test_folds_widen_the_interval_of_a_difference_over_instances_by_the_root_of_their_effect():
+    left, names = counted([8, 6, 7, 5, 8, 3, 7, 6])
+    right, _ = counted([5, 6, 3, 5, 4, 3, 5, 2])
+    alone, folded = difference(left, right, names), difference(left, right, names, folds=10)
+    assert folded.value == alone.value
+    assert folded.interval[1] - folded.value >= 1.4 * (alone.interval[1] - alone.value)
+
+
+def test_what_few_answers_of_a_cross_validation_show_is_not_shown():
+    # Eight trials differ, all in favour of the first: 2 / 2**8 is below 0.05 / 3. Ten folds let them count as 3.8.
+    left, right = [True] * 40, [True] * 32 + [False] * 8
+    assert difference(left, right, comparisons=3.0).is_positive
+    assert not difference(left, right, comparisons=3.0, folds=10).is_positive

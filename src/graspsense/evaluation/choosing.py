@@ -170,6 +170,7 @@ def _nested(answers: Mapping[tuple[str, str], _Answers], folds: Folds) -> tuple[
         support=outer[0].support if alike else np.full(len(folds), np.nan),
         unlike=np.array([pooled.unlike for pooled in outer])[folds, rows],
         trained_on=outer[0].trained_on,
+        folds=outer[0].folds,
     )
     return nested, dict(Counter(" with ".join(key) for key in chosen).most_common())
 

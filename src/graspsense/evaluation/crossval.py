@@ -54,6 +54,8 @@ class Pooled:
     unlike: NDArray[np.bool_]
     trained_on: float
     """Mean number of training trials per fold."""
+    folds: int
+    """The number of folds, 0 for the answers of a single model to other trials than its own."""
 
     @property
     def columns(self) -> NDArray[np.int64]:
@@ -130,7 +132,14 @@ def cross_validate(
             if progress is not None:
                 progress()
     return Pooled(
-        tuple(predicted), all_classes, probabilities, scores, support, unlike, float(np.mean(sizes))
+        predicted=tuple(predicted),
+        classes=all_classes,
+        probabilities=probabilities,
+        scores=scores,
+        support=support,
+        unlike=unlike,
+        trained_on=float(np.mean(sizes)),
+        folds=max(int(fold_of.max()) + 1 for fold_of in folds),
     )
 
 

@@ -37,7 +37,7 @@ from graspsense.evaluation.crossval import (
     cross_validate,
 )
 from graspsense.evaluation.folds import Folds, held_out
-from graspsense.evaluation.intervals import RecognitionRate
+from graspsense.evaluation.intervals import RecognitionRate, effect_of
 
 FOLDS: Final = 10
 BINS: Final = 10
@@ -146,6 +146,7 @@ def calibrated_by(model: Model, labelled: Labelled) -> Model:
         support=np.full(len(known), np.nan) if support is None else support,
         unlike=np.array([answer == UNKNOWN for answer in answers]),
         trained_on=float(model.provenance.get("trials", 0)),
+        folds=0,
     )
     return calibrated_with(model, pooled, known)
 
@@ -187,8 +188,10 @@ def _calibration(
     certainty = certainty_of(
         pooled.probabilities[rows, pooled.columns[rows]],
         pooled.support[rows],
+        [pooled.predicted[i] for i in numbers],
         [right[i] for i in numbers],
         units,
+        effect_of(pooled.folds),
     )
     truth = columns_of(labels, pooled.classes)[rows]
     return _Calibration(
@@ -203,7 +206,9 @@ def _answers(certainty: Certainty, pooled: Pooled, rows: NDArray[np.int64]) -> A
     return Answers(
         scores=pooled.scores[rows],
         predicted=predicted,
-        certainty=certainty.rate(pooled.probabilities[rows, predicted], support),
+        certainty=certainty.rate(
+            pooled.probabilities[rows, predicted], support, [pooled.predicted[i] for i in rows.tolist()]
+        ),
         support_class=certainty.class_of(support),
     )
 

@@ -151,6 +151,7 @@ class Evaluator:
             [minuend[i] for i in rows],
             [subtrahend[i] for i in rows],
             None if instances is None else [instances[i] for i in rows],
+            folds=self.k,
         )
 
     def assigned_folds(

@@ -144,7 +144,7 @@ def rate_of(
     if no_interval:
         return RecognitionRate(correct, n, None, no_interval)
     if instances is None:
-        effect = _effect_of(folds)
+        effect = effect_of(folds)
         return RecognitionRate(correct, n, wilson(correct / effect, n / effect, _z(comparisons)))
     count = len(set(instances))
     if count < MIN_INSTANCES:
@@ -166,8 +166,8 @@ def too_few(instances: int) -> str:
     return f"{counted(instances, 'instance')}, at least {MIN_INSTANCES} are needed"
 
 
-def _effect_of(folds: int) -> float:
-    """Return by how much the variance grows, because so many folds share their training trials."""
+def effect_of(folds: int) -> float:
+    """Return by how much the variance of a rate grows, because so many folds share their training trials; 0 is none."""
     return 1.0 + folds / (folds - 1) if folds > 1 else 1.0
 
 
@@ -180,7 +180,7 @@ def clustered(
     p = correct / n
     # Where every trial is right (or wrong), the design effect is unknown; trials of an instance then count as one.
     effect = n / count if p in (0.0, 1.0) else max(variance / (p * (1.0 - p) / n), 1.0)
-    effect *= _effect_of(folds)
+    effect *= effect_of(folds)
     return wilson(correct / effect, n / effect, t_quantile(count - 1, comparisons))
 
 
@@ -200,20 +200,23 @@ def difference(
     subtrahend: Sequence[bool],
     instances: Sequence[str] | None = None,
     comparisons: float = 1.0,
+    *,
+    folds: int = 0,
 ) -> Difference:
     """Return the rate of `minuend` minus that of `subtrahend`; both state which of the same trials are correct.
 
     With `instances`, the object of each trial, the interval is Student's t of the differences by instance, and never
-    narrower than that of independent trials. It is corrected for a number of comparisons (Bonferroni). With several of
-    them it holds zero unless the exact sign test of the trials that differ excludes it: so far out, Newcombe's interval
-    of a few trials is too narrow. Raises ValueError if the lengths differ or are zero.
+    narrower than that of independent trials. It is corrected for a number of comparisons (Bonferroni), and for `folds`
+    as in `rate_of`. With several comparisons it holds zero unless the sign test of the trials that differ excludes it:
+    so far out, Newcombe's interval of a few trials is too narrow. Raises ValueError if the lengths differ or are zero.
     """
     n = len(minuend)
     if n == 0 or len(subtrahend) != n:
         raise ValueError(f"{n} and {len(subtrahend)} trials: both must be of the same trials")
     value = (sum(minuend) - sum(subtrahend)) / n
-    independent = _newcombe(minuend, subtrahend, _z(comparisons))
-    if comparisons > 1.0 and _sign_test(minuend, subtrahend) * comparisons > ALPHA:
+    effect = effect_of(folds)
+    independent = _newcombe(minuend, subtrahend, effect, _z(comparisons))
+    if comparisons > 1.0 and _sign_test(minuend, subtrahend, effect) * comparisons > ALPHA:
         independent = (min(independent[0], 0.0), max(independent[1], 0.0))
     if instances is None:
         return Difference(value, independent)
@@ -221,18 +224,22 @@ def difference(
     if count < MIN_INSTANCES:
         return Difference(value, None, too_few(count))
     each = [float(x) - float(y) for x, y in zip(minuend, subtrahend, strict=True)]
-    half = t_quantile(count - 1, comparisons) * math.sqrt(_variance_of_mean(each, instances)[0])
+    half = t_quantile(count - 1, comparisons) * math.sqrt(effect * _variance_of_mean(each, instances)[0])
     low, high = min(value - half, independent[0]), max(value + half, independent[1])
     return Difference(value, (max(low, -1.0), min(high, 1.0)))
 
 
-def _sign_test(minuend: Sequence[bool], subtrahend: Sequence[bool]) -> float:
-    """Return the probability that so many of the trials that differ, or more, favour one side (Q. McNemar, 1947)."""
-    from scipy.special import bdtr
+def _sign_test(minuend: Sequence[bool], subtrahend: Sequence[bool], effect: float) -> float:
+    """Return the probability that so many of the trials that differ, or more, favour one side (Q. McNemar, 1947).
 
-    better = sum(x and not y for x, y in zip(minuend, subtrahend, strict=True))
-    worse = sum(y and not x for x, y in zip(minuend, subtrahend, strict=True))
-    return min(1.0, 2.0 * float(bdtr(min(better, worse), better + worse, 0.5)))
+    The trials count as if they were fewer by the design effect.
+    """
+    from scipy.special import betainc
+
+    better = sum(x and not y for x, y in zip(minuend, subtrahend, strict=True)) / effect
+    worse = sum(y and not x for x, y in zip(minuend, subtrahend, strict=True)) / effect
+    # The binomial distribution, for numbers that are not whole.
+    return min(1.0, 2.0 * float(betainc(max(better, worse), min(better, worse) + 1.0, 0.5)))
 
 
 def unpaired_difference(
@@ -266,7 +273,7 @@ def mean_interval(
             return None, too_few(count)
         return None, f"{counted(count, 'trial')}, at least {MIN_INSTANCES} are needed"
     mean = math.fsum(values) / len(values)
-    half = t_quantile(count - 1) * math.sqrt(_effect_of(folds) * _variance_of_mean(values, units)[0])
+    half = t_quantile(count - 1) * math.sqrt(effect_of(folds) * _variance_of_mean(values, units)[0])
     return (mean - half, mean + half), ""
 
 
@@ -299,8 +306,10 @@ def _z(comparisons: float) -> float:
     return float(ndtri(1.0 - ALPHA / 2.0 / comparisons))
 
 
-def _newcombe(minuend: Sequence[bool], subtrahend: Sequence[bool], quantile: float = Z) -> Interval:
-    """Return the interval of a difference on independent trials."""
+def _newcombe(
+    minuend: Sequence[bool], subtrahend: Sequence[bool], effect: float, quantile: float
+) -> Interval:
+    """Return the interval of a difference on independent trials, as if these were fewer by the design effect."""
     n = len(minuend)
     both = sum(1 for x, y in zip(minuend, subtrahend, strict=True) if x and y)
     only_first = sum(1 for x, y in zip(minuend, subtrahend, strict=True) if x and not y)
@@ -308,7 +317,9 @@ def _newcombe(minuend: Sequence[bool], subtrahend: Sequence[bool], quantile: flo
     neither = n - both - only_first - only_second
     right1, right2 = both + only_first, both + only_second
     p1, p2 = right1 / n, right2 / n
-    (low1, high1), (low2, high2) = wilson(right1, n, quantile), wilson(right2, n, quantile)
+    (low1, high1), (low2, high2) = (
+        wilson(right / effect, n / effect, quantile) for right in (right1, right2)
+    )
     phi = _correlation(both, only_first, only_second, neither)
     below, above = _added(p1 - low1, high2 - p2, phi), _added(high1 - p1, p2 - low2, phi)
     value = p1 - p2

@@ -283,7 +283,7 @@ def _ranked(
         loss = None
         standing: Standing = "best" if key == best else "control"
         if key != best and key in judged:
-            loss = difference(right[best], right[key], trials.instances, comparisons)
+            loss = difference(right[best], right[key], trials.instances, comparisons, folds=folds)
             standing = _standing(loss)
         measured_key = measured[key]
         rates = {

@@ -286,7 +286,7 @@ class _Evaluator:
         """Return the difference of two errors, on the trials of which there are both predictions."""
         rows = min(minuend.rows, subtrahend.rows, key=len)
         errors, others = ((held.predicted - self.values)[rows] for held in (minuend, subtrahend))
-        return difference_of_errors(errors.tolist(), others.tolist(), self._instances_of(rows))
+        return difference_of_errors(errors.tolist(), others.tolist(), self._instances_of(rows), self.k)
 
     def _against(self, what: str, held: _HeldOut, other: _HeldOut) -> RegressionMeasurement:
         """Return the error with its difference to another protocol."""

@@ -58,11 +58,14 @@ def error_of(errors: Sequence[float], instances: Sequence[str] | None, folds: in
 
 
 def difference_of_errors(
-    errors: Sequence[float], others: Sequence[float], instances: Sequence[str] | None
+    errors: Sequence[float], others: Sequence[float], instances: Sequence[str] | None, folds: int = 0
 ) -> Difference:
-    """Return the mean absolute error of `first` minus that of `second`, on the same trials, with its 95 % interval."""
+    """Return the mean absolute error of `errors` minus that of `others`, of the same trials, with its 95 % interval.
+
+    `folds` is as in `rate_of`.
+    """
     each = [abs(value) - abs(other) for value, other in zip(errors, others, strict=True)]
-    interval, reason = mean_interval(each, instances)
+    interval, reason = mean_interval(each, instances, folds)
     return Difference(math.fsum(each) / len(each), interval, reason)
 
 

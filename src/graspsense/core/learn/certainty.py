@@ -6,7 +6,11 @@ divided into classes of support, each with enough of them. Within a class the ra
 probability (isotonic regression, R. E. Barlow et al., Statistical Inference under Order Restrictions, 1972). Each step
 of it has enough units. The rates are drawn together by what chance spreads them, and each is (right + 1) / (all + 2),
 so that no answer is certain. Its 95 % interval is that of a beta distribution with this mean: from few units a rate is
-known as badly as that, whatever the luck of these trials.
+known as badly as that, whatever the luck of these trials. Answers of a cross-validation count for less than others:
+its models share training trials, so that the answers of all of them are lucky together.
+
+Where labels are not equally frequent, answers with a rare one are right less often than others that are as probable. So
+a rate is multiplied by how often the answers with its label were right, as a share of what their rates promise.
 
 The probabilities of the other labels are calibrated by temperature scaling: p becomes p^(1/T), divided by the sum of
 these (C. Guo, G. Pleiss, Y. Sun and K. Q. Weinberger, On calibration of modern neural networks, ICML 2017, section
@@ -19,12 +23,12 @@ trials. Below 1 they move apart. The order of the labels stays.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 
 from graspsense.core.learn.stored_values import StoredValues
 
@@ -41,6 +45,8 @@ STEP_SHARE: Final = 0.02
 """Least share of all units from which a rate is computed: more units give more exact rates, and not more of them."""
 CLASS_UNITS: Final = 60
 """Least number of units in a class of support, if there are as many."""
+LABEL_UNITS: Final = 5
+"""With fewer units of a label among the answers, it is not known how certain that answer is."""
 SUPPORT_BOUNDS: Final = (5.0, 10.0, 20.0, 40.0, 80.0)
 """Numbers of training trials at which a class of support may begin."""
 _ROUNDING: Final = 1e-9
@@ -63,10 +69,27 @@ class SupportClass:
 
 
 @frozen(kw_only=True)
+class LabelShare:
+    """How often answers with a label are right, as a share of what their rates promise, at most 1.
+
+    `low` and `high` are the ends of its 95 % interval.
+    """
+
+    share: float
+    low: float
+    high: float
+
+
+@frozen(kw_only=True)
 class Certainty:
-    """The rates of right answers by support and probability; the classes of support begin with the smallest."""
+    """The rates of right answers by support and probability; the classes of support begin with the smallest.
+
+    Labels that were too seldom the answer are not in `of_label`: their certainty is not known. None is a model that was
+    measured before these were kept.
+    """
 
     classes: tuple[SupportClass, ...]
+    of_label: Mapping[str, LabelShare] | None = None
 
     def class_of(self, support: NDArray[np.float64]) -> NDArray[np.int64]:
         """Return the number of the class of support of each answer. NaN is an answer without support."""
@@ -74,8 +97,14 @@ class Certainty:
         numbers = np.searchsorted(np.array(bounds) - _ROUNDING, np.nan_to_num(support, nan=0.0), side="right")
         return np.asarray(numbers, dtype=np.int64)
 
-    def rate(self, probability: NDArray[np.float64], support: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the rate of right answers among those with this probability and support."""
+    def rate(
+        self, probability: NDArray[np.float64], support: NDArray[np.float64], labels: Sequence[str]
+    ) -> NDArray[np.float64]:
+        """Return the rate of right answers with this probability, support and label; NaN where it is not known."""
+        return self._rate(probability, support) * [of_label.share for of_label in self._of_labels(labels)]
+
+    def _rate(self, probability: NDArray[np.float64], support: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the rate of right answers with this probability and support, of all labels together."""
         chosen, steps = self._places(probability, support)
         result = np.empty(len(probability))
         for k, support_class in enumerate(self.classes):
@@ -83,15 +112,31 @@ class Certainty:
             result[rows] = np.array(support_class.rates)[steps[rows]]
         return result
 
+    def _of_labels(self, labels: Sequence[str]) -> list[LabelShare]:
+        """Return the share of each of these labels; NaN for one that was too seldom the answer."""
+        if self.of_label is None:
+            return [LabelShare(share=1.0, low=1.0, high=1.0)] * len(labels)
+        unknown = LabelShare(share=math.nan, low=math.nan, high=math.nan)
+        return [self.of_label.get(label, unknown) for label in labels]
+
     def intervals(
-        self, probability: NDArray[np.float64], support: NDArray[np.float64]
+        self, probability: NDArray[np.float64], support: NDArray[np.float64], labels: Sequence[str]
     ) -> list[tuple[float, float] | None]:
         """Return the 95 % interval of the rate of each answer; None where it was not kept."""
         chosen, steps = self._places(probability, support)
         kept = [
             support_class.intervals or (None,) * len(support_class.rates) for support_class in self.classes
         ]
-        return [kept[k][step] for k, step in zip(chosen.tolist(), steps.tolist(), strict=True)]
+        intervals = [kept[k][step] for k, step in zip(chosen.tolist(), steps.tolist(), strict=True)]
+        rates = self._rate(probability, support).tolist()
+        return [
+            interval
+            and (
+                min(interval[0] * of_label.share, rate * of_label.low),
+                min(max(interval[1] * of_label.share, rate * of_label.high), 1.0),
+            )
+            for interval, rate, of_label in zip(intervals, rates, self._of_labels(labels), strict=True)
+        ]
 
     def _places(
         self, probability: NDArray[np.float64], support: NDArray[np.float64]
@@ -119,8 +164,8 @@ class Certainty:
         ]
 
 
-def certainty_from(kept: Sequence[StoredValues]) -> Certainty:
-    """Return the certainty of a stored model. Raises DataDamaged."""
+def certainty_from(kept: Sequence[StoredValues], of_label: StoredValues | None) -> Certainty:
+    """Return the certainty of a stored model from its classes of support and its labels. Raises DataDamaged."""
     classes: list[SupportClass] = []
     for values in kept:
         rates = values.numbers("rates", (None,), least=0.0)
@@ -148,18 +193,32 @@ def certainty_from(kept: Sequence[StoredValues]) -> Certainty:
                 intervals=tuple((low, high) for low, high in intervals.tolist()),
             )
         )
-    return Certainty(classes=tuple(classes))
+    return Certainty(classes=tuple(classes), of_label=None if of_label is None else _shares_from(of_label))
+
+
+def _shares_from(kept: StoredValues) -> dict[str, LabelShare]:
+    """Return the shares of the labels of a stored model. Raises DataDamaged."""
+    shares = {}
+    for label in kept:
+        low, share, high = kept.numbers(label, (3,), least=0.0).tolist()
+        if not low <= share <= min(high, 1.0):
+            raise kept.refusal(label, "its interval does not hold its share, or the share is above 1")
+        shares[label] = LabelShare(share=share, low=low, high=high)
+    return shares
 
 
 def certainty_of(
     probability: NDArray[np.float64],
     support: NDArray[np.float64],
+    labels: Sequence[str],
     right: Sequence[bool],
     units: Sequence[str],
+    effect: float = 1.0,
 ) -> Certainty:
     """Return the certainty that held-out answers give; at least one.
 
-    `probability` and `support` are those of the predicted labels. Trials of one unit weigh as much as one trial.
+    `probability` and `support` are those of `labels`, the predicted ones. Trials of one unit weigh as much as one.
+    `effect` is by how much the variance of their rates is larger than that of independent answers.
     """
     _, unit_of, trials_of_unit = np.unique(np.array(units), return_inverse=True, return_counts=True)
     weights = 1.0 / trials_of_unit[unit_of]
@@ -170,7 +229,9 @@ def certainty_of(
     classes = []
     for least, end in pairwise(edges):
         rows = (known >= least) & (known < end)
-        begins, rates, intervals = _steps(probability[rows], answers[rows], weights[rows], least_units)
+        begins, rates, intervals = _steps(
+            probability[rows], answers[rows], weights[rows], least_units, effect
+        )
         classes.append(
             SupportClass(
                 least=least,
@@ -180,7 +241,30 @@ def certainty_of(
                 intervals=intervals,
             )
         )
-    return Certainty(classes=tuple(classes))
+    of_all = Certainty(classes=tuple(classes))
+    promised = of_all._rate(probability, support)
+    of_label = {}
+    for label in sorted(set(labels)):
+        rows = np.array(labels) == label
+        if float(weights[rows].sum()) >= LABEL_UNITS - _ROUNDING:
+            of_label[label] = _share_of_label(answers[rows], promised[rows], weights[rows], effect)
+    return evolve(of_all, of_label=of_label)
+
+
+def _share_of_label(
+    right: NDArray[np.float64], promised: NDArray[np.float64], weights: NDArray[np.float64], effect: float
+) -> LabelShare:
+    """Return how often the answers with a label are right, as a share of the rates that they were promised."""
+    from scipy.special import betaincinv
+
+    rate, mean = np.average(right, weights=weights), np.average(promised, weights=weights)
+    units = weights.sum() / effect
+    low, high = (
+        float(betaincinv(rate * units + 1.0, (1.0 - rate) * units + 1.0, end) / mean)
+        for end in (0.025, 0.975)
+    )
+    share = min(float(rate / mean), 1.0)
+    return LabelShare(share=share, low=min(low, share), high=max(high, share))
 
 
 def with_certainty(
@@ -189,10 +273,12 @@ def with_certainty(
     """Return probabilities, shape (trials, classes), in which the predicted label has its certainty.
 
     The other labels share what remains in their proportions, as far as none of them exceeds the predicted one. NaN
-    marks a label that is not possible.
+    marks a label that is not possible; a trial whose certainty is NaN keeps its probabilities.
     """
     result = probabilities.copy()
     for i, (k, sure) in enumerate(zip(predicted.tolist(), certainty.tolist(), strict=True)):
+        if math.isnan(sure):
+            continue
         others = np.flatnonzero(~np.isnan(result[i]))
         others = others[others != k]
         if not len(others):
@@ -225,6 +311,7 @@ def _steps(
     right: NDArray[np.float64],
     weights: NDArray[np.float64],
     least_units: float,
+    effect: float,
 ) -> tuple[tuple[float, ...], tuple[float, ...], tuple[tuple[float, float], ...]]:
     """Return where the steps of the isotonic regression begin, their rates, and the intervals of these."""
     from scipy.special import betaincinv
@@ -242,8 +329,9 @@ def _steps(
     all_of = np.bincount(bins[value_of], weights)
     right_of = np.bincount(bins[value_of], weights * right)
     level_of = np.unique(isotonic_regression(right_of / all_of, sample_weight=all_of), return_inverse=True)[1]
+    # From here on, units are as many as independent ones that tell as much.
     right_in, units = (
-        np.asarray(np.bincount(level_of, counts), dtype=np.float64) for counts in (right_of, all_of)
+        np.asarray(np.bincount(level_of, counts), dtype=np.float64) / effect for counts in (right_of, all_of)
     )
     rates = (units * _drawn_together(right_in, units, len(all_of)) + 1.0) / (units + 2.0)
     rates = np.maximum.accumulate(rates)

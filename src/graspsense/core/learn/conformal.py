@@ -101,7 +101,7 @@ class Answers:
     """What sets are made of, for some trials: the scores of all labels, and what the predictions rest on.
 
     `scores` has shape (trials, classes), NaN for a label that is not possible. `predicted` has the columns of the
-    predicted labels, `certainty` how certain they are, `support_class` their class of support.
+    predicted labels, `certainty` how certain they are (NaN: not known), `support_class` their class of support.
     """
 
     scores: NDArray[np.float64]
@@ -143,7 +143,7 @@ class PredictionSets:
         inside[rows, answers.predicted] = True
         alone = np.flatnonzero(
             (inside.sum(axis=1) == 1)
-            & (answers.certainty < self.coverage)
+            & ~(answers.certainty >= self.coverage)
             & ((~np.isnan(scores)).sum(axis=1) > 1)
         )
         others = np.where(np.isnan(scores), -np.inf, scores)[alone]

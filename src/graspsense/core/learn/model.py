@@ -11,7 +11,7 @@ from attrs import evolve, frozen
 
 from graspsense.core.components.entries import TABLE_OF_ROLE
 from graspsense.core.components.setting import CHANGES_NO_RESULT, NAMES_INPUT, settings_marked, worded
-from graspsense.core.learn.certainty import Certainty, at_temperature, with_certainty
+from graspsense.core.learn.certainty import LABEL_UNITS, Certainty, at_temperature, with_certainty
 from graspsense.core.learn.conformal import Answers, PredictionSets, scores_of
 from graspsense.core.learn.novelty import Novelty
 from graspsense.core.values.errors import ConfigError, DataDamaged
@@ -183,8 +183,9 @@ class Model:
             if support is None:
                 support = np.full(len(table), np.nan)
             share = shares[np.arange(len(table)), predicted]
-            certainty = self.certainty.rate(share, support)
-            kept = self.certainty.intervals(share, support)
+            answered = [classes[k] for k in predicted.tolist()]
+            certainty = self.certainty.rate(share, support, answered)
+            kept = self.certainty.intervals(share, support, answered)
             measured = np.array([not names for names in lacking])
             known &= measured
             calibrated = with_certainty(at_temperature(shares, self.temperature), predicted, certainty)
@@ -207,7 +208,7 @@ class Model:
         made = []
         for i, label in enumerate(labels):
             order = sorted(np.flatnonzero(members[i]), key=lambda k: (k != predicted[i], -scores[i, k]))
-            without = no_certainty or (lacking[i] and f"it was measured with trials that have {lacking[i]}")
+            without = no_certainty or self._why_uncertain(classes[predicted[i]], lacking[i])
             made.append(
                 Prediction(
                     label=label,
@@ -221,6 +222,15 @@ class Model:
                 )
             )
         return made
+
+    def _why_uncertain(self, label: str, lacking: str) -> str:
+        """Return why the certainty of this answer to a trial without these features is not known; empty if it is."""
+        if lacking:
+            return f"it was measured with trials that have {lacking}"
+        if self.certainty is None or self.certainty.of_label is None or label in self.certainty.of_label:
+            return ""
+        unit = "trials" if self.sets is None else self.sets.unit
+        return f"fewer than {LABEL_UNITS} held-out {unit} were called {label}"
 
     def answers(self, table: FeatureTable) -> tuple[list[str], NDArray[np.float64]]:
         """Return the label of `predict` for each trial of a table, and the probabilities that the classifier gives.

@@ -74,7 +74,7 @@ def as_json(model: Model) -> dict[str, Any]:
         "provenance": json_ready(model.provenance),
         "unknown": model.novelty.to_json(),
         **({} if model.sets is None else {"sets": model.sets.to_json()}),
-        "certainty": None if model.certainty is None else model.certainty.to_json(),
+        **_certainty_as_json(model.certainty),
         **({} if model.temperature is None else {"temperature": model.temperature}),
         "model": model.classifier.to_json(),
         **({} if not model.learned_from else {"learned_from": list(model.learned_from)}),
@@ -95,10 +95,18 @@ def _part_as_json(after_s: float, part: Model) -> dict[str, Any]:
         "by_label": json_ready(part.provenance["by_label"]),
         "unknown": part.novelty.to_json(),
         "sets": None if part.sets is None else part.sets.to_json(),
-        "certainty": None if part.certainty is None else part.certainty.to_json(),
+        **_certainty_as_json(part.certainty),
         "temperature": part.temperature,
         "model": part.classifier.to_json(),
     }
+
+
+def _certainty_as_json(certainty: Certainty | None) -> dict[str, Any]:
+    """Return the entries of a certainty in the file of a model."""
+    if certainty is None or certainty.of_label is None:
+        return {"certainty": None if certainty is None else certainty.to_json()}
+    of_label = {name: [share.low, share.share, share.high] for name, share in certainty.of_label.items()}
+    return {"certainty": certainty.to_json(), "certainty_of_label": of_label}
 
 
 def load_model(name: str, plugins: Plugins) -> Model:
@@ -208,7 +216,8 @@ def _certainty_from(stored: StoredValues) -> Certainty | None:
     """Return the certainty; None in a model without calibration, or of an earlier version. Raises DataDamaged."""
     if "certainty" not in stored or stored.value("certainty") is None:
         return None
-    return certainty_from(stored.tables("certainty"))
+    of_label = stored.table("certainty_of_label") if "certainty_of_label" in stored else None
+    return certainty_from(stored.tables("certainty"), of_label)
 
 
 def _sets_from(stored: StoredValues, classifier: Classifier[Any]) -> PredictionSets | None:
