@@ -91,6 +91,17 @@ def test_a_gap_that_is_none_for_a_tenth_of_a_second_ends_the_grasp(absent_from, 
     assert any(fault is not None and fault.ends for fault in faults) is ends
 
 
+@every_case(("velocity_m_s", "seen"), [(-0.02, [50]), (nan, []), (0.0, [])])
+def test_under_an_effort_a_gap_that_jumps_is_known_by_a_velocity_that_is_measured(velocity_m_s, seen):
+    watch, jumped = GapJump(0.2), []
+    for k in range(100):
+        now = frame(k, closing(k) - 0.004 * (k >= 50))._replace(velocity_m_s=velocity_m_s)
+        if watch.see(now) is not None:
+            jumped.append(k)
+        watch.apply(now, Command(EFFORT, 20.0, inf, inf))
+    assert jumped == seen
+
+
 def test_a_gap_that_jumps_is_no_motor_that_turns_the_wrong_way():
     """Against the command and back, as a spike does: the motor is judged by the motion without the jumps."""
     jump, motor = GapJump(0.2), Motor(False, RATE_HZ)

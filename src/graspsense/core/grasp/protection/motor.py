@@ -53,6 +53,8 @@ WRONG_WAY_M: Final = 0.003
 REBOUND_M: Final = 0.012
 REBOUND_SHARE: Final = 0.5
 """Travel for which fingers that met something rebound at most, and its share of the way that they had closed by."""
+COAST_S: Final = 0.25
+"""Time for which fingers that close fast, and slow down, may move on under a command that opens them."""
 RESTS_M_S: Final = 0.0005
 """Speed below which the fingers rest: while they are braked, their mass presses too."""
 MEAN_S: Final = 0.2
@@ -110,6 +112,7 @@ class Motor:
         self._wrong_way_s = 0.0
         self._phase = -1
         self._start_m = self._extreme_m = nan
+        self._start_m_s = nan
 
     def apply(self, frame: Frame, command: Command) -> None:
         """Take the command that is applied after this frame."""
@@ -171,6 +174,7 @@ class Motor:
         if phase != self._phase or not (closes or opens) or self._extreme_m != self._extreme_m:
             self._phase, self._wrong_way_s = phase, 0.0
             self._start_m = self._extreme_m = frame.gap_m
+            self._start_m_s = -frame.velocity_m_s
             return None
         allowed_m = WRONG_WAY_M
         if closes:
@@ -182,6 +186,8 @@ class Motor:
         else:
             self._extreme_m = max(self._extreme_m, frame.gap_m)
             travel_m = self._extreme_m - frame.gap_m
+            if -frame.velocity_m_s < self._start_m_s:
+                allowed_m = max(allowed_m, COAST_S * self._start_m_s)
         wrong = travel_m >= allowed_m
         self._wrong_way_s = self._wrong_way_s + frame.dt_s if wrong else 0.0
         # An object that springs back may open fingers that squeeze it.

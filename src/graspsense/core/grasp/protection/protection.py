@@ -22,7 +22,8 @@ from graspsense.core.grasp.protection.effort_ceiling import asked_effort_n, effo
 from graspsense.core.grasp.protection.kept_speed import KeptSpeed
 from graspsense.core.grasp.protection.motor import FeltForce, FreeEffort, Motor
 from graspsense.core.grasp.protection.opening import Opening
-from graspsense.core.grasp.protection.pad_forces import EmptyForce, EmptyHold, PadBalance, StuckForce
+from graspsense.core.grasp.protection.pad_curves import PadCurves
+from graspsense.core.grasp.protection.pad_forces import EmptyHold, PadBalance, StuckForce
 from graspsense.core.grasp.protection.reports import Repeats, Reports, StatusWatch
 from graspsense.core.grasp.protection.speed import GapJump, GapSpeed, Rush, Standstill
 from graspsense.core.grasp.protection.touch import Touch
@@ -65,6 +66,8 @@ class Protection:
         self.ending: Fault | None = None
         self.acted = 0
         self._closing = False
+        self._approach: Frame | None = None
+        """The last frame of the approach."""
         rates = {channel.name: channel.rate_hz for channel in info.channels}
         self.ceiling_n = effort_ceiling_n(info, controller, run)
         self._effort_limit_n = info.effort_limit_n
@@ -80,11 +83,11 @@ class Protection:
         self._has_pads = "force_left" in rates and "force_right" in rates
         pads_hz = min(rates.get("force_left", 0.0), rates.get("force_right", 0.0))
         self._touch, self._drift = Touch(contact_n, run.first_effort_n, pads_hz), Drift(contact_n)
-        self._stuck, self._balance = StuckForce(pads_hz), PadBalance()
-        self._empty, self._empty_hold = EmptyForce(contact_n), EmptyHold(contact_n)
+        self._stuck, self._balance = StuckForce(pads_hz), PadBalance(contact_n)
+        self._curves, self._empty_hold = PadCurves(contact_n, pads_hz), EmptyHold(contact_n)
         self._felt, self._gap_speed = (
             FeltForce(info.rate_hz, pads_hz, info.friction_n),
-            GapSpeed(info.rate_hz),
+            GapSpeed(info.rate_hz, "velocity" in rates),
         )
         self._free_effort = FreeEffort(info.friction_n)
         self._fingertips = Fingertips()
@@ -119,6 +122,8 @@ class Protection:
         if self._jump.jumps <= FEW_JUMPS:
             self._motor.shift(self._jump.step_m)
         self._see(self._motor.see(frame, phase), phase)
+        if phase == APPROACH:
+            self._approach = frame
         if not self._declared and frame.force_left_n == frame.force_left_n:
             self._has_pads = True
         closing = phase in (APPROACH, SQUEEZE, HOLD)
@@ -150,6 +155,10 @@ class Protection:
         if self._effort is not None:
             self._effort.apply(frame, allowed)
         return allowed
+
+    def side_impact(self) -> str:
+        """Return in words what the edges felt in the last frame of the approach."""
+        return "" if self._approach is None else self._drift.side_impact(self._approach)
 
     def before_closing(self, frame: Frame) -> Fault | None:
         """Return the fault for which the fingers must not close, if there is one."""
@@ -194,9 +203,11 @@ class Protection:
         frame = reading.frame
         closing = phase in (APPROACH, SQUEEZE, HOLD)
         self._see(self._touch.see(frame, phase, command))
-        self._see(self._empty.see(frame, phase))
         if closing:
             self._see(self._felt.see(frame))
+            self._see(self._balance.see(frame, phase))
+        for fault in self._curves.see(reading, phase):
+            self._see(fault, phase)
         free = self._touch.free()
         for fault in self._fingertips.see(reading.pads, free):
             # Fingers that are open hurt nothing; before they close, `before_closing` refuses.
@@ -208,7 +219,6 @@ class Protection:
         elif phase in (SQUEEZE, HOLD):
             self._see(self._stuck.see(frame))
             if phase == HOLD:
-                self._see(self._balance.see(frame))
                 self._see(self._empty_hold.see(frame))
 
     def _see(self, fault: Fault | None, phase: int = APPROACH) -> None:

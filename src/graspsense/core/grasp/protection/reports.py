@@ -25,6 +25,8 @@ REPEATS: Final = 3
 """Standstills of a single approach from which on the way after them is compared."""
 CATCH_UP: Final = 1.5
 """Way of the gap in a frame after a standstill, over that after motion, from which on frames have come twice."""
+SURPLUS_SHARE: Final = 0.05
+"""Share of frames beyond the declared rate from which on the clock of the gripper counts as slow."""
 IMAGES_LATE: Final = 5.0
 """Periods of the cell images without a new one after which the forces are out of date."""
 IMAGES_LATE_S: Final = 0.1
@@ -73,6 +75,13 @@ class Reports:
         self._frames += 1
         self._expected += dt_s / self._period_s
         lost = self._expected - self._frames
+        if self._frames >= FEWEST and -lost > SURPLUS_SHARE * self._expected:
+            return Fault(
+                "clock slow",
+                f"{self._frames} frames came in {self._expected * self._period_s:.2f} s of the gripper's clock, which "
+                f"declares {1.0 / self._period_s:g} a second: its clock is slow, so that times and rates are wrong, or "
+                "frames are repeated; restart the gripper",
+            )
         if self._expected < FEWEST or lost < LOST_SHARE * self._expected:
             return None
         return Fault(

@@ -18,6 +18,8 @@ MEMORY_S: Final = 0.5
 ALLOWED_SHARE: Final = 0.5
 ALLOWED_M: Final = 0.00075
 """By how much both travels may differ: a filtered velocity is late, and a gap has steps."""
+WAY_SHARE: Final = 0.25
+"""By how much the way of the whole closing may differ, as a share: then the velocity is late no more."""
 LASTS_S: Final = 0.1
 """Time for which they must differ by more; at least three frames."""
 RUSH: Final = 3.0
@@ -37,18 +39,23 @@ JUMP_M: Final = 0.001
 
 
 class GapSpeed:
-    """Compares the travel of the gap with that of the velocity, over the last half second of a closing."""
+    """Compares the travel of the gap with that of the velocity, over the last half second and the whole closing.
 
-    def __init__(self, rate_hz: float) -> None:
+    `declared` says that the gripper measures its velocity: one that is 0 from the beginning on is wrong then.
+    """
+
+    def __init__(self, rate_hz: float, declared: bool = False) -> None:
         self._lasts_s = max(LASTS_S, 3.0 / rate_hz)
         self._gap_m = nan
         self._moved_m = self._said_m = self._differs_s = 0.0
-        self._is_measured = False
+        self._way_m = self._said_way_m = self._ways_differ_s = 0.0
+        self._is_measured = declared
 
     def see(self, frame: Frame) -> Fault | None:
         """Take the frame of a tick while the fingers close or hold.
 
-        A gripper without gap or velocity shows nothing, nor does one whose velocity has been 0 so far.
+        A gripper without gap or velocity shows nothing, nor does one whose velocity has been 0 so far if it does not
+        declare that it measures it.
         """
         step_m, said_m = frame.gap_m - self._gap_m, frame.velocity_m_s * frame.dt_s
         self._gap_m = frame.gap_m
@@ -56,19 +63,27 @@ class GapSpeed:
         if step_m != step_m or said_m != said_m or not self._is_measured:
             return None
         kept = exp(-frame.dt_s / MEMORY_S)
-        self._moved_m = kept * self._moved_m + step_m
-        self._said_m = kept * self._said_m + said_m
-        largest_m = max(abs(self._moved_m), abs(self._said_m))
-        differs = abs(self._moved_m - self._said_m) > ALLOWED_M + ALLOWED_SHARE * largest_m
+        self._moved_m, self._said_m = kept * self._moved_m + step_m, kept * self._said_m + said_m
+        self._way_m, self._said_way_m = self._way_m + step_m, self._said_way_m + said_m
+        differs = disagree(self._moved_m, self._said_m, ALLOWED_SHARE)
         self._differs_s = self._differs_s + frame.dt_s if differs else 0.0
-        if self._differs_s <= self._lasts_s:
+        ways_differ = disagree(self._way_m, self._said_way_m, WAY_SHARE)
+        self._ways_differ_s = self._ways_differ_s + frame.dt_s if ways_differ else 0.0
+        ends = self._differs_s > self._lasts_s
+        if not (ends or self._ways_differ_s > self._lasts_s):
             return None
+        moved_m, said_m = (self._moved_m, self._said_m) if ends else (self._way_m, self._said_way_m)
         return Fault(
             "gap and velocity disagree",
-            f"the gap changed by {self._moved_m * 1e3:+.1f} mm where the velocity says {self._said_m * 1e3:+.1f} mm: "
+            f"the gap changed by {moved_m * 1e3:+.1f} mm where the velocity says {said_m * 1e3:+.1f} mm: "
             "one of them is wrong; check the encoder and its scale",
-            ends=True,
+            ends=ends,
         )
+
+
+def disagree(moved_m: float, said_m: float, share: float) -> bool:
+    """Return whether two travels differ by more than this share of the larger one."""
+    return abs(moved_m - said_m) > ALLOWED_M + share * max(abs(moved_m), abs(said_m))
 
 
 class Rush:
@@ -126,7 +141,8 @@ class GapJump:
         self._limit_m_s = speed_limit_m_s
         self._gap_m, self._dt_s = nan, 0.0
         self._told_m_s = [speed_limit_m_s, speed_limit_m_s]
-        self._direction = 0
+        self._direction, self._effort = 0, False
+        self._velocity_m_s, self._moved = 0.0, False
         self.step_m = 0.0
         """The jump of the last frame (m), 0 without one."""
         self.jumps = 0
@@ -139,12 +155,15 @@ class GapJump:
         self._told_m_s = [self._told_m_s[1], min(abs(value), speed_m_s) if kind == VELOCITY else speed_m_s]
         # An object can push fingers open that press with an effort.
         self._direction = 0 if kind == EFFORT else direction_of(command, frame.gap_m)
+        self._effort = kind == EFFORT
 
     def see(self, frame: Frame) -> Fault | None:
         """Take the frame of a tick; return the jump that it shows."""
         step_m, elapsed_s = frame.gap_m - self._gap_m, frame.dt_s + self._dt_s
         self._gap_m, self._dt_s = frame.gap_m, frame.dt_s
         told_m_s = max(self._told_m_s)
+        if self._effort:
+            told_m_s = min(told_m_s, self._measured_m_s(frame.velocity_m_s))
         against = step_m * self._direction > 0.0
         allowed_m = JUMP_M + (told_m_s * frame.dt_s if against else JUMP * told_m_s * elapsed_s)
         if not abs(step_m) > allowed_m:
@@ -154,9 +173,15 @@ class GapJump:
         self.jumps += 1
         return Fault(
             "gap jumps",
-            f"it changed by {step_m * 1e3:+.1f} mm within {frame.dt_s * 1e3:.0f} ms, faster than the fingers were told "
-            "to move: it is wrong before or after that, and so may be what follows from it; check the encoder",
+            f"it changed by {step_m * 1e3:+.1f} mm within {frame.dt_s * 1e3:.0f} ms, faster than the fingers move "
+            "or were told to: it is wrong before or after that, and so may be what follows from it; check the encoder",
         )
+
+    def _measured_m_s(self, velocity_m_s: float) -> float:
+        """Return the larger speed of this frame and the one before; infinity if it is not measured."""
+        last_m_s, self._velocity_m_s = self._velocity_m_s, velocity_m_s
+        self._moved = self._moved or abs(velocity_m_s) > 0.0
+        return max(abs(velocity_m_s), abs(last_m_s)) if self._moved else inf
 
 
 def told_speed_m_s(frame: Frame, command: Command) -> float:

@@ -42,7 +42,10 @@ MOST_S: Final = 3.0
 MOST_PUSHED_S: Final = 15.0
 """The longest time for which one pad may push an object."""
 ABSENT_S: Final = 0.1
-"""Time for which the force of a pad may be no number while the fingers close; at least three periods of the pads."""
+"""Time for which the force of a pad may be no number while the fingers close, without a break or in all; at least
+three periods of the pads."""
+CLAIM_PERIODS: Final = 2.0
+"""Periods of the pads for which a contact may lack a witness."""
 USUAL_M_S: Final = 0.010
 """The speed that is assumed for an approach that has not begun to move: that of the paper."""
 STALL_M: Final = 0.0005
@@ -77,7 +80,8 @@ class Pad:
         self._free_gap_m = self._free_t_s = nan
         self.first_n = nan
         """The force of the first tick."""
-        self.absent_s = 0.0
+        self.absent_s = self.all_absent_s = 0.0
+        """Time (s) without a number, without a break and in all."""
         self.sharp = False
         """Whether the force rose to that of the contact within a short travel and time."""
 
@@ -109,6 +113,7 @@ class Touch:
     def __init__(self, contact_force_n: float, usual_effort_n: float = inf, pads_hz: float = 0.0) -> None:
         self._contact_n, self._usual_n = contact_force_n, usual_effort_n
         self._absent_s = max(ABSENT_S, 3.0 / pads_hz) if pads_hz > 0.0 else ABSENT_S
+        self._images_s = CLAIM_PERIODS / pads_hz if pads_hz > 0.0 else 0.0
         self._left, self._right = Pad(contact_force_n), Pad(contact_force_n)
         self._ever_felt = False
         self._gap_m = nan
@@ -121,7 +126,7 @@ class Touch:
         self._witnessed = False
 
     def see(self, frame: Frame, phase: int, asked: Command) -> Fault | None:
-        """Take the frame of a tick and the command that the controller asks for; return a fault that ends the grasp."""
+        """Take the frame of a tick and the command that the controller asks for; return a fault."""
         if phase not in (APPROACH, SQUEEZE, HOLD):
             return None
         if self._start_gap_m != self._start_gap_m:
@@ -180,11 +185,12 @@ class Touch:
 
     def _absent(self, frame: Frame) -> Fault | None:
         for side, pad in (("left", self._left), ("right", self._right)):
-            pad.absent_s = pad.absent_s + frame.dt_s if pad.force_n != pad.force_n else 0.0
-            if pad.absent_s > self._absent_s:
-                return Fault(
-                    f"{side} pad absent", "it gives no force: check the fingertip and its cable", ends=True
-                )
+            absent = pad.force_n != pad.force_n
+            pad.absent_s = pad.absent_s + frame.dt_s if absent else 0.0
+            pad.all_absent_s += frame.dt_s * absent
+            if pad.all_absent_s > self._absent_s:
+                why = "it gives no force: check the fingertip and its cable"
+                return Fault(f"{side} pad absent", why, ends=pad.absent_s > self._absent_s)
         return None
 
     def _alone(self, frame: Frame) -> Fault | None:
@@ -247,7 +253,8 @@ class Touch:
         elapsed_s, travel_m = frame.t_s - self._claimed_t_s, self._claimed_gap_m - frame.gap_m
         # Fingers that have not approached cannot slow down: they may rest on the object.
         allowed_s = self._allowed_s(TRAVEL_M) if mean_m_s == mean_m_s else inf
-        if elapsed_s < allowed_s and not travel_m >= TRAVEL_M:
+        # Of fast fingers, the pads have not told more than the force of the contact within this travel.
+        if (elapsed_s < allowed_s and not travel_m >= TRAVEL_M) or elapsed_s < self._images_s:
             return None
         return Fault(
             "contact in free air",

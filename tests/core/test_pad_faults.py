@@ -1,0 +1,141 @@
+"""Faults of pads that features would carry on: scale, zero, noise, a force that is late, and one that stands still."""
+
+from math import nan
+from random import Random
+
+from cases import every_case
+
+from graspsense.core.grasp.protection.drift import Drift
+from graspsense.core.grasp.protection.pad_curves import PadCurves
+from graspsense.core.grasp.protection.pad_forces import PadBalance
+from graspsense.core.grasp.protection.touch import Touch
+from graspsense.core.values.signals import (
+    APPROACH,
+    EFFORT,
+    HOLD,
+    NO_PADS,
+    SQUEEZE,
+    Command,
+    Frame,
+    Phase,
+    Reading,
+)
+
+CONTACT_N = 0.625
+PADS_HZ = 25.0
+STIFFNESS_N_M = 2000.0
+CONTACT_M, REST_M = 0.058, 0.055
+CLOSING_S, REST_S, RELEASE_S, END_S = 1.0, 1.3, 1.8, 2.4
+"""The fingers close by 10 mm a second, touch, rest, and open by 50 mm a second."""
+
+
+def gap_m(t_s):
+    if t_s < RELEASE_S:
+        return CONTACT_M + 0.01 * (CLOSING_S - min(t_s, REST_S))
+    return REST_M + 0.05 * (t_s - RELEASE_S)
+
+
+def phase_of(t_s):
+    if t_s < CLOSING_S:
+        return APPROACH
+    if t_s < REST_S:
+        return SQUEEZE
+    return HOLD if t_s < RELEASE_S else Phase.RELEASE
+
+
+def force_n(t_s):
+    """The force of a spring of 2 N/mm, 6 N at rest."""
+    return STIFFNESS_N_M * max(CONTACT_M - gap_m(t_s), 0.0)
+
+
+def told(
+    left=lambda t_s, sound_n: sound_n, right=lambda t_s, sound_n: sound_n, noise_n=0.03, pads_hz=PADS_HZ
+):
+    """Return the names of the faults in a grasp whose pads give these forces, sampled at `pads_hz`."""
+    curves, balance, drift = PadCurves(CONTACT_N, pads_hz), PadBalance(CONTACT_N), Drift(CONTACT_N)
+    gauss, faults = Random(0).gauss, []
+    last, forces = -1, (0.0, 0.0)
+    for k in range(round(END_S * 1000)):
+        t_s = k / 1000
+        sample = int(t_s * pads_hz)
+        if sample != last:
+            last = sample
+            scatter = [gauss(0.0, noise_n), gauss(0.0, noise_n)]
+            # Measured half a period ago.
+            sound_n = force_n(max(t_s - 0.5 / pads_hz, 0.0))
+            forces = (left(t_s, sound_n + scatter[0]), right(t_s, sound_n + scatter[1]))
+        frame = Frame(t_s, 0.001, gap_m(t_s), 0.0, 0.0, *forces, 0.0, 0.0, 0)
+        phase, reading = phase_of(t_s), Reading(frame, NO_PADS)
+        seen = [*curves.see(reading, phase), balance.see(frame, phase) if phase <= HOLD else None]
+        if phase == APPROACH and max(forces) < CONTACT_N:
+            seen += drift.see(reading)
+        faults += [fault.name for fault in seen if fault is not None]
+    return set(faults)
+
+
+@every_case("pads_hz", [10.0, 25.0, 1000.0])
+def test_sound_pads_are_not_accused(pads_hz):
+    assert told(pads_hz=pads_hz) == set()
+
+
+def late(t_s, late_s):
+    return force_n(max(t_s - late_s, 0.0))
+
+
+@every_case(
+    ("left", "names"),
+    [
+        # 10 % of the scale are allowed: half of them reach the mean of the pads.
+        (lambda t, f: 0.93 * f, set()),
+        (lambda t, f: 0.5 * f, {"pads disagree"}),
+        (lambda t, f: 0.8 * f, {"pads disagree"}),
+        (lambda t, f: 1.25 * f, {"pads disagree"}),
+        # From the middle of the squeeze on.
+        (lambda t, f: f * (0.7 if t > 1.15 else 1.0), {"pads disagree"}),
+        # Friction holds what one finger has pushed: more, and as much from before the contact on.
+        (lambda t, f: f + 1.0 * (0.8 < t < RELEASE_S), set()),
+        (lambda t, f: f + 0.5 * (t > 1.4), {"left pad off its zero"}),
+        (lambda t, f: f - 0.5 * (t > 1.4), {"left pad off its zero"}),
+        (lambda t, f: f + 0.1 * (t > 1.4), set()),
+        (lambda t, f: late(t, 0.2), {"left pad feels more on opening"}),
+        (lambda t, f: late(t, 0.04), set()),
+        (lambda t, f: f + 4.0 * (abs(t - 1.4) < 0.02), {"left pad jumps"}),
+        # Twice in free air; once can be an object that is knocked away.
+        (lambda t, f: f + 4.0 * (min(abs(t - 0.3), abs(t - 0.7)) < 0.02), {"left pad jumps"}),
+        (lambda t, f: f + 4.0 * (abs(t - 0.3) < 0.02), set()),
+        (lambda t, f: -f, {"left pad below zero"}),
+        (lambda t, f: f + Random(t).gauss(0.0, 0.3), {"left pad noisy"}),
+    ],
+)
+def test_a_fault_of_one_pad_names_it(left, names):
+    assert told(left) >= names
+    assert names or not told(left)
+
+
+@every_case(
+    ("both", "names"),
+    [
+        # Late, at the end of its range, and of half the force on opening, as an object can lose it.
+        (lambda t, f: late(t, 0.2), {"left pad feels more on opening", "right pad feels more on opening"}),
+        (lambda t, f: min(f, 2.0), {"left pad stands still", "right pad stands still"}),
+        (lambda t, f: 0.5 * f if t > RELEASE_S else f, set()),
+    ],
+)
+def test_a_fault_of_both_pads_that_the_way_back_shows_is_told(both, names):
+    assert told(both, both) >= names
+    assert names or not told(both, both)
+
+
+def test_a_force_without_noise_that_stands_still_is_no_fault():
+    assert told(lambda t, f: min(f, 2.0), lambda t, f: min(f, 2.0), noise_n=0.0) == set()
+
+
+@every_case(("share", "name"), [(0.2, "left pad absent"), (0.02, None)])
+def test_a_force_that_is_no_number_now_and_then_is_told_and_does_not_end_the_grasp(share, name):
+    touch, chance, faults = Touch(CONTACT_N), Random(0).random, []
+    for k in range(1000):
+        left_n = nan if chance() < share else 3.0
+        frame = Frame(k / 1000, 0.001, 0.05, 0.0, 0.0, left_n, 3.0, 0.0, 0.0, 0)
+        faults.append(touch.see(frame, HOLD, Command(EFFORT, 8.0, 8.0, 1.0)))
+    seen = {(fault.name, fault.ends) for fault in faults if fault is not None}
+    assert seen == ({(name, False)} if name else set())
