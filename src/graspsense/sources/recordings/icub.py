@@ -15,7 +15,6 @@ ring and little finger together (https://icub-tech-iit.github.io/documentation, 
 
 from __future__ import annotations
 
-from math import nan
 from pathlib import Path
 from typing import Final
 
@@ -154,11 +153,19 @@ def relative_readings(grasp: IcubGrasp) -> tuple[Reading, ...]:
     gap_m = START_GAP_M - GAP_M_PER_DEG * (flexion_deg - flexion_deg[0])
     velocity = np.diff(gap_m, prepend=gap_m[0])
     forces, signals, sides = pressure.tolist(), signal_type(HAND), opposed_forces(HAND)
-    motions = zip(gap_m.tolist(), velocity.tolist(), forces, strict=True)
-    return tuple(
-        Reading(Frame(float(k), 1.0, gap, speed, nan, *sides(force)), NO_PADS, signals(*force))
-        for k, (gap, speed, force) in enumerate(motions)
-    )
+    readings = []
+    for k, (gap, speed, force) in enumerate(zip(gap_m.tolist(), velocity.tolist(), forces, strict=True)):
+        left, right = sides(force)
+        frame = Frame(
+            t_s=float(k),
+            dt_s=1.0,
+            gap_m=gap,
+            velocity_m_s=speed,
+            force_left_n=left,
+            force_right_n=right,
+        )
+        readings.append(Reading(frame, NO_PADS, signals(*force)))
+    return tuple(readings)
 
 
 def _locate(name: str) -> Path:

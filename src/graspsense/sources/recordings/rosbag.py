@@ -258,18 +258,23 @@ def _readings(
         change = np.diff(gap, prepend=gap[:1]) / steps
     velocity = np.where(np.isnan(velocity) & (steps > 0.0), change, velocity)
     last, old = times.latest(ns)
-    measured = zip(
-        ((ns - ns[0]) * 1e-9).tolist(),
-        steps.tolist(),
-        *(v.tolist() for v in (gap, velocity, effort)),
-        strict=True,
-    )
     readings = []
-    for motion, k, is_old in zip(measured, last.tolist(), old.tolist(), strict=True):
+    for i, (k, is_old) in enumerate(zip(last.tolist(), old.tolist(), strict=True)):
         pads = images[k]
         left, edge_left = (_NAN, _NAN) if is_old else _forces(pads.left, zero[0])
         right, edge_right = (_NAN, _NAN) if is_old else _forces(pads.right, zero[1])
-        readings.append(Reading(Frame._make((*motion, left, right, edge_left, edge_right, 0)), pads))
+        frame = Frame(
+            t_s=(int(ns[i]) - int(ns[0])) * 1e-9,
+            dt_s=steps[i].item(),
+            gap_m=gap[i].item(),
+            velocity_m_s=velocity[i].item(),
+            effort_n=effort[i].item(),
+            force_left_n=left,
+            force_right_n=right,
+            edge_left_n=edge_left,
+            edge_right_n=edge_right,
+        )
+        readings.append(Reading(frame, pads))
     return tuple(readings)
 
 
