@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from attrs import evolve, field, frozen
-from numpy.typing import NDArray
 
 from graspsense.core.learn.certainty import (
     Certainty,
@@ -24,8 +23,6 @@ from graspsense.core.learn.conformal import (
     sets_of,
     units_needed,
 )
-from graspsense.core.learn.labelled import Labelled
-from graspsense.core.learn.model import Model
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import UNKNOWN
 from graspsense.evaluation.crossval import (
@@ -36,8 +33,15 @@ from graspsense.evaluation.crossval import (
     columns_of,
     cross_validate,
 )
-from graspsense.evaluation.folds import Folds, held_out
+from graspsense.evaluation.folds import held_out
 from graspsense.evaluation.intervals import RecognitionRate
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from graspsense.core.learn.labelled import Labelled
+    from graspsense.core.learn.model import Model
+    from graspsense.evaluation.folds import Folds
 
 FOLDS: Final = 10
 BINS: Final = 10

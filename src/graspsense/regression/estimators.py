@@ -7,14 +7,16 @@ A missing feature is the median of the training trials. Features and target are 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from graspsense.core.learn.one_thread import one_thread
 from graspsense.core.values.errors import ConfigError, counted, suggestion
 from graspsense.core.values.features import LARGEST_VALUE
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 DEFAULT_ESTIMATOR: Final = "forest"
 MOST_SCALED: Final = 1e30

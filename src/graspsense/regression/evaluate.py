@@ -6,18 +6,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from attrs import frozen
-from numpy.typing import NDArray
 
 from graspsense.core.components.caller import option
 from graspsense.core.learn.conformal import COVERAGE
-from graspsense.core.learn.labelled import ControlFeatures, Labelled
 from graspsense.core.values.errors import ConfigError, counted
 from graspsense.evaluation.controls import PERMUTATIONS
 from graspsense.evaluation.evaluator import Progress
-from graspsense.evaluation.folds import INSTANCE_HELD_OUT, Folds, in_order, instance_held_out, stratified
+from graspsense.evaluation.folds import INSTANCE_HELD_OUT, in_order, instance_held_out, stratified
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.evaluation.intervals import MIN_INSTANCES, rate_of
 from graspsense.regression.estimators import FittedRegression, check_estimator
@@ -30,6 +29,12 @@ from graspsense.regression.results import (
     difference_of_errors,
     error_of,
 )
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from graspsense.core.learn.labelled import ControlFeatures, Labelled
+    from graspsense.evaluation.folds import Folds
 
 
 def evaluate_regression(

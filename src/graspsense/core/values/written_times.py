@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from datetime import datetime, timedelta
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-import numpy as np
-from numpy.typing import NDArray
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 _TIME: Final = re.compile(
     r"(?P<day>[0-9]{4}-?[0-9]{2}-?[0-9]{2}[T ])?(?P<time>[0-9]{2}:?[0-9]{2}:?[0-9]{2}(?:[.,][0-9]{1,9})?)"
@@ -24,6 +25,8 @@ def seconds_since_first(cells: Sequence[str]) -> NDArray[np.float64] | None:
     Times with a zone are compared as instants; those without one are all taken to be of the same zone. A time of the
     day that is earlier by more than half a day than the one before is of the next day.
     """
+    import numpy as np
+
     times, dated = [], False
     for cell in cells:
         match = _TIME.fullmatch(cell)
