@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache, partial
+from itertools import product
 from math import ceil, inf, nan
 from pathlib import Path
 from typing import Any, Final, Unpack, final
@@ -144,8 +145,17 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
 
     def variants(self) -> Sequence[SimulationVariant]:
         """Return each integrator of MuJoCo with steps from 0.1 ms to 1 ms; the reference has 0.05 ms."""
-        curve = [(integrator, step_s) for integrator in INTEGRATORS for step_s in STEPS_S]
-        return [_step_variant(*scheme) for scheme in (REFERENCE, *curve)]
+        exact = {"force_noise_n": 0.0, "gap_step_m": 0.0}
+        return [
+            SimulationVariant(
+                method=integrator,
+                fidelity="fixed step",
+                step=f"{step_s * 1e3:g} ms",
+                settings={"integrator": integrator, "timestep_s": step_s, **exact},
+                role="reference" if (integrator, step_s) == REFERENCE else "curve",
+            )
+            for integrator, step_s in (REFERENCE, *product(INTEGRATORS, STEPS_S))
+        ]
 
     def run_many(
         self,
@@ -223,15 +233,13 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             if isinstance(self._cells, SpringCells)
             else ForceGauge(model, data, fingers, things, travel.axis)
         )
-        self._sensors = [
-            int(model.sensor_adr[identifier(model, "sensor", channel.sensor)])
-            for channel in self._gripper.channels.values()
-        ]
-        self._edges = [
-            int(model.sensor_adr[identifier(model, "sensor", finger.edge)])
-            for finger in fingers
-            if finger.edge
-        ]
+        self._sensors, self._edges = (
+            [int(model.sensor_adr[identifier(model, "sensor", name)]) for name in names]
+            for names in (
+                [channel.sensor for channel in self._gripper.channels.values()],
+                [finger.edge for finger in fingers if finger.edge],
+            )
+        )
         self._signals: Any = signal_type(self._channels_of(self._gripper))
         self._shell = [identifier(model, "equality", PREFIX + name) for name in self._thing.shell]
         self._drive = ActuatorDrive(model, data, self._gripper, travel)
@@ -439,19 +447,3 @@ def kept_steps(steps: int, most: float) -> list[int]:
     """Return the steps of a tick, in parts under the same controls: as many as `most` in each, and at least one."""
     each = max(int(most + 1e-9), 1)
     return [min(each, steps - begun) for begun in range(0, steps, each)]
-
-
-def _step_variant(integrator: str, timestep_s: float) -> SimulationVariant:
-    is_reference = (integrator, timestep_s) == REFERENCE
-    return SimulationVariant(
-        method=integrator,
-        fidelity="fixed step",
-        step=f"{timestep_s * 1e3:g} ms",
-        settings={
-            "integrator": integrator,
-            "timestep_s": timestep_s,
-            "force_noise_n": 0.0,
-            "gap_step_m": 0.0,
-        },
-        role="reference" if is_reference else "curve",
-    )

@@ -22,9 +22,10 @@ from importlib import import_module
 from importlib.resources import files
 from math import inf
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, Final, Literal, TypeVar
 
 from attrs import field, frozen
+from attrs.validators import ge, gt, lt, min_len
 
 from graspsense.plugin_api import ConfigError
 from graspsense.simulator_api import TomlError, ValidationFailed, first_bytes, structured, toml_values
@@ -34,6 +35,7 @@ SHIPPED: Final = ("parallel", "soft_pads")
 LARGEST_BYTES: Final = 512 * 1024
 """Limit on the size of a gripper file."""
 
+FROM_ZERO: Final = (ge(0.0), lt(inf))
 DescribedT = TypeVar("DescribedT")
 
 
@@ -50,11 +52,7 @@ class Point:
     """A point on a body, in the frame of the body (m)."""
 
     body: str
-    position_m: tuple[float, ...] = field(alias="at")
-
-    def __attrs_post_init__(self) -> None:
-        if len(self.position_m) != 3:
-            raise ValueError(f"at has {len(self.position_m)} numbers: a point has three")
+    position_m: tuple[float, float, float] = field(alias="at")
 
 
 @frozen(kw_only=True)
@@ -65,10 +63,10 @@ class Gap:
     geoms is the distance of their surfaces; that of a joint is `offset_m` plus `scale` times its position.
     """
 
-    sites: tuple[str, ...] = ()
+    sites: tuple[str, str] | None = None
     left: tuple[Point, ...] = ()
     right: tuple[Point, ...] = ()
-    geoms: tuple[str, ...] = ()
+    geoms: tuple[str, str] | None = None
     joint: str = ""
     scale: float = 1.0
     offset_m: float = 0.0
@@ -78,9 +76,6 @@ class Gap:
             raise ValueError("the points of the gap are given for both fingers: left and right")
         if bool(self.sites) + bool(self.left) + bool(self.geoms) + bool(self.joint) != 1:
             raise ValueError("give the gap by one of sites, geoms and joint, or by left and right points")
-        for name, pair in (("sites", self.sites), ("geoms", self.geoms)):
-            if pair and len(pair) != 2:
-                raise ValueError(f"{name} has {len(pair)} names: give two, one of each finger")
 
 
 @frozen(kw_only=True)
@@ -131,12 +126,8 @@ class PalmSensor:
     """
 
     sensor: str
-    floor_m_s2: float = 0.0
-    gear_1_s: float = 0.0
-
-    def __attrs_post_init__(self) -> None:
-        if not (0.0 <= self.floor_m_s2 < inf and 0.0 <= self.gear_1_s < inf):
-            raise ValueError("floor_m_s2 and gear_1_s are at least 0")
+    floor_m_s2: float = field(default=0.0, validator=FROM_ZERO)
+    gear_1_s: float = field(default=0.0, validator=FROM_ZERO)
 
 
 @frozen(kw_only=True)
@@ -144,42 +135,32 @@ class GripperFile:
     """A gripper: its model, the actuators that close it, and its measurements.
 
     `open` and `closed` are the controls of each actuator with the fingers open and closed. `closing` is the direction
-    in which the left finger moves (a vector of the world); empty: from the left finger to the right one. `angle` is the
-    unit of angles in a model that leaves it to those that include it. With `only_fingers`, only their geoms
-    touch: the hull of a mesh may fill the space between them. `impratio` is MuJoCo's option of that name, with elliptic
+    in which the left finger moves (a vector of the world), by default from the left finger to the right one. `angle` is
+    the unit of angles in a model that leaves it to those that include it. With `only_fingers`, only their geoms touch:
+    the hull of a mesh may fill the space between them. `impratio` is MuJoCo's option of that name, with elliptic
     friction cones; 0: as the model says. At 1, MuJoCo's default, things creep out of fingers that are not parallel.
     """
 
     model: str
-    actuators: tuple[str, ...]
+    actuators: tuple[str, ...] = field(validator=min_len(1))
     open: tuple[float, ...]
     closed: tuple[float, ...]
     gap: Gap
     left: Finger
     right: Finger
-    closing: tuple[float, ...] = ()
-    angle: str = ""
+    closing: tuple[float, float, float] | None = None
+    angle: Literal["", "radian", "degree"] = ""
     only_fingers: bool = False
-    impratio: float = 0.0
-    effort_limit_n: float = field(default=0.0)
-    speed_limit_m_s: float = field(default=0.1)
+    impratio: float = field(default=0.0, validator=FROM_ZERO)
+    effort_limit_n: float = field(default=0.0, validator=ge(0.0))
+    speed_limit_m_s: float = field(default=0.1, validator=gt(0.0))
     channels: Mapping[str, ModelSensor] = field(factory=dict)
     accelerometer: PalmSensor | None = None
 
     def __attrs_post_init__(self) -> None:
-        if not self.actuators:
-            raise ValueError("actuators is empty: name the actuators that close the fingers")
         for name, values in (("open", self.open), ("closed", self.closed)):
             if len(values) != len(self.actuators):
                 raise ValueError(f"{name} has {len(values)} values for {len(self.actuators)} actuators")
-        if self.closing and len(self.closing) != 3:
-            raise ValueError(f"closing has {len(self.closing)} numbers: a direction has three")
-        if not 0.0 <= self.impratio < inf:
-            raise ValueError(f"impratio is {self.impratio:g}: it is above 0, or 0 for that of the model")
-        if self.angle not in ("", "radian", "degree"):
-            raise ValueError(f"angle is {self.angle!r}: give radian or degree, or leave it out")
-        if self.effort_limit_n < 0.0 or self.speed_limit_m_s <= 0.0:
-            raise ValueError("effort_limit_n is at least 0 (0: from the model), speed_limit_m_s above 0")
         shared = {*self.left.geoms, *self.left.bodies} & {*self.right.geoms, *self.right.bodies}
         if shared:
             raise ValueError(

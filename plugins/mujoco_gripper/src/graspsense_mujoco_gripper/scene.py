@@ -26,13 +26,13 @@ from typing import Final
 import mujoco
 import numpy as np
 from attrs import evolve, field, frozen
-from attrs.validators import ge, gt, le
+from attrs.validators import ge, gt, le, optional
 from numpy.typing import NDArray
 
 from graspsense.plugin_api import ConfigError
-from graspsense_mujoco_gripper.bump import Bump
+from graspsense_mujoco_gripper.bump import ABOVE_ZERO, Bump
 from graspsense_mujoco_gripper.catalogue import Thing, Walls, thing_named
-from graspsense_mujoco_gripper.gripper_file import described
+from graspsense_mujoco_gripper.gripper_file import FROM_ZERO, described
 
 Floats = NDArray[np.float64]
 SCENES: Final = Path(str(files("graspsense_mujoco_gripper") / "scenes"))
@@ -106,9 +106,9 @@ class Scene:
     cord: Cord | None = None
     shake: Shake | None = None
     bump: Bump | None = None
-    mass_kg: float | None = field(default=None)
-    friction: float | None = field(default=None)
-    roughness_m: float = field(default=0.0)
+    mass_kg: float | None = field(default=None, validator=optional(ABOVE_ZERO))
+    friction: float | None = field(default=None, validator=optional(FROM_ZERO))
+    roughness_m: float = field(default=0.0, validator=[ge(0.0), le(1e-3)])
 
     def __attrs_post_init__(self) -> None:
         for name in ("arm", "table_height", "fill"):
@@ -118,12 +118,6 @@ class Scene:
             raise ValueError("table_height moves a table: add table = true")
         if any(mass_kg < 0.0 for _, mass_kg in self.fill):
             raise ValueError("fill is a mass (kg), at least 0")
-        if not 0.0 <= self.roughness_m <= 1e-3:
-            raise ValueError(f"roughness_m is {self.roughness_m}: it is from 0 to 0.001")
-        if self.mass_kg is not None and not 0.0 < self.mass_kg < float("inf"):
-            raise ValueError(f"mass_kg is {self.mass_kg}: it is above 0")
-        if self.friction is not None and not 0.0 <= self.friction < float("inf"):
-            raise ValueError(f"friction is {self.friction}: it is at least 0")
 
     @property
     def needs_friction(self) -> bool:
