@@ -296,6 +296,14 @@ def test_what_changes_with_the_lines_or_stands_alone_is_told(column, tmp_path):
     assert [note for note in notes if "reveals" in note or "unlike all other values" in note]
 
 
+def test_what_drifts_is_told_in_the_order_of_recording(tmp_path):
+    order = np.random.default_rng(4).permutation(N)
+    lines = [f"{LABELS[i]},{DRIFTS['a zero'][i]:.4f},{i},{i * 7919 % 101 / 17:.4f}" for i in order]
+    (tmp_path / "t.csv").write_text("\n".join(["object,kind,nr,s", *lines]) + "\n")
+    notes = read_labelled(tmp_path / "t.csv", "object", order="nr").notes
+    assert any("kind" in note and "follow the order of recording" in note for note in notes)
+
+
 @given(
     seed=st.integers(0, 10_000), objects=st.sampled_from([1, 3, 6]), spread=st.sampled_from([0.05, 0.3, 1.0])
 )
