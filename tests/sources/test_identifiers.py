@@ -40,7 +40,6 @@ COUNTERS = {
     "a counter of four bits": [(i + 5) % 16 for i in range(N)],
     "a counter of a byte with lost numbers": np.cumsum(np.random.default_rng(1).integers(1, 9, N)) % 256,
     "minutes of the hour": [(2 * i + 20) % 60 for i in range(N)],
-    "the number of the repetition": [i % 6 for i in range(N)],
 }
 ORDERS = {"as it is": list, "falling": lambda values: list(values)[::-1], "a swap": swapped, "a tie": tied}
 
