@@ -40,7 +40,6 @@ COUNTERS = {
     "a counter of four bits": [(i + 5) % 16 for i in range(N)],
     "a counter of a byte with lost numbers": np.cumsum(np.random.default_rng(1).integers(1, 9, N)) % 256,
     "minutes of the hour": [(2 * i + 20) % 60 for i in range(N)],
-    "the number of the repetition": [i % 6 for i in range(N)],
 }
 ORDERS = {"as it is": list, "falling": lambda values: list(values)[::-1], "a swap": swapped, "a tie": tied}
 
@@ -294,6 +293,14 @@ def test_what_changes_with_the_lines_or_stands_alone_is_told(column, tmp_path):
     heading = "kind" if column in ("months", "a version") else "kind [V]"
     notes = notes_on(tmp_path / "t.csv", heading, DRIFTS[column], order=range(N))
     assert [note for note in notes if "reveals" in note or "unlike all other values" in note]
+
+
+def test_what_drifts_is_told_in_the_order_of_recording(tmp_path):
+    order = np.random.default_rng(4).permutation(N)
+    lines = [f"{LABELS[i]},{DRIFTS['a zero'][i]:.4f},{i},{i * 7919 % 101 / 17:.4f}" for i in order]
+    (tmp_path / "t.csv").write_text("\n".join(["object,kind,nr,s", *lines]) + "\n")
+    notes = read_labelled(tmp_path / "t.csv", "object", order="nr").notes
+    assert any("kind" in note and "follow the order of recording" in note for note in notes)
 
 
 @given(

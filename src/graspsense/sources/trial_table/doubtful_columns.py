@@ -166,7 +166,7 @@ def _of_time_and_digits(
             "If it is a time or a counter it reveals the labels: ",
         ),
         (
-            "its values follow the lines within each label, as a zero that drifts, a battery or a clock does",
+            "its values follow the order of recording within each label, as a drifting zero, a battery or a clock does",
             [
                 name
                 for name, values in numbers.items()

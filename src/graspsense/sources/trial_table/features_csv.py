@@ -92,8 +92,10 @@ def read_labelled(
     identified = partial(_identified, once, labels_once, ranks_once) if export is None else _measured
     table = _feature_table(columns, features, reserved, identified, notes)
     if export is None:
-        values = None if target is None else [target.values[i] for i in lines]
-        notes += doubts(once, labels_once, table.rows(np.array(lines)), values)
+        recorded = lines if ranks is None else sorted(lines, key=ranks.__getitem__)
+        values = None if target is None else [target.values[i] for i in recorded]
+        in_order = [labels[i] for i in recorded]
+        notes += doubts(columns.rows(recorded), in_order, table.rows(np.array(recorded)), values)
         others = [name for name in columns.names if name not in {*reserved, *table.names}]
         notes += not_held_out(columns, others, instances)
     return Labelled(

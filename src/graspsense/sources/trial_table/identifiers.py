@@ -54,7 +54,8 @@ _DRIFTS_NEAR: Final = 0.35
 """The same of a drift with noise, and that within a few lines."""
 _TIES: Final = 0.2
 _COUNTING: Final = 15
-"""Number of steps from which on so many in one direction show a counter: of random values, one in ten thousand does."""
+"""Number of values from which on their order shows a counter: of random ones, one column in ten thousand does. Fewer
+number the repetitions with an object."""
 _BY_CHANCE: Final = 0.005
 _ORDERS: Final = 10_000
 """Number of orders of the lines within the labels from which on a rank correlation is no chance."""
@@ -227,7 +228,9 @@ def _follows(column: NDArray[np.float64], lines: NDArray[np.int64], labels: Sequ
 def _begins_anew(column: NDArray[np.float64], lines: NDArray[np.int64]) -> bool:
     """Return whether nearly all values are larger, or smaller, than the one before, as those of a counter of a byte."""
     steps = np.diff(column[np.argsort(lines)])
-    return len(steps) >= _COUNTING and max((steps > 0.0).mean(), (steps < 0.0).mean()) >= 1.0 - _TIES
+    return (
+        len(np.unique(column)) >= _COUNTING and max((steps > 0.0).mean(), (steps < 0.0).mean()) >= 1.0 - _TIES
+    )
 
 
 def _follows_in_labels(column: NDArray[np.float64], lines: NDArray[np.int64], labels: Sequence[str]) -> bool:
