@@ -34,10 +34,7 @@ def intervals(counts: np.ndarray) -> dict[str, Interval]:
     n, correct = TRIALS * k, int(counts.sum())
     right = [j < count for count in counts for j in range(TRIALS)]
     names = [str(i) for i in range(k) for _ in range(TRIALS)]
-    return {
-        "wilson": wilson(correct, n),
-        "graspsense": clustered(right, names),
-    }
+    return {"wilson": wilson(correct, n), "graspsense": clustered(right, names)}
 
 
 def coverage(k: int, rate: float, correlation: float, repeats: int, seed: int = 0) -> dict[str, float]:
