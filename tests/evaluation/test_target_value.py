@@ -22,6 +22,7 @@ from graspsense.regression.estimators import ESTIMATORS
 from graspsense.regression.evaluate import evaluate_regression
 from graspsense.regression.intervals import intervals_of
 from graspsense.regression.model import load_regression, train_regression, write_regression
+from graspsense.regression.results import difference_of_errors, error_of
 from graspsense.store.store import Store
 
 
@@ -73,10 +74,11 @@ def test_the_error_is_that_of_the_predictions_and_its_interval_that_of_the_insta
     assert evaluation.headline.mean_absolute == pytest.approx(np.abs(errors).mean())
     assert evaluation.headline.root_mean_square == pytest.approx(math.sqrt((errors**2).mean()))
     # With as many trials in each instance, this is Student's interval of the means of the instances, widened for five
-    # folds that share their training trials.
+    # folds that share their training trials, on the logarithm.
     means = np.abs(errors).reshape(20, 4).mean(axis=1)
     half = 2.093024054408263 * means.std(ddof=1) / math.sqrt(20) * math.sqrt(1.0 + 5.0 / 4.0)
-    assert evaluation.headline.interval == pytest.approx((means.mean() - half, means.mean() + half))
+    factor = math.exp(half / means.mean())
+    assert evaluation.headline.interval == pytest.approx((means.mean() / factor, means.mean() * factor))
 
 
 @pytest.mark.slow
@@ -333,3 +335,19 @@ def test_a_number_of_a_trial_is_name_and_number(text):
     with pytest.raises(ConfigError, match=r"NAME \[UNIT\]=NUMBER"):
         value_label(text)
     assert value_label("fill [ml] = 250") == ("fill [ml]", "250")
+
+
+def test_the_interval_of_an_error_is_one_of_its_logarithm_and_counts_the_folds():
+    errors = [1.0, -2.0, 3.0, 1.0, -1.0, 4.0, 2.0, 2.0]
+    alone, folded = error_of(errors, None), error_of(errors, None, folds=10)
+    for error in (alone, folded):
+        low, high = error.interval
+        assert low * high == pytest.approx(error.mean_absolute**2)
+    # The variance of a mean of ten folds is multiplied by 1 + 10 / 9.
+    wider = math.log(folded.interval[1] / 2.0) / math.log(alone.interval[1] / 2.0)
+    assert wider == pytest.approx(math.sqrt(1.0 + 10.0 / 9.0))
+    shown = difference_of_errors([5.0, 6.0, 5.5, 5.0, 6.5, 6.0], [1.0, 4.0, 1.0, 2.0, 4.0, 1.0], None)
+    folded = difference_of_errors([5.0, 6.0, 5.5, 5.0, 6.5, 6.0], [1.0, 4.0, 1.0, 2.0, 4.0, 1.0], None, 10)
+    assert folded.interval[1] - folded.value == pytest.approx(
+        math.sqrt(1.0 + 10.0 / 9.0) * (shown.interval[1] - shown.value)
+    )

@@ -44,14 +44,22 @@ class RegressionError:
 
 
 def error_of(errors: Sequence[float], instances: Sequence[str] | None, folds: int = 0) -> RegressionError:
-    """Return the error of these predictions; `errors` are predicted minus true values, `folds` is of `rate_of`."""
+    """Return the error of these predictions; `errors` are predicted minus true values, `folds` is of `rate_of`.
+
+    The interval is as wide on the logarithm of the error as Student's: it does not reach zero, and reaches farther
+    upwards, where the few large errors are that these trials may not have.
+    """
     absolute = [abs(error) for error in errors]
+    mean = math.fsum(absolute) / len(absolute)
     interval, reason = mean_interval(absolute, instances, folds)
+    if interval is not None and mean > 0.0:
+        factor = math.exp((interval[1] - mean) / mean)
+        interval = (mean / factor, mean * factor)
     return RegressionError(
         n=len(absolute),
-        mean_absolute=math.fsum(absolute) / len(absolute),
+        mean_absolute=mean,
         root_mean_square=math.sqrt(math.fsum(error * error for error in errors) / len(errors)),
-        interval=None if interval is None else (max(interval[0], 0.0), interval[1]),
+        interval=interval,
         no_interval=reason,
         instances=None if instances is None else len(set(instances)),
     )
