@@ -61,8 +61,9 @@ class Protection:
         self._told: dict[str, Fault] = {}
         self.ending: Fault | None = None
         self.acted = 0
-        self._approach: Frame | None = None
-        """The last frame of the approach."""
+        self._phase = -1
+        self.side_impact = ""
+        """What the edges felt in the reading that ended the approach, in words."""
         rates = {channel.name: channel.rate_hz for channel in info.channels}
         self.ceiling_n = effort_ceiling_n(info, controller, run)
         self._effort_limit_n = info.effort_limit_n
@@ -117,10 +118,11 @@ class Protection:
         if self._jump.jumps <= FEW_JUMPS:
             self._motor.shift(self._jump.step_m)
         self._see(self._motor.see(frame, phase), phase)
-        if phase == APPROACH:
-            self._approach = frame
-            if self._touch.free():
-                self._see(self._rush.see(frame))
+        if phase == APPROACH and self._touch.free():
+            self._see(self._rush.see(frame))
+        if phase != APPROACH and self._phase == APPROACH:
+            self.side_impact = self._drift.side_impact(reading)
+        self._phase = phase
         if not self._declared and frame.force_left_n == frame.force_left_n:
             self._has_pads = True
         closing = phase in (APPROACH, SQUEEZE, HOLD)
@@ -142,10 +144,6 @@ class Protection:
         self._motor.apply(frame, allowed)
         self._jump.apply(frame, allowed)
         return allowed
-
-    def side_impact(self) -> str:
-        """Return in words what the edges felt in the last frame of the approach."""
-        return "" if self._approach is None else self._drift.side_impact(self._approach)
 
     def before_closing(self, frame: Frame) -> Fault | None:
         """Return the fault for which the fingers must not close, if there is one."""
