@@ -1,6 +1,6 @@
 """Faults of pads that features would carry on: scale, zero, noise, a force that is late, and one that stands still."""
 
-from math import nan
+from math import nan, pi, sin
 from random import Random
 
 from cases import every_case
@@ -146,6 +146,20 @@ def test_a_force_that_is_no_number_now_and_then_is_told_and_does_not_end_the_gra
         faults.append(touch.see(frame, HOLD, Command(EFFORT, 8.0, 8.0, 1.0)))
     seen = {(fault.name, fault.ends) for fault in faults if fault is not None}
     assert seen == ({(name, False)} if name else set())
+
+
+def test_pads_that_differ_while_an_arm_moves_what_they_hold_are_not_accused():
+    """Half a kilogram that is shaken by 10 m/s2, 3 times a second, from a second after the rest on."""
+    curves, balance, gauss = PadCurves(CONTACT_N, PADS_HZ), PadBalance(CONTACT_N), Random(0).gauss
+    for k in range(round(PADS_HZ * 6.0)):
+        t_s = k / PADS_HZ
+        more_n = 5.0 * sin(2.0 * pi * 3.0 * t_s) if t_s > REST_S + 1.1 else 0.0
+        pressed_n = force_n(min(t_s, REST_S))
+        forces = (pressed_n + more_n + gauss(0.0, 0.03), pressed_n + gauss(0.0, 0.03))
+        frame = Frame(t_s, 1.0 / PADS_HZ, gap_m(min(t_s, REST_S)), 0.0, 0.0, *forces, 0.0, 0.0, 0)
+        phase = phase_of(min(t_s, REST_S))
+        assert curves.see(Reading(frame, NO_PADS), phase) == []
+        assert balance.see(frame, phase) is None
 
 
 class FaultyEdge(Scripted):

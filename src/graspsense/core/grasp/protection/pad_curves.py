@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from graspsense.core.grasp.protection.cells import DOUBT, FEWEST_IMAGES, MOST_NOISY, frozen
+from graspsense.core.grasp.protection.pad_forces import HELD_S
 from graspsense.core.values.faults import Fault
 from graspsense.core.values.signals import APPROACH, HOLD, SQUEEZE, Phase, Reading
 
@@ -210,6 +211,8 @@ class PadCurves:
         self._pushed_n = self._pressed_n = 0.0
         """What the left pad felt more than the right one before both touched, and the greatest force of both (N)."""
         self._apart_samples = 0
+        self._unheld_t_s = nan
+        """Time of the last sample before the hold."""
 
     def see(self, reading: Reading, phase: int) -> list[Fault]:
         """Take the reading of a tick; return the faults that it shows."""
@@ -224,7 +227,13 @@ class PadCurves:
         earlier_gap_m = gaps[0][1]
         self._least_gap_m = min(self._least_gap_m, earlier_gap_m)
         forces = (frame.force_left_n, frame.force_right_n)
-        faults = [self._apart(forces, phase), self._spikes.see(forces, phase) if closing else None]
+        if phase != HOLD:
+            self._unheld_t_s = frame.t_s
+        moved = frame.t_s - self._unheld_t_s > HELD_S
+        faults = [
+            None if moved else self._apart(forces, phase),
+            self._spikes.see(forces, phase) if closing and not moved else None,
+        ]
         for pad, force_n in zip(self._pads, forces, strict=True):
             if force_n != force_n or earlier_gap_m != earlier_gap_m:
                 continue

@@ -11,6 +11,8 @@ from graspsense.core.values.signals import Frame, Phase
 
 MEAN_S: Final = 0.1
 """Time over which the forces are averaged, and after which they are compared."""
+HELD_S: Final = 1.0
+"""Time of the hold after which the pads are not compared: the mass of an object that an arm moves presses on one."""
 ALLOWED_N: Final = 2.0
 """Difference that friction can hold: 1.5 N for half a kilogram on a table."""
 ALLOWED_SHARE: Final = 1.0 / 3.0
@@ -64,7 +66,7 @@ class PadBalance:
         grown_n = difference_n - (self._pushed_n if strong == "left" else -self._pushed_n)
         far = difference_n > max(ALLOWED_N, ALLOWED_SHARE * forces[strong])
         scaled = min(difference_n, grown_n) > max(self._scaled_n, SCALED_SHARE * forces[strong])
-        if self._seen_s < MEAN_S or not (far or scaled):
+        if not MEAN_S <= self._seen_s <= HELD_S or not (far or scaled):
             return None
         return Fault(
             "pads disagree",
