@@ -93,9 +93,9 @@ def bottle(t):
     return force, force
 
 
-def settings_with(create, *options):
-    """Return the settings of the pipeline `default` whose gripper this function creates; there is no classifier."""
-    settings = resolve("default", plugins=installed(), options=["classifier.type=none", *options])
+def settings_with(create, *options, classifier="none"):
+    """Return the settings of the pipeline `default` whose gripper this function creates, with this classifier."""
+    settings = resolve("default", plugins=installed(), options=[f"classifier.type={classifier}", *options])
 
     class Choice(type(settings.gripper)):
         def create(self):

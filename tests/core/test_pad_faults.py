@@ -1,14 +1,17 @@
 """Faults of pads that features would carry on: scale, zero, noise, a force that is late, and one that stands still."""
 
-from math import nan
+from math import nan, pi, sin
 from random import Random
 
 from cases import every_case
+from grippers import Scripted, bottle, squeezing
 
+from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.protection.drift import Drift
 from graspsense.core.grasp.protection.pad_curves import PadCurves
 from graspsense.core.grasp.protection.pad_forces import PadBalance
 from graspsense.core.grasp.protection.touch import Touch
+from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.values.signals import (
     APPROACH,
     EFFORT,
@@ -17,9 +20,11 @@ from graspsense.core.values.signals import (
     SQUEEZE,
     Command,
     Frame,
+    Outcome,
     Phase,
     Reading,
 )
+from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
 
 CONTACT_N = 0.625
 PADS_HZ = 25.0
@@ -99,6 +104,8 @@ def late(t_s, late_s):
         (lambda t, f: f + 0.1 * (t > 1.4), set()),
         (lambda t, f: late(t, 0.2), {"left pad feels more on opening"}),
         (lambda t, f: late(t, 0.04), set()),
+        # Late in the squeeze alone: the other pad shows it.
+        (lambda t, f: late(t, 0.2) if t < REST_S else f, {"pads disagree"}),
         (lambda t, f: f + 4.0 * (abs(t - 1.4) < 0.02), {"left pad jumps"}),
         # Twice in free air; once can be an object that is knocked away.
         (lambda t, f: f + 4.0 * (min(abs(t - 0.3), abs(t - 0.7)) < 0.02), {"left pad jumps"}),
@@ -139,3 +146,32 @@ def test_a_force_that_is_no_number_now_and_then_is_told_and_does_not_end_the_gra
         faults.append(touch.see(frame, HOLD, Command(EFFORT, 8.0, 8.0, 1.0)))
     seen = {(fault.name, fault.ends) for fault in faults if fault is not None}
     assert seen == ({(name, False)} if name else set())
+
+
+def test_pads_that_differ_while_an_arm_moves_what_they_hold_are_not_accused():
+    """Half a kilogram that is shaken by 10 m/s2, 3 times a second, from a second after the rest on."""
+    curves, balance, gauss = PadCurves(CONTACT_N, PADS_HZ), PadBalance(CONTACT_N), Random(0).gauss
+    for k in range(round(PADS_HZ * 6.0)):
+        t_s = k / PADS_HZ
+        more_n = 5.0 * sin(2.0 * pi * 3.0 * t_s) if t_s > REST_S + 1.1 else 0.0
+        pressed_n = force_n(min(t_s, REST_S))
+        forces = (pressed_n + more_n + gauss(0.0, 0.03), pressed_n + gauss(0.0, 0.03))
+        frame = Frame(t_s, 1.0 / PADS_HZ, gap_m(min(t_s, REST_S)), 0.0, 0.0, *forces, 0.0, 0.0, 0)
+        phase = phase_of(min(t_s, REST_S))
+        assert curves.see(Reading(frame, NO_PADS), phase) == []
+        assert balance.see(frame, phase) is None
+
+
+class FaultyEdge(Scripted):
+    """A gripper whose left edge feels 0.4 N from half a second on."""
+
+    def read(self, timeout_s):
+        reading = super().read(timeout_s)
+        edge_n = 0.4 if reading.frame.t_s > 0.5 else 0.05
+        return reading._replace(frame=reading.frame._replace(edge_left_n=edge_n))
+
+
+def test_a_side_impact_says_which_edge_felt_how_much():
+    grasp = run_grasp(FaultyEdge(squeezing, bottle), HybridController(HybridConfig()), RunConfig())
+    assert grasp.outcome is Outcome.SIDE_IMPACT
+    assert "the left edge felt 0.40 N" in grasp.reason

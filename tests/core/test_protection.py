@@ -275,6 +275,20 @@ def test_fingers_that_rebound_from_what_they_met_in_the_approach_are_not_reverse
     assert any(fault is not None and fault.relaxes for fault in faults) == is_reversed
 
 
+@every_case(("answer_n", "told"), [(20.0, False), (18.5, False), (17.0, True), (23.0, True)])
+def test_a_motor_that_answers_a_tenth_less_or_more_in_the_hold_is_told_and_does_not_end_the_grasp(
+    answer_n, told
+):
+    motor, faults = Motor(reports_effort=True, rate_hz=1000.0), []
+    for k in range(300):
+        now = frame(0.001 * k, velocity=0.0, effort=answer_n)
+        faults.append(motor.see(now, HOLD))
+        motor.apply(now, Command(EFFORT, 20.0, inf, inf))
+    assert {(fault.name, fault.ends) for fault in faults if fault is not None} == (
+        {("motor off", False)} if told else set()
+    )
+
+
 @every_case(("slows", "is_reversed"), [(True, False), (False, True)])
 def test_fingers_that_were_fast_and_slow_down_under_an_opening_command_are_not_reversed(slows, is_reversed):
     """From 100 mm/s at 0.3 m/s2, as after an egg that broke; a reversed motor closes faster and faster."""
@@ -386,12 +400,17 @@ def test_a_fingertip_that_goes_blank_ends_the_grasp_with_the_second_image():
     assert fault.name == "right fingertip without signal"
 
 
-def test_a_force_that_stands_still_while_the_other_one_rises_is_stuck():
+@every_case(("speed_m_s", "name"), [(0.01, "left pad stuck"), (0.0, "pads disagree")])
+def test_a_force_that_stands_still_while_the_other_one_rises_is_stuck(speed_m_s, name):
+    """Where the fingers rest, it can also be the one that rises that is wrong."""
     stuck = StuckForce(pads_hz=24.0)
     faults = [stuck.see(frame(0.001 * k, left=2.0, right=2.0 + 0.01 * (k // 40))) for k in range(200)]
     assert faults == [None] * 200
-    faults = [stuck.see(frame(0.2 + 0.001 * k, left=2.0, right=2.0 + 0.01 * k)) for k in range(400)]
-    assert next(fault for fault in faults if fault is not None).name == "left pad stuck"
+    for k in range(400):
+        now = frame(0.2 + 0.001 * k, 0.05 - 0.001 * speed_m_s * k, left=2.0, right=2.0 + 0.01 * k)
+        faults.append(stuck.see(now))
+    fault = next(fault for fault in faults if fault is not None)
+    assert (fault.name, fault.ends) == (name, True)
 
 
 # ------------------------------------------------------------------------------------------------------------ drift

@@ -323,7 +323,7 @@ class _Grasp:
         if ending is None:
             ending = ended_by_itself(self.state.guard.stopped, self.state.law.outcome)
             if ending[0] is Outcome.SIDE_IMPACT and self.protection is not None:
-                ending = ending[0], self.protection.side_impact()
+                ending = ending[0], self.protection.side_impact
         failed = ending[0] in (Outcome.DEVICE_LOST, Outcome.ABORTED)
         if self.stop_reason and not failed:
             return Outcome.RECOGNISED, self.stop_reason

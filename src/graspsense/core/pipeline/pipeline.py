@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 
 from graspsense.core.components.caller import set_option
 from graspsense.core.components.registry import Component, Plugins, installed
@@ -211,7 +211,11 @@ def grasp_with(
     else:
         features, prediction = _recognised(settings, feature_set, model, grasp)
     if prediction is not None and faults_among(grasp.warnings):
-        prediction = prediction.without_certainty("a fault was seen in this grasp")
+        why = "a fault was seen in this grasp"
+        prediction = prediction.without_certainty(why)
+        checkpoints = tuple(
+            evolve(early, prediction=early.prediction.without_certainty(why)) for early in checkpoints
+        )
     trial = Trial(
         run=run,
         trace=grasp.trace,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from graspsense.core.grasp.protection.cells import watched
 from graspsense.core.values.faults import Fault
-from graspsense.core.values.signals import Frame, Reading
+from graspsense.core.values.signals import Reading
 
 SAMPLES: Final = 3
 """Samples of the force that are averaged."""
@@ -161,8 +161,10 @@ class Drift:
             faults.append(self._edges[side].fault(f"{side} edge", NOISY_EDGE * self._contact_n))
         return [fault for fault in faults if fault is not None]
 
-    def side_impact(self, frame: Frame) -> str:
-        """Return in words what an edge felt that ended the approach."""
+    def side_impact(self, reading: Reading) -> str:
+        """Return in words what the edges felt in the reading that ended the approach."""
+        self.see(reading)
+        frame = reading.frame
         edges = {"left": frame.edge_left_n, "right": frame.edge_right_n}
         side = max(edges, key=lambda name: edges[name])
         words = f"the {side} edge felt {edges[side]:.2f} N"

@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 
 from graspsense.core.grasp.protection.effort_ceiling import asked_effort_n
 from graspsense.core.values.faults import Fault
-from graspsense.core.values.signals import APPROACH, EFFORT, FORCE, POSITION, Command, Frame
+from graspsense.core.values.signals import APPROACH, EFFORT, FORCE, HOLD, POSITION, Command, Frame
 
 
 class RecentMean:
@@ -48,6 +48,10 @@ STRONG_S: Final = 0.3
 """Time for which a motor may answer somewhat more than its command before the grasp ends."""
 WEAK_S: Final = 0.5
 """Time for which a motor may answer less than its command, which crushes nothing, before the grasp ends."""
+OFF_SHARE: Final = 0.1
+OFF_N: Final = 0.5
+OFF_S: Final = 0.1
+"""By how much the mean answer in the hold may differ, and after which time: forces at rest are off by as much."""
 WRONG_WAY_M: Final = 0.003
 """Travel against the command from which on the motor turns the wrong way round."""
 REBOUND_M: Final = 0.012
@@ -109,7 +113,8 @@ class Motor:
         self._lasts_s = max(LASTS_S, PERIODS / rate_hz)
         self._commands: deque[Asked] = deque()
         self._strong_s = self._weak_s = self._reversed_s = 0.0
-        self._wrong_way_s = 0.0
+        self._wrong_way_s = self._held_s = 0.0
+        self._held_n, self._asked_n = RecentMean(MEAN_S), RecentMean(MEAN_S)
         self._phase = -1
         self._start_m = self._extreme_m = nan
         self._start_m_s = nan
@@ -140,7 +145,25 @@ class Motor:
         efforts = [asked.effort_n for asked in commands]
         least, most = min(efforts), max(efforts)
         # One command of another kind makes the sum no number.
-        return self._answer(frame, least, most) if sum(efforts) == sum(efforts) else None
+        if sum(efforts) != sum(efforts):
+            return None
+        return self._answer(frame, least, most) or (
+            self._off(frame, 0.5 * (least + most)) if phase == HOLD else None
+        )
+
+    def _off(self, frame: Frame, asked_n: float) -> Fault | None:
+        """The mean answer in the hold is not the commanded one, though by too little to be dangerous."""
+        self._held_n.add(frame.effort_n, frame.dt_s)
+        self._asked_n.add(asked_n, frame.dt_s)
+        self._held_s += frame.dt_s
+        answered_n, asked_n = self._held_n.value, self._asked_n.value
+        if self._held_s < OFF_S or not abs(answered_n - asked_n) > max(OFF_N, OFF_SHARE * abs(asked_n)):
+            return None
+        return Fault(
+            "motor off",
+            f"it answers {answered_n:.1f} N in the hold to a command of {asked_n:.1f} N, and {OFF_SHARE:.0%} are "
+            "allowed: forces at rest are off by as much; check its supply and its scale",
+        )
 
     def _answer(self, frame: Frame, least: float, most: float) -> Fault | None:
         answered_n = frame.effort_n

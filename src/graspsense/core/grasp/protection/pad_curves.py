@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from graspsense.core.grasp.protection.cells import DOUBT, FEWEST_IMAGES, MOST_NOISY, frozen
+from graspsense.core.grasp.protection.pad_forces import HELD_S
 from graspsense.core.values.faults import Fault
 from graspsense.core.values.signals import APPROACH, HOLD, SQUEEZE, Phase, Reading
 
@@ -21,9 +22,12 @@ LATE_PERIODS: Final = 1.25
 """How old the force of a sound pad can be: a period, and the time of the transmission."""
 SLACK_M: Final = 0.0005
 """By how much gaps may differ that count as the same: a step of a coarse encoder."""
-MORE_SHARE: Final = 0.25
-"""Share of the force by which a pad may feel more on opening, at least the contact force: that of a spring that gets
-softer as it is pressed."""
+MORE_CONTACTS: Final = 0.5
+MORE_SHARE: Final = 0.2
+"""By how much a pad may feel more on opening: a share of the contact force, and the share of the force by which a
+spring that gets softer as it is pressed is above a straight line."""
+HARDLY_SHARE: Final = 0.65
+"""Share of the fall of the force by which it may stay behind, where that is less."""
 FEWEST_MORE: Final = 2
 MORE_S: Final = 0.02
 """So many samples in a row, over so long a time, show that it does."""
@@ -39,6 +43,11 @@ SPIKE_CONTACTS: Final = 0.8
 SPIKE_SHARE: Final = 0.15
 """By how much a sample may differ from the mean of its neighbours, over what the other pad shows: a share of the
 contact force, or of the force."""
+FRICTION_N: Final = 1.5
+"""Difference that friction can hold: of half a kilogram on a table."""
+APART_SHARE: Final = 0.3
+FEWEST_APART: Final = 3
+"""Share of the greatest force by which the pads may differ besides, in so many samples in a row."""
 FREE_SHARE: Final = 0.3
 """Share of the contact force below which a pad is free."""
 FEWEST_SPIKES: Final = 2
@@ -70,11 +79,14 @@ class PadCurve:
         if force_n > self._greatest_n:
             self._closing.append((earlier_gap_m, force_n))
 
+    def touch(self, earlier_gap_m: float) -> None:
+        """Take a gap at which both pads feel a contact."""
+        if not earlier_gap_m < self._contact_gap_m:
+            self._contact_gap_m = earlier_gap_m
+
     def close(self, force_n: float, earlier_gap_m: float, phase: int) -> Fault | None:
         """Take a sample while the fingers close or hold, with the gap at the time of which it can be."""
         self.press(force_n, earlier_gap_m)
-        if force_n > self._contact_n and not earlier_gap_m < self._contact_gap_m:
-            self._contact_gap_m = earlier_gap_m
         changed, self._last_n = force_n != self._last_n, force_n
         if phase == APPROACH:
             self._free_samples += 1
@@ -100,7 +112,9 @@ class PadCurve:
         if earlier_gap_m > self._contact_gap_m + OPENED_M:
             return self._empty(force_n, t_s)
         most_n = self._most_n(earlier_gap_m - SLACK_M)
-        if not force_n - most_n > max(self._contact_n, MORE_SHARE * self._held[1]):
+        held_n = self._held[1]
+        allowed_n = min(MORE_SHARE * held_n, HARDLY_SHARE * (held_n - most_n))
+        if not force_n - most_n > max(MORE_CONTACTS * self._contact_n, allowed_n):
             self._more = 0
             return None
         if not self._more:
@@ -186,6 +200,7 @@ class PadCurves:
     """Both pads of a gripper with forces at this rate (Hz; 0: not known)."""
 
     def __init__(self, contact_n: float, pads_hz: float) -> None:
+        self._contact_n = contact_n
         self._period_s = 1.0 / pads_hz if pads_hz > 0.0 else 0.0
         self._late_s = LATE_S + LATE_PERIODS * (self._period_s or LATE_S)
         self._pads = (PadCurve("left", contact_n), PadCurve("right", contact_n))
@@ -193,6 +208,11 @@ class PadCurves:
         self._counter, self._t_s = 0, nan
         self._least_gap_m = inf
         self._spikes = Spikes(contact_n)
+        self._pushed_n = self._pressed_n = 0.0
+        """What the left pad felt more than the right one before both touched, and the greatest force of both (N)."""
+        self._apart_samples = 0
+        self._unheld_t_s = nan
+        """Time of the last sample before the hold."""
 
     def see(self, reading: Reading, phase: int) -> list[Fault]:
         """Take the reading of a tick; return the faults that it shows."""
@@ -207,11 +227,19 @@ class PadCurves:
         earlier_gap_m = gaps[0][1]
         self._least_gap_m = min(self._least_gap_m, earlier_gap_m)
         forces = (frame.force_left_n, frame.force_right_n)
-        faults = [self._spikes.see(forces, phase)] if closing else []
+        if phase != HOLD:
+            self._unheld_t_s = frame.t_s
+        moved = frame.t_s - self._unheld_t_s > HELD_S
+        faults = [
+            None if moved else self._apart(forces, phase),
+            self._spikes.see(forces, phase) if closing and not moved else None,
+        ]
         for pad, force_n in zip(self._pads, forces, strict=True):
             if force_n != force_n or earlier_gap_m != earlier_gap_m:
                 continue
             if closing:
+                if min(forces) > self._contact_n:
+                    pad.touch(earlier_gap_m)
                 faults.append(pad.close(force_n, earlier_gap_m, phase))
             elif phase == Phase.RELEASE and earlier_gap_m <= self._least_gap_m + SLACK_M:
                 # Fingers that were fast go on closing for a while.
@@ -219,6 +247,22 @@ class PadCurves:
             elif phase == Phase.RELEASE:
                 faults.append(pad.open(force_n, frame.t_s, frame.gap_m, earlier_gap_m))
         return [fault for fault in faults if fault is not None]
+
+    def _apart(self, forces: tuple[float, float], phase: int) -> Fault | None:
+        """Return the fault of pads that differ by more than friction holds while the force rises or falls."""
+        difference_n = forces[0] - forces[1]
+        if phase == APPROACH:
+            self._pushed_n = difference_n
+        self._pressed_n = max(self._pressed_n, *forces)
+        apart = abs(difference_n - self._pushed_n) > max(FRICTION_N, APART_SHARE * self._pressed_n)
+        self._apart_samples = self._apart_samples + 1 if apart and phase > APPROACH else 0
+        if self._apart_samples < FEWEST_APART:
+            return None
+        return Fault(
+            "pads disagree",
+            f"while the force changes, the left pad feels {forces[0]:.1f} N and the right one {forces[1]:.1f} N, "
+            "though both touch one object: one is late, has another scale, or lost its zero; check both fingertips",
+        )
 
     def _is_new(self, reading: Reading) -> bool:
         """Return whether this tick has a new force, by the counter of the images or by the rate."""

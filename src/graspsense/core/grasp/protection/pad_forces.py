@@ -11,6 +11,8 @@ from graspsense.core.values.signals import Frame, Phase
 
 MEAN_S: Final = 0.1
 """Time over which the forces are averaged, and after which they are compared."""
+HELD_S: Final = 1.0
+"""Time of the hold after which the pads are not compared: the mass of an object that an arm moves presses on one."""
 ALLOWED_N: Final = 2.0
 """Difference that friction can hold: 1.5 N for half a kilogram on a table."""
 ALLOWED_SHARE: Final = 1.0 / 3.0
@@ -21,6 +23,8 @@ SCALED_SHARE: Final = 0.1
 force: features of their mean are then 5 % off."""
 STILL_S: Final = 0.25
 """Least time for which the force of a pad stands still."""
+RESTS_M: Final = 0.0003
+"""Travel in that time below which the fingers rest."""
 IMAGES: Final = 5.0
 """Periods of the pads for which it stands still at least."""
 CHANGE_N: Final = 1.0
@@ -62,7 +66,7 @@ class PadBalance:
         grown_n = difference_n - (self._pushed_n if strong == "left" else -self._pushed_n)
         far = difference_n > max(ALLOWED_N, ALLOWED_SHARE * forces[strong])
         scaled = min(difference_n, grown_n) > max(self._scaled_n, SCALED_SHARE * forces[strong])
-        if self._seen_s < MEAN_S or not (far or scaled):
+        if not MEAN_S <= self._seen_s <= HELD_S or not (far or scaled):
             return None
         return Fault(
             "pads disagree",
@@ -83,24 +87,30 @@ class StuckForce:
         self._forces = (nan, nan)
         self._since: list[float] = [nan, nan]
         self._others: list[float] = [nan, nan]
+        self._gaps_m: list[float] = [nan, nan]
 
     def see(self, frame: Frame) -> Fault | None:
-        """Take the frame of a tick of the squeeze or the hold, and return a pad that it shows to be stuck."""
+        """Take the frame of a tick of the squeeze or the hold, and return a pad that it shows to be stuck.
+
+        While the fingers rest, it can also be the other one that is wrong.
+        """
         forces = (frame.force_left_n, frame.force_right_n)
         for i, side in enumerate(("left", "right")):
             if forces[i] != self._forces[i]:
-                self._since[i], self._others[i] = frame.t_s, forces[1 - i]
+                self._since[i], self._others[i], self._gaps_m[i] = frame.t_s, forces[1 - i], frame.gap_m
             elif (
                 frame.t_s - self._since[i] >= self._still_s
                 and abs(forces[1 - i] - self._others[i]) >= CHANGE_N
                 and self._forces[1 - i] == self._forces[1 - i]
             ):
-                return Fault(
-                    f"{side} pad stuck",
+                words = (
                     f"its force has stood at {forces[i]:.2f} N for {frame.t_s - self._since[i]:.2f} s, while that of "
-                    f"the other pad went from {self._others[i]:.2f} to {forces[1 - i]:.2f} N: check its cable",
-                    ends=True,
+                    f"the other pad went from {self._others[i]:.2f} to {forces[1 - i]:.2f} N"
                 )
+                if abs(frame.gap_m - self._gaps_m[i]) < RESTS_M:
+                    words = f"{side} pad: {words}, and the fingers rest: one is stuck, or the other jumps or is late"
+                    return Fault("pads disagree", f"{words}; check the cables of both", ends=True)
+                return Fault(f"{side} pad stuck", f"{words}: check its cable", ends=True)
         self._forces = forces
         return None
 

@@ -65,9 +65,9 @@ class Protection:
         self._told: dict[str, Fault] = {}
         self.ending: Fault | None = None
         self.acted = 0
-        self._closing = False
-        self._approach: Frame | None = None
-        """The last frame of the approach."""
+        self._phase = -1
+        self.side_impact = ""
+        """What the edges felt in the reading that ended the approach, in words."""
         rates = {channel.name: channel.rate_hz for channel in info.channels}
         self.ceiling_n = effort_ceiling_n(info, controller, run)
         self._effort_limit_n = info.effort_limit_n
@@ -122,15 +122,15 @@ class Protection:
         if self._jump.jumps <= FEW_JUMPS:
             self._motor.shift(self._jump.step_m)
         self._see(self._motor.see(frame, phase), phase)
-        if phase == APPROACH:
-            self._approach = frame
+        last_phase, self._phase = self._phase, phase
+        if phase != APPROACH and last_phase == APPROACH:
+            self.side_impact = self._drift.side_impact(reading)
         if not self._declared and frame.force_left_n == frame.force_left_n:
             self._has_pads = True
         closing = phase in (APPROACH, SQUEEZE, HOLD)
-        if closing or self._closing:
+        if closing or last_phase in (APPROACH, SQUEEZE, HOLD):
             # Also the jump with which the law has ended the grasp in this tick.
             self._see(jump)
-        self._closing = closing
         if closing:
             self._see(self._gap_speed.see(frame))
             self._see(self._gap_absence.see(frame.gap_m, frame))
@@ -155,10 +155,6 @@ class Protection:
         if self._effort is not None:
             self._effort.apply(frame, allowed)
         return allowed
-
-    def side_impact(self) -> str:
-        """Return in words what the edges felt in the last frame of the approach."""
-        return "" if self._approach is None else self._drift.side_impact(self._approach)
 
     def before_closing(self, frame: Frame) -> Fault | None:
         """Return the fault for which the fingers must not close, if there is one."""
