@@ -119,9 +119,9 @@ OPENS = Command(POSITION, 0.08, inf, 0.05)
 
 
 def opened(gap_of, start_m=0.08, delay_s=0.02):
-    """Return the names of the faults in a release of a second, after a squeeze at 50 mm."""
+    """Return the names of the faults in a release of a second, after a squeeze that rested at 50 mm for 0.2 s."""
     watch = Opening(RATE_HZ, delay_s, OPENS, tells_gap=True)
-    gaps = [*np.linspace(start_m, 0.05, 100), *(gap_of(k / RATE_HZ) for k in range(100))]
+    gaps = [*np.linspace(start_m, 0.05, 80), *[0.05] * 20, *(gap_of(k / RATE_HZ) for k in range(100))]
     phases = [SQUEEZE] * 100 + [Phase.RELEASE] * 100
     faults = [
         watch.see(frame(k, gap), phase) for k, (gap, phase) in enumerate(zip(gaps, phases, strict=True))
@@ -145,6 +145,15 @@ def opened(gap_of, start_m=0.08, delay_s=0.02):
 )
 def test_fingers_that_closed_have_to_open_when_they_are_told_to(gap_of, start_m, names):
     assert opened(gap_of, start_m) == names
+
+
+def test_fingers_that_brake_first_are_not_late():
+    """They close at 50 mm/s when they are told to open, brake over 4 mm, and turn round after 0.2 s."""
+    watch = Opening(RATE_HZ, 0.02, OPENS, tells_gap=True)
+    for k in range(100):
+        watch.see(frame(k, 0.08 - 0.05 * k / RATE_HZ), Phase.APPROACH)
+    braking = [0.03 - 0.004 + 0.1 * (0.01 * k - 0.2) ** 2 for k in range(60)]
+    assert all(watch.see(frame(100 + k, gap_m), Phase.RELEASE) is None for k, gap_m in enumerate(braking))
 
 
 class LateGap(Scripted):

@@ -581,6 +581,8 @@ def test_fingers_that_move_with_less_than_their_friction():
     for sound in (
         {"effort": 5.0},
         {"effort": 1.0, "friction": 0.0},
+        # Fingers that are braked, on a drive whose friction is not known.
+        {"effort": -6.0, "friction": 0.0},
         {"effort": 0.0, "speed": 0.0},
         {"effort": 1.0, "kind": FORCE},
     ):

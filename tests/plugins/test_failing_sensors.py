@@ -16,11 +16,11 @@ MOVES_S = 1.5
 def grasped(pipeline, fault=None, from_s=0.0):
     """Return a grasp with an emulated gripper, and its features.
 
-    From a time on, `fault(frame, first)` says what its frames have in place of what was measured; `first` is the frame
+    From a time on, `fault(frame, start)` says what its frames have in place of what was measured; `start` is the frame
     of this time.
     """
     settings = load_pipeline(pipeline, options=[f"gripper.{GRIPPERS[pipeline]}=emulated"]).settings
-    gripper, first = settings.gripper.create(), []
+    gripper, faulty = settings.gripper.create(), []
     sound = gripper.read
 
     def read(timeout_s):
@@ -28,8 +28,8 @@ def grasped(pipeline, fault=None, from_s=0.0):
         frame = reading.frame
         if fault is None or frame.t_s < from_s:
             return reading
-        first.append(frame)
-        return reading._replace(frame=frame._replace(**fault(frame, first[0])))
+        faulty.append(frame)
+        return reading._replace(frame=frame._replace(**fault(frame, faulty[0])))
 
     gripper.read = read
     grasp = run_grasp(gripper, settings.controller.create(), settings.run)
@@ -42,39 +42,39 @@ def test_a_sound_gripper_is_not_accused(pipeline):
     assert (grasp.outcome, grasp.warnings, features.reasons) == (Outcome.STEADY, (), {})
 
 
-def half(frame, first):
-    return {"gap_m": first.gap_m + 0.5 * (frame.gap_m - first.gap_m)}
+def half(frame, start):
+    return {"gap_m": start.gap_m + 0.5 * (frame.gap_m - start.gap_m)}
 
 
-def half_the_time(frame, first):
-    return {"t_s": first.t_s + 0.5 * (frame.t_s - first.t_s), "dt_s": 0.5 * frame.dt_s}
+def half_the_time(frame, start):
+    return {"t_s": start.t_s + 0.5 * (frame.t_s - start.t_s), "dt_s": 0.5 * frame.dt_s}
 
 
 @every_case(
     ("pipelines", "fault", "from_s", "names"),
     [
-        ("robotiq so101 franka", lambda frame, first: {"gap_m": 0.0}, 0.0, {"fingers not open"}),
-        ("robotiq so101 franka", lambda frame, first: {"gap_m": nan}, 0.0, {"fingers not open"}),
+        ("robotiq so101 franka", lambda frame, start: {"gap_m": 0.0}, 0.0, {"fingers not open"}),
+        ("robotiq so101 franka", lambda frame, start: {"gap_m": nan}, 0.0, {"fingers not open"}),
         (
             "robotiq so101 franka",
-            lambda frame, first: {"gap_m": 0.0},
+            lambda frame, start: {"gap_m": 0.0},
             MOVES_S,
             {"gap jumps", "fingers did not open"},
         ),
         (
             "robotiq so101 franka",
-            lambda frame, first: {"gap_m": frame.gap_m - 0.02},
+            lambda frame, start: {"gap_m": frame.gap_m - 0.02},
             0.0,
             {"opened to another width"},
         ),
         ("robotiq so101 franka", half, 0.0, {"not the commanded speed"}),
         ("robotiq so101 franka", half_the_time, 0.0, {"not the commanded speed"}),
-        ("robotiq so101", lambda frame, first: {"effort_n": nan}, MOVES_S, {"effort absent"}),
-        ("robotiq so101", lambda frame, first: {"effort_n": 60.0}, MOVES_S, {"effort stuck"}),
-        ("robotiq so101", lambda frame, first: {"effort_n": first.effort_n}, MOVES_S, {"effort stuck"}),
+        ("robotiq so101", lambda frame, start: {"effort_n": nan}, MOVES_S, {"effort absent"}),
+        ("robotiq so101", lambda frame, start: {"effort_n": 60.0}, MOVES_S, {"effort stuck"}),
+        ("robotiq so101", lambda frame, start: {"effort_n": start.effort_n}, MOVES_S, {"effort stuck"}),
         (
             "robotiq so101",
-            lambda frame, first: {"effort_n": -frame.effort_n},
+            lambda frame, start: {"effort_n": -frame.effort_n},
             MOVES_S,
             {"effort has the wrong sign"},
         ),
@@ -88,5 +88,5 @@ def test_a_sensor_that_fails_is_named(pipelines, fault, from_s, names):
 
 @every_case("pipeline", ["robotiq", "so101"])
 def test_half_the_scale_of_the_effort_gives_no_wrong_contact(pipeline):
-    _, features = grasped(pipeline, lambda frame, first: {"effort_n": 0.5 * frame.effort_n})
+    _, features = grasped(pipeline, lambda frame, start: {"effort_n": 0.5 * frame.effort_n})
     assert set(features.reasons) == {"p_first", "delta_t", "dp_dt"}

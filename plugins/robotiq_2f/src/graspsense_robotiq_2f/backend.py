@@ -249,7 +249,7 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
             rate_hz=RATE_HZ,
             effort_limit_n=model.forces_n[1],
             speed_limit_m_s=model.speeds_m_s[1],
-            opening=Command(POSITION, model.stroke_m, inf, 0.05),
+            opening=Command(POSITION, (self._emulated or model).stroke_m, inf, 0.05),
             # It still has a target to go to, where the encoder is wrong or the object yields.
             relaxed=Command(VELOCITY, 0.0, self.least_force_n, inf),
             tare_images=TARE_IMAGES if self._fingertips is not None else 0,

@@ -145,7 +145,8 @@ class FingerTarget(NamedTuple):
 class EmulatedFingers:
     """Fingers with this stroke (m) over the backend `body`, at the time (s) that each call gives.
 
-    A hand with a shorter stroke than the body has its fingers mounted closer together; None takes the body's stroke.
+    A hand with a shorter stroke than the body has its fingers mounted closer together; one with a longer stroke, or
+    None, has the body's.
     Raises ConfigError for a body that has a clock of its own.
     """
 
@@ -163,8 +164,9 @@ class EmulatedFingers:
         """For how long (s) the fingers have been at rest on their way."""
         self._integral_n = self._body_s = 0.0
         self._frame = self._read()
-        self.stroke_m = float(self._frame.gap_m) if stroke_m is None else stroke_m
-        self._offset_m = max(float(self._frame.gap_m) - self.stroke_m, 0.0)
+        widest_m = float(self._frame.gap_m)
+        self.stroke_m = widest_m if stroke_m is None else min(stroke_m, widest_m)
+        self._offset_m = widest_m - self.stroke_m
 
     @property
     def gap_m(self) -> float:

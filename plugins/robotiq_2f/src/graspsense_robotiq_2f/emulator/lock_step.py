@@ -34,6 +34,11 @@ class LockStepGripper:
         """What the body knows."""
         return self._hand.fingers.body.report()
 
+    @property
+    def stroke_m(self) -> float:
+        """How wide it opens (m): not wider than its body."""
+        return self._hand.fingers.stroke_m
+
     def monotonic(self) -> float:
         """Return the time (s) of the gripper."""
         return self._now_s

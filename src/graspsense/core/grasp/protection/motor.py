@@ -277,7 +277,7 @@ class FreeEffort:
 
     def see(self, frame: Frame, applied: Command) -> Fault | None:
         """Take the frame of a tick of the approach in which nothing is felt, and the command that is applied."""
-        if applied.kind != EFFORT or not -frame.velocity_m_s > MOVES_M_S:
+        if not self._friction_n > 0.0 or applied.kind != EFFORT or not -frame.velocity_m_s > MOVES_M_S:
             return None
         self._travel_m -= frame.velocity_m_s * frame.dt_s
         self._mean_n.add(asked_effort_n(applied), frame.dt_s)

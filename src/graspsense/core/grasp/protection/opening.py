@@ -21,6 +21,8 @@ LATE_S: Final = 0.2
 """Time beyond the delay of a command after which the gap is late; at least four frames."""
 STANDS_S: Final = 0.5
 """Time beyond it after which the fingers count as not opened; at least six frames."""
+RESTED_S: Final = 0.1
+"""Time for which fingers must have rested that have to open at once: others brake first."""
 TARGET_M: Final = 0.002
 TARGET_SHARE: Final = 0.05
 """By how much open fingers may miss the width that they were told, at least and as a share of it."""
@@ -45,7 +47,7 @@ class Opening:
         self._tells_gap = tells_gap
         self._first_m = nan
         self._widest_m = -inf
-        self._start_m = self._start_s = nan
+        self._start_m = self._start_s = self._rest_m = self._rest_s = nan
         self._opened = False
 
     def before_closing(self, frame: Frame) -> Fault | None:
@@ -73,17 +75,20 @@ class Opening:
             if phase >= APPROACH:
                 self._widest_m = max(self._widest_m, frame.gap_m)
                 self._start_m, self._start_s = frame.gap_m, frame.t_s
+                if not abs(frame.gap_m - self._rest_m) < OPENED_M:
+                    self._rest_m, self._rest_s = frame.gap_m, frame.t_s
             return None
         if self._opened:
             return None
         closed_m, elapsed_s = self._widest_m - self._start_m, frame.t_s - self._start_s
-        # A gap that is late closes on for a while.
+        # A gap that is late closes on for a while, as that of fingers which brake.
         self._start_m = min(self._start_m, frame.gap_m)
         self._opened = frame.gap_m - self._start_m >= OPENED_M
         if not closed_m >= LEAST_TRAVEL_M:
             return None
         if self._opened:
-            return None if elapsed_s <= self._late_s else self._late(elapsed_s)
+            rested = self._start_s - self._rest_s >= RESTED_S
+            return self._late(elapsed_s) if rested and elapsed_s > self._late_s else None
         if elapsed_s < self.stands_s:
             return None
         return Fault(
