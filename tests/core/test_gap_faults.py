@@ -139,6 +139,8 @@ def opened(gap_of, start_m=0.08, delay_s=0.02):
         (lambda t: nan, 0.08, ["fingers did not open"]),
         # Frames that come late tell the end of the squeeze first, which is no opening.
         (lambda t: 0.05 - 0.01 * min(t, 0.2) + 0.05 * max(t - 0.3, 0.0), 0.08, ["gap late"]),
+        # An encoder that stopped after the first 1.7 mm of the closing.
+        (lambda t: 0.05, 0.0517, ["fingers did not open"]),
         # Fingers that never closed need not open.
         (lambda t: 0.05, 0.051, []),
     ],
