@@ -83,7 +83,7 @@ def half_the_time(frame, start):
 def test_a_sensor_that_fails_is_named(pipelines, fault, from_s, names):
     for pipeline in pipelines.split():
         grasp, _ = grasped(pipeline, fault, from_s)
-        assert {warning.split(":")[0] for warning in grasp.warnings} == names, pipeline
+        assert {warning.split(":")[0] for warning in grasp.warnings} >= names, pipeline
 
 
 @every_case("pipeline", ["robotiq", "so101"])

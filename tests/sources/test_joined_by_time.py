@@ -68,6 +68,16 @@ def test_a_hole_and_another_clock_in_a_file_beside_are_told(tmp_path):
     written(tmp_path / "pad.tsv", "t,N", seconds(times + 1e5), force(times))
     with pytest.raises(DataDamaged, match="no t in common"):
         frames(tmp_path, BESIDE)
+    (tmp_path / "pad.tsv").write_text("t,N\nms,N\n0,0\n10,0\n20,0\n")
+    with pytest.raises(DataDamaged, match="in different units"):
+        frames(tmp_path, BESIDE)
+
+
+def test_as_many_rows_with_other_times_in_words_are_told(tmp_path):
+    written(tmp_path / "jar.csv", "t,gap", stamps(T_S), GAP_MM)
+    for late_s, told in ((0.0, False), (0.5, True)):
+        written(tmp_path / "pad.tsv", "t,N", stamps(T_S + late_s), force(T_S))
+        assert any("row by row" in notice for notice in frames(tmp_path, BESIDE)[3]) == told
 
 
 @every_case("late_s", [0.0, 0.003])

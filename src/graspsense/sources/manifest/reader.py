@@ -24,7 +24,7 @@ from graspsense.recording.replayable import Recording
 from graspsense.sources.columns.grasp_columns import GraspColumns, checked_recording
 from graspsense.sources.formats.array_format import ArrayRules
 from graspsense.sources.formats.raw_tables import TableRules, raw_tables
-from graspsense.sources.formats.table import ColumnTable
+from graspsense.sources.formats.table import ColumnTable, Numbers
 from graspsense.sources.formats.topic_clocks import NOTICED, PERIODS
 from graspsense.sources.manifest.description import ReadManifest, axes_of, read_manifest, texts_of
 from graspsense.sources.manifest.facts import (
@@ -116,10 +116,10 @@ def _joined(manifest: ReadManifest, tables: list[ColumnTable], path: Path) -> li
             "with as many, or with the column of the time in both"
         )
     (table,), (other,) = tables, others
-    warnings = (
-        tuple(_other_times(table, other, path, time)) if rows[0] == rows[1] and time is not None else ()
-    )
-    if rows[0] != rows[1] and time is not None:
+    warnings: tuple[str, ...] = ()
+    if rows[0] == rows[1] and time is not None:
+        warnings = tuple(_other_times(table, other, path, time))
+    elif time is not None:
         table, other = _by_time(table, other, time)
 
     def named(columns: Mapping[str, Any]) -> dict[str, Any]:
@@ -139,20 +139,14 @@ def _joined(manifest: ReadManifest, tables: list[ColumnTable], path: Path) -> li
 
 def _by_time(table: ColumnTable, other: ColumnTable, time: str) -> tuple[ColumnTable, ColumnTable]:
     """Return two tables at the times of the one with more rows, each with its last values. Raises DataDamaged."""
-    times = [part.numbers[time] for part in (table, other)]
-    if table.units.get(time) == other.units.get(time) == "s" and time in table.texts and time in other.texts:
-        # Times in words count from the first one of their file.
-        between = seconds_since_first([table.texts[time][0], other.texts[time][0]])
-        times[1] = times[1] + (0.0 if between is None else between[1])
+    times = _times_of(table, other, time)
     if not all(len(at_s) > 1 and (np.diff(at_s) > 0.0).all() for at_s in times):
         raise DataDamaged(
             f"{table.source} and {other.source} are joined by {time}, which has to increase in both"
         )
     usual = [float(np.median(np.diff(at_s))) for at_s in times]
-    begin, end = (
-        max(at_s[0] for at_s in times),
-        min(at_s[-1] + step for at_s, step in zip(times, usual, strict=True)),
-    )
+    begin = max(at_s[0] for at_s in times)
+    end = min(at_s[-1] + step for at_s, step in zip(times, usual, strict=True))
     most = times[0] if len(times[0]) >= len(times[1]) else times[1]
     rows = most[(most >= begin) & (most <= end)]
     if not len(rows):
@@ -165,9 +159,8 @@ def _by_time(table: ColumnTable, other: ColumnTable, time: str) -> tuple[ColumnT
         if is_old
     ]
     lost = 1.0 - len(rows) / len(most)
-    told += [f"{lost:.0%} of the rows are left out: {other.source} begins later or ends earlier"] * (
-        lost > NOTICED
-    )
+    if lost > NOTICED:
+        told.append(f"{lost:.0%} of the rows are left out: {other.source} begins later or ends earlier")
     joined = table.rows(last[0])
     return (
         evolve(
@@ -180,9 +173,24 @@ def _by_time(table: ColumnTable, other: ColumnTable, time: str) -> tuple[ColumnT
     )
 
 
+def _times_of(table: ColumnTable, other: ColumnTable, time: str) -> list[Numbers]:
+    """Return the times of two tables on one clock; those in words count from the first one of their file.
+
+    Raises DataDamaged for different units.
+    """
+    if table.units.get(time) != other.units.get(time):
+        raise DataDamaged(f"{table.source} and {other.source} have their {time} in different units")
+    times = [table.numbers[time], other.numbers[time]]
+    if time in table.texts and time in other.texts:
+        between = seconds_since_first([table.texts[time][0], other.texts[time][0]])
+        times[1] = times[1] + (0.0 if between is None else between[1])
+    return times
+
+
 def _other_times(table: ColumnTable, other: ColumnTable, path: Path, time: str) -> Iterator[str]:
     """Yield that rows that are used together have different times."""
-    apart = np.abs(other.numbers[time] - table.numbers[time])
+    times = _times_of(table, other, time)
+    apart = np.abs(times[1] - times[0])
     largest = float(np.max(apart, initial=0.0, where=np.isfinite(apart)))
     if len(table) > 1 and largest * (len(table) - 1) > np.ptp(table.numbers[time]):
         yield (

@@ -93,9 +93,7 @@ def read_labelled(
     table = _feature_table(columns, features, reserved, identified, notes)
     if export is None:
         recorded = lines if ranks is None else sorted(lines, key=ranks.__getitem__)
-        values = None if target is None else [target.values[i] for i in recorded]
-        in_order = [labels[i] for i in recorded]
-        notes += doubts(columns.rows(recorded), in_order, table.rows(np.array(recorded)), values)
+        notes += _doubts(columns, recorded, labels, table, target)
         others = [name for name in columns.names if name not in {*reserved, *table.names}]
         notes += not_held_out(columns, others, instances)
     return Labelled(
@@ -124,6 +122,18 @@ def _lines_once(columns: CsvColumns, counted_by: set[str | None], labels: Sequen
     originals = {line: i for i, line in reversed(list(enumerate(lines)))}
     repeated = len(originals) >= LEAST_LINES * len(set(labels)) and len(set(Counter(lines).values())) == 1
     return sorted(originals.values()) if repeated else list(range(len(lines)))
+
+
+def _doubts(
+    columns: CsvColumns,
+    lines: Sequence[int],
+    labels: Sequence[str],
+    table: FeatureTable,
+    target: TargetValue | None,
+) -> list[str]:
+    """Return notes on the features of these lines, which are in the order of recording."""
+    values = None if target is None else [target.values[i] for i in lines]
+    return doubts(columns.rows(lines), [labels[i] for i in lines], table.rows(np.array(lines)), values)
 
 
 def _controls(
