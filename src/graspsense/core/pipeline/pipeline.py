@@ -28,7 +28,14 @@ from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import FAILURES, ConfigError, WiringError, named, place_of
 from graspsense.core.values.events import GraspEvent
 from graspsense.core.values.faults import faults_among
-from graspsense.core.values.features import UNKNOWN, Features, FeatureTable, Prediction, missing
+from graspsense.core.values.features import (
+    UNKNOWN,
+    CheckpointPrediction,
+    Features,
+    FeatureTable,
+    Prediction,
+    missing,
+)
 from graspsense.core.values.signals import Outcome
 from graspsense.core.values.trial import RunInfo, Trial
 
@@ -210,12 +217,7 @@ def grasp_with(
         features, prediction = checkpoints[-1].features, checkpoints[-1].prediction
     else:
         features, prediction = _recognised(settings, feature_set, model, grasp)
-    if prediction is not None and faults_among(grasp.warnings):
-        why = "a fault was seen in this grasp"
-        prediction = prediction.without_certainty(why)
-        checkpoints = tuple(
-            evolve(early, prediction=early.prediction.without_certainty(why)) for early in checkpoints
-        )
+    prediction, checkpoints = _as_certain_as_the_gripper(grasp, prediction, checkpoints)
     trial = Trial(
         run=run,
         trace=grasp.trace,
@@ -236,6 +238,22 @@ def grasp_with(
     if grasp.interrupted:
         raise GraspInterrupted(trial)
     return trial
+
+
+def _as_certain_as_the_gripper(
+    grasp: Grasp, prediction: Prediction | None, checkpoints: tuple[CheckpointPrediction, ...]
+) -> tuple[Prediction | None, tuple[CheckpointPrediction, ...]]:
+    """Return the answers without their certainty, which was measured with sound grippers, if this one was not sound."""
+    if grasp.outcome == Outcome.DEVICE_LOST:
+        why = "the gripper was lost in this grasp"
+    elif faults_among(grasp.warnings):
+        why = "a fault was seen in this grasp"
+    else:
+        return prediction, checkpoints
+    return (
+        None if prediction is None else prediction.without_certainty(why),
+        tuple(evolve(early, prediction=early.prediction.without_certainty(why)) for early in checkpoints),
+    )
 
 
 def _run_info(settings: Settings, labels: Mapping[str, str] | None) -> RunInfo:
