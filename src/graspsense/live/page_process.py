@@ -17,7 +17,7 @@ from http import HTTPStatus
 from importlib.resources import files
 from typing import Final
 
-from websockets.asyncio.server import ServerConnection, serve
+from websockets.asyncio.server import ServerConnection, broadcast, serve
 from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
@@ -39,7 +39,7 @@ from graspsense.recording.layout import TICK_FIELDS
 from graspsense.recording.wire_messages import leave_control_alone
 
 WAITING_BYTES: Final = 8 << 20
-"""Text that may wait for a viewer before it is dropped."""
+"""Bytes that may wait for a viewer before it is dropped, beside those with which it began."""
 LARGEST_MESSAGE: Final = 1024
 FILES: Final = {"": "text/html", "page.js": "text/javascript", "curves.js": "text/javascript"}
 POLICY: Final = (
@@ -104,32 +104,14 @@ class History:
         return f"[{','.join([*head, *self._texts, *others])}]"
 
 
-class _Waiting:
-    """The texts that a viewer has not taken yet, and their size."""
-
-    def __init__(self) -> None:
-        self.size = 0
-        self._queue: asyncio.Queue[str | None] = asyncio.Queue()
-
-    def add(self, text: str | None) -> None:
-        """Add a text; None is the end."""
-        self.size += len(text or "")
-        self._queue.put_nowait(text)
-
-    async def next(self) -> str | None:
-        """Return the oldest text."""
-        text = await self._queue.get()
-        self.size -= len(text or "")
-        return text
-
-
 class LivePage:
     """The page under its token, and the viewers that are connected to it."""
 
     def __init__(self, host: str) -> None:
         self.address = Address("http", host)
         self.history = History()
-        self.viewers: dict[ServerConnection, _Waiting] = {}
+        self.viewers: dict[ServerConnection, int] = {}
+        """Each viewer, with the bytes that may wait for it."""
         folder = files("graspsense.live")
         self._files = {name: (folder / (name or "page.html")).read_bytes() for name in FILES}
 
@@ -161,40 +143,30 @@ class LivePage:
         return Response(HTTPStatus.OK, "OK", headers, body)
 
     async def show(self, viewer: ServerConnection) -> None:
-        """Send everything to a viewer until it leaves, sends something, or the grasping program ends."""
-        waiting = self.viewers[viewer] = _Waiting()
-        waiting.add(None if len(self.viewers) > MOST_VIEWERS else self.history.text())
-        listening = asyncio.create_task(self._drop_speaker(viewer, waiting))
+        """Show everything to a viewer until it leaves, or says something, for which it is dropped."""
+        if len(self.viewers) >= MOST_VIEWERS:
+            return
+        text = self.history.text()
+        self.viewers[viewer] = WAITING_BYTES + len(text)
+        broadcast([viewer], text)
         try:
             with suppress(ConnectionClosed):
-                while (text := await waiting.next()) is not None:
-                    await viewer.send(text)
+                await viewer.recv()
+                viewer.transport.abort()
         finally:
-            self.viewers.pop(viewer, None)
-            listening.cancel()
-
-    async def _drop_speaker(self, viewer: ServerConnection, waiting: _Waiting) -> None:
-        with suppress(ConnectionClosed):
-            await viewer.recv()
-            viewer.transport.abort()
-        waiting.add(None)
+            del self.viewers[viewer]
 
     def pass_on(self, messages: list[Message]) -> None:
         """Hand messages to every viewer; one that has not taken those before is dropped."""
-        text = self.history.add(messages)
-        for viewer, waiting in list(self.viewers.items()):
-            waiting.add(text)
-            if waiting.size > WAITING_BYTES:
-                del self.viewers[viewer]
+        broadcast(self.viewers, self.history.add(messages))
+        for viewer, most in self.viewers.items():
+            if viewer.transport.get_write_buffer_size() > most:
                 viewer.transport.abort()
 
     async def end(self) -> None:
         """Let the viewers take what is left, for a short time."""
-        for waiting in self.viewers.values():
-            waiting.add(None)
         async with asyncio.timeout(FLUSH_S):
-            while self.viewers:
-                await asyncio.sleep(0.01)
+            await asyncio.gather(*(viewer.close() for viewer in self.viewers))
 
 
 class _Limited(ServerConnection):  # type: ignore[misc, unused-ignore]

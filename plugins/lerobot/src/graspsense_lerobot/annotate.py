@@ -22,15 +22,7 @@ from graspsense.plugin_api import ConfigError, DataDamaged, GraspColumns
 from graspsense_lerobot.columns import statistics
 from graspsense_lerobot.folder import INFO, json_lines, read_folder
 from graspsense_lerobot.reader import numbered_parts
-from graspsense_lerobot.writer import (
-    about,
-    event_numbers,
-    meanings_of_numbers,
-    predicted_classes,
-    prediction_numbers,
-    told_events,
-    write_json,
-)
+from graspsense_lerobot.writer import Meanings, about, write_json
 
 NO_GRASP: Final = -1
 """The phase of a frame that is in no trial."""
@@ -57,12 +49,12 @@ def annotate(grasps: Sequence[StoredGrasp], original: Path, copy: Path) -> dict[
         raise ConfigError(f"{original} is not changed: name a folder for the copy that is not in it")
     folder = read_folder(original)
     placed = _placed(grasps, original)
-    events, classes = told_events(grasps), predicted_classes(grasps)
+    meanings = Meanings.of_grasps(grasps)
     shutil.copytree(original, copy, dirs_exist_ok=True)
     every: dict[str, list[Any]] = {name: [] for name in COLUMNS}
     unreadable = 0
     for path in sorted((copy / "data").rglob("*.parquet")):
-        columns = _annotate_file(path, placed, (events, classes))
+        columns = _annotate_file(path, placed, meanings)
         unreadable += not columns
         for name, values in columns.items():
             every[name] += values
@@ -72,9 +64,9 @@ def annotate(grasps: Sequence[StoredGrasp], original: Path, copy: Path) -> dict[
     _annotate_episodes(copy, folder.version, placed)
     declared = {name: {"dtype": "int64", "shape": [1], "names": None} for name in COLUMNS}
     write_json(copy / INFO, {**folder.info, "features": {**folder.info["features"], **declared}})
-    meanings: dict[str, dict[str, str]] = meanings_of_numbers(events, classes)
-    meanings["graspsense.phase"][str(NO_GRASP)] = "no grasp"
-    write_json(copy / "meta" / "graspsense.json", meanings)
+    described = meanings.as_json()
+    described["graspsense.phase"][str(NO_GRASP)] = "no grasp"
+    write_json(copy / "meta" / "graspsense.json", described)
     stats = copy / "meta" / "stats.json"
     if stats.is_file():
         known = json.loads(stats.read_text("utf-8"))
@@ -124,7 +116,7 @@ def _same(grasp: StoredGrasp, columns: GraspColumns) -> bool:
 
 
 def _annotate_file(
-    path: Path, placed: Mapping[int, Sequence[Placed]], meanings: tuple[Sequence[str], Sequence[str]]
+    path: Path, placed: Mapping[int, Sequence[Placed]], meanings: Meanings
 ) -> dict[str, list[Any]]:
     """Add the columns to a data file, one group of rows after the other, and return them; none if it is damaged."""
     part = path.with_suffix(".part")
@@ -152,9 +144,7 @@ def _annotate_file(
     return added
 
 
-def _numbers(
-    table: Any, placed: Mapping[int, Sequence[Placed]], meanings: tuple[Sequence[str], Sequence[str]]
-) -> dict[str, Any]:
+def _numbers(table: Any, placed: Mapping[int, Sequence[Placed]], meanings: Meanings) -> dict[str, Any]:
     episodes = table["episode_index"].to_numpy()
     times = table["timestamp"].to_numpy().astype(np.float64)
     phase = np.full(len(table), NO_GRASP, dtype=np.int64)
@@ -170,8 +160,7 @@ def _numbers(
             trace = squeeze.grasp.trace()
             tick = np.clip(np.searchsorted(trace.t_s, own_s + 1e-6, side="right") - 1, 0, len(trace) - 1)
             phase[within] = trace.phase[tick]
-            event[within] = event_numbers(squeeze.grasp, meanings[0], own_s)
-            prediction[within] = prediction_numbers(squeeze.grasp, meanings[1], own_s)
+            event[within], prediction[within] = meanings.numbers(squeeze.grasp, own_s)
     return dict(zip(COLUMNS, (phase, event, prediction), strict=True))
 
 

@@ -35,6 +35,8 @@ VIDEO_PATHS: Final = {
     2: "videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d}.mp4",
     3: "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4",
 }
+PLACE: Final = ("chunk_index", "file_index")
+"""The columns that say in which file an episode is, v3.0."""
 LFS: Final = b"version https://git-lfs"
 """What a file begins with that was cloned without its content."""
 _FIELD: Final = re.compile(r"\{(?P<name>[a-z_]+)(?::0?(?P<width>[0-9])d)?\}")
@@ -162,14 +164,15 @@ class Folder:
                 yield {name: float(values[k]) for name, values in table.numbers.items() if values.ndim == 1}
 
     def _data_path(self, row: Mapping[str, Any]) -> str:
+        return self._filled("data_path", self._numbers(row, "data/"))
+
+    def _numbers(self, row: Mapping[str, Any], prefix: str) -> dict[str, int | str]:
+        """Return the fields of the path of an episode's data, or of a video, whose columns begin with `prefix`."""
         index = _whole(row, "episode_index", "meta/episodes")
         if self.version == 2:
-            chunk = index // self._chunk_size
-            return self._filled("data_path", {"episode_chunk": chunk, "episode_index": index})
-        numbers = {
-            name: _whole(row, f"data/{name}", "meta/episodes") for name in ("chunk_index", "file_index")
-        }
-        return self._filled("data_path", {**numbers, "episode_index": index})
+            return {"episode_chunk": index // self._chunk_size, "episode_index": index}
+        numbers = {name: _whole(row, prefix + name, "meta/episodes") for name in PLACE}
+        return {**numbers, "episode_index": index}
 
     @property
     def _chunk_size(self) -> int:
@@ -219,9 +222,7 @@ class Folder:
                 f"{self.place}/{path} has {int(kept.sum())} frames of episode {index}, and meta/episodes says {length}"
             )
         frames = table.rows(np.flatnonzero(kept))
-        return Episode(
-            index=index, table=frames, task=self._task(frames, index), videos=self._videos(row, index)
-        )
+        return Episode(index=index, table=frames, task=self._task(frames, index), videos=self._videos(row))
 
     def _task(self, frames: ColumnTable, index: int) -> str:
         numbers = frames.numbers.get("task_index")
@@ -234,28 +235,15 @@ class Folder:
             )
         return self.tasks[number]
 
-    def _videos(self, row: Mapping[str, Any], index: int) -> dict[str, tuple[str, float]]:
+    def _videos(self, row: Mapping[str, Any]) -> dict[str, tuple[str, float]]:
         videos = {}
         for feature in self.features.values():
-            if feature.dtype != "video":
-                continue
-            if self.version == 2:
-                chunk = index // self._chunk_size
-                fields: dict[str, int | str] = {
-                    "episode_chunk": chunk,
-                    "episode_index": index,
-                    "video_key": feature.key,
-                }
-                videos[feature.key] = self._filled("video_path", fields), 0.0
-                continue
-            names = {name: f"videos/{feature.key}/{name}" for name in ("chunk_index", "file_index")}
-            if all(name in row for name in names.values()):
-                numbers = {name: _whole(row, column, "meta/episodes") for name, column in names.items()}
-                start_s = float(row.get(f"videos/{feature.key}/from_timestamp", 0.0))
-                videos[feature.key] = (
-                    self._filled("video_path", {**numbers, "video_key": feature.key}),
-                    start_s,
-                )
+            prefix = f"videos/{feature.key}/"
+            known = self.version == 2 or all(prefix + name in row for name in PLACE)
+            if feature.dtype == "video" and known:
+                fields = {**self._numbers(row, prefix), "video_key": feature.key}
+                start_s = float(row.get(f"{prefix}from_timestamp", 0.0))
+                videos[feature.key] = self._filled("video_path", fields), start_s
         return videos
 
 

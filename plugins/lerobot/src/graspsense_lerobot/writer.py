@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 import pyarrow
@@ -45,6 +45,46 @@ _FRAME: Final = {
 
 
 @frozen(kw_only=True)
+class Meanings:
+    """The events that were told in these trials, and the labels that were predicted.
+
+    Their numbers are their places in these lists, from 1 on; 0 is none.
+    """
+
+    events: tuple[str, ...]
+    classes: tuple[str, ...]
+
+    @classmethod
+    def of_grasps(cls, grasps: Sequence[StoredGrasp]) -> Self:
+        """Return those of these trials."""
+        return cls(
+            events=tuple(dict.fromkeys(what for grasp in grasps for _, what in _told(grasp))),
+            classes=tuple(dict.fromkeys(label for grasp in grasps for _, label in predictions(grasp))),
+        )
+
+    def numbers(self, grasp: StoredGrasp, times: Any) -> tuple[Any, Any]:
+        """Return the number of the event that was told in each frame, and of the prediction that holds in it."""
+        event, prediction = np.zeros((2, len(times)), dtype=np.int64)
+        for t_s, what in _told(grasp):
+            event[_frame(times, t_s)] = self.events.index(what) + 1
+        for t_s, label in predictions(grasp):
+            prediction[_frame(times, t_s) :] = self.classes.index(label) + 1
+        return event, prediction
+
+    def as_json(self) -> dict[str, dict[str, str]]:
+        """Return what the numbers of phase, event and prediction stand for."""
+        return {
+            "graspsense.phase": {str(int(phase)): phase.name.lower() for phase in Phase},
+            "graspsense.event": {str(k): name for k, name in enumerate(("", *self.events))},
+            "graspsense.prediction": {str(k): name for k, name in enumerate(("", *self.classes))},
+        }
+
+
+def _frame(times: Any, t_s: float) -> int:
+    return min(int(np.searchsorted(times, t_s - 1e-9)), len(times) - 1)
+
+
+@frozen(kw_only=True)
 class Plan:
     """What all episodes have: frames per second, names of the state, arrays, and what numbers stand for."""
 
@@ -53,9 +93,7 @@ class Plan:
     units: tuple[str, ...]
     arrays: tuple[TactileArray, ...]
     tasks: tuple[str, ...]
-    classes: tuple[str, ...]
-    """What was predicted; `graspsense.prediction` is 0 for none, and else the place in this list, from 1 on."""
-    events: tuple[str, ...]
+    meanings: Meanings
     commanded: bool
     """Whether all trials have commands; else the action is the position one frame later."""
 
@@ -98,8 +136,7 @@ def planned(grasps: Sequence[StoredGrasp], fps: int) -> Plan:
         units=tuple(state.values()),
         arrays=arrays,
         tasks=tuple(dict.fromkeys(map(task_of, grasps))),
-        classes=predicted_classes(grasps),
-        events=told_events(grasps),
+        meanings=Meanings.of_grasps(grasps),
         commanded=commanded,
     )
 
@@ -120,18 +157,13 @@ def predictions(grasp: StoredGrasp) -> list[tuple[float, str]]:
     return running + ([(np.inf, str(final["label"]))] if final else [])
 
 
-def predicted_classes(grasps: Sequence[StoredGrasp]) -> tuple[str, ...]:
-    """Return every label that was predicted."""
-    return tuple(dict.fromkeys(label for grasp in grasps for _, label in predictions(grasp)))
-
-
-def told_events(grasps: Sequence[StoredGrasp]) -> tuple[str, ...]:
-    """Return the name of every event that was told."""
-    return tuple(dict.fromkeys(str(event["what"]) for grasp in grasps for event in _told(grasp)))
-
-
-def _told(grasp: StoredGrasp) -> list[Mapping[str, Any]]:
-    return [event for event in grasp.events if event.get("source") == "controller"]
+def _told(grasp: StoredGrasp) -> list[tuple[float, str]]:
+    """Return the events that the controller told, with their times (s)."""
+    return [
+        (float(event["t_s"]), str(event["what"]))
+        for event in grasp.events
+        if event.get("source") == "controller"
+    ]
 
 
 def _arrays(grasp: StoredGrasp) -> tuple[TactileArray, ...]:
@@ -202,22 +234,22 @@ def _columns(grasp: StoredGrasp, trace: Trace, plan: Plan, episode: int, start: 
     state = np.column_stack([_filled(known[name][0])[tick] for name in plan.state])
     position = state[:, plan.state.index("gripper.pos")] if "gripper.pos" in plan.state else state[:, 0]
     action = trace.command[tick] if plan.commanded else np.append(position[1:], position[-1])
-    columns = [
+    event, prediction = plan.meanings.numbers(grasp, times)
+    return [
         Column("observation.state", state.astype(np.float32), plan.state, plan.units),
         *(_array_column(array, trace, late) for array in plan.arrays),
         Column(
             "action", action.astype(np.float32), ("gripper.command" if plan.commanded else "gripper.pos",)
         ),
         Column("graspsense.phase", trace.phase[tick].astype(np.int64)),
-        Column("graspsense.event", event_numbers(grasp, plan.events, times)),
-        Column("graspsense.prediction", prediction_numbers(grasp, plan.classes, times)),
+        Column("graspsense.event", event),
+        Column("graspsense.prediction", prediction),
         Column("timestamp", (frame / plan.fps).astype(np.float32)),
         Column("frame_index", frame),
         Column("episode_index", np.full(n, episode)),
         Column("index", start + frame),
         Column("task_index", np.full(n, plan.tasks.index(task_of(grasp)))),
     ]
-    return columns
 
 
 def _filled(values: Any) -> Any:
@@ -242,24 +274,6 @@ def cell_names(array: TactileArray) -> tuple[str, ...]:
     columns = array.columns or array.cells
     places = [(k // columns, k % columns) for k in range(array.cells)]
     return tuple(f"{array.name}.r{row:02d}c{column:02d}{axis}" for row, column in places for axis in axes)
-
-
-def event_numbers(grasp: StoredGrasp, events: Sequence[str], times: Any) -> Any:
-    """Return the number of the event that was told in each frame, 0 for none."""
-    numbers = np.zeros(len(times), dtype=np.int64)
-    for event in _told(grasp):
-        frame = min(int(np.searchsorted(times, float(event["t_s"]) - 1e-9)), len(times) - 1)
-        numbers[frame] = events.index(str(event["what"])) + 1
-    return numbers
-
-
-def prediction_numbers(grasp: StoredGrasp, classes: Sequence[str], times: Any) -> Any:
-    """Return the number of the prediction that holds in each frame, 0 for none."""
-    numbers = np.zeros(len(times), dtype=np.int64)
-    for t_s, label in predictions(grasp):
-        frame = min(int(np.searchsorted(times, t_s - 1e-9)), len(times) - 1)
-        numbers[frame:] = classes.index(label) + 1
-    return numbers
 
 
 def _episode_row(
@@ -287,7 +301,7 @@ def _episode_row(
 
 def about(grasp: StoredGrasp) -> dict[str, Any]:
     """Return what is known of a trial as columns of its episode."""
-    told = [str(event["what"]) for event in _told(grasp)]
+    told = [what for _, what in _told(grasp)]
     final = grasp.prediction
     return {
         "graspsense/trial": grasp.number,
@@ -339,19 +353,10 @@ def _write_meta(
 
 def _meanings(grasps: Sequence[StoredGrasp], plan: Plan) -> dict[str, Any]:
     return {
-        **meanings_of_numbers(plan.events, plan.classes),
+        **plan.meanings.as_json(),
         "action": "the value that was commanded" if plan.commanded else "the position one frame later",
         "units of features": {name: unit for grasp in grasps for name, unit in grasp.units.items()},
         "raw": "graspsense/raw: the channels of each episode at their own rates",
-    }
-
-
-def meanings_of_numbers(events: Sequence[str], classes: Sequence[str]) -> dict[str, dict[str, str]]:
-    """Return what the numbers of phase, event and prediction stand for."""
-    return {
-        "graspsense.phase": {str(int(phase)): phase.name.lower() for phase in Phase},
-        "graspsense.event": {"0": "", **{str(k): name for k, name in enumerate(events, 1)}},
-        "graspsense.prediction": {"0": "", **{str(k): name for k, name in enumerate(classes, 1)}},
     }
 
 
