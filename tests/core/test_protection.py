@@ -689,6 +689,18 @@ def test_pads_that_both_feel_nothing_in_the_hold_are_told(left_n, right_n, told)
     assert any(fault is not None and not fault.ends for fault in faults) is told
 
 
+@every_case(("pads_hz", "ends"), [(0.0, True), (24.4, False)])
+def test_fast_fingers_have_two_images_of_the_pads_to_show_a_contact(pads_hz, ends):
+    """At 100 mm/s they move by 3 mm within an image, as when an egg breaks."""
+    touch, seen = Touch(CONTACT_N, pads_hz=pads_hz), []
+    for k in range(360):
+        # Between free and a contact for longer than a sharp rise takes.
+        force_n = 0.0 if k < 270 else 0.3 if k < 300 else 0.8
+        now = frame(0.001 * k, 0.08 - 1e-4 * k, velocity=-0.1, left=force_n, right=force_n)
+        seen.append(touch.see(now, APPROACH, CLOSING))
+    assert any(fault is not None and fault.ends for fault in seen) is ends
+
+
 @every_case(("rises_n", "ends"), [(0.0, True), (5.0, False)])
 def test_a_force_that_is_there_before_the_fingers_close_is_a_contact_only_if_it_rises(rises_n, ends):
     """Both pads feel 3 N from the beginning, while the fingers close by 10 mm."""
