@@ -36,9 +36,10 @@ OPENED_M: Final = 0.005
 FEWEST_OPEN: Final = 2
 OPEN_S: Final = 0.03
 """So many samples, over so long a time, show the zero of a pad."""
-ZERO_CONTACTS: Final = 0.25
-ZERO_SHARE: Final = 0.05
-"""By how much the zero may have moved: a share of the contact force, or of the greatest force."""
+ZERO_CONTACTS: Final = 0.5
+ZERO_SHARE: Final = 0.1
+"""By how much the zero may have moved: a share of the contact force, or of the greatest force. The PR2's object
+manipulator tares again after a hard squeeze, since a rest of the load remains (pr2_gripper_reactive_approach)."""
 SPIKE_CONTACTS: Final = 0.8
 SPIKE_SHARE: Final = 0.15
 """By how much a sample may differ from the mean of its neighbours, over what the other pad shows: a share of the
