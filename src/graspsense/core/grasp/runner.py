@@ -428,6 +428,8 @@ class _Grasp:
             return state
         delay_s = self.backend.command_delay_s
         if state.phase == RELEASE and self.protection is not None:
+            if self.protection.opening.opened:
+                return state
             # A gap that is told late stands still for longer.
             delay_s = self.protection.opening.stands_s
         still, earliest_s = state.still, state.since_t_s + delay_s

@@ -48,7 +48,8 @@ class Opening:
         self._first_m = nan
         self._widest_m = -inf
         self._start_m = self._start_s = self._rest_m = self._rest_s = nan
-        self._opened = False
+        self.opened = False
+        """Whether the fingers have begun to open after the grasp."""
 
     def before_closing(self, frame: Frame) -> Fault | None:
         """Take the frame in which the fingers are open; return what is wrong with their width."""
@@ -78,15 +79,15 @@ class Opening:
                 if not abs(frame.gap_m - self._rest_m) < OPENED_M:
                     self._rest_m, self._rest_s = frame.gap_m, frame.t_s
             return None
-        if self._opened:
+        if self.opened:
             return None
         closed_m, elapsed_s = self._widest_m - self._start_m, frame.t_s - self._start_s
         # A gap that is late closes on for a while, as that of fingers which brake.
         self._start_m = min(self._start_m, frame.gap_m)
-        self._opened = frame.gap_m - self._start_m >= OPENED_M
+        self.opened = frame.gap_m - self._start_m >= OPENED_M
         if not closed_m >= LEAST_TRAVEL_M:
             return None
-        if self._opened:
+        if self.opened:
             rested = self._start_s - self._rest_s >= RESTED_S
             return self._late(elapsed_s) if rested and elapsed_s > self._late_s else None
         if elapsed_s < self.stands_s:
@@ -106,7 +107,7 @@ class Opening:
         first_m, gap_m = self._first_m, frame.gap_m
         # Fingers that are seen not to open have a fault of their own.
         if (
-            not self._opened
+            not self.opened
             or self._target_m != self._target_m
             or not abs(gap_m - first_m) > max(AGAIN_M, AGAIN_SHARE * first_m)
         ):
