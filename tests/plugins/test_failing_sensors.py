@@ -81,9 +81,12 @@ def half_the_time(frame, start):
     ],
 )
 def test_a_sensor_that_fails_is_named(pipelines, fault, from_s, names):
+    # A wrong scale of the gap or of the time shows in these as well, where the gripper has what they compare.
+    beside = {"gap and velocity disagree", "clock slow"} if fault in (half, half_the_time) else set()
     for pipeline in pipelines.split():
         grasp, _ = grasped(pipeline, fault, from_s)
-        assert {warning.split(":")[0] for warning in grasp.warnings} >= names, pipeline
+        told = {warning.split(":")[0] for warning in grasp.warnings}
+        assert names <= told <= names | beside, (pipeline, told)
 
 
 @every_case("pipeline", ["robotiq", "so101"])
