@@ -70,22 +70,45 @@ def gap_resolution_by_sample(
     times_s: NDArray[np.float64], gaps_m: NDArray[np.float64], contact: int, end: int
 ) -> GapResolution:
     """Return what `gap_resolution` does for the samples before `end`, one by one, so that it can be compiled."""
-    step_m, coarse, last_change, was_closing = 0.0, False, 0, False
-    first_s, last_s, first_free, last_free, changes = 0.0, 0.0, 0, 0, 0
-    for i in range(1, end):
-        moved = gaps_m[i] - gaps_m[i - 1]
-        if not abs(moved) > ROUNDING * abs(gaps_m[i]):
-            continue
-        closing = moved < 0.0
-        if last_change > 0 and i - last_change > 1 and closing and was_closing:
-            coarse = True
-        step_m = abs(moved) if last_change == 0 else min(step_m, abs(moved))
-        last_change, was_closing = i, closing
-        if i <= contact:
-            if changes == 0:
-                first_free, first_s = i, times_s[i]
-            changes, last_free, last_s = changes + 1, i, times_s[i]
+    first_change, last_change = 1, contact
+    while first_change < end and not _changes(gaps_m[first_change - 1], gaps_m[first_change]):
+        first_change += 1
+    while last_change > first_change and not _changes(gaps_m[last_change - 1], gaps_m[last_change]):
+        last_change -= 1
+    n_changes = _count_changes(gaps_m[first_change - 1 : last_change], gaps_m[first_change : last_change + 1])
     period_s = 0.0
-    if changes >= LEAST_CHANGES and last_free - first_free > HELD * (changes - 1):
-        period_s = (last_s - first_s) / (changes - 1)
-    return GapResolution(step_m if coarse else 0.0, period_s)
+    if n_changes >= LEAST_CHANGES and last_change - first_change > HELD * (n_changes - 1):
+        period_s = (times_s[last_change] - times_s[first_change]) / (n_changes - 1)
+    # An approach in which each sample is a change has no repeated number.
+    begin = last_change if n_changes == last_change - first_change + 1 else first_change
+    if not _repeats_while_closing(gaps_m, begin, end):
+        return GapResolution(0.0, period_s)
+    step_m = abs(gaps_m[first_change] - gaps_m[first_change - 1])
+    for i in range(first_change, end):
+        if _changes(gaps_m[i - 1], gaps_m[i]):
+            step_m = min(step_m, abs(gaps_m[i] - gaps_m[i - 1]))
+    return GapResolution(step_m, period_s)
+
+
+def _changes(previous_m: float, gap_m: float) -> bool:
+    return abs(gap_m - previous_m) > ROUNDING * abs(gap_m)
+
+
+def _count_changes(previous_m: NDArray[np.float64], gaps_m: NDArray[np.float64]) -> int:
+    """Return how many gaps differ from those before them; the arrays have one shape."""
+    n = 0
+    for i in range(len(gaps_m)):
+        n += 1 if _changes(previous_m[i], gaps_m[i]) else 0
+    return n
+
+
+def _repeats_while_closing(gaps_m: NDArray[np.float64], begin: int, end: int) -> bool:
+    """Return whether a number is repeated between two changes that close the gap."""
+    last_change, was_closing = end, False
+    for i in range(begin, end):
+        if _changes(gaps_m[i - 1], gaps_m[i]):
+            closing = gaps_m[i] < gaps_m[i - 1]
+            if i - last_change > 1 and closing and was_closing:
+                return True
+            last_change, was_closing = i, closing
+    return False
