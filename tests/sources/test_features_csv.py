@@ -233,3 +233,27 @@ def test_a_table_that_is_repeated_gives_the_notes_of_its_lines(csv):
     assert double.table.names == single.table.names == ("peak", "valid")
     assert double.notes == single.notes
     assert len(double) == 2 * len(single)
+
+
+def test_objects_that_a_column_names_are_held_out_unless_a_column_is_named(csv):
+    """Six cups and six cans, each grasped twice: both trials of a cup are in one fold."""
+    kinds = [kind for kind in ("cup", "can") for _ in range(12)]
+    things = [f"{kind}-{'abcdef'[i % 12 // 2]}" for i, kind in enumerate(kinds)]
+    forces = np.random.default_rng(1).normal(5.0, 1.0, 24).round(3).tolist()
+    turns = [f"s{i % 2}" for i in range(24)]
+
+    def table(*columns):
+        return csv(
+            "what,thing,second,force\n"
+            + "".join(f"{','.join(map(str, row))}\n" for row in zip(*columns, strict=True))
+        )
+
+    path = table(kinds, things, turns, forces)
+    assert read_labelled(path, "what").instances == tuple(things)
+    assert read_labelled(path, "what", instance="second").instances == tuple(turns)
+    assert read_labelled(path, "what", features=["thing", "force"]).instances is None
+    # Two columns name the objects: which of them is meant, only the user knows.
+    assert (
+        read_labelled(table(kinds, things, [thing.upper() for thing in things], forces), "what").instances
+        is None
+    )

@@ -44,7 +44,11 @@ SOURCES: Final = """\b
 
 _OPTIONS: Final = (
     click.option("--label", metavar="COLUMN", help="CSV: column of the label."),
-    click.option("--instance", metavar="COLUMN", help="CSV: column of the instance."),
+    click.option(
+        "--instance",
+        metavar="COLUMN",
+        help="CSV: column of the instance.  [default: the only one that names objects]",
+    ),
     click.option("--order", metavar="COLUMN", help="CSV: column that increases in the order of recording."),
     click.option(
         "--features",

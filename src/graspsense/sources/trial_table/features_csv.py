@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -32,6 +32,7 @@ from graspsense.sources.trial_table.doubtful_columns import doubts, not_held_out
 from graspsense.sources.trial_table.exported_table import ExportedTable, exported
 from graspsense.sources.trial_table.identifiers import (
     LEAST_LINES,
+    OF_OBJECTS,
     identifies,
     names_a_recording,
     text_identifies,
@@ -61,8 +62,9 @@ def read_labelled(
 ) -> Labelled:
     """Return the trials of a CSV file; the column `label` says what was grasped.
 
-    `instance` is the column that identifies the individual object, `order` a column of numbers that increase in the
-    order of recording (default: the order of the lines). Both are known in a table that `graspsense export` wrote.
+    `instance` is the column that identifies the individual object (default: the column `instance`, or the only one
+    whose values name objects), `order` a column of numbers that increase in the order of recording (default: the order
+    of the lines). Both are known in a table that `graspsense export` wrote.
     `features` are the columns to learn from, by default all columns of numbers that have no other meaning. Those of
     `known_before` are known before contact, for the control; they are features unless `features` leaves them out. With
     `value`, this column of numbers is the target; lines without it are left out, and no label is needed.
@@ -76,20 +78,18 @@ def read_labelled(
     if export is not None:
         label = label or "label"
         export.keep_complete_trials(label if value is None else None, notes)
-        if instance is None and not any(map(is_missing_label, columns.cells["instance"])):
-            instance = "instance"
         features = features or export.features
     elif isinstance(columns, ArffColumns) and value is None:
         notes += columns.without_label(label)
     target = None if value is None else _target(columns, value, export, notes)
     labels = _labels(columns, label, notes) if target is None else _texts(columns, label)
-    instances = None if instance is None else tuple(columns.complete_column(instance, "the instance"))
-    reserved = {name for name in (label, instance, order, value) if name}
     ranks, no_order = _order(columns, order, export, notes)
     lines = _lines_once(columns, {order, columns.index}, labels)
-    once, labels_once = columns.rows(lines), [labels[i] for i in lines]
-    ranks_once = None if ranks is None else [ranks[i] for i in lines]
-    identified = partial(_identified, once, labels_once, ranks_once) if export is None else _measured
+    identified = _measured if export is not None else _identifying(columns, labels, ranks, lines)
+    if instance is None and (target is None or export is not None):
+        instance = _object_column(columns, {label, order, columns.index, *features}, identified, notes)
+    instances = None if instance is None else tuple(columns.complete_column(instance, "the instance"))
+    reserved = {name for name in (label, instance, order, value) if name}
     table = _feature_table(columns, features, reserved, identified, notes)
     if export is None:
         recorded = lines if ranks is None else sorted(lines, key=ranks.__getitem__)
@@ -109,6 +109,34 @@ def read_labelled(
         notes=tuple(notes),
         provenance={"simulated": export is not None and "1" in columns.cells["simulated"]},
     )
+
+
+def _object_column(
+    columns: CsvColumns, others: set[str | None], identified: Callable[[str], str], notes: list[str]
+) -> str | None:
+    """Return the column `instance`, or the only one that names the objects, and note it; None if there is none.
+
+    `others` are the columns with another meaning.
+    """
+    possible = [name for name in columns.names if name not in others and not columns.is_blank(name)]
+    named = [name for name in possible if name == "instance"] or [
+        name for name in possible if identified(name) in OF_OBJECTS
+    ]
+    if len(named) != 1 or any(map(is_missing_label, columns.cells[named[0]])):
+        return None
+    notes.append(
+        f"the trials of an object are held out together: {named[0]} names the objects "
+        f"({option('instance', 'COLUMN')} names another column)"
+    )
+    return named[0]
+
+
+def _identifying(
+    columns: CsvColumns, labels: Sequence[str], ranks: Sequence[int] | None, lines: Sequence[int]
+) -> Callable[[str], str]:
+    """Return `_identified` of these lines, which computes the answer for a column once."""
+    ranks_once = None if ranks is None else [ranks[i] for i in lines]
+    return cache(partial(_identified, columns.rows(lines), [labels[i] for i in lines], ranks_once))
 
 
 def _lines_once(columns: CsvColumns, counted_by: set[str | None], labels: Sequence[str]) -> list[int]:

@@ -73,6 +73,10 @@ _EPOCH_S: Final = (6.3e8, 4.2e9)
 """The years 1990 to 2100 in seconds since 1970."""
 _PER_SECOND: Final = (1.0, 1e3, 1e6, 1e9)
 """The units of such times."""
+NAME_OBJECTS: Final = "name the objects (say so by --instance)"
+NUMBER_OBJECTS: Final = "number the objects (name them by --instance)"
+OF_OBJECTS: Final = (NAME_OBJECTS, NUMBER_OBJECTS)
+"""How the values of a column identify trials that are of the same object."""
 _MOST_VALUES: Final = 1.0 / 3.0
 """Share of different texts from which on they are no values of a nominal feature."""
 _DATE_TEXT: Final = re.compile(
@@ -146,7 +150,7 @@ def identifies(
             return "have equal steps, as those of a clock or a counter"
     hashed = whole and column.max() >= _HASHED and bool((column % 1000.0).any())
     if (hashed or cells <= 2.0 * len(values_of)) and name_objects(column.tolist(), known):
-        return "number the objects (name them by --instance)"
+        return NUMBER_OBJECTS
     return ""
 
 
@@ -163,14 +167,14 @@ def text_identifies(texts: Sequence[str], labels: Sequence[str]) -> str:
         len(counts) > 2 and all(_WEEKDAYS.fullmatch(text.lower()) for text in counts)
     ):
         return "are dates or times"
+    values, known = [text for text, _ in given], [label for _, label in given]
+    if name_objects(values, known):
+        return NAME_OBJECTS
     if len(counts) > max(2, len(given) * _MOST_VALUES):
         return "are texts that hardly repeat, as names of trials, files and remarks do"
     numbered = all(re.search(r"\d", text) for text in counts)
-    values, known = [text for text, _ in given], [label for _, label in given]
-    if (numbered and _enough_objects(len(counts), known) and len(set(given)) == len(counts)) or name_objects(
-        values, known
-    ):
-        return "name the objects (say so by --instance)"
+    if numbered and _enough_objects(len(counts), known) and len(set(given)) == len(counts):
+        return NAME_OBJECTS
     return ""
 
 
