@@ -59,7 +59,7 @@ def test_run_reports_each_decision_with_its_number():
     report = json.loads(done.stdout)["report"]
     selection = report["selection"]
     assert (selection["accuracy"], selection["fidelity"], report["resolved"]) == (0.01, "scene", True)
-    assert selection["level"] == PLAIN.level(0.01)._asdict()
+    assert selection["level"] == PLAIN[0].level(0.01)._asdict()
     assert selection["verified"]["error"] <= 0.005
     # The probing force less friction, and what the controller is set to.
     assert 10.0 < selection["expected_force_n"] < 25.0
@@ -97,10 +97,7 @@ def test_scenes_on_which_it_was_once_broken(bench, number):
     # second finger that meets what the first pushes or presses, a contact that is sensitive to the approach.
     row = regimes.measured(bench, random_scenes.scene_of(number))
     assert row["stable"]
-    missed = [accuracy for accuracy, error in errors_of(row).items() if error > 1.0]
-    # At 0.1 % the trial grasps of the last scene reach their limit of work: its report says that nothing is verified.
-    assert missed == ([0.001] if number == 2164 else [])
-    assert all("not verified" in row[f"{accuracy:g}"]["flags"] for accuracy in missed)
+    assert max(errors_of(row).values()) <= 1.0
 
 
 @pytest.mark.slow

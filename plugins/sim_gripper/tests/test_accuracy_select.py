@@ -282,7 +282,7 @@ def test_every_object_of_the_catalogue_has_a_model_of_ordinary_steps():
         config = evolve(CONFIG, spread=True, open_gap_m=min(spec.width_m + 0.01, CONFIG.open_gap_m))
         model = selected(config, spec, hybrid())
         assert model.verification is not None, spec.name
-        ordinary = [scale.level(config.accuracy) for scale in (PLAIN, CONTROLLED[0])]
+        ordinary = [scale.level(config.accuracy) for scale in (*PLAIN, CONTROLLED[0])]
         assert model.level in ordinary, spec.name
 
 
@@ -293,7 +293,7 @@ def test_with_spread_a_step_per_tick_is_chosen_if_it_suffices_for_several_instan
     config = evolve(CONFIG, spread=True, accuracy=1e-3, pad_stiffness_n_m=math.inf)
     model = selected(config, spec, hybrid())
     # The nominal object passes; with a wide spread, an instance does not.
-    assert model.level == (PLAIN if stiffness_spread == 0.0 else CONTROLLED[0]).level(1e-3)
+    assert model.level == (PLAIN[0] if stiffness_spread == 0.0 else CONTROLLED[0]).level(1e-3)
     assert model.verification.error <= 0.5e-3
 
 
@@ -301,7 +301,7 @@ def test_with_spread_a_step_per_tick_is_chosen_if_it_suffices_for_several_instan
 def test_a_step_per_tick_is_chosen_where_it_is_accurate_enough_and_not_where_it_is_not():
     stiff = thing(("elastic", {"k1_n_m": 5e5}), ("maxwell", {"k_n_m": 2e5, "tau_s": 0.01}))
     tight = selected(evolve(CONFIG, accuracy=1e-4), thing(SHELL), hybrid())
-    assert tight.level == PLAIN.level(1e-4)
+    assert tight.level == PLAIN[0].level(1e-4)
     assert tight.verification.error <= 0.8e-4
     controlled = selected(evolve(CONFIG, accuracy=1e-4, pad_stiffness_n_m=math.inf), stiff, hybrid())
     assert controlled.steps.tolerance < math.inf

@@ -351,7 +351,7 @@ def test_a_stuck_gripper_does_not_creep_whatever_it_holds(name, params):
 
 
 def a_step_per_tick():
-    return steps_for(PLAIN.level(0.01), TICK)._replace(macro_tolerance=0.0)
+    return steps_for(PLAIN[0].level(0.01), TICK)._replace(macro_tolerance=0.0)
 
 
 @cache

@@ -54,8 +54,9 @@ class LevelScale(NamedTuple):
         return Level(accuracy / self.refinement, self.min_steps, self.plain)
 
 
-PLAIN: Final = LevelScale(plain=1)
-"""A step per tick, and over several ticks: it costs least."""
+PLAIN: Final = LevelScale(plain=1), LevelScale(10.0, plain=1)
+"""A step per tick, and over several ticks: it costs least. The error of steps over several ticks, which moves the time
+of rest, is a tenth in the second one."""
 CONTROLLED: Final = (LevelScale(), LevelScale(10.0, 4), LevelScale(100.0, 32))
 """Smaller and smaller steps whose error is controlled."""
 REFERENCE_SCALES: Final = {

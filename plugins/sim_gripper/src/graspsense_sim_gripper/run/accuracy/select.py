@@ -168,7 +168,7 @@ def _accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Iterator[Chos
     """Yield the models that trial grasps accept, the fastest first. Raises ConfigError if there is none."""
     config = problem.model_config
     share, least, grasps, n_accepted = _accepted_share(config), (math.inf, ""), 1, 0
-    for scale in (PLAIN, *CONTROLLED):
+    for scale in (*PLAIN, *CONTROLLED):
         chosen = propose(problem, grip, scale)
         full = propose(problem, grip, _reference_scale(config, scale))
         error, quantity = _off(trial, chosen, trial.record(full))
