@@ -216,6 +216,7 @@ class Model:
                     because=(),
                     prediction_set=tuple(classes[k] for k in order),
                     coverage=self.sets.coverage if self.sets is not None and order else None,
+                    of_same_objects=self.sets is not None and self.sets.of_same_objects,
                     calibrated=not without,
                     certainty_interval=None if without else intervals[i],
                     no_certainty=without,
@@ -290,12 +291,12 @@ class Model:
         if (
             self.certainty is not None
             and self.sets is not None
-            and self.sets.unit == "trials"
+            and self.sets.of_same_objects
             and not differences
         ):
             yield (
-                "certainty and sets were measured with grasps of the objects that it was trained on: of other objects "
-                "it knows less, and less once the forces have drifted"
+                "certainty and sets are for the same objects and sessions, since the training held out no named ones: "
+                "of others it knows less, and less once the forces have drifted"
             )
         if self.sets is not None and self.sets.uncalibrated and not differences:
             names = ", ".join(self.sets.uncalibrated)
