@@ -154,11 +154,6 @@ class PredictionSets:
         return inside
 
     @property
-    def of_same_objects(self) -> bool:
-        """Whether they hold for grasps of the trained objects: that others were held out is not known."""
-        return self.unit != "instances"
-
-    @property
     def uncalibrated(self) -> tuple[str, ...]:
         """The labels that are in every set, because they have too few units."""
         return tuple(sorted(name for name, threshold in self.thresholds.items() if threshold.score is None))
@@ -173,7 +168,7 @@ class PredictionSets:
         text = f"{100 * self.coverage:.0f} % for {len(self.thresholds) - len(shared)} of {len(self.thresholds)} labels"
         if not shared:
             fewest = min(threshold.units for threshold in self.thresholds.values())
-            held_for = ", for grasps of the same objects only" if self.of_same_objects else ""
+            held_for = "" if self.unit == "instances" else ", for grasps of the same objects only"
             return f"{text} ({fewest} {self.unit} or more of each{held_for})"
         lacking = ", ".join(f"{name} {needed - self.thresholds[name].units} more" for name in shared)
         return f"{text}; the others are in every set; a label needs {needed} {self.unit}: {lacking}"

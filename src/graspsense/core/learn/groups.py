@@ -79,8 +79,8 @@ def grouped(labelled: Labelled) -> Labelled:
 
 def _to_the_first(group_of: Numbers) -> Numbers:
     """Return pairs, shape (2, trials), of each trial with the first one of its group."""
-    _, first, column = np.unique(group_of, return_index=True, return_inverse=True)
-    return np.stack([np.arange(len(group_of)), first[column]])
+    _, begins, column = np.unique(group_of, return_index=True, return_inverse=True)
+    return np.stack([np.arange(len(group_of)), begins[column]])
 
 
 def _joined(pairs: Numbers, n: int) -> list[int]:
@@ -90,8 +90,8 @@ def _joined(pairs: Numbers, n: int) -> list[int]:
 
     joined = coo_array((np.ones(pairs.shape[1]), (pairs[0], pairs[1])), shape=(n, n))
     _, component_of = connected_components(joined, directed=False)
-    first: list[int] = _to_the_first(component_of.astype(np.int64))[1].tolist()
-    return first
+    joined_to: list[int] = _to_the_first(component_of.astype(np.int64))[1].tolist()
+    return joined_to
 
 
 def _near_copies(labelled: Labelled) -> tuple[Numbers, list[str]]:
