@@ -267,6 +267,11 @@ DOUBTFUL = {
         "gap_at_start [mm]",
         [80.0 + i // 10 + RNG.normal(0.0, 0.1) for i in range(N)],
     ),
+    "a level of force that most trials of a label have": (
+        "level [N]",
+        [5 + 5 * ((i > 29) != (i % 9 == 0)) for i in range(N)],
+    ),
+    "who grasped most trials of a label": ("handler", ["AB"[(i > 29) != (i % 9 == 0)] for i in range(N)]),
     "millimetres and metres": ("x", [*NOISE[:30], *[f"{value / 1000:.6f}" for value in NOISE[30:]]]),
 }
 
@@ -274,6 +279,12 @@ DOUBTFUL = {
 @every_case("doubt", DOUBTFUL)
 def test_a_column_that_may_reveal_the_labels_is_told(doubt, tmp_path):
     assert notes_on(tmp_path / "t.csv", *DOUBTFUL[doubt])
+
+
+def test_a_setting_that_all_labels_have_is_a_feature(tmp_path):
+    assert not notes_on(
+        tmp_path / "t.csv", "level [N]", [5 + 5 * ((i % 2) != (i % 9 == 0)) for i in range(N)]
+    )
 
 
 DRIFTS = {

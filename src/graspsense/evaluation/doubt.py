@@ -124,7 +124,7 @@ def calibrated(model: Model, learner: ClassifierFactory, labelled: Labelled, see
         folds = held_out(labels, instances, FOLDS, seed)
         pooled = cross_validate(learner, labelled.table, labels, [np.arange(len(labels))], [folds], seed=seed)
     except (FitRefused, ConfigError) as refusal:
-        return evolve(model, sets=_no_sets(instances, str(refusal)))
+        return evolve(model, sets=_no_sets(labelled, str(refusal)))
     return calibrated_with(model, pooled, labelled)
 
 
@@ -156,21 +156,28 @@ def calibrated_with(model: Model, answers: Pooled, labelled: Labelled) -> Model:
     instances, trials = exchangeable_instances(labelled), len(labelled)
     calibration = _calibration(answers, labelled.labels, instances, np.arange(trials))
     if isinstance(calibration, str):
-        return evolve(model, sets=_no_sets(instances, calibration))
+        return evolve(model, sets=_no_sets(labelled, calibration))
     return evolve(
         model,
         certainty=calibration.certainty,
         temperature=calibration.temperature,
-        sets=evolve(calibration.sets, unknown=int(answers.unlike.sum()), trials=trials),
+        sets=evolve(
+            calibration.sets,
+            unit=_unit(instances, labelled.grouped),
+            unknown=int(answers.unlike.sum()),
+            trials=trials,
+        ),
     )
 
 
-def _no_sets(instances: Sequence[str] | None, why: str) -> PredictionSets:
-    return PredictionSets(coverage=COVERAGE, unit=_unit(instances), thresholds={}, reason=why)
+def _no_sets(labelled: Labelled, why: str) -> PredictionSets:
+    unit = _unit(exchangeable_instances(labelled), labelled.grouped)
+    return PredictionSets(coverage=COVERAGE, unit=unit, thresholds={}, reason=why)
 
 
-def _unit(instances: Sequence[str] | None) -> str:
-    return "trials" if instances is None else "instances"
+def _unit(instances: Sequence[str] | None, grouped: bool = False) -> str:
+    """Return what is held out, one of `conformal.UNITS`."""
+    return "trials" if instances is None else "groups" if grouped else "instances"
 
 
 def _calibration(
@@ -214,9 +221,9 @@ def _answers(certainty: Certainty, pooled: Pooled, rows: NDArray[np.int64]) -> A
 
 
 def exchangeable_instances(labelled: Labelled) -> tuple[str, ...] | None:
-    """Return the instances of the trials; None if they are not known, or if a label has a single one."""
-    if labelled.instances is None:
-        return None
+    """Return the instances of the trials; None if they are not known, or if a label has a single named one."""
+    if labelled.instances is None or labelled.grouped:
+        return labelled.instances
     pairs = set(zip(labelled.labels, labelled.instances, strict=True))
     several = all(sum(label == name for name, _ in pairs) > 1 for label in labelled.classes)
     return labelled.instances if several else None
@@ -226,7 +233,8 @@ def exchangeable_instances(labelled: Labelled) -> tuple[str, ...] | None:
 class HeldOut:
     """Predictions of held-out trials, their true labels, the instances held out if any, and the folds of each group.
 
-    What is said of the trials of a fold is calibrated with the predictions of the other folds.
+    `grouped` says that the instances are those of `learn.groups`. What is said of the trials of a fold is calibrated
+    with the predictions of the other folds.
     """
 
     pooled: Pooled
@@ -234,6 +242,7 @@ class HeldOut:
     instances: Sequence[str] | None
     groups: Groups
     folds: Sequence[Folds]
+    grouped: bool = False
 
     def members(self) -> NDArray[np.bool_] | str:
         """Return which labels belong to the set of each trial, shape (trials, classes), or why there are no sets."""
@@ -252,7 +261,7 @@ class HeldOut:
         The model of a fold does not know the instances that it is tested on. The thresholds do indirectly: the models
         of the other folds were trained on them.
         """
-        labels, classes, unit = self.labels, self.pooled.classes, _unit(self.instances)
+        labels, classes, unit = self.labels, self.pooled.classes, _unit(self.instances, self.grouped)
         inside = self.members()
         if isinstance(inside, str):
             return SetCoverage(asked=COVERAGE, unit=unit, reason=inside)

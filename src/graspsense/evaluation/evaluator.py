@@ -127,6 +127,7 @@ class Evaluator:
             instances=self.trials.instances if headline.protocol == INSTANCE_HELD_OUT else None,
             groups=self.groups,
             folds=headline.folds,
+            grouped=self.trials.grouped,
         )
 
     def by_features(self, pooled: Pooled) -> dict[str, RecognitionRate]:

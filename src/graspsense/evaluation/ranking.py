@@ -261,6 +261,7 @@ def _measured(
                 instances=exchangeable_instances(trials),
                 groups=groups,
                 folds=[folds],
+                grouped=trials.grouped,
             )
             sets = held_out.set_coverage(partial(rate_among, trials, folds=int(folds.max()) + 1))
     return CandidateResult(right=right, training_s=seconds[0], sets=sets)

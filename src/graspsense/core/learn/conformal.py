@@ -35,6 +35,8 @@ COVERAGE: Final = 0.9
 """Share of the trials whose set shall contain the true label."""
 COVERAGES: Final = (0.01, 0.999)
 """The coverages that a stored model may have; each needs a number of units that can be counted."""
+UNITS: Final = ("instances", "groups", "trials")
+"""What is held out: named objects or sessions, trials that belong together (`learn.groups`), or single trials."""
 _ROUNDING: Final = 1e-9
 _CLOSENESS: Final = 1e-3
 """Weight of the closeness in a score: it only matters among probabilities that are equal, or almost."""
@@ -114,7 +116,7 @@ class Answers:
 class PredictionSets:
     """The thresholds of all labels, from trials that were predicted by a model without their unit.
 
-    `unit` is `instances` or `trials`. `of_support` has the threshold of each class of support, which holds for all
+    `unit` is one of `UNITS`. `of_support` has the threshold of each class of support, which holds for all
     labels. `thresholds` is empty if no label has enough units; `reason` then says so. `unknown` of the `trials`
     calibration trials were called unknown: the false alarms of that rule.
     """
@@ -199,7 +201,7 @@ def sets_from(kept: StoredValues, classes: Sequence[str], support_classes: int) 
     trials = kept.whole("trials")
     return PredictionSets(
         coverage=kept.number("coverage", *COVERAGES),
-        unit=kept.choice("unit", ("instances", "trials")),
+        unit=kept.choice("unit", UNITS),
         thresholds=thresholds,
         of_support=tuple(kept.numbers("of_support", (support_classes if thresholds else None,)).tolist()),
         reason=kept.text("reason"),

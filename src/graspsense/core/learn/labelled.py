@@ -64,8 +64,9 @@ class Labelled:
     """Trials with their features and labels.
 
     `labels` are `class:state`, or a class alone. `instances` identify the individual object of each trial
-    (`odwalla#3`); None if that was not recorded, with the reason in `no_instances`. `order` numbers the trials in the
-    order of recording. `before_contact` are features from before contact only, None with the reason in
+    (`odwalla#3`); None if that was not recorded, with the reason in `no_instances`. If `grouped`, they are trials that
+    belong together (`learn.groups`), of objects that are not known. `order` numbers the trials in the order of
+    recording. `before_contact` are features from before contact only, None with the reason in
     `no_before_contact`; `first_line` are the numbers of the first frame alone, if the trials were imported; `width` is
     the width alone. `variants` are further tables to evaluate. If rates on these
     trials say nothing about other objects, `no_interval` is the reason, and they get no interval. `notes` tell what a
@@ -80,6 +81,7 @@ class Labelled:
     labels: tuple[str, ...] = field(converter=_label_texts)
     instances: tuple[str, ...] | None = field(default=None, converter=optional(_label_texts))
     no_instances: str = ""
+    grouped: bool = False
     no_interval: str = ""
     order: tuple[int, ...] | None = None
     no_order: str = ""

@@ -76,6 +76,11 @@ class Model:
         return bool(self.provenance.get("simulated", False))
 
     @property
+    def of_same_objects(self) -> bool:
+        """Whether its certainty holds for grasps of the trained objects only, as far as is known."""
+        return self.certainty is not None and self.sets is not None and self.sets.unit != "instances"
+
+    @property
     def in_a_line(self) -> str:
         """The classifier and its training data, in one line."""
         kind = "simulated grasps" if self.simulated else f"trials of {self.provenance.get('source', '?')}"
@@ -139,6 +144,7 @@ class Model:
                     support=explained.support,
                     warnings=warnings,
                     model=self.in_a_line,
+                    of_same_objects=self.of_same_objects,
                 )
             probabilities = prediction.probabilities
             because = (strange,)
@@ -160,7 +166,10 @@ class Model:
         warnings = (*self._kind_warnings(differences), *differences)
         labels, shares = self.answers(table)
         made = self._calibrated(table.columns(self.names), labels, shares, bool(differences))
-        return [evolve(prediction, warnings=warnings, model=self.in_a_line) for prediction in made]
+        return [
+            evolve(prediction, warnings=warnings, model=self.in_a_line, of_same_objects=self.of_same_objects)
+            for prediction in made
+        ]
 
     def _calibrated(
         self, table: FeatureTable, labels: Sequence[str], shares: NDArray[np.float64], elsewhere: bool
@@ -287,15 +296,10 @@ class Model:
 
     def _kind_warnings(self, differences: Sequence[str]) -> Iterator[str]:
         """Yield what holds for all predictions of this model, unless a difference says more."""
-        if (
-            self.certainty is not None
-            and self.sets is not None
-            and self.sets.unit == "trials"
-            and not differences
-        ):
+        if self.of_same_objects and not differences:
             yield (
-                "certainty and sets were measured with grasps of the objects that it was trained on: of other objects "
-                "it knows less, and less once the forces have drifted"
+                "certainty and sets are for the same objects and sessions, since the training held out no named ones: "
+                "of others it knows less, and less once the forces have drifted"
             )
         if self.sets is not None and self.sets.uncalibrated and not differences:
             names = ", ".join(self.sets.uncalibrated)

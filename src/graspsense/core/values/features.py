@@ -210,7 +210,8 @@ class Prediction:
     the most probable first: it contains the true label of a new object with the probability `coverage`. It is empty,
     and `coverage` None, if the model is not calibrated or the trial is unknown. `calibrated` says whether the
     probabilities agree with rates in held-out trials (`graspsense.core.learn.certainty`); `no_certainty` says why not.
-    `certainty_interval` is the 95 % interval of the certainty, None if it was not measured.
+    `certainty_interval` is the 95 % interval of the certainty, None if it was not measured. `of_same_objects` says that
+    both hold for grasps of the trained objects, since it is not known that others were held out.
     """
 
     label: str
@@ -224,6 +225,7 @@ class Prediction:
     calibrated: bool = False
     no_certainty: str = ""
     certainty_interval: tuple[float, float] | None = None
+    of_same_objects: bool = False
 
     @property
     def set_in_words(self) -> str:
@@ -235,7 +237,13 @@ class Prediction:
 
         The coverage is that of sets of all sizes together: those of many labels hold more often, those of few less.
         """
-        return "" if self.coverage is None else f"{labels}, {certainty_words(self.coverage)} of all sets"
+        if self.coverage is None:
+            return ""
+        return f"{labels}, {certainty_words(self.coverage)} of all sets{self._for_which}"
+
+    @property
+    def _for_which(self) -> str:
+        return " for the same objects" if self.of_same_objects else ""
 
     @property
     def certainty(self) -> float | None:
@@ -255,12 +263,15 @@ class Prediction:
 
     @property
     def certainty_figure(self) -> str:
-        """The certainty in per cent, with its interval if that is wide: `92 % (72 to 98 %)`; empty without one."""
+        """The certainty in per cent, with its interval if that is wide: `92 % (72 to 98 %)`; empty without one.
+
+        It says so where it holds `for the same objects` only.
+        """
         if self.certainty is None:
             return ""
         low, high = self.certainty_interval or (self.certainty, self.certainty)
         interval = f" ({100 * low:.0f} to {100 * high:.0f} %)" if high - low > WIDE else ""
-        return certainty_words(self.certainty) + interval
+        return certainty_words(self.certainty) + interval + self._for_which
 
     @property
     def certainty_in_words(self) -> str:
@@ -294,6 +305,7 @@ class Prediction:
             "certainty": self.certainty,
             "certainty_interval": None if self.certainty_interval is None else list(self.certainty_interval),
             "calibrated": self.calibrated,
+            "of_same_objects": self.of_same_objects,
             "no_certainty": self.no_certainty,
             "because": [reason.as_json() for reason in self.because],
         }

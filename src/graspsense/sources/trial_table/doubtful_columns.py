@@ -65,6 +65,8 @@ _FEW: Final = 0.1
 """Share of the lines of a label that may differ from the others in whether they have a value."""
 _ROUNDED: Final = 6
 """Most digits of a number that is taken for a rounded one."""
+_MOSTLY: Final = 0.75
+"""Share of the lines of each label from which on a value may be the setting that this label was recorded with."""
 _ENOUGH_LINES: Final = 30
 _USUAL: Final = 2.0
 """Largest step between two labels over the median step within labels."""
@@ -120,6 +122,15 @@ def _of_recording(
             "all trials of a label have the same value",
             same,
             "If it is the label in other words, or tells of the recording, ",
+        ),
+        (
+            "most trials of each label have the same one of its few values",
+            [
+                name
+                for name in used
+                if name not in same and mostly_says_the_label(columns.cells[name], labels)
+            ],
+            "If it is a setting or a condition of the experiment, it reveals the labels: ",
         ),
         (
             "each of its values occurs with one label only",
@@ -236,6 +247,20 @@ def says_the_label(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
     different, among = len(set(values)), len(set(labels))
     few = different < among and min(Counter(labels).values()) < LEAST_LINES
     return 1 < different <= len(pairs) == among < len(labels) and not few
+
+
+def mostly_says_the_label(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
+    """Return whether each label, of lines that are not few, has one of few values in most of its lines.
+
+    There are no more values than labels, as where each was recorded by another operator or at another level of force.
+    """
+    counts = Counter(labels)
+    usual: dict[str, Hashable] = {}
+    for (value, label), lines in Counter(zip(values, labels, strict=True)).items():
+        if lines >= _MOSTLY * counts[label]:
+            usual[label] = value
+    few = len(set(values)) <= len(counts) and min(counts.values()) >= LEAST_LINES
+    return few and len(usual) == len(counts) and len(set(usual.values())) == len(set(values)) > 1
 
 
 def says_of_labels(values: Sequence[bool], labels: Sequence[str]) -> bool:

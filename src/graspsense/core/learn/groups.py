@@ -1,0 +1,214 @@
+"""Trials that belong together, although no instance says so: they are held out together, as those of one object are.
+
+Near copies: rounded, shifted or noisy copies of a trial have no equal features. What gives them away is their number.
+Of trials drawn independently, with features that all follow one number, a fifth are five times closer to one trial than
+to the next one, and fewer if there are more numbers to follow. More than that are copies, or grasps of one object.
+
+Neighbours: where no instances are named, trials of a label that follow each other may be more alike than others, as
+grasps of one object, windows of one recording and a drifting sensor make them. They are held out in blocks, whose
+length is doubled as long as neighbouring blocks are alike. Of trials in another order, no values tell.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from attrs import evolve
+
+from graspsense.core.components.caller import option
+from graspsense.core.values.errors import counted
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from graspsense.core.learn.labelled import Labelled
+
+    Numbers = NDArray[np.int64]
+    Values = NDArray[np.float64]
+
+_CLOSER: Final = 0.2
+"""Ratio of two distances below which a trial is much closer to some trials than to the next one."""
+_BY_CHANCE: Final = 1e-6
+_MOST_OTHERS: Final = 4
+"""Largest number of trials that each trial may be close to."""
+_FEWEST_OF_LABEL: Final = 3
+"""A label with fewer trials than this times those that are close is a group of its own."""
+_MOST_TRIALS: Final = 2000
+_MOST_FEATURES: Final = 32
+_NEAREST: Final = 1e-7
+"""Distances, in standard deviations, below which the difference of two squares is not known."""
+_PERMUTATIONS: Final = 199
+_ALIKE: Final = 3.5
+"""Standard deviations by which neighbours are more alike than trials in random order, if they belong together."""
+_STILL_ALIKE: Final = 2.0
+"""The same for blocks, once it is known that neighbours are alike."""
+_FEWEST_BLOCKS: Final = 4
+"""Blocks of a label from which on it can be told whether neighbouring ones are alike."""
+
+
+def grouped(labelled: Labelled) -> Labelled:
+    """Return the trials with groups as their instances, and notes on them, if some of them belong together.
+
+    Named instances are joined where their trials are near copies. Numbers to predict have no blocks.
+    """
+    pairs, notes = _near_copies(labelled)
+    links = [pairs]
+    if labelled.instances is not None:
+        links.append(_to_the_first(np.unique(np.array(labelled.instances), return_inverse=True)[1]))
+    elif labelled.value is None:
+        length, block_of = _blocks(labelled)
+        if length > 1:
+            links.append(_to_the_first(block_of))
+            notes.append(
+                "trials of a label that follow each other are more alike than others, as grasps of one object, windows "
+                f"of one recording, and drift make them. Blocks of {length} are held out as if of one object: name the "
+                f"objects or sessions ({option('instance', 'COLUMN')})"
+            )
+    if not notes:
+        return labelled
+    named = labelled.instances or [f"group of trial {k + 1}" for k in range(len(labelled))]
+    return evolve(
+        labelled,
+        instances=tuple(named[k] for k in _joined(np.concatenate(links, axis=1), len(labelled))),
+        grouped=labelled.instances is None,
+        notes=(*labelled.notes, *notes),
+    )
+
+
+def _to_the_first(group_of: Numbers) -> Numbers:
+    """Return pairs, shape (2, trials), of each trial with the first one of its group."""
+    _, begins, column = np.unique(group_of, return_index=True, return_inverse=True)
+    return np.stack([np.arange(len(group_of)), begins[column]])
+
+
+def _joined(pairs: Numbers, n: int) -> list[int]:
+    """Return for each of `n` trials the first one that these pairs join it to."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    joined = coo_array((np.ones(pairs.shape[1]), (pairs[0], pairs[1])), shape=(n, n))
+    _, component_of = connected_components(joined, directed=False)
+    joined_to: list[int] = _to_the_first(component_of.astype(np.int64))[1].tolist()
+    return joined_to
+
+
+def _near_copies(labelled: Labelled) -> tuple[Numbers, list[str]]:
+    """Return pairs of trials that are much closer to each other than to the rest, and a note on them, if any.
+
+    Trials of one named instance may be close.
+    """
+    pairs: list[Numbers] = [np.empty((2, 0), dtype=np.int64)]
+    values = _scaled(labelled.table.values)
+    if not 2 * _MOST_OTHERS < len(labelled) <= _MOST_TRIALS or values.shape[1] < 2:
+        return pairs[0], []
+    squares = (values**2).sum(axis=1)
+    apart = np.sqrt(np.maximum(squares[:, np.newaxis] + squares - 2.0 * values @ values.T, 0.0))
+    np.fill_diagonal(apart, np.inf)
+    if labelled.instances is not None:
+        instances = np.unique(np.array(labelled.instances), return_inverse=True)[1]
+        apart[instances[:, np.newaxis] == instances] = np.inf
+    of_label = Counter(labelled.labels)
+    trials_of_label = np.array([of_label[label] for label in labelled.labels])
+    closest = np.argsort(apart, axis=1, kind="stable")[:, : _MOST_OTHERS + 1]
+    nearest = np.take_along_axis(apart, closest, axis=1)
+    most = 0
+    copies: set[int] = set()
+    for others in range(1, _MOST_OTHERS + 1):
+        near, next_one = nearest[:, others - 1], nearest[:, others]
+        judged = (near > _NEAREST) & np.isfinite(next_one)
+        judged &= trials_of_label > _FEWEST_OF_LABEL * (others + 1)
+        close = np.flatnonzero(judged & (near < _CLOSER * next_one))
+        if len(close) and _tail(len(close), int(judged.sum()), _CLOSER) < _BY_CHANCE:
+            most, copies = others, copies | set(close.tolist())
+            pairs.append(np.stack([np.repeat(close, others), closest[close, :others].ravel()]))
+    if not copies:
+        return pairs[0], []
+    whom = "another trial" if most == 1 else f"at most {most} other trials"
+    named = "of several instances" if labelled.instances is not None else "of one object"
+    note = (
+        f"{counted(len(copies), 'trial is', 'trials are')} more than five times closer to {whom} than to the next "
+        f"one, as copies with other digits and grasps {named} are. They are held out together: leave copies out, and "
+        f"name the objects ({option('instance', 'COLUMN')})"
+    )
+    return np.concatenate(pairs, axis=1), [note]
+
+
+def _scaled(values: Values) -> Values:
+    """Return the features without missing values, those with the most different ones, by their standard deviation."""
+    whole = values[:, ~np.isnan(values).any(axis=0)]
+    finest = np.argsort([-len(np.unique(column)) for column in whole.T], kind="stable")[:_MOST_FEATURES]
+    whole = whole[:, finest] - whole[:, finest].mean(axis=0)
+    spread = whole.std(axis=0)
+    scaled: Values = whole[:, spread > 0.0] / spread[spread > 0.0]
+    return scaled
+
+
+def _tail(successes: int, n: int, share: float) -> float:
+    """Return the probability of at least so many successes of `n`, each with the probability `share`."""
+    from scipy.special import bdtrc
+
+    return float(bdtrc(successes - 1, n, share))
+
+
+def _blocks(labelled: Labelled) -> tuple[int, Numbers]:
+    """Return the length of the blocks in which trials of a label are alike, and the block of each trial.
+
+    The length is 1 if they are not, and if the trials are sorted by a feature. Each label has two blocks at least.
+    """
+    times = np.arange(len(labelled)) if labelled.order is None else np.array(labelled.order)
+    codes = np.unique(np.array(labelled.labels), return_inverse=True)[1]
+    in_time = np.lexsort((times, codes))
+    codes, values = codes[in_time], labelled.table.values[in_time]
+    sizes = np.bincount(codes)
+    place = np.arange(len(codes)) - (np.cumsum(sizes) - sizes)[codes]
+    length, block_of = 1, np.arange(len(codes))
+    limit = np.inf if _is_sorted(values, codes) else _ALIKE
+    while _likeness(_means(values, block_of), codes[np.unique(block_of, return_index=True)[1]]) > limit:
+        length, limit = 2 * length, _STILL_ALIKE
+        block_of = codes * len(codes) + place // np.minimum(length, (sizes + 1) // 2)[codes]
+    result = np.empty_like(block_of)
+    result[in_time] = block_of
+    return length, result
+
+
+def _is_sorted(values: Values, codes: Numbers) -> bool:
+    """Return whether measured values of a feature rise, or fall, within every label: no trials are recorded so."""
+    within = codes[1:] == codes[:-1]
+    steps = np.diff(values, axis=0)[within]
+    return bool(((steps > 0.0).all(axis=0) | (steps < 0.0).all(axis=0)).any()) and len(steps) > _FEWEST_BLOCKS
+
+
+def _means(values: Values, block_of: Numbers) -> Values:
+    """Return the mean of each feature in each block of consecutive trials; NaN where all are missing."""
+    begins = np.unique(block_of, return_index=True)[1]
+    known = np.add.reduceat(~np.isnan(values), begins, axis=0, dtype=np.float64)
+    with np.errstate(invalid="ignore"):
+        means: Values = np.add.reduceat(np.nan_to_num(values), begins, axis=0) / known
+    return means
+
+
+def _likeness(means: Values, codes: Numbers) -> float:
+    """Return by how many standard deviations blocks of a label are more like the next one than in random order.
+
+    It is the sum of the products of their ranks in each feature (A. Wald and J. Wolfowitz, Ann. Math. Stat. 14 (1943)
+    378), against its mean over permutations. `codes` number the labels, which come one after the other.
+    """
+    from scipy.stats import rankdata
+
+    ranks = np.zeros(means.shape)
+    for code in np.unique(codes).tolist():
+        rows = codes == code
+        if rows.sum() >= _FEWEST_BLOCKS:
+            placed = rankdata(means[rows], axis=0, nan_policy="omit") / rows.sum()
+            known = np.maximum((~np.isnan(placed)).sum(axis=0), 1)
+            ranks[rows] = np.nan_to_num(placed - np.nansum(placed, axis=0) / known)
+    rng, within = np.random.default_rng(0), codes[1:] == codes[:-1]
+
+    def products(ordered: Values) -> float:
+        return float((ordered[1:] * ordered[:-1])[within].sum())
+
+    by_chance = [products(ranks[np.lexsort((rng.random(len(codes)), codes))]) for _ in range(_PERMUTATIONS)]
+    spread = float(np.std(by_chance))
+    return (products(ranks) - float(np.mean(by_chance))) / spread if spread > 0.0 else 0.0
