@@ -213,6 +213,18 @@ def test_statistics_below_the_trials_are_left_out_and_told(csv, word):
         assert any(word in note for note in trials.notes)
 
 
+@every_case("lines", [["a mean,0.05,6", "mean (b),0.05,6"], ["Summary,,", "mean,0.05,6", "N,8,8"]])
+def test_statistics_of_labels_and_their_heading_are_left_out(csv, lines):
+    trials = read_labelled(csv("\n".join([GOOD.strip(), *lines, ""])), "what")
+    assert trials.labels == ("a", "b") * 4
+
+
+def test_a_table_with_a_line_for_each_feature_is_refused(csv):
+    lines = [f"{k},{'ab'[k % 2]},{name},{k}.5" for k in range(12) for name in ("peak", "width")]
+    with pytest.raises(DataDamaged, match="one line per trial"):
+        read_labelled(csv("\n".join(["trial,what,variable,value", *lines, ""])), "what")
+
+
 def test_a_mean_of_each_object_is_known_by_the_column_of_trial_numbers(csv):
     lines = [f"{k},{what},{k * 0.31 % 1:.3f}" for what in ("can", "jar") for k in range(6)]
     table = "\n".join(["trial,what,peak", *lines[:6], "mean,can,0.5", *lines[6:], "mean,jar,0.5", ""])

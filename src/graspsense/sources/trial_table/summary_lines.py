@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
+from collections.abc import Container
 from typing import TYPE_CHECKING, Final
 
 from graspsense.core.values.errors import listed
@@ -23,8 +25,9 @@ _STATISTICS: Final = frozenset({
 def without_summaries(columns: CsvColumns) -> None:
     """Remove the lines that are statistics of the others, with a note.
 
-    In the last lines, each has the name of a statistic that its column has nowhere else; an object of that name has
-    several trials. Anywhere, the name stands in a column of numbers, as that of a trial.
+    In the last lines, each has the name of a statistic that its column has nowhere else, alone or beside the name of
+    another line, as in `mean (can)`; an object of that name has several trials. A heading may stand above them.
+    Anywhere, the name stands in a column of numbers, as that of a trial.
     """
     summaries: dict[int, str] = {}
     for name, cells in columns.cells.items():
@@ -32,15 +35,16 @@ def without_summaries(columns: CsvColumns) -> None:
             " ".join(cell.casefold().replace("_", " ").replace(".", " ").split()).strip(": ")
             for cell in cells
         ]
-        rows = [i for i, word in enumerate(words) if word in _STATISTICS]
-        if not rows:
-            continue
         times = Counter(words)
         last = len(cells)
-        while last and words[last - 1] in _STATISTICS and times[words[last - 1]] == 1:
+        while last and times[words[last - 1]] == 1 and _is_statistic(words[last - 1], times):
             last -= 1
-        numbered = columns.has_numbers(name)
-        summaries |= {i: cells[i] for i in rows if numbered or i >= last}
+        if 0 < last < len(cells) and sum(bool(column[last - 1]) for column in columns.cells.values()) == 1:
+            last -= 1
+        rows = set(range(last, len(cells)))
+        if not _STATISTICS.isdisjoint(times) and columns.has_numbers(name):
+            rows |= {i for i, word in enumerate(words) if word in _STATISTICS}
+        summaries |= {i: cells[i] for i in rows}
     if 0 < len(summaries) < len(columns):
         columns.notes = (
             *columns.notes,
@@ -48,3 +52,13 @@ def without_summaries(columns: CsvColumns) -> None:
             + listed([f"line {columns.lines[i]} ({summaries[i]})" for i in sorted(summaries)]),
         )
         columns.keep([i for i in range(len(columns)) if i not in summaries])
+
+
+def _is_statistic(word: str, others: Container[str]) -> bool:
+    """Return whether this is the name of a statistic, or that of one and of another line."""
+    parts = re.split(r" of |[ ()]+", word.strip("()"))
+    return word in _STATISTICS or any(
+        statistic in _STATISTICS and " ".join(other) in others
+        for statistic, other in ((parts[0], parts[1:]), (parts[-1], parts[:-1]))
+        if other
+    )
