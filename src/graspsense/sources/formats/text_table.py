@@ -353,8 +353,8 @@ def _with_remarks(rows: list[Row]) -> list[Row]:
 
 def _begin_with_numbers_of_rows(rows: Sequence[Row], width: int) -> bool:
     """Return whether all rows have so many cells, and number themselves in the first: R writes no name for it."""
-    first = [row[0] for _, row in rows if len(row) == width]
-    return len(first) == len(rows) > 1 and any(first == [*map(str, range(k, k + len(first)))] for k in (0, 1))
+    counter, n = [row[0] for _, row in rows if len(row) == width], len(rows)
+    return n > 1 and counter in ([*map(str, range(n))], [*map(str, range(1, n + 1))])
 
 
 def numbers_with_unit(cells: Sequence[str]) -> tuple[Sequence[str], str]:
