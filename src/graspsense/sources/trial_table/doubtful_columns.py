@@ -20,6 +20,7 @@ from graspsense.core.values.features import LARGEST_VALUE
 from graspsense.sources.trial_table.identifiers import (
     LEAST_LINES,
     TIMES,
+    can_be_days,
     follow_lines,
     groups_trials,
     is_count,
@@ -53,7 +54,7 @@ _OF_TIMES: Final = TIMES | {
     "total",
 }
 _OF_A_SESSION: Final = frozenset({
-    "temperature", "temp", "humidity", "battery", "baseline", "zero", "initial", "start", "before"
+    "temperature", "temp", "humidity", "battery", "batt", "vbat", "baseline", "zero", "initial", "start", "before"
 })  # fmt: skip
 _TEMPERATURES: Final = frozenset({"C", "\u00b0C", "degC"})
 """What can be the same, or drift, in a whole session; by the name of a column, or by its unit."""
@@ -113,11 +114,16 @@ def _of_recording(
     columns: CsvColumns, labels: Sequence[str], used: Sequence[str], table: FeatureTable
 ) -> tuple[tuple[str, list[str], str], ...]:
     """Return what may tell of labels, devices or objects: how, the names of the columns, and what to do."""
-    same = [name for name in used if says_the_label(columns.cells[name], labels)]
+    same = [
+        name
+        for name in used
+        if says_the_label(columns.cells[name], labels)
+        or (columns.is_nominal(name) and nearly_says_the_label(columns.cells[name], labels))
+    ]
     missing = {name: np.isnan(table.columns(columns.columns_of(name)[:1]).values[:, 0]) for name in used}
     return (
         (
-            "all trials of a label have the same value",
+            "all trials of a label, or nearly all, have the same value",
             same,
             "If it is the label in other words, or tells of the recording, ",
         ),
@@ -170,13 +176,19 @@ def _of_time_and_digits(
             [
                 name
                 for name, values in numbers.items()
-                if name not in rising and differs_by_label(values, labels) and follow_lines(values, labels)
+                if name not in rising
+                and (differs_by_label(values, labels) or are_in_blocks(labels))
+                and follow_lines(values, labels)
             ],
             "If it tells when a trial was recorded, it reveals the labels: ",
         ),
         (
-            "its name is that of a time",
-            [name for name in counted if name not in rising and _is_named_as_time(name)],
+            "its name is that of a time, or its values can be dates as spreadsheets and MATLAB number them",
+            [
+                name
+                for name in counted
+                if name not in rising and (_is_named_as_time(name) or can_be_days(numbers[name]))
+            ],
             "If it is the time of recording, it reveals the labels: ",
         ),
         (
@@ -236,6 +248,20 @@ def says_the_label(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
     different, among = len(set(values)), len(set(labels))
     few = different < among and min(Counter(labels).values()) < LEAST_LINES
     return 1 < different <= len(pairs) == among < len(labels) and not few
+
+
+def nearly_says_the_label(values: Sequence[str], labels: Sequence[str]) -> bool:
+    """Return whether nearly all lines of each label have a value of its own, as a prediction of the label has."""
+    counts, pairs = Counter(labels), Counter(zip(labels, values, strict=True))
+    usual = {label: max((n, value) for (own, value), n in pairs.items() if own == label) for label in counts}
+    return len({value for _, value in usual.values()}) == len(counts) and all(
+        n >= LEAST_LINES and n >= (1.0 - _FEW) * counts[label] for label, (n, _) in usual.items()
+    )
+
+
+def are_in_blocks(labels: Sequence[str]) -> bool:
+    """Return whether the lines of a label mostly come one after the other, so that what drifts can tell labels."""
+    return LEAST_LINES * sum(1 for _ in groupby(labels)) <= len(labels)
 
 
 def says_of_labels(values: Sequence[bool], labels: Sequence[str]) -> bool:
