@@ -163,32 +163,21 @@ def _of_time_and_digits(
     columns: CsvColumns, labels: Sequence[str], numbers: dict[str, Numbers]
 ) -> tuple[tuple[str, list[str], str], ...]:
     """Return what may tell of times and rounding: how, the names of the columns, and what to do."""
-    rising = [name for name, values in numbers.items() if keeps_rising(values)]
     counted = [name for name in numbers if is_count(columns.units[name]) or is_time(columns.units[name])]
     return (
-        (
-            "every line has more than the one before, or every line less",
-            rising,
-            "If it is a time or a counter it reveals the labels: ",
-        ),
         (
             "its values follow the order of recording within each label, as a drifting zero, a battery or a clock does",
             [
                 name
                 for name, values in numbers.items()
-                if name not in rising
-                and (differs_by_label(values, labels) or are_in_blocks(labels))
+                if (differs_by_label(values, labels) or are_in_blocks(labels))
                 and follow_lines(values, labels)
             ],
             "If it tells when a trial was recorded, it reveals the labels: ",
         ),
         (
             "its name is that of a time, or its values can be dates as spreadsheets and MATLAB number them",
-            [
-                name
-                for name in counted
-                if name not in rising and (_is_named_as_time(name) or can_be_days(numbers[name]))
-            ],
+            [name for name in counted if _is_named_as_time(name) or can_be_days(numbers[name])],
             "If it is the time of recording, it reveals the labels: ",
         ),
         (
@@ -203,7 +192,7 @@ def _of_time_and_digits(
         ),
         (
             "its values pass from label to label without a gap or an overlap, as those of a clock or a counter do",
-            [name for name in counted if name not in rising and passes_without_a_gap(numbers[name], labels)],
+            [name for name in counted if passes_without_a_gap(numbers[name], labels)],
             "If it is a time or a counter it reveals the labels: ",
         ),
         (
