@@ -146,6 +146,13 @@ def test_the_numbers_of_rows_that_r_writes_without_a_name_are_the_index(tmp_path
         read_labelled(path, "what")
 
 
+def test_a_single_column_may_have_a_name_with_spaces(tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_text("Load left [N]\n" + "".join(f"{k}.5\n" for k in range(5)))
+    (table,) = read_text(path)
+    assert table.numbers["Load left [N]"].tolist() == [0.5, 1.5, 2.5, 3.5, 4.5]
+
+
 def test_a_sign_or_a_factor_behind_a_number_is_no_unit(tmp_path):
     path = tmp_path / "t.csv"
     for sign in ("-", "k", "M"):

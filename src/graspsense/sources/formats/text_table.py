@@ -52,6 +52,7 @@ SPREADSHEETS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 """The first bytes of a ZIP file, as which spreadsheets are saved, and of those of old programs."""
 _CODE_PAGES: Final = ("cp1252", "cp1250", "iso8859-1", "iso8859-15")
 """They agree on degrees, micro and the letters of several languages."""
+_NO_SEPARATOR: Final = "\x1f"
 _WITH_UNIT: Final = re.compile(r"(.*[0-9.])\s*([^\s0-9]+)")
 _SAMPLED: Final = 400
 """Lines from which the separator and the kinds of the columns are found."""
@@ -213,7 +214,8 @@ class _Layout:
         named = [
             k
             for k, (_, row) in enumerate(self.rows[data + 1 : most + 1], data + 1)
-            if not any(is_number(row[c]) or is_missing(row[c]) for c in numeric if c < len(row))
+            if len(row) > 1
+            and not any(is_number(row[c]) or is_missing(row[c]) for c in numeric if c < len(row))
             and _can_be_names(row, width, [set()] * width)
             and all(row != earlier for _, earlier in self.rows[:data])
             and k + 1 < len(self.rows)
@@ -434,7 +436,8 @@ def _sample(lines: Sequence[Any]) -> list[Any]:
 def _separator(lines: Sequence[str]) -> str:
     """Return what separates the cells of these lines: a semicolon, a tab, a comma, a bar, or any number of spaces.
 
-    It gives most lines the same number of cells, and the first line as many if any does.
+    It gives most lines the same number of cells, and the first line as many if any does. In a single column it is a
+    sign that no text has: the name may have spaces.
     """
     widths = {separator: _width(lines, separator) for separator in (";", "\t", ",", "|", " ")}
     agreeing = {separator: count for separator, (width, count) in widths.items() if width > 1}
@@ -442,7 +445,7 @@ def _separator(lines: Sequence[str]) -> str:
         agreeing.pop(",", None)
     able = [separator for separator, count in agreeing.items() if count >= 0.9 * max(agreeing.values())]
     fitting = [item for item in able if _width(lines[:1], item)[0] == widths[item][0]]
-    return next(iter(fitting or able), " ")
+    return next(iter(fitting or able), _NO_SEPARATOR)
 
 
 def _words(line: str) -> list[str]:
