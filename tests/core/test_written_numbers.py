@@ -78,6 +78,8 @@ def test_the_other_columns_decide_what_a_column_alone_does_not():
     assert numbers("1.500", "2.000").tolist() == [1.5, 2.0]
     assert isinstance(numbers("975", "1.000", other=["0.01", "1"]), NotNumbers)
     assert numbers("6,002", "999.9").tolist() == [6002, 999.9]
+    assert numbers("1,234.567", "1,250", "0.125").tolist() == [1234.567, 1250, 0.125]
+    assert isinstance(numbers("7,756", "6.002"), NotNumbers)
     contrary = numbers("6,002", "999.9", other=["49,5", "1"])
     assert isinstance(contrary, NotNumbers)
     assert "6002 or 6.002" in contrary.why

@@ -214,9 +214,27 @@ def test_statistics_below_the_trials_are_left_out_and_told(csv, word):
 
 
 @every_case("lines", [["a mean,0.05,6", "mean (b),0.05,6"], ["Summary,,", "mean,0.05,6", "N,8,8"]])
-def test_statistics_of_labels_and_their_heading_are_left_out(csv, lines):
-    trials = read_labelled(csv("\n".join([GOOD.strip(), *lines, ""])), "what")
+@every_case("begin", [1, 4, 9])
+def test_statistics_of_labels_and_their_heading_are_left_out(csv, begin, lines):
+    given = GOOD.strip().splitlines()
+    lines = lines if begin != 4 else lines[:1]
+    trials = read_labelled(csv("\n".join([*given[:begin], *lines, *given[begin:], ""])), "what")
     assert trials.labels == ("a", "b") * 4
+
+
+def test_a_trial_without_values_or_with_the_remark_max_is_one(csv):
+    given = [f"{line},{'max' if k == 4 else 'x'}" for k, line in enumerate(GOOD.strip().splitlines())]
+    trials = read_labelled(csv("\n".join([*given[:5], "a,,,", "c,,,", "c,,,", *given[5:], ""])), "what")
+    assert trials.labels == ("a", "b", "a", "b", "a", "c", "c", "a", "b", "a", "b")
+
+
+def test_trials_may_be_numbered_by_a_sign_that_begins_comments(csv):
+    lines = [f"#{k},{line}" if k else f"nr,{line}" for k, line in enumerate(GOOD.strip().splitlines())]
+    assert len(read_labelled(csv("\n".join(["# by hand", *lines, ""])), "what")) == 8
+
+
+def test_tables_that_were_joined_with_their_marks_of_encoding_are_one(csv):
+    assert len(read_labelled(csv(f"\ufeff{GOOD}\ufeff{GOOD}"), "what")) == 16
 
 
 def test_a_table_with_a_line_for_each_feature_is_refused(csv):

@@ -203,12 +203,14 @@ def _read(cells: Sequence[str], fit: _Fit, of_file: int) -> Numbers | NotNumbers
             return _values(cells, POINT) if fit.values is None else fit.values
         if not of_file & THOUSANDS:
             return _values(cells, COMMA)
+    elif (common == THOUSANDS and of_file & COMMA) or _three_digits_behind_both_marks(cells):
+        pass
     elif common == THOUSANDS | COMMA:
         if of_file == COMMA:
             return _values(cells, COMMA)
         if of_file == THOUSANDS or _signs_of_thousands(cells, ",") > 0:
             return _values(cells, THOUSANDS)
-    elif common != THOUSANDS or not of_file & COMMA:
+    else:
         return _values(cells, common)
     mark = "," if common & POINT == 0 else "."
     row = next(k for k, cell in enumerate(cells) if mark in cell)
@@ -230,6 +232,13 @@ def _signs_of_thousands(cells: Sequence[str], mark: str) -> int:
     return any(cell.endswith("0") for cell in cells if mark in cell) + any(
         len(cell.lstrip("+-\u2212")) == 3 for cell in plain
     )
+
+
+def _three_digits_behind_both_marks(cells: Sequence[str]) -> bool:
+    """Return whether these are `1,250` and `1.310`: three decimals, behind the mark of one place and of another."""
+    parts = [re.split("([,.])", cell) for cell in cells if "," in cell or "." in cell]
+    both = {part[1] for part in parts} == {",", "."}
+    return both and all(len(part) == 3 and len(part[2]) == 3 for part in parts)
 
 
 def _values(cells: Sequence[str], notation: int) -> Numbers:

@@ -117,12 +117,8 @@ class _Layout:
         given = _SEPARATOR_LINE.fullmatch(written[0][1]) if written else None
         if given:
             written = written[1:]
-        self.comments = [numbered for numbered in written if numbered[1].lstrip().startswith(_COMMENTS)]
-        plain = [
-            numbered
-            for numbered in written
-            if not numbered[1].lstrip().startswith(_COMMENTS) and not _RULE.fullmatch(numbered[1])
-        ]
+        self.comments = _comments(written)
+        plain = [each for each in written if each not in {*self.comments} and not _RULE.fullmatch(each[1])]
         if all(re.fullmatch(r"\s*\|.*\|\s*", line) for _, line in plain):
             plain = [(number, line.strip()[1:-1]) for number, line in plain]
         self.separator = given[1] if given else _separator([line for _, line in _sample(plain)])
@@ -343,6 +339,15 @@ class _Layout:
             return rows
         self.notes.append(f"line {number} is cut off, and left out")
         return rows[:-1]
+
+
+def _comments(lines: Sequence[Line]) -> list[Line]:
+    """Return the lines that are comments. After the first other line they are few: trials can be called #1, #2."""
+    marked = [line.lstrip().startswith(_COMMENTS) for _, line in lines]
+    begin = marked.index(False) if False in marked else len(lines)
+    later = marked[begin + 1 :]
+    few = 2 * sum(later) <= len(later)
+    return [each for k, each in enumerate(lines) if marked[k] and (few or k < begin)]
 
 
 def _with_remarks(rows: list[Row]) -> list[Row]:
@@ -576,7 +581,7 @@ def text_of(path: Path) -> str:
         raise DataDamaged(f"{path} is a spreadsheet or an archive, not text: save its table as CSV in UTF-8")
     if too_large := TEXT_BYTES.exceeded(size):
         raise DataDamaged(f"{path}: {too_large}")
-    text = _decoded(path, data)
+    text = _decoded(path, data).replace("\ufeff", "")  # also of files that were joined
     if "\0" in text:
         raise DataDamaged(
             f"{path} contains zero bytes: it is not a text file. If a program wrote it as Unicode text, save it as "

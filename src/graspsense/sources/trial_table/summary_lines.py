@@ -23,32 +23,37 @@ _STATISTICS: Final = frozenset({
 
 
 def without_summaries(columns: CsvColumns) -> None:
-    """Remove the lines that are statistics of the others, with a note.
+    """Remove the lines that are statistics of the others, or headings between them, with a note.
 
-    In the last lines, each has the name of a statistic that its column has nowhere else, alone or beside the name of
-    another line, as in `mean (can)`; an object of that name has several trials. A heading may stand above them.
-    Anywhere, the name stands in a column of numbers, as that of a trial.
+    In the first and the last lines, each has the name of a statistic that its column has nowhere else; an object of
+    that name has several trials. Anywhere, the name stands beside that of other lines, as in `mean (can)`, or in a
+    column of numbers, as that of a trial. A heading is a text that its column has nowhere else, alone in its line.
     """
     summaries: dict[int, str] = {}
+    alone = [sum(map(bool, row)) == 1 < len(row) - 1 for row in zip(*columns.cells.values(), strict=True)]
     for name, cells in columns.cells.items():
         words = [
             " ".join(cell.casefold().replace("_", " ").replace(".", " ").split()).strip(": ")
             for cell in cells
         ]
         times = Counter(words)
-        last = len(cells)
-        while last and times[words[last - 1]] == 1 and _is_statistic(words[last - 1], times):
-            last -= 1
-        if 0 < last < len(cells) and sum(bool(column[last - 1]) for column in columns.cells.values()) == 1:
-            last -= 1
-        rows = set(range(last, len(cells)))
+        telling = [
+            word != "" and times[word] == 1 and (lone or _is_statistic(word, times))
+            for word, lone in zip(words, alone, strict=True)
+        ]
+        begin = telling.index(False) if False in telling else 0
+        end = len(cells) - (telling[::-1].index(False) if False in telling else 0)
+        summaries |= {
+            i: cells[i]
+            for i, told in enumerate(telling)
+            if told and (not begin <= i < end or alone[i] or words[i] not in _STATISTICS)
+        }
         if not _STATISTICS.isdisjoint(times) and columns.has_numbers(name):
-            rows |= {i for i, word in enumerate(words) if word in _STATISTICS}
-        summaries |= {i: cells[i] for i in rows}
+            summaries |= {i: cells[i] for i, word in enumerate(words) if word in _STATISTICS}
     if 0 < len(summaries) < len(columns):
         columns.notes = (
             *columns.notes,
-            "left out, because they are statistics of other lines: "
+            "left out, because they are statistics of other lines, or headings: "
             + listed([f"line {columns.lines[i]} ({summaries[i]})" for i in sorted(summaries)]),
         )
         columns.keep([i for i in range(len(columns)) if i not in summaries])
@@ -56,7 +61,7 @@ def without_summaries(columns: CsvColumns) -> None:
 
 def _is_statistic(word: str, others: Container[str]) -> bool:
     """Return whether this is the name of a statistic, or that of one and of another line."""
-    parts = re.split(r" of |[ ()]+", word.strip("()"))
+    parts = re.split(r" of |[ ()]+", word.strip("()")) if word[:1].isalpha() else [""]
     return word in _STATISTICS or any(
         statistic in _STATISTICS and " ".join(other) in others
         for statistic, other in ((parts[0], parts[1:]), (parts[-1], parts[:-1]))
