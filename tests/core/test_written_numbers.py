@@ -32,6 +32,12 @@ def numbers(*cells, **others):
         (["1 234.5", "1'000", "12\u202f000"], [1234.5, 1000, 12000]),
         (["1.5D-03", "\u22122", "+3e2"], [0.0015, -2, 300]),
         (["1", "", "NA", "--", "#N/A", "#DIV/0!", "NaN"], [1] + [math.nan] * 6),
+        (
+            ["1", "#WERT!", "#NV", "#\u00a1VALOR!", "Err:502", "-nan", "-nan(ind)", "1.#QNAN0"],
+            [1] + [math.nan] * 7,
+        ),
+        (["1", "<NA>", "NaT", "n.a.", r"\N", ".", "\u2014"], [1] + [math.nan] * 6),
+        (["1,00,000", "12,34,567.5", "250"], [100000, 1234567.5, 250]),
         (["inf", "-Infinity"], [math.inf, -math.inf]),
         (["0x7D0", "0", "", "0Xff"], [2000, 0, math.nan, 255]),
     ],
@@ -50,7 +56,7 @@ def test_a_column_has_one_notation(cells, values):
         (["1", "\u0661"], 1),
         (["1", "12 N"], 1),
         (["1,2,3"], 0),
-        (["1,00,000"], 0),
+        (["1,0,000"], 0),
         (["12.5", "1,5", "1,234.5"], 1),
     ],
 )
@@ -71,6 +77,12 @@ def test_the_other_columns_decide_what_a_column_alone_does_not():
     assert numbers("1.500", "2.000", other=["49,5", "1"]).tolist() == [1500, 2000]
     assert numbers("1.500", "2.000").tolist() == [1.5, 2.0]
     assert isinstance(numbers("975", "1.000", other=["0.01", "1"]), NotNumbers)
+    assert numbers("6,002", "999.9").tolist() == [6002, 999.9]
+    assert numbers("1,234.567", "1,250", "0.125").tolist() == [1234.567, 1250, 0.125]
+    assert isinstance(numbers("7,756", "6.002"), NotNumbers)
+    contrary = numbers("6,002", "999.9", other=["49,5", "1"])
+    assert isinstance(contrary, NotNumbers)
+    assert "6002 or 6.002" in contrary.why
 
 
 @given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1), st.sampled_from([".", ","]))

@@ -1,5 +1,6 @@
 """Results are of the content of their inputs: what was replaced since is computed again, and nothing else."""
 
+import os
 from functools import partial
 
 import numpy as np
@@ -9,7 +10,7 @@ from attrs import evolve
 from cases import every_case
 from kept import keep
 
-from graspsense.core.components.registry import installed
+from graspsense.core.components.registry import IsolatedPlugins, installed
 from graspsense.core.values.errors import ConfigError
 from graspsense.experiments.executors.processes import Processes
 from graspsense.experiments.executors.serial import Serial
@@ -17,6 +18,7 @@ from graspsense.experiments.experiment_file import _located, read_experiment
 from graspsense.experiments.results import Results
 from graspsense.experiments.run import run_experiment
 from graspsense.experiments.summary import summarise
+from graspsense.plugin_api import hookimpl
 from graspsense.sources.input_content import contents_of
 from graspsense.store.changes import set_aside
 from graspsense.store.store import Store
@@ -84,6 +86,24 @@ def grasps(store, numbers):
             grasp=k,
             ticks=9,
         )
+
+
+@every_case("name", ["x,y.csv", "a,b/t.csv", "12:30/t.csv"])
+def test_a_table_whose_path_has_a_comma_or_a_colon_counts(tmp_path, name):
+    (tmp_path / name).parent.mkdir(exist_ok=True)
+    (tmp_path / name).write_text("1")
+    located = _located({"data": {"source": name}}, tmp_path)
+    assert located["data"]["source"] == str(tmp_path / name)
+    assert_counts(tmp_path / name, located)
+
+
+def test_a_file_that_is_replaced_with_the_same_size_and_time_counts_in_the_same_process(tmp_path):
+    file = tmp_path / "t.csv"
+    file.write_text("1")
+    state, known = file.stat(), contents_of([str(file)])
+    file.write_text("2")
+    os.utime(file, ns=(state.st_atime_ns, state.st_mtime_ns))
+    assert contents_of([str(file)]) != known
 
 
 def test_a_store_that_grew_or_was_corrected_is_another_input(tmp_path):
@@ -258,6 +278,40 @@ def test_the_code_of_a_component_that_a_setting_names_is_an_input(monkeypatch):
     contents = contents_of(params)
     monkeypatch.setattr(module, "_hash_of_code", lambda version, name: f"{version} {name} changed")
     assert contents[foreign.name] != contents_of(params)[foreign.name]
+
+
+def test_the_code_of_a_kind_of_experiment_and_of_a_term_of_others_is_an_input(tmp_path, monkeypatch):
+    import graspsense.sources.input_content as module
+    import graspsense_paper.plugin
+    import graspsense_sim_gripper.plugin
+
+    class Terms:
+        GRASPSENSE_API = (2, 0)
+        __name__ = "lab_terms"
+
+        @staticmethod
+        @hookimpl(optionalhook=True)
+        def graspsense_sim_terms():
+            return []
+
+    table(tmp_path / "t.csv", 1, 1.0)
+    planned = read_experiment(experiment(tmp_path, "t.csv"))
+    with IsolatedPlugins(graspsense_paper.plugin) as plugins:
+        plugins.add(graspsense_sim_gripper.plugin, "graspsense-sim-gripper")
+        plugins.add(Terms(), "lab-terms")
+        (status,) = [status for status in plugins.statuses if status.distribution == "lab-terms"]
+        known, contents = contents_of(["grasp", "sim"]), module._hash_of_code
+        for changed, name in (("graspsense_paper.grasping", "grasp"), (status.module, "sim")):
+            monkeypatch.setattr(
+                module,
+                "_hash_of_code",
+                lambda version, file, changed=changed: (
+                    "changed" if file == changed else contents(version, file)
+                ),
+            )
+            assert contents_of(["grasp", "sim"])[name] != known[name]
+        cases = tuple(evolve(case, kind="grasp") for case in planned.cases)
+        assert "grasp" in evolve(planned, cases=cases).with_inputs().tasks()[0].params["inputs"]
 
 
 @pytest.mark.parametrize(

@@ -213,6 +213,36 @@ def test_statistics_below_the_trials_are_left_out_and_told(csv, word):
         assert any(word in note for note in trials.notes)
 
 
+@every_case("lines", [["a mean,0.05,6", "mean (b),0.05,6"], ["Summary,,", "mean,0.05,6", "N,8,8"]])
+@every_case("begin", [1, 4, 9])
+def test_statistics_of_labels_and_their_heading_are_left_out(csv, begin, lines):
+    given = GOOD.strip().splitlines()
+    lines = lines if begin != 4 else lines[:1]
+    trials = read_labelled(csv("\n".join([*given[:begin], *lines, *given[begin:], ""])), "what")
+    assert trials.labels == ("a", "b") * 4
+
+
+def test_a_trial_without_values_or_with_the_remark_max_is_one(csv):
+    given = [f"{line},{'max' if k == 4 else 'x'}" for k, line in enumerate(GOOD.strip().splitlines())]
+    trials = read_labelled(csv("\n".join([*given[:5], "a,,,", "c,,,", "c,,,", *given[5:], ""])), "what")
+    assert trials.labels == ("a", "b", "a", "b", "a", "c", "c", "a", "b", "a", "b")
+
+
+def test_trials_may_be_numbered_by_a_sign_that_begins_comments(csv):
+    lines = [f"#{k},{line}" if k else f"nr,{line}" for k, line in enumerate(GOOD.strip().splitlines())]
+    assert len(read_labelled(csv("\n".join(["# by hand", *lines, ""])), "what")) == 8
+
+
+def test_tables_that_were_joined_with_their_marks_of_encoding_are_one(csv):
+    assert len(read_labelled(csv(f"\ufeff{GOOD}\ufeff{GOOD}"), "what")) == 16
+
+
+def test_a_table_with_a_line_for_each_feature_is_refused(csv):
+    lines = [f"{k},{'ab'[k % 2]},{name},{k}.5" for k in range(12) for name in ("peak", "width")]
+    with pytest.raises(DataDamaged, match="one line per trial"):
+        read_labelled(csv("\n".join(["trial,what,variable,value", *lines, ""])), "what")
+
+
 def test_a_mean_of_each_object_is_known_by_the_column_of_trial_numbers(csv):
     lines = [f"{k},{what},{k * 0.31 % 1:.3f}" for what in ("can", "jar") for k in range(6)]
     table = "\n".join(["trial,what,peak", *lines[:6], "mean,can,0.5", *lines[6:], "mean,jar,0.5", ""])

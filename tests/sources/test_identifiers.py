@@ -36,6 +36,8 @@ COUNTERS = {
     "dates": [20260101 + i % 28 + 100 * (i // 28) for i in range(N)],
     "dates of sessions": [20260101 + i // 15 for i in range(N)],
     "times": [20261126093000 + i % 30 + 100 * (i // 30) for i in range(N)],
+    "times of the day": [int(f"{9 + k // 3600}{k // 60 % 60:02}{k % 60:02}") for k in range(0, 97 * N, 97)],
+    "dates without the century": [int(f"2403{1 + i // 9:02}{9 + i % 9:02}{i * 7 % 60:02}") for i in range(N)],
     "a counter of each label": [*range(30), *range(30)],
     "a counter of four bits": [(i + 5) % 16 for i in range(N)],
     "a counter of a byte with lost numbers": np.cumsum(np.random.default_rng(1).integers(1, 9, N)) % 256,
@@ -52,7 +54,7 @@ def test_a_counter_or_a_time_is_no_feature_in_any_order(counter, order):
 
 @given(
     seed=st.integers(0, 10_000),
-    counter=st.sampled_from(["a trial number", "seconds since 1970", "dates", "times"]),
+    counter=st.sampled_from(["a trial number", "seconds since 1970", "dates", "times", "times of the day"]),
 )
 def test_nor_where_the_lines_are_shuffled(seed, counter):
     order = np.random.default_rng(seed).permutation(N)
@@ -72,6 +74,10 @@ def test_where_the_lines_are_shuffled_numbers_are_known_by_their_name_their_orde
     objects = np.repeat(np.arange(12), 5)
     assert "--instance" in identifies("x", "", objects, LABELS)
     assert "--instance" in identifies("x", "", objects[order], labels)
+    # The last object of each label has fewer lines.
+    kinds = [f"kind {k // 20}" for k in range(N)]
+    fewer = [10 * (k // 20) + k % 20 // 3 for k in range(N)]
+    assert "--instance" in identifies("x", "", np.array(fewer)[order], [kinds[k] for k in order])
 
 
 @given(seed=st.integers(0, 10_000), scale=st.sampled_from([1e-6, 1e-3, 1.0, 50.0]))
@@ -159,6 +165,8 @@ def test_what_was_measured_with_few_digits_is_a_feature_in_any_order(seed, digit
 SESSIONS = {
     "letters": ["ABCDEF"[i // 10] for i in range(N)],
     "weekdays": [("Monday", "Tuesday", "Friday")[i // 20] for i in range(N)],
+    "weekdays of others": [("Mo", "Di", "Fr")[i // 20] for i in range(N)],
+    "predictions": ["can" if i % 40 < 30 else "jar" for i in range(N)],
     "names": [("cola", "tonic", "water", "beans", "honey", "jam")[i // 10] for i in range(N)],
     "numbered, with a group in both labels": [f"group{(i + 1) // 10}" for i in range(N)],
 }
@@ -193,6 +201,7 @@ NAMED = {
         (1, 2, 3, 4)[i // 15] for i in range(N)
     ],  # two for each label: too few to be known by their values
     "Robot ID": [f"arm {i // 20}" for i in range(N)],
+    "Bediener": ["anna" if i < 27 else "ben" for i in range(N)],
     "operator": ["anna" if i < 27 else "ben" for i in range(N)],
     "randomSeed": [1234 + 8765 * (i // 30) for i in range(N)],
     "day [day]": [i // 20 for i in range(N)],
@@ -255,6 +264,12 @@ DOUBTFUL = {
         "x",
         (1.77e6 + 0.037 * np.arange(N) + RNG.uniform(0, 0.02, N)).tolist(),
     ),
+    "days of a spreadsheet": (
+        "x",
+        [45352.375 + 0.0007 * i + 0.02 * (i >= 30) + 1e-4 * (i % 7) for i in range(N)],
+    ),
+    "days of MATLAB": ("x", [739312.375 + i // 20 + 0.0007 * (i % 20) ** 1.1 for i in range(N)]),
+    "an operator, mostly": ("who", ["ann" if i < 28 else "ben" for i in range(N)]),
     "values of one label only": ("x", [*NOISE[:30], *[""] * 30]),
     "values of hardly any trial of a label": ("x", [*NOISE[:33], *[""] * 27]),
     "fewer digits for a label": ("x", [*NOISE[:30], *map(round, NOISE[30:])]),
@@ -304,6 +319,15 @@ def test_what_changes_with_the_lines_or_stands_alone_is_told(column, tmp_path):
     heading = "kind" if column in ("months", "a version") else "kind [V]"
     notes = notes_on(tmp_path / "t.csv", heading, DRIFTS[column], order=range(N))
     assert [note for note in notes if "reveals" in note or "unlike all other values" in note]
+
+
+@every_case("n", [20, 60])
+def test_minutes_of_the_day_are_told_where_the_labels_are_in_blocks(n, tmp_path):
+    labels = [("can", "jar")[i // 10 % 2] for i in range(n)]
+    minutes = [f"9.{i // 2 + i // 10:02}" for i in range(n)]
+    assert notes_on(tmp_path / "t.csv", "x", minutes, labels, range(n))
+    mixed = np.random.default_rng(2).permutation(labels).tolist()
+    assert not notes_on(tmp_path / "t.csv", "x", [*minutes[:3], *minutes[:-3]], mixed, range(n))
 
 
 def test_what_drifts_is_told_in_the_order_of_recording(tmp_path):

@@ -753,6 +753,12 @@ def test_a_bad_file_does_not_stop_an_import_and_a_second_run_takes_only_what_is_
     assert [trial["source"] for trial in answer["trials"]] == ["jar_2.csv"]
     assert (len(answer["refused"]), answer["unreadable"]) == (3, [])
 
+    # A manifest that is corrected reads other grasps from the same files.
+    with open(described, "a") as file:
+        file.write("\nresample_hz = 50.0\n")
+    code, out, _ = graspsense(*command, "--json")
+    assert [trial["earlier"] for trial in json.loads(out)["trials"]] == [1, 2, 4, 3]
+
 
 def test_where_no_file_can_be_read_the_first_error_is_told(tmp_path):
     for k in range(3):

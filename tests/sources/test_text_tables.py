@@ -95,6 +95,12 @@ VARIANTS = {
     "Fortran": [HEADER, *(row.replace("0.0000", "0.0000D+00") for row in ROWS)],
     "zones": stamped(iso),
     "times of the day": stamped(lambda k: f"23:58:{k * 0.01:09.6f}"),
+    "MATLAB's dates": stamped(lambda k: noon(k).strftime("%d-%b-%Y %H:%M:%S.%f")),
+    "LabVIEW": ["***End_of_Header***", f"{HEADER},Comment", f"{ROWS[0]},start", *ROWS[1:]],
+    "a device that tells something": [HEADER, *ROWS[:90], "ERROR: no answer", *ROWS[90:], "End of file"],
+    "Markdown": [f"| {line.replace(',', ' | ')} |" for line in [HEADER, *ROWS]],
+    "a rule below the names": ["t | pos | f1 | f2", "--+-----+----+---", *(row.replace(",", " | ") for row in ROWS)],
+    "MATLAB's display": ["  t  pos  f1  f2", "  ___  ___  ___  ___", *(row.replace(",", "   ") for row in ROWS)],
     "morning and afternoon": stamped(lambda k: noon(k).strftime("%I:%M:%S.%f %p")),
     "an American date": stamped(lambda k: noon(k, 12).strftime("%m/%d/%Y %I:%M:%S.%f %p")),
     "a British date": stamped(lambda k: noon(k, 12).strftime("%d/%m/%Y %H:%M:%S.%f")),
@@ -114,6 +120,52 @@ def test_a_recording_is_read_as_instruments_write_it(lines, tmp_path):
     frames = [reading.frame for reading in recording.readings]
     assert [frame.gap_m for frame in frames] == pytest.approx(GAP_MM * 1e-3, abs=1e-7)
     assert [frame.force_left_n for frame in frames] == pytest.approx(FORCE_N, abs=1e-3)
+
+
+def test_a_line_that_numbers_the_columns_is_no_row(tmp_path):
+    path = tmp_path / "jar.csv"
+    numbered = [f"{k},{row}" for k, row in enumerate(ROWS)]
+    for lines, named_time in ((["0,1,2,3", *ROWS], "c1"), ([",0,1,2,3", *numbered], "c2")):
+        path.write_text("\n".join(lines) + "\n")
+        (table,) = read_text(path)
+        assert len(table) == N
+        assert [name for name, column in table.numbers.items() if np.allclose(column, T_S)] == [named_time]
+    path.write_text("0,1\n0.5,2\n")
+    assert len(read_text(path)[0]) == 2
+
+
+@every_case("quote", ['"', ""])
+def test_the_numbers_of_rows_that_r_writes_without_a_name_are_the_index(tmp_path, quote):
+    path = tmp_path / "t.txt"
+    lines = [f"{quote}{k + 1}{quote} {quote}{'ab'[k % 2]}{quote} {k * k % 7 + 0.5}" for k in range(20)]
+    path.write_text("\n".join([f"{quote}what{quote} {quote}peak{quote}", *lines, ""]))
+    trials = read_labelled(path, "what")
+    assert (trials.labels, trials.table.names) == (("a", "b") * 10, ("peak",))
+    path.write_text("\n".join([f"{quote}what{quote} {quote}peak{quote}", *lines[::-1], ""]))
+    with pytest.raises(DataDamaged):  # these can be measured, and the name of another column missing
+        read_labelled(path, "what")
+
+
+def test_a_single_column_may_have_a_name_with_spaces(tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_text("Load left [N]\n" + "".join(f"{k}.5\n" for k in range(5)))
+    (table,) = read_text(path)
+    assert table.numbers["Load left [N]"].tolist() == [0.5, 1.5, 2.5, 3.5, 4.5]
+
+
+def test_a_sign_or_a_factor_behind_a_number_is_no_unit(tmp_path):
+    path = tmp_path / "t.csv"
+    for sign in ("-", "k", "M"):
+        path.write_text("x,y\n" + "".join(f"{k}.5{sign},{k}\n" for k in range(5)))
+        (table,) = read_text(path)
+        assert not table.units
+        assert "x" not in table.numbers
+
+
+def test_thousands_between_apostrophes_of_windows_are_read(tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_bytes(b"x;y\n1\x92250.5;1\n975.0;2\n")
+    assert read_text(path)[0].numbers["x"].tolist() == [1250.5, 975.0]
 
 
 def test_compressed_text_and_json_lines_are_read(tmp_path):

@@ -300,6 +300,15 @@ def _import(
     if stored.kept:
         echo(f"  {chosen.words}", err=as_json)
         _echo_notices(_summary(recordings), ends.notice, err=as_json)
+    if again := [trial for trial in stored.kept if "earlier" in trial]:
+        known = f"{again[0]['source']} is that of trial {again[0]['earlier']}"
+        echo(
+            f"  {counted(len(again), 'trial')} from sources with a name that the store has, and with another content: "
+            f"{known}. A grasp that was read anew is stored twice now: set the earlier trials aside "
+            f"(graspsense trials aside {save}#{again[0]['earlier']})",
+            Style.CAUTION,
+            err=as_json,
+        )
     if stored.refused:
         refused = counted(len(stored.refused), "recording")
         echo(f"  {refused} left out: {stored.refused[0]}", Style.CAUTION, err=as_json)
@@ -345,7 +354,10 @@ def _store(
                 except GraspsenseError as error:
                     unreadable.append(UnreadableRecording(source=source, error=error))
                     continue
-            stored.kept.append({"source": source, "trial": number, "outcome": trial.outcome.words})
+            kept = {"source": source, "trial": number, "outcome": trial.outcome.words}
+            if (earlier := contents.earlier(source)) is not None:
+                kept["earlier"] = earlier
+            stored.kept.append(kept)
             noticed = recording.labelled.notices
             stored.notes.append(tuple(note for note in trial.device.notes if note not in noticed))
             progress("grasps imported", done + 1, len(recordings))

@@ -143,13 +143,14 @@ class Planned:
     def task(self, case: ExperimentCase, seed: int) -> Task:
         """Return the task for a case and a seed."""
         params = self._params(case, is_first=seed == self.seeds[0])
-        own = {text: self.inputs[text] for text in input_names(params) if text in self.inputs}
+        own = {text: self.inputs[text] for text in input_names([case.kind, params]) if text in self.inputs}
         params = {**params, "inputs": own} if own else params
         return Task(kind=case.kind, params=params, seed=seed, name=f"{case.name}, seed {seed}".lstrip(", "))
 
     def with_inputs(self) -> Planned:
         """Return the experiment with the present content of its inputs."""
-        return evolve(self, inputs=contents_of([self._params(case, is_first=True) for case in self.cases]))
+        named = [[case.kind, self._params(case, is_first=True)] for case in self.cases]
+        return evolve(self, inputs=contents_of(named))
 
     def _params(self, case: ExperimentCase, *, is_first: bool) -> dict[str, Any]:
         return {

@@ -161,9 +161,8 @@ def _run_tasks(
 def _without_changed_inputs(task: Task, result: TaskResult) -> TaskResult:
     """Return the result, or a failure if an input of its task has another content than when the experiment was read."""
     planned = task.params.get("inputs", {})
-    present = (
-        contents_of({key: value for key, value in task.params.items() if key != "inputs"}) if planned else {}
-    )
+    params = {key: value for key, value in task.params.items() if key != "inputs"}
+    present = contents_of([task.kind, params]) if planned else {}
     changed = [name for name, content in planned.items() if present.get(name) != content]
     if result.state == "failed" or not changed:
         return result

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from graspsense import __version__
-from graspsense.core.components.entries import DatasetEntry
+from graspsense.core.components.entries import ConformanceCheckEntry, DatasetEntry, ExperimentKindEntry
 from graspsense.core.components.registry import installed
 from graspsense.core.grasp.calibration_files import calibration_folder
 from graspsense.core.values.errors import GraspsenseError
@@ -74,15 +74,27 @@ def _content(text: str, codes: Mapping[str, list[tuple[str, str]]]) -> str | Non
         return None  # the text of a scene, which is its own content
     if text in codes:
         return _hash(_hash_of_code(*code) for code in codes[text])
-    kind, colon, places = text.partition(":")
     if text.startswith(STORE):
-        return _hash_of_store(places)
-    paths = [_path(place) for place in (places if colon else text).split(",")]
-    if not all(os.path.isfile(path) or (colon and os.path.isdir(path)) for path in paths):
+        return _hash_of_store(text.removeprefix(STORE))
+    kind, paths = _named_places(text)
+    if not paths:
         return None
     parts = [_hash_of_files(path, kind) for path in paths]
-    readers = codes.get(f"{kind}:", []) if colon else []
+    readers = codes.get(f"{kind}:", [])
     return _hash([*parts, *(_hash_of_code(*reader) for reader in readers)])
+
+
+def _named_places(text: str) -> tuple[str, list[str]]:
+    """Return the files, or files and folders behind a kind and a colon, that a text names; none if it names no input.
+
+    The name of a file may have commas and colons itself.
+    """
+    kind, _, places = text.partition(":")
+    for scheme, names in (("", [text]), ("", text.split(",")), (kind, [places]), (kind, places.split(","))):
+        paths = [_path(name) for name in names]
+        if all(os.path.isfile(path) or (scheme and os.path.isdir(path)) for path in paths):
+            return scheme, paths
+    return "", []
 
 
 def _path(place: str) -> str:
@@ -95,7 +107,7 @@ def _path(place: str) -> str:
 def located_text(text: str, base: Path) -> str:
     """Return a text that names a file or a store, or files or a folder after a colon, with absolute paths."""
     kind, colon, places = text.partition(":")
-    if not colon:
+    if not colon or os.path.isfile(base / _path(text)):
         path = base / _path(text)
         is_input = (os.path.isfile(path) and path.suffix) or as_source(str(path)).startswith(STORE)
         return str(base.absolute() / text) if is_input else text
@@ -109,14 +121,25 @@ def located_text(text: str, base: Path) -> str:
 def _codes() -> dict[str, list[tuple[str, str]]]:
     """Return version and module of every component by its qualified name, and of every data set as `NAME:`.
 
-    A setting may also name components of others without their distribution, as those of a union of feature sets.
+    A setting may also name components of others without their distribution, as those of a union of feature sets. Kinds
+    of experiments have their names. What plugins give to a hook of another one counts for the components of that one.
     """
     codes: dict[str, list[tuple[str, str]]] = {}
+    added: dict[str, list[tuple[str, str]]] = {}
+    for check in installed().resources(ConformanceCheckEntry):
+        added.setdefault(check.distribution, []).extend(
+            (status.version, status.module)
+            for status in installed().statuses
+            if check.entry.hook in status.hooks
+        )
     for part in installed().components():
-        code = (part.version, part.entry.target.partition(":")[0])
-        codes.setdefault(part.qualified, []).append(code)
+        code = [(part.version, part.entry.target.partition(":")[0]), *added.get(part.distribution, [])]
+        codes.setdefault(part.qualified, []).extend(code)
         if part.distribution != FRAMEWORK:
-            codes.setdefault(part.name, []).append(code)
+            codes.setdefault(part.name, []).extend(code)
+    for kind in installed().resources(ExperimentKindEntry):
+        if kind.entry.run and kind.distribution != FRAMEWORK:
+            codes.setdefault(kind.name, []).append((kind.version, kind.entry.run.partition(":")[0]))
     for dataset in installed().resources(DatasetEntry):
         target = dataset.entry.target or dataset.entry.recordings
         codes[f"{dataset.name}:"] = [(dataset.version, target.partition(":")[0])]
@@ -245,7 +268,7 @@ def _hash_of_file(path: str) -> str:
         if not os.path.isfile(path):
             return "no file"
         state = os.stat(path)
-        return _read_hash(path, state.st_size, state.st_mtime_ns, state.st_ino)
+        return _read_hash(path, state.st_size, state.st_ctime_ns, state.st_ino)
     except OSError as error:
         return str(error.strerror)
 

@@ -27,12 +27,15 @@ class ImportedContents:
     def __init__(self, store: Store) -> None:
         self._folder = store.folder
         self._trials: dict[str, int] = {}
+        self._sources: dict[str, int] = {}
         rows = store.query(
             """SELECT trial.id, trial.recording, detail.provenance FROM trial JOIN detail ON detail.trial = trial.id
             WHERE trial.origin = 'import' AND trial.set_aside IS NULL ORDER BY trial.id"""
         )
         for number, recording, provenance in rows:
-            sha256 = _stated(provenance)
+            sha256, source = _stated(provenance, CONTENT), _stated(provenance, "source")
+            if source is not None:
+                self._sources.setdefault(source, number)
             if sha256 is None:
                 try:
                     sha256 = content_sha256(read_recorded(store.recording_path(recording)).recording())
@@ -50,14 +53,21 @@ class ImportedContents:
                 f"again with other options, first set that trial aside: graspsense trials aside {self._folder}#{number}"
             )
 
+    def earlier(self, source: str) -> int | None:
+        """Return the trial that was imported before from a source of this name, None if there is none.
+
+        It may be the same grasp, read by a manifest that was corrected since.
+        """
+        return self._sources.get(source)
+
     def add(self, sha256: str, number: int) -> None:
         """Note the content of a trial that was just imported."""
         self._trials.setdefault(sha256, number)
 
 
-def _stated(provenance: str) -> str | None:
+def _stated(provenance: str, key: str) -> str | None:
     try:
-        stated = json.loads(provenance).get(CONTENT)
+        stated = json.loads(provenance).get(key)
     except (ValueError, AttributeError):
         return None
     return stated if isinstance(stated, str) else None

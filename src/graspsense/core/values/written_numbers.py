@@ -29,20 +29,24 @@ HEXADECIMAL: Final = 8
 _EVERY: Final = POINT | THOUSANDS | COMMA
 _NOTATIONS: Final = (POINT, THOUSANDS, COMMA)
 
-MISSING: Final = frozenset(
-    (
-        *("", "nan", "na", "n/a", "null", "none", "?", "-", "--", "---"),
-        *("#n/a", "#div/0!", "#value!", "#ref!", "#num!", "#null!", "#name?", "1.#qnan", "1.#ind", "-1.#ind"),
-    )
+_MISSING_WORDS: Final = frozenset({
+    "", "na", "n/a", "n.a.", "<na>", "nat", "null", "\\n", "none", "?", ".", "-", "--", "---", "\u2013", "\u2014"
+})  # fmt: skip
+_MISSING: Final = re.compile(
+    r"[-+]?(?:nan(?:\(\w*\))?|1[.,]#(?:q?nan|ind)\d*)|#[^\W\d][^!?]*[!?]|#[\u00a1\u00bf].*|#n/?[adv]|err:\d{3}",
+    re.IGNORECASE,
 )
-"""What stands for a missing number, in small letters."""
-_LONGEST_MISSING: Final = max(map(len, MISSING))
+"""NaN as the libraries of C write it, and the errors of spreadsheets in their languages, such as `#WERT!`."""
+_LONGEST_MISSING: Final = 20
 
 _LOGICAL: Final = {"True": 1.0, "False": 0.0}
 _SIGN, _EXPONENT = "[-+\u2212]?", "(?:[eEdD][-+]?[0-9]+)?"
 _WITH_POINT: Final = re.compile(rf"{_SIGN}(?:(?P<whole>[0-9]+)(?:\.[0-9]*)?|\.[0-9]+){_EXPONENT}")
 _WITH_COMMA: Final = re.compile(rf"{_SIGN}[0-9]*,[0-9]+{_EXPONENT}")
-_COMMA_GROUPS: Final = re.compile(rf"{_SIGN}[1-9][0-9]{{0,2}}(?:,[0-9]{{3}})+(?:\.[0-9]*)?{_EXPONENT}")
+_COMMA_GROUPS: Final = re.compile(
+    rf"{_SIGN}[1-9](?:[0-9]{{0,2}}(?:,[0-9]{{3}})+|[0-9]?(?:,[0-9]{{2}})+,[0-9]{{3}})(?:\.[0-9]*)?{_EXPONENT}"
+)
+"""Thousands between commas, also with those of India between them: 1,00,000."""
 _POINT_GROUPS: Final = re.compile(rf"{_SIGN}[1-9][0-9]{{0,2}}(?:\.[0-9]{{3}})+(?:,[0-9]*)?{_EXPONENT}")
 _OTHER_GROUPS: Final = re.compile(
     rf"{_SIGN}[1-9][0-9]{{0,2}}(?:[ '\u2019\u00a0\u2009\u202f][0-9]{{3}})+(?:[.,][0-9]*)?{_EXPONENT}"
@@ -71,7 +75,9 @@ class NotNumbers:
 
 def is_missing(cell: str) -> bool:
     """Return whether the text of a cell stands for a missing number."""
-    return len(cell) <= _LONGEST_MISSING and cell.lower() in MISSING
+    return len(cell) <= _LONGEST_MISSING and (
+        cell.lower() in _MISSING_WORDS or _MISSING.fullmatch(cell) is not None
+    )
 
 
 def is_number(cell: str) -> bool:
@@ -197,6 +203,8 @@ def _read(cells: Sequence[str], fit: _Fit, of_file: int) -> Numbers | NotNumbers
             return _values(cells, POINT) if fit.values is None else fit.values
         if not of_file & THOUSANDS:
             return _values(cells, COMMA)
+    elif (common == THOUSANDS and of_file & COMMA) or _three_digits_behind_both_marks(cells):
+        pass
     elif common == THOUSANDS | COMMA:
         if of_file == COMMA:
             return _values(cells, COMMA)
@@ -204,10 +212,10 @@ def _read(cells: Sequence[str], fit: _Fit, of_file: int) -> Numbers | NotNumbers
             return _values(cells, THOUSANDS)
     else:
         return _values(cells, common)
-    row = next(k for k, cell in enumerate(cells) if "," in cell or "." in cell)
-    readings = " or ".join(
-        f"{_values([cells[row]], notation)[0]:.15g}" for notation in _NOTATIONS if common & notation
-    )
+    mark = "," if common & POINT == 0 else "."
+    row = next(k for k, cell in enumerate(cells) if mark in cell)
+    able = [notation for notation in _NOTATIONS if _notations(cells[row]) & notation]
+    readings = " or ".join(dict.fromkeys(f"{_values([cells[row]], notation)[0]:.15g}" for notation in able))
     return NotNumbers(
         row, cells[row], f"which can be {readings}: write a decimal point, and nothing between thousands"
     )
@@ -224,6 +232,13 @@ def _signs_of_thousands(cells: Sequence[str], mark: str) -> int:
     return any(cell.endswith("0") for cell in cells if mark in cell) + any(
         len(cell.lstrip("+-\u2212")) == 3 for cell in plain
     )
+
+
+def _three_digits_behind_both_marks(cells: Sequence[str]) -> bool:
+    """Return whether these are `1,250` and `1.310`: three decimals, behind the mark of one place and of another."""
+    parts = [re.split("([,.])", cell) for cell in cells if "," in cell or "." in cell]
+    both = {part[1] for part in parts} == {",", "."}
+    return both and all(len(part) == 3 and len(part[2]) == 3 for part in parts)
 
 
 def _values(cells: Sequence[str], notation: int) -> Numbers:

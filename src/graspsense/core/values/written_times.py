@@ -19,6 +19,10 @@ _TIME: Final = re.compile(
     r"(?: ?(?P<half>[AP])\.?M\.?)? ?(?P<zone>Z|[-+][0-9]{2}:?[0-9]{2}|)",
     re.IGNORECASE,
 )
+_MONTH: Final = re.compile(
+    r"(?<=\d)[- ](jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec)[a-z]*[- ]", re.IGNORECASE
+)
+_MONTHS: Final = ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"]
 _MINUTES: Final = re.compile(r"[0-5]?[0-9]:[0-5][0-9][.,][0-9]{1,9}")
 """Minutes and seconds; without a fraction they can be hours and minutes."""
 _DAY_S: Final = 86_400.0
@@ -47,7 +51,7 @@ def _seconds(cells: Sequence[str], *, month_first: bool) -> Numbers | None:
     """Return the times in seconds since the first one, None if a cell is not a time."""
     times, dated = [], False
     for cell in cells:
-        match = _TIME.fullmatch(cell)
+        match = _TIME.fullmatch(_MONTH.sub(lambda name: f".{_MONTHS.index(name[1].lower()) + 1}.", cell))
         if match is None or not (match["year"] or match["c"] or ":" in cell):
             return None
         dated = dated or bool(match["year"] or match["c"])

@@ -14,7 +14,7 @@ from graspsense.sources.formats.array_format import ARRAY_SUFFIXES, ArrayRules, 
 from graspsense.sources.formats.table import ColumnTable
 from graspsense.sources.formats.text_table import JSON_LINES, text_suffix
 
-TEXT_SUFFIXES: Final = (".csv", ".tsv", ".txt", ".dat", ".data", *JSON_LINES)
+TEXT_SUFFIXES: Final = (".csv", ".tsv", ".txt", ".dat", ".data", ".lvm", *JSON_LINES)
 BAG_SUFFIXES: Final = (".bag", ".mcap", ".db3")
 PARQUET_SUFFIXES: Final = (".parquet", ".pq")
 READ_SUFFIXES: Final = (*TEXT_SUFFIXES, *ARRAY_SUFFIXES, *BAG_SUFFIXES, *PARQUET_SUFFIXES)

@@ -38,14 +38,21 @@ UNITS: Final = frozenset((
     "newtons", "m/s\u00b2", "rad/s", "deg/s", "counts", "count", "raw", "adc", "a.u.", "au", "step", "steps",
 ))  # fmt: skip
 """What stands in a line of units, in small letters."""
+_SINGLE_UNITS: Final = frozenset("smgNVACK%\u00b0")
+"""Units of one sign behind a number: in the other case, or as `12-`, it can be a factor or a sign of its own."""
 _LINE_ENDS: Final = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
 """The characters at which `str.splitlines` divides a text."""
 _COMMENTS: Final = ("#", "%")
+_RULE: Final = re.compile(r"(?=.*[-_=]{3})[-_=+|:\s]+")
+"""A line of signs below the names, or around a table."""
+_REMARKS: Final = frozenset({"comment", "comments", "remark", "remarks", "note", "notes"})
+"""Names of a last column whose cells a program leaves out, with the separator, where it has nothing to say."""
 _SEPARATOR_LINE: Final = re.compile(r'"?sep=([;,\t|])"?\s*')
 SPREADSHEETS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 """The first bytes of a ZIP file, as which spreadsheets are saved, and of those of old programs."""
 _CODE_PAGES: Final = ("cp1252", "cp1250", "iso8859-1", "iso8859-15")
 """They agree on degrees, micro and the letters of several languages."""
+_NO_SEPARATOR: Final = "\x1f"
 _WITH_UNIT: Final = re.compile(r"(.*[0-9.])\s*([^\s0-9]+)")
 _SAMPLED: Final = 400
 """Lines from which the separator and the kinds of the columns are found."""
@@ -110,10 +117,12 @@ class _Layout:
         given = _SEPARATOR_LINE.fullmatch(written[0][1]) if written else None
         if given:
             written = written[1:]
-        self.comments = [numbered for numbered in written if numbered[1].lstrip().startswith(_COMMENTS)]
-        plain = [numbered for numbered in written if not numbered[1].lstrip().startswith(_COMMENTS)]
+        self.comments = _comments(written)
+        plain = [each for each in written if each not in {*self.comments} and not _RULE.fullmatch(each[1])]
+        if all(re.fullmatch(r"\s*\|.*\|\s*", line) for _, line in plain):
+            plain = [(number, line.strip()[1:-1]) for number, line in plain]
         self.separator = given[1] if given else _separator([line for _, line in _sample(plain)])
-        self.rows = list(self._checked(self._rows(plain)))
+        self.rows = _with_remarks(list(self._checked(self._rows(plain))))
 
     def table(self, ended: bool) -> TextTable:
         """Return the table. Raises DataDamaged."""
@@ -123,6 +132,9 @@ class _Layout:
         check_columns(self.path, names)
         rows = self.rows[begin:]
         rows = self._without_repeats(rows, names, units)
+        rows = self._without_texts(rows, len(names))
+        if _begin_with_numbers_of_rows(rows, len(names) + 1):
+            names, units = ["", *names], ["", *units] if units else None
         names, rows = self._without_blank_end(names, rows)
         rows = self._without_cut(rows, len(names), ended)
         for number, row in rows:
@@ -146,7 +158,7 @@ class _Layout:
         """Yield the cells of each line; a cell in quotes may go over several lines. Raises DataDamaged."""
         if self.separator == " ":
             for number, line in lines:
-                yield number, line.split()
+                yield number, _words(line)
             return
         reader = csv.reader((line + "\n" for _, line in lines), delimiter=self.separator, strict=True)
         try:
@@ -185,7 +197,10 @@ class _Layout:
             if named is not None:
                 return named[1], named[2], 0, named[0]
             if all(is_number(cell) or is_missing(cell) for cell in top):
-                return [f"c{k}" for k in range(1, width + 1)], None, 0, 0
+                numbered = width > 2 and top in ([*map(str, range(width))], ["", *map(str, range(width - 1))])
+                if numbered:
+                    self.notes.append(_lines_words([self.rows[0][0]], "lines that number the columns"))
+                return [f"c{k}" for k in range(1, width + 1)], None, int(numbered), 0
             return top, None, 1, self.rows[0][0]
         return self._later_header(data, width, numeric)
 
@@ -195,7 +210,8 @@ class _Layout:
         named = [
             k
             for k, (_, row) in enumerate(self.rows[data + 1 : most + 1], data + 1)
-            if not any(is_number(row[c]) or is_missing(row[c]) for c in numeric if c < len(row))
+            if len(row) > 1
+            and not any(is_number(row[c]) or is_missing(row[c]) for c in numeric if c < len(row))
             and _can_be_names(row, width, [set()] * width)
             and all(row != earlier for _, earlier in self.rows[:data])
             and k + 1 < len(self.rows)
@@ -273,7 +289,7 @@ class _Layout:
     def _cells(self, comment: str) -> list[str]:
         text = comment.strip().lstrip("#% ")
         return (
-            text.split() if self.separator == " " else [cell.strip() for cell in text.split(self.separator)]
+            _words(text) if self.separator == " " else [cell.strip() for cell in text.split(self.separator)]
         )
 
     def _without_repeats(
@@ -286,6 +302,14 @@ class _Layout:
             return rows
         self.notes.append(_lines_words(again, "repeated headers"))
         return [row for row in rows if row[1] != header and [cell.strip("[]()") for cell in row[1]] != units]
+
+    def _without_texts(self, rows: list[Row], width: int) -> list[Row]:
+        """Return the rows without lines that are one text, as a device prints them between its numbers."""
+        texts = [number for number, row in rows if len(row) == 1 < width and not is_number(row[0])]
+        if not 0 < len(texts) <= max(1, _MOST_BEFORE * len(rows)):
+            return rows
+        self.notes.append(_lines_words(texts, "lines of text"))
+        return [row for row in rows if row[0] not in {*texts}]
 
     def _without_blank_end(self, names: list[str], rows: list[Row]) -> tuple[list[str], list[Row]]:
         """Return names and rows without a last column that a separator at the end of the lines makes."""
@@ -317,6 +341,29 @@ class _Layout:
         return rows[:-1]
 
 
+def _comments(lines: Sequence[Line]) -> list[Line]:
+    """Return the lines that are comments. After the first other line they are few: trials can be called #1, #2."""
+    marked = [line.lstrip().startswith(_COMMENTS) for _, line in lines]
+    begin = marked.index(False) if False in marked else len(lines)
+    later = marked[begin + 1 :]
+    few = 2 * sum(later) <= len(later)
+    return [each for k, each in enumerate(lines) if marked[k] and (few or k < begin)]
+
+
+def _with_remarks(rows: list[Row]) -> list[Row]:
+    """Return the rows with the last cell, if most of them lack it because only a column of remarks has it."""
+    width = next((len(row) for _, row in rows if len(row) > 1 and row[-1].lower() in _REMARKS), 0)
+    if 2 * sum(len(row) == width - 1 for _, row in rows) <= len(rows):
+        return rows
+    return [(number, [*row, ""] if len(row) == width - 1 else row) for number, row in rows]
+
+
+def _begin_with_numbers_of_rows(rows: Sequence[Row], width: int) -> bool:
+    """Return whether all rows have so many cells, and number themselves in the first: R writes no name for it."""
+    counter, n = [row[0] for _, row in rows if len(row) == width], len(rows)
+    return n > 1 and counter in ([*map(str, range(n))], [*map(str, range(1, n + 1))])
+
+
 def numbers_with_unit(cells: Sequence[str]) -> tuple[Sequence[str], str]:
     """Return the numbers and the unit of cells such as `12.3 N`; the cells, and no unit, if they have not all the same.
 
@@ -333,7 +380,8 @@ def numbers_with_unit(cells: Sequence[str]) -> tuple[Sequence[str], str]:
             return cells, ""
         numbers.append(match[1])
         unit = match[2]
-    return (numbers, unit) if unit.lower() in UNITS else (cells, "")
+    known = unit.lower() in UNITS if len(unit) > 1 else unit in _SINGLE_UNITS
+    return (numbers, unit) if known else (cells, "")
 
 
 def _json_table(path: Path, lines: Sequence[Line], ended: bool) -> TextTable:
@@ -393,7 +441,8 @@ def _sample(lines: Sequence[Any]) -> list[Any]:
 def _separator(lines: Sequence[str]) -> str:
     """Return what separates the cells of these lines: a semicolon, a tab, a comma, a bar, or any number of spaces.
 
-    It gives most lines the same number of cells, and the first line as many if any does.
+    It gives most lines the same number of cells, and the first line as many if any does. In a single column it is a
+    sign that no text has: the name may have spaces.
     """
     widths = {separator: _width(lines, separator) for separator in (";", "\t", ",", "|", " ")}
     agreeing = {separator: count for separator, (width, count) in widths.items() if width > 1}
@@ -401,7 +450,14 @@ def _separator(lines: Sequence[str]) -> str:
         agreeing.pop(",", None)
     able = [separator for separator, count in agreeing.items() if count >= 0.9 * max(agreeing.values())]
     fitting = [item for item in able if _width(lines[:1], item)[0] == widths[item][0]]
-    return next(iter(fitting or able), " ")
+    return next(iter(fitting or able), _NO_SEPARATOR)
+
+
+def _words(line: str) -> list[str]:
+    """Return the words between spaces; spaces within quotes are of their word."""
+    if '"' not in line:
+        return line.split()
+    return [quoted or word for quoted, word in re.findall(r'"([^"]*)"(?!\S)|(\S+)', line)]
 
 
 def _commas_are_within_numbers(lines: Sequence[str]) -> bool:
@@ -415,7 +471,7 @@ def _width(lines: Sequence[str], separator: str) -> tuple[int, int]:
     widths: Counter[int] = Counter()
     for line in lines:
         try:
-            cells = line.split() if separator == " " else next(csv.reader([line], delimiter=separator), [])
+            cells = _words(line) if separator == " " else next(csv.reader([line], delimiter=separator), [])
         except (csv.Error, ValueError):
             continue
         widths[len(cells)] += 1
@@ -525,7 +581,7 @@ def text_of(path: Path) -> str:
         raise DataDamaged(f"{path} is a spreadsheet or an archive, not text: save its table as CSV in UTF-8")
     if too_large := TEXT_BYTES.exceeded(size):
         raise DataDamaged(f"{path}: {too_large}")
-    text = _decoded(path, data)
+    text = _decoded(path, data).replace("\ufeff", "")  # also of files that were joined
     if "\0" in text:
         raise DataDamaged(
             f"{path} contains zero bytes: it is not a text file. If a program wrote it as Unicode text, save it as "
@@ -549,7 +605,8 @@ def _decoded(path: Path, data: bytes) -> str:
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        texts = {data.decode(code_page, "replace") for code_page in _CODE_PAGES}
+        apart = re.sub(rb"(?<=\d)\x92(?=\d{3})", b"'", data)  # thousands, as Windows has them in Switzerland
+        texts = {apart.decode(code_page, "replace") for code_page in _CODE_PAGES}
         if len(texts) == 1:
             return texts.pop()
         line = data.count(b"\n", 0, error.start) + 1

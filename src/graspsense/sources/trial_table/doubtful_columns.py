@@ -20,6 +20,7 @@ from graspsense.core.values.features import LARGEST_VALUE
 from graspsense.sources.trial_table.identifiers import (
     LEAST_LINES,
     TIMES,
+    can_be_days,
     follow_lines,
     groups_trials,
     is_count,
@@ -53,7 +54,7 @@ _OF_TIMES: Final = TIMES | {
     "total",
 }
 _OF_A_SESSION: Final = frozenset({
-    "temperature", "temp", "humidity", "battery", "baseline", "zero", "initial", "start", "before"
+    "temperature", "temp", "humidity", "battery", "batt", "vbat", "baseline", "zero", "initial", "start", "before"
 })  # fmt: skip
 _TEMPERATURES: Final = frozenset({"C", "\u00b0C", "degC"})
 """What can be the same, or drift, in a whole session; by the name of a column, or by its unit."""
@@ -130,7 +131,7 @@ def _of_recording(
                 for name in used
                 if name not in same and mostly_says_the_label(columns.cells[name], labels)
             ],
-            "If it is a setting or a condition of the experiment, it reveals the labels: ",
+            "If it is a setting of the experiment, or a prediction, it reveals the labels: ",
         ),
         (
             "each of its values occurs with one label only",
@@ -168,26 +169,21 @@ def _of_time_and_digits(
     columns: CsvColumns, labels: Sequence[str], numbers: dict[str, Numbers]
 ) -> tuple[tuple[str, list[str], str], ...]:
     """Return what may tell of times and rounding: how, the names of the columns, and what to do."""
-    rising = [name for name, values in numbers.items() if keeps_rising(values)]
     counted = [name for name in numbers if is_count(columns.units[name]) or is_time(columns.units[name])]
     return (
-        (
-            "every line has more than the one before, or every line less",
-            rising,
-            "If it is a time or a counter it reveals the labels: ",
-        ),
         (
             "its values follow the order of recording within each label, as a drifting zero, a battery or a clock does",
             [
                 name
                 for name, values in numbers.items()
-                if name not in rising and differs_by_label(values, labels) and follow_lines(values, labels)
+                if (differs_by_label(values, labels) or are_in_blocks(labels))
+                and follow_lines(values, labels)
             ],
             "If it tells when a trial was recorded, it reveals the labels: ",
         ),
         (
-            "its name is that of a time",
-            [name for name in counted if name not in rising and _is_named_as_time(name)],
+            "its name is that of a time, or its values can be dates as spreadsheets and MATLAB number them",
+            [name for name in counted if _is_named_as_time(name) or can_be_days(numbers[name])],
             "If it is the time of recording, it reveals the labels: ",
         ),
         (
@@ -202,7 +198,7 @@ def _of_time_and_digits(
         ),
         (
             "its values pass from label to label without a gap or an overlap, as those of a clock or a counter do",
-            [name for name in counted if name not in rising and passes_without_a_gap(numbers[name], labels)],
+            [name for name in counted if passes_without_a_gap(numbers[name], labels)],
             "If it is a time or a counter it reveals the labels: ",
         ),
         (
@@ -261,6 +257,11 @@ def mostly_says_the_label(values: Sequence[Hashable], labels: Sequence[str]) -> 
             usual[label] = value
     few = len(set(values)) <= len(counts) and min(counts.values()) >= LEAST_LINES
     return few and len(usual) == len(counts) and len(set(usual.values())) == len(set(values)) > 1
+
+
+def are_in_blocks(labels: Sequence[str]) -> bool:
+    """Return whether the lines of a label mostly come one after the other, so that what drifts can tell labels."""
+    return LEAST_LINES * sum(1 for _ in groupby(labels)) <= len(labels)
 
 
 def says_of_labels(values: Sequence[bool], labels: Sequence[str]) -> bool:

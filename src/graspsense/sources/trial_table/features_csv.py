@@ -46,6 +46,10 @@ SMALL: Final = 1e-3
 """A column that varies by less than this has few values that differ by J48's 1e-5."""
 _ROUNDING: Final = 1e-13
 """Variation relative to the largest value that is only rounding, and no measurement, as in C4.5 trees."""
+_QUANTITY: Final = frozenset(
+    {"variable", "quantity", "parameter", "feature", "measure", "measurement", "metric"}
+)
+_VALUE: Final = frozenset({"value", "values"})
 LARGEST_WHOLE: Final = 2.0**53
 """From here on, not every whole number is a number of the computer."""
 
@@ -137,6 +141,16 @@ def _identifying(
     """Return `_identified` of these lines, which computes the answer for a column once."""
     ranks_once = None if ranks is None else [ranks[i] for i in lines]
     return cache(partial(_identified, columns.rows(lines), [labels[i] for i in lines], ranks_once))
+
+
+def _refuse_long_form(columns: CsvColumns) -> None:
+    """Raise DataDamaged if a column names what the number in a column `value` is, so that a trial has several lines."""
+    quantity = next((name for name in columns.names if name.lower() in _QUANTITY), None)
+    if quantity and columns.is_nominal(quantity) and any(name.lower() in _VALUE for name in columns.names):
+        raise DataDamaged(
+            f"{columns.path} has a line for each {quantity} of a trial: write one line per trial, with a column for "
+            f"each {quantity}"
+        )
 
 
 def _lines_once(columns: CsvColumns, counted_by: set[str | None], labels: Sequence[str]) -> list[int]:
@@ -319,6 +333,7 @@ def _feature_names(
     columns: CsvColumns, reserved: set[str], identified: Callable[[str], str], notes: list[str]
 ) -> list[str]:
     """Return the columns that are neither reserved nor identifiers. Raises ConfigError, DataDamaged."""
+    _refuse_long_form(columns)
     names, nominal, blank = [], [], []
     if columns.index:
         notes.append(f"not used, because it is the index that pandas wrote: {columns.index}")

@@ -33,11 +33,13 @@ TIMES: Final = frozenset({
 _NAMES: Final = frozenset({
     "id", "uid", "uuid", "index", "idx", "number", "num", "no", "nr", "trial", "run", "row", "line", "record",
     "seq", "sequence", "serial", "counter", "file", "filename", "session", "date", "timestamp", "time",
-    "epoch"
+    "epoch", "nummer", "versuch", "messung", "zeile", "datei", "sitzung", "datum", "zeit", "uhrzeit", "essai",
+    "fichier", "heure", "numero", "prueba", "archivo", "fecha", "hora"
 })  # fmt: skip
 _OF_RECORDINGS: Final = frozenset({
     "session", "operator", "experimenter", "person", "user", "robot", "host", "seed", "batch", "weekday", "day", "date",
     "datetime", "trial", "fold", "split", "file", "filename", "uid", "uuid", "prediction", "predicted",
+    "sitzung", "bediener", "proband", "datum", "wochentag", "tag", "versuch", "datei", "fichier", "jour", "fecha",
 })  # fmt: skip
 """What a recording is known by, and what a model said of it; no gripper measures it."""
 _DIVISIONS: Final = frozenset({"seed", "trial", "fold", "split", "uid", "uuid", "prediction", "predicted"})
@@ -66,7 +68,7 @@ _SPACED: Final = 30
 _ALIKE: Final = 0.35
 """The same ratio of a clock whose lines are in any order: of 30 measurements it is less once in a million."""
 _ENDS: Final = 2
-"""Objects that may have fewer lines than the others: the one that came before all others, and the last one."""
+"""Objects that may have fewer lines than the others: the first and the last one; or the last one of each label."""
 _HASHED: Final = 1e7
 """Integers from this one on are hashes, if they number objects and are no multiples of 1000."""
 _EPOCH_S: Final = (6.3e8, 4.2e9)
@@ -83,9 +85,23 @@ _DATE_TEXT: Final = re.compile(
     r"(\d{1,4}([-./])\d{1,2}\2\d{1,4})?[T ]?(\d{1,2}(:\d{2}){1,2}(\.\d+)?)?( ?Z| ?[+-]\d\d:?\d\d)?"
 )
 _WEEKDAYS: Final = re.compile(
-    r"mon(day)?|tue(sday)?|wed(nesday)?|thu(rsday)?|fri(day)?|sat(urday)?|sun(day)?"
+    r"mon(day)?|tue(sday)?|wed(nesday)?|thu(rsday)?|fri(day)?|sat(urday)?|sun(day)?|mo(ntag)?|di(enstag)?|"
+    r"mi(ttwoch)?|do(nnerstag)?|fr(eitag)?|sa(mstag)?|so(nntag)?|lun(di)?|mar(di)?|mer(credi)?|jeu(di)?|ven(dredi)?|"
+    r"sam(edi)?|dim(anche)?"
 )
-_DATES: Final = ("%Y%m%d", "%Y%m%d%H%M", "%Y%m%d%H%M%S")
+_DATES: Final = ("%Y%m%d", "%y%m%d%H%M", "%Y%m%d%H%M", "%y%m%d%H%M%S", "%Y%m%d%H%M%S")
+_SEXAGESIMAL: Final = 60.0
+_CLOCK_VALUES: Final = (10, 15)
+"""Different hundreds, and different last two digits, from which on 142530 and 91205 are times of the day: that no two
+digits are above 59 is a chance of one in two thousand."""
+_DAYS: Final = (36_526.0, 55_153.0)
+"""The years 2000 to 2050 in days, as spreadsheets count them."""
+_DAYS_OF_MATLAB: Final = 693_960.0
+"""How many days more MATLAB counts."""
+_LONGEST_DAYS: Final = 3_700.0
+"""Ten years, in which one table is recorded."""
+_WORKING_DAY: Final = 0.7
+"""Part of the day in which all recordings were made."""
 
 
 def names_a_recording(name: str) -> bool:
@@ -163,6 +179,8 @@ def text_identifies(texts: Sequence[str], labels: Sequence[str]) -> str:
     counts = Counter(text for text, _ in given)
     if len(counts) < 2:
         return ""
+    if counts.keys() <= set(labels):
+        return "are the labels, as those of a prediction are"
     if all(map(_is_date, counts)) or (
         len(counts) > 2 and all(_WEEKDAYS.fullmatch(text.lower()) for text in counts)
     ):
@@ -208,19 +226,37 @@ def _is_calendar(column: NDArray[np.float64]) -> bool:
         for unit in _PER_SECOND
     ):
         return True
-    if least < 19_700_101 or (column != np.floor(column)).any():
+    if least < 0.0 or (column != np.floor(column)).any():
         return False
-    return all(_is_written_date(f"{value:.0f}") for value in np.unique(column).tolist())
+    if least < 19_700_101:
+        hundreds, ends = np.unique(column // 100.0), np.unique(column % 100.0)
+        many = len(hundreds) >= _CLOCK_VALUES[0] and len(ends) >= _CLOCK_VALUES[1]
+        return many and most < 240_000.0 and max(ends.max(), (hundreds % 100.0).max()) < _SEXAGESIMAL
+    texts = [f"{value:.0f}" for value in np.unique(column).tolist()]
+    return any(all(_is_written_date(text, form) for text in texts) for form in _DATES)
 
 
-def _is_written_date(text: str) -> bool:
-    for form in _DATES:
-        if len(text) == len(datetime(2000, 1, 1).strftime(form)):
-            try:
-                return 1970 <= datetime.strptime(text, form).year <= 2100
-            except ValueError:
-                return False
-    return False
+def _is_written_date(text: str, form: str) -> bool:
+    try:
+        return (
+            len(text) == len(datetime(2000, 1, 1).strftime(form))
+            and 1970 <= datetime.strptime(text, form).year <= 2100
+        )
+    except ValueError:
+        return False
+
+
+def can_be_days(values: NDArray[np.float64]) -> bool:
+    """Return whether these can be days and parts of days, as spreadsheets and MATLAB number them."""
+    known = values[~np.isnan(values)]
+    if (
+        len(known) < LEAST_LINES
+        or np.ptp(known) > _LONGEST_DAYS
+        or not 0.0 < np.ptp(known % 1.0) < _WORKING_DAY
+    ):
+        return False
+    low, high = _DAYS
+    return any(low <= known.min() - later and known.max() - later <= high for later in (0.0, _DAYS_OF_MATLAB))
 
 
 def _follows(column: NDArray[np.float64], lines: NDArray[np.int64], labels: Sequence[str]) -> bool:
@@ -248,13 +284,17 @@ def _follows_in_labels(column: NDArray[np.float64], lines: NDArray[np.int64], la
 
 
 def follow_lines(values: NDArray[np.float64], labels: Sequence[str]) -> bool:
-    """Return whether values drift with the lines: over each label, and within a few lines of it.
+    """Return whether values hardly leave the order of the lines of a label, or drift with them.
 
-    Objects that come one after the other differ from each other, and not within their lines.
+    A drift shows over each label, and within a few lines of it: objects that come one after the other differ from each
+    other, and not within their lines.
     """
     given = np.flatnonzero(~np.isnan(values))
-    codes = np.unique(np.array(labels)[given], return_inverse=True)[1]
+    known = np.array(labels)[given]
+    codes = np.unique(known, return_inverse=True)[1]
     column, lines = values[given], given.astype(np.float64)
+    if _follows_in_labels(column, given, known.tolist()):
+        return True
     if len(given) < _SPACED or not np.ptp(column):
         return False
     counts = np.bincount(codes)
@@ -303,7 +343,7 @@ def _hardly_repeats(n: int, distinct: int, cells: float) -> bool:
 def name_objects(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
     """Return whether values name objects: each belongs to one label, and all have as many lines, or one block.
 
-    Where two labels meet, an object may have lines of both. The objects at the ends may have fewer lines.
+    Where two labels meet, an object may have lines of both. Objects at the ends may have fewer lines.
     """
     counts = Counter(values)
     objects = len(counts)
@@ -313,7 +353,7 @@ def name_objects(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
     most = max(counts.values())
     fewer = sum(count < most for count in counts.values())
     in_blocks = sum(1 for _ in groupby(values)) == objects
-    return most > 1 and (fewer <= _ENDS or (in_blocks and min(counts.values()) > 1))
+    return most > 1 and (fewer <= max(_ENDS, among) or (in_blocks and min(counts.values()) > 1))
 
 
 def _enough_objects(objects: int, labels: Sequence[str]) -> bool:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
+from collections.abc import Container
 from typing import TYPE_CHECKING, Final
 
 from graspsense.core.values.errors import listed
@@ -21,30 +23,47 @@ _STATISTICS: Final = frozenset({
 
 
 def without_summaries(columns: CsvColumns) -> None:
-    """Remove the lines that are statistics of the others, with a note.
+    """Remove the lines that are statistics of the others, or headings between them, with a note.
 
-    In the last lines, each has the name of a statistic that its column has nowhere else; an object of that name has
-    several trials. Anywhere, the name stands in a column of numbers, as that of a trial.
+    In the first and the last lines, each has the name of a statistic that its column has nowhere else; an object of
+    that name has several trials. Anywhere, the name stands beside that of other lines, as in `mean (can)`, or in a
+    column of numbers, as that of a trial. A heading is a text that its column has nowhere else, alone in its line.
     """
     summaries: dict[int, str] = {}
+    alone = [sum(map(bool, row)) == 1 < len(row) - 1 for row in zip(*columns.cells.values(), strict=True)]
     for name, cells in columns.cells.items():
         words = [
             " ".join(cell.casefold().replace("_", " ").replace(".", " ").split()).strip(": ")
             for cell in cells
         ]
-        rows = [i for i, word in enumerate(words) if word in _STATISTICS]
-        if not rows:
-            continue
         times = Counter(words)
-        last = len(cells)
-        while last and words[last - 1] in _STATISTICS and times[words[last - 1]] == 1:
-            last -= 1
-        numbered = columns.has_numbers(name)
-        summaries |= {i: cells[i] for i in rows if numbered or i >= last}
+        telling = [
+            word != "" and times[word] == 1 and (lone or _is_statistic(word, times))
+            for word, lone in zip(words, alone, strict=True)
+        ]
+        begin = telling.index(False) if False in telling else 0
+        end = len(cells) - (telling[::-1].index(False) if False in telling else 0)
+        summaries |= {
+            i: cells[i]
+            for i, told in enumerate(telling)
+            if told and (not begin <= i < end or alone[i] or words[i] not in _STATISTICS)
+        }
+        if not _STATISTICS.isdisjoint(times) and columns.has_numbers(name):
+            summaries |= {i: cells[i] for i, word in enumerate(words) if word in _STATISTICS}
     if 0 < len(summaries) < len(columns):
         columns.notes = (
             *columns.notes,
-            "left out, because they are statistics of other lines: "
+            "left out, because they are statistics of other lines, or headings: "
             + listed([f"line {columns.lines[i]} ({summaries[i]})" for i in sorted(summaries)]),
         )
         columns.keep([i for i in range(len(columns)) if i not in summaries])
+
+
+def _is_statistic(word: str, others: Container[str]) -> bool:
+    """Return whether this is the name of a statistic, or that of one and of another line."""
+    parts = re.split(r" of |[ ()]+", word.strip("()")) if word[:1].isalpha() else [""]
+    return word in _STATISTICS or any(
+        statistic in _STATISTICS and " ".join(other) in others
+        for statistic, other in ((parts[0], parts[1:]), (parts[-1], parts[:-1]))
+        if other
+    )
