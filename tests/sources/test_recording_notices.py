@@ -89,7 +89,7 @@ def test_a_gap_that_is_measured_more_rarely_than_the_force_is_noticed_and_a_coar
     assert noticed(LEFT, RIGHT, np.round(closing / 0.004) * 0.004) == ()
 
 
-OPEN_AGAIN_M = np.where(T_S < 2.6, np.maximum(0.08 - 0.03 * T_S, 0.05), 0.05 + 0.1 * (T_S - 2.6))
+OPEN_AGAIN_M = np.where(T_S < 2.68, np.maximum(0.08 - 0.03 * T_S, 0.05), 0.05 + 0.1 * (T_S - 2.68))
 RELEASED_N = np.where(T_S < 2.7, LOAD_N, 0.0) + NOISE_N[0]
 
 
@@ -155,7 +155,7 @@ def test_a_gap_that_is_slower_than_the_samples_has_not_stopped() -> None:
 
 def test_a_gap_that_stops_in_the_squeeze_is_noticed() -> None:
     squeeze = 0.05 - 0.002 * (1.0 - np.exp(-np.clip(T_S - 1.0, 0.0, None) / 0.3))
-    gap = np.where(T_S < 1.0, OPEN_AGAIN_M, np.where(T_S < 2.6, squeeze, squeeze + 0.1 * (T_S - 2.6)))
+    gap = np.where(T_S < 1.0, OPEN_AGAIN_M, np.where(T_S < 2.68, squeeze, squeeze + 0.1 * (T_S - 2.68)))
     assert noticed(RELEASED_N, RELEASED_N, gap) == ()
     for until_s, says in ((1.6, "then jumps by 1.42 mm"), (9.0, "although the force is gone")):
         stopped = np.where((T_S >= 1.05) & (until_s > T_S), gap[105], gap)
@@ -165,7 +165,7 @@ def test_a_gap_that_stops_in_the_squeeze_is_noticed() -> None:
     assert noticed(RELEASED_N, RELEASED_N, OPEN_AGAIN_M) == ()
     stairs = np.floor(np.clip(T_S - 1.0, 0.0, 1.0) * 4.0)
     force = np.where(T_S < 2.7, 1.5 * stairs, 0.0) + NOISE_N[0]
-    assert noticed(force, force, np.where(T_S < 2.6, OPEN_AGAIN_M - 0.0005 * stairs, OPEN_AGAIN_M)) == ()
+    assert noticed(force, force, np.where(T_S < 2.68, OPEN_AGAIN_M - 0.0005 * stairs, OPEN_AGAIN_M)) == ()
 
 
 def test_a_slow_gap_that_opens_after_a_hold_without_creep_has_not_stopped() -> None:
@@ -263,3 +263,49 @@ def test_a_sound_pad_that_reads_low_or_feels_the_object_later_is_not_doubted() -
     for low in (0.5 * RELEASED_N, 0.1 * RELEASED_N, np.where(T_S < 1.2, NOISE_N[1], RELEASED_N)):
         for pads in ((low, RELEASED_N), (RELEASED_N, low)):
             assert not any("stays at" in notice for notice in noticed(*pads, OPEN_AGAIN_M))
+
+
+def test_pads_that_are_exchanged_under_a_load_are_noticed() -> None:
+    """One that reads a fifth less is sound by itself, so only the step tells it."""
+    low = 0.8 * (RELEASED_N - NOISE_N[0]) + NOISE_N[1]
+    assert noticed(low, RELEASED_N, OPEN_AGAIN_M) == ()
+    for since_s in (1.6, 2.0):
+        later = since_s <= T_S
+        (notice,) = noticed(np.where(later, RELEASED_N, low), np.where(later, low, RELEASED_N), OPEN_AGAIN_M)
+        assert "part by" in notice
+        assert f"at {since_s:g} s" in notice
+
+
+@every_case("share", [0.06, 0.2])
+@every_case("rate_hz", [50.0, 1000.0])
+def test_a_force_whose_single_values_are_wrong_is_noticed(share: float, rate_hz: float) -> None:
+    t_s = np.arange(0.0, 3.0, 1.0 / rate_hz)
+    force, gap = np.interp(t_s, T_S, RELEASED_N - NOISE_N[0]), np.interp(t_s, T_S, OPEN_AGAIN_M)
+    hum = share * 6.0 * np.sin(2.0 * np.pi * 60.0 * t_s + 0.3)
+    noise = share * 6.0 * np.random.default_rng(4).normal(0.0, 1.0, len(t_s))
+    assert noticed(force, force, gap, rate_hz=rate_hz) == ()
+    for spoilt in (force + hum, force + noise):
+        assert any("around its course" in notice for notice in noticed(spoilt, spoilt, gap, rate_hz=rate_hz))
+    coarse = np.round(force / (share * 6.0)) * share * 6.0
+    told = noticed(coarse, coarse, gap, rate_hz=rate_hz)
+    assert any("has steps of" in notice for notice in told) == (share > 0.1)  # half a step is 3 or 10 %
+
+
+@every_case("late_s", [0.2, 0.3, 0.5])
+def test_a_gap_or_a_force_that_comes_late_is_noticed(late_s: float) -> None:
+    late = np.maximum(np.arange(300) - round(100 * late_s), 0)
+    squeeze = 0.05 - 0.0005 * (RELEASED_N - NOISE_N[0])
+    gap = np.where(T_S < 1.0, OPEN_AGAIN_M, np.where(T_S < 2.68, squeeze, 0.047 + 0.1 * (T_S - 2.68)))
+    released = np.where(T_S < 2.3, LOAD_N, 0.0) + NOISE_N[0]
+    opened = np.where(T_S < 2.29, gap, 0.047 + 0.1 * (T_S - 2.29))
+    assert noticed(released, released, opened) == ()
+    for force, gaps, says in (
+        (released[late], opened, "the force stays"),
+        (released, opened[late], "gap come late"),
+    ):
+        assert any(says in notice for notice in noticed(force, force, gaps))
+    # Fingers that are relaxed some time before they open, on something rigid.
+    rigid = np.where(
+        2.29 + late_s > T_S, np.maximum(0.08 - 0.03 * T_S, 0.05), 0.05 + 0.1 * (T_S - 2.29 - late_s)
+    )
+    assert not any("late" in notice for notice in noticed(released, released, rigid))

@@ -48,6 +48,22 @@ UNEQUAL: Final = 0.12
 """Share of the force of both pads by which that of one is away from a half, or changes under load,"""
 UNEQUAL_REST: Final = 0.1
 """without this share of the samples at each end, in which a pad can touch first or let go last."""
+PARTED: Final = 0.1
+"""Share of its range by which the force of a loaded pad leaves that of the other one at once."""
+ROUGH_S: Final = 0.1
+ROUGH: Final = 0.02
+"""Time (s) over which a force is averaged, and the share of its range that it usually is away from that,"""
+COARSE: Final = 0.05
+"""and half a step of it, from which on a single value is not known."""
+OPENS: Final = 0.05
+"""Share of its range by which a gap is wider than at the contact when no object can press any more,"""
+STILL: Final = 0.01
+"""and by which it changes where the fingers begin to open,"""
+LATE_S: Final = 0.05
+LATE_SAMPLES: Final = 2.0
+"""if that lasts for more than so long (s), and so many samples,"""
+GOES_ON: Final = 0.2
+"""and share of its speed with which a gap that comes late goes on after the contact."""
 FAR: Final = 2.0
 FAR_S: Final = 0.2
 FAR_SAMPLES: Final = 10
@@ -109,6 +125,7 @@ def signal_notices(recording: Recording) -> Iterator[str]:
             told += _numb(what, times, gap, pads[what], other, recording.units)
         hand = any(isinstance(channel, FingerForce) for channel in recording.channels)
         told += _unequal(left, right, recording.units) if not told and not hand else ()
+        told += _parted(times, left, right, recording.units) if not told and not hand else ()
     yield from told
     for what, force in pads.items():
         known = np.isfinite(force)
@@ -116,9 +133,11 @@ def signal_notices(recording: Recording) -> Iterator[str]:
             if "t" not in recording.units:
                 yield from _glitches(what, times[known], force[known], recording.units)
                 yield from _seldom(what, times[known], force[known], LARGE_CHANGE)
+                yield from _rough(what, times[known], force[known]) if not told else ()
             yield from _drift(what, gap[known], force[known], recording.units)
     if not {"gap", "t"} & recording.units.keys() and len(gap) >= FEWEST:
         yield from _bump(times, gap, (left + right) / 2.0, recording.units)
+        yield from _late(times, gap, (left + right) / 2.0)
         yield from _jump(times, gap)
         steps = np.abs(np.diff(gap))
         # The steps of a coarse gap are alike.
@@ -204,6 +223,51 @@ def _unequal(left: Numbers, right: Numbers, units: Mapping[str, str]) -> Iterato
             f"the right pad bears {least:.0%} to {most:.0%} of the force of both under load, and half is due: were the "
             "pads exchanged, does one read wrong, or did the object lie on one of them only in part?"
         )
+
+
+def _parted(times: Numbers, left: Numbers, right: Numbers, units: Mapping[str, str]) -> Iterator[str]:
+    """Yield that the forces of two loaded pads part at once: one failed or came back, or they were exchanged."""
+    known = np.isfinite(left) & np.isfinite(right)
+    t, left, right = times[known], left[known], right[known]
+    if len(left) < FEWEST:
+        return
+    left, right = (force - np.median(force[:ZERO_SAMPLES]) for force in (left, right))
+    low, high = usual_range((left + right) / 2.0)
+    span = high - low
+    loaded = np.minimum(left, right) > FREE * span
+    if not loaded.any():
+        return
+    scale = float(np.median(left[loaded] / right[loaded]))
+    steps = np.abs(np.diff(_course(left - scale * right, GLITCH_SAMPLES)))
+    larger = np.maximum(left, right)
+    held = np.flatnonzero(larger > 0.5 * larger.max())
+    within = (loaded[1:] | loaded[:-1]) & (np.arange(1, len(t)) > held[0]) & (np.arange(1, len(t)) < held[-1])
+    k = int(np.argmax(steps * within))
+    least = max(PARTED * span, GLITCH_NOISE * float(np.median(steps)), JUMP * float(np.sort(steps)[-3]))
+    if steps[k] > least and within[k]:
+        yield (
+            f"the forces of the pads part by {steps[k]:.3g} {units.get('force_left', 'N')} at {t[k + 1]:.4g} "
+            f"{units.get('t', 's')}: did one of them fail for a while, or were they exchanged?"
+        )
+
+
+def _rough(what: str, times: Numbers, force: Numbers) -> Iterator[str]:
+    """Yield that a force varies so much around its mean course, or has so coarse steps, that no value tells it."""
+    low, high = usual_range(force)
+    span, step_s = high - low, float(np.median(np.diff(times)))
+    width = 2 * max(2, round(0.5 * ROUGH_S / step_s)) + 1
+    if len(force) < 2 * width or not span > 0.0:
+        return
+    around = np.pad(force, width // 2, mode="edge")
+    course = np.convolve(around, np.full(width, 1.0 / width), mode="valid")
+    varies = float(np.median(np.abs(force - course)))
+    apart = np.diff(np.unique(force))
+    coarse = 0.5 * float(apart.min())
+    in_steps = np.allclose(apart / (2.0 * coarse), np.round(apart / (2.0 * coarse)))
+    if varies > ROUGH * span:
+        yield f"{what} varies by {varies / span:.0%} of its range around its course, and so does each feature of it"
+    elif in_steps and coarse > COARSE * span:
+        yield f"{what} has steps of {2.0 * coarse / span:.0%} of its range: each value is up to half a step off"
 
 
 def _is_clear(force: Numbers) -> bool:
@@ -312,6 +376,41 @@ def _bump(times: Numbers, gap: Numbers, force: Numbers, units: Mapping[str, str]
             f"{closes * 1e3:.3g} mm more, and it comes back at {t_s[again]:.4g} s: the contact is the first of these. "
             "If the fingers touched something on their way, cut that out; or the object broke"
         )
+
+
+def _late(times: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
+    """Yield that a force (N) stays while the fingers open, or that the gap (m) follows late, by time (s)."""
+    known = np.isfinite(force) & np.isfinite(gap)
+    t_s, gap, force = times[known], gap[known], force[known]
+    if len(force) < FEWEST_IN_COURSE:
+        return
+    low, high = usual_range(force)
+    loaded = np.flatnonzero(force > low + 0.5 * (high - low))
+    free = np.flatnonzero(force < low + FREE_GLITCH * (high - low))
+    if not len(loaded) or not len(onset := free[free < loaded[0]]) or not np.ptp(gap) > 0.0:
+        return
+    gone = free[free > loaded[-1]]
+    begin, opened = int(onset[-1]), OPENS * float(np.ptp(gap))
+    least_s = max(LATE_S, LATE_SAMPLES * float(np.median(np.diff(t_s))))
+    wide = loaded[(gap[loaded] > gap[begin] + opened) & (loaded > loaded[gap[loaded].argmin()])]
+    if len(wide) and len(gone) and t_s[wide[-1]] - t_s[wide[0]] > least_s:
+        yield (
+            f"the force stays until {t_s[wide[-1]]:.4g} s, although the fingers are wider than at the contact from "
+            f"{t_s[wide[0]]:.4g} s on: does the force come late, or did its sensor stop?"
+        )
+    elif len(gone):
+        end, still = int(gone[0]), STILL * float(np.ptp(gap))
+        opens = end + int((gap[end:] > gap[begin : end + 1].min() + still).argmax())
+        late_s = float(t_s[opens] - t_s[end])
+        around_s = t_s[begin] + late_s * np.arange(-1, 2)
+        approach, further = -np.diff(np.interp(around_s, t_s, gap))
+        closes = float(np.interp(t_s[end] - late_s, t_s, gap)) - gap[end] > GOES_ON * approach
+        goes_on = further > GOES_ON * approach > still
+        if late_s > least_s and around_s[0] >= t_s[0] and goes_on and not closes:
+            yield (
+                f"the fingers go on as fast after the force begins (at {t_s[begin]:.4g} s), and open {late_s:.2g} s "
+                "after it is gone: does the gap come late?"
+            )
 
 
 def _jump(times: Numbers, gap: Numbers) -> Iterator[str]:

@@ -26,7 +26,7 @@ JUMP: Final = 20.0
 HOLE: Final = 5.0
 HOLE_S: Final = 0.05
 HOLE_FORCE: Final = 0.2
-"""A time step of so many usual ones, and so long, is a hole if the force changes in it by this share of its range."""
+"""A step of so many usual ones, and so long, is a hole under this share of the force, or where the force changes so."""
 SHORTEST_S: Final = 0.1
 """No grasp is shorter (s)."""
 OFFSET: Final = 0.05
@@ -188,10 +188,16 @@ def _of_time(columns: GraspColumns) -> Iterator[str]:
 
 
 def _of_holes(columns: GraspColumns) -> Iterator[str]:
-    """Yield that there are no samples while the force changes by much."""
+    """Yield that there are no samples for a while under a load, or while the force changes by much."""
     steps, force, t = np.diff(columns.t_s), columns.force_n, columns.units.get("t") or "s"
+    low, high = usual_range(force)
+    felt = force > low + HOLE_FORCE * (high - low)
     changes = np.abs(np.diff(force)) > HOLE_FORCE * np.ptp(force)
-    missed = np.flatnonzero(changes & (steps > HOLE * np.median(steps)) & ((steps > HOLE_S) | (t != "s")))
+    missed = np.flatnonzero(
+        (changes | (felt[1:] & felt[:-1]))
+        & (steps > HOLE * np.median(steps))
+        & ((steps > HOLE_S) | (t != "s"))
+    )
     for k in missed[:1].tolist():
         begin, end = columns.t_s[k : k + 2].tolist()
         yield (
