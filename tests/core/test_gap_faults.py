@@ -112,7 +112,8 @@ def test_a_gap_that_jumps_is_no_motor_that_turns_the_wrong_way():
         assert motor.see(now, Phase.APPROACH) is None
         motor.apply(now, CLOSES)
         jump.apply(now, CLOSES)
-    assert jump.jumps == 3
+    # Up, down and up again: the second one takes the first one back.
+    assert jump.jumps == 1
 
 
 OPENS = Command(POSITION, 0.08, inf, 0.05)
@@ -257,3 +258,13 @@ def test_fingers_that_still_close_when_they_are_told_to_open_are_not_open_where_
     grasp = run_grasp(gripper, HybridController(HybridConfig()), RunConfig())
     assert grasp.outcome is Outcome.NOTHING_THERE
     assert grasp.trace.gap_m[-1] > 0.075
+
+
+@every_case(("stands_m", "outcome"), [(0.054, Outcome.STEADY), (nan, Outcome.ABORTED)])
+def test_fingers_whose_gap_is_no_witness_open_for_as_long_as_they_need_from_any_width(stands_m, outcome):
+    """Their encoder has stood still, or failed, since they rest: 80 mm at 50 mm/s take 1.6 s."""
+    gripper = ByPosition(lambda t: squeezing(t) if t < REST_S else stands_m)
+    grasp = run_grasp(gripper, HybridController(HybridConfig()), RunConfig())
+    assert grasp.outcome is outcome
+    opening = [command.kind == POSITION for command in gripper.commands]
+    assert sum(opening[-3000:]) / 1000.0 >= 1.6

@@ -67,32 +67,39 @@ def approach(k):
 
 
 @every_case(
-    ("way_m", "is_told"),
+    ("way_m", "names"),
     [
-        (approach, False),
+        (approach, set()),
         # Steps of a coarse encoder, and a gap that is measured for each third frame.
-        (lambda k: in_steps(approach(k), 0.00037), False),
-        (lambda k: in_steps(approach(k), 0.004), False),
-        (lambda k: approach(k - k % 3), False),
+        (lambda k: in_steps(approach(k), 0.00037), set()),
+        (lambda k: in_steps(approach(k), 0.004), {"gap in steps"}),
+        (lambda k: approach(k - k % 3), set()),
         # Each fifth frame is that before it.
-        (lambda k: approach(k - (k % 5 == 0)), True),
-        (lambda k: approach(k - (k == 50)), False),
+        (lambda k: approach(k - (k % 5 == 0)), {"frames repeated"}),
+        (lambda k: approach(k - (k > 60 and k % 5 == 0)), {"frames repeated"}),
+        (lambda k: approach(k - (k == 50)), set()),
+        # Half as fast, in steps that are then coarse for it.
+        (
+            lambda k: in_steps(approach(min(k, 50)) + 0.5 * (approach(k) - approach(min(k, 50))), 0.00015),
+            set(),
+        ),
     ],
 )
-def test_frames_that_come_twice_show_in_what_the_gap_makes_up_for(way_m, is_told):
+def test_frames_that_come_twice_show_in_what_the_gap_makes_up_for(way_m, names):
     watch = Repeats()
     faults = [watch.see(frame(k, 0.08 - way_m(k))) for k in range(120)]
-    assert any(fault is not None for fault in faults) is is_told
+    assert {fault.name for fault in faults if fault is not None} == names
 
 
 def grasp_with(effort):
-    """Return the names of what a grasp shows that has this effort (N), a function of the sound one.
+    """Return the names of what a grasp shows that has this effort (N), a function of the sound one and of the time (s).
 
     The motor holds at its limit, begins to open at the same one, and needs less while the fingers move.
     """
     watch, names, gap_m, k = ReportedEffort(), set(), 0.08, 0
     for phase, ticks, speed_m_s, effort_n in (
         (APPROACH, 100, -0.02, 4.0),
+        (APPROACH, 10, 0.0, 8.0),
         (SQUEEZE, 50, 0.0, 10.0),
         (HOLD, 25, 0.0, 10.0),
         (Phase.RELEASE, 20, 0.05, -10.0),
@@ -102,7 +109,7 @@ def grasp_with(effort):
         for _ in range(ticks):
             k += 1
             gap_m += speed_m_s / RATE_HZ
-            now = frame(k, gap_m, effort(effort_n), speed_m_s)
+            now = frame(k, gap_m, effort(effort_n, k / RATE_HZ), speed_m_s)
             names.add(watch.see(now, phase))
             watch.apply(now, command)
     names.add(watch.released(now))
@@ -114,13 +121,20 @@ def grasp_with(effort):
 @every_case(
     ("effort", "names"),
     [
-        (lambda effort_n: effort_n, set()),
+        (lambda effort_n, t: effort_n, set()),
         # Many grippers have a current without a sign.
-        (abs, set()),
-        (lambda effort_n: 0.5 * effort_n, set()),
-        (lambda effort_n: -effort_n, {"effort has the wrong sign"}),
-        (lambda effort_n: 0.0, {"effort stuck"}),
-        (lambda effort_n: 60.0, {"effort stuck"}),
+        (lambda effort_n, t: abs(effort_n), set()),
+        (lambda effort_n, t: 0.5 * effort_n, set()),
+        # Two newtons more or less to open than to close are no fault.
+        (lambda effort_n, t: effort_n + 1.0, set()),
+        (lambda effort_n, t: effort_n + 0.3 * (-1) ** round(t * RATE_HZ), set()),
+        (lambda effort_n, t: -effort_n, {"effort has the wrong sign"}),
+        (lambda effort_n, t: 0.0, {"effort stuck"}),
+        (lambda effort_n, t: 60.0, {"effort stuck"}),
+        (lambda effort_n, t: effort_n + 3.0 * t, {"effort not as before"}),
+        (lambda effort_n, t: abs(effort_n) + 3.0 * t, {"effort not as before"}),
+        (lambda effort_n, t: effort_n * (1.0 + (t > 0.8)), {"effort not as before"}),
+        (lambda effort_n, t: effort_n + 2.0 * (-1) ** round(t * RATE_HZ), {"effort noisy"}),
     ],
 )
 def test_an_effort_that_cannot_be_that_of_the_motor_is_named(effort, names):

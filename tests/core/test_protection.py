@@ -264,15 +264,31 @@ def test_commands_of_a_velocity_are_not_compared_but_fingers_that_open_on_one_th
         assert reversed_ or faults == [None] * 1000
 
 
-@every_case(("opens_m", "is_reversed"), [(0.0076, False), (0.02, True)])
-def test_fingers_that_rebound_from_what_they_met_in_the_approach_are_not_reversed(opens_m, is_reversed):
-    """The widest rebound of the simulated catalogue is 7.6 mm, of the block at 100 mm/s."""
+@every_case(
+    ("closes_m", "opens_m", "kind", "name"),
+    [
+        (0.05, 0.0076, POSITION, None),
+        (0.05, 0.02, POSITION, "gap against the command"),
+        (0.05, 0.02, EFFORT, "motor reversed"),
+        (0.0, 0.02, POSITION, "motor reversed"),
+    ],
+)
+def test_fingers_that_rebound_from_what_they_met_in_the_approach_are_not_reversed(
+    closes_m, opens_m, kind, name
+):
+    """The widest rebound of the simulated catalogue is 7.6 mm, of the block at 100 mm/s.
+
+    A motor that keeps a position, and has closed the fingers before, turns the right way: they can be opened.
+    """
     motor, faults = Motor(reports_effort=False, rate_hz=100.0), []
-    for gap_m in (*np.linspace(0.08, 0.03, 200), *np.linspace(0.03, 0.03 + opens_m, 100)):
+    met_m = 0.08 - closes_m
+    for gap_m in (*np.linspace(0.08, met_m, 200), *np.linspace(met_m, met_m + opens_m, 100)):
         now = frame(0.01 * len(faults), gap=gap_m, dt=0.01)
         faults.append(motor.see(now, APPROACH))
-        motor.apply(now, Command(POSITION, 0.0, 10.0, 0.035))
-    assert any(fault is not None and fault.relaxes for fault in faults) == is_reversed
+        motor.apply(now, Command(kind, 0.0 if kind == POSITION else 8.0, 10.0, 0.035))
+    seen = [fault for fault in faults if fault is not None]
+    assert {fault.name for fault in seen} == ({name} if name else set())
+    assert all(fault.ends and fault.relaxes == (name == "motor reversed") for fault in seen)
 
 
 @every_case(("answer_n", "told"), [(20.0, False), (18.5, False), (17.0, True), (23.0, True)])

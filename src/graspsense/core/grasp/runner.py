@@ -428,10 +428,8 @@ class _Grasp:
             return state
         delay_s = self.backend.command_delay_s
         if state.phase == RELEASE and self.protection is not None:
-            if self.protection.opening.opened:
-                return state
-            # A gap that is told late stands still for longer.
-            delay_s = self.protection.opening.stands_s
+            # A gap that is told late, or that is wrong, stands still for longer.
+            delay_s = self.protection.opening.unknown_s(state.still.gap_m)
         still, earliest_s = state.still, state.since_t_s + delay_s
         if still.since_t_s >= earliest_s:
             return state
@@ -593,7 +591,8 @@ class _Grasp:
                 break
             self.last = last = reading.frame
             still = update_rest(still, last.t_s, last.gap_m, OPEN_SPEED_M_S, OPEN_WINDOW_S)
-            if at_rest(still, last.t_s, OPEN_WINDOW_S):
+            unknown_s = 0.0 if self.protection is None else self.protection.opening.unknown_s(last.gap_m)
+            if at_rest(still, last.t_s, OPEN_WINDOW_S) and last.t_s - began_s >= unknown_s:
                 return f"opened to {last.gap_m * 1e3:.1f} mm"
             if last.t_s - began_s > run.opening_timeout_s:
                 break

@@ -193,6 +193,7 @@ class Motor:
     def _wrong_way(self, frame: Frame, phase: int) -> Fault | None:
         """The fingers open while every recent command closes, or close while every one opens."""
         directions = {asked.direction for asked in self._commands}
+        commands_no_effort = all(asked.effort_n != asked.effort_n for asked in self._commands)
         closes, opens = directions == {1}, directions == {-1}
         if phase != self._phase or not (closes or opens) or self._extreme_m != self._extreme_m:
             self._phase, self._wrong_way_s = phase, 0.0
@@ -216,6 +217,13 @@ class Motor:
         # An object that springs back may open fingers that squeeze it.
         if self._wrong_way_s <= self._lasts_s or (closes and phase != APPROACH):
             return None
+        if closes and self._start_m - self._extreme_m >= FREE_TRAVEL_M and commands_no_effort:
+            return Fault(
+                "gap against the command",
+                f"it opens by {travel_m * 1e3:.1f} mm under a closing command that has closed the fingers before: it "
+                "is wrong, or something pushes them open; look at the encoder and the fingers",
+                ends=True,
+            )
         moved, commanded = ("open", "closing") if closes else ("close", "opening")
         return Fault(
             "motor reversed",

@@ -44,12 +44,12 @@ class Opening:
         self.stands_s = command_delay_s + max(STANDS_S, 6.0 / rate_hz)
         """Time (s) after which fingers that stand still have not opened."""
         self._target_m = opening.value if opening is not None and opening.kind == POSITION else nan
+        self._longest_s = nan if opening is None else self.stands_s + self._target_m / opening.speed_limit_m_s
         self._tells_gap = tells_gap
         self._first_m = nan
         self._widest_m = -inf
         self._start_m = self._start_s = self._rest_m = self._rest_s = nan
-        self.opened = False
-        """Whether the fingers have begun to open after the grasp."""
+        self._opened = False
 
     def before_closing(self, frame: Frame) -> Fault | None:
         """Take the frame in which the fingers are open; return what is wrong with their width."""
@@ -79,15 +79,15 @@ class Opening:
                 if not abs(frame.gap_m - self._rest_m) < OPENED_M:
                     self._rest_m, self._rest_s = frame.gap_m, frame.t_s
             return None
-        if self.opened:
+        if self._opened:
             return None
         closed_m, elapsed_s = self._widest_m - self._start_m, frame.t_s - self._start_s
         # A gap that is late closes on for a while, as that of fingers which brake.
         self._start_m = min(self._start_m, frame.gap_m)
-        self.opened = frame.gap_m - self._start_m >= OPENED_M
+        self._opened = frame.gap_m - self._start_m >= OPENED_M
         if not closed_m >= LEAST_TRAVEL_M:
             return None
-        if self.opened:
+        if self._opened:
             rested = self._start_s - self._rest_s >= RESTED_S
             return self._late(elapsed_s) if rested and elapsed_s > self._late_s else None
         if elapsed_s < self.stands_s:
@@ -99,6 +99,15 @@ class Opening:
             "encoder",
         )
 
+    def unknown_s(self, gap_m: float) -> float:
+        """Return for how long (s) from their command on it is not known whether fingers at this gap are open.
+
+        A gap that stands still or has jumped is no witness. Then only the time tells in which they open from any width.
+        """
+        if self._target_m != self._target_m:
+            return 0.0 if self._opened else self.stands_s
+        return 0.0 if self._opened and self._is_as_before(gap_m) else self._longest_s
+
     def released(self, frame: Frame) -> Fault | None:
         """Take the last frame of the release; return what is wrong with the width of the open fingers.
 
@@ -107,9 +116,10 @@ class Opening:
         first_m, gap_m = self._first_m, frame.gap_m
         # Fingers that are seen not to open have a fault of their own.
         if (
-            not self.opened
+            not self._opened
             or self._target_m != self._target_m
-            or not abs(gap_m - first_m) > max(AGAIN_M, AGAIN_SHARE * first_m)
+            or gap_m - first_m != gap_m - first_m
+            or self._is_as_before(gap_m)
         ):
             return None
         return Fault(
@@ -118,6 +128,9 @@ class Opening:
             "holds them, or the gap drifts or has jumped, so that what follows from it is wrong; look at the fingers "
             "and the encoder",
         )
+
+    def _is_as_before(self, gap_m: float) -> bool:
+        return abs(gap_m - self._first_m) <= max(AGAIN_M, AGAIN_SHARE * self._first_m)
 
     def _late(self, elapsed_s: float) -> Fault:
         return Fault(

@@ -43,7 +43,7 @@ from graspsense.core.values.signals import (
 
 RELEASE: Final = int(Phase.RELEASE)
 FEW_JUMPS: Final = 4
-"""Jumps of a gap that are not taken for motion; with more of them, the fingers may move as fast as it says."""
+"""Jumps of a gap to one side that are not taken for motion; with more, the fingers may move as fast as it says."""
 
 
 class Protection:
@@ -119,7 +119,7 @@ class Protection:
         for fault in self._status.see(frame, phase):
             self._see(fault, phase)
         jump = self._jump.see(frame)
-        if self._jump.jumps <= FEW_JUMPS:
+        if abs(self._jump.jumps) <= FEW_JUMPS:
             self._motor.shift(self._jump.step_m)
         self._see(self._motor.see(frame, phase), phase)
         last_phase, self._phase = self._phase, phase
@@ -135,7 +135,7 @@ class Protection:
             self._see(self._gap_speed.see(frame))
             self._see(self._gap_absence.see(frame.gap_m, frame))
             self._see(self._effort_absence.see(frame.effort_n, frame))
-        self._see_free_motion(frame, phase)
+        self._see_free_motion(frame, phase, jumped=jump is not None)
         if self._effort is not None:
             self._see(self._effort.see(frame, phase), phase)
         self._see(self.opening.see(frame, phase), phase)
@@ -183,14 +183,15 @@ class Protection:
         """Take a reading, and the command that opens the fingers at last; return whether the motor closes them."""
         fault = self._motor.see(reading.frame, RELEASE)
         self._see(fault, RELEASE)
+        self._see(self.opening.see(reading.frame, RELEASE), RELEASE)
         self._motor.apply(reading.frame, command)
         return fault is not None and fault.relaxes
 
-    def _see_free_motion(self, frame: Frame, phase: int) -> None:
+    def _see_free_motion(self, frame: Frame, phase: int, *, jumped: bool) -> None:
         """Take the frame of a tick in which the fingers may move freely."""
         if phase == APPROACH and self._touch.free():
             self._see(self._rush.see(frame))
-            self._see(self._repeats.see(frame))
+            self._see(self._repeats.see(frame, jumped=jumped))
             self._see(self._kept_speed.see(frame, phase))
         elif phase == RELEASE:
             self._see(self._kept_speed.see(frame, phase), phase)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from functools import reduce
 from math import inf, nan
@@ -21,10 +22,20 @@ ENDS_SHARE: Final = 0.5
 """Share of lost frames that ends the grasp: a controller that sees half of them does not control."""
 FEWEST: Final = 200
 """Frames, with the lost ones, after which a share is told."""
+SLOW_S: Final = 2.0
+"""Time after which a share of a slow gripper is told, and by single gaps: its rate is the highest that it has."""
+SINGLE_GAPS: Final = 3
+SINGLE_SHARE: Final = 0.05
+"""Frames of a slow gripper that are missing, and their share, from which on they are told."""
 REPEATS: Final = 3
-"""Standstills of a single approach from which on the way after them is compared."""
+"""Standstills of an approach from which on the way after them is compared."""
+RECENT: Final = 40
+"""Ways of the gap that are compared: fingers that were slower before stood still for another reason."""
 CATCH_UP: Final = 1.5
 """Way of the gap in a frame after a standstill, over that after motion, from which on frames have come twice."""
+STEPS_M: Final = 0.002
+ALIKE: Final = 0.9
+"""Step of the gap from which on it is coarse, and share of it that the others have."""
 SURPLUS_SHARE: Final = 0.05
 """Share of frames beyond the declared rate from which on the clock of the gripper counts as slow."""
 IMAGES_LATE: Final = 5.0
@@ -42,6 +53,7 @@ class Reports:
         self._stands = 0
         self._frames = 0
         self._expected = 0.0
+        self._singly_lost = 0
         self._counter = -1
         self._image_t_s = nan
 
@@ -74,6 +86,7 @@ class Reports:
     def _lost(self, dt_s: float) -> Fault | None:
         self._frames += 1
         self._expected += dt_s / self._period_s
+        self._singly_lost += max(round(dt_s / self._period_s) - 1, 0)
         lost = self._expected - self._frames
         if self._frames >= FEWEST and -lost > SURPLUS_SHARE * self._expected:
             return Fault(
@@ -82,7 +95,12 @@ class Reports:
                 f"declares {1.0 / self._period_s:g} a second: its clock is slow, so that times and rates are wrong, or "
                 "frames are repeated; restart the gripper",
             )
-        if self._expected < FEWEST or lost < LOST_SHARE * self._expected:
+        if self._expected < FEWEST:
+            lost = self._singly_lost
+            few = lost < max(SINGLE_GAPS, SINGLE_SHARE * self._expected)
+            if self._expected * self._period_s < SLOW_S or few:
+                return None
+        elif lost < LOST_SHARE * self._expected:
             return None
         return Fault(
             "frames lost",
@@ -95,33 +113,48 @@ class Reports:
 class Repeats:
     """Watches the gap of fingers that approach for frames that come twice: it stands still, and then makes up for it.
 
-    A gap in coarse steps, or one that is measured for each n-th frame only, stands still too, but then moves no further
-    than after a motion.
+    A gap in steps, or one that is measured for each n-th frame only, stands still too, but then moves no further than
+    after a motion. Where the steps are coarse, and it stands still before each of them, they are told.
     """
 
     def __init__(self) -> None:
         self._gap_m = self._way_m = nan
-        self._counts, self._ways_m = [0, 0], [0.0, 0.0]
+        self._ways_m: tuple[deque[float], deque[float]] = deque(maxlen=RECENT), deque(maxlen=RECENT)
+        self._recent: deque[bool] = deque(maxlen=RECENT)
 
-    def see(self, frame: Frame) -> Fault | None:
-        """Take the frame of a tick of the approach; return the fault if frames have come twice."""
-        way_m, earlier_m = self._gap_m - frame.gap_m, self._way_m
+    def see(self, frame: Frame, *, jumped: bool = False) -> Fault | None:
+        """Take the frame of a tick of the approach; return what the ways of the gap show. A jump is no way."""
+        way_m, earlier_m = (nan if jumped else self._gap_m - frame.gap_m), self._way_m
         self._gap_m, self._way_m = frame.gap_m, way_m
         if not (way_m > 0.0 and earlier_m >= 0.0):
             return None
+        if len(self._recent) == RECENT:
+            self._ways_m[self._recent[0]].popleft()
         stood = earlier_m == 0.0
-        self._counts[stood] += 1
-        self._ways_m[stood] += way_m
-        moving, standing = self._counts
-        if not stood or moving < REPEATS or standing < REPEATS:
+        self._recent.append(stood)
+        self._ways_m[stood].append(way_m)
+        moving, standing = self._ways_m
+        if not stood or len(standing) < REPEATS:
             return None
-        ratio = self._ways_m[1] / standing * moving / self._ways_m[0]
-        if ratio < CATCH_UP:
+        if not moving:
+            return self._coarse(standing)
+        ratio = sum(standing) / len(standing) * len(moving) / sum(moving)
+        if len(moving) < REPEATS or ratio < CATCH_UP:
             return None
         return Fault(
             "frames repeated",
-            f"the gap stood still {standing} times in the approach, and then moved {ratio:.1f} times as far as in "
+            f"the gap stood still {len(standing)} times in the approach, and then moved {ratio:.1f} times as far as in "
             "other frames: some frames come twice, so that a standstill may be none; check the connection",
+        )
+
+    def _coarse(self, steps_m: deque[float]) -> Fault | None:
+        """Return the fault of a gap that stands still before each of these steps, if they are coarse and alike."""
+        if not ALIKE * max(steps_m) <= min(steps_m) or min(steps_m) < STEPS_M:
+            return None
+        return Fault(
+            "gap in steps",
+            f"it moves by {max(steps_m) * 1e3:.1f} mm at once, and stands still in between: what follows from it is "
+            "off by up to that; check the encoder",
         )
 
 

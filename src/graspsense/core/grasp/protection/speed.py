@@ -146,7 +146,7 @@ class GapJump:
         self.step_m = 0.0
         """The jump of the last frame (m), 0 without one."""
         self.jumps = 0
-        """The number of jumps."""
+        """The number of jumps that open, less that of those that close."""
 
     def apply(self, frame: Frame, command: Command) -> None:
         """Take the command that is applied after this frame; that of an effort leaves the speed to the gripper."""
@@ -170,7 +170,7 @@ class GapJump:
             self.step_m = 0.0
             return None
         self.step_m = step_m
-        self.jumps += 1
+        self.jumps += 1 if step_m > 0.0 else -1
         return Fault(
             "gap jumps",
             f"it changed by {step_m * 1e3:+.1f} mm within {frame.dt_s * 1e3:.0f} ms, faster than the fingers move "
