@@ -380,7 +380,9 @@ class _Grasp:
                 self._event(frame.t_s, Phase(phase), Phase(phase).name.lower())
             if state.guard is not watcher:
                 watcher = self._guard_event(frame, watcher, state.guard)
-            command = self._protected(reading, phase if stepped else TARING, command)
+            protected_phase = phase if stepped else TARING
+            if self.protection is not None:
+                command = self.protection.limit(reading, protected_phase, command)
             # The frame that ended the taring still has forces relative to the old zero.
             recorded = phase >= APPROACH and stepped
             if recorded:
@@ -394,6 +396,7 @@ class _Grasp:
                 # Also if the gripper is lost at this moment: the frame was measured.
                 if recorded:
                     record(reading, phase, command)
+                self._check_for_faults(reading, protected_phase, command)
                 if state.events:
                     self._told(frame, phase, state.events)
                 if recorded and self.sinks:
@@ -458,14 +461,13 @@ class _Grasp:
         self.failed_sinks.append(f"{type(sink).__name__} failed: {named(error)}")
         self._event(t_s, phase, self.failed_sinks[-1])
 
-    def _protected(self, reading: Reading, phase: int, command: Command) -> Command:
-        """Return the command that the protection allows, if this gripper can hurt something."""
+    def _check_for_faults(self, reading: Reading, phase: int, command: Command) -> None:
+        """Let the protection see a tick whose command the gripper has, if this gripper can hurt something."""
         if self.protection is None:
-            return command
-        command = self.protection.limit(reading, phase, command)
+            return
+        self.protection.watch(reading, phase, command)
         if self.state.done:
             self.protection.released(reading.frame)
-        return command
 
     def _tared(self, images: list[Pads], frame: Frame) -> bool:
         """Set the zero of the pads; return whether the fingers may close."""

@@ -1,7 +1,8 @@
 """The protection of one grasp: it limits what a controller may command, and ends a grasp whose sensors or motor fail.
 
 It holds for every controller and every gripper that can hurt something (`DeviceInfo.harmless` is False), as far as the
-channels of the gripper allow. The runner passes each reading and each command through it, after the guard.
+channels of the gripper allow. The runner passes each command through its limits, after the guard. The other checks
+follow when the gripper has the command. A fault that they find ends the grasp in the same tick.
 """
 
 from __future__ import annotations
@@ -42,6 +43,8 @@ from graspsense.core.values.signals import (
 )
 
 RELEASE: Final = int(Phase.RELEASE)
+CLOSING: Final = (APPROACH, SQUEEZE, HOLD)
+"""The phases in which the fingers may press something."""
 FEW_JUMPS: Final = 4
 """Jumps of a gap that are not taken for motion; with more of them, the fingers may move as fast as it says."""
 
@@ -111,8 +114,22 @@ class Protection:
     def limit(self, reading: Reading, phase: int, command: Command) -> Command:
         """Take the reading of a tick and the command for it; return the command that may be applied.
 
-        If the reading shows a fault that ends the grasp, it is `ending`, and the command is the relaxing one. In the
-        release, only a motor that turns the wrong way ends it: the grasp is over, and its outcome stays.
+        Only what bounds the command is looked at here, so that the gripper does not wait for `watch`.
+        """
+        frame = reading.frame
+        if not self._declared and frame.force_left_n == frame.force_left_n:
+            self._has_pads = True
+        if self._has_pads:
+            self._see(self._touch.see(frame, phase, command))
+        allowed = self._limited(phase, command)
+        self.acted += allowed.value != command.value or self._gives(command) > asked_effort_n(allowed)
+        return allowed
+
+    def watch(self, reading: Reading, phase: int, applied: Command) -> None:
+        """Take the reading of a tick and the command that was applied to it, once the gripper has the command.
+
+        If the reading shows a fault that ends the grasp, it is `ending`. In the release, only a motor that turns the
+        wrong way ends it: the grasp is over, and its outcome stays.
         """
         frame = reading.frame
         self._see(self._reports.see(reading, phase), phase)
@@ -125,36 +142,26 @@ class Protection:
         last_phase, self._phase = self._phase, phase
         if phase != APPROACH and last_phase == APPROACH:
             self.side_impact = self._drift.side_impact(reading)
-        if not self._declared and frame.force_left_n == frame.force_left_n:
-            self._has_pads = True
-        closing = phase in (APPROACH, SQUEEZE, HOLD)
-        if closing or last_phase in (APPROACH, SQUEEZE, HOLD):
+        closing = phase in CLOSING
+        if closing or last_phase in CLOSING:
             # Also the jump with which the law has ended the grasp in this tick.
             self._see(jump)
         if closing:
             self._see(self._gap_speed.see(frame))
             self._see(self._gap_absence.see(frame.gap_m, frame))
             self._see(self._effort_absence.see(frame.effort_n, frame))
-        self._see_free_motion(frame, phase)
+        self._see_free_motion(frame, phase, applied)
         if self._effort is not None:
             self._see(self._effort.see(frame, phase), phase)
+            self._effort.apply(frame, applied)
         self._see(self.opening.see(frame, phase), phase)
         if self._has_pads:
-            self._see_pads(reading, phase, command)
-        allowed = self._limited(phase, command)
+            self._see_pads(reading, phase)
         if closing:
-            self._felt.apply(allowed)
-        if phase == APPROACH and self._touch.free():
-            self._see(self._free_effort.see(frame, allowed))
-        if phase == APPROACH and self.ending is None:
-            self._see(self._standstill.see(frame, allowed))
-        self.acted += allowed.value != command.value or self._gives(command) > asked_effort_n(allowed)
-        self._motor.apply(frame, allowed)
-        self._jump.apply(frame, allowed)
-        self._kept_speed.apply(frame, allowed, jumped=jump is not None)
-        if self._effort is not None:
-            self._effort.apply(frame, allowed)
-        return allowed
+            self._felt.apply(applied)
+        self._motor.apply(frame, applied)
+        self._jump.apply(frame, applied)
+        self._kept_speed.apply(frame, applied, jumped=jump is not None)
 
     def before_closing(self, frame: Frame) -> Fault | None:
         """Return the fault for which the fingers must not close, if there is one."""
@@ -186,19 +193,21 @@ class Protection:
         self._motor.apply(reading.frame, command)
         return fault is not None and fault.relaxes
 
-    def _see_free_motion(self, frame: Frame, phase: int) -> None:
-        """Take the frame of a tick in which the fingers may move freely."""
-        if phase == APPROACH and self._touch.free():
-            self._see(self._rush.see(frame))
-            self._see(self._repeats.see(frame))
-            self._see(self._kept_speed.see(frame, phase))
+    def _see_free_motion(self, frame: Frame, phase: int, applied: Command) -> None:
+        """Take the frame of a tick in which the fingers may move freely, and the command that was applied to it."""
+        if phase == APPROACH:
+            if self._touch.free():
+                self._see(self._rush.see(frame))
+                self._see(self._repeats.see(frame))
+                self._see(self._kept_speed.see(frame, phase))
+                self._see(self._free_effort.see(frame, applied))
+            self._see(self._standstill.see(frame, applied))
         elif phase == RELEASE:
             self._see(self._kept_speed.see(frame, phase), phase)
 
-    def _see_pads(self, reading: Reading, phase: int, command: Command) -> None:
+    def _see_pads(self, reading: Reading, phase: int) -> None:
         frame = reading.frame
-        closing = phase in (APPROACH, SQUEEZE, HOLD)
-        self._see(self._touch.see(frame, phase, command))
+        closing = phase in CLOSING
         if closing:
             self._see(self._felt.see(frame))
             self._see(self._balance.see(frame, phase))
@@ -246,6 +255,6 @@ class Protection:
                     f"the controller asks for more than {closing_n:.1f} N; run.effort_ceiling_n allows more",
                 )
             )
-        if self._has_pads and phase in (APPROACH, SQUEEZE, HOLD):
+        if self._has_pads and phase in CLOSING:
             closing_n = min(closing_n, self._touch.closing_limit_n())
         return limited(command, closing_n, self._opening_n)
