@@ -318,8 +318,8 @@ class _Grasp:
             # A lost gripper may still receive commands, so it is commanded to relax.
             fault = self._fault()
             self._let_go(lost, opens=not (self.state.done or (fault is not None and fault.relaxes)))
-        if ending is None and fault is not None:
-            ending = fault.outcome, fault.told
+        if ending is None and fault is not None and self.protection is not None:
+            ending = fault.outcome, self.protection.cause_of(fault).told
         if ending is None:
             ending = ended_by_itself(self.state.guard.stopped, self.state.law.outcome)
             if ending[0] is Outcome.SIDE_IMPACT and self.protection is not None:

@@ -16,6 +16,7 @@ from attrs import evolve
 from graspsense.core.components.roles import Controller
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.protection.absence import EFFORT_ABSENT, GAP_ABSENT, Absence
+from graspsense.core.grasp.protection.causes import causes, follows
 from graspsense.core.grasp.protection.cells import Fingertips
 from graspsense.core.grasp.protection.drift import Drift
 from graspsense.core.grasp.protection.effort import ReportedEffort
@@ -52,8 +53,9 @@ FEW_JUMPS: Final = 4
 class Protection:
     """Watches one grasp of a gripper under a controller.
 
-    `tell` is called with each fault at its first sight. `ending` is the fault that ends the grasp, once there is one.
-    `warnings` are the faults that were seen, in words, and `acted` is the number of commands that were limited.
+    `tell` is called with each fault at its first sight, unless it follows from an earlier one and ends nothing.
+    `ending` is the fault that ends the grasp, once there is one. `warnings` are the causes among the faults that were
+    seen, in words, and `acted` is the number of commands that were limited.
     """
 
     def __init__(
@@ -85,7 +87,8 @@ class Protection:
         self._declared = bool(rates)
         self._has_pads = "force_left" in rates and "force_right" in rates
         pads_hz = min(rates.get("force_left", 0.0), rates.get("force_right", 0.0))
-        self._touch, self._drift = Touch(contact_n, run.first_effort_n, pads_hz), Drift(contact_n)
+        self._drift = Drift(contact_n)
+        self._touch = Touch(contact_n, run.first_effort_n, pads_hz, self._drift.on_some_cells)
         self._stuck, self._balance = StuckForce(pads_hz), PadBalance(contact_n)
         self._curves, self._empty_hold = PadCurves(contact_n, pads_hz), EmptyHold(contact_n)
         self._felt, self._gap_speed = (
@@ -102,14 +105,19 @@ class Protection:
         first_m_s = run.first_speed_m_s if info.clock == "device" else inf
         self._standstill, self._jump = Standstill(), GapJump(info.speed_limit_m_s)
         self._kept_speed, self._repeats = KeptSpeed(info.rate_hz), Repeats()
-        self.opening = Opening(info.rate_hz, command_delay_s, info.opening, tells_gap="gap" in rates)
+        self.opening = Opening(info.rate_hz, command_delay_s, info.opening, "gap" in rates, info.friction_n)
         self._rush = Rush(min(first_m_s, info.speed_limit_m_s), info.rate_hz)
         self._reports = Reports(info.rate_hz, rates.get("pads", 0.0))
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """The faults that were seen, each in a sentence."""
-        return tuple(fault.told for fault in self._told.values())
+        """The faults that were seen and do not follow from others, each in a sentence."""
+        return tuple(self._told[name].told for name in causes(self._told))
+
+    def cause_of(self, fault: Fault) -> Fault:
+        """Return the fault from which this one follows, or this one itself."""
+        names = (name for name in causes(self._told) if follows(fault.name, name))
+        return self._told.get(next(names, fault.name), fault)
 
     def limit(self, reading: Reading, phase: int, command: Command) -> Command:
         """Take the reading of a tick and the command for it; return the command that may be applied.
@@ -142,10 +150,9 @@ class Protection:
         last_phase, self._phase = self._phase, phase
         if phase != APPROACH and last_phase == APPROACH:
             self.side_impact = self._drift.side_impact(reading)
-        closing = phase in CLOSING
-        if closing or last_phase in CLOSING:
-            # Also the jump with which the law has ended the grasp in this tick.
+        if phase >= APPROACH:
             self._see(jump)
+        closing = phase in CLOSING
         if closing:
             self._see(self._gap_speed.see(frame))
             self._see(self._gap_absence.see(frame.gap_m, frame))
@@ -179,6 +186,8 @@ class Protection:
     def released(self, frame: Frame) -> None:
         """Take the last frame of the release."""
         self._see(self.opening.released(frame), RELEASE)
+        for fault in self._curves.released(frame.t_s):
+            self._see(fault, RELEASE)
         if self._effort is not None:
             self._see(self._effort.released(frame), RELEASE)
 
@@ -209,6 +218,8 @@ class Protection:
         frame = reading.frame
         closing = phase in CLOSING
         if closing:
+            for fault in self._touch.absent(frame):
+                self._see(fault)
             self._see(self._felt.see(frame))
             self._see(self._balance.see(frame, phase))
         for fault in self._curves.see(reading, phase):
@@ -234,7 +245,8 @@ class Protection:
         told = self._told.get(fault.name)
         if told is None or (fault.ends and not told.ends):
             self._told[fault.name] = fault
-            self._tell(fault)
+            if fault.ends or not any(follows(fault.name, other) for other in self._told):
+                self._tell(fault)
         if fault.ends and self.ending is None:
             self.ending = fault
 
