@@ -505,8 +505,12 @@ class _Grasp:
 
     def warnings(self) -> tuple[str, ...]:
         """Return the faults that were seen, and that the squeeze was not the one that the controller commanded."""
-        seen = () if self.protection is None else self.protection.warnings
-        if self.squeezed_guarded <= MOSTLY * self.squeezed:
+        seen, unclear = (
+            ((), 0) if self.protection is None else (self.protection.warnings, self.protection.unclear)
+        )
+        # A fault of the pads is told, and not that it made a contact unclear.
+        limited = self.squeezed_guarded - (unclear if faults_among(seen) else 0)
+        if limited <= MOSTLY * self.squeezed:
             return seen
         why = f"the limits of the gripper are {self.info.effort_limit_n:g} N and {self.info.speed_limit_m_s:g} m/s"
         guard_params = self.params.guard
@@ -515,9 +519,11 @@ class _Grasp:
                 f"no pad has felt a contact, so run.first_effort_n ({guard_params.first_effort_n:g} N) and "
                 f"run.first_speed_m_s ({guard_params.first_speed_m_s:g} m/s) held throughout"
             )
+        elif unclear > 0.5 * limited:
+            why = "one pad felt nothing, or a contact had no witness, so the effort of the approach held"
         elif self.protection is not None and self.protection.acted:
             why = f"the ceiling is {self.protection.ceiling_n:.1f} N; run.effort_ceiling_n allows more"
-        told = f"{LIMITED}: {self.squeezed_guarded} of its {self.squeezed} commands were lowered; {why}"
+        told = f"{LIMITED}: {limited} of its {self.squeezed} commands were lowered; {why}"
         # With its share, instead of the first sight of it.
         return (*faults_among(seen), told)
 

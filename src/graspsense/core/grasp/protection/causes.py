@@ -21,9 +21,9 @@ PAD: Final[Mapping[str, tuple[str, ...]]] = {
     "pad absent": ALONE,
     "pad noisy": ("pad drifts", "pad jumps", "pad off its zero"),
     "pad drifts": ("pad jumps", "pad off its zero", "contact in free air"),
-    "pad off its zero": ("pad jumps", "pad feels more on opening"),
+    "pad off its zero": ("pad jumps",),
     "pad below zero": ("pad jumps", "pad off its zero"),
-    "pad jumps": ALONE,
+    "pad jumps": ("pad feels more on opening", *ALONE),
     "pad feels more on opening": ("pads disagree",),
 }
 """What follows of the same pad, and of the grasp, from a fault of a pad."""

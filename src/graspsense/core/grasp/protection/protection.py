@@ -55,7 +55,8 @@ class Protection:
 
     `tell` is called with each fault at its first sight, unless it follows from an earlier one and ends nothing.
     `ending` is the fault that ends the grasp, once there is one. `warnings` are the causes among the faults that were
-    seen, in words, and `acted` is the number of commands that were limited.
+    seen, in words. `acted` is the number of commands that were limited, and `unclear` the number of those of a squeeze
+    that were because only one pad felt, or a contact had no witness.
     """
 
     def __init__(
@@ -69,7 +70,7 @@ class Protection:
         self._tell = tell
         self._told: dict[str, Fault] = {}
         self.ending: Fault | None = None
-        self.acted = 0
+        self.acted = self.unclear = 0
         self._phase = -1
         self.side_impact = ""
         """What the edges felt in the reading that ended the approach, in words."""
@@ -130,7 +131,11 @@ class Protection:
         if self._has_pads:
             self._see(self._touch.see(frame, phase, command))
         allowed = self._limited(phase, command)
-        self.acted += allowed.value != command.value or self._gives(command) > asked_effort_n(allowed)
+        if allowed.value != command.value or self._gives(command) > asked_effort_n(allowed):
+            self.acted += 1
+            self.unclear += (
+                phase in (SQUEEZE, HOLD) and self._has_pads and self._touch.closing_limit_n() < inf
+            )
         return allowed
 
     def watch(self, reading: Reading, phase: int, applied: Command) -> None:
