@@ -3,16 +3,17 @@
     python benchmarks/control.py [--grasps N] [--short]
 
 The tick is what the runner does from the moment a report's bytes are in the process to the moment the command's are
-handed to the wire: decode, count, convert, the hybrid controller's step, the guard, encode. The reports are those of
-an emulated grasp, recorded first and played back, so that neither the emulated board nor the simulator is in the
-figure. The reports are played back twice more by the clock, without and with the predictions of the default model at
-its checkpoints, in turn: *paced* is the time from when a report is due to its command, in the squeeze, and *predicting*
-the same in the ticks during which the thread beside the loop computes. Further times they are played back with each of
-the sinks: a live page (*live*) and Foxglove (*foxglove*) that a viewer receives, a file of Rerun (*rerun*), an observer
-of a plugin (*observer*). Within each grasp the sink takes every other block of ticks, so that ticks with and without it
-meet the same machine. The last table says how much more the 99th percentile of the tick is in the blocks that it takes,
-with a 95 % interval over pairs of blocks, from when the report is in the process (*working*) and from when it is due
-(*due*); *handed over* is what the runner spends on the sink after the command of a tick.
+handed to the wire: decode, count, convert, the hybrid controller's step, the guard, encode. A *pass* of the loop has
+also what follows the command: recording it, and the checks for faults. The reports are those of an emulated grasp,
+recorded first and played back, so that neither the emulated board nor the simulator is in the figure. The reports are
+played back twice more by the clock, without and with the predictions of the default model at its checkpoints, in turn:
+*paced* is the time from when a report is due to its command, in the squeeze, and *predicting* the same in the ticks
+during which the thread beside the loop computes. Further times they are played back with each of the sinks: a live page
+(*live*) and Foxglove (*foxglove*) that a viewer receives, a file of Rerun (*rerun*), an observer of a plugin
+(*observer*). Within each grasp the sink takes every other block of ticks, so that ticks with and without it meet the
+same machine. The last table says how much more the 99th percentile of the tick is in the blocks that it takes, with a
+95 % interval over pairs of blocks, from when the report is in the process (*working*) and from when it is due (*due*);
+*handed over* is what the runner spends on the sink after the command of a tick.
 """
 
 from __future__ import annotations
@@ -87,10 +88,14 @@ class Playback(Transport):
         self.ticks_ns: list[int] = []
         self.working_ns: list[int] = []
         """The same from when the report was handed over."""
+        self.passes_ns: list[int] = []
+        """The times from when a report was handed over until the next one was asked for."""
 
     def read(self, timeout_s: float) -> bytes:
         if timeout_s == 0.0:  # nothing else waits
             return b""
+        if self._there_ns:
+            self.passes_ns.append(time.perf_counter_ns() - self._there_ns)
         if self._next == len(self._reports):
             raise TransportGone("the recording is over")
         self._next += 1
@@ -202,13 +207,15 @@ def played(
     assert grasp.outcome.words == "steady", grasp.reason
 
 
-def ticks_us(grasps: int, sent: Sequence[bytes], feature: bytes) -> list[float]:
-    ticks: list[float] = []
+def ticks_us(grasps: int, sent: Sequence[bytes], feature: bytes) -> dict[str, list[float]]:
+    """Return the times of the ticks, and of whole passes of the loop."""
+    times_us: dict[str, list[float]] = {"tick": [], "pass": []}
     for _ in range(grasps):
         wire = Playback(sent, feature)
         played(wire, feature)
-        ticks += [ns / 1e3 for ns in wire.ticks_ns]
-    return ticks
+        times_us["tick"] += [ns / 1e3 for ns in wire.ticks_ns]
+        times_us["pass"] += [ns / 1e3 for ns in wire.passes_ns]
+    return times_us
 
 
 def paced_us(grasps: int, sent: Sequence[bytes], feature: bytes) -> dict[str, list[float]]:
@@ -314,7 +321,7 @@ def main() -> None:
     paced = paced_us(asked.grasps, sent, feature)
     added, spent = watched_us(asked.grasps, sent, feature)
     times_us = {
-        "tick": ticks_us(asked.grasps, sent, feature),
+        **ticks_us(asked.grasps, sent, feature),
         **paced,
         **spent,
     }

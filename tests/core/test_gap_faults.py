@@ -208,11 +208,25 @@ def test_a_gripper_without_a_gap_or_a_told_width_may_close():
     assert by_effort.before_closing(frame(0, 0.03)) is None
 
 
+STRONGLY, WEAKLY = (Command(EFFORT, effort_n, inf, inf) for effort_n in (-20.0, -10.0))
+
+
 @every_case(
-    ("end_m", "is_told"), [(0.08, False), (0.0789, False), (0.077, True), (0.085, True), (nan, False)]
+    ("opens", "end_m", "is_told"),
+    [
+        (OPENS, 0.08, False),
+        (OPENS, 0.0789, False),
+        (OPENS, 0.077, True),
+        (OPENS, 0.085, True),
+        (OPENS, nan, False),
+        # Twice the friction of 7 N opens the fingers until their stop.
+        (STRONGLY, 0.077, True),
+        (STRONGLY, 0.0789, False),
+        (WEAKLY, 0.077, False),
+    ],
 )
-def test_open_fingers_are_as_wide_after_a_grasp_as_before_it(end_m, is_told):
-    watch = Opening(RATE_HZ, 0.02, OPENS, tells_gap=True)
+def test_open_fingers_are_as_wide_after_a_grasp_as_before_it(opens, end_m, is_told):
+    watch = Opening(RATE_HZ, 0.02, opens, tells_gap=True, friction_n=7.0)
     watch.before_closing(frame(0, 0.08))
     for k, gap_m in enumerate([0.08, 0.06, 0.05]):
         watch.see(frame(k, gap_m), SQUEEZE)

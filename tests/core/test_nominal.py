@@ -188,7 +188,7 @@ def test_a_damaged_arff_file_is_told_with_its_line(weather, old, new, line):
         ([f"grasp_{i:04d}.csv" for i in range(40)], "hardly repeat"),
         ([f"2026-11-{1 + i // 10:02d}" for i in range(40)], "dates or times"),
         ([f"{1 + i // 10}.11.2026 10:00" for i in range(40)], "dates or times"),
-        ([f"object {i // 4}" for i in range(40)], "--instance"),
+        ([f"object {i // 4}" for i in range(40)], "held out together"),
         ([("it slipped", "", "good", f"see {i}")[i % 4] for i in range(40)], "hardly repeat"),
     ],
 )

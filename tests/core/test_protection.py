@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.protection.cells import Fingertips
-from graspsense.core.grasp.protection.drift import PadDrift
+from graspsense.core.grasp.protection.drift import Drift, PadDrift
 from graspsense.core.grasp.protection.effort_ceiling import effort_ceiling_n, limited
 from graspsense.core.grasp.protection.motor import FeltForce, FreeEffort, Motor
 from graspsense.core.grasp.protection.pad_forces import EmptyHold, StuckForce
@@ -187,6 +187,13 @@ def test_a_contact_that_rises_within_a_millimetre_is_squeezed_at_once():
     approach.go(0.04, left=0.3, right=0.3)
     assert approach.go(0.001, left=0.7, right=0.7, phase=SQUEEZE)[0] is None
     assert approach.touch.closing_limit_n() == inf
+
+
+def test_a_finger_that_first_pushes_an_object_that_yields_is_no_drift():
+    """A soft full bottle: one pad feels it at once and pushes it, and both forces then rise by 0.2 N/mm."""
+    approach = Approach()
+    approach.go(0.6, left=0.03, right=0.55)
+    assert approach.go(0.5, left=0.65, right=0.65, phase=SQUEEZE) == (None, 0.5)
 
 
 @every_case(
@@ -376,6 +383,20 @@ def test_a_clock_that_is_slow_for_the_frames_that_come_is_told(rate, told):
     assert [fault.name for fault in faults[-1:] if fault is not None] == ["clock slow"] * told
 
 
+def test_a_clock_that_becomes_slow_late_is_told():
+    """10 % slow from the contact on, after a sound approach of three seconds."""
+    clock_s = [0.001] * 3000 + [0.0009] * 900
+    faults, _ = first_end([reading(sum(clock_s[:k]), dt=clock_s[k]) for k in range(3900)], SQUEEZE)
+    assert {fault.name for fault in faults if fault is not None} == {"clock slow"}
+
+
+@every_case(("jump_s", "ends"), [(1.0, False), (4.0, True), (-0.1, False)])
+def test_a_clock_that_jumps_is_told_and_ends_the_grasp_where_it_is_half_of_its_time(jump_s, ends):
+    now = [reading(0.001 * k + jump_s * (k >= 2000), dt=0.001 + jump_s * (k == 2000)) for k in range(2100)]
+    faults, _ = first_end(now, APPROACH)
+    assert [(fault.name, fault.ends) for fault in faults if fault is not None] == [("clock jumps", ends)]
+
+
 def images(n, frozen=(), noise=15.0, seed=0):
     """Return images of 22 noisy cells a side; `frozen` cells of the left side keep their first value."""
     rng = np.random.default_rng(seed)
@@ -453,6 +474,20 @@ def facing_cells(t):
     return 3000.0 + 50.0 * t * (np.arange(22) >= 7)
 
 
+@every_case(("cells", "touched"), [(all_cells, False), (facing_cells, True)])
+def test_forces_of_both_pads_that_rise_on_the_cells_that_face_the_object_are_a_contact(cells, touched):
+    """Something soft raises the forces as slowly as drift does."""
+    rng, drift = np.random.default_rng(0), Drift(CONTACT_N)
+    for k in range(50):
+        t = 0.04 * k
+        image = tuple(cells(t) + 3.0 * rng.standard_normal(22))
+        force_n = 15 * 50.0 * t / 1600.0
+        drift.see(
+            Reading(frame(t, 0.09 - 0.01 * t, left=force_n, right=force_n), Pads(t, k + 1, image, image))
+        )
+    assert drift.on_some_cells() is touched
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_slow_change_of_all_cells_is_drift(sign):
     fault = drifted(lambda t: sign * 0.47 * t, lambda t: 6000.0 - all_cells(t) if sign < 0 else all_cells(t))
@@ -496,13 +531,17 @@ def test_a_slow_approach_may_push_an_object_as_far(speed):
         assert touch.see(now, APPROACH, CLOSING) is None, k
 
 
-def test_a_force_that_becomes_no_number_ends_the_grasp():
+def test_forces_that_become_no_number_end_the_grasp_and_each_pad_is_named():
     approach = Approach()
     approach.go(0.3, left=4.0, right=4.0, speed=0.001, phase=SQUEEZE)
-    assert approach.go(1.0, left=nan, right=nan, speed=0.0, phase=SQUEEZE) == (
-        "left pad absent",
-        pytest.approx(0.1, abs=0.01),
-    )
+    for k in range(102):
+        now = frame(approach.t + 0.001 * k, approach.gap, 0.0, 8.0, nan, nan)
+        assert approach.touch.see(now, SQUEEZE, CLOSING) is None
+        faults = approach.touch.absent(now)
+    assert [(fault.name, fault.ends) for fault in faults] == [
+        ("left pad absent", True),
+        ("right pad absent", True),
+    ]
 
 
 def test_a_contact_that_is_not_clear_without_a_known_effort_is_held_at_the_usual_one():

@@ -67,6 +67,21 @@ def test_a_fault_in_the_squeeze_crushes_nothing_and_without_a_fault_nothing_is_t
     check(row, sound)
 
 
+@pytest.mark.parametrize(
+    ("fault", "told"),
+    [
+        ("absent", "left fingertip absent"),
+        ("zero", "left pad dead"),
+        ("stuck", "left pad stuck"),
+    ],
+)
+def test_of_a_fingertip_that_fails_in_the_squeeze_the_cause_alone_is_told(fault, told):
+    grasp = grasped(pad_fault=fault, pad_side="left", pad_at_s=0.8)
+    assert [warning.split(":")[0] for warning in grasp.warnings] == [told]
+    if grasp.outcome.words == "aborted":
+        assert grasp.reason == grasp.warnings[0]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("controller", "faults", "sides"),

@@ -62,9 +62,8 @@ _CHANNELS: Final = (
 OPENING_N: Final = -20.0
 """Effort that opens the fingers. The authors' recordings show 17 and 20 N, opening, between squeezes."""
 TARE_IMAGES: Final = 6
-RELEASE_REPORT: Final = OutputReport(
-    counter=0, kind=RELEASE_KIND, effort_un=0, effort_limit_un=0, speed_limit_um_s=0
-)
+_RELEASE: Final = (RELEASE_KIND, 0, 0, 0)
+"""What `OutputReport` has after its counter, of a command that lets go."""
 UNHEARD_S: Final = 0.1
 """Device time without the echo of a command after which the device counts as lost."""
 UNHEARD_COMMANDS: Final = 5
@@ -139,20 +138,16 @@ class Pr2Backend(BackendWithEmulator[Pr2Config]):
 
         Any other command, and an effort of NaN, relaxes the gripper.
         """
-        numbers = RELEASE_REPORT
+        numbers = _RELEASE
         if command.kind == EFFORT:
             with suppress(ProtocolError):
                 most_un = limit(min(command.effort_limit_n, self._effort_limit_n))
                 effort_un = micro(min(max(command.value, -self._effort_limit_n), self._effort_limit_n))
-                numbers = OutputReport(
-                    counter=0,
-                    kind=EFFORT_KIND,
-                    # In whole numbers, since the board reports an effort that it must clamp.
-                    effort_un=min(max(effort_un, -most_un), most_un),
-                    effort_limit_un=most_un,
-                    speed_limit_um_s=limit(min(command.speed_limit_m_s, self._speed_limit_m_s)),
-                )
-        self._send(self._open(), numbers)
+                # In whole numbers, since the board reports an effort that it must clamp.
+                effort_un = min(max(effort_un, -most_un), most_un)
+                speed_um_s = limit(min(command.speed_limit_m_s, self._speed_limit_m_s))
+                numbers = EFFORT_KIND, effort_un, most_un, speed_um_s
+        self._send(self._open(), *numbers)
 
     def tare(self, images: Sequence[Pads]) -> None:
         """Set the zero of the pads. Raises TareRefused."""
@@ -166,7 +161,7 @@ class Pr2Backend(BackendWithEmulator[Pr2Config]):
             return
         if self._sent:
             with suppress(DeviceLost):
-                self._send(opened, RELEASE_REPORT)
+                self._send(opened, *_RELEASE)
         if opened.link.gone:
             self._lost_serial = opened.identity.serial
         clean = opened.link.close()
@@ -236,9 +231,18 @@ class Pr2Backend(BackendWithEmulator[Pr2Config]):
             status_bits=status_bits(config.swap_fingers),
         )
 
-    def _send(self, opened: Opened, command: OutputReport) -> None:
+    def _send(
+        self, opened: Opened, kind: int, effort_un: int, effort_limit_un: int, speed_limit_um_s: int
+    ) -> None:
         self._sent += 1
-        opened.link.send(encode_output(command._replace(counter=self._sent & 0xFFFF)))
+        command = OutputReport(
+            counter=self._sent & 0xFFFF,
+            kind=kind,
+            effort_un=effort_un,
+            effort_limit_un=effort_limit_un,
+            speed_limit_um_s=speed_limit_um_s,
+        )
+        opened.link.send(encode_output(command))
 
     def _counted(self, opened: Opened) -> dict[str, float | int | str | bool]:
         link, emulation = opened.link, opened.emulation

@@ -204,7 +204,7 @@ class Measure:
         good, bad = masked(cells, zero)
         status = BAD_CELL if bad else 0
         if bad and masked(cells[FIRST_PAD_CELL:], zero[FIRST_PAD_CELL:])[1] > ENDURED_CELLS:
-            status |= (LEFT_DEAD, RIGHT_DEAD)[side]
+            status = (LEFT_DEAD, RIGHT_DEAD)[side]
         if self._zero is None:
             # Without a tare there is no force: the offsets alone are some thousand counts for each cell.
             return _PadForce(force_n=0.0, edge_n=0.0, bad=bad, status=status)

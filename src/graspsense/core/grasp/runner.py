@@ -318,8 +318,8 @@ class _Grasp:
             # A lost gripper may still receive commands, so it is commanded to relax.
             fault = self._fault()
             self._let_go(lost, opens=not (self.state.done or (fault is not None and fault.relaxes)))
-        if ending is None and fault is not None:
-            ending = fault.outcome, fault.told
+        if ending is None and fault is not None and self.protection is not None:
+            ending = fault.outcome, self.protection.cause_of(fault).told
         if ending is None:
             ending = ended_by_itself(self.state.guard.stopped, self.state.law.outcome)
             if ending[0] is Outcome.SIDE_IMPACT and self.protection is not None:
@@ -380,7 +380,9 @@ class _Grasp:
                 self._event(frame.t_s, Phase(phase), Phase(phase).name.lower())
             if state.guard is not watcher:
                 watcher = self._guard_event(frame, watcher, state.guard)
-            command = self._protected(reading, phase if stepped else TARING, command)
+            protected_phase = phase if stepped else TARING
+            if self.protection is not None:
+                command = self.protection.limit(reading, protected_phase, command)
             # The frame that ended the taring still has forces relative to the old zero.
             recorded = phase >= APPROACH and stepped
             if recorded:
@@ -394,6 +396,7 @@ class _Grasp:
                 # Also if the gripper is lost at this moment: the frame was measured.
                 if recorded:
                     record(reading, phase, command)
+                self._check_for_faults(reading, protected_phase, command)
                 if state.events:
                     self._told(frame, phase, state.events)
                 if recorded and self.sinks:
@@ -456,14 +459,13 @@ class _Grasp:
         self.failed_sinks.append(f"{type(sink).__name__} failed: {named(error)}")
         self._event(t_s, phase, self.failed_sinks[-1])
 
-    def _protected(self, reading: Reading, phase: int, command: Command) -> Command:
-        """Return the command that the protection allows, if this gripper can hurt something."""
+    def _check_for_faults(self, reading: Reading, phase: int, command: Command) -> None:
+        """Let the protection see a tick whose command the gripper has, if this gripper can hurt something."""
         if self.protection is None:
-            return command
-        command = self.protection.limit(reading, phase, command)
+            return
+        self.protection.watch(reading, phase, command)
         if self.state.done:
             self.protection.released(reading.frame)
-        return command
 
     def _tared(self, images: list[Pads], frame: Frame) -> bool:
         """Set the zero of the pads; return whether the fingers may close."""
@@ -501,8 +503,12 @@ class _Grasp:
 
     def warnings(self) -> tuple[str, ...]:
         """Return the faults that were seen, and that the squeeze was not the one that the controller commanded."""
-        seen = () if self.protection is None else self.protection.warnings
-        if self.squeezed_guarded <= MOSTLY * self.squeezed:
+        seen, unclear = (
+            ((), 0) if self.protection is None else (self.protection.warnings, self.protection.unclear)
+        )
+        # A fault of the pads is told, and not that it made a contact unclear.
+        limited = self.squeezed_guarded - (unclear if faults_among(seen) else 0)
+        if limited <= MOSTLY * self.squeezed:
             return seen
         why = f"the limits of the gripper are {self.info.effort_limit_n:g} N and {self.info.speed_limit_m_s:g} m/s"
         guard_params = self.params.guard
@@ -511,9 +517,11 @@ class _Grasp:
                 f"no pad has felt a contact, so run.first_effort_n ({guard_params.first_effort_n:g} N) and "
                 f"run.first_speed_m_s ({guard_params.first_speed_m_s:g} m/s) held throughout"
             )
+        elif unclear > 0.5 * limited:
+            why = "one pad felt nothing, or a contact had no witness, so the effort of the approach held"
         elif self.protection is not None and self.protection.acted:
             why = f"the ceiling is {self.protection.ceiling_n:.1f} N; run.effort_ceiling_n allows more"
-        told = f"{LIMITED}: {self.squeezed_guarded} of its {self.squeezed} commands were lowered; {why}"
+        told = f"{LIMITED}: {limited} of its {self.squeezed} commands were lowered; {why}"
         # With its share, instead of the first sight of it.
         return (*faults_among(seen), told)
 

@@ -47,27 +47,29 @@ class Fingertip:
         self.side = side
         self._cells: NDArray[np.float64] = np.empty(0)
         self._changes: NDArray[np.int64] = np.empty(0, np.int64)
+        self._images = 0
+        """Images of free air."""
         self._free: NDArray[np.int64] = np.empty(0, np.int64)
         """Images of free air of each cell, up to its last change."""
-        self._waiting: NDArray[np.int64] = np.empty(0, np.int64)
-        """Images of free air since the last change of each cell."""
         self._still: NDArray[np.int64] = np.empty(0, np.int64)
         self._patterned = self._blank_images = 0
 
     def see(self, image: NDArray[np.float64], free: bool) -> None:
         """Take a new image; `free`: nothing touches the fingertip."""
         if image.shape != self._cells.shape:
-            self._changes, self._free, self._waiting, self._still = np.zeros((4, *image.shape), np.int64)
+            self._changes, self._free, self._still = np.zeros((3, *image.shape), np.int64)
+            self._images = 0
         else:
-            changed = (image != self._cells) & ~(np.isnan(image) & np.isnan(self._cells))
-            self._still = np.where(changed, 0, self._still + 1)
+            # By their bits, since a cell that stays NaN has not changed.
+            changed = image.view(np.int64) != self._cells.view(np.int64)
+            self._still += 1
+            self._still[changed] = 0
             if free:
-                self._waiting += 1
+                self._images += 1
                 self._changes += changed
-                self._free += np.where(changed, self._waiting, 0)
-                self._waiting[changed] = 0
+                self._free[changed] = self._images
         self._cells = image
-        blank = image.size > 1 and bool(np.all(image == image[0]))
+        blank = image.size > 1 and image.max() == image.min()
         self._patterned = self._patterned if blank else self._patterned + 1
         self._blank_images = self._blank_images + 1 if blank else 0
 

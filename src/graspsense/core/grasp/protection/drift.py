@@ -123,11 +123,13 @@ class PadDrift:
             ends=abs(mean_n) >= max(ENDS * self._contact_n, noise_n),
         )
 
-    def on_all_cells(self) -> bool:
-        """Return whether nearly all cells have risen alike; without several cells, a slow contact looks the same."""
+    def on_all_cells(self) -> bool | None:
+        """Return whether nearly all cells have risen alike; None without several cells, or a rise."""
         if self._start is None or self._start.size < FEWEST_CELLS or len(self._images) < SAMPLES:
-            return False
+            return None
         change = np.mean(self._images, axis=0) - self._start
+        if sum(self._forces) < SAMPLES * WARNS * self._contact_n:
+            return None
         return bool(np.quantile(change, 0.1) >= UNIFORM * np.median(change) > 0.0)
 
 
@@ -160,6 +162,10 @@ class Drift:
             self._edges[side].add(edge_n)
             faults.append(self._edges[side].fault(f"{side} edge", NOISY_EDGE * self._contact_n))
         return [fault for fault in faults if fault is not None]
+
+    def on_some_cells(self) -> bool:
+        """Return whether the forces of both pads rose on some of their cells only, as a contact lets them."""
+        return all(pad.on_all_cells() is False for pad in self._pads.values())
 
     def side_impact(self, reading: Reading) -> str:
         """Return in words what the edges felt in the reading that ended the approach."""

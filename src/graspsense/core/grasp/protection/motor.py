@@ -112,6 +112,8 @@ class Motor:
         self._delay_s = max(DELAY_S, PERIODS / rate_hz)
         self._lasts_s = max(LASTS_S, PERIODS / rate_hz)
         self._commands: deque[Asked] = deque()
+        self._direction_t_s = nan
+        """The time since when all commands have the direction of the last one."""
         self._strong_s = self._weak_s = self._reversed_s = 0.0
         self._wrong_way_s = self._held_s = 0.0
         self._held_n, self._asked_n = RecentMean(MEAN_S), RecentMean(MEAN_S)
@@ -124,8 +126,11 @@ class Motor:
         effort_n = command.value if command.kind == EFFORT else nan
         asked = Asked(frame.t_s, effort_n, direction_of(command, frame.gap_m))
         # Where the clock of the gripper stands still, the commands would gather.
-        if not self._commands or asked != self._commands[-1]:
-            self._commands.append(asked)
+        commands = self._commands
+        if not commands or asked.direction != commands[-1].direction:
+            self._direction_t_s = frame.t_s
+        if not commands or asked != commands[-1]:
+            commands.append(asked)
 
     def shift(self, step_m: float) -> None:
         """Let the gap jump by this (m), which is no motion of the fingers."""
@@ -192,9 +197,9 @@ class Motor:
 
     def _wrong_way(self, frame: Frame, phase: int) -> Fault | None:
         """The fingers open while every recent command closes, or close while every one opens."""
-        directions = {asked.direction for asked in self._commands}
-        commands_no_effort = all(asked.effort_n != asked.effort_n for asked in self._commands)
-        closes, opens = directions == {1}, directions == {-1}
+        steady = self._direction_t_s <= self._commands[0].t_s
+        direction = self._commands[-1].direction if steady else 0
+        closes, opens = direction == 1, direction == -1
         if phase != self._phase or not (closes or opens) or self._extreme_m != self._extreme_m:
             self._phase, self._wrong_way_s = phase, 0.0
             self._start_m = self._extreme_m = frame.gap_m
@@ -217,6 +222,7 @@ class Motor:
         # An object that springs back may open fingers that squeeze it.
         if self._wrong_way_s <= self._lasts_s or (closes and phase != APPROACH):
             return None
+        commands_no_effort = all(asked.effort_n != asked.effort_n for asked in self._commands)
         if closes and self._start_m - self._extreme_m >= FREE_TRAVEL_M and commands_no_effort:
             return Fault(
                 "gap against the command",

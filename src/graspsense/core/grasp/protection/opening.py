@@ -11,7 +11,7 @@ from typing import Final
 
 from graspsense.core.grasp.protection.touch import CLOSED_M
 from graspsense.core.values.faults import Fault
-from graspsense.core.values.signals import APPROACH, POSITION, Command, Frame, Phase
+from graspsense.core.values.signals import APPROACH, EFFORT, POSITION, Command, Frame, Phase
 
 LEAST_TRAVEL_M: Final = 0.0015
 """Travel of the closing from which on the opening must show."""
@@ -26,6 +26,8 @@ RESTED_S: Final = 0.1
 TARGET_M: Final = 0.002
 TARGET_SHARE: Final = 0.05
 """By how much open fingers may miss the width that they were told, at least and as a share of it."""
+STOP: Final = 2.0
+"""Effort over the friction of the drive with which fingers open until a stop."""
 AGAIN_M: Final = 0.001
 AGAIN_SHARE: Final = 0.02
 """By how much their width after a grasp may differ from that before it, at least and as a share of it."""
@@ -34,11 +36,16 @@ AGAIN_SHARE: Final = 0.02
 class Opening:
     """Watches the gap of a gripper with this rate of frames (Hz) and delay of commands (s), which this command opens.
 
-    `tells_gap` says whether the frames have a gap at all.
+    `tells_gap` says whether the frames have a gap at all, and `friction_n` is that of the drive (N; 0: not known).
     """
 
     def __init__(
-        self, rate_hz: float, command_delay_s: float, opening: Command | None, tells_gap: bool
+        self,
+        rate_hz: float,
+        command_delay_s: float,
+        opening: Command | None,
+        tells_gap: bool,
+        friction_n: float = 0.0,
     ) -> None:
         self._late_s = command_delay_s + max(LATE_S, 4.0 / rate_hz)
         self.stands_s = command_delay_s + max(STANDS_S, 6.0 / rate_hz)
@@ -46,6 +53,9 @@ class Opening:
         self._target_m = opening.value if opening is not None and opening.kind == POSITION else nan
         self._longest_s = nan if opening is None else self.stands_s + self._target_m / opening.speed_limit_m_s
         self._tells_gap = tells_gap
+        self._ends_alike = self._target_m == self._target_m or (
+            opening is not None and opening.kind == EFFORT and -opening.value >= STOP * friction_n > 0.0
+        )
         self._first_m = nan
         self._widest_m = -inf
         self._start_m = self._start_s = self._rest_m = self._rest_s = nan
@@ -111,13 +121,13 @@ class Opening:
     def released(self, frame: Frame) -> Fault | None:
         """Take the last frame of the release; return what is wrong with the width of the open fingers.
 
-        Fingers that are opened by an effort or a velocity may end anywhere.
+        Fingers that are opened by little effort or a velocity may end anywhere.
         """
         first_m, gap_m = self._first_m, frame.gap_m
         # Fingers that are seen not to open have a fault of their own.
         if (
             not self._opened
-            or self._target_m != self._target_m
+            or not self._ends_alike
             or gap_m - first_m != gap_m - first_m
             or self._is_as_before(gap_m)
         ):

@@ -35,7 +35,7 @@ OPENED_M: Final = 0.005
 """So much wider than at the contact, no object touches both fingers any more."""
 FEWEST_OPEN: Final = 2
 OPEN_S: Final = 0.03
-"""So many samples, over so long a time, show the zero of a pad."""
+"""So many samples at the end of the release, and so long a time after the object, show the zero of a pad."""
 ZERO_CONTACTS: Final = 0.5
 ZERO_SHARE: Final = 0.1
 """By how much the zero may have moved: a share of the contact force, or of the greatest force. The PR2's object
@@ -49,6 +49,8 @@ FRICTION_N: Final = 1.5
 APART_SHARE: Final = 0.3
 FEWEST_APART: Final = 3
 """Share of the greatest force by which the pads may differ besides, in so many samples in a row."""
+RETURNS: Final = 0.3
+"""Share of a jump by which the next sample goes back if it is noise; beyond a step, the force stays."""
 FREE_SHARE: Final = 0.3
 """Share of the contact force below which a pad is free."""
 FEWEST_SPIKES: Final = 2
@@ -68,7 +70,7 @@ class PadCurve:
         self._free_samples = self._changes = self._still = 0
         self._more = 0
         self._more_t_s = self._open_t_s = nan
-        self._open_sum_n, self._open_samples = 0.0, 0
+        self._open_n: deque[float] = deque(maxlen=FEWEST_OPEN)
 
     @property
     def _greatest_n(self) -> float:
@@ -111,7 +113,10 @@ class PadCurve:
     def open(self, force_n: float, t_s: float, gap_m: float, earlier_gap_m: float) -> Fault | None:
         """Take a sample of the release."""
         if earlier_gap_m > self._contact_gap_m + OPENED_M:
-            return self._empty(force_n, t_s)
+            if not self._open_n:
+                self._open_t_s = t_s
+            self._open_n.append(force_n)
+            return None
         most_n = self._most_n(earlier_gap_m - SLACK_M)
         held_n = self._held[1]
         allowed_n = min(MORE_SHARE * held_n, HARDLY_SHARE * (held_n - most_n))
@@ -139,14 +144,11 @@ class PadCurve:
         share = (contact_gap_m - gap_m) / max(contact_gap_m - held_gap_m, SLACK_M)
         return min(closing_n, held_n * min(max(share, 0.0), 1.0)) if share == share else closing_n
 
-    def _empty(self, force_n: float, t_s: float) -> Fault | None:
-        if self._open_t_s != self._open_t_s:
-            self._open_t_s = t_s
-        self._open_samples += 1
-        self._open_sum_n += force_n
-        mean_n = self._open_sum_n / self._open_samples
-        if self._open_samples < FEWEST_OPEN or t_s - self._open_t_s < OPEN_S:
+    def released(self, t_s: float) -> Fault | None:
+        """Return what the last samples of the release show: a force that is only late has gone by then."""
+        if len(self._open_n) < FEWEST_OPEN or t_s - self._open_t_s < OPEN_S:
             return None
+        mean_n = sum(self._open_n) / FEWEST_OPEN
         allowed_n = max(ZERO_CONTACTS * self._contact_n, ZERO_SHARE * self._greatest_n)
         if not abs(mean_n) > allowed_n:
             return None
@@ -190,8 +192,10 @@ class Spikes:
             if self._free_spikes[i] < FEWEST_SPIKES:
                 return None
         side, other = ("left", "right") if i == 0 else ("right", "left")
+        jump_n, back_n = middle[i] - earlier[i], middle[i] - later[i]
+        returns = jump_n * back_n > 0.0 and min(jump_n / back_n, back_n / jump_n) > RETURNS
         return Fault(
-            f"{side} pad jumps",
+            f"{side} pad noisy" if returns else f"{side} pad jumps",
             f"it went from {earlier[i]:.1f} over {middle[i]:.1f} to {later[i]:.1f} N, which the {other} one did not "
             "feel: it has noise, or a loose contact; check its cable",
         )
@@ -248,6 +252,10 @@ class PadCurves:
             elif phase == Phase.RELEASE:
                 faults.append(pad.open(force_n, frame.t_s, frame.gap_m, earlier_gap_m))
         return [fault for fault in faults if fault is not None]
+
+    def released(self, t_s: float) -> list[Fault]:
+        """Return what the pads show at the end of the release (s)."""
+        return [fault for pad in self._pads if (fault := pad.released(t_s)) is not None]
 
     def _apart(self, forces: tuple[float, float], phase: int) -> Fault | None:
         """Return the fault of pads that differ by more than friction holds while the force rises or falls."""

@@ -1,7 +1,8 @@
 """The protection of one grasp: it limits what a controller may command, and ends a grasp whose sensors or motor fail.
 
 It holds for every controller and every gripper that can hurt something (`DeviceInfo.harmless` is False), as far as the
-channels of the gripper allow. The runner passes each reading and each command through it, after the guard.
+channels of the gripper allow. The runner passes each command through its limits, after the guard. The other checks
+follow when the gripper has the command. A fault that they find ends the grasp in the same tick.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from attrs import evolve
 from graspsense.core.components.roles import Controller
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.protection.absence import EFFORT_ABSENT, GAP_ABSENT, Absence
+from graspsense.core.grasp.protection.causes import causes, follows
 from graspsense.core.grasp.protection.cells import Fingertips
 from graspsense.core.grasp.protection.drift import Drift
 from graspsense.core.grasp.protection.effort import ReportedEffort
@@ -42,6 +44,8 @@ from graspsense.core.values.signals import (
 )
 
 RELEASE: Final = int(Phase.RELEASE)
+CLOSING: Final = (APPROACH, SQUEEZE, HOLD)
+"""The phases in which the fingers may press something."""
 FEW_JUMPS: Final = 4
 """Jumps of a gap to one side that are not taken for motion; with more, the fingers may move as fast as it says."""
 
@@ -49,8 +53,10 @@ FEW_JUMPS: Final = 4
 class Protection:
     """Watches one grasp of a gripper under a controller.
 
-    `tell` is called with each fault at its first sight. `ending` is the fault that ends the grasp, once there is one.
-    `warnings` are the faults that were seen, in words, and `acted` is the number of commands that were limited.
+    `tell` is called with each fault at its first sight, unless it follows from an earlier one and ends nothing.
+    `ending` is the fault that ends the grasp, once there is one. `warnings` are the causes among the faults that were
+    seen, in words. `acted` is the number of commands that were limited, and `unclear` the number of those of a squeeze
+    that were because only one pad felt, or a contact had no witness.
     """
 
     def __init__(
@@ -64,7 +70,7 @@ class Protection:
         self._tell = tell
         self._told: dict[str, Fault] = {}
         self.ending: Fault | None = None
-        self.acted = 0
+        self.acted = self.unclear = 0
         self._phase = -1
         self.side_impact = ""
         """What the edges felt in the reading that ended the approach, in words."""
@@ -82,7 +88,8 @@ class Protection:
         self._declared = bool(rates)
         self._has_pads = "force_left" in rates and "force_right" in rates
         pads_hz = min(rates.get("force_left", 0.0), rates.get("force_right", 0.0))
-        self._touch, self._drift = Touch(contact_n, run.first_effort_n, pads_hz), Drift(contact_n)
+        self._drift = Drift(contact_n)
+        self._touch = Touch(contact_n, run.first_effort_n, pads_hz, self._drift.on_some_cells)
         self._stuck, self._balance = StuckForce(pads_hz), PadBalance(contact_n)
         self._curves, self._empty_hold = PadCurves(contact_n, pads_hz), EmptyHold(contact_n)
         self._felt, self._gap_speed = (
@@ -99,20 +106,43 @@ class Protection:
         first_m_s = run.first_speed_m_s if info.clock == "device" else inf
         self._standstill, self._jump = Standstill(), GapJump(info.speed_limit_m_s)
         self._kept_speed, self._repeats = KeptSpeed(info.rate_hz), Repeats()
-        self.opening = Opening(info.rate_hz, command_delay_s, info.opening, tells_gap="gap" in rates)
+        self.opening = Opening(info.rate_hz, command_delay_s, info.opening, "gap" in rates, info.friction_n)
         self._rush = Rush(min(first_m_s, info.speed_limit_m_s), info.rate_hz)
         self._reports = Reports(info.rate_hz, rates.get("pads", 0.0))
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """The faults that were seen, each in a sentence."""
-        return tuple(fault.told for fault in self._told.values())
+        """The faults that were seen and do not follow from others, each in a sentence."""
+        return tuple(self._told[name].told for name in causes(self._told))
+
+    def cause_of(self, fault: Fault) -> Fault:
+        """Return the fault from which this one follows, or this one itself."""
+        names = (name for name in causes(self._told) if follows(fault.name, name))
+        return self._told.get(next(names, fault.name), fault)
 
     def limit(self, reading: Reading, phase: int, command: Command) -> Command:
         """Take the reading of a tick and the command for it; return the command that may be applied.
 
-        If the reading shows a fault that ends the grasp, it is `ending`, and the command is the relaxing one. In the
-        release, only a motor that turns the wrong way ends it: the grasp is over, and its outcome stays.
+        Only what bounds the command is looked at here, so that the gripper does not wait for `watch`.
+        """
+        frame = reading.frame
+        if not self._declared and frame.force_left_n == frame.force_left_n:
+            self._has_pads = True
+        if self._has_pads:
+            self._see(self._touch.see(frame, phase, command))
+        allowed = self._limited(phase, command)
+        if allowed.value != command.value or self._gives(command) > asked_effort_n(allowed):
+            self.acted += 1
+            self.unclear += (
+                phase in (SQUEEZE, HOLD) and self._has_pads and self._touch.closing_limit_n() < inf
+            )
+        return allowed
+
+    def watch(self, reading: Reading, phase: int, applied: Command) -> None:
+        """Take the reading of a tick and the command that was applied to it, once the gripper has the command.
+
+        If the reading shows a fault that ends the grasp, it is `ending`. In the release, only a motor that turns the
+        wrong way ends it: the grasp is over, and its outcome stays.
         """
         frame = reading.frame
         self._see(self._reports.see(reading, phase), phase)
@@ -125,36 +155,25 @@ class Protection:
         last_phase, self._phase = self._phase, phase
         if phase != APPROACH and last_phase == APPROACH:
             self.side_impact = self._drift.side_impact(reading)
-        if not self._declared and frame.force_left_n == frame.force_left_n:
-            self._has_pads = True
-        closing = phase in (APPROACH, SQUEEZE, HOLD)
-        if closing or last_phase in (APPROACH, SQUEEZE, HOLD):
-            # Also the jump with which the law has ended the grasp in this tick.
+        if phase >= APPROACH:
             self._see(jump)
+        closing = phase in CLOSING
         if closing:
             self._see(self._gap_speed.see(frame))
             self._see(self._gap_absence.see(frame.gap_m, frame))
             self._see(self._effort_absence.see(frame.effort_n, frame))
-        self._see_free_motion(frame, phase, jumped=jump is not None)
+        self._see_free_motion(frame, phase, applied, jumped=jump is not None)
         if self._effort is not None:
             self._see(self._effort.see(frame, phase), phase)
+            self._effort.apply(frame, applied)
         self._see(self.opening.see(frame, phase), phase)
         if self._has_pads:
-            self._see_pads(reading, phase, command)
-        allowed = self._limited(phase, command)
+            self._see_pads(reading, phase)
         if closing:
-            self._felt.apply(allowed)
-        if phase == APPROACH and self._touch.free():
-            self._see(self._free_effort.see(frame, allowed))
-        if phase == APPROACH and self.ending is None:
-            self._see(self._standstill.see(frame, allowed))
-        self.acted += allowed.value != command.value or self._gives(command) > asked_effort_n(allowed)
-        self._motor.apply(frame, allowed)
-        self._jump.apply(frame, allowed)
-        self._kept_speed.apply(frame, allowed, jumped=jump is not None)
-        if self._effort is not None:
-            self._effort.apply(frame, allowed)
-        return allowed
+            self._felt.apply(applied)
+        self._motor.apply(frame, applied)
+        self._jump.apply(frame, applied)
+        self._kept_speed.apply(frame, applied, jumped=jump is not None)
 
     def before_closing(self, frame: Frame) -> Fault | None:
         """Return the fault for which the fingers must not close, if there is one."""
@@ -172,6 +191,8 @@ class Protection:
     def released(self, frame: Frame) -> None:
         """Take the last frame of the release."""
         self._see(self.opening.released(frame), RELEASE)
+        for fault in self._curves.released(frame.t_s):
+            self._see(fault, RELEASE)
         if self._effort is not None:
             self._see(self._effort.released(frame), RELEASE)
 
@@ -187,20 +208,24 @@ class Protection:
         self._motor.apply(reading.frame, command)
         return fault is not None and fault.relaxes
 
-    def _see_free_motion(self, frame: Frame, phase: int, *, jumped: bool) -> None:
-        """Take the frame of a tick in which the fingers may move freely."""
-        if phase == APPROACH and self._touch.free():
-            self._see(self._rush.see(frame))
-            self._see(self._repeats.see(frame, jumped=jumped))
-            self._see(self._kept_speed.see(frame, phase))
+    def _see_free_motion(self, frame: Frame, phase: int, applied: Command, *, jumped: bool) -> None:
+        """Take the frame of a tick in which the fingers may move freely, and the command that was applied to it."""
+        if phase == APPROACH:
+            if self._touch.free():
+                self._see(self._rush.see(frame))
+                self._see(self._repeats.see(frame, jumped=jumped))
+                self._see(self._kept_speed.see(frame, phase))
+                self._see(self._free_effort.see(frame, applied))
+            self._see(self._standstill.see(frame, applied))
         elif phase == RELEASE:
             self._see(self._kept_speed.see(frame, phase), phase)
 
-    def _see_pads(self, reading: Reading, phase: int, command: Command) -> None:
+    def _see_pads(self, reading: Reading, phase: int) -> None:
         frame = reading.frame
-        closing = phase in (APPROACH, SQUEEZE, HOLD)
-        self._see(self._touch.see(frame, phase, command))
+        closing = phase in CLOSING
         if closing:
+            for fault in self._touch.absent(frame):
+                self._see(fault)
             self._see(self._felt.see(frame))
             self._see(self._balance.see(frame, phase))
         for fault in self._curves.see(reading, phase):
@@ -226,7 +251,8 @@ class Protection:
         told = self._told.get(fault.name)
         if told is None or (fault.ends and not told.ends):
             self._told[fault.name] = fault
-            self._tell(fault)
+            if fault.ends or not any(follows(fault.name, other) for other in self._told):
+                self._tell(fault)
         if fault.ends and self.ending is None:
             self.ending = fault
 
@@ -247,6 +273,6 @@ class Protection:
                     f"the controller asks for more than {closing_n:.1f} N; run.effort_ceiling_n allows more",
                 )
             )
-        if self._has_pads and phase in (APPROACH, SQUEEZE, HOLD):
+        if self._has_pads and phase in CLOSING:
             closing_n = min(closing_n, self._touch.closing_limit_n())
         return limited(command, closing_n, self._opening_n)

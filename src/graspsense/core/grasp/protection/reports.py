@@ -16,6 +16,8 @@ STANDS_S: Final = 0.1
 """Time, counted in frames of the declared rate, for which the clock of the gripper may stand still."""
 FEWEST_STILL: Final = 3
 """Frames in a row that show a clock that stands still."""
+JUMP_S: Final = 0.1
+"""Time between two frames, at least five periods, that is a jump of the clock or a stall."""
 LOST_SHARE: Final = 0.02
 """Share of lost frames from which on a person must know: derivatives of the force then change."""
 ENDS_SHARE: Final = 0.5
@@ -37,7 +39,9 @@ STEPS_M: Final = 0.002
 ALIKE: Final = 0.9
 """Step of the gap from which on it is coarse, and share of it that the others have."""
 SURPLUS_SHARE: Final = 0.05
-"""Share of frames beyond the declared rate from which on the clock of the gripper counts as slow."""
+SURPLUS_S: Final = 0.4
+"""Share of frames beyond the declared rate, and the time over which it is taken (at least `FEWEST` frames), from which
+on the clock of the gripper counts as slow."""
 IMAGES_LATE: Final = 5.0
 """Periods of the cell images without a new one after which the forces are out of date."""
 IMAGES_LATE_S: Final = 0.1
@@ -51,8 +55,10 @@ class Reports:
         self._period_s = 1.0 / rate_hz
         self._images_late_s = max(IMAGES_LATE / images_hz, IMAGES_LATE_S) if images_hz > 0.0 else 0.0
         self._stands = 0
-        self._frames = 0
-        self._expected = 0.0
+        self._jump_s, self._jumped_s = max(JUMP_S, 5.0 / rate_hz), 0.0
+        self._frames = self._block_frames = 0
+        self._expected = self._block_s = 0.0
+        self._block = max(FEWEST, SURPLUS_S * rate_hz)
         self._singly_lost = 0
         self._counter = -1
         self._image_t_s = nan
@@ -72,6 +78,8 @@ class Reports:
                     "are not valid; restart the gripper",
                     ends=True,
                 )
+        if closing and self._frames and not -self._period_s < frame.dt_s < self._jump_s:
+            return self._jumped(frame.dt_s)
         if pads.counter != self._counter or self._image_t_s != self._image_t_s:
             self._counter, self._image_t_s = pads.counter, frame.t_s
         elif closing and self._images_late_s > 0.0 and frame.t_s - self._image_t_s > self._images_late_s:
@@ -83,18 +91,23 @@ class Reports:
             )
         return self._lost(frame.dt_s) if closing else None
 
+    def _jumped(self, dt_s: float) -> Fault:
+        self._jumped_s += max(dt_s, 0.0)
+        return Fault(
+            "clock jumps",
+            f"the time of the gripper changed by {dt_s:+.2f} s from a frame to the next: its clock jumped, or this "
+            "computer or the connection stood still, so that times and rates are wrong; check the connection and the "
+            "load of this computer",
+            ends=self._jumped_s >= ENDS_SHARE * (self._jumped_s + self._expected * self._period_s),
+        )
+
     def _lost(self, dt_s: float) -> Fault | None:
         self._frames += 1
         self._expected += dt_s / self._period_s
         self._singly_lost += max(round(dt_s / self._period_s) - 1, 0)
         lost = self._expected - self._frames
-        if self._frames >= FEWEST and -lost > SURPLUS_SHARE * self._expected:
-            return Fault(
-                "clock slow",
-                f"{self._frames} frames came in {self._expected * self._period_s:.2f} s of the gripper's clock, which "
-                f"declares {1.0 / self._period_s:g} a second: its clock is slow, so that times and rates are wrong, or "
-                "frames are repeated; restart the gripper",
-            )
+        if (slow := self._slow(dt_s)) is not None:
+            return slow
         if self._expected < FEWEST:
             lost = self._singly_lost
             few = lost < max(SINGLE_GAPS, SINGLE_SHARE * self._expected)
@@ -107,6 +120,23 @@ class Reports:
             f"{lost / self._expected * 100:.0f} % of the frames are missing: rates and times are less exact; check the "
             "connection and the load of this computer",
             ends=lost >= ENDS_SHARE * self._expected,
+        )
+
+    def _slow(self, dt_s: float) -> Fault | None:
+        """Compare each block of frames with the time that it took by the clock of the gripper."""
+        self._block_frames += 1
+        self._block_s += dt_s
+        frames, block_s = self._block_frames, self._block_s
+        if frames < self._block:
+            return None
+        self._block_frames, self._block_s = 0, 0.0
+        if frames * self._period_s - block_s <= SURPLUS_SHARE * block_s:
+            return None
+        return Fault(
+            "clock slow",
+            f"{frames} frames came in {block_s:.2f} s of the gripper's clock, which declares "
+            f"{1.0 / self._period_s:g} a second: its clock is slow, so that times and rates are wrong, or frames are "
+            "repeated; restart the gripper",
         )
 
 

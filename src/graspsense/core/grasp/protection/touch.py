@@ -11,6 +11,7 @@ full bottle is pushed by up to 14 mm in the simulated catalogue, with the contac
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import inf, nan
 from typing import Final
 
@@ -77,21 +78,22 @@ class Pad:
         self._contact_n = contact_force_n
         self.felt = False
         self.force_n = nan
-        self._free_gap_m = self._free_t_s = nan
+        self._free_gap_m = self._free_t_s = self._free_n = nan
         self.first_n = nan
         """The force of the first tick."""
         self.absent_s = self.all_absent_s = 0.0
         """Time (s) without a number, without a break and in all."""
         self.sharp = False
-        """Whether the force rose to that of the contact within a short travel and time."""
+        """Whether the force rose by most of the contact force within a short travel and time, and is there yet."""
 
     def see(self, force_n: float, frame: Frame, sharp_s: float) -> None:
         """Take the force (N) of this tick, which is not felt if it is NaN. A sharp rise takes at most `sharp_s`."""
         if self.first_n != self.first_n:
             self.first_n = force_n
         if force_n < FREE_SHARE * self._contact_n:
-            self._free_gap_m, self._free_t_s = frame.gap_m, frame.t_s
-        if not self.felt and force_n >= self._contact_n:
+            self._free_gap_m, self._free_t_s, self._free_n = frame.gap_m, frame.t_s, force_n
+            self.sharp = False
+        elif not self.sharp and force_n - self._free_n >= (1.0 - FREE_SHARE) * self._contact_n:
             travel_m, elapsed_s = self._free_gap_m - frame.gap_m, frame.t_s - self._free_t_s
             self.sharp = travel_m <= SHARP_M and elapsed_s <= sharp_s
         self.force_n = force_n
@@ -107,11 +109,18 @@ class Touch:
     """Watches both pads against the motion of the fingers, from the approach to the hold.
 
     `usual_effort_n` limits a contact that is not clear where the approach has shown no effort. `pads_hz` is the rate of
-    the forces of the pads, 0 if it is not known.
+    the forces of the pads, 0 if it is not known. `on_some_cells` returns whether both forces rose on some cells only.
     """
 
-    def __init__(self, contact_force_n: float, usual_effort_n: float = inf, pads_hz: float = 0.0) -> None:
+    def __init__(
+        self,
+        contact_force_n: float,
+        usual_effort_n: float = inf,
+        pads_hz: float = 0.0,
+        on_some_cells: Callable[[], bool] = lambda: False,
+    ) -> None:
         self._contact_n, self._usual_n = contact_force_n, usual_effort_n
+        self._on_some_cells = on_some_cells
         self._absent_s = max(ABSENT_S, 3.0 / pads_hz) if pads_hz > 0.0 else ABSENT_S
         self._images_s = CLAIM_PERIODS / pads_hz if pads_hz > 0.0 else 0.0
         self._left, self._right = Pad(contact_force_n), Pad(contact_force_n)
@@ -142,9 +151,7 @@ class Touch:
         self._gap_m = frame.gap_m
         self._speed_m_s.add(-velocity_m_s, frame.dt_s)
         self._approached(frame, asked)
-        return (
-            self._absent(frame) or self._alone(frame) or self._free_air(frame) or self._stalled(frame, asked)
-        )
+        return self._alone(frame) or self._free_air(frame) or self._stalled(frame, asked)
 
     def closing_limit_n(self) -> float:
         """Return the greatest closing effort (N) in this tick: that of the approach while a contact is not clear."""
@@ -159,6 +166,18 @@ class Touch:
     def free(self) -> bool:
         """Whether neither pad feels anything."""
         return not (self._left.felt or self._right.felt)
+
+    def absent(self, frame: Frame) -> list[Fault]:
+        """Take the frame of a tick that was seen while the fingers close or hold; return the pads without a force."""
+        faults = []
+        for side, pad in (("left", self._left), ("right", self._right)):
+            absent = pad.force_n != pad.force_n
+            pad.absent_s = pad.absent_s + frame.dt_s if absent else 0.0
+            pad.all_absent_s += frame.dt_s * absent
+            if pad.all_absent_s > self._absent_s:
+                why = "it gives no force: check the fingertip and its cable"
+                faults.append(Fault(f"{side} pad absent", why, ends=pad.absent_s > self._absent_s))
+        return faults
 
     def _approached(self, frame: Frame, asked: Command) -> None:
         """Learn the speed and the effort of the approach, while the fingers move and neither pad feels."""
@@ -182,16 +201,6 @@ class Touch:
         if not speed_m_s > 0.0:
             speed_m_s = USUAL_M_S
         return min(max(travel_m / speed_m_s, LEAST_S), most_s)
-
-    def _absent(self, frame: Frame) -> Fault | None:
-        for side, pad in (("left", self._left), ("right", self._right)):
-            absent = pad.force_n != pad.force_n
-            pad.absent_s = pad.absent_s + frame.dt_s if absent else 0.0
-            pad.all_absent_s += frame.dt_s * absent
-            if pad.all_absent_s > self._absent_s:
-                why = "it gives no force: check the fingertip and its cable"
-                return Fault(f"{side} pad absent", why, ends=pad.absent_s > self._absent_s)
-        return None
 
     def _alone(self, frame: Frame) -> Fault | None:
         left, right = self._left, self._right
@@ -230,14 +239,15 @@ class Touch:
         return elapsed_s >= max(self._allowed_s(STALL_M / STALL_SHARE), 2.0 * LEAST_S)
 
     def _free_air(self, frame: Frame) -> Fault | None:
-        """A contact that both pads claim has a witness: the force rose in a short travel, the fingers slow down, or the
-        force goes on rising.
+        """A contact that both pads claim has a witness: the force rose in a short travel or on some cells only, the
+        fingers slow down, or the force goes on rising.
         """
         if self._witnessed or not (self._left.felt and self._right.felt):
             self._claimed_t_s = nan
             return None
         if self._claimed_t_s != self._claimed_t_s:
             self._claimed_t_s, self._claimed_gap_m = frame.t_s, frame.gap_m
+            self._witnessed = self._on_some_cells()
         mean_m_s = self._approach_m_s.value
         sharp = self._left.sharp or self._right.sharp
         slowed = self._speed_m_s.value < SLOWED_SHARE * mean_m_s
@@ -246,8 +256,8 @@ class Touch:
             pad.force_n >= max(pad.first_n, self._contact_n) + self._contact_n
             for pad in (self._left, self._right)
         )
-        if sharp or slowed or risen:
-            self._witnessed = True
+        self._witnessed = self._witnessed or sharp or slowed or risen
+        if self._witnessed:
             self._claimed_t_s = nan
             return None
         elapsed_s, travel_m = frame.t_s - self._claimed_t_s, self._claimed_gap_m - frame.gap_m
