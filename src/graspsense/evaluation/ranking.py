@@ -87,7 +87,7 @@ class Ranking:
         if self.chosen is not None:
             chosen = self.chosen
             text += (
-                f" As the best of {chosen.candidates} it was lucky too: of new trials expect {chosen.words}."
+                f" The best of {chosen.candidates} owes something to luck: expect {chosen.words} of new trials."
             )
         interval = best.rates[self.protocol].interval
         if interval is None or interval[0] <= self.guessing:
