@@ -67,7 +67,9 @@ def test_words_of_contributions_are_points_or_factors_of_the_odds():
     width = FeatureValue("p_first", 0.0661, "m")
     value = FeatureValue("f_steady", None, "N")
 
-    shares = contribution_reasons([((width,), 0.25), ((value,), -1e-9)], 0.3, scale="probability", label="can")
+    shares = contribution_reasons(
+        [((width,), 0.25), ((value,), -1e-9)], 0.3, scale="probability", label="can"
+    )
     odds = contribution_reasons(
         [((width,), -math.log(4.0)), ((width, value), math.log(10.0))],
         0.0,
