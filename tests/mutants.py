@@ -882,6 +882,11 @@ class Sluggish(Hand):
         return reading
 
 
+@giving("rate-is-as-declared", "stands still")
+def _(reading):
+    return reading._replace(frame=reading.frame._replace(t_s=0.0))
+
+
 @mutant("sensor-backend", "pads-can-be-zeroed", "subtract the zero")
 class Unzeroed(Hand):
     def tare(self, images):
@@ -914,6 +919,18 @@ class Forceful(Hand):
 
     def apply(self, command):
         super().apply(command._replace(value=19.0) if command.value > 0.0 else command)
+
+
+@mutant("sensor-backend", "squeezes-with-what-it-is-asked", "`least_force_n`")
+class Restless(Hand):
+    """Closes with ever more effort once it is to close, so that it never comes to rest."""
+
+    _effort_n = 0.0
+
+    def apply(self, command):
+        if command.value > 0.0:
+            self._effort_n += 0.02
+        super().apply(command._replace(value=max(command.value, self._effort_n)))
 
 
 @mutant("sensor-backend", "what-it-delivers-is-kept", "of its")

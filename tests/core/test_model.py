@@ -237,7 +237,8 @@ def test_a_model_of_other_features_is_refused_before_the_grasp_with_what_to_do()
     [
         (lambda data: data.replace(b"0.25", b"0.26", 1), "its sha256 does not match"),
         (lambda data: data[:400], "is not JSON"),
-        *((lambda data, new=new: new, "is not JSON") for new in (b"", b"\x80\x04\x95pickle")),
+        (lambda data: b"", "is empty"),
+        (lambda data: b"\x80\x04\x95pickle", "is not JSON"),
         *((lambda data, new=new: new, "is not a model") for new in (b"[]", b"{}", b'{"format": "other"}')),
     ],
 )

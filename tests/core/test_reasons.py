@@ -67,7 +67,9 @@ def test_words_of_contributions_are_points_or_factors_of_the_odds():
     width = FeatureValue("p_first", 0.0661, "m")
     value = FeatureValue("f_steady", None, "N")
 
-    shares = contribution_reasons([((width,), 0.25)], 0.3, scale="probability", label="can")
+    shares = contribution_reasons(
+        [((width,), 0.25), ((value,), -1e-9)], 0.3, scale="probability", label="can"
+    )
     odds = contribution_reasons(
         [((width,), -math.log(4.0)), ((width, value), math.log(10.0))],
         0.0,
@@ -78,6 +80,7 @@ def test_words_of_contributions_are_points_or_factors_of_the_odds():
 
     assert [share.words for share in shares] == [
         "p_first = 66.1 mm: +25.0 points",
+        "f_steady is missing: +0.0 points",
         "before any feature: 30.0 % for can",
     ]
     assert [odd.words for odd in odds] == [

@@ -142,6 +142,12 @@ def test_installed_grippers_that_would_fit_are_listed(misfit):
     assert "lab/bare" not in last
 
 
+def test_a_pipeline_for_the_gripper_is_named():
+    with pytest.raises(WiringError, match="pipeline=robotiq") as refused:
+        load_pipeline("default", options=["gripper.type=robotiq"])
+    assert "pipeline=franka" not in str(refused.value)
+
+
 def test_every_misfit_is_told_at_once(misfit):
     said = misfit("bare", "hybrid", "chitta")
 

@@ -368,7 +368,7 @@ def test_a_fit_that_refuses_few_trials_costs_its_figure_only():
     assert evaluation.headline.rate > 0.95
     assert [point.trained_on >= 60 for point in evaluation.learning_curve] == [True, True]
     assert any(
-        "no point at 10% of the trials" in note and "60 trials are needed" in note
+        "no point at 10 % of the trials" in note and "60 trials are needed" in note
         for note in evaluation.notes
     )
     with pytest.raises(ConfigError, match=r" 90 .* 4 .*1000 trials are needed"):

@@ -63,7 +63,7 @@ def test_the_unit_of_a_ratio_is_not_printed():
 def test_path_tells_close_numbers_apart_and_says_what_is_missing():
     assert explain(grasp_tree(), [0.5421, 0.0]).steps[0] == "delta_t 0.5421 s > 0.542 s"
     missing = explain(grasp_tree(), [math.nan, 2.0])
-    assert missing.steps[0] == "delta_t missing (delta_t > 0.542 s in 57% of training)"
+    assert missing.steps[0] == "delta_t missing (delta_t > 0.542 s in 57 % of training)"
     assert missing.probability == pytest.approx(16 / 28)
 
 

@@ -85,7 +85,7 @@ class HoldRows:
 
     def _row(self, t_s: float, what: str) -> None:
         self._t_s, self._shown = t_s, what
-        force = " no pads" if self._force_n != self._force_n else f"{self._force_n:6.2f} N"
+        force = " no pads" if self._force_n != self._force_n else f"{self._force_n:z6.2f} N"
         talk(f"{t_s:8.3f} s  {force}  {what}")
 
     def summary(self) -> str:

@@ -434,7 +434,7 @@ def _echo_summary(summary: ImportSummary) -> None:
     force = summary.units.get("force_left", "N")
     time = "Hz" if summary.units.get("t", "s") == "s" else f"per {summary.units['t']}"
     header = (
-        "Label", "Grasps", "Objects", "Samples", f"Rate, {time}", f"Gap, {gap}", f"Left, {force}", f"Right, {force}",
+        "LABEL", "GRASPS", "OBJECTS", "SAMPLES", f"RATE, {time}", f"GAP, {gap}", f"LEFT, {force}", f"RIGHT, {force}",
     )  # fmt: skip
     rows = [
         (

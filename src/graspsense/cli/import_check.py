@@ -70,15 +70,15 @@ def suggest_manifest(sources: Sequence[str], name: str) -> None:
 def echo_channels(channels: Sequence[ChannelFacts]) -> None:
     """Print a table of channels."""
     header = (
-        "Channel",
-        "Unit",
-        "Samples",
-        "Missing",
-        "Range",
-        "Resolution",
-        "Rate, Hz",
-        "Longest gap, s",
-        "Age, s",
+        "CHANNEL",
+        "UNIT",
+        "SAMPLES",
+        "MISSING",
+        "RANGE",
+        "RESOLUTION",
+        "RATE, Hz",
+        "LONGEST GAP, s",
+        "AGE, s",
     )
     rows = []
     for channel in channels:

@@ -67,7 +67,7 @@ def _millimetres(gap_m: float) -> str:
 
 
 def _newtons(force_n: float) -> str:
-    return f"{force_n:7.2f} N" if force_n == force_n else f"{'-':>7}  "
+    return f"{force_n:z7.2f} N" if force_n == force_n else f"{'-':>7}  "
 
 
 def _phase_name(phase: int) -> str:

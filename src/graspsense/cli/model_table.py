@@ -28,7 +28,7 @@ def print_model(model: Mapping[str, Any]) -> None:
             row["term"],
             f"{row['peak_n']:.3f} N",
             f"{row['at_peak_n']:.3f} N",
-            f"{row['share']:.1%}",
+            f"{100 * row['share']:.1f} %",
             f"{row['work_j'] * 1e3:.2f} mJ",
             f"{row['lost_j'] * 1e3:.2f} mJ",
             _times(row["rates"]),
@@ -69,7 +69,7 @@ def _loss(row: Mapping[str, Any], accuracy: float) -> str:
 
 def _change(name: str, effect: Mapping[str, Any]) -> str:
     if effect["change"] is not None:
-        return f"{name} {effect['change']:+.1%}"
+        return f"{name} {100 * effect['change']:+.1f} %"
     return f"{name} is no longer defined" if effect["without"] is None else f"{name} becomes defined"
 
 

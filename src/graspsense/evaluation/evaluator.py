@@ -90,12 +90,12 @@ class Evaluator:
         for share in SHARES:
             pooled = headline.pooled
             if share < 1.0:
-                name = f"learning curve {share:.0%}"
+                name = f"learning curve {100 * share:.0f} %"
                 try:
                     pooled = self.pooled(name, self.trials.table, headline.folds, share)
                 except FitRefused as refusal:
                     self.notes.append(
-                        f"the learning curve has no point at {share:.0%} of the trials: {refusal}"
+                        f"the learning curve has no point at {100 * share:.0f} % of the trials: {refusal}"
                     )
                     continue
             # At least one trial per label is used, so small shares of few trials may be the same trials.

@@ -86,9 +86,7 @@ class Ranking:
         text = f"{best.name} has the highest rate, {rate:.1f} %."
         if self.chosen is not None:
             chosen = self.chosen
-            text += (
-                f" As the best of {chosen.candidates} it was lucky too: of new trials expect {chosen.words}."
-            )
+            text += f" The best of {chosen.candidates} owes something to luck: expect {chosen.words} of new trials."
         interval = best.rates[self.protocol].interval
         if interval is None or interval[0] <= self.guessing:
             guessing = f"always giving the most frequent label ({100 * self.guessing:.1f} %)"

@@ -126,8 +126,7 @@ def _ends_of_sweep(
 def _points(change: MeanDifference) -> str:
     value, (low, high) = change.value, change.interval
     chance = "" if low > 0 or high < 0 else ", which may be chance"
-    text = f"{100 * value:+.1f} percentage points (95 %: {100 * low:+.1f} to {100 * high:+.1f}){chance}"
-    return text.replace("-", "−")
+    return f"{100 * value:+.1f} points (95 %: {100 * low:+.1f} to {100 * high:+.1f}){chance}"
 
 
 def _capitalised(name: str) -> str:

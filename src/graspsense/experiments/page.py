@@ -285,7 +285,8 @@ def _made_of(summary: Summary, results: Results) -> Section:
         ("code", f"graspsense {made.get('graspsense', '?')}, commit {commit_text(made)}"),
         *(
             (f"hash of {name}", value)
-            for name, value in (made.get("inputs") or made.get("files") or {}).items()
+            for name, value in (made.get("inputs") or {}).items()
+            if name != "graspsense"  # its version
         ),
     ]
     versions = sorted((str(k), str(v)) for k, v in (made.get("versions") or {}).items())

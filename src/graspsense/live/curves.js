@@ -97,7 +97,7 @@ function draw(canvas, curves, from, to, marks, style) {
   pen.textAlign = "center";
   for (let t = Math.ceil(from / run) * run; t <= to; t += run) {
     line(pen, x(t), 6, x(t), 6 + height);
-    pen.fillText(t.toFixed(Math.min(digits, 4)), Math.min(x(t), wide - 14), high - 4);
+    pen.fillText(`${t.toFixed(Math.min(digits, 4))} s`, Math.min(x(t), wide - 18), high - 4);
   }
   pen.textAlign = "left";
   pen.strokeStyle = style.mark;

@@ -58,6 +58,7 @@ def confusion_table(confusion: Confusion, caption: str) -> str:
     head = "".join(f'<th scope="col"><span>{escape(label)}</span></th>' for label in confusion.labels)
     body = []
     for i, (label, row) in enumerate(zip(confusion.labels, confusion.counts, strict=True)):
+        breakable = escape(label).replace(":", ":<wbr>").replace("_", "_<wbr>")
         total = sum(row) or 1
         cells = []
         for j, count in enumerate(row):
@@ -66,7 +67,7 @@ def confusion_table(confusion: Confusion, caption: str) -> str:
             kind = f' class="{" ".join(kinds)}"' if kinds else ""
             cells.append(f"<td{kind}>{count if count else '·'}</td>")
         body.append(
-            f'<tr><th scope="row">{escape(label)}</th>{"".join(cells)}'
+            f'<tr><th scope="row">{breakable}</th>{"".join(cells)}'
             f'<td class="n">{100 * row[i] / total:.0f} %</td></tr>'
         )
     return wide(

@@ -116,7 +116,8 @@ def rates_over(
     `guess` is the rate of guessing.
     """
     legends = [lines_within(name, WIDTH - 80) for name in series]
-    picture = Picture(262 + LEGEND * len(series) + LINE * sum(len(lines) - 1 for lines in legends))
+    below = 262.0 + LINE * (len(lines_within(axis, WIDTH)) - 1)
+    picture = Picture(below + LEGEND * len(series) + LINE * sum(len(lines) - 1 for lines in legends))
     xs = [x for points in series.values() for x, _ in points]
     x_scale = reaching(xs, 44, picture.width - 14)
     y_scale = rate_scale([row for points in series.values() for _, row in points], 215, 24)
@@ -130,7 +131,7 @@ def rates_over(
     elif guess is not None:
         where = "below" if 100 * guess < y_scale.low else "above"
         caption += f" Always guessing the most frequent label, {100 * guess:.0f} %, is {where} the axis."
-    told, y = [], 262.0
+    told, y = [], below
     for k, (name, points) in enumerate(series.items()):
         ink, dash = INKS[k % len(INKS)], DASHES[k % len(DASHES)]
         drawn = sorted(points, key=lambda point: point[0])

@@ -177,15 +177,17 @@ class Picture:
         )
 
     def x_axis(self, scale: AxisScale, top: float, bottom: float, title: str) -> None:
-        """Draw the ticks of a horizontal axis, with lines up to `top`, and its title below."""
+        """Draw the ticks of a horizontal axis, with lines up to `top`, and its title below, which may need lines."""
         self.parts.append(f'<g class="axis x" data-scale="{_range(scale)}" data-span="{top:g} {bottom:g}">')
         for value in scale.ticks():
             x = scale(value)
             self.line([(x, top), (x, bottom)], GRID, width=1)
             self.text(x, bottom + 13, number(value), anchor="middle", ink=QUIET)
         self.parts.append("</g>")
-        if title:
-            self.text((scale.start + scale.end) / 2, bottom + 28, title, anchor="middle", ink=QUIET)
+        lines = lines_within(title, self.width)
+        middle = (scale.start + scale.end if len(lines) == 1 else self.width) / 2
+        for k, words in enumerate(lines):
+            self.text(middle, bottom + 28 + LINE * k, words, anchor="middle", ink=QUIET)
 
     def y_axis(self, scale: AxisScale, left: float, right: float, title: str) -> None:
         """Draw the ticks of a vertical axis, and its title above."""

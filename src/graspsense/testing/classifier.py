@@ -95,7 +95,8 @@ def separates_separable_trials(subject: Subject) -> None:
     right = sum(a == b for a, b in zip(said, labels, strict=True)) / len(labels)
     demand(
         right >= LEAST_RIGHT,
-        f"{right:.0%} of the training trials are predicted correctly: is the order of `classes` that of the columns?",
+        f"{100 * right:.0f} % of the training trials are predicted correctly: is the order of `classes` that "
+        "of the columns?",
     )
 
 

@@ -283,6 +283,7 @@ def rate_is_as_declared(subject: Subject) -> None:
     info, frames = subject.session.info, subject.session.frames
     passed = [now.t_s - earlier.t_s for earlier, now in pairwise(frames)]
     demand(bool(passed), "only one frame came")
+    demand(median(passed) > 0.0, "t_s stands still: give each frame the time at which it was measured")
     rate = 1.0 / median(passed)
     if info.units.get("t", "s") == "s":
         demand(

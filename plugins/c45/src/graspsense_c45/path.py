@@ -81,7 +81,7 @@ def explain(tree: Tree, row: Sequence[float]) -> Path:
             slot = int(np.argmax(tree.weighted_n_node_samples[tree.children(node)]))
             share = _share(tree, node, slot)
             steps.append(
-                f"{tree.attribute(node).name} missing ({branch(tree, node, slot)} in {share:.0%} of training)"
+                f"{tree.attribute(node).name} missing ({branch(tree, node, slot)} in {100 * share:.0f} % of training)"
             )
         else:
             steps.append(_step(tree, node, slot, float(tested)))

@@ -68,8 +68,8 @@ def with_fingertips_of_block(
         "the delay of the settings" if lag_s == 0.0 else "which these squeezes show, and the settings do not"
     )
     said = (
-        f"the fingertips follow from {squeezes} of the block: {stiffness}; residual {fitted.rms:.2%} of the peak; "
-        f"their force is late by {1e3 * (config.force_delay_s + lag_s):.3g} ms, {source}"
+        f"the fingertips follow from {squeezes} of the block: {stiffness}; residual {100 * fitted.rms:.2f} % of the "
+        f"peak; their force is late by {1e3 * (config.force_delay_s + lag_s):.3g} ms, {source}"
     )
     changed = evolve(
         config, pad_stiffness_n_m=k, pad_hardening_m=hardening_m, pad_exponent=EXPONENT, pad_creep_n_m=0.0

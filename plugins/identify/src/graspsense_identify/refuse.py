@@ -108,9 +108,9 @@ def _falls(fitted: Fitted) -> Iterator[Undetermined]:
         total = len(fitted.squeezes)
         yield Undetermined(
             what="a fall of the force",
-            reason=f"the force falls by more than {FALL_SHARE:.0%} of the peak in {len(forces)} of {total} "
+            reason=f"the force falls by more than {100 * FALL_SHARE:.0f} % of the peak in {len(forces)} of {total} "
             f"squeezes (at {min(forces):.3g} to {max(forces):.3g} N) while the fingers close. It is neither a break (a "
-            f"fall by {BREAK_SHARE:.0%} at once) nor described by a snap",
+            f"fall by {100 * BREAK_SHARE:.0f} % at once) nor described by a snap",
             remedy='cut the recordings there (cut = "rupture" in a manifest), or squeeze more slowly, so that the '
             "fall has several measurements",
         )

@@ -173,9 +173,9 @@ def _ready(
     apart = max(squeeze.pad_difference for squeeze in ready.values())
     if apart > PADS_DIFFER:
         notes.append(
-            f"the forces on the two pads differ by up to {apart:.0%} of the largest force. If the object is fixed off "
-            "the centre, one finger touches it before the other, and the chosen terms are wrong: centre it, or let it "
-            "stand free"
+            f"the forces on the two pads differ by up to {100 * apart:.0f} % of the largest force. If the object is "
+            "fixed off the centre, one finger touches it before the other, and the chosen terms are wrong: centre it, "
+            "or let it stand free"
         )
     shares = WHOLE
     if has_cells:

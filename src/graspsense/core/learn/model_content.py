@@ -54,7 +54,8 @@ def parsed(name: str, text: bytes) -> Any:
     except RecursionError:
         raise DataDamaged(f"model {name!r} is damaged: lists or tables in it are nested too deeply") from None
     except ValueError as error:
-        raise DataDamaged(f"model {name!r} is not JSON: {error}") from error
+        why = f"is not JSON: {error}" if text.strip() else "is empty"
+        raise DataDamaged(f"model {name!r} {why}") from error
     return values
 
 

@@ -7,11 +7,12 @@ from typing import Any
 
 from attrs import asdict, frozen
 
-from graspsense.core.components.caller import set_option
+from graspsense.core.components.caller import option, set_option
 from graspsense.core.components.channels import declared_dtype, declared_shape
-from graspsense.core.components.entries import Role
+from graspsense.core.components.entries import PipelineEntry, Role
 from graspsense.core.components.registry import Component, installed
 from graspsense.core.components.roles import FeatureSet
+from graspsense.core.settings.layers import read_toml
 from graspsense.core.settings.resolved import Settings
 from graspsense.core.settings.selected import SelectedComponent, select_component
 from graspsense.core.values.channel import FLOATS, Channel, FastChannel, TactileArray
@@ -30,9 +31,8 @@ def check(settings: Settings) -> None:
         head = (
             "the components do not fit together" if len(misfits) > 1 else "two components do not fit together"
         )
-        raise WiringError(
-            "\n".join([f"{head}:", *(f"  {misfit}" for misfit in misfits), f"  {_fitting(settings)}"])
-        )
+        advice = [*_pipelines_of(settings.gripper.component), _fitting(settings)]
+        raise WiringError("\n  ".join([f"{head}:", *misfits, *advice]))
     if too_small := [*_too_small(settings)]:
         raise WiringError("\n  ".join(["the gripper cannot do as little as is asked:", *too_small]))
 
@@ -89,6 +89,17 @@ def _too_small(settings: Settings) -> Iterator[str]:
                 f"run.{key} is {limit:g} {unit}, and {cannot} cannot keep that limit: its least {what} is {can:g} "
                 f"{unit}. If that is not too much for the object: {set_option(f'run.{key}={can:g}')}"
             )
+
+
+def _pipelines_of(gripper: Component) -> Iterator[str]:
+    """Yield how to choose an installed pipeline that is for this gripper."""
+    for pipeline in installed().resources(PipelineEntry):
+        try:
+            values = read_toml(pipeline.file(), pipeline.qualified, "pipeline").values
+        except GraspsenseError:
+            continue  # it is told where it is asked for
+        if values.get("gripper", {}).get("type") in (gripper.name, gripper.qualified):
+            yield f"A pipeline for this gripper is installed: {option('pipeline', pipeline.name)}"
 
 
 def _fitting(settings: Settings) -> str:

@@ -6,6 +6,7 @@ Each class has the exit code of the command line. A grasp that fails is not an e
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from enum import IntEnum
@@ -40,6 +41,7 @@ MOST_NAMED: Final = 24
 _LONGEST_NAME: Final = 100
 _MOST_COMPARED: Final = 1000
 _FRAMEWORK: Final = Path(__file__).parents[2]
+_STANDARD_LIBRARY: Final = Path(os.__file__).parent
 
 
 class GraspsenseError(Exception):
@@ -122,11 +124,16 @@ def place_of(error: BaseException) -> str:
     trace, folder, place = error.__traceback__, None, ""
     while trace is not None:
         path = Path(trace.tb_frame.f_code.co_filename)
-        ours = path.is_relative_to(_FRAMEWORK) and not path.is_relative_to(_FRAMEWORK / "plugins")
-        if path.is_file() and not ours and (folder is None or path.is_relative_to(folder)):
+        if path.is_file() and _is_of_a_plugin(path) and (folder is None or path.is_relative_to(folder)):
             folder, place = path.parent, f" in {path.parent.name}/{path.name}:{trace.tb_lineno}"
         trace = trace.tb_next
     return place
+
+
+def _is_of_a_plugin(path: Path) -> bool:
+    if path.is_relative_to(_FRAMEWORK):
+        return path.is_relative_to(_FRAMEWORK / "plugins")
+    return not path.is_relative_to(_STANDARD_LIBRARY) or "site-packages" in path.parts
 
 
 def suggestion(word: str, allowed: Iterable[str]) -> str:

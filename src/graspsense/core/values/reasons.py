@@ -56,7 +56,7 @@ class Contribution:
     def words(self) -> str:
         """The contribution in percentage points, or as a factor of the odds."""
         if self.scale == "probability":
-            return f"{100 * self.value:+.1f} points"
+            return f"{100 * self.value:+z.1f} points"
         factor = math.exp(min(abs(self.value), 700.0))
         return f"odds of {self.label} to {self.against} {'×' if self.value >= 0 else '÷'} {factor:.3g}"
 

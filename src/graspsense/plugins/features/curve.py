@@ -343,7 +343,7 @@ class CurveFeatures(FeatureSet[CurveConfig]):
         measured.values["creep"] = curve.compression(curve.end_s) - curve.compression(loading.end_s)
         if lost < RELAXED * loading.peak_n:
             measured.reasons["relaxation_time"] = (
-                f"the force lost less than {RELAXED:.0%} of its largest value"
+                f"the force lost less than {100 * RELAXED:.0f} % of its largest value"
             )
             return
         top = int(loading.force.argmax())

@@ -416,7 +416,7 @@ def _check_plausible(columns: GraspColumns, quantity: str, unit_of: str, *values
     if beyond <= GLITCHES:
         raise DataDamaged(
             f"{columns.source}, {columns.place(worst % len(columns))}: the {quantity} is {extreme:g} {unit} there, "
-            f"which no gripper has, and plausible in {1.0 - beyond:.1%} of the samples: leave out what is no "
+            f"which no gripper has, and plausible in {100 * (1.0 - beyond):.1f} % of the samples: leave out what is no "
             "measurement"
         )
     advice = [

@@ -220,8 +220,8 @@ def _unequal(left: Numbers, right: Numbers, units: Mapping[str, str]) -> Iterato
     )
     if most - least > UNEQUAL or (abs(usual - 0.5) > UNEQUAL and "force_left" not in units):
         yield (
-            f"the right pad bears {least:.0%} to {most:.0%} of the force of both under load, and half is due: were the "
-            "pads exchanged, does one read wrong, or did the object lie on one of them only in part?"
+            f"the right pad bears {100 * least:.0f} % to {100 * most:.0f} % of the force of both under load, and half "
+            "is due: were the pads exchanged, does one read wrong, or did the object lie on one of them only in part?"
         )
 
 

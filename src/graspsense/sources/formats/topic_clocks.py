@@ -373,4 +373,4 @@ def _trimmed(lasting: Mapping[str, TopicTimes], begin_ns: int, end_ns: int) -> I
     parts = [f"{late} begins after the other topics"] if begin_ns - begin > much else []
     parts += [f"{early} ends before the other topics"] if last - end_ns > much else []
     if parts:
-        yield f"more than {NOTICED:.0%} of the recording is left out, because {' and '.join(parts)}"
+        yield f"more than {100 * NOTICED:.0f} % of the recording is left out, because {' and '.join(parts)}"

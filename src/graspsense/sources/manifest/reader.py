@@ -160,7 +160,9 @@ def _by_time(table: ColumnTable, other: ColumnTable, time: str) -> tuple[ColumnT
     ]
     lost = 1.0 - len(rows) / len(most)
     if lost > NOTICED:
-        told.append(f"{lost:.0%} of the rows are left out: {other.source} begins later or ends earlier")
+        told.append(
+            f"{100 * lost:.0f} % of the rows are left out: {other.source} begins later or ends earlier"
+        )
     joined = table.rows(last[0])
     return (
         evolve(

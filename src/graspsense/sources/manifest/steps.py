@@ -90,8 +90,8 @@ def squeezes(columns: GraspColumns) -> list[GraspColumns]:
         unit = columns.units.get("force") or "N"
         note = (
             f"{counted(len(weak), 'rise')} of the force by at most {strongest:.2g} {unit} (the first at "
-            f"{columns.t_s[weak[0][0]]:.4g} s) is taken for no squeeze: less than {WEAKEST:.0%} of the usual force. "
-            "If fingers closed then, split by a column"
+            f"{columns.t_s[weak[0][0]]:.4g} s) is taken for no squeeze: less than {100 * WEAKEST:.0f} % of the usual "
+            "force. If fingers closed then, split by a column"
         )
         parts[0] = evolve(parts[0], warnings=(*parts[0].warnings, note))
     return parts

@@ -393,7 +393,7 @@ def _pads_apart(numbers: dict[str, Numbers]) -> Iterator[str]:
         if trials >= _OFTEN and others >= LEAST_LINES and int(alike.sum()) > (1.0 - _FEW) * others:
             yield (
                 f"{name} and {other} are alike in {others} trials, and in {trials} one of them is less than "
-                f"{_APART:.0%} of the other, or has another sign: did a fingertip fail there?"
+                f"{100 * _APART:.0f} % of the other, or has another sign: did a fingertip fail there?"
             )
 
 

@@ -389,7 +389,7 @@ def _note_uninformative_columns(path: Path, table: FeatureTable, notes: list[str
         )
     share = float(np.isnan(table.values).mean())
     if share > 0.0:
-        notes.append(f"{share:.1%} of all values are missing")
+        notes.append(f"{100 * share:.1f} % of all values are missing")
     if len(blank) == len(table.names):
         raise DataDamaged(f"{path}: no feature has any value: {listed(blank)}")
 

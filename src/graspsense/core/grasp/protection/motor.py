@@ -166,8 +166,8 @@ class Motor:
             return None
         return Fault(
             "motor off",
-            f"it answers {answered_n:.1f} N in the hold to a command of {asked_n:.1f} N, and {OFF_SHARE:.0%} are "
-            "allowed: forces at rest are off by as much; check its supply and its scale",
+            f"it answers {answered_n:.1f} N in the hold to a command of {asked_n:.1f} N, and {100 * OFF_SHARE:.0f} % "
+            "are allowed: forces at rest are off by as much; check its supply and its scale",
         )
 
     def _answer(self, frame: Frame, least: float, most: float) -> Fault | None:
