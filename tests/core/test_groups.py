@@ -6,12 +6,14 @@ import numpy as np
 from attrs import evolve
 from cases import every_case
 from test_conformal import model_of
-from test_evaluate import labelled
+from test_evaluate import labelled, learner
 
 from graspsense.core.components.registry import installed
 from graspsense.core.learn.copies import without_copies
 from graspsense.core.learn.groups import grouped
 from graspsense.core.learn.model_file import load_model, write_model
+from graspsense.evaluation.evaluate import evaluate
+from graspsense.report.verdict import verdict
 
 MEANS = 1.3 * np.random.default_rng(5).normal(size=(3, 4))
 
@@ -142,3 +144,12 @@ def test_a_certainty_says_that_it_is_of_the_same_objects_unless_others_were_held
         for words in filter(None, (certain.certainty_in_words, certain.set_in_words)):
             assert ("for the same objects" in words) == of_same
         assert any("drifted" in warning for warning in certain.warnings) == of_same
+
+
+def test_a_rate_with_groups_held_out_is_not_said_to_be_that_of_new_objects():
+    numbers, values, _ = pasted(np.random.default_rng(0))
+    evaluation = evaluate(learner("c45"), without_copies(table_of(numbers, values)), permutations=1)
+    assert evaluation.protocol == "group_held_out"
+    assert evaluation.sets.unit == "groups"
+    assert evaluation.headline.correct < evaluation.protocols["stratified_10_fold"].rate.correct
+    assert "other grasps may have been used" in verdict(evaluation)

@@ -12,7 +12,7 @@ from graspsense.core.learn.model import Model, checkpoint_model
 from graspsense.core.learn.training import train
 from graspsense.evaluation.crossval import columns_of, cross_validate
 from graspsense.evaluation.doubt import HeldOut, calibrated, calibrated_by, exchangeable_instances
-from graspsense.evaluation.folds import INSTANCE_HELD_OUT, Folds, held_out
+from graspsense.evaluation.folds import Folds, held_out, held_out_protocol
 from graspsense.evaluation.intervals import RecognitionRate, rate_among
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ def early_recognition(
     if not reason:
         rows.append(_stopped(whole, parts, answers, folds))
     return EarlyRecognition(
-        protocol="stratified" if instances is None else INSTANCE_HELD_OUT,
+        protocol="stratified" if instances is None else held_out_protocol(whole),
         rows=tuple(rows),
         reason=reason,
     )

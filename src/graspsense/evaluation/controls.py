@@ -12,7 +12,7 @@ from graspsense.core.learn.labelled import ControlFeatures
 from graspsense.core.values.errors import counted
 from graspsense.evaluation.crossval import FitRefused, Groups, Pooled
 from graspsense.evaluation.evaluator import Evaluator, Headline
-from graspsense.evaluation.folds import INSTANCE_HELD_OUT, Folds, commonest, in_order, instance_held_out
+from graspsense.evaluation.folds import Folds, commonest, in_order, instance_held_out
 from graspsense.evaluation.intervals import RecognitionRate, percent, rate_among
 from graspsense.evaluation.results import Measurement
 
@@ -46,7 +46,7 @@ class ControlMeasurements:
             "width_only": self._other_features(
                 "width_only", trials.width, "the width alone", trials.no_width
             ),
-            INSTANCE_HELD_OUT: protocols[INSTANCE_HELD_OUT],
+            self.evaluator.held_out_name: protocols[self.evaluator.held_out_name],
             "recording_order": self._in_order(),
             "majority_class": majority,
             "shuffled_labels": self._shuffled(permutations),
@@ -194,12 +194,13 @@ class ControlMeasurements:
             )
 
     def _warn_of_leaks(self, controls: Mapping[str, Measurement]) -> None:
+        held_out = self.evaluator.held_out_name
         for name, why in (
-            (INSTANCE_HELD_OUT, "part of the stratified rate comes from having seen the same objects"),
+            (held_out, "part of the stratified rate comes from having seen the same objects"),
             ("recording_order", "part of the stratified rate comes from the time of recording"),
         ):
             by = controls[name].difference
-            if by is not None and by.is_positive and (name != INSTANCE_HELD_OUT or self._objects_differ()):
+            if by is not None and by.is_positive and (name != held_out or self._objects_differ()):
                 self.warnings.append(f"the rate of {name} is lower by {by.words}: {why}")
 
     def _objects_differ(self) -> bool:
@@ -223,7 +224,7 @@ class ControlMeasurements:
             pooled = evaluator.pooled("random groups", self.trials.table, folds)
         except FitRefused:
             return False
-        held = evaluator.pooled_by_protocol[INSTANCE_HELD_OUT]
+        held = evaluator.pooled_by_protocol[evaluator.held_out_name]
         return evaluator.difference(pooled.right(self.labels), held.right(self.labels)).is_positive
 
 

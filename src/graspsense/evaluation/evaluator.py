@@ -14,8 +14,9 @@ from graspsense.core.values.features import FeatureTable
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, Groups, Pooled, cross_validate
 from graspsense.evaluation.doubt import HeldOut
 from graspsense.evaluation.folds import (
-    INSTANCE_HELD_OUT,
     Folds,
+    held_out_protocol,
+    held_out_words,
     instance_held_out,
     stratified,
     trials_by_class,
@@ -62,6 +63,7 @@ class Evaluator:
         self.groups = trials_by_class(self.labels, target)
         self._featureless = np.isnan(trials.table.values).all(axis=1)
         self.stratified_name = f"stratified_{k}_fold"
+        self.held_out_name = held_out_protocol(trials)
         self.pooled_by_protocol: dict[str, Pooled] = {}
 
     def measure_protocols(self) -> tuple[Headline, dict[str, Measurement]]:
@@ -75,11 +77,11 @@ class Evaluator:
         headline = Headline(self.stratified_name, plain, folds, assign)
         held, measured = self._instance_held_out(plain)
         if held is not None:
-            self.pooled_by_protocol[INSTANCE_HELD_OUT] = held.pooled
+            self.pooled_by_protocol[self.held_out_name] = held.pooled
         self.pooled_by_protocol[self.stratified_name] = plain
         what = f"{self.k} folds, stratified by label; predictions of all folds pooled"
         protocols = {
-            INSTANCE_HELD_OUT: measured,
+            self.held_out_name: measured,
             self.stratified_name: Measurement(what, self.rate(plain)),
         }
         return held or headline, protocols
@@ -124,7 +126,7 @@ class Evaluator:
         return HeldOut(
             pooled=headline.pooled,
             labels=self.labels,
-            instances=self.trials.instances if headline.protocol == INSTANCE_HELD_OUT else None,
+            instances=self.trials.instances if headline.protocol == self.held_out_name else None,
             groups=self.groups,
             folds=headline.folds,
             grouped=self.trials.grouped,
@@ -196,7 +198,7 @@ class Evaluator:
         return Measurement(what, self.rate_among(right, rows), difference=by, difference_of=other_name)
 
     def _instance_held_out(self, plain: Pooled) -> tuple[Headline | None, Measurement]:
-        what = f"at most {self.k} folds of whole instances: no model was trained on the object that it is tested on"
+        what = held_out_words(self.trials, self.k)
         instances = self.trials.instances
         if instances is None:
             return None, Measurement(what, reason=self.trials.no_instances or "no instances are named")
@@ -218,8 +220,8 @@ class Evaluator:
 
         folds = assign(self.labels)
         try:
-            held = self.pooled(INSTANCE_HELD_OUT, self.trials.table, folds)
+            held = self.pooled(self.held_out_name, self.trials.table, folds)
         except FitRefused as refusal:
             return None, Measurement(what, reason=str(refusal))
-        headline = Headline(INSTANCE_HELD_OUT, held, folds, assign)
+        headline = Headline(self.held_out_name, held, folds, assign)
         return headline, self.against(what, held, plain, self.stratified_name)

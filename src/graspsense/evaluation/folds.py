@@ -10,13 +10,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graspsense.core.components.caller import option
-from graspsense.core.learn.labelled import Target, class_of
+from graspsense.core.learn.labelled import Labelled, Target, class_of
 from graspsense.core.values.errors import ConfigError, counted
 
 Folds = NDArray[np.int64]
 
 INSTANCE_HELD_OUT: Final = "instance_held_out"
 """The name of the protocol with folds of whole instances."""
+GROUP_HELD_OUT: Final = "group_held_out"
+"""The name of the protocol with folds of trials that belong together, of objects that are not named."""
+
+
+def held_out_protocol(trials: Labelled) -> str:
+    """Return the name of the protocol that holds out the instances of these trials."""
+    return GROUP_HELD_OUT if trials.grouped else INSTANCE_HELD_OUT
+
+
+def held_out_words(trials: Labelled, k: int) -> str:
+    """Return what `k` folds of the instances of these trials are."""
+    if trials.grouped:
+        return f"at most {k} folds of trials that belong together, by their values: the objects are not named"
+    return f"at most {k} folds of whole instances: no model was trained on the object that it is tested on"
 
 
 def stratified(labels: Sequence[str], k: int, seed: int) -> Folds:

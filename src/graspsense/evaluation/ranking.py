@@ -22,9 +22,9 @@ from graspsense.evaluation.chosen import ChosenRate, comparisons_of, rate_of_cho
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, cross_validate
 from graspsense.evaluation.doubt import HeldOut, SetCoverage, exchangeable_instances
 from graspsense.evaluation.folds import (
-    INSTANCE_HELD_OUT,
     Folds,
     commonest,
+    held_out_protocol,
     in_order,
     instance_held_out,
     stratified,
@@ -230,7 +230,7 @@ def protocols_of(trials: Labelled, k: int, seed: int) -> dict[str, Folds]:
     protocols: dict[str, Folds] = {}
     instances = exchangeable_instances(trials)
     if instances is not None:
-        protocols[INSTANCE_HELD_OUT] = instance_held_out(trials.labels, instances, k, seed)
+        protocols[held_out_protocol(trials)] = instance_held_out(trials.labels, instances, k, seed)
     protocols[f"stratified_{k}_fold"] = stratified(trials.labels, k, seed)
     if trials.order is not None:
         protocols["recording_order"] = in_order(trials.labels, trials.order, k)

@@ -170,10 +170,16 @@ def _cross_validated(
 
 
 def _protocol(evaluation: Evaluation, wanted: str) -> str:
-    """Return the full name of the protocol that the settings ask for."""
+    """Return the full name of the protocol that the settings ask for. Raises ConfigError if it was not measured."""
     if wanted == "headline":
         return evaluation.protocol
-    return next(name for name in evaluation.protocols if name.startswith(wanted))
+    for name in evaluation.protocols:
+        if name.startswith(wanted):
+            return name
+    raise ConfigError(
+        f"judge.protocol = {wanted!r} cannot be followed here: no instances are named, and trials were grouped by "
+        "their values"
+    )
 
 
 def _on_other_trials(

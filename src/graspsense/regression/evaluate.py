@@ -18,7 +18,14 @@ from graspsense.core.learn.labelled import ControlFeatures, Labelled
 from graspsense.core.values.errors import ConfigError, counted
 from graspsense.evaluation.controls import PERMUTATIONS
 from graspsense.evaluation.evaluator import Progress
-from graspsense.evaluation.folds import INSTANCE_HELD_OUT, Folds, in_order, instance_held_out, stratified
+from graspsense.evaluation.folds import (
+    Folds,
+    held_out_protocol,
+    held_out_words,
+    in_order,
+    instance_held_out,
+    stratified,
+)
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.evaluation.intervals import MIN_INSTANCES, Difference, rate_of
 from graspsense.regression.estimators import FittedRegression, check_estimator
@@ -160,14 +167,14 @@ class _Evaluator:
         """Measure the error under each protocol. The headline holds out whole instances if they are known."""
         alike = [""] * len(self.values)
         self.plain = self.headline = self._predicted(f"{self.k}_fold", stratified(alike, self.k, self.seed))
-        what = f"at most {self.k} folds of whole instances: no model was trained on the object that it is tested on"
+        what, name = held_out_words(self.trials, self.k), held_out_protocol(self.trials)
         if self.instances is None:
             reason = self.trials.no_instances or "no instances are named"
-            self.protocols[INSTANCE_HELD_OUT] = RegressionMeasurement(what=what, reason=reason)
+            self.protocols[name] = RegressionMeasurement(what=what, reason=reason)
         else:
             folds = instance_held_out(alike, self.instances, self.k, self.seed)
-            self.headline = self._predicted(INSTANCE_HELD_OUT, folds)
-            self.protocols[INSTANCE_HELD_OUT] = self._against(what, self.headline, self.plain)
+            self.headline = self._predicted(name, folds)
+            self.protocols[name] = self._against(what, self.headline, self.plain)
         self.protocols[self.plain.name] = RegressionMeasurement(
             what=f"{self.k} folds of shuffled trials", error=self.error(self.plain)
         )
@@ -191,7 +198,8 @@ class _Evaluator:
         )
         if trials.first_line is not None:
             self._other_features("first_line", trials.first_line, "", "")
-        self.controls[INSTANCE_HELD_OUT] = self.protocols[INSTANCE_HELD_OUT]
+        held_out_name = held_out_protocol(self.trials)
+        self.controls[held_out_name] = self.protocols[held_out_name]
         self._in_order()
         self._shuffled(permutations)
 
@@ -250,7 +258,10 @@ class _Evaluator:
                 "the error with the width alone is not shown to be larger: the squeeze may not add anything"
             )
         for name, why in (
-            (INSTANCE_HELD_OUT, "part of the accuracy within folds comes from having seen the same objects"),
+            (
+                held_out_protocol(self.trials),
+                "part of the accuracy within folds comes from having seen the same objects",
+            ),
             ("recording_order", "part of the accuracy within folds comes from the time of recording"),
         ):
             if _is_worse(self.controls[name]):

@@ -23,6 +23,10 @@ CONTROLS: Final[Mapping[str, tuple[str, str]]] = {
     ),
     "width_only": ("width alone", "what the first contact shows, without any squeeze"),
     "instance_held_out": ("new objects", "no grasp of the same object was used for training"),
+    "group_held_out": (
+        "trials that belong together",
+        "neither near copies nor neighbours that are alike were used for training, but perhaps the same objects",
+    ),
     "stratified_10_fold": (
         "ten stratified folds",
         "the same objects may occur in training and test, as in the paper",
@@ -63,6 +67,11 @@ def protocol_words(protocol: str) -> str:
     """Return how trials were split into training and test, as the end of a sentence."""
     if protocol == "instance_held_out":
         return "a classifier that was trained neither on it nor on any other grasp of the same object"
+    if protocol == "group_held_out":
+        return (
+            "a classifier that was trained neither on it nor on trials that belong to it by their values, but perhaps "
+            "on other grasps of the same object"
+        )
     if protocol.startswith("stratified"):
         folds = protocol.split("_")[1]
         return (
