@@ -403,8 +403,6 @@ def _json_table(path: Path, lines: Sequence[Line], ended: bool) -> TextTable:
             raise DataDamaged(f"{path}, line {number}: not a JSON object: {error}") from None
         names |= dict.fromkeys(row)
         rows.append(row)
-        if k == 0:
-            check_columns(path, list(names))
         if too_many := COLUMNS.exceeded(len(names)) or CELLS.exceeded(len(rows) * len(names)):
             raise DataDamaged(f"{path}: {too_many}")
     check_columns(path, list(names))

@@ -86,7 +86,7 @@ def read_labelled(
     elif isinstance(columns, ArffColumns) and value is None:
         notes += columns.without_label(label)
     target = None if value is None else _target(columns, value, export, notes)
-    labels = _labels(columns, label, notes) if target is None else _texts(columns, label)
+    labels = _labels(columns, label, notes, required=target is None)
     instances = None if instance is None else tuple(columns.complete_column(instance, "the instance"))
     reserved = {name for name in (label, instance, order, value) if name}
     ranks, no_order = _order(columns, order, export, notes)
@@ -177,11 +177,6 @@ def _target(columns: CsvColumns, value: str, export: ExportedTable | None, notes
     return TargetValue(name=value, unit=columns.units[name], values=tuple(columns.numbers(name)))
 
 
-def _texts(columns: CsvColumns, label: str | None) -> list[str]:
-    """Return the labels of trials whose target is a number: they may lack one."""
-    return [""] * len(columns) if label is None else list(columns.column(label, "the label"))
-
-
 def _order(
     columns: CsvColumns, order: str | None, export: ExportedTable | None, notes: list[str]
 ) -> tuple[tuple[int, ...] | None, str]:
@@ -219,7 +214,10 @@ def write_labelled(path: Path, labelled: Labelled) -> None:
     write_or_replace(path, csv_text([[*extra, *headings], *rows]).encode())
 
 
-def _labels(columns: CsvColumns, label: str | None, notes: list[str]) -> list[str]:
+def _labels(columns: CsvColumns, label: str | None, notes: list[str], *, required: bool) -> list[str]:
+    """Return the labels. Trials whose target is a number may lack them. Raises ConfigError, DataDamaged."""
+    if not required:
+        return [""] * len(columns) if label is None else list(columns.column(label, "the label"))
     if label is None:
         raise ConfigError(
             f"which column of {columns.path} holds the label? Name it: {option('label', 'COLUMN')}"
@@ -275,9 +273,8 @@ def _loses_digits(cells: Sequence[str], values: Sequence[float]) -> bool:
     return len(set(values)) < len(set(cells)) and any(abs(value) >= LARGEST_WHOLE for value in values)
 
 
-def _measured(name: str) -> str:
+def _measured(_name: str) -> str:
     """Return that no feature of an exported store identifies trials: a feature set made it."""
-    del name
     return ""
 
 

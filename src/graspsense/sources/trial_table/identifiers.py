@@ -94,8 +94,6 @@ _DAYS: Final = (36_526.0, 55_153.0)
 """The years 2000 to 2050 in days, as spreadsheets count them."""
 _DAYS_OF_MATLAB: Final = 693_960.0
 """How many days more MATLAB counts."""
-_LONGEST_DAYS: Final = 3_700.0
-"""Ten years, in which one table is recorded."""
 _WORKING_DAY: Final = 0.7
 """Part of the day in which all recordings were made."""
 
@@ -245,11 +243,7 @@ def _is_written_date(text: str, form: str) -> bool:
 def can_be_days(values: NDArray[np.float64]) -> bool:
     """Return whether these can be days and parts of days, as spreadsheets and MATLAB number them."""
     known = values[~np.isnan(values)]
-    if (
-        len(known) < LEAST_LINES
-        or np.ptp(known) > _LONGEST_DAYS
-        or not 0.0 < np.ptp(known % 1.0) < _WORKING_DAY
-    ):
+    if len(known) < LEAST_LINES or not 0.0 < np.ptp(known % 1.0) < _WORKING_DAY:
         return False
     low, high = _DAYS
     return any(low <= known.min() - later and known.max() - later <= high for later in (0.0, _DAYS_OF_MATLAB))
