@@ -48,7 +48,6 @@ _ROUNDING: Final = 1e-13
 _QUANTITY: Final = frozenset(
     {"variable", "quantity", "parameter", "feature", "measure", "measurement", "metric"}
 )
-_VALUE: Final = frozenset({"value", "values"})
 LARGEST_WHOLE: Final = 2.0**53
 """From here on, not every whole number is a number of the computer."""
 
@@ -118,7 +117,11 @@ def read_labelled(
 def _refuse_long_form(columns: CsvColumns) -> None:
     """Raise DataDamaged if a column names what the number in a column `value` is, so that a trial has several lines."""
     quantity = next((name for name in columns.names if name.lower() in _QUANTITY), None)
-    if quantity and columns.is_nominal(quantity) and any(name.lower() in _VALUE for name in columns.names):
+    if (
+        quantity
+        and columns.is_nominal(quantity)
+        and any(name.lower() in ("value", "values") for name in columns.names)
+    ):
         raise DataDamaged(
             f"{columns.path} has a line for each {quantity} of a trial: write one line per trial, with a column for "
             f"each {quantity}"
