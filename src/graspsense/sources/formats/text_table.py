@@ -195,8 +195,8 @@ class _Layout:
             if named is not None:
                 return named[1], named[2], 0, named[0]
             if all(is_number(cell) or is_missing(cell) for cell in top):
-                numbered = width > 2 and top in ([*map(str, range(width))], ["", *map(str, range(width - 1))])
-                if numbered:
+                ordinals = [*map(str, range(width))]
+                if numbered := width > 2 and top in (ordinals, ["", *ordinals[:-1]]):
                     self.notes.append(_lines_words([self.rows[0][0]], "lines that number the columns"))
                 return [f"c{k}" for k in range(1, width + 1)], None, int(numbered), 0
             return top, None, 1, self.rows[0][0]

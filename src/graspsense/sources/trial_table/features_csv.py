@@ -116,12 +116,9 @@ def read_labelled(
 
 def _refuse_long_form(columns: CsvColumns) -> None:
     """Raise DataDamaged if a column names what the number in a column `value` is, so that a trial has several lines."""
-    quantity = next((name for name in columns.names if name.lower() in _QUANTITY), None)
-    if (
-        quantity
-        and columns.is_nominal(quantity)
-        and any(name.lower() in ("value", "values") for name in columns.names)
-    ):
+    names = {name.lower(): name for name in columns.names}
+    quantity = next((names[word] for word in _QUANTITY if word in names), None)
+    if quantity and columns.is_nominal(quantity) and {"value", "values"} & names.keys():
         raise DataDamaged(
             f"{columns.path} has a line for each {quantity} of a trial: write one line per trial, with a column for "
             f"each {quantity}"
