@@ -102,9 +102,7 @@ class CsvColumns:
     def numbers(self, name: str) -> list[float]:
         """Return a column as numbers, NaN where missing. Raises DataDamaged with the line that has another text."""
         self.column(name, "a feature")
-        if self._numbers is None:
-            self._numbers = columns_of_numbers({name: self._without_unit(name) for name in self.cells})
-        number = self._numbers[name]
+        number = self._read_numbers()[name]
         if isinstance(number, NotNumbers):
             times = seconds_since_first(self.cells[name])
             if times is not None:
@@ -119,8 +117,16 @@ class CsvColumns:
         values: list[float] = number.tolist()
         return values
 
+    def _read_numbers(self) -> dict[str, Numbers | NotNumbers]:
+        if self._numbers is None:
+            self._numbers = columns_of_numbers({name: self._without_unit(name) for name in self.cells})
+        return self._numbers
+
     def has_numbers(self, name: str) -> bool:
         """Return whether half of the cells of a column are numbers: a few may be so by chance, as those of hashes."""
+        number = self._read_numbers()[name]
+        if not isinstance(number, NotNumbers):
+            return not np.isnan(number).all()
         given = [cell for cell in self._without_unit(name) if not is_missing(cell)]
         return 2 * sum(map(is_number, given)) >= len(given) > 0
 

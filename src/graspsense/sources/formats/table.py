@@ -83,21 +83,15 @@ class ColumnTable:
 
     def rows(self, which: Any, part: str = "") -> ColumnTable:
         """Return these rows (a slice, numbers, or a mask); `part` says in words which they are."""
-        kept = self._texts_of(which) if self.texts else {}
+        index = np.arange(len(self))[which].tolist() if self.texts else []
         return evolve(
             self,
             source=f"{self.source}, {part}" if part else self.source,
             numbers={name: values[which] for name, values in self.numbers.items()},
-            texts=kept,
+            texts={name: [values[i] for i in index] for name, values in self.texts.items()},
             t_s=None if self.t_s is None else self.t_s[which],
             lines=None if self.lines is None else self.lines[which],
         )
-
-    def _texts_of(self, which: Any) -> dict[str, Sequence[str]]:
-        if isinstance(which, slice):
-            return {name: values[which] for name, values in self.texts.items()}
-        index = np.arange(len(self))[which].tolist()
-        return {name: [values[i] for i in index] for name, values in self.texts.items()}
 
     def with_fields(self, fields: Mapping[str, str]) -> ColumnTable:
         """Return the table with these facts beside its own."""

@@ -115,9 +115,8 @@ def _columns(path: Path, part: _Part, table: TextTable, *, several: bool) -> Col
         if not isinstance(column, NotNumbers):
             numbers[name] = column
             if np.isnan(column).any() and any(map(_is_word, cells[name])):
-                texts[name] = cells[
-                    name
-                ]  # as numbers `none` and `NA` are missing, and as labels they are not
+                # As numbers `none` and `NA` are missing, and as labels they are not.
+                texts[name] = cells[name]
             continue
         lists = _lists(path, name, cells[name])
         if lists is not None:

@@ -52,7 +52,6 @@ SPREADSHEETS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 """The first bytes of a ZIP file, as which spreadsheets are saved, and of those of old programs."""
 _CODE_PAGES: Final = ("cp1252", "cp1250", "iso8859-1", "iso8859-15")
 """They agree on degrees, micro and the letters of several languages."""
-_NO_SEPARATOR: Final = "\x1f"
 _WITH_UNIT: Final = re.compile(r"(.*[0-9.])\s*([^\s0-9]+)")
 _SAMPLED: Final = 400
 """Lines from which the separator and the kinds of the columns are found."""
@@ -117,8 +116,7 @@ class _Layout:
         given = _SEPARATOR_LINE.fullmatch(written[0][1]) if written else None
         if given:
             written = written[1:]
-        self.comments = _comments(written)
-        plain = [each for each in written if each not in {*self.comments} and not _RULE.fullmatch(each[1])]
+        self.comments, plain = _comments_and_others(written)
         if all(re.fullmatch(r"\s*\|.*\|\s*", line) for _, line in plain):
             plain = [(number, line.strip()[1:-1]) for number, line in plain]
         self.separator = given[1] if given else _separator([line for _, line in _sample(plain)])
@@ -197,8 +195,8 @@ class _Layout:
             if named is not None:
                 return named[1], named[2], 0, named[0]
             if all(is_number(cell) or is_missing(cell) for cell in top):
-                numbered = width > 2 and top in ([*map(str, range(width))], ["", *map(str, range(width - 1))])
-                if numbered:
+                ordinals = [*map(str, range(width))]
+                if numbered := width > 2 and top in (ordinals, ["", *ordinals[:-1]]):
                     self.notes.append(_lines_words([self.rows[0][0]], "lines that number the columns"))
                 return [f"c{k}" for k in range(1, width + 1)], None, int(numbered), 0
             return top, None, 1, self.rows[0][0]
@@ -309,7 +307,7 @@ class _Layout:
         if not 0 < len(texts) <= max(1, _MOST_BEFORE * len(rows)):
             return rows
         self.notes.append(_lines_words(texts, "lines of text"))
-        return [row for row in rows if row[0] not in {*texts}]
+        return [row for row in rows if len(row[1]) > 1 or is_number(row[1][0])]
 
     def _without_blank_end(self, names: list[str], rows: list[Row]) -> tuple[list[str], list[Row]]:
         """Return names and rows without a last column that a separator at the end of the lines makes."""
@@ -341,13 +339,15 @@ class _Layout:
         return rows[:-1]
 
 
-def _comments(lines: Sequence[Line]) -> list[Line]:
-    """Return the lines that are comments. After the first other line they are few: trials can be called #1, #2."""
+def _comments_and_others(lines: Sequence[Line]) -> tuple[list[Line], list[Line]]:
+    """Return the comments, and the other lines without rules. Behind names, trials can be called #1, #2, and so on."""
     marked = [line.lstrip().startswith(_COMMENTS) for _, line in lines]
     begin = marked.index(False) if False in marked else len(lines)
-    later = marked[begin + 1 :]
-    few = 2 * sum(later) <= len(later)
-    return [each for k, each in enumerate(lines) if marked[k] and (few or k < begin)]
+    if 2 * sum(marked[begin:]) > len(lines) - begin:
+        marked[begin:] = [False] * (len(lines) - begin)
+    comments = [line for line, is_comment in zip(lines, marked, strict=True) if is_comment]
+    others = [line for line, is_comment in zip(lines, marked, strict=True) if not is_comment]
+    return comments, [line for line in others if not _RULE.fullmatch(line[1])]
 
 
 def _with_remarks(rows: list[Row]) -> list[Row]:
@@ -403,8 +403,6 @@ def _json_table(path: Path, lines: Sequence[Line], ended: bool) -> TextTable:
             raise DataDamaged(f"{path}, line {number}: not a JSON object: {error}") from None
         names |= dict.fromkeys(row)
         rows.append(row)
-        if k == 0:
-            check_columns(path, list(names))
         if too_many := COLUMNS.exceeded(len(names)) or CELLS.exceeded(len(rows) * len(names)):
             raise DataDamaged(f"{path}: {too_many}")
     check_columns(path, list(names))
@@ -450,7 +448,7 @@ def _separator(lines: Sequence[str]) -> str:
         agreeing.pop(",", None)
     able = [separator for separator, count in agreeing.items() if count >= 0.9 * max(agreeing.values())]
     fitting = [item for item in able if _width(lines[:1], item)[0] == widths[item][0]]
-    return next(iter(fitting or able), _NO_SEPARATOR)
+    return next(iter(fitting or able), "\x1f")
 
 
 def _words(line: str) -> list[str]:

@@ -49,7 +49,6 @@ _ROUNDING: Final = 1e-13
 _QUANTITY: Final = frozenset(
     {"variable", "quantity", "parameter", "feature", "measure", "measurement", "metric"}
 )
-_VALUE: Final = frozenset({"value", "values"})
 LARGEST_WHOLE: Final = 2.0**53
 """From here on, not every whole number is a number of the computer."""
 
@@ -86,7 +85,7 @@ def read_labelled(
     elif isinstance(columns, ArffColumns) and value is None:
         notes += columns.without_label(label)
     target = None if value is None else _target(columns, value, export, notes)
-    labels = _labels(columns, label, notes) if target is None else _texts(columns, label)
+    labels = _labels(columns, label, notes, required=target is None)
     ranks, no_order = _order(columns, order, export, notes)
     lines = _lines_once(columns, {order, columns.index}, labels)
     identified = _measured if export is not None else _identifying(columns, labels, ranks, lines)
@@ -145,8 +144,9 @@ def _identifying(
 
 def _refuse_long_form(columns: CsvColumns) -> None:
     """Raise DataDamaged if a column names what the number in a column `value` is, so that a trial has several lines."""
-    quantity = next((name for name in columns.names if name.lower() in _QUANTITY), None)
-    if quantity and columns.is_nominal(quantity) and any(name.lower() in _VALUE for name in columns.names):
+    names = {name.lower(): name for name in columns.names}
+    quantity = next((names[word] for word in _QUANTITY if word in names), None)
+    if quantity and columns.is_nominal(quantity) and {"value", "values"} & names.keys():
         raise DataDamaged(
             f"{columns.path} has a line for each {quantity} of a trial: write one line per trial, with a column for "
             f"each {quantity}"
@@ -205,11 +205,6 @@ def _target(columns: CsvColumns, value: str, export: ExportedTable | None, notes
     return TargetValue(name=value, unit=columns.units[name], values=tuple(columns.numbers(name)))
 
 
-def _texts(columns: CsvColumns, label: str | None) -> list[str]:
-    """Return the labels of trials whose target is a number: they may lack one."""
-    return [""] * len(columns) if label is None else list(columns.column(label, "the label"))
-
-
 def _order(
     columns: CsvColumns, order: str | None, export: ExportedTable | None, notes: list[str]
 ) -> tuple[tuple[int, ...] | None, str]:
@@ -247,7 +242,10 @@ def write_labelled(path: Path, labelled: Labelled) -> None:
     write_or_replace(path, csv_text([[*extra, *headings], *rows]).encode())
 
 
-def _labels(columns: CsvColumns, label: str | None, notes: list[str]) -> list[str]:
+def _labels(columns: CsvColumns, label: str | None, notes: list[str], *, required: bool) -> list[str]:
+    """Return the labels. Trials whose target is a number may lack them. Raises ConfigError, DataDamaged."""
+    if not required:
+        return [""] * len(columns) if label is None else list(columns.column(label, "the label"))
     if label is None:
         raise ConfigError(
             f"which column of {columns.path} holds the label? Name it: {option('label', 'COLUMN')}"
@@ -303,9 +301,8 @@ def _loses_digits(cells: Sequence[str], values: Sequence[float]) -> bool:
     return len(set(values)) < len(set(cells)) and any(abs(value) >= LARGEST_WHOLE for value in values)
 
 
-def _measured(name: str) -> str:
+def _measured(_name: str) -> str:
     """Return that no feature of an exported store identifies trials: a feature set made it."""
-    del name
     return ""
 
 

@@ -90,16 +90,11 @@ _WEEKDAYS: Final = re.compile(
     r"sam(edi)?|dim(anche)?"
 )
 _DATES: Final = ("%Y%m%d", "%y%m%d%H%M", "%Y%m%d%H%M", "%y%m%d%H%M%S", "%Y%m%d%H%M%S")
-_SEXAGESIMAL: Final = 60.0
 _CLOCK_VALUES: Final = (10, 15)
 """Different hundreds, and different last two digits, from which on 142530 and 91205 are times of the day: that no two
 digits are above 59 is a chance of one in two thousand."""
-_DAYS: Final = (36_526.0, 55_153.0)
-"""The years 2000 to 2050 in days, as spreadsheets count them."""
-_DAYS_OF_MATLAB: Final = 693_960.0
-"""How many days more MATLAB counts."""
-_LONGEST_DAYS: Final = 3_700.0
-"""Ten years, in which one table is recorded."""
+_DAYS: Final = ((36_526.0, 55_153.0), (730_486.0, 749_113.0))
+"""The years 2000 to 2050 in days, as spreadsheets and as MATLAB count them."""
 _WORKING_DAY: Final = 0.7
 """Part of the day in which all recordings were made."""
 
@@ -231,7 +226,7 @@ def _is_calendar(column: NDArray[np.float64]) -> bool:
     if least < 19_700_101:
         hundreds, ends = np.unique(column // 100.0), np.unique(column % 100.0)
         many = len(hundreds) >= _CLOCK_VALUES[0] and len(ends) >= _CLOCK_VALUES[1]
-        return many and most < 240_000.0 and max(ends.max(), (hundreds % 100.0).max()) < _SEXAGESIMAL
+        return many and most < 240_000.0 and max(ends.max(), (hundreds % 100.0).max()) < 60.0
     texts = [f"{value:.0f}" for value in np.unique(column).tolist()]
     return any(all(_is_written_date(text, form) for text in texts) for form in _DATES)
 
@@ -249,14 +244,9 @@ def _is_written_date(text: str, form: str) -> bool:
 def can_be_days(values: NDArray[np.float64]) -> bool:
     """Return whether these can be days and parts of days, as spreadsheets and MATLAB number them."""
     known = values[~np.isnan(values)]
-    if (
-        len(known) < LEAST_LINES
-        or np.ptp(known) > _LONGEST_DAYS
-        or not 0.0 < np.ptp(known % 1.0) < _WORKING_DAY
-    ):
+    if len(known) < LEAST_LINES or not 0.0 < np.ptp(known % 1.0) < _WORKING_DAY:
         return False
-    low, high = _DAYS
-    return any(low <= known.min() - later and known.max() - later <= high for later in (0.0, _DAYS_OF_MATLAB))
+    return any(low <= known.min() and known.max() <= high for low, high in _DAYS)
 
 
 def _follows(column: NDArray[np.float64], lines: NDArray[np.int64], labels: Sequence[str]) -> bool:
@@ -290,10 +280,9 @@ def follow_lines(values: NDArray[np.float64], labels: Sequence[str]) -> bool:
     other, and not within their lines.
     """
     given = np.flatnonzero(~np.isnan(values))
-    known = np.array(labels)[given]
-    codes = np.unique(known, return_inverse=True)[1]
+    codes = np.unique(np.array(labels)[given], return_inverse=True)[1]
     column, lines = values[given], given.astype(np.float64)
-    if _follows_in_labels(column, given, known.tolist()):
+    if _follows_in_labels(column, given, [labels[i] for i in given.tolist()]):
         return True
     if len(given) < _SPACED or not np.ptp(column):
         return False

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Container
+from itertools import takewhile
 from typing import TYPE_CHECKING, Final
 
 from graspsense.core.values.errors import listed
@@ -31,6 +32,7 @@ def without_summaries(columns: CsvColumns) -> None:
     """
     summaries: dict[int, str] = {}
     alone = [sum(map(bool, row)) == 1 < len(row) - 1 for row in zip(*columns.cells.values(), strict=True)]
+    rows = range(len(columns))
     for name, cells in columns.cells.items():
         words = [
             " ".join(cell.casefold().replace("_", " ").replace(".", " ").split()).strip(": ")
@@ -41,12 +43,9 @@ def without_summaries(columns: CsvColumns) -> None:
             word != "" and times[word] == 1 and (lone or _is_statistic(word, times))
             for word, lone in zip(words, alone, strict=True)
         ]
-        begin = telling.index(False) if False in telling else 0
-        end = len(cells) - (telling[::-1].index(False) if False in telling else 0)
+        ends = {*takewhile(telling.__getitem__, rows), *takewhile(telling.__getitem__, reversed(rows))}
         summaries |= {
-            i: cells[i]
-            for i, told in enumerate(telling)
-            if told and (not begin <= i < end or alone[i] or words[i] not in _STATISTICS)
+            i: cells[i] for i in rows if telling[i] and (i in ends or alone[i] or words[i] not in _STATISTICS)
         }
         if not _STATISTICS.isdisjoint(times) and columns.has_numbers(name):
             summaries |= {i: cells[i] for i, word in enumerate(words) if word in _STATISTICS}
