@@ -57,11 +57,11 @@ ROUGH: Final = 0.02
 """Time (s) over which a force is averaged, and the share of its range that it usually is away from that,"""
 COARSE: Final = 0.05
 """and half a step of it, from which on a single value is not known."""
-OPENS: Final = 0.05
+OPENS: Final = 0.02
 """Share of its range by which a gap is wider than at the contact when no object can press any more,"""
 STILL: Final = 0.01
 """and by which it changes where the fingers begin to open,"""
-LATE_S: Final = 0.05
+LATE_S: Final = 0.04
 LATE_SAMPLES: Final = 2.0
 """if that lasts for more than so long (s), and so many samples,"""
 GOES_ON: Final = 0.2
@@ -141,7 +141,7 @@ def signal_notices(recording: Recording) -> Iterator[str]:
     yield from told or _rises_at_once(times, (left + right) / 2.0, recording.units)
     if not {"gap", "t"} & recording.units.keys() and len(gap) >= FEWEST:
         yield from _bump(times, gap, (left + right) / 2.0, recording.units)
-        yield from _late(times, gap, (left + right) / 2.0)
+        yield from next(filter(None, ([*_late(what, times, gap, force)] for what, force in pads.items())), ())
         yield from _jump(times, gap)
         steps = np.abs(np.diff(gap))
         # The steps of a coarse gap are alike.
@@ -285,10 +285,9 @@ def _rises_at_once(times: Numbers, force: Numbers, units: Mapping[str, str]) -> 
     low, high = usual_range(force)
     steps = np.diff(_course(force, GLITCH_SAMPLES))
     free = np.flatnonzero(force <= low + FREE * (high - low))
-    samples = np.arange(len(steps))
+    samples, usual = np.arange(len(steps)), float(np.sort(np.abs(steps))[-3])
     steps[samples - free[np.searchsorted(free, samples, side="right") - 1] < LOADED_SAMPLES] = 0.0
-    k, usual = int(steps.argmax()), float(np.sort(steps)[-2])
-    noise = float(np.median(np.abs(np.diff(force, 2))))
+    k, noise = int(steps.argmax()), float(np.median(np.abs(np.diff(force, 2))))
     if steps[k] > max(PARTED * (high - low), GLITCH_NOISE * noise, JUMP * usual):
         yield (
             f"the force rises by {steps[k]:.3g} {units.get('force_left', 'N')} at once at {t[k + 1]:.4g} "
@@ -404,7 +403,7 @@ def _bump(times: Numbers, gap: Numbers, force: Numbers, units: Mapping[str, str]
         )
 
 
-def _late(times: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
+def _late(what: str, times: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
     """Yield that a force (N) stays while the fingers open, or that the gap (m) follows late, by time (s)."""
     known = np.isfinite(force) & np.isfinite(gap)
     t_s, gap, force = times[known], gap[known], force[known]
@@ -421,7 +420,7 @@ def _late(times: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
     wide = loaded[(gap[loaded] > gap[begin] + opened) & (loaded > loaded[gap[loaded].argmin()])]
     if len(wide) and len(gone) and t_s[wide[-1]] - t_s[wide[0]] > least_s:
         yield (
-            f"the force stays until {t_s[wide[-1]]:.4g} s, although the fingers are wider than at the contact from "
+            f"{what} stays until {t_s[wide[-1]]:.4g} s, although the fingers are wider than at the contact from "
             f"{t_s[wide[0]]:.4g} s on: does the force come late, or did its sensor stop?"
         )
     elif len(gone):
