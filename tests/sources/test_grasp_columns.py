@@ -166,6 +166,10 @@ def test_gap_and_force_with_rows_of_their_own_hold_their_last_values():
     assert [frame.force_left_n for frame in frames] == pytest.approx([5.0 * (f.t_s - 0.009) for f in frames])
     # Equal times are of one moment.
     assert len(checked_recording(topics_in_one_table(force_late_s=0.0)).readings) == N
+    # All rows of the gap, and then all rows of the force.
+    table = topics_in_one_table()
+    blocks = checked_recording(table.rows(np.argsort(np.isnan(table.gap_m), kind="stable")))
+    assert [reading.frame for reading in blocks.readings] == frames
 
 
 def test_a_force_that_ends_before_the_gap_is_not_held_to_the_end():

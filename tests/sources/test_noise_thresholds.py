@@ -258,7 +258,14 @@ def test_recordings_that_begin_in_contact_with_different_forces_are_in_contact_f
 
 @every_case(
     ("rest_mm", "rest_n", "goes_on"),
-    [(64.0, 3.6, True), (64.0, 7.5, False), (63.0, 3.6, True), (61.7, 3.6, False), (61.6, 7.9, False)],
+    [
+        (64.0, 3.6, True),
+        (64.0, 7.5, False),
+        (63.0, 3.6, True),
+        (61.7, 3.6, False),
+        (61.6, 7.9, False),
+        (61.6, 0.1, True),  # the force is gone, and the fingers have not opened
+    ],
 )
 def test_a_rest_before_most_of_the_force_is_doubted_also_where_the_gap_shows_no_travel(
     rest_mm, rest_n, goes_on

@@ -309,3 +309,24 @@ def test_a_gap_or_a_force_that_comes_late_is_noticed(late_s: float) -> None:
         2.29 + late_s > T_S, np.maximum(0.08 - 0.03 * T_S, 0.05), 0.05 + 0.1 * (T_S - 2.29 - late_s)
     )
     assert not any("late" in notice for notice in noticed(released, released, rigid))
+
+
+def test_a_force_that_rises_at_once_under_a_load_is_noticed() -> None:
+    """As where samples without a time of their own are missing; the same squeeze at a lower rate has such steps too."""
+    kept = (T_S < 1.5) | (T_S >= 1.7)
+    (notice,) = noticed(RELEASED_N[kept], RELEASED_N[kept], OPEN_AGAIN_M[kept])
+    assert "rises by 1.2" in notice  # 6 N/s for 0.2 s
+    assert "at 1.5 s" in notice
+    assert noticed(RELEASED_N[::5], RELEASED_N[::5], OPEN_AGAIN_M[::5], rate_hz=20.0) == ()
+    stairs = np.floor(np.clip(T_S - 1.0, 0.0, 1.0) * 4.0) * (T_S < 2.7) + NOISE_N[0]
+    assert noticed(stairs, stairs, OPEN_AGAIN_M) == ()
+
+
+def test_a_gap_that_jumps_at_a_moderate_speed_is_noticed() -> None:
+    """4 mm within 10 ms are no speed that a finger never has, but none gains and loses it in one sample."""
+    for since_s in (0.4, 1.5, 2.0):
+        jumped = OPEN_AGAIN_M + np.where(since_s <= T_S, 0.004, 0.0)
+        (notice,) = (text for text in noticed(RELEASED_N, RELEASED_N, jumped) if "the gap jumps" in text)
+        assert "within 10 ms" in notice
+    fast = np.interp(T_S, [0.0, 0.3, 0.34, 1.0, 2.68, 2.7, 3.0], [0.08, 0.08, 0.072, 0.05, 0.05, 0.054, 0.08])
+    assert noticed(RELEASED_N, RELEASED_N, fast) == ()

@@ -163,8 +163,12 @@ def _known(columns: GraspColumns) -> NDArray[np.bool_]:
 def _held(columns: GraspColumns) -> GraspColumns:
     """Return the rows of the gap or of a force, whichever has most, with the last values of the others.
 
-    They are the columns themselves if one has no number, or if the time goes back.
+    They are the columns themselves if one has no number, or if its own time goes back.
     """
+    order = np.argsort(columns.t_s, kind="stable")
+    in_order = all((np.diff(order[~np.isnan(column[order])]) > 0).all() for column in _needed(columns)[1:])
+    if in_order:  # the rows of one come after those of another
+        columns = columns.rows(order)
     values = {"gap": columns.gap_m, "left force": columns.left_n, "right force": columns.right_n}
     rows = {name: np.flatnonzero(~np.isnan(column)) for name, column in values.items()}
     rises = bool((np.diff(columns.t_s) >= 0.0).all()) and np.ptp(columns.t_s) < LONGEST_S

@@ -49,17 +49,19 @@ UNEQUAL: Final = 0.12
 UNEQUAL_REST: Final = 0.1
 """without this share of the samples at each end, in which a pad can touch first or let go last."""
 PARTED: Final = 0.1
-"""Share of its range by which the force of a loaded pad leaves that of the other one at once."""
+"""Share of its range by which the force of a loaded pad leaves that of the other one at once, or rises,"""
+LOADED_SAMPLES: Final = 5
+"""after so many samples under a load."""
 ROUGH_S: Final = 0.1
 ROUGH: Final = 0.02
 """Time (s) over which a force is averaged, and the share of its range that it usually is away from that,"""
 COARSE: Final = 0.05
 """and half a step of it, from which on a single value is not known."""
-OPENS: Final = 0.05
+OPENS: Final = 0.02
 """Share of its range by which a gap is wider than at the contact when no object can press any more,"""
 STILL: Final = 0.01
 """and by which it changes where the fingers begin to open,"""
-LATE_S: Final = 0.05
+LATE_S: Final = 0.04
 LATE_SAMPLES: Final = 2.0
 """if that lasts for more than so long (s), and so many samples,"""
 GOES_ON: Final = 0.2
@@ -76,7 +78,8 @@ OPENED: Final = 0.1
 DRIFT: Final = 0.1
 """Share of its range by which a force may end from where it began."""
 JUMP_SPEED_M_S: Final = 1.0
-"""Speed beyond which no finger moves,"""
+JUMP_M_S2: Final = 10.0
+"""Speed beyond which no finger moves, and acceleration,"""
 JUMP: Final = 3.0
 """and how many times farther than the third largest step of the gap a jump goes, since a glitch is two steps."""
 USUAL_HOLDS: Final = 3.0
@@ -126,18 +129,19 @@ def signal_notices(recording: Recording) -> Iterator[str]:
         hand = any(isinstance(channel, FingerForce) for channel in recording.channels)
         told += _unequal(left, right, recording.units) if not told and not hand else ()
         told += _parted(times, left, right, recording.units) if not told and not hand else ()
-    yield from told
     for what, force in pads.items():
         known = np.isfinite(force)
         if int(known.sum()) >= FEWEST:
+            of_pad = times[known], force[known]
             if "t" not in recording.units:
-                yield from _glitches(what, times[known], force[known], recording.units)
-                yield from _seldom(what, times[known], force[known], LARGE_CHANGE)
-                yield from _rough(what, times[known], force[known]) if not told else ()
-            yield from _drift(what, gap[known], force[known], recording.units)
+                doubtful = bool(told)
+                told += [*_glitches(what, *of_pad, recording.units), *_seldom(what, *of_pad, LARGE_CHANGE)]
+                told += [] if doubtful else _rough(what, *of_pad)
+            told += _drift(what, gap[known], force[known], recording.units)
+    yield from told or _rises_at_once(times, (left + right) / 2.0, recording.units)
     if not {"gap", "t"} & recording.units.keys() and len(gap) >= FEWEST:
         yield from _bump(times, gap, (left + right) / 2.0, recording.units)
-        yield from _late(times, gap, (left + right) / 2.0)
+        yield from next(filter(None, ([*_late(what, times, gap, force)] for what, force in pads.items())), ())
         yield from _jump(times, gap)
         steps = np.abs(np.diff(gap))
         # The steps of a coarse gap are alike.
@@ -240,8 +244,10 @@ def _parted(times: Numbers, left: Numbers, right: Numbers, units: Mapping[str, s
     scale = float(np.median(left[loaded] / right[loaded]))
     steps = np.abs(np.diff(_course(left - scale * right, GLITCH_SAMPLES)))
     larger = np.maximum(left, right)
+    # Where fingers meet an object, or let it go, one of them can be first.
     held = np.flatnonzero(larger > 0.5 * larger.max())
-    within = (loaded[1:] | loaded[:-1]) & (np.arange(1, len(t)) > held[0]) & (np.arange(1, len(t)) < held[-1])
+    begin, end = min(int(loaded.argmax()), int(held[0])), int(held[-1])
+    within = (loaded[1:] | loaded[:-1]) & (np.arange(1, len(t)) > begin) & (np.arange(1, len(t)) < end)
     k = int(np.argmax(steps * within))
     least = max(PARTED * span, GLITCH_NOISE * float(np.median(steps)), JUMP * float(np.sort(steps)[-3]))
     if steps[k] > least and within[k]:
@@ -268,6 +274,25 @@ def _rough(what: str, times: Numbers, force: Numbers) -> Iterator[str]:
         yield f"{what} varies by {varies / span:.0%} of its range around its course, and so does each feature of it"
     elif in_steps and coarse > COARSE * span:
         yield f"{what} has steps of {2.0 * coarse / span:.0%} of its range: each value is up to half a step off"
+
+
+def _rises_at_once(times: Numbers, force: Numbers, units: Mapping[str, str]) -> Iterator[str]:
+    """Yield that a force under a load rises within a sample, as where some are missing, or after its sensor stopped."""
+    known = np.isfinite(force)
+    t, force = times[known], force[known]
+    if len(force) < FEWEST_IN_COURSE:
+        return
+    low, high = usual_range(force)
+    steps = np.diff(_course(force, GLITCH_SAMPLES))
+    free = np.flatnonzero(force <= low + FREE * (high - low))
+    samples, usual = np.arange(len(steps)), float(np.sort(np.abs(steps))[-3])
+    steps[samples - free[np.searchsorted(free, samples, side="right") - 1] < LOADED_SAMPLES] = 0.0
+    k, noise = int(steps.argmax()), float(np.median(np.abs(np.diff(force, 2))))
+    if steps[k] > max(PARTED * (high - low), GLITCH_NOISE * noise, JUMP * usual):
+        yield (
+            f"the force rises by {steps[k]:.3g} {units.get('force_left', 'N')} at once at {t[k + 1]:.4g} "
+            f"{units.get('t', 's')}, under a load: are samples missing there, or did its sensor stop before?"
+        )
 
 
 def _is_clear(force: Numbers) -> bool:
@@ -378,7 +403,7 @@ def _bump(times: Numbers, gap: Numbers, force: Numbers, units: Mapping[str, str]
         )
 
 
-def _late(times: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
+def _late(what: str, times: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
     """Yield that a force (N) stays while the fingers open, or that the gap (m) follows late, by time (s)."""
     known = np.isfinite(force) & np.isfinite(gap)
     t_s, gap, force = times[known], gap[known], force[known]
@@ -395,7 +420,7 @@ def _late(times: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
     wide = loaded[(gap[loaded] > gap[begin] + opened) & (loaded > loaded[gap[loaded].argmin()])]
     if len(wide) and len(gone) and t_s[wide[-1]] - t_s[wide[0]] > least_s:
         yield (
-            f"the force stays until {t_s[wide[-1]]:.4g} s, although the fingers are wider than at the contact from "
+            f"{what} stays until {t_s[wide[-1]]:.4g} s, although the fingers are wider than at the contact from "
             f"{t_s[wide[0]]:.4g} s on: does the force come late, or did its sensor stop?"
         )
     elif len(gone):
@@ -416,14 +441,18 @@ def _late(times: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
 def _jump(times: Numbers, gap: Numbers) -> Iterator[str]:
     """Yield that a gap (m) jumps faster (s) than fingers move, and farther than it does elsewhere."""
     known = np.isfinite(gap)
-    steps = np.abs(np.diff(gap[known]))
-    if len(steps) < FEWEST:
+    t_s, steps = times[known], np.abs(np.diff(gap[known]))
+    changes = np.flatnonzero(steps)
+    if len(changes) < FEWEST:
         return
     k, usual = int(steps.argmax()), float(np.sort(steps)[-3])
-    seconds = max(float(np.diff(times[known])[k]), float(np.median(np.diff(times[known]))))
-    if steps[k] > JUMP_SPEED_M_S * seconds and steps[k] > JUMP * usual:
+    seconds = max(float(np.diff(t_s)[k]), float(np.median(np.diff(t_s))))
+    # A gap that is measured more rarely than the rows moves in the time between its values.
+    measured_s = max(seconds, float(np.median(np.diff(t_s[changes]))))
+    faster = steps[k] > JUMP_SPEED_M_S * seconds or steps[k] - usual > JUMP_M_S2 * measured_s**2
+    if faster and steps[k] > JUMP * usual:
         yield (
-            f"the gap jumps by {steps[k] * 1e3:.3g} mm within {seconds * 1e3:.3g} ms (at {times[known][k + 1]:.4g} s), "
+            f"the gap jumps by {steps[k] * 1e3:.3g} mm within {seconds * 1e3:.3g} ms (at {t_s[k + 1]:.4g} s), "
             "as no finger does: is it a glitch, or did its sensor stop before?"
         )
 

@@ -32,8 +32,9 @@ PRESSED: Final = 2.0
 """ratio of a later force to that of the rest, from which on most of the squeeze comes after it."""
 RIGID: Final = 0.01
 PRESSED_RIGID: Final = 1.4
-"""Share of its range by which the gap closes at most on a rigid object, whose squeeze is that of the force alone, and
-the same ratio there."""
+LOST: Final = 10.0
+"""Share of its range by which the gap closes at most on a rigid object, whose squeeze is that of the force alone, the
+same ratio there, and that of the force in the same gap to one that is gone."""
 
 
 @frozen
@@ -75,7 +76,8 @@ def tried(
 def presses_on(features: Features, recording: Recording) -> bool:
     """Return whether most of a squeeze comes after its rest, as it does if the fingers stick on their way.
 
-    A gap that shows no travel after the rest, nor before it, tells of no rest either.
+    A gap that shows no travel after the rest, nor before it, tells of no rest either. Nor is there one of a squeeze
+    where the force is gone, and the gap is what it was.
     """
     known = dict(zip(features.names, features.values, strict=True))
     p_first, p_steady, f_steady = (known.get(name, math.nan) for name in ("p_first", "p_steady", "f_steady"))
@@ -86,7 +88,11 @@ def presses_on(features: Features, recording: Recording) -> bool:
     widest = max(reading.frame.gap_m for reading in recording.readings)
     force = max((frame.force_left_n + frame.force_right_n) / 2.0 for frame in later)
     travels_on = p_steady - narrowest >= MOST_TRAVEL * (p_first - narrowest)
-    rigid = p_first - narrowest < RIGID * (widest - narrowest)
+    still = RIGID * (widest - narrowest)
+    rigid = p_first - narrowest < still
+    stayed = [reading.frame for reading in recording.readings if abs(reading.frame.gap_m - p_steady) <= still]
+    if max((frame.force_left_n + frame.force_right_n) / 2.0 for frame in stayed) > LOST * max(f_steady, 0.0):
+        return True
     return (rigid and force > PRESSED_RIGID * f_steady) or (travels_on and force > PRESSED * f_steady)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from graspsense.core.control.contact import CONTACT_FORCE_N, both_touch
 from graspsense.core.values.errors import DataDamaged
 from graspsense.sources.columns.grasp_columns import GraspColumns
-from graspsense.sources.columns.recording_notices import FEWEST, STEADY, ZERO_SAMPLES, force_of_pads
+from graspsense.sources.columns.recording_notices import FEWEST, OPENED, STEADY, ZERO_SAMPLES, force_of_pads
 from graspsense.sources.columns.usual_range import usual_range
 from graspsense.sources.manifest.closings import CLOSED, OPEN
 from graspsense.sources.manifest.steps import NOISE, squeezes
@@ -90,7 +90,9 @@ def falls_on_closing(columns: GraspColumns) -> str:
 def _of_gap(columns: GraspColumns) -> Iterator[str]:
     gap = columns.gap_m
     began = float(np.median(gap[:3]))  # the first sample can be from before the sensor was ready
-    moved, span = float(gap[int(columns.force_n.argmax())]) - began, float(np.ptp(gap))
+    force, span = columns.force_n, float(np.ptp(gap))
+    pressed = float(gap[int(force.argmax())])
+    touched = float(gap[int((force > force.min() + BEGINS_LOADED * np.ptp(force)).argmax())])
     if span == 0.0 and not columns.units.get("gap"):
         yield "the gap does not change during the recording: is it another column?"
     if span > 0.0 and gap.min() > 0.0 and gap.max() < WIDEST_M and not columns.units.get("gap"):
@@ -103,7 +105,7 @@ def _of_gap(columns: GraspColumns) -> Iterator[str]:
             f"the gap goes down to {gap.min() * 1e3:.3g} mm, and fingers meet at 0: is it measured from another zero? "
             'Then add the difference: gap = "POSITION + 20 [mm]"'
         )
-    if span > 0.0 and moved > 0.2 * span:
+    if span > 0.0 and (pressed - began > 0.2 * span or pressed - touched > OPENED * span):
         yield (
             "the gap rises while the force rises: is it a position that grows on closing? Write the gap as a "
             f'difference: gap = "{_opening(gap):g} - POSITION"'
