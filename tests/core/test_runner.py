@@ -203,6 +203,24 @@ def test_whatever_stops_the_loop_the_fingers_are_opened(act, reason, after):
     assert gripper.closed == 1
 
 
+@every_case(("tick", "outcome"), [(1200, Outcome.ABORTED), (1700, Outcome.ABORTED), (1850, Outcome.STEADY)])
+def test_a_grasp_that_is_interrupted_while_the_fingers_open_keeps_its_outcome(tick, outcome):
+    """The hold ends at 1.8 s."""
+
+    class Interrupted(Scripted):
+        def read(self, timeout_s):
+            if self.k == tick:
+                signal.raise_signal(signal.SIGINT)
+            return super().read(timeout_s)
+
+    gripper = Interrupted(squeezing, bottle)
+    grasp = run_grasp(gripper, HYBRID, RUN)
+    assert grasp.outcome is outcome
+    assert grasp.interrupted
+    assert "interrupted" in grasp.reason
+    assert let_go(gripper)
+
+
 def test_a_step_that_fails_or_returns_no_command_is_named_with_what_it_returns():
     class Halved(HybridController):
         @staticmethod

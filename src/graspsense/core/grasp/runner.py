@@ -329,6 +329,9 @@ class _Grasp:
             return Outcome.RECOGNISED, self.stop_reason
         if self.state.law.outcome != RUNNING and failed:
             own_ending, unknown = ended_by_itself(0, self.state.law.outcome)
+            if not unknown and self.interrupted and self.state.phase == RELEASE:
+                # The grasp had its outcome, and the fingers were opened nevertheless.
+                return own_ending, f"{ending[1]} while the fingers opened"
             if not unknown:
                 ending = ending[0], f"{ending[1]} (after the grasp had ended: {own_ending.words})"
         return ending

@@ -30,11 +30,13 @@ SINGLE_GAPS: Final = 3
 SINGLE_SHARE: Final = 0.05
 """Frames of a slow gripper that are missing, and their share, from which on they are told."""
 REPEATS: Final = 3
-"""Standstills of an approach from which on the way after them is compared."""
-RECENT: Final = 40
-"""Ways of the gap that are compared: fingers that were slower before stood still for another reason."""
+"""Standstills of an approach from which on the motion after them is compared."""
+RECENT: Final = 20
+"""Standstills that are compared."""
 CATCH_UP: Final = 1.5
-"""Way of the gap in a frame after a standstill, over that after motion, from which on frames have come twice."""
+"""Speed of the gap in a frame after a standstill, over that of the next frame, from which on frames have come twice."""
+COARSE: Final = 3
+"""Steps of a gap in a row that stood still before each of them."""
 STEPS_M: Final = 0.002
 ALIKE: Final = 0.9
 """Step of the gap from which on it is coarse, and share of it that the others have."""
@@ -148,38 +150,42 @@ class Repeats:
     """
 
     def __init__(self) -> None:
-        self._gap_m = self._way_m = nan
-        self._ways_m: tuple[deque[float], deque[float]] = deque(maxlen=RECENT), deque(maxlen=RECENT)
-        self._recent: deque[bool] = deque(maxlen=RECENT)
+        self._gap_m = self._way_m = self._caught_up_m_s = nan
+        self._speeds_m_s: deque[tuple[float, float]] = deque(maxlen=RECENT)
+        """Of each standstill, the speed in the frame after it, and in the next one."""
+        self._steps_m: deque[float] = deque(maxlen=COARSE)
 
     def see(self, frame: Frame, *, jumped: bool = False) -> Fault | None:
         """Take the frame of a tick of the approach; return what the ways of the gap show. A jump is no way."""
         way_m, earlier_m = (nan if jumped else self._gap_m - frame.gap_m), self._way_m
         self._gap_m, self._way_m = frame.gap_m, way_m
-        if not (way_m > 0.0 and earlier_m >= 0.0):
+        caught_up_m_s, self._caught_up_m_s = self._caught_up_m_s, nan
+        if not (way_m > 0.0 and earlier_m >= 0.0 and frame.dt_s > 0.0):
             return None
-        if len(self._recent) == RECENT:
-            self._ways_m[self._recent[0]].popleft()
-        stood = earlier_m == 0.0
-        self._recent.append(stood)
-        self._ways_m[stood].append(way_m)
-        moving, standing = self._ways_m
-        if not stood or len(standing) < REPEATS:
+        # A frame that comes late has a longer way, and the same speed.
+        speed_m_s = way_m / frame.dt_s
+        if earlier_m == 0.0:
+            self._caught_up_m_s = speed_m_s
+            self._steps_m.append(way_m)
+            return self._coarse()
+        self._steps_m.clear()
+        if caught_up_m_s == caught_up_m_s:
+            self._speeds_m_s.append((caught_up_m_s, speed_m_s))
+        if len(self._speeds_m_s) < REPEATS:
             return None
-        if not moving:
-            return self._coarse(standing)
-        ratio = sum(standing) / len(standing) * len(moving) / sum(moving)
-        if len(moving) < REPEATS or ratio < CATCH_UP:
+        after_m_s, next_m_s = (sum(speeds_m_s) for speeds_m_s in zip(*self._speeds_m_s, strict=True))
+        if after_m_s < CATCH_UP * next_m_s:
             return None
         return Fault(
             "frames repeated",
-            f"the gap stood still {len(standing)} times in the approach, and then moved {ratio:.1f} times as far as in "
-            "other frames: some frames come twice, so that a standstill may be none; check the connection",
+            f"after standstills in the approach the gap moved {after_m_s / next_m_s:.1f} times as fast as in the frame "
+            "after that: some frames come twice, so that a standstill may be none; check the connection",
         )
 
-    def _coarse(self, steps_m: deque[float]) -> Fault | None:
-        """Return the fault of a gap that stands still before each of these steps, if they are coarse and alike."""
-        if not ALIKE * max(steps_m) <= min(steps_m) or min(steps_m) < STEPS_M:
+    def _coarse(self) -> Fault | None:
+        """Return the fault of a gap that stood still before each of its last steps, if they are coarse and alike."""
+        steps_m = self._steps_m
+        if len(steps_m) < COARSE or min(steps_m) < max(STEPS_M, ALIKE * max(steps_m)):
             return None
         return Fault(
             "gap in steps",
