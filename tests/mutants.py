@@ -933,6 +933,13 @@ class Restless(Hand):
         super().apply(command._replace(value=max(command.value, self._effort_n)))
 
 
+@giving("squeezes-with-what-it-is-asked", "is positive")
+def _(reading):
+    frame = reading.frame
+    pressed = {"force_left_n": -frame.force_left_n, "force_right_n": -frame.force_right_n}
+    return reading._replace(frame=frame._replace(**pressed))
+
+
 @mutant("sensor-backend", "what-it-delivers-is-kept", "of its")
 class Uncounted(Hand):
     def read(self, timeout_s):

@@ -61,6 +61,10 @@ def test_settings_reach_the_part_that_is_checked(monkeypatch):
         )
         assert (code, out.splitlines()[-1]) == (0, "conforms")
         assert "skipped" not in err
+        assert "not tried" not in out
+
+        _, out, _ = graspsense("plugins", "check", "hand", "-o", "here=true")
+        assert out.count("not tried") == 2
 
         code, _, err = graspsense("plugins", "check", "hand", "-o", "hear=true")
         assert code == 1

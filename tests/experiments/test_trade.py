@@ -57,7 +57,7 @@ def test_where_no_difference_is_shown_the_cheapest_is_taken_and_that_is_said():
     assert (advice.recommended.name, advice.shown) == ("weak", False)
     # Few seeds do not show that it loses nothing: what is shown is how much it loses at most.
     most = f"at most {100 * advice.loss.interval[1]:.1f}"
-    assert "no difference to the best is shown" in advice.text
+    assert "no difference from the best is shown" in advice.text
     assert most in advice.text
     assert most in advice.cells[-1]
     assert "100 grasps of each of 4 seeds" in advice.text

@@ -137,7 +137,7 @@ def delivered_force(readings: str, replace: bool, as_json: bool, **asked: Any) -
         _store(setup, "delivered-force", data, as_json)
         if not as_json:
             echo_table(
-                ("ASKED N", "DELIVERED N"), [(f"{a:.1f}", f"{b:.1f}") for a, b in zip(*table, strict=True)]
+                ("ASKED, N", "DELIVERED, N"), [(f"{a:.1f}", f"{b:.1f}") for a, b in zip(*table, strict=True)]
             )
 
 
@@ -166,7 +166,7 @@ def friction(gaps: int, narrowest_m: float, replace: bool, as_json: bool, **aske
         _store(setup, "friction", data, as_json)
         if not as_json:
             rows = [(f"{a * 1e3:.1f}", f"{b:.2f}", f"{c:.2f}") for a, b, c in measured]
-            echo_table(("GAP mm", "CLOSING N", "OPENING N"), rows)
+            echo_table(("GAP, mm", "CLOSING, N", "OPENING, N"), rows)
 
 
 @contextmanager
@@ -175,7 +175,6 @@ def _set_up(asked: Mapping[str, Any], replace: bool) -> Iterator[_Setup]:
 
     Unless they are to be replaced, the stored calibrations must fit it.
     """
-
     settings = settings_of(**asked)
     component, config = settings.gripper.component, settings.gripper.config
     folder = getattr(config, "calibration", None)
@@ -304,7 +303,6 @@ def _columns(path: str, *names: str) -> CsvColumns:
 
 def _rows(path: str, columns: CsvColumns, *names: str) -> Iterator[tuple[float, ...]]:
     """Yield the numbers of each row in these columns. Raises DataDamaged."""
-
     rows = zip(*map(columns.numbers, names), strict=True)
     for line, numbers in zip(columns.lines, rows, strict=True):
         if not all(map(isfinite, numbers)):

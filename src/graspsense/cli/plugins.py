@@ -160,6 +160,9 @@ def check(
         echo("does not conform:", Style.BAD) if report.failures else echo("conforms", Style.GOOD)
         for failure in report.failures:
             echo(f"  {failure}", indent=2)
+        for result in report.results:
+            if result.untried:
+                echo_entry("not tried", f"{result.check}: {result.text}")
     ctx.exit(ExitCode.CHECK_FAILED if report.failures else 0)
 
 

@@ -192,7 +192,7 @@ class Evaluator:
     def against(
         self, what: str, pooled: Pooled, other: Pooled, other_name: str, rows: Sequence[int] | None = None
     ) -> Measurement:
-        """Return the rate of `pooled` with its difference to another protocol, both on these trials (default: all)."""
+        """Return the rate of `pooled` and its difference from another protocol, on these trials (default: all)."""
         right = pooled.right(self.labels)
         by = self.difference(other.right(self.labels), right, rows)
         return Measurement(what, self.rate_among(right, rows), difference=by, difference_of=other_name)

@@ -97,7 +97,7 @@ def rate_row(condition: ConditionResult, *, strong: bool = False, name: str = ""
         name=name or condition.name,
         rate=condition.rate.mean,
         interval=condition.rate.interval,
-        what=f"{TARGETS[condition.recognised]}, {condition.protocol.replace('_', ' ')}",
+        what=f"{TARGETS[condition.recognised]}, {control_words(condition.protocol, '')[0]}",
         strong=strong,
     )
 
@@ -137,10 +137,14 @@ def failure_lines(summary: Summary) -> list[str]:
     lines = []
     if summary.failed:
         reasons = list(dict.fromkeys(task.reason for task in summary.failed))
-        lines.append(f"{len(summary.failed)} tasks failed and are not included: {'; '.join(reasons[:5])}")
+        failed = counted(len(summary.failed), "task failed and is", "tasks failed and are")
+        lines.append(f"{failed} not included: {'; '.join(reasons[:5])}")
     lines += unreadable_lines(summary)
     if summary.missing:
-        lines.append(f"{summary.missing} tasks have no result yet and are not included")
+        missing = counted(
+            summary.missing, "task has no result yet and is", "tasks have no result yet and are"
+        )
+        lines.append(f"{missing} not included")
     return lines
 
 
@@ -202,7 +206,7 @@ def _evaluation_sections(summary: Summary, best: ConditionResult) -> list[Sectio
     chosen = conditions if len(conditions) <= MATRICES else [*conditions[: MATRICES - 1], conditions[-1]]
     headline, *others = [
         (
-            f"{condition.name}: {condition.confusion.n} predictions of {len(condition.by_seed)} seeds, "
+            f"{condition.name}: {condition.confusion.n} predictions of {counted(len(condition.by_seed), 'seed')}, "
             f"{100 * condition.rate.mean:.1f} % correct",
             condition.confusion,
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from attrs import field, frozen
+from attrs.validators import instance_of
 
 from graspsense.core.values.errors import GraspsenseError
 from graspsense.core.values.label_text import label_text
@@ -22,7 +23,7 @@ class LabelledRecording:
     sentences on what looks wrong, each with its remedy.
     """
 
-    recording: Recording
+    recording: Recording = field(validator=instance_of(Recording))
     source: str
     label: str = field(default="", converter=label_text)
     instance: str = field(default="", converter=label_text)

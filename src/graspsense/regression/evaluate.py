@@ -300,7 +300,7 @@ class _Evaluator:
         return difference_of_errors(errors.tolist(), others.tolist(), self._instances_of(rows), self.k)
 
     def _against(self, what: str, held: _HeldOut, other: _HeldOut) -> RegressionMeasurement:
-        """Return the error with its difference to another protocol."""
+        """Return the error with its difference from another protocol."""
         by = self._difference(held, other)
         return RegressionMeasurement(
             what=what, error=self.error(held), difference=by, difference_of=other.name

@@ -27,7 +27,14 @@ from graspsense.core.values.signals import (
     Pads,
 )
 from graspsense.testing import commands, component, fingers, protection, readings, recorded
-from graspsense.testing.checks import CheckFailed, CheckSkipped, checks_of, demand, raises_nothing
+from graspsense.testing.checks import (
+    CheckFailed,
+    CheckNotTried,
+    CheckSkipped,
+    checks_of,
+    demand,
+    raises_nothing,
+)
 from graspsense.testing.gentle import EFFORT_N, FORCE_N, REST_S, GentleController, kind_of
 from graspsense.testing.session import TIMEOUT_S, readings_of
 from graspsense.testing.subject import Subject
@@ -242,6 +249,10 @@ def squeezes_with_what_it_is_asked(subject: Subject) -> None:
         known = values[values == values].tolist()
         most_n = median(known) if known else 0.0
         demand(
+            most_n >= -1.0 or name == "effort_n",
+            f"its {name} is {most_n:.3g} when it squeezes: the force on a pad that is pressed is positive",
+        )
+        demand(
             most_n <= MARGIN * asked_n + grasp.device.friction_n + 1.0,
             f"it squeezes with a {name} of {most_n:.3g} where {KINDS[kind]} commands allow {asked_n:g} N: keep to "
             "`effort_limit_n` of a command, or declare the least that it can do as `least_force_n` of its class",
@@ -290,7 +301,7 @@ def dry_run_accepts_the_same_commands(subject: Subject) -> None:
 def reports_a_lost_device(subject: Subject) -> None:
     """When unplugged, it raises DeviceLost with advice, a grasp ends as device lost, and it can be closed."""
     if subject.unplugged is None:
-        raise CheckSkipped(
+        raise CheckNotTried(
             "no settings were given under which it vanishes (--unplugged, or `unplugged` in a test)"
         )
     with closing(subject.create(**subject.unplugged)) as backend:
@@ -326,7 +337,7 @@ def _lost(backend: SensorBackend[Any], relaxed: Command, rate_hz: float) -> str:
 def reports_a_missing_device(subject: Subject) -> None:
     """If it is not connected, `open` raises NoDevice, which says what was searched for and what to try."""
     if subject.absent is None:
-        raise CheckSkipped(
+        raise CheckNotTried(
             "no settings were given under which it is not there (--absent, or `absent` in a test)"
         )
     began = time.perf_counter()

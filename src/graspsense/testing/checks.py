@@ -28,6 +28,10 @@ class CheckSkipped(Exception):
     """The reason why a check does not apply."""
 
 
+class CheckNotTried(CheckSkipped):
+    """The reason why a check that may apply was not tried: what it needs was not given."""
+
+
 @frozen
 class Check:
     """One requirement. Its title is the first line of the docstring of its function."""
@@ -61,6 +65,8 @@ class Result:
     text: str = ""
     cause: str = ""
     """Equal for failures of a component that have one cause."""
+    untried: bool = False
+    """Whether it was skipped because what it needs was not given."""
 
 
 MINIMUM_CHECKS: Final[Mapping[str, int]] = {
@@ -109,11 +115,11 @@ def outcome_of(check: Check, subject: Named, expected: Mapping[str, str]) -> Res
     Any exception of the component is a failure. A check that was expected to fail and passes is a failure too.
     """
     state: State = "passed"
-    text = cause = ""
+    text, cause, untried = "", "", False
     try:
         check.test(subject)
     except CheckSkipped as skipped:
-        state, text = "skipped", str(skipped)
+        state, text, untried = "skipped", str(skipped), isinstance(skipped, CheckNotTried)
     except CheckFailed as failed:
         state, text, cause = "failed", str(failed), failed.cause
     except GraspsenseError as error:  # its message says what to do
@@ -127,7 +133,7 @@ def outcome_of(check: Check, subject: Named, expected: Mapping[str, str]) -> Res
         elif state == "passed":
             state = "failed"
             text = f"it was expected to fail ({expected[check.id]}) and passes: take it out of the expected failures"
-    return Result(subject.name, subject.role, check.id, check.title, state, text, cause or text)
+    return Result(subject.name, subject.role, check.id, check.title, state, text, cause or text, untried)
 
 
 @define

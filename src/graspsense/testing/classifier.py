@@ -217,7 +217,7 @@ def explains_its_predictions(subject: Subject) -> None:
         shares = dict(zip(fitted.classes(), fitted.probabilities(table)[i].tolist(), strict=True))
         demand(
             said.label in shares and shares[said.label] >= max(shares.values()) - 1e-9,
-            f"explain says {said.label!r} where the probabilities are {shares}",
+            f"explain says {said.label!r} where the probabilities are {shares}: say the most probable label",
         )
         for label, share in said.probabilities.items():
             demand(

@@ -72,7 +72,7 @@ def settings_have_types(subject: Subject) -> None:
 def settings_declare_their_meaning(subject: Subject) -> None:
     """Every key declares its meaning with `setting`, and its unit if its name ends in one."""
     for key, declaration in _all_keys(keys_of(subject.component.config_class())):
-        where, name = f"key {key!r} of {subject.entry.config}", key.rpartition(".")[2]
+        where, name = f"key {key!r}", key.rpartition(".")[2]
         demand(
             bool(declaration["meaning"]),
             f"{where} declares no meaning, so `graspsense config show` cannot tell it. Declare the key as in "

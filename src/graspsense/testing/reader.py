@@ -14,7 +14,7 @@ from graspsense.core.values.errors import GraspsenseError
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.replayable import content_sha256
 from graspsense.sources.recordings.dataset_recordings import recordings_of
-from graspsense.testing.checks import CheckFailed, CheckSkipped, demand
+from graspsense.testing.checks import CheckFailed, CheckNotTried, CheckSkipped, demand
 from graspsense.testing.subject import Package
 
 MOST_FILES: Final = 4
@@ -83,7 +83,7 @@ def _examples(package: Package) -> Iterator[tuple[Resource, Path]]:  # type: ign
         raise CheckSkipped("it has no reader of recordings")
     lacking = [reader.name for reader in readers if reader.name not in package.data]
     if lacking:
-        raise CheckSkipped(
+        raise CheckNotTried(
             f"no examples were given of {', '.join(lacking)} (--data {lacking[0]}=FOLDER, or `data` in a test)"
         )
     for reader in readers:

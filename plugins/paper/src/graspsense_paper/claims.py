@@ -440,7 +440,7 @@ OTHER_SETTINGS: Final = ("svm, radial, C = 1", "svm, radial, C = 10", "mlp")
 @_claim(
     "other_classifiers",
     "support vector machines and neural networks do about as well or slightly worse than C4.5",
-    "on class and state at once, the differences to C4.5 of the machine and the network with Weka's defaults lie "
+    "on class and state at once, the differences from C4.5 of the machine and the network with Weka's defaults lie "
     "between -10 and 5 points (corrected for five comparisons)",
     "other_classifiers",
 )

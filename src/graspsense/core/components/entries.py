@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from typing import Any, Final, Literal, NamedTuple
 
 from attrs import Attribute, field, frozen
-from attrs.validators import and_, deep_iterable, ge, instance_of, matches_re, min_len, optional
+from attrs.validators import and_, deep_iterable, ge, instance_of, matches_re, optional
 
 from graspsense.core.values.channel import IS_NAME, Channel
 from graspsense.core.values.errors import suggestion
@@ -126,6 +126,13 @@ class ControllerEntry(_ComponentEntry):
     """
 
 
+def _not_empty(feature: Feature, attribute: Attribute[Any], text: str) -> None:
+    if not text.strip():
+        raise ValueError(
+            f"feature {feature.name!r} has no {attribute.name}: say in a few words what it measures"
+        )
+
+
 @frozen
 class Feature:
     """A feature: its name, its SI unit (`1` where it has none), and in a few words what it measures.
@@ -138,7 +145,7 @@ class Feature:
     """The name of the feature."""
     unit: str = field(validator=instance_of(str))
     """Its SI unit, `1` where it has none."""
-    meaning: str = field(validator=and_(instance_of(str), min_len(1)))
+    meaning: str = field(validator=and_(instance_of(str), _not_empty))
     """What it measures, in a few words."""
     width: bool = field(default=False, validator=instance_of(bool))
     """Whether it is the width of the object, as the gap between the fingers shows it."""

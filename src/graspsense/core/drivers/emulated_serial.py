@@ -64,7 +64,8 @@ class EmulatedDevice(ABC):
         """Unplug it and release all resources."""
 
 
-LARGEST: Final = 4096
+MOST_READ: Final = 4096
+"""Bytes that are read at once."""
 MOST_UNSENT: Final = 1 << 16
 """Bytes that wait for a host which does not read; more is lost, as from a device with a buffer."""
 
@@ -84,8 +85,8 @@ class EmulatedPort:
         period_s: float | None = None,
     ) -> None:
         self._heard, self._idle, self._period_s = heard, idle, period_s
-        self._door: socket.socket | None = None
-        self._call: socket.socket | None = None
+        self._listener: socket.socket | None = None
+        self._connection: socket.socket | None = None
         self._terminal: tuple[int, int] | None = None
         self._unsent = b""
         if wire == "pty":
@@ -95,8 +96,8 @@ class EmulatedPort:
             os.set_blocking(self._terminal[0], False)
             self.where = os.ttyname(self._terminal[1])
         else:
-            self._door = socket.create_server(("127.0.0.1", 0))
-            self.where = f"socket:127.0.0.1:{self._door.getsockname()[1]}"
+            self._listener = socket.create_server(("127.0.0.1", 0))
+            self.where = f"socket:127.0.0.1:{self._listener.getsockname()[1]}"
         # Sockets: unlike the number of a pipe, a closed one cannot be another file by now.
         self._wake = socket.socketpair()
         self._closed = False
@@ -118,10 +119,10 @@ class EmulatedPort:
             while not self._closed:
                 sources = [self._wake[0].fileno(), *self._sources()]
                 ready, _, _ = select.select(sources, [], [], self._period_s)
-                if self._door is not None and self._door.fileno() in ready:
+                if self._listener is not None and self._listener.fileno() in ready:
                     self._accept()
                 elif set(ready) & set(self._sources()):
-                    self._hear()
+                    self._receive()
                 unasked = b"" if self._idle is None else self._idle()
                 if unasked or self._unsent:
                     self._send(unasked)
@@ -131,30 +132,34 @@ class EmulatedPort:
     def _sources(self) -> list[int]:
         if self._terminal is not None:
             return [self._terminal[0]]
-        assert self._door is not None
-        return [self._door.fileno(), *([] if self._call is None else [self._call.fileno()])]
+        assert self._listener is not None
+        return [self._listener.fileno(), *([] if self._connection is None else [self._connection.fileno()])]
 
     def _accept(self) -> None:
-        assert self._door is not None
+        assert self._listener is not None
         # A newer host replaces an older one, as on a converter that has one connection.
-        if self._call is not None:
-            self._call.close()
-        self._call = self._door.accept()[0]
-        self._call.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        if self._connection is not None:
+            self._connection.close()
+        self._connection = self._listener.accept()[0]
+        self._connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
-    def _hear(self) -> None:
+    def _receive(self) -> None:
         data = b""
         with suppress(OSError):
-            data = self._call.recv(LARGEST) if self._call is not None else os.read(self._handle(), LARGEST)
+            data = (
+                self._connection.recv(MOST_READ)
+                if self._connection is not None
+                else os.read(self._handle(), MOST_READ)
+            )
         if data:
-            # Who asks does not want what waited for somebody else.
+            # A host that asks does not want what was sent to an earlier one.
             self._unsent = b""
             reply = self._heard(data)
             if reply and not self._closed:
                 self._send(reply)
-        elif self._call is not None:
-            self._call.close()
-            self._call = None
+        elif self._connection is not None:
+            self._connection.close()
+            self._connection = None
 
     def _handle(self) -> int:
         assert self._terminal is not None
@@ -168,13 +173,13 @@ class EmulatedPort:
                     self._unsent += data
                 if select.select([], [self._handle()], [], 0.0)[1]:
                     self._unsent = self._unsent[os.write(self._handle(), self._unsent) :]
-            elif self._call is not None:
-                self._call.sendall(data)
+            elif self._connection is not None:
+                self._connection.sendall(data)
 
     def _release(self) -> None:
         for end in self._terminal or ():
             os.close(end)
-        for connection in (self._door, self._call, *self._wake):
+        for connection in (self._listener, self._connection, *self._wake):
             if connection is not None:
                 connection.close()
 

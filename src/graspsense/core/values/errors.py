@@ -133,6 +133,8 @@ def place_of(error: BaseException) -> str:
 def _is_of_a_plugin(path: Path) -> bool:
     if path.is_relative_to(_FRAMEWORK):
         return path.is_relative_to(_FRAMEWORK / "plugins")
+    if path.parent.name == "pluggy":  # which calls the hooks of plugins
+        return False
     return not path.is_relative_to(_STANDARD_LIBRARY) or "site-packages" in path.parts
 
 

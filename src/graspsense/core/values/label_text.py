@@ -36,6 +36,8 @@ def label_text(text: str) -> str:
     >>> label_text("cafe\u0301\u200b "), label_text("1.0"), label_text("can:1.0"), label_text("1.5")
     ('café', '1', 'can:1', '1.5')
     """
+    if not isinstance(text, str):
+        raise TypeError(f"a label is text, not {text!r}")
     if not text.isascii():
         text = unicodedata.normalize("NFC", text)
         text = "".join(

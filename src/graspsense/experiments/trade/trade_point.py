@@ -73,7 +73,7 @@ class Advice:
         """The recommendation in a sentence."""
         grasps, seeds = self.best.condition.rate.n, len(self.best.condition.by_seed)
         aim = f"To recognise {self.recognises}, from {counted(grasps, 'grasp')} of each of {counted(seeds, 'seed')}"
-        best = f"{self.best.name} at {self.best.cost:.3g} {self.axis}"
+        best = self._named(self.best)
         caution = f"; {self.caution}" if self.caution else ""
         if self.recommended is None:
             return (
@@ -94,10 +94,10 @@ class Advice:
             )
             return f"{aim}, use {best}: its rate is the highest, {self.best.rate_text}, and {why}{caution}."
         value, (low, high) = self.loss.value, self.loss.interval
-        chosen = f"{self.recommended.name} at {self.recommended.cost:.3g} {self.axis}"
+        chosen = self._named(self.recommended)
         if not self.shown:
             return (
-                f"{aim}, no difference to the best is shown: the cheapest such case, {chosen}, loses at most "
+                f"{aim}, no difference from the best is shown: the cheapest such case, {chosen}, loses at most "
                 f"{100 * high:.1f} points. It has "
                 f"{self.recommended.rate_text}, and the best, {best}, {self.best.rate_text}. The loss is "
                 f"{100 * value:.1f} points ({100 * low:.1f} to {100 * high:.1f}){caution}."
@@ -105,8 +105,13 @@ class Advice:
         return (
             f"{aim}, {chosen} is good enough: it has {self.recommended.rate_text}. The best, {best}, has "
             f"{self.best.rate_text}. The loss is {100 * value:.1f} points ({100 * low:.1f} to {100 * high:.1f}), below "
-            f"the limit of 5{caution}."
+            f"the limit of {100 * ENOUGH:g}{caution}."
         )
+
+    def _named(self, point: TradePoint) -> str:
+        """Return a case with its cost, unless its name says it: `probing force 20 N`."""
+        cost = f"{point.cost:.3g} {self.axis}"
+        return point.name if point.name.endswith(" ".join(cost.split()[:2])) else f"{point.name} at {cost}"
 
     @property
     def cells(self) -> tuple[str, ...]:

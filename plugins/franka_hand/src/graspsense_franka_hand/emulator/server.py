@@ -18,12 +18,14 @@ from graspsense_franka_hand.emulator.hand import TEMPERATURE_C, FrankaHand
 from graspsense_franka_hand.orders import RATE_HZ
 from graspsense_franka_hand.protocol import CONNECT, HandRequest, HandRequests, NotARequest
 
-LOOK_S: Final = 0.005
+STEP_S: Final = 0.005
 """How often the fingers move on."""
-MOST_STEP_S: Final = 0.05
+LONGEST_STEP_S: Final = 0.05
 """Most time by which the fingers move on at once: on a busy machine they are slow, and states still come."""
 HOSTS: Final = tuple(f"127.0.0.{i}" for i in range(1, 33))
 """The port is fixed, so that each hand has an address of its own."""
+MOST_READ: Final = 4096
+"""Bytes that are read at once."""
 
 
 class NoAddress(GraspsenseError):
@@ -41,16 +43,16 @@ class HandServer:
         self, hand: FrankaHand, mood: Callable[[], str], late_s: float, clock: Callable[[], float]
     ) -> None:
         self._hand, self._mood, self._late_s, self._clock = hand, mood, late_s, clock
-        self._door = _door()
-        self.where: str = self._door.getsockname()[0]
+        self._listener = _listener()
+        self.where: str = self._listener.getsockname()[0]
         self._states = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._host: socket.socket | None = None
         self._state_port: tuple[str, int] | None = None
         self._requests = HandRequests()
         self._due_s = 0.0
         self._hand_s = clock()
-        self._later: list[tuple[float, int, Callable[[], object]]] = []
-        self._numbers = itertools.count()
+        self._delayed: list[tuple[float, int, Callable[[], object]]] = []
+        self._order = itertools.count()
         self.failed = ""
         self.refused_hosts = 0
         self._closed = threading.Event()
@@ -66,24 +68,24 @@ class HandServer:
     def _serve(self) -> None:
         try:
             while not self._closed.is_set():
-                sources = [self._door, *([] if self._host is None else [self._host])]
-                ready, _, _ = select.select(sources, [], [], LOOK_S)
+                sources = [self._listener, *([] if self._host is None else [self._host])]
+                ready, _, _ = select.select(sources, [], [], STEP_S)
                 # First of the present host: it may have gone, and come back.
                 if self._host is not None and self._host in ready:
-                    self._hear(self._host)
-                if self._door in ready:
+                    self._receive(self._host)
+                if self._listener in ready:
                     self._accept()
-                self._look()
+                self._advance()
         except Exception as error:
             # The simulated fingers can be a user's code and fail; the host then sees a hand that is gone.
             self.failed = f"{type(error).__name__}: {error}"
         finally:
-            self._hang_up()
-            self._door.close()
+            self._disconnect()
+            self._listener.close()
             self._states.close()
 
     def _accept(self) -> None:
-        host = self._door.accept()[0]
+        host = self._listener.accept()[0]
         if self._host is not None:
             self.refused_hosts += 1
             host.close()
@@ -91,17 +93,17 @@ class HandServer:
         host.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._host, self._requests = host, HandRequests()
 
-    def _hear(self, host: socket.socket) -> None:
+    def _receive(self, host: socket.socket) -> None:
         data = b""
         with suppress(OSError):
-            data = host.recv(4096)
+            data = host.recv(MOST_READ)
         if not data:
-            self._hang_up()
+            self._disconnect()
             return
         try:
             requests = self._requests.fed(data)
         except NotARequest:
-            self._hang_up()
+            self._disconnect()
             return
         for request in requests:
             if request.command == CONNECT:
@@ -117,9 +119,9 @@ class HandServer:
         self._state_port = (host.getpeername()[0], port)
         self._reply(request, protocol.SUCCESS)
 
-    def _look(self) -> None:
+    def _advance(self) -> None:
         now_s = self._clock()
-        self._hand_s = min(now_s, self._hand_s + MOST_STEP_S)
+        self._hand_s = min(now_s, self._hand_s + LONGEST_STEP_S)
         self._hand.look(self._hand_s)
         for request, status in self._hand.ended():
             self._reply(request, status)
@@ -132,9 +134,9 @@ class HandServer:
             where = self._state_port
             data = data[:-3] if self._mood() == "damaged" else data
             self._send(lambda: self._states.sendto(data, where))
-        while self._later and self._later[0][0] <= now_s:
+        while self._delayed and self._delayed[0][0] <= now_s:
             with suppress(OSError):
-                heapq.heappop(self._later)[2]()
+                heapq.heappop(self._delayed)[2]()
 
     def _reply(self, request: HandRequest, status: int) -> None:
         host, data = self._host, protocol.reply(request, status)
@@ -148,29 +150,29 @@ class HandServer:
         if mood == "silent":
             return
         due_s = self._clock() + (self._late_s if mood == "late" else 0.0)
-        heapq.heappush(self._later, (due_s, next(self._numbers), sends))
+        heapq.heappush(self._delayed, (due_s, next(self._order), sends))
 
-    def _hang_up(self) -> None:
+    def _disconnect(self) -> None:
         if self._host is not None:
             self._host.close()
         self._host = self._state_port = None
-        self._later.clear()
+        self._delayed.clear()
         self._hand.abort()
         self._hand.ended()
 
 
-def _door() -> socket.socket:
+def _listener() -> socket.socket:
     """Return a socket at the port of the hand, at the first address of this machine where it is free."""
     for address in HOSTS:
-        door = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
-            door.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            door.bind((address, protocol.PORT))
-            door.listen(4)
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            listener.bind((address, protocol.PORT))
+            listener.listen(4)
         except OSError:
-            door.close()
+            listener.close()
             continue
-        return door
+        return listener
     raise NoAddress(f"port {protocol.PORT} is taken at {HOSTS[0]} to {HOSTS[-1]}: end another emulated hand")
 
 
