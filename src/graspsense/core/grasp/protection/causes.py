@@ -52,7 +52,7 @@ GRASP: Final[Mapping[str, tuple[str, ...]]] = {
     ),
     "clock slow": ("gap and velocity disagree", "not the commanded speed"),
     "frames lost": ("gap late",),
-    "gap jumps": ENCODER,
+    "gap jumps": ("effort not as before", *ENCODER),
     "gap and velocity disagree": ("gap late", "gap not as before", "not the commanded speed", "stalled"),
     "fingers did not open": ("gap late", "gap not as before"),
     "effort stuck": ("effort has the wrong sign", "motor off", "motor too strong", "motor too weak"),
