@@ -65,7 +65,7 @@ def test_check_on_a_table_in_words(tmp_path):
     table(tmp_path / "jar.csv", TABLE)
     code, out, _ = graspsense("import", tmp_path / "jar.csv", "--check", "--plot", tmp_path / "x.png")
     assert code == 0
-    assert all(word in out for word in ("Resolution", "Age, s", "2 in F (N)", "t (ms)' [ms]"))
+    assert all(word in out for word in ("RESOLUTION", "AGE, s", "2 in F (N)", "t (ms)' [ms]"))
 
 
 @pytest.mark.slow
