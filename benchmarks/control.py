@@ -318,17 +318,12 @@ def main() -> None:
     if asked.short:
         asked.grasps = 1
     sent, feature = recorded()
-    paced = paced_us(asked.grasps, sent, feature)
+    times_us = ticks_us(asked.grasps, sent, feature) | paced_us(asked.grasps, sent, feature)
     added, spent = watched_us(asked.grasps, sent, feature)
-    times_us = {
-        **ticks_us(asked.grasps, sent, feature),
-        **paced,
-        **spent,
-    }
     quantiles = (0.5, 0.99, 0.999, 1.0)
     rows = [
         [name, str(len(us)), *(f"{np.quantile(us, share):.1f}" for share in quantiles)]
-        for name, us in times_us.items()
+        for name, us in (times_us | spent).items()
         if us
     ]
     scheduler = SCHEDULERS.get(os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK, "other")

@@ -250,7 +250,7 @@ def test_a_prediction_that_takes_long_makes_no_tick_wait_and_the_next_checkpoint
 
     assert grasp.outcome == Outcome.STEADY
     told = [event.what for event in grasp.events if event.source == "model"]
-    assert told == ["0.05 s after the contact: no prediction, the one before still runs"]
+    assert told == ["0.05 s after the contact: no prediction, since the last one is still being made"]
 
 
 def test_a_prediction_that_fails_does_not_end_the_grasp(model):

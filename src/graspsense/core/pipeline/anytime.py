@@ -96,7 +96,9 @@ class Anytime:
         after_s, model = self._left.pop(0)
         self._set_due()
         if self._running is not None:
-            skipped = f"{after_s:g} s after the contact: no prediction, the one before still runs"
+            skipped = (
+                f"{after_s:g} s after the contact: no prediction, since the last one is still being made"
+            )
             self._tell(t_s, phase, skipped, None)
             return ""
         compute = self._prediction_of(after_s, model)
