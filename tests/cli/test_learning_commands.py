@@ -139,21 +139,24 @@ def test_a_certainty_by_trials_is_said_to_be_that_of_the_same_objects(tmp_path):
     rng = np.random.default_rng(2)
     widths = rng.normal(60.0, 5.0, 40)
     rows = [
-        f"{('can', 'jar')[k % 2]},thing {k},{widths[k] + 0.05 * rng.normal():.4f}"
+        (("can", "jar")[k % 2], f"thing {k}", f"{widths[k] + 0.05 * rng.normal():.4f}")
         for k in range(40)
         for _ in range(4)
     ]
-    for name, some in (("known.csv", rows[:80]), ("new.csv", rows[80:])):
-        (tmp_path / name).write_text("\n".join(["what,thing,p_first [mm]", *some]) + "\n")
-    said = {}
-    for more in ((), ("--instance", "thing")):
+    known, new = [rows[k] for k in rng.permutation(80)], rows[80:]
+    said = []
+    for columns in ((0, 2), (0, 1, 2)):
+        for name, some in (("known.csv", known), ("new.csv", new)):
+            lines = [("what", "thing", "p_first [mm]"), *some]
+            (tmp_path / name).write_text("".join(",".join(row[k] for k in columns) + "\n" for row in lines))
         model = tmp_path / "m.json"
-        graspsense("train", tmp_path / "known.csv", "--label", "what", *more, "--out", model, "--overwrite")
-        said[more] = json.loads(printed("predict", model, tmp_path / "new.csv", "--label", "what", "--json"))
-    by_trials, by_objects = said.values()
+        graspsense("train", tmp_path / "known.csv", "--label", "what", "--out", model, "--overwrite")
+        said.append(json.loads(printed("predict", model, tmp_path / "new.csv", "--label", "what", "--json")))
+    by_trials, by_objects = said
     assert by_trials["rate"]["rate"] < 0.75
-    assert any("of other objects it knows less" in warning for warning in by_trials["warnings"])
-    assert not any("of other objects" in warning for warning in by_objects["warnings"])
+    for predicted, of_same_objects in ((by_trials, True), (by_objects, False)):
+        assert any("same objects" in warning for warning in predicted["warnings"]) is of_same_objects
+        assert {row["of_same_objects"] for row in predicted["predictions"]} == {of_same_objects}
 
 
 def test_a_model_of_states_or_classes(csv, tmp_path):

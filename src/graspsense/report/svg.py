@@ -184,7 +184,7 @@ class Picture:
             self.line([(x, top), (x, bottom)], GRID, width=1)
             self.text(x, bottom + 13, number(value), anchor="middle", ink=QUIET)
         self.parts.append("</g>")
-        lines = lines_within(title, self.width)
+        lines = lines_within(title, self.width) if title else []
         middle = (scale.start + scale.end if len(lines) == 1 else self.width) / 2
         for k, words in enumerate(lines):
             self.text(middle, bottom + 28 + LINE * k, words, anchor="middle", ink=QUIET)

@@ -271,9 +271,11 @@ def _rough(what: str, times: Numbers, force: Numbers) -> Iterator[str]:
     coarse = 0.5 * float(apart.min())
     in_steps = np.allclose(apart / (2.0 * coarse), np.round(apart / (2.0 * coarse)))
     if varies > ROUGH * span:
-        yield f"{what} varies by {varies / span:.0%} of its range around its course, and so does each feature of it"
+        share = f"{100 * varies / span:.0f} %"
+        yield f"{what} varies by {share} of its range around its course, and so does each feature of it"
     elif in_steps and coarse > COARSE * span:
-        yield f"{what} has steps of {2.0 * coarse / span:.0%} of its range: each value is up to half a step off"
+        share = f"{200 * coarse / span:.0f} %"
+        yield f"{what} has steps of {share} of its range: each value is up to half a step off"
 
 
 def _rises_at_once(times: Numbers, force: Numbers, units: Mapping[str, str]) -> Iterator[str]:
