@@ -1,13 +1,15 @@
 """A robot with a gripper, in a process of its own: topics at 100 Hz and an action. It prints a line for each goal.
 
 python fake_robot.py KIND: KIND is GripperCommand or ParallelGripperCommand. A line of its input is a fault from now on:
-silent (no wrenches), nan, wrong (bytes that are no wrench), late (stamps that fall behind), refuse (goals).
+silent (no wrenches), nan, wrong (bytes that are no wrench), late (stamps that fall behind), behind (messages come
+a fifth of a second later), twice (each fourth joint state is the one before), refuse (goals).
 """
 
 import json
 import sys
 import threading
 import time
+from collections import deque
 
 from graspsense_ros2.action_server import ActionServer
 from graspsense_ros2.message_types import encode
@@ -20,6 +22,9 @@ OBJECT_M, STIFFNESS_N_M = 0.05, 2000.0
 """Width and stiffness of what is between the fingers."""
 FALLS_BEHIND = 0.5
 """Of a late message: seconds by which its stamp falls behind in a second."""
+BEHIND = 20
+"""Messages by which a robot is behind, and AGAIN: each n-th message of one that sends some twice."""
+AGAIN = 4
 
 
 class Hand:
@@ -82,15 +87,21 @@ def main(kind):
     )
     threading.Thread(target=listen, args=(hand,), daemon=True).start()
     due_s = time.monotonic()
+    states, wrenches, sent = deque(maxlen=BEHIND), deque(maxlen=BEHIND), 0
     while True:
         hand.tick()
         stamp_s = time.time()
         if hand.fault == "late":
             stamp_s -= FALLS_BEHIND * (stamp_s - hand.fault_s)
         state = {"name": ["finger"], "position": [hand.gap_m / 2], "effort": [hand.force_n]}
-        joints(encode(JOINT_STATE, {"header": header(time.time()), **state}))
+        states.append(encode(JOINT_STATE, {"header": header(time.time()), **state}))
+        wrenches.append(hand.wrench(stamp_s))
+        sent += 1
+        behind = hand.fault == "behind"
+        again = hand.fault == "twice" and sent % AGAIN == 0 and len(states) > 1
+        joints(states[0] if behind else states[-2] if again else states[-1])
         if hand.fault != "silent":
-            wrench(hand.wrench(stamp_s))
+            wrench(wrenches[0 if behind else -1])
         due_s += 1.0 / RATE_HZ
         time.sleep(max(0.0, due_s - time.monotonic()))
 

@@ -66,6 +66,30 @@ def test_a_fault_of_a_topic_ends_the_grasp_and_opens_the_fingers(robot, fault, w
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("fault", "name"), [("", None), ("behind", "messages late"), ("twice", "messages repeated")]
+)
+def test_messages_that_come_late_or_twice_are_told(robot, fault, name):
+    faulty = robot()
+
+    trial = grasp(lambda event: faulty.fault(fault) if event.phase.name == "APPROACH" else None)
+
+    # A machine that is held up has late messages too.
+    told = {warning.split(":")[0] for warning in trial.warnings} & {"messages late", "messages repeated"}
+    assert name in told if name else "messages repeated" not in told
+
+
+@pytest.mark.slow
+def test_a_topic_that_stops_while_the_fingers_open_leaves_them_open(robot):
+    faulty = robot()
+
+    trial = grasp(lambda event: faulty.fault("silent") if event.phase.name == "RELEASE" else None)
+
+    assert trial.report["told_to_open"] is True
+    assert faulty.goals()[-1]["position"] == 0.085
+
+
+@pytest.mark.slow
 def test_a_robot_that_dies_ends_the_grasp(robot):
     dying = robot()
 

@@ -10,7 +10,7 @@ from math import inf, isfinite, nan
 from types import MappingProxyType
 from typing import Final, final
 
-from graspsense.gripper_api import Polling
+from graspsense.gripper_api import Polling, StatusBit
 from graspsense.plugin_api import (
     FORCE,
     NO_PADS,
@@ -36,6 +36,25 @@ GOAL_PERIOD_S: Final = 0.05
 AHEAD_M: Final = 0.004
 """How far the target can be ahead of the fingers while they close."""
 LOOK_AGAIN_S: Final = 0.1
+LATE_S: Final = 0.1
+"""By how much later than the quickest one a message may come without a fault."""
+REPEATED: Final = 3
+"""Messages without a new stamp, or with an earlier one, that are a fault."""
+MESSAGES_LATE, MESSAGES_REPEATED = 1, 2
+STATUS_BITS: Final = (
+    StatusBit(
+        mask=MESSAGES_LATE,
+        name="messages late",
+        meaning=f"their stamps are {LATE_S:g} s older than at best, so gaps, forces and times do not fit; look at the "
+        "network, the load of both computers and their clocks",
+    ),
+    StatusBit(
+        mask=MESSAGES_REPEATED,
+        name="messages repeated",
+        meaning="some have the stamp of an earlier one, so a standstill may be none; look at the node that publishes "
+        "them",
+    ),
+)
 _MUST_BE_NUMBERS: Final = frozenset({"gap", "force_left", "force_right"})
 _UNITS: Final = {"gap": "m", "velocity": "m/s", "effort": "N", "force_left": "N", "force_right": "N"}
 
@@ -85,13 +104,14 @@ class Ros2Backend(SensorBackend[Ros2Config]):
             self._polling = Polling(self.config.rate_hz)
             self._good = dict.fromkeys(self._numbers, (nan, self._polling.began_s))
             self._gap_m = self._measured()["gap"]
+            self._repeated = sum(topic.repeated + topic.late for topic in self._topics.values())
         except (DeviceLost, ConfigError) as error:
             self.close()
             raise NoDevice(str(error)) from error
         except NoDevice:
             self.close()
             raise
-        self._target_m, self._opening = self._gap_m, True
+        self._target_m = self._gap_m
         self._sent: Target | None = None
         self._sent_s = -inf
         return self._described()
@@ -106,7 +126,7 @@ class Ros2Backend(SensorBackend[Ros2Config]):
             raise DeviceLost(f"{MOST_FAILURES} goals in a row failed: {self._action.said}")
         numbers = self._measured()
         self._gap_m = numbers["gap"]
-        frame = self._polling.frame(self._gap_m, numbers.get("effort", nan))
+        frame = self._polling.frame(self._gap_m, numbers.get("effort", nan), self._status())
         frame = frame._replace(
             velocity_m_s=numbers.get("velocity", frame.velocity_m_s),
             force_left_n=numbers.get("force_left", nan),
@@ -133,7 +153,6 @@ class Ros2Backend(SensorBackend[Ros2Config]):
         )
         if stops:
             self._target_m = self._gap_m
-        self._opening = goal >= config.open_gap_m
         target = Target(
             position=self._position(self._target_m),
             effort=min(max(effort, config.least_effort_n), config.effort_limit_n),
@@ -145,18 +164,20 @@ class Ros2Backend(SensorBackend[Ros2Config]):
             self._action.want(target)
 
     def close(self) -> None:
-        """Tell the fingers to open if they were not, and leave the network."""
+        """Tell the fingers to open if they were moved, and leave the network."""
         node, self._node = self._node, None
         action, self._action = self._action, None
         if action is not None:
             action.end()
-            if self._sent is not None and not self._opening:
+            # A goal that opens may not have been sent yet, or have opened the fingers a part of the way.
+            if self._sent is not None:
                 self._report["told_to_open"] = self._told_to_open(action)
             self._report |= {
                 "frames": self._polling.frames,
                 "goals": action.goals,
                 "damaged_messages": sum(newest.damaged for newest in self._topics.values()),
                 "late_messages": sum(newest.late for newest in self._topics.values()),
+                "repeated_messages": sum(newest.repeated for newest in self._topics.values()),
             }
         if node is not None:
             node.close()
@@ -164,6 +185,13 @@ class Ros2Backend(SensorBackend[Ros2Config]):
     def report(self) -> dict[str, float | int | str | bool]:
         """Return the number of frames, of goals, and of messages that could not be used."""
         return self._report
+
+    def _status(self) -> int:
+        """Return the bits of what is wrong with the messages since the gripper was opened."""
+        newest = self._topics.values()
+        late = any(topic.lateness_s > LATE_S for topic in newest)
+        repeated = sum(topic.repeated + topic.late for topic in newest) - self._repeated
+        return MESSAGES_LATE * late + MESSAGES_REPEATED * (repeated >= REPEATED)
 
     def _told_to_open(self, action: GripperAction) -> bool:
         config = self.config
@@ -251,6 +279,7 @@ class Ros2Backend(SensorBackend[Ros2Config]):
             speed_limit_m_s=config.speed_limit_m_s,
             opening=Command(POSITION, config.open_gap_m, config.effort_limit_n, config.speed_limit_m_s),
             relaxed=Command(FORCE, 0.0, inf, inf),
+            status_bits=STATUS_BITS,
             numbers={name: number.text for name, number in self._numbers.items()},
             notes=(
                 "forces and gap are those of ROS topics; their calibration and their zero are a matter of the driver",

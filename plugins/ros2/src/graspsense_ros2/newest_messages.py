@@ -23,19 +23,20 @@ class NewestMessage:
     """The newest message of one topic; what cannot be used counts as if it had not come.
 
     A message that is damaged or not of the type is `damaged`. One whose stamp is before that of the newest one is
-    `late`, and is left out. A stamp that falls behind makes a message as old as it says: `age_s` adds by how much later
-    it came than the quickest one.
+    `late`, and is left out; one with the same stamp is `repeated`. A stamp that falls behind makes a message as old as
+    it says: `lateness_s` is by how much later it came than the quickest one, and `age_s` adds it.
     """
 
     topic: str
     type_name: str
     damaged: int = 0
     late: int = 0
+    repeated: int = 0
     columns: Mapping[str, NDArray[np.float64]] = field(factory=dict)
     _came_s: float = -inf
     _stamp_s: float = -inf
     _quickest_s: float = inf
-    _lateness_s: float = 0.0
+    lateness_s: float = 0.0
     _came: threading.Event = field(factory=threading.Event)
 
     def take(self, data: bytes) -> None:
@@ -51,16 +52,17 @@ class NewestMessage:
             if stamp_s < self._stamp_s:
                 self.late += 1
                 return
+            self.repeated += stamp_s == self._stamp_s
             self._stamp_s = stamp_s
             self._quickest_s = min(self._quickest_s, now_s - stamp_s)
-            self._lateness_s = now_s - stamp_s - self._quickest_s
+            self.lateness_s = now_s - stamp_s - self._quickest_s
         self.columns = message_columns(message, self.topic)
         self._came_s = now_s
         self._came.set()
 
     def age_s(self) -> float:
         """Return how old the newest message is; inf if none came."""
-        return time.monotonic() - self._came_s + self._lateness_s
+        return time.monotonic() - self._came_s + self.lateness_s
 
     def wait(self, timeout_s: float) -> bool:
         """Wait for the first message, and return whether it came."""
