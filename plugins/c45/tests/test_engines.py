@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -133,6 +134,7 @@ def test_many_small_fits_use_compiled_code_once_the_plain_form_took_as_long(monk
     pytest.importorskip("graspsense")
     from graspsense_c45.building import compiled
 
+    monkeypatch.delitem(sys.modules, "numba", raising=False)
     chosen = {}
     for on_disk in (True, False):
         monkeypatch.setattr(compiled, "kept", lambda slim, on_disk=on_disk: on_disk)
@@ -144,7 +146,18 @@ def test_many_small_fits_use_compiled_code_once_the_plain_form_took_as_long(monk
     assert chosen == {True: [False] + 5 * [True], False: [k >= engines.COMPILING_S for k in range(6)]}
 
 
+@pytest.mark.parametrize("on_disk", [True, False])
+def test_kept_code_is_used_at_once_where_numba_is_imported_anyway(monkeypatch, on_disk):
+    pytest.importorskip("graspsense")
+    from graspsense_c45.building import compiled
+
+    monkeypatch.setattr(compiled, "kept", lambda slim: on_disk)
+    monkeypatch.setitem(sys.modules, "numba", sys)
+    assert Fits().choose_fast("auto", 6_000, True) == on_disk
+
+
 def test_a_tree_of_the_plain_form_counts(monkeypatch):
+    monkeypatch.delitem(sys.modules, "numba", raising=False)
     fits = Fits()
     monkeypatch.setattr(fitting, "_FITS", fits)
     monkeypatch.setattr(engines, "LOADING_S", 1e-9)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from functools import cache
 from importlib.util import find_spec
 from typing import get_args
@@ -16,7 +17,7 @@ COMPILING_S = 4.0
 """Processor time for trees by the interpreter, in this process, after which "auto" compiles, which takes 4 to 7 s.
 However many fits come, they take at most about twice as long as with compiled code from the beginning."""
 LOADING_S = 0.5
-"""The same where an earlier process has kept the machine code."""
+"""The same where an earlier process has kept the machine code, for the import of numba."""
 
 _NEEDED = ("numba", "graspsense")
 """numba compiles; graspsense keeps the compiled code on disk, under a fingerprint of the code."""
@@ -53,7 +54,8 @@ class Fits:
         """
         if choose_fast(engine, n_values):
             return True
-        if engine != "auto" or self._plain_s < LOADING_S or missing_for_fast():
+        loading_s = 0.0 if "numba" in sys.modules else LOADING_S
+        if engine != "auto" or self._plain_s < loading_s or missing_for_fast():
             return False
         return self._plain_s >= COMPILING_S or self._is_kept(slim)
 

@@ -335,8 +335,8 @@ def _steps(
     effect: float,
 ) -> tuple[tuple[float, ...], tuple[float, ...], tuple[tuple[float, float], ...]]:
     """Return where the steps of the isotonic regression begin, their rates, and the intervals of these."""
+    from scipy.optimize import isotonic_regression
     from scipy.special import betaincinv
-    from sklearn.isotonic import isotonic_regression
 
     values, value_of = np.unique(np.round(probability, 9), return_inverse=True)
     of_value = np.bincount(value_of, weights)
@@ -349,7 +349,8 @@ def _steps(
             number, gathered = number + 1, 0.0
     all_of = np.bincount(bins[value_of], weights)
     right_of = np.bincount(bins[value_of], weights * right)
-    level_of = np.unique(isotonic_regression(right_of / all_of, sample_weight=all_of), return_inverse=True)[1]
+    rising = isotonic_regression(right_of / all_of, weights=all_of).x
+    level_of = np.unique(rising, return_inverse=True)[1]
     # From here on, units are as many as independent ones that tell as much.
     right_in, units = (
         np.asarray(np.bincount(level_of, counts), dtype=np.float64) / effect for counts in (right_of, all_of)
