@@ -13,9 +13,9 @@ WORTH_COMPILING = 500_000
 """Values (rows x attributes) of one table from which "auto" compiles at once."""
 PARTS = 5
 """How many values one counts for where rows have fractional weights, as parts of rows have: their terms take longer."""
-COMPILING_S = 4.0
+COMPILING_S = 1.0
 """Processor time for trees by the interpreter, in this process, after which "auto" compiles, which takes 4 to 7 s.
-However many fits come, they take at most about twice as long as with compiled code from the beginning."""
+That is a loss where few trees would follow, once: the machine code is kept, and later processes have it."""
 LOADING_S = 0.5
 """The same where an earlier process has kept the machine code, for the import of numba."""
 
