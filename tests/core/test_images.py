@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from attrs import evolve, frozen
+from attrs import evolve
 from cases import every_case
 from kept import begun
 from lab_grasp import recorded_grasp
@@ -32,7 +32,6 @@ from graspsense.core.values.trace import TraceRecorder, trace_of
 from graspsense.plugin_api import (
     EFFORT,
     HOLD,
-    NAMES_INPUT,
     NO_PADS,
     STEADY,
     Channel,
@@ -41,12 +40,10 @@ from graspsense.plugin_api import (
     ControllerEntry,
     Frame,
     Image,
-    ObjectKind,
     Reading,
     SensorBackend,
     SensorBackendEntry,
     TactileArray,
-    setting,
     signal_type,
 )
 from graspsense.recording.export_trace import write_csv, write_npz, write_parquet
@@ -82,12 +79,7 @@ def numbers_of(array: TactileArray, counter: int):
     return numbers.astype(array.dtype)
 
 
-@frozen(kw_only=True)
-class Held:
-    object: str = setting(default="cup:full", effect=NAMES_INPUT, meaning="What it holds.")
-
-
-class Eyes(ModelGripper, SensorBackend[Held]):
+class Eyes(ModelGripper, SensorBackend[NoKeys]):
     """The model gripper with a camera, an image of 16 bits, one of floats with a missing cell, and force vectors."""
 
     channels = (*FRAME, *IMAGES)
@@ -99,13 +91,9 @@ class Eyes(ModelGripper, SensorBackend[Held]):
 
     def open(self, seed):
         self._tick, self._images = -1, no_signals(self.channels)
-        return evolve(super().open(seed), name="eyes", opening=Command(EFFORT, -15.0, inf, inf))
-
-    def objects(self):
-        return (ObjectKind(name="cup", states=("full",)),)
-
-    def with_object(self, name):
-        return type(self)(evolve(self.config, object=name))
+        return evolve(
+            super().open(seed), name="eyes", simulated=False, opening=Command(EFFORT, -15.0, inf, inf)
+        )
 
     def image(self, array, t_s, counter):
         numbers = numbers_of(array, counter)
@@ -132,9 +120,7 @@ WATCHING = ControllerEntry(
     commands=("effort",),
 )
 LAB_HAND = offering(
-    SensorBackendEntry(
-        name="eyes", target=f"{__name__}:Eyes", config=f"{__name__}:Held", summary="a gripper with cameras"
-    ),
+    SensorBackendEntry(name="eyes", target=f"{__name__}:Eyes", summary="a gripper with cameras"),
     WATCHING,
     # It needs another type of cells.
     evolve(WATCHING, name="deep", requires=(evolve(EYE, dtype="uint16"),)),
@@ -243,7 +229,7 @@ def grasped(image, monkeypatch, array):
 
     monkeypatch.setattr(Eyes, "channels", (*FRAME, array))
     monkeypatch.setattr(Eyes, "read", read)
-    return run_grasp(Eyes(Held()), GentleController(EFFORT), RunConfig())
+    return run_grasp(Eyes(NoKeys()), GentleController(EFFORT), RunConfig())
 
 
 def fixed(array):
@@ -436,7 +422,7 @@ def test_the_state_of_a_law_holds_images_that_nobody_changes(seen, monkeypatch):
 
 
 def test_a_law_keeps_a_reference_image():
-    ended = run_grasp(Eyes(Held()), Watching(NoKeys()), RunConfig())
+    ended = run_grasp(Eyes(NoKeys()), Watching(NoKeys()), RunConfig())
     assert ended.outcome is Outcome.STEADY
     eye = ended.trace.signals["eye"]
     changes = abs(eye.cells.astype(float) - eye.cells[0].astype(float)).mean(axis=(1, 2, 3))
