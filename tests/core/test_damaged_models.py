@@ -173,6 +173,7 @@ def test_what_is_no_strict_json_is_refused(tmp_path, text, says):
         ("sets.coverage", 0.999_999_999),
         ("sets.thresholds.bottle:empty", [0.1, 9]),
         ("sets.thresholds.bottle:empty.score", "high"),
+        ("sets.thresholds", {"bottle:empty": {"score": 0.1, "units": 9}}),
         ("sets.of_support", [0.1]),
         ("certainty.0.rates", [0.3, 1.7]),
         ("certainty.0.probabilities", [0.9, 0.4]),
