@@ -16,19 +16,20 @@ def image(counter, level=3300.0, pad=0.0):
     return Pads(counter * 0.041, counter, cells, cells)
 
 
+ZERO = (3000.0,) * CELLS
+
+
 def test_a_newton_is_1600_counts_over_the_pads_fifteen_cells():
-    zero = (3000.0,) * CELLS
     cells = tuple(3000.0 + (1600.0 / 15 if i >= 7 else 5000.0) for i in range(CELLS))
-    assert pad_force(cells, zero, 1600.0, 7) == pytest.approx(1.0)
+    assert pad_force(cells, ZERO, 1600.0, 7) == pytest.approx(1.0)
 
 
 def test_edge_force_is_the_largest_single_edge_cell_each_with_its_own_scale():
-    zero = (3000.0,) * CELLS
-    cells = list(zero)
+    cells = list(ZERO)
     cells[1] += 100.0  # a side cell, 400 counts/N
     cells[3] += 120.0  # a tip cell, 600 counts/N
     cells[10] += 9000.0  # a pad cell: no edge
-    assert edge_force(cells, zero, EDGE_COUNTS_PER_N) == pytest.approx(0.25)
+    assert edge_force(cells, ZERO, EDGE_COUNTS_PER_N) == pytest.approx(0.25)
 
 
 @every_case("place", [0, 10, CELLS - 1])
