@@ -24,6 +24,8 @@ from graspsense.simulator_api import (
     first_call,
 )
 
+pytest.importorskip("numba", reason="compiling needs the extra `fast`")
+
 FACTOR = 2.0
 TABLE = np.array([1.0, 2.0])
 
@@ -55,16 +57,8 @@ def _scaled(x):
     return FACTOR * helper(x)
 
 
-def _by_table(x):
-    return TABLE[0] * x
-
-
-def _in_gear(x):
-    return Gear.LOW * x
-
-
-def _by_module(x):
-    return math.pi * x
+def _by_constants(x):
+    return TABLE[0] * Gear.LOW * math.pi * x
 
 
 def _countdown(n):
@@ -80,11 +74,6 @@ def _labelled(x):
     return len(f"{x:.3f}")
 
 
-@pytest.fixture
-def _numba():
-    pytest.importorskip("numba", reason="compiling needs the extra `fast`")
-
-
 # ---------------------------------------------------------------------------------------------- fingerprints
 
 
@@ -97,15 +86,14 @@ def test_a_fingerprint_changes_with_constants_called_functions_and_defaults():
         (_scaled, {"FACTOR": 2}),
         (_scaled, {"helper": _thrice}),
         # What an array, an enumeration or a module holds is a constant in the machine code.
-        (_by_table, {"TABLE": np.array([1.0, 3.0])}),
-        (_in_gear, {"Gear": IntEnum("Gear", {"LOW": 2}, module=__name__)}),
-        (_by_module, {"math": numbers}),
+        (_by_constants, {"TABLE": np.array([1.0, 3.0])}),
+        (_by_constants, {"Gear": IntEnum("Gear", {"LOW": 2}, module=__name__)}),
+        (_by_constants, {"math": numbers}),
     ):
         assert fingerprint(bind(function, **changes)) != fingerprint(function), changes
     assert fingerprint(_scaled, {_twice: _thrice}) == fingerprint(bind(_scaled, helper=_thrice))
 
 
-@pytest.mark.usefixtures("_numba")
 def test_a_fingerprint_covers_the_functions_that_generate_the_code_of_an_intrinsic():
     from numba.extending import intrinsic
 
@@ -118,7 +106,6 @@ def test_a_fingerprint_covers_the_functions_that_generate_the_code_of_an_intrins
     assert of_half_with(_twice) == of_half_with(_twice) != of_half_with(_thrice)
 
 
-@pytest.mark.usefixtures("_numba")
 def test_closures_recursion_and_builtins_are_refused_by_name_before_they_are_called():
     factor = 2.0
 
@@ -135,14 +122,12 @@ def test_closures_recursion_and_builtins_are_refused_by_name_before_they_are_cal
 # ------------------------------------------------------------------------------------------------- compiling
 
 
-@pytest.mark.usefixtures("_numba")
 def test_what_the_compiler_refuses_is_named_by_file_and_line():
     compiled = compile_function(_labelled)
     with pytest.raises(NotCompilable, match=r"test_compiling.py:\d+"), first_call():
         compiled(1.0)
 
 
-@pytest.mark.usefixtures("_numba")
 def test_compiling_raises_no_warning_and_gives_what_the_interpreter_gives():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -162,7 +147,6 @@ def _twice_checked(x):
     return 2.0 * _checked(x)
 
 
-@pytest.mark.usefixtures("_numba")
 def test_a_called_function_raises_with_values_as_soon_as_it_is_compiled(tmp_path, monkeypatch):
     # Nothing is loaded from disk, where numba itself gives called functions what they need for it.
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
@@ -186,7 +170,6 @@ def _largest(numbers):
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:Cannot cache compiled function")
 def test_a_function_of_numba_calls_one_of_ours_with_all_that_it_calls(tmp_path, monkeypatch):
-    pytest.importorskip("numba")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     compiled = compile_function(_largest)
     with first_call():
@@ -270,7 +253,6 @@ ASKS = """
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("_numba")
 def test_compositions_compiled_in_three_processes_stay_themselves_in_a_fourth(tmp_path):
     # Same functions, same types, other parts or other options: under one name, one would run the code of another.
     source = tmp_path / "source"
@@ -293,33 +275,24 @@ def test_compositions_compiled_in_three_processes_stay_themselves_in_a_fourth(tm
     assert sorted(path.name for path in source.iterdir()) == ["asks.py", "compose.py", "program.py"]
 
 
-MAIN = """
-    import numbers_of_law
-    from laws import helper
-    from graspsense.simulator_api import compile_function
-
-    def law(x):
-        return helper(x) * numbers_of_law.SCALE
-
-    compiled = compile_function(law)
-    print(compiled(1.0), sum(compiled.stats.cache_hits.values()))
-"""
-
-
 @pytest.mark.slow
-@pytest.mark.usefixtures("_numba")
 def test_an_edited_helper_or_constant_of_another_module_is_noticed(tmp_path):
     # numba itself looks at the file of the outermost function alone.
+    law = "import scales, helpers\n\ndef law(x):\n    return helpers.helper(x) * scales.SCALE\n"
     helper = "def helper(x):\n    return {} * x\n"
     told = []
     for factor, scale in ((2.0, 1.0), (2.0, 1.0), (3.0, 1.0), (3.0, 7.0)):
-        main = write(tmp_path, main=MAIN, laws=helper.format(factor), numbers_of_law=f"SCALE = {scale}\n")
-        told += run(main, NUMBA_CACHE_DIR=str(tmp_path / "cache"))
-    assert told == ["2.0 0", "2.0 1", "3.0 0", "21.0 0"]
+        others = {
+            "helpers": helper.format(factor),
+            "scales": f"SCALE = {scale}\n",
+            "shapes": "number = float\n",
+        }
+        main = write(tmp_path, main=CALLS_LAW, law=law, **others)
+        told += run(main, "number", NUMBA_CACHE_DIR=str(tmp_path / "cache"))
+    assert told == ["6.0 0", "6.0 1", "9.0 0", "63.0 0"]
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("_numba")
 def test_the_same_code_in_another_folder_or_further_down_in_its_file_is_not_compiled_again(tmp_path):
     law = "def law(x):\n    return 2.0 * x + 1.0\n"
     told = []
@@ -330,7 +303,6 @@ def test_the_same_code_in_another_folder_or_further_down_in_its_file_is_not_comp
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("_numba")
 def test_code_of_a_version_with_other_types_is_made_anew(tmp_path):
     """The code of the function stays the same, but the type of its argument has another name."""
     shape = "from typing import NamedTuple\n\nclass {}(NamedTuple):\n    stiffness: float\n"
@@ -351,7 +323,6 @@ def kept_in(tmp_path, monkeypatch):
     compiled_code_folder.cache_clear()
 
 
-@pytest.mark.usefixtures("_numba")
 def test_where_code_is_on_disk_what_a_function_calls_is_not_prepared_for_compiling(kept_in, monkeypatch):
     monkeypatch.setattr(compiling, "_COMPILED", {})
     assert compile_function(bind(_scaled, helper=_thrice))(2.0) == 12.0
@@ -371,7 +342,6 @@ def test_where_code_is_on_disk_what_a_function_calls_is_not_prepared_for_compili
     assert loaded(2) == 12.0
 
 
-@pytest.mark.usefixtures("_numba")
 def test_a_called_function_that_is_replaced_before_the_first_call_is_not_kept_under_the_old_name(
     kept_in, monkeypatch
 ):
@@ -385,7 +355,6 @@ def test_a_called_function_that_is_replaced_before_the_first_call_is_not_kept_un
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("_numba")
 def test_where_nothing_can_be_kept_functions_are_compiled_all_the_same(tmp_path):
     program = write(tmp_path, compose=COMPOSE)
     assert run(program, "soft", XDG_CACHE_HOME=str(program), NUMBA_CACHE_DIR="") == ["soft 100.0 0"]

@@ -121,12 +121,16 @@ def complaint(file, options=()) -> str:
 def test_later_layers_are_laid_over_earlier_ones(plugins, write):
     settings = resolve(
         write(BASE),
-        experiment=Layer(label="experiment paper", values={"controller": {"low_n": 5, "speed_m_s": 0.5}}),
-        options=["gripper.retries=5", "gripper.port=b", "controller.speed_m_s=0.02"],
+        experiment=Layer(
+            label="experiment paper",
+            values={"gripper": {"offsets_n": [1, 2, 3]}, "controller": {"low_n": 5, "speed_m_s": 0.5}},
+        ),
+        options=["gripper.offsets_n=[9]", "gripper.port=b", "controller.speed_m_s=0.02"],
         flags=[Flag("--speed", "controller.speed_m_s", 0.03)],
     )
 
-    assert (settings.gripper.config.port, settings.gripper.config.retries) == ("b", 5)
+    # Lists replace, tables merge.
+    assert (settings.gripper.config.port, settings.gripper.config.offsets_n) == ("b", (9.0,))
     law = {"type": "lab-parts/law", "force_n": 12.0, "speed_m_s": 0.03, "low_n": 5.0}
     assert settings.values["controller"] == law
     # A whole number is taken for a number and becomes one.
@@ -156,16 +160,6 @@ def test_every_leaf_has_an_origin_and_every_origin_a_leaf(plugins, write):
 
     assert sorted(settings.origins) == sorted(leaves(settings.values))
     assert settings.origins["gripper.gains.left"] == settings.origins["gripper.filter.order"] == "-o"
-
-
-def test_lists_replace_and_tables_merge(plugins, write):
-    more = 'port = "a"\noffsets_n = [1, 2, 3]\nfilter = { cutoff_hz = 5, order = 1 }'
-    options = ["gripper.offsets_n=[9]", "gripper.filter.order=3"]
-
-    config = resolve(write(BASE.replace('port = "a"', more)), options=options).gripper.config
-
-    assert config.offsets_n == (9.0,)
-    assert asdict(config.filter) == {"cutoff_hz": 5.0, "order": 3}
 
 
 def test_a_table_that_a_value_replaced_leaves_no_origin_behind(plugins, write):

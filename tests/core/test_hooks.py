@@ -211,26 +211,6 @@ def test_a_finding_is_in_one_of_three_states():
         Finding("cable", "fine", "straight")  # type: ignore[arg-type]
 
 
-def test_hook_graspsense_probe_devices():
-    def timed(self, timeout_s):
-        return [FoundDevice("mine", str(timeout_s), "bus 1", ready=True)]
-
-    hook = "graspsense_probe_devices"
-    plugins = IsolatedPlugins(builtins=False)
-    plugins.add(implementing(hook, raising(PermissionError("cannot list the bus"))), "lab-a")
-    plugins.add(example(hook), "lab-b")
-    plugins.add(implementing(hook, timed), "lab-c")
-    plugins.add(implementing(hook, lambda self: ["/dev/ttyUSB0"]), "lab-d")
-
-    failed, devices, timed_devices, other = plugins.probe_devices(0.25)
-
-    assert (failed.distribution, failed.given) == ("lab-a", ())
-    assert failed.error == "PermissionError: cannot list the bus"
-    assert (devices.error, devices.given[0].advice) == ("", "add yourself to the group dialout")
-    assert timed_devices.given[0].serial == "0.25"
-    assert other.error == "graspsense_probe_devices gave '/dev/ttyUSB0': it takes FoundDevice only"
-
-
 @pytest.mark.parametrize("failure", [RuntimeError("no room on the disk"), SystemExit("no room on the disk")])
 def test_an_observer_that_raises_stops_nobody_and_is_reported_once(caplog, failure):
     seen = example("graspsense_grasp_event")
