@@ -208,13 +208,8 @@ def test_predictions_say_which_labels_are_in_every_set():
             assert any("in every set" in text and "empty" in text for text in said.warnings)
 
 
-@pytest.mark.parametrize(
-    "instances",
-    [
-        *(pytest.param(n, marks=pytest.mark.slow) for n in (3, 9)),
-        *(pytest.param(n, marks=pytest.mark.long) for n in (4, 8, 12, 20, 60)),
-    ],
-)
+@pytest.mark.slow
+@every_case("instances", [3, 9])
 def test_each_label_is_covered_however_few_instances_it_has(instances):
     """Four labels, of which one has few instances; the sets are judged by trials of new instances of each label."""
     covered, draws = np.zeros(4), 40

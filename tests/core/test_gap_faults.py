@@ -154,29 +154,52 @@ def test_fingers_that_brake_first_are_not_late():
     assert all(watch.see(frame(100 + k, gap_m), Phase.RELEASE) is None for k, gap_m in enumerate(braking))
 
 
-class LateGap(Scripted):
-    """A gripper whose gap is told this much later (s)."""
+class Misread(Scripted):
+    """A gripper whose gap is told this much later (s), stands still from one time on, and is no number from another."""
 
-    def __init__(self, late_s):
-        super().__init__(squeezing, bottle)
-        self.late_s = late_s
+    def __init__(self, path, late_s=0.0, stands_from_s=inf, none_from_s=inf):
+        super().__init__(path, bottle)
+        self.late_s, self.stands_from_s, self.none_from_s = late_s, stands_from_s, none_from_s
 
     def gap_m(self, t):
-        return super().gap_m(t - self.late_s)
+        return nan if t >= self.none_from_s else super().gap_m(min(t, self.stands_from_s) - self.late_s)
 
 
-@every_case(("late_s", "names"), [(0.0, ()), (0.3, ("gap late",)), (inf, ("fingers did not open",))])
-def test_a_gap_that_follows_late_or_never_is_told_and_the_fingers_open_nevertheless(late_s, names):
+class ByPosition(Misread):
+    """One that is strong and opens to a width."""
+
+    def open(self, seed):
+        return evolve(super().open(seed), opening=OPENS, effort_limit_n=235.0)
+
+    def apply(self, command):
+        opens = command.kind == POSITION
+        super().apply(command._replace(kind=EFFORT, value=-1.0) if opens else command)
+        self.commands[-1] = command
+
+    def opening_effort_n(self):
+        return max(command.effort_limit_n for command in self.commands if command.kind == POSITION)
+
+
+def grasp_of(gripper):
+    return run_grasp(gripper, HybridController(HybridConfig()), RunConfig())
+
+
+@every_case(
+    ("fault", "names"),
+    [
+        ({}, ()),
+        ({"late_s": 0.3}, ("gap late",)),
+        ({"stands_from_s": REST_S}, ("fingers did not open",)),
+    ],
+)
+def test_a_gap_that_follows_late_or_never_is_told_and_the_fingers_open_nevertheless(fault, names):
     """A gap that is late stands still at first, which is no sign of open fingers. Its grasp stays steady."""
-    gripper = LateGap(late_s)
-    if late_s == inf:
-        gripper.gap_m = lambda t: squeezing(min(t, REST_S))
-    grasp = run_grasp(gripper, HybridController(HybridConfig()), RunConfig())
+    gripper = Misread(squeezing, **fault)
+    grasp = grasp_of(gripper)
     assert grasp.outcome is Outcome.STEADY
     assert tuple(warning.split(":")[0] for warning in grasp.warnings) == names
     assert gripper.commands[-1].value == 0.0
-    if late_s < inf:
-        assert grasp.trace.gap_m[-1] > 0.078
+    assert (grasp.trace.gap_m[-1] > 0.078) == ("stands_from_s" not in fault)
 
 
 @every_case(
@@ -223,33 +246,10 @@ def test_open_fingers_are_as_wide_after_a_grasp_as_before_it(opens, end_m, is_to
     assert (watch.released(frame(5, end_m)) is not None) is is_told
 
 
-class ByPosition(Scripted):
-    """A strong gripper that opens to a width; its gap is no number from then on, and `late_s` late (s)."""
-
-    def __init__(self, path, none_from_s=inf, late_s=0.0):
-        super().__init__(path, bottle)
-        self.none_from_s, self.late_s = none_from_s, late_s
-
-    def open(self, seed):
-        return evolve(super().open(seed), opening=OPENS, effort_limit_n=235.0)
-
-    def apply(self, command):
-        opens = command.kind == POSITION
-        super().apply(command._replace(kind=EFFORT, value=-1.0) if opens else command)
-        self.commands[-1] = command
-
-    def gap_m(self, t):
-        return nan if t >= self.none_from_s else super().gap_m(t - self.late_s)
-
-    def opening_effort_n(self):
-        return max(command.effort_limit_n for command in self.commands if command.kind == POSITION)
-
-
 def test_a_fault_opens_the_fingers_with_no_more_effort_than_a_release():
     sound, failing = ByPosition(squeezing), ByPosition(squeezing, none_from_s=REST_S)
-    controller = HybridController(HybridConfig())
-    assert run_grasp(sound, controller, RunConfig()).outcome is Outcome.STEADY
-    assert run_grasp(failing, controller, RunConfig()).outcome is Outcome.ABORTED
+    assert grasp_of(sound).outcome is Outcome.STEADY
+    assert grasp_of(failing).outcome is Outcome.ABORTED
     assert failing.opening_effort_n() == sound.opening_effort_n() == 1.25 * HybridConfig().probing_force_n
 
 
@@ -257,7 +257,7 @@ def test_fingers_that_still_close_when_they_are_told_to_open_are_not_open_where_
     """They stand at the end of the stroke until they turn round, which is no rest of open fingers."""
     gripper = ByPosition(lambda t: max(0.08 - 0.04 * max(t - 0.3, 0.0), 0.0), late_s=0.3)
     gripper.felt = lambda t: (0.0, 0.0)
-    grasp = run_grasp(gripper, HybridController(HybridConfig()), RunConfig())
+    grasp = grasp_of(gripper)
     assert grasp.outcome is Outcome.NOTHING_THERE
     assert grasp.trace.gap_m[-1] > 0.075
 
@@ -266,7 +266,7 @@ def test_fingers_that_still_close_when_they_are_told_to_open_are_not_open_where_
 def test_fingers_whose_gap_is_no_witness_open_for_as_long_as_they_need_from_any_width(stands_m, outcome):
     """Their encoder has stood still, or failed, since they rest: 80 mm at 50 mm/s take 1.6 s."""
     gripper = ByPosition(lambda t: squeezing(t) if t < REST_S else stands_m)
-    grasp = run_grasp(gripper, HybridController(HybridConfig()), RunConfig())
+    grasp = grasp_of(gripper)
     assert grasp.outcome is outcome
     opening = [command.kind == POSITION for command in gripper.commands]
     assert sum(opening[-3000:]) / 1000.0 >= 1.6
