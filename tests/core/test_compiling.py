@@ -4,7 +4,6 @@ import math
 import os
 import sys
 import textwrap
-import warnings
 from enum import IntEnum
 
 import numpy as np
@@ -19,7 +18,6 @@ from graspsense.simulator_api import (
     NotCompilable,
     bind,
     compile_function,
-    entry_point,
     fingerprint,
     first_call,
 )
@@ -126,15 +124,6 @@ def test_what_the_compiler_refuses_is_named_by_file_and_line():
     compiled = compile_function(_labelled)
     with pytest.raises(NotCompilable, match=r"test_compiling.py:\d+"), first_call():
         compiled(1.0)
-
-
-def test_compiling_raises_no_warning_and_gives_what_the_interpreter_gives():
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        compiled = compile_function(_scaled)
-        assert compiled(1.5) == _scaled(1.5) == 6.0
-    assert entry_point(compiled)(1.5) == 6.0
-    assert compile_function(_scaled) is compiled
 
 
 def _checked(x):

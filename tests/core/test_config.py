@@ -20,7 +20,7 @@ from parts import NoKeys, implementing, offering
 from graspsense.core.components.caller import command_line
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.files.toml_text import key_lines, toml_key, toml_value
-from graspsense.core.settings.layers import Flag, Layer, read_layer
+from graspsense.core.settings.layers import Flag, Layer
 from graspsense.core.settings.resolved import resolve
 from graspsense.core.settings.selected import build, create, recipe_of
 from graspsense.core.settings.settings_file import to_toml
@@ -382,12 +382,6 @@ def test_a_byte_order_mark_and_windows_line_ends_are_no_matter(plugins, write):
     settings = resolve("lab.toml")
     assert settings.gripper.config.port == "a"
     assert settings.origins["controller.force_n"] == "lab.toml:7"
-
-
-def test_a_layer_can_be_read_by_itself(plugins, write):
-    layer = read_layer(write("[sweep]\nseeds = [\n 1,\n 2]\n"))
-
-    assert layer.where(("sweep", "seeds", 1)) == "lab.toml:4"
 
 
 def test_create_makes_a_component_as_strictly_as_a_file(plugins):

@@ -67,6 +67,7 @@ class LawConfig:
     label: str = "slow"
     ticks: int = 3
     careful: bool = True
+    sends: Literal["effort", "velocity"] = "effort"
     limits: dict[str, float] = field(factory=dict)
 
 
@@ -163,22 +164,13 @@ def test_the_result_has_the_declared_names_and_units():
     assert dict(summit.undefined("empty").reasons) == {"summit": "empty", "width": "empty"}
 
 
-def test_the_parameters_of_a_law_are_the_numbers_of_its_config():
+def test_the_parameters_of_a_law_are_the_numbers_of_its_config_and_the_kind_that_it_sends():
     params = Law(LawConfig(speed_m_s=0.03, careful=False)).params()
 
-    assert params._asdict() == {"speed_m_s": 0.03, "ticks": 3, "careful": 0}
-    assert [type(param) for param in params] == [float, int, int]
+    assert params._asdict() == {"speed_m_s": 0.03, "ticks": 3, "careful": 0, "sends": EFFORT}
+    assert [type(param) for param in params] == [float, int, int, int]
     assert type(params_of(LawConfig())) is type(params)
-
-
-def test_the_kind_that_a_law_sends_is_one_of_its_parameters():
-    @frozen(kw_only=True)
-    class TwoKindsConfig:
-        sends: Literal["effort", "velocity"] = "effort"
-        speed_m_s: float = 0.02
-
-    assert params_of(TwoKindsConfig())._asdict() == {"speed_m_s": 0.02, "sends": EFFORT}
-    assert params_of(TwoKindsConfig(sends="velocity")).sends == VELOCITY
+    assert params_of(LawConfig(sends="velocity")).sends == VELOCITY
 
 
 def test_the_wiring_knows_the_channels_of_the_fitted_fingers():

@@ -25,11 +25,7 @@ from graspsense.gripper_api import FingerForce, opposed_forces
 from graspsense.plugin_api import (
     EFFORT,
     NO_PADS,
-    Channel,
     Command,
-    Feature,
-    FeatureSet,
-    FeatureSetEntry,
     Reading,
     SensorBackend,
     SensorBackendEntry,
@@ -90,18 +86,7 @@ class ThreeJaws(ModelGripper, SensorBackend[NoKeys]):
         return Reading(frame, NO_PADS, signal_type(self.channels)(*felt))
 
 
-class ThumbPeak(FeatureSet[NoKeys]):
-    requires = (Channel("force_thumb", "N"),)
-    features = (Feature("thumb_peak", "N", "largest force of the thumb"),)
-
-    def extract(self, trace):
-        return self.result({"thumb_peak": trace.signals["force_thumb"].max()})
-
-
-LAB_HAND = offering(
-    SensorBackendEntry(name="jaws", target=f"{__name__}:ThreeJaws", summary="three fingers"),
-    FeatureSetEntry(name="thumb-peak", target=f"{__name__}:ThumbPeak", summary="peak of the thumb"),
-)
+LAB_HAND = offering(SensorBackendEntry(name="jaws", target=f"{__name__}:ThreeJaws", summary="three fingers"))
 
 
 @pytest.fixture(scope="module")
@@ -215,16 +200,6 @@ def test_the_pages_and_the_picture_draw_the_force_of_each_finger(grasped):
     (fingers,) = channel_figures(trial.trace, trial.device.channels)
     assert all(name in fingers for name in ("Forces of the fingers", "thumb", "index", "ring"))
     assert {"thumb", "index", "ring"} <= {line.get_label() for line in force.lines}
-
-
-def test_features_may_require_the_force_of_a_finger(grasped):
-    trial, _, plugins = grasped
-    options = ["gripper.type=jaws", "features.type=thumb-peak", "classifier.type=none"]
-
-    # Raises WiringError if they do not fit.
-    settings = load_pipeline(options=options, plugins=plugins).settings
-
-    assert settings.features.create().extract(trial.trace).values == (trial.trace.force_left_n.max(),)
 
 
 @pytest.mark.slow

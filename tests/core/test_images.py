@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 from attrs import evolve
 from cases import every_case
-from kept import begun
 from lab_grasp import recorded_grasp
 from mcap.reader import make_reader
 from parts import NoKeys, channels, offering
@@ -47,9 +46,8 @@ from graspsense.plugin_api import (
     signal_type,
 )
 from graspsense.recording.export_trace import write_csv, write_npz, write_parquet
-from graspsense.recording.layout import START, Topic, shown_array
+from graspsense.recording.layout import Topic, shown_array
 from graspsense.recording.reader import read_recorded
-from graspsense.recording.recorder import Recorder
 from graspsense.recording.replayable import content_sha256
 from graspsense.sources.recordings.replay import read_named
 from graspsense.testing.checks import CheckFailed
@@ -190,19 +188,6 @@ def test_a_gripper_with_cameras_and_a_law_with_a_reference_image_conform(seen, p
     assert [(result.check, result.text) for result in results if result.state == "failed"] == []
     passed = {result.check for result in results if result.state == "passed"}
     assert part != "eyes" or "images-stay-as-they-were-delivered" in passed
-
-
-def test_a_recording_shows_the_shape_of_its_images_without_the_declaration(tmp_path):
-    recorder = Recorder(tmp_path / "g.mcap")
-    recorder.metadata(START, begun().section(START))
-    images = images_at(0.0, 1)
-    recorder.take(Reading(TOUCHING, NO_PADS, images), 3, NOTHING)
-    recorder.finish()
-    grasp = read_recorded(tmp_path / "g.mcap")
-    shown = {channel.name: (channel.shape, channel.dtype) for channel in grasp.channels}
-    assert shown == {array.name: (array.shape, array.dtype) for array in IMAGES}
-    for name, image in zip(images._fields, images, strict=True):
-        assert np.array_equal(grasp.trace().signals[name].cells[0], image.cells, equal_nan=True)
 
 
 @every_case(

@@ -51,8 +51,3 @@ def test_nothing_is_told_where_nothing_was_lost():
     grasp = run_grasp(Lossy(loses=False), create("controller", "hybrid"), RunConfig())
     assert grasp.reason == ""
     assert not [name for name in grasp.counts if name.startswith("lost")]
-
-
-def test_a_simulated_gripper_loses_nothing():
-    gripper = create("sensor-backend", "sim", object="block", rate_hz=250.0)
-    assert "lost" not in run_grasp(gripper, create("controller", "hybrid"), RunConfig()).reason
