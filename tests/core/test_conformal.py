@@ -105,9 +105,11 @@ def test_the_threshold_is_reached_by_90_percent_of_the_trials_that_are_not_recog
     assert threshold(calibrated_by(truth, ["a"] * 19)) == truth[1]
     # The smallest number with a finite quantile.
     assert [units_needed(coverage) for coverage in (0.8, 0.9, 0.95, 0.99)] == [4, 9, 19, 99]
-    few, enough = (
-        calibrated_by(np.ones(9 * n), ["a"] * 9 * n, [str(i % n) for i in range(9 * n)]) for n in (8, 9)
-    )
+
+
+def test_eight_instances_are_too_few_and_nine_are_enough():
+    few, enough = (calibrated_by(np.ones(72), ["a"] * 72, [str(i % n) for i in range(72)]) for n in (8, 9))
+
     assert few.thresholds == {}
     assert "8 calibration instances" in few.in_words
     assert enough.thresholds["a"].units == 9

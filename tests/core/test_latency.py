@@ -65,9 +65,6 @@ class DelayedGripper(SensorBackend[None]):
         self._ticks += 1
         return Reading(Frame(self._ticks / RATE_HZ, 1 / RATE_HZ, self._gap_m, 0.0, self._effort_n), NO_PADS)
 
-    def tare(self, images):
-        pass
-
     def close(self):
         pass
 
