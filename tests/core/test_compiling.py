@@ -18,6 +18,7 @@ from graspsense.simulator_api import (
     NotCompilable,
     bind,
     compile_function,
+    entry_point,
     fingerprint,
     first_call,
 )
@@ -124,6 +125,12 @@ def test_what_the_compiler_refuses_is_named_by_file_and_line():
     compiled = compile_function(_labelled)
     with pytest.raises(NotCompilable, match=r"test_compiling.py:\d+"), first_call():
         compiled(1.0)
+
+
+def test_a_function_is_compiled_once_and_gives_what_the_interpreter_gives():
+    compiled = compile_function(_scaled)
+    assert compiled(1.5) == entry_point(compiled)(1.5) == _scaled(1.5) == 6.0
+    assert compile_function(_scaled) is compiled
 
 
 def _checked(x):

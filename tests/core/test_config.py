@@ -118,30 +118,26 @@ def complaint(file, options=()) -> str:
     return str(caught.value)
 
 
-def test_later_layers_are_laid_over_earlier_ones(plugins, write):
+def test_later_layers_replace_lists_and_values_and_are_merged_with_tables(plugins, write):
+    tried = {"offsets_n": [1, 2, 3], "filter": {"cutoff_hz": 5, "order": 1}}
     settings = resolve(
         write(BASE),
-        experiment=Layer(
-            label="experiment paper",
-            values={"gripper": {"offsets_n": [1, 2, 3]}, "controller": {"low_n": 5, "speed_m_s": 0.5}},
-        ),
-        options=["gripper.offsets_n=[9]", "gripper.port=b", "controller.speed_m_s=0.02"],
+        experiment=Layer(label="experiment", values={"gripper": tried, "controller": {"speed_m_s": 0.5}}),
+        options=["gripper.offsets_n=[9]", "gripper.filter.order=3", "controller.speed_m_s=0.02"],
         flags=[Flag("--speed", "controller.speed_m_s", 0.03)],
     )
 
-    # Lists replace, tables merge.
-    assert (settings.gripper.config.port, settings.gripper.config.offsets_n) == ("b", (9.0,))
-    law = {"type": "lab-parts/law", "force_n": 12.0, "speed_m_s": 0.03, "low_n": 5.0}
+    assert settings.gripper.config == Hand(port="a", offsets_n=(9.0,), filter=Filter(5.0, 3))
+    law = {"type": "lab-parts/law", "force_n": 12.0, "speed_m_s": 0.03, "low_n": 0.0}
     assert settings.values["controller"] == law
     # A whole number is taken for a number and becomes one.
     assert type(settings.controller.config.force_n) is float
     assert settings.components["gripper"] == "lab-parts/hand 0.3"
     origins = {
         "gripper.type": "lab.toml:2",
-        "gripper.port": "-o",
-        "gripper.filter.cutoff_hz": "default",
+        "gripper.offsets_n": "-o",
+        "gripper.filter.cutoff_hz": "experiment",
         "controller.force_n": "lab.toml:7",
-        "controller.low_n": "experiment paper",
         "controller.speed_m_s": "--speed",
         "run.seed": "default",
     }

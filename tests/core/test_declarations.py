@@ -171,6 +171,7 @@ def test_the_parameters_of_a_law_are_the_numbers_of_its_config_and_the_kind_that
     assert [type(param) for param in params] == [float, int, int, int]
     assert type(params_of(LawConfig())) is type(params)
     assert params_of(LawConfig(sends="velocity")).sends == VELOCITY
+    assert params_of(parts.LawConfig())._asdict() == {"speed_m_s": 0.01}
 
 
 def test_the_wiring_knows_the_channels_of_the_fitted_fingers():
