@@ -1,5 +1,7 @@
 """From counts to newtons, and when a tare is refused."""
 
+from math import nan
+
 import pytest
 from cases import every_case
 
@@ -16,36 +18,31 @@ def image(counter, level=3300.0, pad=0.0):
     return Pads(counter * 0.041, counter, cells, cells)
 
 
+ZERO = (3000.0,) * CELLS
+
+
 def test_a_newton_is_1600_counts_over_the_pads_fifteen_cells():
-    zero = (3000.0,) * CELLS
     cells = tuple(3000.0 + (1600.0 / 15 if i >= 7 else 5000.0) for i in range(CELLS))
-    assert pad_force(cells, zero, 1600.0, 7) == pytest.approx(1.0)
+    assert pad_force(cells, ZERO, 1600.0, 7) == pytest.approx(1.0)
 
 
 def test_edge_force_is_the_largest_single_edge_cell_each_with_its_own_scale():
-    zero = (3000.0,) * CELLS
-    cells = list(zero)
+    cells = list(ZERO)
     cells[1] += 100.0  # a side cell, 400 counts/N
     cells[3] += 120.0  # a tip cell, 600 counts/N
     cells[10] += 9000.0  # a pad cell: no edge
-    assert edge_force(cells, zero, EDGE_COUNTS_PER_N) == pytest.approx(0.25)
+    assert edge_force(cells, ZERO, EDGE_COUNTS_PER_N) == pytest.approx(0.25)
 
 
 @every_case("place", [0, 10, CELLS - 1])
-@every_case("reading", [0.0, 65535.0, float("nan")])
+@every_case("reading", [0.0, 65535.0, nan])
 def test_a_cell_that_does_not_answer_is_left_out_wherever_it_is(place, reading):
-    zero = tuple(3000.0 + i for i in range(CELLS))
-    cells = [3500.0] * CELLS
-    assert masked(tuple(cells), zero) == (tuple(cells), 0)
-    cells[place] = reading
-    kept, dead = masked(tuple(cells), zero)
-    assert dead == 1
-    assert kept == (*cells[:place], zero[place], *cells[place + 1 :])
-
-
-def test_a_cell_that_was_dead_in_the_tare_is_dead_afterwards():
-    zero = (3000.0, 0.0, 3000.0)
-    assert masked((3500.0,) * 3, zero) == ((3500.0, 0.0, 3500.0), 1)
+    cells = (3500.0,) * CELLS
+    with_dead, masked_cells = ((*cells[:place], value, *cells[place + 1 :]) for value in (reading, 3000.0))
+    assert masked(cells, ZERO) == (cells, 0)
+    assert masked(with_dead, ZERO) == (masked_cells, 1)
+    # One that was dead in the tare is dead afterwards.
+    assert masked((3500.0,) * 3, (3000.0, 0.0, 3000.0)) == ((3500.0, 0.0, 3500.0), 1)
 
 
 def test_the_zero_is_the_mean_of_all_images_not_the_last():
@@ -59,7 +56,7 @@ def test_the_zero_is_the_mean_of_all_images_not_the_last():
     [
         ([], "no cell image"),
         ([image(1), image(2, pad=60.0), image(3)], r"left pad varied by .* 0.5 N is allowed"),
-        ([image(1, float("nan")), image(2)], "not numbers"),
+        ([image(1, nan), image(2)], "not numbers"),
     ],
 )
 def test_a_tare_is_refused_without_images_or_numbers_and_while_something_moves(images, says):

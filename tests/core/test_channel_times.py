@@ -69,12 +69,3 @@ def test_a_trial_tells_it_and_names_its_channels():
     assert trial.apart_s("gap", "effort") == 0.0
     with pytest.raises(UnknownName, match="gap"):
         trial.apart_s("gap", "gape")
-
-
-@pytest.mark.slow
-def test_a_gripper_with_fingertips_of_their_own_tells_how_far_they_can_be_apart():
-    options = ["gripper.port=emulated", "gripper.tactile_port=emulated", "features.type=chitta"]
-    trial = load_pipeline("robotiq", options=options).grasp()
-    for name in ("pads", "force_left"):
-        assert 0.0 < trial.apart_s("gap", name) < 1.0
-    assert {"tactile_offset_s", "tactile_drift", "tactile_uncertainty_s"} <= set(trial.report)

@@ -7,90 +7,76 @@ import re
 import tomllib
 from decimal import Decimal
 from pathlib import Path
+from typing import Literal
 
 import pytest
-from attrs import asdict, evolve
+from attrs import asdict, evolve, field, frozen
+from attrs.validators import ge, gt
 from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
+from parts import NoKeys, implementing, offering
 
 from graspsense.core.components.caller import command_line
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.files.toml_text import key_lines, toml_key, toml_value
-from graspsense.core.settings.layers import Flag, Layer, read_layer
+from graspsense.core.settings.layers import Flag, Layer
 from graspsense.core.settings.resolved import resolve
 from graspsense.core.settings.selected import build, create, recipe_of
 from graspsense.core.settings.settings_file import to_toml
 from graspsense.core.values.errors import ConfigError, UnknownName
+from graspsense.plugin_api import ClassifierEntry, ControllerEntry, FeatureSetEntry, SensorBackendEntry
 
-PARTS = """
-    from __future__ import annotations
-    from pathlib import Path
-    from typing import Literal
-    from attrs import field, frozen
-    from attrs.validators import ge, gt, in_, instance_of
-    from graspsense.plugin_api import ClassifierEntry, Channel, ControllerEntry, FeatureSetEntry
-    from graspsense.plugin_api import PipelineEntry, SensorBackendEntry, hookimpl
 
-    GRASPSENSE_API = (2, 0)
+@frozen
+class Filter:
+    cutoff_hz: float = field(default=50.0, validator=gt(0.0))
+    order: int = 2
 
-    @frozen
-    class Filter:
-        cutoff_hz: float = field(default=50.0, validator=gt(0.0))
-        order: int = 2
 
-    @frozen(kw_only=True)
-    class Hand:
-        port: str
-        rate_hz: float = field(default=100.0, validator=gt(0.0))
-        retries: int = 3
-        echo: bool = False
-        transport: Literal["usb", "emulated"] = "usb"
-        offsets_n: tuple[float, ...] = ()
-        serial: str | None = None
-        gains: dict[str, float] = {}
-        log: Path | None = None
-        filter: Filter = Filter()
+@frozen(kw_only=True)
+class Hand:
+    port: str
+    rate_hz: float = field(default=100.0, validator=gt(0.0))
+    retries: int = 3
+    echo: bool = False
+    transport: Literal["usb", "emulated"] = "usb"
+    offsets_n: tuple[float, ...] = ()
+    serial: str | None = None
+    gains: dict[str, float] = field(factory=dict)
+    log: Path | None = None
+    filter: Filter = Filter()
 
-    @frozen
-    class Other:
-        transport: Literal["tcp", "emulated"] = "tcp"
 
-    @frozen
-    class Law:
-        force_n: float = field(default=10.0, validator=ge(0.0))
-        speed_m_s: float = field(default=0.01, validator=gt(0.0))
-        low_n: float = field(default=0.0)
+@frozen
+class Other:
+    transport: Literal["tcp", "emulated"] = "tcp"
 
-        @low_n.validator
-        def _below(self, attribute, value):
-            if value > self.force_n:
-                raise ValueError(f"low_n {value} is above force_n {self.force_n}")
 
-    @frozen
-    class Empty:
-        pass
+@frozen
+class Law:
+    force_n: float = field(default=10.0, validator=ge(0.0))
+    speed_m_s: float = field(default=0.01, validator=gt(0.0))
+    low_n: float = field(default=0.0)
 
-    def entry(kind, name, config, **more):
-        return kind(name=name, target="lab_parts:Nothing", config=f"lab_parts:{config}", summary=name, **more)
+    @low_n.validator
+    def _below(self, attribute, value):
+        if value > self.force_n:
+            raise ValueError(f"low_n {value} is above force_n {self.force_n}")
 
-    @hookimpl
-    def graspsense_sensor_backends():
-        yield entry(SensorBackendEntry, "hand", "Hand", channels=(), accepts=())
-        yield entry(SensorBackendEntry, "other", "Other", channels=(), accepts=())
 
-    @hookimpl
-    def graspsense_controllers():
-        yield entry(ControllerEntry, "law", "Law", requires=(), commands=())
+def entry(kind, name, config, **more):
+    config = f"{config.__module__}:{config.__name__}"
+    return kind(name=name, target="no_such_module:Nothing", config=config, summary=name, **more)
 
-    @hookimpl
-    def graspsense_feature_sets():
-        yield entry(FeatureSetEntry, "none-at-all", "Empty", requires=(), features=())
 
-    @hookimpl
-    def graspsense_classifiers():
-        yield entry(ClassifierEntry, "guess", "Law")
-"""
+LAB_PARTS = offering(
+    entry(SensorBackendEntry, "hand", Hand, channels=(), accepts=()),
+    entry(SensorBackendEntry, "other", Other, channels=(), accepts=()),
+    entry(ControllerEntry, "law", Law, requires=(), commands=()),
+    entry(FeatureSetEntry, "none-at-all", NoKeys, requires=(), features=()),
+)
+GUESS = implementing("graspsense_classifiers", lambda self: [entry(ClassifierEntry, "guess", Law)])
 
 BASE = """\
 [gripper]
@@ -107,12 +93,10 @@ type = "none-at-all"
 
 
 @pytest.fixture
-def plugins(site):
-    site.write(lab_parts=PARTS)
-    import lab_parts
-
+def plugins():
     with IsolatedPlugins() as plugins:
-        plugins.add(lab_parts, "lab-parts", "0.3")
+        plugins.add(LAB_PARTS, "lab-parts", "0.3")
+        plugins.add(GUESS, "lab-guess")
         yield plugins
 
 
@@ -128,39 +112,36 @@ def write(tmp_path, monkeypatch):
     return write
 
 
-def complaint(*arguments, **keywords) -> str:
+def complaint(file, options=()) -> str:
     with command_line(), pytest.raises(ConfigError) as caught:
-        resolve(*arguments, **keywords)
+        resolve(file, options=options)
     return str(caught.value)
 
 
-def test_defaults_file_options_and_flags_are_laid_over_each_other(plugins, write):
+def test_later_layers_replace_lists_and_values_and_are_merged_with_tables(plugins, write):
+    tried = {"offsets_n": [1, 2, 3], "filter": {"cutoff_hz": 5, "order": 1}}
     settings = resolve(
         write(BASE),
-        options=["gripper.retries=5", "gripper.port=b", "controller.speed_m_s=0.02"],
+        experiment=Layer(label="experiment", values={"gripper": tried, "controller": {"speed_m_s": 0.5}}),
+        options=["gripper.offsets_n=[9]", "gripper.filter.order=3", "controller.speed_m_s=0.02"],
         flags=[Flag("--speed", "controller.speed_m_s", 0.03)],
     )
 
-    assert settings.gripper.config.port == "b"
-    assert settings.gripper.config.retries == 5
-    assert settings.controller.config.speed_m_s == 0.03
-    assert settings.values["controller"] == {
-        "type": "lab-parts/law",
-        "force_n": 12.0,
-        "speed_m_s": 0.03,
-        "low_n": 0.0,
-    }
+    assert settings.gripper.config == Hand(port="a", offsets_n=(9.0,), filter=Filter(5.0, 3))
+    law = {"type": "lab-parts/law", "force_n": 12.0, "speed_m_s": 0.03, "low_n": 0.0}
+    assert settings.values["controller"] == law
     # A whole number is taken for a number and becomes one.
     assert type(settings.controller.config.force_n) is float
     assert settings.components["gripper"] == "lab-parts/hand 0.3"
-    assert settings.classifier is None
-    origins = settings.origins
-    assert origins["gripper.type"] == "lab.toml:2"
-    assert origins["gripper.port"] == "-o"
-    assert origins["gripper.filter.cutoff_hz"] == "default"
-    assert origins["controller.force_n"] == "lab.toml:7"
-    assert origins["controller.speed_m_s"] == "--speed"
-    assert origins["run.seed"] == "default"
+    origins = {
+        "gripper.type": "lab.toml:2",
+        "gripper.offsets_n": "-o",
+        "gripper.filter.cutoff_hz": "experiment",
+        "controller.force_n": "lab.toml:7",
+        "controller.speed_m_s": "--speed",
+        "run.seed": "default",
+    }
+    assert {key: settings.origins[key] for key in origins} == origins
 
 
 def test_every_leaf_has_an_origin_and_every_origin_a_leaf(plugins, write):
@@ -174,29 +155,7 @@ def test_every_leaf_has_an_origin_and_every_origin_a_leaf(plugins, write):
                 yield ".".join((*path, key))
 
     assert sorted(settings.origins) == sorted(leaves(settings.values))
-    assert settings.origins["gripper.gains.left"] == "-o"
-    assert settings.origins["gripper.filter.order"] == "-o"
-    assert settings.origins["gripper.filter.cutoff_hz"] == "default"
-
-
-def test_an_experiment_lies_between_the_file_and_the_options(plugins, write):
-    layer = Layer(label="experiment paper", values={"controller": {"force_n": 15, "speed_m_s": 0.5}})
-
-    settings = resolve(write(BASE), experiment=layer, options=["controller.speed_m_s=0.25"])
-
-    assert (settings.controller.config.force_n, settings.controller.config.speed_m_s) == (15.0, 0.25)
-    assert settings.origins["controller.force_n"] == "experiment paper"
-
-
-def test_lists_replace_and_tables_merge(plugins, write):
-    text = BASE.replace(
-        'port = "a"', 'port = "a"\noffsets_n = [1, 2, 3]\nfilter = { cutoff_hz = 5, order = 1 }'
-    )
-
-    config = resolve(write(text), options=["gripper.offsets_n=[9]", "gripper.filter.order=3"]).gripper.config
-
-    assert config.offsets_n == (9.0,)
-    assert asdict(config.filter) == {"cutoff_hz": 5.0, "order": 3}
+    assert settings.origins["gripper.gains.left"] == settings.origins["gripper.filter.order"] == "-o"
 
 
 def test_a_table_that_a_value_replaced_leaves_no_origin_behind(plugins, write):
@@ -218,7 +177,7 @@ def test_extends_lays_a_file_over_another_with_paths_from_its_own_folder(plugins
 
     settings = resolve(top)
 
-    assert settings.controller.config == settings.controller.component.config_class()(13.0, 0.5)
+    assert settings.controller.config == Law(13.0, 0.5)
     assert settings.origins["controller.force_n"] == "shared/middle.toml:3"
     assert settings.origins["controller.speed_m_s"] == "top.toml:4"
     assert settings.origins["gripper.port"] == "shared/base.toml:3"
@@ -233,80 +192,44 @@ def test_a_file_extends_a_named_pipeline(plugins, write):
     assert re.fullmatch(r"pipeline graspsense/default:\d+", settings.origins["controller.probing_force_n"])
 
 
-def test_extends_in_a_circle_is_an_error(plugins, write):
-    write('extends = "b.toml"', "a.toml")
-    write('\nextends = "a.toml"', "b.toml")
-
-    assert complaint("a.toml") == "b.toml:2: extends forms a circle: a.toml -> b.toml -> a.toml"
+OTHER = (Flag("--gripper", "gripper.type", "other"),)
+MIDDLE = 'extends = "base.toml"\n[gripper]\ntype = "other"\ntransport = "emulated"'
+EMULATED = {"type": "lab-parts/other", "transport": "emulated"}
 
 
-def test_a_file_that_extends_nothing_known_is_named_with_its_line(plugins, write):
-    assert complaint(write('extends = "defualt"')).startswith(
-        "lab.toml:1: no pipeline named 'defualt'. Known: best, default. Did you mean 'default'?"
-    )
-    assert complaint(write("extends = 3")) == (
-        "lab.toml:1: extends: expected the name of a pipeline or the path of a .toml file, "
-        "found 3 (a whole number)"
-    )
+@every_case(
+    ("text", "options", "flags", "gripper"),
+    [
+        # Keys of the file's other component are dropped; options apply to the final type, whatever their order.
+        (BASE, [], OTHER, {"type": "lab-parts/other", "transport": "tcp"}),
+        (BASE, ["gripper.transport=emulated"], OTHER, EMULATED),
+        # The same type under its qualified name keeps the keys.
+        (BASE, [], [Flag("--gripper", "gripper.type", "lab-parts/hand")], {"port": "a"}),
+        # A type that is given late takes the keys given before any type.
+        (BASE.replace('type = "hand"\n', ""), ["gripper.type=hand"], [], {"port": "a"}),
+        # A file that changes the type starts afresh, and one that does not inherits.
+        ('extends = "middle.toml"\n[run]\nseed = 4', [], [], EMULATED),
+    ],
+)
+def test_a_change_of_type(plugins, write, text, options, flags, gripper):
+    write(BASE, "base.toml")
+    write(MIDDLE, "middle.toml")
+
+    values = resolve(write(text), options=options, flags=flags).values["gripper"]
+
+    assert {key: values[key] for key in gripper} == gripper
+    assert ("port" in values) == ("port" in gripper)
 
 
-class TestChangeOfType:
-    OTHER = (Flag("--gripper", "gripper.type", "other"),)
+def test_a_table_names_a_classifier_and_none_removes_it(plugins, write):
+    text = BASE + '[classifier]\ntype = "guess"\nforce_n = 3\n'
+    settings, removed = resolve(write(text)), resolve(write(text), options=["classifier.type=none"])
 
-    def test_keys_of_the_files_other_component_are_dropped(self, plugins, write):
-        settings = resolve(write(BASE), flags=self.OTHER)
-
-        assert settings.values["gripper"] == {"type": "lab-parts/other", "transport": "tcp"}
-
-    def test_options_apply_to_the_final_type_whatever_their_order(self, plugins, write):
-        settings = resolve(write(BASE), options=["gripper.transport=emulated"], flags=self.OTHER)
-
-        assert settings.gripper.config.transport == "emulated"
-        assert (
-            complaint(write(BASE), options=["gripper.port=b"], flags=self.OTHER)
-            == "-o gripper.port=b: lab-parts/other has no key 'port'. It is a key of gripper.type = \"hand\""
-        )
-
-    def test_the_same_type_under_its_qualified_name_keeps_the_keys(self, plugins, write):
-        settings = resolve(write(BASE), flags=[Flag("--gripper", "gripper.type", "lab-parts/hand")])
-
-        assert settings.gripper.config.port == "a"
-
-    def test_a_file_that_changes_the_type_starts_afresh_and_one_that_does_not_inherits(self, plugins, write):
-        write(BASE, "base.toml")
-        write('extends = "base.toml"\n[gripper]\ntype = "other"\ntransport = "emulated"', "middle.toml")
-        top = write('extends = "middle.toml"\n[run]\nseed = 4', "top.toml")
-
-        assert resolve(top).values["gripper"] == {"type": "lab-parts/other", "transport": "emulated"}
-
-    def test_a_type_given_late_takes_the_keys_given_before_any_type(self, plugins, write):
-        text = BASE.replace('type = "hand"\n', "")
-
-        assert resolve(write(text), options=["gripper.type=hand"]).gripper.config.port == "a"
-
-
-class TestClassifier:
-    GUESS = BASE + '[classifier]\ntype = "guess"\nforce_n = 3\n'
-
-    def test_a_table_names_one_and_none_removes_it(self, plugins, write):
-        settings = resolve(write(self.GUESS))
-
-        assert settings.classifier is not None
-        assert settings.classifier.config.force_n == 3.0
-        tables = [choice.component.table for choice in settings.chosen]
-        assert tables == ["gripper", "controller", "features", "classifier"]
-
-        removed = resolve(write(self.GUESS), options=["classifier.type=none"])
-        assert removed.classifier is None
-        assert "classifier" not in removed.values
-
-    def test_a_key_for_none_or_a_table_without_a_type_is_an_error(self, plugins, write):
-        assert complaint(write(BASE), options=["classifier.type=none", "classifier.force_n=3"]) == (
-            '-o classifier.force_n=3: classifier.type is "none", so this key has no meaning'
-        )
-        assert complaint(write(BASE + "[classifier]\nforce_n = 3\n")).startswith(
-            "lab.toml:11: classifier.type is not given: name a classifier. Known: backprop, "
-        )
+    assert settings.classifier.config.force_n == 3.0
+    tables = [choice.component.table for choice in settings.chosen]
+    assert tables == ["gripper", "controller", "features", "classifier"]
+    assert removed.classifier is None
+    assert "classifier" not in removed.values
 
 
 def test_every_error_is_told_at_once_with_its_line(plugins, write):
@@ -337,55 +260,62 @@ seed = true
     head, *told = complaint(write(text), options=["features.type=nosuch", "nonsense"]).splitlines()
 
     assert head.startswith("15 errors")
-    for line, (place, said) in zip(
-        told,
-        [
-            ("-o nonsense", "expected TABLE.KEY=VALUE"),
-            ("lab.toml:12: controler", "Did you mean 'controller'?"),
-            ("lab.toml:1: gripper", "needs the key 'port'"),
-            (
-                "lab.toml:3: gripper.rate_hz",
-                "expected a number, found '100 Hz' (text): give the number alone",
-            ),
-            ("lab.toml:4: gripper.retries", "expected a whole number, found 2.5"),
-            ("lab.toml:5: gripper.echo", "expected true or false, found 'false' (text)"),
-            ("lab.toml:6: gripper.transport", "expected one of 'usb', 'emulated', found 'ubs'"),
-            ("lab.toml:7: gripper.offsets_n[1]", "expected a number, found 'two'"),
-            ("lab.toml:7: gripper.offsets_n[2]", "expected a number, found true"),
-            ("lab.toml:10: gripper.filter.cutof_hz", "Did you mean 'cutoff_hz'? It has: cutoff_hz, order"),
-            ("lab.toml:19: controller.forse_n", "Did you mean 'force_n'?"),
-            ("lab.toml:17: controller.force_n", "must be >= 0.0: -1.0"),
-            ("lab.toml:18: controller.speed_m_s", "must be > 0.0: 0.0"),
-            ("-o features.type=nosuch", "no feature set named 'nosuch'. Known: catch22, "),
-            ("lab.toml:22: run.seed", "expected a whole number, found true"),
-        ],
-        strict=True,
-    ):
+    expected = [
+        ("-o nonsense", "expected TABLE.KEY=VALUE"),
+        ("lab.toml:12: controler", "Did you mean 'controller'?"),
+        ("lab.toml:1: gripper", "needs the key 'port'"),
+        ("lab.toml:3: gripper.rate_hz", "found '100 Hz' (text): give the number alone"),
+        ("lab.toml:4: gripper.retries", "expected a whole number, found 2.5"),
+        ("lab.toml:5: gripper.echo", "expected true or false, found 'false' (text)"),
+        ("lab.toml:6: gripper.transport", "expected one of 'usb', 'emulated', found 'ubs'"),
+        ("lab.toml:7: gripper.offsets_n[1]", "expected a number, found 'two'"),
+        ("lab.toml:7: gripper.offsets_n[2]", "expected a number, found true"),
+        ("lab.toml:10: gripper.filter.cutof_hz", "Did you mean 'cutoff_hz'? It has: cutoff_hz, order"),
+        ("lab.toml:19: controller.forse_n", "Did you mean 'force_n'?"),
+        ("lab.toml:17: controller.force_n", "must be >= 0.0: -1.0"),
+        ("lab.toml:18: controller.speed_m_s", "must be > 0.0: 0.0"),
+        ("-o features.type=nosuch", "no feature set named 'nosuch'. Known: catch22, "),
+        ("lab.toml:22: run.seed", "expected a whole number, found true"),
+    ]
+    for line, (place, said) in zip(told, expected, strict=True):
         assert line.startswith(f"  {place}: ")
         assert said in line
     assert "\n".join(told).count("give the number alone") == 1
 
 
-def test_a_misspelt_type_of_a_table_is_proposed_and_a_validator_keeps_its_words(plugins, write):
-    assert "has no key 'typ'. Did you mean 'gripper.type'?" in complaint(
-        write(BASE), options=["gripper.typ=pr2"]
-    )
-    # One that looks at other keys.
-    assert complaint(write(BASE), options=["controller.low_n=13"]) == (
-        "-o controller.low_n=13: low_n 13.0 is above force_n 12.0"
-    )
+@every_case(
+    ("text", "options", "says"),
+    [
+        ('extends = "defualt"', "", "lab.toml:1: no pipeline named 'defualt'. Known: best, default. Did you"),
+        ("extends = 3", "", "lab.toml:1: extends: expected the name of a pipeline or the path of a .toml"),
+        ('extends = "b.toml"', "", "b.toml:2: extends forms a circle: lab.toml -> b.toml -> lab.toml"),
+        (BASE, "gripper.typ=pr2", "has no key 'typ'. Did you mean 'gripper.type'?"),
+        # A validator that looks at other keys keeps its words.
+        (BASE, "controller.low_n=13", "-o controller.low_n=13: low_n 13.0 is above force_n 12.0"),
+        (BASE, "gripper.type=other gripper.port=b", "no key 'port'. It is a key of gripper.type = \"hand\""),
+        (BASE, "classifier.type=none classifier.x=3", '-o classifier.x=3: classifier.type is "none", so'),
+        (BASE + "[classifier]\nforce_n = 3", "", "lab.toml:11: classifier.type is not given: name a"),
+        ("", "", "3 errors in the settings:\n  gripper.type is not given: name a "),
+        ("[gripper]\ntype hand", "", "lab.toml:2, column 6: not TOML: Expected '=' after a key"),
+        ("a = 1\na = 2\n", "", "lab.toml:2, column 6: not TOML: Cannot overwrite a value"),
+        ('a = """\n', "", "lab.toml:2: not TOML: Unterminated string"),
+        ("a = " + "9" * 5000, "", "lab.toml:1: not TOML: Exceeds the limit (4300 digits)"),
+        ("a = " + "[" * 50000, "", "lab.toml: lists or tables nested too deep"),
+    ],
+)
+def test_a_mistake_is_told_with_its_place(plugins, write, text, options, says):
+    write('\nextends = "lab.toml"', "b.toml")
+    assert says in complaint(write(text), options=options.split())
 
 
 @every_case(
     ("option", "said"),
     [
         ("gripper.retries=3.0", "expected a whole number, found 3.0"),
-        ("gripper.rate_hz=true", "expected a number, found true"),
         ("gripper.rate_hz=nan", "expected a number, found nan (not a number)"),
         ("gripper.echo=1", "expected true or false, found 1"),
         ("gripper.port=5", "put it in quotes, with -o as 'KEY=\"...\"'"),
         ("gripper.port=2024-01-02", "expected text, found 2024-01-02 (a date)"),
-        ("gripper.offsets_n=5", "expected a list, found 5"),
         ("gripper.offsets_n=abc", "expected a list, found 'abc'"),
         ("gripper.filter=3", "expected a table, found 3"),
         ("gripper.gains={left = true}", "expected a number, found true"),
@@ -413,7 +343,6 @@ def test_nothing_is_coerced(plugins, write, option, said):
         ('"17"', "17"),
         ("/dev/tty USB#0", "/dev/tty USB#0"),
         ("1 # not a comment", "1 # not a comment"),
-        ("1,", "1,"),
         ("1\nretries = 7", "1\nretries = 7"),
         ("a=b", "a=b"),
         ("", ""),
@@ -423,66 +352,32 @@ def test_what_is_no_toml_value_is_text(plugins, write, typed, value):
     assert resolve(write(BASE), options=[f"gripper.port={typed}"]).gripper.config.port == value
 
 
-def test_tables_that_are_missing_altogether_are_named(plugins, write):
-    head, *lines = complaint(write("")).splitlines()
-    assert head == "3 errors in the settings:"
-    for table, line in zip(("gripper", "controller", "features"), lines, strict=True):
-        assert re.match(rf"  {table}\.type is not given: name a .*Known: .*(hand|law|none-at-all)", line)
+@every_case(
+    ("name", "says"),
+    [
+        ("defualt", "no pipeline named 'defualt'. Known: best, default. Did you mean 'default'?"),
+        ("mine", "A file is given with its ending .toml; there is a file 'mine' without it: rename it"),
+        ("yours", "A file is given with its ending .toml: yours.toml"),
+        ("nosuch.toml", "no pipeline file 'nosuch.toml' in {here}"),
+        ("x/y.toml", "no pipeline file 'x/y.toml' in {here}/x"),
+        ("youres.toml", "Did you mean 'yours.toml'?"),
+        ("z/y.toml", "no pipeline file 'z/y.toml': there is no folder '{here}/z'"),
+        ("folder.toml", "cannot read the pipeline file 'folder.toml': Is a directory"),
+        ("latin.toml", "latin.toml:2: not UTF-8 text (byte 0xff)"),
+    ],
+)
+def test_a_file_that_is_not_there_or_cannot_be_read_is_told(plugins, write, name, says):
+    for existing in ("mine", "yours.toml", "x/y.txt", "folder.toml/inside"):
+        write(BASE, existing)
+    Path("latin.toml").write_bytes(b"[gripper]\nname = \xff\xfe\n")
+    assert says.format(here=Path.cwd()) in complaint(name)
 
 
-class TestFiles:
-    def test_no_such_pipeline(self, plugins, write):
-        write(BASE, "mine")
-        assert complaint("defualt").startswith(
-            "no pipeline named 'defualt'. Known: best, default. Did you mean 'default'?"
-        )
-        assert complaint("mine").endswith(
-            "A file is given with its ending .toml; there is a file 'mine' without it: rename it"
-        )
-        write(BASE, "yours.toml")
-        assert complaint("yours").endswith("A file is given with its ending .toml: yours.toml")
-
-    def test_no_such_file(self, plugins, write):
-        write("", "x/y.txt")
-        write("", "gentle.toml")
-        assert complaint("nosuch.toml") == f"no pipeline file 'nosuch.toml' in {Path.cwd()}"
-        assert complaint("x/y.toml") == f"no pipeline file 'x/y.toml' in {Path.cwd()}/x"
-        assert complaint("gentel.toml").endswith("Did you mean 'gentle.toml'?")
-        assert complaint("z/y.toml") == f"no pipeline file 'z/y.toml': there is no folder '{Path.cwd()}/z'"
-
-    def test_a_folder_or_a_file_that_is_not_utf8(self, plugins, write):
-        write("", "folder.toml/inside")
-        assert complaint("folder.toml") == "cannot read the pipeline file 'folder.toml': Is a directory"
-        Path(write("")).write_bytes(b"[gripper]\nname = \xff\xfe\n")
-        assert complaint("lab.toml").startswith("lab.toml:2: not UTF-8 text (byte 0xff)")
-
-    @every_case(
-        ("text", "said"),
-        [
-            (
-                "[gripper]\ntype hand",
-                "lab.toml:2, column 6: not TOML: Expected '=' after a key in a key/value pair",
-            ),
-            ("a = 1\na = 2\n", "lab.toml:2, column 6: not TOML: Cannot overwrite a value"),
-            ('a = """\n', "lab.toml:2: not TOML: Unterminated string"),
-            ("a = " + "9" * 5000, "lab.toml:1: not TOML: Exceeds the limit (4300 digits)"),
-            ("a = " + "[" * 50000, "lab.toml: lists or tables nested too deep"),
-        ],
-    )
-    def test_not_toml(self, plugins, write, text, said):
-        assert complaint(write(text)).startswith(said)
-
-    def test_a_byte_order_mark_and_windows_line_ends_are_no_matter(self, plugins, write):
-        Path(write("")).write_bytes(("\ufeff" + BASE).replace("\n", "\r\n").encode())
-        settings = resolve("lab.toml")
-        assert settings.gripper.config.port == "a"
-        assert settings.origins["controller.force_n"] == "lab.toml:7"
-
-
-def test_a_layer_can_be_read_by_itself(plugins, write):
-    layer = read_layer(write("[sweep]\nseeds = [\n 1,\n 2]\n"))
-
-    assert layer.where(("sweep", "seeds", 1)) == "lab.toml:4"
+def test_a_byte_order_mark_and_windows_line_ends_are_no_matter(plugins, write):
+    Path(write("")).write_bytes(("\ufeff" + BASE).replace("\n", "\r\n").encode())
+    settings = resolve("lab.toml")
+    assert settings.gripper.config.port == "a"
+    assert settings.origins["controller.force_n"] == "lab.toml:7"
 
 
 def test_create_makes_a_component_as_strictly_as_a_file(plugins):
@@ -532,12 +427,8 @@ class TestToToml:
         )
         again = resolve(write(to_toml(resolved), "again.toml"))
 
-        assert again.values == resolved.values
-        assert again.gripper.config == resolved.gripper.config
-        assert again.run == resolved.run
-        assert set(again.origins.values()) - {"default"} == {
-            origin for origin in again.origins.values() if origin.startswith("again.toml:")
-        }
+        assert (again.values, again.run) == (resolved.values, resolved.run)
+        assert {origin.partition(":")[0] for origin in again.origins.values()} == {"default", "again.toml"}
         assert to_toml(again).replace("again.toml", "lab.toml") == to_toml(resolved)
 
     def test_with_origins_it_is_still_the_same_file(self, plugins, write):
@@ -550,21 +441,17 @@ class TestToToml:
         assert "# serial is not set                       # default\n" in text
 
 
+TEXT = st.text(st.characters(exclude_categories=["Cs"]))
 PLAIN = st.recursive(
-    st.booleans()
-    | st.integers(-(2**63), 2**63 - 1)
-    | st.floats(allow_nan=False)
-    | st.text(st.characters(exclude_categories=["Cs"])),
-    lambda inner: (
-        st.lists(inner, max_size=4)
-        | st.dictionaries(st.text(st.characters(exclude_categories=["Cs"])), inner, max_size=4)
-    ),
+    st.booleans() | st.integers(-(2**63), 2**63 - 1) | st.floats(allow_nan=False) | TEXT,
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(TEXT, inner, max_size=4),
     max_leaves=12,
 )
+TABLES = st.dictionaries(TEXT, PLAIN, max_size=5)
 
 
 @pytest.mark.slow
-@given(st.dictionaries(st.text(st.characters(exclude_categories=["Cs"])), PLAIN, max_size=5))
+@given(TABLES)
 def test_any_plain_value_survives_being_written_as_toml(values):
     text = "\n".join(f"{toml_key(key)} = {toml_value(value)}" for key, value in values.items())
 
@@ -583,7 +470,7 @@ def paths(value, path=()):
 
 
 @pytest.mark.slow
-@given(st.dictionaries(st.text(st.characters(exclude_categories=["Cs"])), PLAIN, max_size=5))
+@given(TABLES)
 def test_every_key_has_the_line_on_which_it_stands(values):
     text = "# first\n" + "\n\n".join(
         f"{toml_key(key)} = {toml_value(value)}" for key, value in values.items()
@@ -598,44 +485,35 @@ def test_every_key_has_the_line_on_which_it_stands(values):
 
 def test_lines_of_everything_that_toml_can_write():
     text = '''\
-a.b."c.d" = 1 # [no]
-text = """
+a.b."1" = 1 # [no]
+2 = """
 [not.a.table]
 x = 1
 """
-raw = \'\'\'it's
+6 = \'\'\'it's
 x = 1\'\'\'
-list = [ # one
+8 = [ # one
   1, "]", # two
-  { k = [3], m.n = 4 },
+  { 10 = [3], m.10 = 4 },
 ]
 [t . u]
-when = 1979-05-27 07:32:00
+13 = 1979-05-27 07:32:00
 [[s]]
-n = 1
+15 = 1
 [[s]]
 [s.t]
-n = 2
+18 = 2
 [[s.deep]]
 [[s.deep]]
-"" = 'end'
+21 = { "" = 'end' }
 '''
     lines = key_lines(text)
 
     assert set(lines) == set(paths(tomllib.loads(text)))
-    placed = {
-        ("a", "b", "c.d"): 1,
-        ("text",): 2,
-        ("raw",): 6,
-        ("list",): 8,
-        ("list", 1): 9,
-        ("list", 2, "m", "n"): 10,
-        ("t", "u"): 12,
-        ("t", "u", "when"): 13,
-        ("s", 0, "n"): 15,
-        ("s", 1): 16,
-        ("s", 1, "t", "n"): 18,
-        ("s", 1, "deep", 1): 20,
-        ("s", 1, "deep", 1, ""): 21,
+    # A key that is a number is that of its line.
+    numbered = {
+        path: line for path, line in lines.items() if str(path[-1]).isdigit() and isinstance(path[-1], str)
     }
-    assert {path: lines[path] for path in placed} == placed
+    assert numbered == {path: int(path[-1]) for path in numbered}
+    tables = {("a", "b"): 1, ("8", 1): 9, ("t", "u"): 12, ("s", 1): 16, ("s", 1, "deep", 1): 20}
+    assert {path: lines[path] for path in tables} == tables

@@ -1,5 +1,7 @@
 """First contact and rest: the two instants every feature hangs on."""
 
+from math import nan
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -18,11 +20,8 @@ from graspsense.core.control.contact import (
 
 def test_contact_needs_both_pads_at_or_over_the_threshold():
     # Equation 1 as the text means it: one finger first is no contact, exactly tau_1 is.
-    assert both_touch(0.625, 0.7, 0.625)
-    assert both_touch(0.7, 0.625, 0.625)
-    assert not both_touch(5.0, 0.6249, 0.625)
-    assert not both_touch(0.0, 5.0, 0.625)
-    assert not both_touch(float("nan"), 5.0, 0.625)
+    assert all(both_touch(*forces, 0.625) for forces in ((0.625, 0.7), (0.7, 0.625)))
+    assert not any(both_touch(*forces, 0.625) for forces in ((5.0, 0.6249), (0.0, 5.0), (nan, 5.0)))
 
 
 def still_after(gaps, dt=0.001):
@@ -52,8 +51,8 @@ def test_fifty_ticks_of_a_millisecond_fill_the_window_despite_rounding():
 
 
 def test_a_gap_that_is_no_number_is_never_still():
-    still = update_rest(RestState(0.0, 0.05), 0.001, float("nan"), REST_SPEED_M_S, REST_WINDOW_S)
-    again = update_rest(still, 0.1, float("nan"), REST_SPEED_M_S, REST_WINDOW_S)
+    still = update_rest(RestState(0.0, 0.05), 0.001, nan, REST_SPEED_M_S, REST_WINDOW_S)
+    again = update_rest(still, 0.1, nan, REST_SPEED_M_S, REST_WINDOW_S)
     assert not at_rest(again, 0.1, REST_WINDOW_S)
 
 
@@ -76,7 +75,7 @@ def test_at_rest_means_the_gap_stayed_within_bounds_over_the_whole_window(steps)
             assert max(abs(g - within[0]) for g in within) <= REST_SPEED_M_S * (t - still.since_t_s) + 1e-15
 
 
-MOVES = st.sampled_from([0.0, 0.0, 0.0, 1e-6, -1e-6, 1e-5, float("nan")])
+MOVES = st.sampled_from([0.0, 0.0, 0.0, 1e-6, -1e-6, 1e-5, nan])
 
 
 @given(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from math import inf, nan
+from textwrap import dedent
 from typing import Literal
 
 import parts
@@ -66,6 +67,7 @@ class LawConfig:
     label: str = "slow"
     ticks: int = 3
     careful: bool = True
+    sends: Literal["effort", "velocity"] = "effort"
     limits: dict[str, float] = field(factory=dict)
 
 
@@ -94,14 +96,12 @@ def importable(monkeypatch):
 def test_an_entry_is_completed_by_the_class():
     peak = part(Summit)
 
-    assert peak.config_class() is PeakConfig
     assert peak.declared().requires == (Channel("force_left", "N"),)
-    assert peak.declared().width == "width"
-    assert peak.entry.features is None
-    assert peak.declared_twice() == ()
+    assert (peak.declared().width, peak.entry.features, peak.declared_twice()) == ("width", None, ())
 
 
 def test_the_config_class_is_that_of_the_nearest_base():
+    assert part(Summit).config_class() is PeakConfig
     assert part(Fingers, "sensor-backend", SensorBackendEntry).config_class() is FingersConfig
     assert config_of(parts.Nearest, Classifier) is parts.ClassifierConfig
 
@@ -150,8 +150,7 @@ def test_the_result_has_the_declared_names_and_units():
     summit = Summit(PeakConfig())
     features = summit.extract(None)
 
-    assert features.as_dict() == {"summit": 3.0, "width": None}
-    assert features.units == ("N", "m")
+    assert (features.as_dict(), features.units) == ({"summit": 3.0, "width": None}, ("N", "m"))
     assert type(features.values[0]) is float
     for values, says in (
         ({"summits": 1.0}, "Summit declares no feature 'summits'; it has summit, width"),
@@ -162,38 +161,17 @@ def test_the_result_has_the_declared_names_and_units():
         with pytest.raises(ValueError, match=says):
             summit.result(values)
     assert summit.result({"summit": 1.7e308, "width": 1.7e308}).values == (1.7e308, 1.7e308)
-    undefined = summit.undefined("the trace is empty")
-    assert dict(undefined.reasons) == {"summit": "the trace is empty", "width": "the trace is empty"}
+    assert dict(summit.undefined("empty").reasons) == {"summit": "empty", "width": "empty"}
 
 
-def test_the_parameters_of_a_law_are_the_numbers_of_its_config():
+def test_the_parameters_of_a_law_are_the_numbers_of_its_config_and_the_kind_that_it_sends():
     params = Law(LawConfig(speed_m_s=0.03, careful=False)).params()
 
-    assert params._asdict() == {"speed_m_s": 0.03, "ticks": 3, "careful": 0}
-    assert [type(param) for param in params] == [float, int, int]
+    assert params._asdict() == {"speed_m_s": 0.03, "ticks": 3, "careful": 0, "sends": EFFORT}
+    assert [type(param) for param in params] == [float, int, int, int]
     assert type(params_of(LawConfig())) is type(params)
-
-
-def test_the_kind_that_a_law_sends_is_one_of_its_parameters():
-    @frozen(kw_only=True)
-    class TwoKindsConfig:
-        sends: Literal["effort", "velocity"] = "effort"
-        speed_m_s: float = 0.02
-
-    assert params_of(TwoKindsConfig())._asdict() == {"speed_m_s": 0.02, "sends": EFFORT}
-    assert params_of(TwoKindsConfig(sends="velocity")).sends == VELOCITY
-
-
-def settings(plugins, fingers):
-    return settings_from(
-        {
-            "gripper": {"type": "fingers", "fingers": fingers},
-            "controller": {"type": "law"},
-            "features": {"type": "summit"},
-        },
-        "test",
-        plugins,
-    )
+    assert params_of(LawConfig(sends="velocity")).sends == VELOCITY
+    assert params_of(parts.LawConfig())._asdict() == {"speed_m_s": 0.01}
 
 
 def test_the_wiring_knows_the_channels_of_the_fitted_fingers():
@@ -204,46 +182,41 @@ def test_the_wiring_knows_the_channels_of_the_fitted_fingers():
     )
     plugins = IsolatedPlugins(lab, builtins=False)
 
-    check(settings(plugins, "force"))
-    with pytest.raises(WiringError) as error:
-        check(settings(plugins, "plain"))
-    assert str(error.value).startswith(
-        "the components do not fit together:\n"
-        "  controller graspsense-test/law needs the channel 'force_left' in N, which gripper "
-        "graspsense-test/fingers does not have with these settings (it has: gap, velocity). Choose another"
-    )
-    assert "or other settings of [gripper]: its channels depend on them" in str(error.value)
+    def wired(fingers):
+        gripper = {"type": "fingers", "fingers": fingers}
+        tables = {"gripper": gripper, "controller": {"type": "law"}, "features": {"type": "summit"}}
+        check(settings_from(tables, "test", plugins))
+
+    wired("force")
+    missing = r"gripper graspsense-test/fingers does not have with these settings \(it has: gap, velocity\)"
+    with pytest.raises(WiringError, match=f"'force_left' in N, which {missing}.*its channels depend on them"):
+        wired("plain")
     hand = plugins.find("sensor-backend", "fingers")
     assert hand.channels_vary()
     assert [channel.name for channel in hand.declared().channels] == ["gap", "velocity"]
 
 
+SLOW_LAW = """
+    from attrs import frozen
+    from graspsense.core.components.step_params import params_of
+    from graspsense.simulator_api import compile_function
+    @frozen
+    class SlowConfig:
+        speed_m_s: float = 0.5
+        ticks: int = 3
+    def law(params):
+        return params.speed_m_s * params.ticks
+    if __name__ == "__main__":
+        compiled = compile_function(law)
+        print(compiled(params_of(SlowConfig())), sum(compiled.stats.cache_hits.values()))
+"""
+
+
 @pytest.mark.slow
 def test_a_law_with_the_numbers_of_its_config_is_compiled_once_and_then_loaded(tmp_path):
     """Another process finds the machine code, although no module defines the type of the parameters."""
-    (tmp_path / "lab_slow.py").write_text(
-        "from attrs import frozen\n"
-        "from graspsense.core.components.step_params import params_of\n"
-        "from graspsense.simulator_api import compile_function, first_call\n"
-        "@frozen\n"
-        "class SlowConfig:\n"
-        "    speed_m_s: float = 0.5\n"
-        "    ticks: int = 3\n"
-        "def law(params):\n"
-        "    return params.speed_m_s * params.ticks\n"
-        "if __name__ == '__main__':\n"
-        "    compiled = compile_function(law)\n"
-        "    with first_call():\n"
-        "        print(compiled(params_of(SlowConfig())), sum(compiled.stats.cache_hits.values()))\n"
-    )
-    said = [
-        python(
-            "lab_slow.py",
-            cwd=tmp_path,
-            env={"PATH": "", "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
-            check=True,
-        ).stdout
-        for _ in range(2)
-    ]
+    (tmp_path / "lab_slow.py").write_text(dedent(SLOW_LAW))
+    environ = {"PATH": "", "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    said = [python("lab_slow.py", cwd=tmp_path, env=environ, check=True).stdout for _ in range(2)]
 
     assert said == ["1.5 0\n", "1.5 1\n"]

@@ -103,35 +103,27 @@ def test_the_list_says_what_is_to_be_done(home, site):
     # A process of its own, for which numpy is not imported yet.
     environ = {**os.environ, "PYTHONPATH": str(site.folder), "NO_COLOR": "1", "GRASPSENSE_PLUGINS": NAMED}
     program = "from graspsense.cli.main import main; main(['plugins', 'list'])"
-    done = python("-c", program, env=environ)
-    said = done.stdout.partition("To be done:")[2]
+    said = python("-c", program, env=environ).stdout.partition("To be done:")[2]
 
-    assert (
+    for words in (
         "lab-peak: the feature set name 'peak' is also that of lab-other/peak: write "
-        'features.type = "lab-peak/peak", or disable one of them'
-    ) in said
-    assert "lab-old: broken: it is written for plugin API 0.9" in said
-    assert "upgrade lab-old" in said
-    assert "lab-slow: slow: importing lab_slow_plugin takes" in said
-    assert "and imports numpy. Its author: name classes by import strings" in said
-    assert (
-        "lab-sleepy: slow: importing lab_sleepy_plugin waits for 0.7 s. Its author: wait for a device" in said
-    )
-    assert (
-        "GRASPSENSE_PLUGINS names lab-loud, and no plugin of that distribution is installed. Did you mean 'lab-old'?"
-    ) in said
-    assert (
+        'features.type = "lab-peak/peak", or disable one of them',
+        "lab-old: broken: it is written for plugin API 0.9",
+        "upgrade lab-old",
+        "lab-slow: slow: importing lab_slow_plugin takes",
+        "and imports numpy. Its author: name classes by import strings",
+        "lab-sleepy: slow: importing lab_sleepy_plugin waits for 0.7 s. Its author: wait for a device",
+        "GRASPSENSE_PLUGINS names lab-loud, and no plugin of that distribution is installed. Did you mean 'lab-old'",
         "lab-broken: broken: ModuleNotFoundError: No module named 'no_such_driver'; `graspsense plugins show "
-        "lab-broken` has the whole of it, `graspsense plugins disable lab-broken` leaves it out"
-    ) in said
+        "lab-broken` has the whole of it, `graspsense plugins disable lab-broken` leaves it out",
+    ):
+        assert words in said
 
 
 def test_a_distribution_that_is_installed_twice_is_told_of(site, tmp_path, monkeypatch):
     site.install("lab-peak", FEATURES.format(name="peak"))
-    copy_info = tmp_path / "second" / "lab_peak-0.1.dist-info"
-    copy_info.mkdir(parents=True)
-    (copy_info / "METADATA").write_text("Metadata-Version: 2.1\nName: lab-peak\nVersion: 0.1\n")
-    (copy_info / "entry_points.txt").write_text("[graspsense.plugins]\nmain = lab_peak_plugin\n")
+    second = type(site)(tmp_path / "second", monkeypatch)
+    second.metadata("lab-peak", "0.1", "[graspsense.plugins]\nmain = lab_peak_plugin\n")
     monkeypatch.syspath_prepend(tmp_path / "second")
 
     mine = [source for source in installed_sources() if source.distribution == "lab-peak"]
@@ -143,19 +135,19 @@ def test_a_distribution_that_is_installed_twice_is_told_of(site, tmp_path, monke
     assert "pip uninstall lab-peak until none is left, then install it once" in row["advice"][0]
 
 
-def test_a_hook_with_a_default_is_refused_with_what_to_write(site):
-    site.install(
-        "lab-peak",
-        """
-        from graspsense.plugin_api import hookimpl
-        GRASPSENSE_API = (2, 0)
-        @hookimpl
-        def graspsense_probe_devices(timeout_s=1.0):
-            return []
-        """,
-    )
+DEFAULT = """
+    from graspsense.plugin_api import hookimpl
+    GRASPSENSE_API = (2, 0)
+    @hookimpl
+    def graspsense_probe_devices(timeout_s=1.0):
+        return []
+"""
 
-    (status,) = [statuse for statuse in site.discover().statuses if statuse.distribution == "lab-peak"]
+
+def test_a_hook_with_a_default_is_refused_with_what_to_write(site):
+    site.install("lab-peak", DEFAULT)
+
+    (status,) = [status for status in site.discover().statuses if status.distribution == "lab-peak"]
 
     assert status.state == "broken"
     assert "gives timeout_s a default in its signature" in status.reason

@@ -1,4 +1,4 @@
-"""Events that a controller tells: of an inherited step, in feature sets, and of a grasp that is cut off."""
+"""Events that a controller tells: of an inherited step, of a part of a trace, and of a grasp that is cut off."""
 
 from __future__ import annotations
 
@@ -9,14 +9,12 @@ import textwrap
 import pytest
 from cases import every_case
 from grippers import Scripted, bottle, squeezing
-from parts import NoKeys
 
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.control.tick import events_of
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.values.errors import DeviceLost
 from graspsense.core.values.signals import Phase
-from graspsense.plugin_api import Feature, FeatureSet
 from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
 from graspsense.recording.reader import read_recorded
 from graspsense.store.recover import recover_store
@@ -116,23 +114,8 @@ def test_a_killed_grasp_keeps_its_events(tmp_path):
     assert event.t_s == trace.t_s[trace.phase == Phase.SQUEEZE][0]
 
 
-class Delay(FeatureSet[NoKeys]):
-    """The time from the first tick to the first contact that the controller told."""
-
-    requires = ()
-    features = (Feature("contact_at", "s", "time of the contact that the controller told"),)
-
-    def extract(self, trace):
-        told = [event.t_s for event in trace.events if event.what == "contact"]
-        if not told:
-            return self.undefined("the controller told no contact")
-        return self.result({"contact_at": told[0] - trace.t_s[0]})
-
-
-def test_a_feature_set_reads_events():
+def test_a_part_of_a_trace_has_the_events_until_then():
     trace = grasped(HybridController).trace
     touched = trace.t_s[trace.phase == Phase.SQUEEZE][0]
-    assert Delay(NoKeys()).extract(trace)["contact_at"] == pytest.approx(touched - trace.t_s[0])
-
-    early = Delay(NoKeys()).extract(trace.until(touched - 0.01))
-    assert early.reasons == {"contact_at": "the controller told no contact"}
+    assert [(event.what, event.t_s) for event in trace.events] == [("contact", touched)]
+    assert trace.until(touched - 0.01).events == ()

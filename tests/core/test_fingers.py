@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import sys
-from math import isnan, nan, sqrt
+from math import inf, isnan, nan, sqrt
 
 import numpy as np
 import pytest
-from attrs import evolve, frozen
+from attrs import evolve
 from cases import every_case
 from commands import graspsense
 from hypothesis import given
 from hypothesis import strategies as st
 from lab_grasp import recorded_grasp
-from parts import offering
+from parts import NoKeys, channels, offering
 
-import graspsense_sim_gripper.plugin as simulator
 from graspsense import load_pipeline
 from graspsense.core.components.channels import as_json, from_json
 from graspsense.core.control.contact import both_touch
@@ -24,16 +23,12 @@ from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.fingers import fingers_of
 from graspsense.gripper_api import FingerForce, opposed_forces
 from graspsense.plugin_api import (
-    NAMES_INPUT,
-    Channel,
-    Feature,
-    FeatureSet,
-    FeatureSetEntry,
+    EFFORT,
+    NO_PADS,
+    Command,
     Reading,
     SensorBackend,
     SensorBackendEntry,
-    create,
-    setting,
     signal_type,
 )
 from graspsense.recording.export_trace import WRITERS
@@ -45,121 +40,77 @@ from graspsense.sources.columns.grasp_columns import GraspColumns, checked_recor
 from graspsense.sources.recordings.dataset_recordings import readable_or_not
 from graspsense.sources.recordings.exported_grasp import read_exported
 from graspsense.testing.conformance import Examined
+from graspsense.testing.model_gripper import ModelGripper
 from graspsense.testing.subject import Subject
 
 HERE = sys.modules[__name__]
+FRAME = channels("gap", "velocity", "effort", "force_left", "force_right")
 FORCES = st.lists(st.floats(0.0, 50.0), min_size=5, max_size=5)
 HALF = sqrt(0.75)
-JAWS = tuple(
-    FingerForce(f"force_{name}", "N", 250.0, side=side, closing=closing)
-    for name, side, closing in (
-        ("thumb", "left", (1.0, 0.0, 0.0)),
-        ("index", "right", (-0.5, HALF, 0.0)),
-        ("ring", "right", (-0.5, -HALF, 0.0)),
-    )
+JAWS = (
+    FingerForce("force_thumb", "N", 250.0, side="left", closing=(1.0, 0.0, 0.0)),
+    FingerForce("force_index", "N", 250.0, side="right", closing=(-0.5, HALF, 0.0)),
+    FingerForce("force_ring", "N", 250.0, side="right", closing=(-0.5, -HALF, 0.0)),
 )
 """Three fingers that close at 120 degrees to each other."""
 
 
+FINGERS = ("thumb", "index", "middle", "ring", "little")
+
+
 def five(touch, **sides):
-    names = ("thumb", "index", "middle", "ring", "little")
     return tuple(
-        FingerForce(f"force_{name}", "N", side=sides.get(name, "right"), touch=touch) for name in names
+        FingerForce(f"force_{name}", "N", side=sides.get(name, "right"), touch=touch) for name in FINGERS
     )
 
 
-@frozen(kw_only=True)
-class JawsConfig:
-    object: str = setting(default="water:full_closed", effect=NAMES_INPUT, meaning="What it holds.")
-
-
-class ThreeJaws(SensorBackend[JawsConfig]):
-    """The simulated gripper, of which two fingers at 120 degrees share what its right pad feels."""
+class ThreeJaws(ModelGripper, SensorBackend[NoKeys]):
+    """The model gripper, of which two fingers at 120 degrees share what its right pad feels."""
 
     accepts = ("effort",)
+    channels = (*FRAME, *JAWS)
 
     def __init__(self, config):
-        super().__init__(config)
-        self._gripper = create("sensor-backend", "sim", object=config.object, rate_hz=250.0)
-        self._forces = opposed_forces(JAWS)
-
-    @property
-    def channels(self):
-        return (*self._gripper.channels, *JAWS)
-
-    def objects(self):
-        return self._gripper.objects()
-
-    def with_object(self, name):
-        return type(self)(evolve(self.config, object=name))
+        super().__init__(frozenset(FRAME), 0.06, 1500.0)
+        self.config, self._forces = config, opposed_forces(JAWS)
 
     def open(self, seed):
-        return self._gripper.open(seed)
+        return evolve(super().open(seed), simulated=False, opening=Command(EFFORT, -15.0, inf, inf))
 
     def read(self, timeout_s):
-        frame, pads, _ = self._gripper.read(timeout_s)
+        frame, _, _ = super().read(timeout_s)
         # At 60 degrees to the axis of the thumb, two fingers bear together twice what one on the axis would.
         felt = (frame.force_left_n, 1.2 * frame.force_right_n, 0.8 * frame.force_right_n)
         left, right = self._forces(felt)
         frame = frame._replace(force_left_n=left, force_right_n=right)
-        return Reading(frame, pads, signal_type(self.channels)(*felt))
-
-    def apply(self, command):
-        self._gripper.apply(command)
-
-    def tare(self, images):
-        self._gripper.tare(images)
-
-    def close(self):
-        self._gripper.close()
+        return Reading(frame, NO_PADS, signal_type(self.channels)(*felt))
 
 
-class ThumbPeak(FeatureSet[JawsConfig]):
-    requires = (Channel("force_thumb", "N"),)
-    features = (Feature("thumb_peak", "N", "largest force of the thumb"),)
-
-    def extract(self, trace):
-        return self.result({"thumb_peak": trace.signals["force_thumb"].max()})
-
-
-LAB_HAND = offering(
-    SensorBackendEntry(name="jaws", target=f"{__name__}:ThreeJaws", summary="three fingers"),
-    FeatureSetEntry(name="thumb-peak", target=f"{__name__}:ThumbPeak", summary="peak of the thumb"),
-)
+LAB_HAND = offering(SensorBackendEntry(name="jaws", target=f"{__name__}:ThreeJaws", summary="three fingers"))
 
 
 @pytest.fixture(scope="module")
 def grasped(tmp_path_factory):
     """One grasp with three fingers: the trial, the path of its recording, and the plugins."""
-    others = ((simulator, "graspsense-sim-gripper"),)
     options = ("gripper.type=jaws", "run.hold_s=0.05")
     folder = tmp_path_factory.mktemp("recorded")
-    with recorded_grasp(HERE, LAB_HAND, folder, *options, others=others) as (kept, path, plugins):
+    with recorded_grasp(HERE, LAB_HAND, folder, *options) as (kept, path, plugins):
         yield kept.trial, path, plugins
 
 
 # ------------------------------------------------------------------------------------------------- the rule
 
 
-@given(FORCES)
-def test_two_sides_touch_where_each_bears_the_contact_force(forces):
-    left, right = opposed_forces(five("sides", thumb="left"))(forces)
-
-    assert (left, right) == (forces[0], pytest.approx(sum(forces[1:])))
-
-
 @given(FORCES, st.floats(0.1, 10.0))
-def test_each_finger_touches_where_both_forces_are_those_of_a_contact(forces, contact_n):
-    both = both_touch(*opposed_forces(five("each"))(forces), contact_n)
+def test_fingers_touch_where_a_side_every_finger_or_the_thumb_and_another_one_bears_the_contact_force(
+    forces, contact_n
+):
+    thumb, others = forces[0], forces[1:]
+    each, opposed = opposed_forces(five("each"))(forces), opposed_forces(five("any", thumb="left"))(forces)
 
-    assert both == all(force >= contact_n for force in forces)
-
-
-@given(FORCES, st.floats(0.1, 10.0))
-def test_any_two_opposed_fingers_touch_where_the_thumb_and_another_one_do(forces, contact_n):
-    both = both_touch(*opposed_forces(five("any", thumb="left"))(forces), contact_n)
-
-    assert both == (forces[0] >= contact_n and max(forces[1:]) >= contact_n)
+    assert opposed_forces(five("sides", thumb="left"))(forces) == (thumb, pytest.approx(sum(others)))
+    assert both_touch(*each, contact_n) == (min(forces) >= contact_n)
+    assert both_touch(*opposed, contact_n) == (min(thumb, max(others)) >= contact_n)
 
 
 def test_a_finger_without_a_number_is_no_contact_of_its_side_or_of_every_finger():
@@ -191,21 +142,18 @@ def test_the_forces_of_a_side_count_along_its_direction_so_that_three_jaws_balan
     assert [from_json(as_json(jaw)) for jaw in JAWS] == list(JAWS)
 
 
-def test_the_name_of_a_finger_is_not_that_of_another_channel():
-    for name in ("thumb", "force_left", "force_"):
-        with pytest.raises(ValueError, match="finger"):
-            FingerForce(name, "N")
+@every_case("name", ["thumb", "force_left", "force_"])
+def test_the_name_of_a_finger_is_not_that_of_another_channel(name):
+    with pytest.raises(ValueError, match="finger"):
+        FingerForce(name, "N")
 
 
 # ------------------------------------------------------------------------------------------------- a grasp
 
 
-def test_a_grasp_with_three_fingers_says_of_which_fingers_its_features_are(grasped):
-    trial, _, _ = grasped
-
-    assert trial.outcome.words == "steady"
-    assert not isnan(trial.features.as_dict()["f_steady"])
-    (note,) = [text for text in trial.device.notes if "fingers" in text]
+def demand_rule(device):
+    """The note of the device must say of which fingers the forces are."""
+    (note,) = [text for text in device.notes if "fingers" in text]
     assert "left force is of thumb" in note
     assert "index and ring" in note
 
@@ -216,10 +164,11 @@ def test_every_finger_is_in_trace_recording_and_replay(grasped):
     options = ["gripper.type=replay", f"gripper.recording={path}", "classifier.type=none"]
     replayed = grasp_with(load_pipeline(options=options, plugins=plugins).settings, plugins)
 
-    assert [channel for channel in recorded.channels if isinstance(channel, FingerForce)] == list(JAWS)
-    assert [note for note in replayed.device.notes if "fingers" in note] == [
-        note for note in trial.device.notes if "fingers" in note
-    ]
+    assert trial.outcome.words == "steady"
+    assert not isnan(trial.features.as_dict()["f_steady"])
+    assert fingers_of(recorded.channels) == JAWS
+    demand_rule(trial.device)
+    demand_rule(replayed.device)
     for jaw in JAWS:
         signal = trial.trace.signals[jaw.name]
         assert signal.max() > 1.0
@@ -242,28 +191,15 @@ def test_an_export_declares_the_fingers_and_has_their_forces(grasped, tmp_path, 
 
 @pytest.mark.slow
 def test_the_pages_and_the_picture_draw_the_force_of_each_finger(grasped):
-    trial, _, _ = grasped
-    figures = channel_figures(trial.trace, trial.device.channels)
     from matplotlib.figure import Figure
 
+    trial, _, _ = grasped
     force, gap = Figure().subplots(2)
     draw_trace(trial.trace, force, gap, fingers_of(trial.device.channels))
 
-    (fingers,) = [figure for figure in figures if "Forces of the fingers" in figure]
-    assert len(figures) == 1
-    assert all(name in fingers for name in ("thumb", "index", "ring"))
+    (fingers,) = channel_figures(trial.trace, trial.device.channels)
+    assert all(name in fingers for name in ("Forces of the fingers", "thumb", "index", "ring"))
     assert {"thumb", "index", "ring"} <= {line.get_label() for line in force.lines}
-
-
-def test_features_may_require_the_force_of_a_finger(grasped):
-    trial, _, plugins = grasped
-    options = ["gripper.type=jaws", "features.type=thumb-peak", "classifier.type=none"]
-
-    settings = load_pipeline(
-        options=options, plugins=plugins
-    ).settings  # raises WiringError if they do not fit
-
-    assert settings.features.create().extract(trial.trace).values == (trial.trace.force_left_n.max(),)
 
 
 @pytest.mark.slow
@@ -277,7 +213,6 @@ def test_a_hand_with_three_fingers_conforms(grasped):
 # ------------------------------------------------------------------------------------------------- recordings
 
 
-FINGERS = ("thumb", "index", "middle", "ring", "little")
 LOADS_N = dict(zip(FINGERS, (10.0, 4.0, 3.0, 2.0, 0.0), strict=True))
 """What each finger bears at rest; the little finger touches nothing."""
 NAMED = (
@@ -290,12 +225,9 @@ def five_fingers(folder, manifest_lines, offset_n=0.0):
     t_s = np.arange(300) / 100.0
     gap_mm = np.maximum(60.0 - 10.0 * t_s, 40.0)
     pressed = np.clip(0.1 * (50.0 - gap_mm), 0.0, 1.0)
-    forces = [offset_n + load * pressed for load in LOADS_N.values()]
-    rows = [
-        f"{t:.2f},{gap:.3f}," + ",".join(f"{force[k]:.4f}" for force in forces)
-        for k, (t, gap) in enumerate(zip(t_s, gap_mm, strict=True))
-    ]
-    (folder / "cup-1.csv").write_text("\n".join(["t,gap,F1,F2,F3,F4,F5", *rows]) + "\n")
+    columns = [t_s, gap_mm, *(offset_n + load * pressed for load in LOADS_N.values())]
+    head = "t,gap,F1,F2,F3,F4,F5"
+    np.savetxt(folder / "cup-1.csv", np.stack(columns, 1), "%.4f", ",", header=head, comments="")
     text = ['files = "{label}-{order:d}.csv"', 'time = "t [s]"', 'gap = "gap [mm]"', *manifest_lines]
     (folder / "manifest.toml").write_text("\n".join(text) + "\n")
     recordings = list(readable_or_not("manifest", str(folder / "manifest.toml")))
@@ -320,8 +252,7 @@ def test_each_finger_of_a_recording_has_its_own_zero(tmp_path):
     (finger_grasp,) = five_fingers(tmp_path, [NAMED, 'touch = "thumb"', 'zero = "10 samples"'], offset_n=0.7)
 
     last = finger_grasp.recording.readings[-1]
-    forces = [getattr(last.signals, f"force_{name}") for name in FINGERS]
-    assert forces == pytest.approx(list(LOADS_N.values()))
+    assert list(last.signals) == pytest.approx(list(LOADS_N.values()))
     assert last.frame.force_right_n == pytest.approx(9.0)
 
 
@@ -335,16 +266,13 @@ def test_a_resampled_recording_keeps_the_rule(tmp_path):
 
 def test_an_imported_trial_of_five_fingers_says_of_which_fingers_its_features_are(tmp_path):
     five_fingers(tmp_path, [NAMED, 'touch = "thumb"'])
-    manifest = tmp_path / "manifest.toml"
+    given = (tmp_path / "manifest.toml", "--save", tmp_path / "store", "-o", "classifier.type=none")
 
-    done = graspsense("import", manifest, "--save", tmp_path / "store", "-o", "classifier.type=none")
-
-    assert done.returncode == 0, done.stderr
+    assert graspsense("import", *given).returncode == 0
     (path,) = (tmp_path / "store" / "recordings").glob("*.mcap")
     recorded = read_recorded(path)
     assert [finger.finger for finger in fingers_of(recorded.channels)] == list(FINGERS)
-    (note,) = [text for text in recorded.device.notes if "fingers" in text]
-    assert "left force is of thumb" in note
+    assert "left force is of thumb" in " ".join(recorded.device.notes)
     assert recorded.record().result.features.values
 
 
@@ -367,14 +295,13 @@ def test_a_manifest_with_fingers_that_cannot_be_is_refused(tmp_path, lines, says
 
 
 def test_columns_of_a_reader_have_every_finger_that_they_declare():
-    n = 20
     columns = GraspColumns(
         source="a hand",
-        t_s=np.arange(n) / 100.0,
-        gap_m=np.full(n, 0.05),
-        left_n=np.ones(n),
-        right_n=np.ones(n),
-        scalars={"force_thumb": np.ones(n)},
+        t_s=np.arange(20) / 100.0,
+        gap_m=np.full(20, 0.05),
+        left_n=np.ones(20),
+        right_n=np.ones(20),
+        scalars={"force_thumb": np.ones(20)},
         fingers=five("sides", thumb="left")[:2],
     )
 

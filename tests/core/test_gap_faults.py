@@ -29,21 +29,22 @@ from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
 RATE_HZ = 100.0
 
 
-def frame(k, gap_m):
-    return Frame(k / RATE_HZ, 1.0 / RATE_HZ, gap_m, 0.0, nan, nan, nan, nan, nan, 0)
+def frame(k, gap_m, velocity_m_s=0.0):
+    return Frame(k / RATE_HZ, 1.0 / RATE_HZ, gap_m, velocity_m_s, nan, nan, nan, nan, nan, 0)
 
 
-def jumps(command, gap_of, frames=100):
+def jumps(command, gap_of, velocity_m_s=0.0):
     """Return in which frames the gap jumps under this command."""
     watch, seen = GapJump(0.2), []
-    for k in range(frames):
-        if watch.see(frame(k, gap_of(k))) is not None:
+    for k in range(100):
+        now = frame(k, gap_of(k), velocity_m_s)
+        if watch.see(now) is not None:
             seen.append(k)
-        watch.apply(frame(k, gap_of(k)), command)
+        watch.apply(now, command)
     return seen
 
 
-CLOSES = Command(POSITION, 0.0, 20.0, 0.02)
+CLOSES, PUSHES = Command(POSITION, 0.0, 20.0, 0.02), Command(EFFORT, 20.0, inf, inf)
 
 
 def closing(k):
@@ -63,7 +64,7 @@ def closing(k):
         (CLOSES, lambda k: round(closing(k), 3), []),
         (CLOSES, lambda k: closing(k - k % 5), []),
         # How fast fingers move under an effort is not known.
-        (Command(EFFORT, 20.0, inf, inf), lambda k: closing(k) + 0.004 * (k >= 50), []),
+        (PUSHES, lambda k: closing(k) + 0.004 * (k >= 50), []),
         (CLOSES, lambda k: nan if k > 50 else closing(k), []),
     ],
 )
@@ -87,23 +88,16 @@ def test_a_gap_that_changes_faster_than_the_fingers_were_told_jumps(command, gap
 )
 def test_a_gap_that_is_none_for_a_tenth_of_a_second_ends_the_grasp(is_absent, expected, ends):
     for none in (nan, inf):
-        watch = Absence(GAP_ABSENT, RATE_HZ, expected=expected)
-        faults = [
-            watch.see(now.gap_m, now)
-            for now in (frame(k, none if is_absent(k) else 0.05) for k in range(100))
-        ]
+        watch, faults = Absence(GAP_ABSENT, RATE_HZ, expected=expected), []
+        for k in range(100):
+            now = frame(k, none if is_absent(k) else 0.05)
+            faults.append(watch.see(now.gap_m, now))
         assert {fault.ends for fault in faults if fault is not None} == ends
 
 
 @every_case(("velocity_m_s", "seen"), [(-0.02, [50]), (nan, []), (0.0, [])])
 def test_under_an_effort_a_gap_that_jumps_is_known_by_a_velocity_that_is_measured(velocity_m_s, seen):
-    watch, jumped = GapJump(0.2), []
-    for k in range(100):
-        now = frame(k, closing(k) - 0.004 * (k >= 50))._replace(velocity_m_s=velocity_m_s)
-        if watch.see(now) is not None:
-            jumped.append(k)
-        watch.apply(now, Command(EFFORT, 20.0, inf, inf))
-    assert jumped == seen
+    assert jumps(PUSHES, lambda k: closing(k) - 0.004 * (k >= 50), velocity_m_s) == seen
 
 
 def test_a_gap_that_jumps_is_no_motor_that_turns_the_wrong_way():
@@ -127,10 +121,7 @@ def opened(gap_of, start_m=0.08, delay_s=0.02):
     """Return the names of the faults in a release of a second, after a squeeze that rested at 50 mm for 0.2 s."""
     watch = Opening(RATE_HZ, delay_s, OPENS, tells_gap=True)
     gaps = [*np.linspace(start_m, 0.05, 80), *[0.05] * 20, *(gap_of(k / RATE_HZ) for k in range(100))]
-    phases = [SQUEEZE] * 100 + [Phase.RELEASE] * 100
-    faults = [
-        watch.see(frame(k, gap), phase) for k, (gap, phase) in enumerate(zip(gaps, phases, strict=True))
-    ]
+    faults = [watch.see(frame(k, gap), Phase.RELEASE if k >= 100 else SQUEEZE) for k, gap in enumerate(gaps)]
     return sorted({fault.name for fault in faults if fault is not None and not fault.ends})
 
 
@@ -163,47 +154,65 @@ def test_fingers_that_brake_first_are_not_late():
     assert all(watch.see(frame(100 + k, gap_m), Phase.RELEASE) is None for k, gap_m in enumerate(braking))
 
 
-class LateGap(Scripted):
-    """A gripper whose gap is told this much later (s)."""
+class Misread(Scripted):
+    """A gripper whose gap is told this much later (s), stands still from one time on, and is no number from another."""
 
-    def __init__(self, late_s):
-        super().__init__(squeezing, bottle)
-        self.late_s = late_s
+    def __init__(self, path, late_s=0.0, stands_from_s=inf, none_from_s=inf):
+        super().__init__(path, bottle)
+        self.late_s, self.stands_from_s, self.none_from_s = late_s, stands_from_s, none_from_s
 
     def gap_m(self, t):
-        return super().gap_m(t - self.late_s)
+        return nan if t >= self.none_from_s else super().gap_m(min(t, self.stands_from_s) - self.late_s)
 
 
-@every_case(("late_s", "names"), [(0.0, ()), (0.3, ("gap late",)), (inf, ("fingers did not open",))])
-def test_a_gap_that_follows_late_or_never_is_told_and_the_fingers_open_nevertheless(late_s, names):
-    """A gap that is late stands still at first, which is no sign of open fingers. Its grasp stays steady."""
-    gripper = LateGap(late_s)
-    if late_s == inf:
-        gripper.gap_m = lambda t: squeezing(min(t, REST_S))
-    grasp = run_grasp(gripper, HybridController(HybridConfig()), RunConfig())
-    assert grasp.outcome is Outcome.STEADY
-    assert tuple(warning.split(":")[0] for warning in grasp.warnings) == names
-    assert gripper.commands[-1].value == 0.0
-    if late_s < inf:
-        assert grasp.trace.gap_m[-1] > 0.078
+class ByPosition(Misread):
+    """One that is strong and opens to a width."""
+
+    def open(self, seed):
+        return evolve(super().open(seed), opening=OPENS, effort_limit_n=235.0)
+
+    def apply(self, command):
+        opens = command.kind == POSITION
+        super().apply(command._replace(kind=EFFORT, value=-1.0) if opens else command)
+        self.commands[-1] = command
+
+    def opening_effort_n(self):
+        return max(command.effort_limit_n for command in self.commands if command.kind == POSITION)
+
+
+def grasp_of(gripper):
+    return run_grasp(gripper, HybridController(HybridConfig()), RunConfig())
 
 
 @every_case(
-    ("gap_m", "refused", "told"),
+    ("fault", "names"),
     [
-        (0.08, False, []),
-        (0.077, False, []),
-        (0.06, False, ["opened to another width"]),
-        (0.09, False, ["opened to another width"]),
-        (0.0, True, ["fingers not open"]),
-        (nan, True, ["fingers not open"]),
+        ({}, ()),
+        ({"late_s": 0.3}, ("gap late",)),
+        ({"stands_from_s": REST_S}, ("fingers did not open",)),
     ],
 )
-def test_fingers_that_are_not_as_open_as_they_were_told_are_named_before_they_close(gap_m, refused, told):
-    watch = Opening(RATE_HZ, 0.02, OPENS, tells_gap=True)
-    fault = watch.before_closing(frame(0, gap_m))
-    assert [fault.name for fault in (fault,) if fault is not None] == told
-    assert (fault is not None and fault.ends) is refused
+def test_a_gap_that_follows_late_or_never_is_told_and_the_fingers_open_nevertheless(fault, names):
+    """A gap that is late stands still at first, which is no sign of open fingers. Its grasp stays steady."""
+    gripper = Misread(squeezing, **fault)
+    grasp = grasp_of(gripper)
+    assert grasp.outcome is Outcome.STEADY
+    assert tuple(warning.split(":")[0] for warning in grasp.warnings) == names
+    assert gripper.commands[-1].value == 0.0
+    assert (grasp.trace.gap_m[-1] > 0.078) == ("stands_from_s" not in fault)
+
+
+@every_case(
+    ("gap_m", "told"),
+    [
+        *((gap_m, None) for gap_m in (0.08, 0.077)),
+        *((gap_m, ("opened to another width", False)) for gap_m in (0.06, 0.09)),
+        *((gap_m, ("fingers not open", True)) for gap_m in (0.0, nan)),
+    ],
+)
+def test_fingers_that_are_not_as_open_as_they_were_told_are_named_before_they_close(gap_m, told):
+    fault = Opening(RATE_HZ, 0.02, OPENS, tells_gap=True).before_closing(frame(0, gap_m))
+    assert (fault and (fault.name, fault.ends)) == told
 
 
 def test_a_gripper_without_a_gap_or_a_told_width_may_close():
@@ -232,40 +241,15 @@ STRONGLY, WEAKLY = (Command(EFFORT, effort_n, inf, inf) for effort_n in (-20.0, 
 def test_open_fingers_are_as_wide_after_a_grasp_as_before_it(opens, end_m, is_told):
     watch = Opening(RATE_HZ, 0.02, opens, tells_gap=True, friction_n=7.0)
     watch.before_closing(frame(0, 0.08))
-    for k, gap_m in enumerate([0.08, 0.06, 0.05]):
-        watch.see(frame(k, gap_m), SQUEEZE)
-    for k, gap_m in enumerate([0.05, 0.06], 3):
-        watch.see(frame(k, gap_m), Phase.RELEASE)
+    for k, gap_m in enumerate([0.08, 0.06, 0.05, 0.05, 0.06]):
+        watch.see(frame(k, gap_m), SQUEEZE if k < 3 else Phase.RELEASE)
     assert (watch.released(frame(5, end_m)) is not None) is is_told
-
-
-class ByPosition(Scripted):
-    """A strong gripper that opens to a width; its gap is no number from then on, and `late_s` late (s)."""
-
-    def __init__(self, path, none_from_s=inf, late_s=0.0):
-        super().__init__(path, bottle)
-        self.none_from_s, self.late_s = none_from_s, late_s
-
-    def open(self, seed):
-        return evolve(super().open(seed), opening=OPENS, effort_limit_n=235.0)
-
-    def apply(self, command):
-        opens = command.kind == POSITION
-        super().apply(command._replace(kind=EFFORT, value=-1.0) if opens else command)
-        self.commands[-1] = command
-
-    def gap_m(self, t):
-        return nan if t >= self.none_from_s else super().gap_m(t - self.late_s)
-
-    def opening_effort_n(self):
-        return max(command.effort_limit_n for command in self.commands if command.kind == POSITION)
 
 
 def test_a_fault_opens_the_fingers_with_no_more_effort_than_a_release():
     sound, failing = ByPosition(squeezing), ByPosition(squeezing, none_from_s=REST_S)
-    controller = HybridController(HybridConfig())
-    assert run_grasp(sound, controller, RunConfig()).outcome is Outcome.STEADY
-    assert run_grasp(failing, controller, RunConfig()).outcome is Outcome.ABORTED
+    assert grasp_of(sound).outcome is Outcome.STEADY
+    assert grasp_of(failing).outcome is Outcome.ABORTED
     assert failing.opening_effort_n() == sound.opening_effort_n() == 1.25 * HybridConfig().probing_force_n
 
 
@@ -273,7 +257,7 @@ def test_fingers_that_still_close_when_they_are_told_to_open_are_not_open_where_
     """They stand at the end of the stroke until they turn round, which is no rest of open fingers."""
     gripper = ByPosition(lambda t: max(0.08 - 0.04 * max(t - 0.3, 0.0), 0.0), late_s=0.3)
     gripper.felt = lambda t: (0.0, 0.0)
-    grasp = run_grasp(gripper, HybridController(HybridConfig()), RunConfig())
+    grasp = grasp_of(gripper)
     assert grasp.outcome is Outcome.NOTHING_THERE
     assert grasp.trace.gap_m[-1] > 0.075
 
@@ -282,7 +266,7 @@ def test_fingers_that_still_close_when_they_are_told_to_open_are_not_open_where_
 def test_fingers_whose_gap_is_no_witness_open_for_as_long_as_they_need_from_any_width(stands_m, outcome):
     """Their encoder has stood still, or failed, since they rest: 80 mm at 50 mm/s take 1.6 s."""
     gripper = ByPosition(lambda t: squeezing(t) if t < REST_S else stands_m)
-    grasp = run_grasp(gripper, HybridController(HybridConfig()), RunConfig())
+    grasp = grasp_of(gripper)
     assert grasp.outcome is outcome
     opening = [command.kind == POSITION for command in gripper.commands]
     assert sum(opening[-3000:]) / 1000.0 >= 1.6

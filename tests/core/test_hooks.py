@@ -1,4 +1,4 @@
-"""Every hook has a test, `test_hook_NAME` or a case of its kind, and an example in its docstring that runs."""
+"""Every hook has a case of its kind, and an example in its docstring that runs."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import logging
 import re
 import types
 
-import click
 import pytest
 from cases import every_case
 from parts import implementing
@@ -25,10 +24,8 @@ from graspsense.core.components.entries import (
 )
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.values.events import GraspEvent
-from graspsense.core.values.features import Features
-from graspsense.core.values.signals import Outcome, Phase
-from graspsense.core.values.trace import trace_of
-from graspsense.core.values.trial import RunInfo, Trial
+from graspsense.core.values.signals import Phase
+from graspsense.core.values.trial import RunInfo
 from graspsense.experiment_api import ExperimentKindEntry
 from graspsense.plugin_api import (
     CommandEntry,
@@ -38,6 +35,7 @@ from graspsense.plugin_api import (
     UnknownName,
 )
 from graspsense.simulator_api import collect
+from graspsense.testing.samples import a_trial
 
 HOOKS = {name: spec for name, spec in vars(hookspecs).items() if name.startswith("graspsense_")}
 PAGES = script_of_docs("role_pages")
@@ -65,23 +63,6 @@ def raising(error: BaseException):
     return raise_it
 
 
-def trial() -> Trial:
-    return Trial(
-        run=RUN,
-        trace=trace_of([], [], [], []),
-        outcome=Outcome.NEVER_STEADY,
-        reason="",
-        features=Features(names=(), values=(), units=()),
-        prediction=None,
-        device={},
-        report={},
-        counts={},
-        events=(),
-        seconds_simulated=None,
-        seconds_wall=0.0,
-    )
-
-
 COMPONENTS = {
     "graspsense_sensor_backends": ("sensor-backend", "lab-hand", "lab_hand.backend:LabHand"),
     "graspsense_controllers": ("controller", "gentle", "lab_hand.gentle:GentleController"),
@@ -89,44 +70,62 @@ COMPONENTS = {
     "graspsense_classifiers": ("classifier", "nearest", "lab_hand.nearest:Nearest"),
 }
 """Hooks of components; the role, the name and the target of what its example gives."""
-
-
 RESOURCES = {
-    "graspsense_models": (ModelEntry, "lab-cans", {"resource": "lab_hand:models/cans.json"}),
-    "graspsense_datasets": (DatasetEntry, "lab-csv", {"recordings": "lab_hand.csv:recordings"}),
-    "graspsense_emulators": (
-        EmulatorEntry,
-        "lab-hand",
-        {"target": "lab_hand.emulator:emulate", "wires": ("pty",), "options": ()},
-    ),
-    "graspsense_live_observers": (LiveObserverEntry, "lab-wall", {"target": "lab_hand.wall:observe"}),
+    "graspsense_models": (ModelEntry, "lab-cans", "resource", "lab_hand:models/cans.json"),
+    "graspsense_datasets": (DatasetEntry, "lab-csv", "recordings", "lab_hand.csv:recordings"),
+    "graspsense_emulators": (EmulatorEntry, "lab-hand", "target", "lab_hand.emulator:emulate"),
+    "graspsense_live_observers": (LiveObserverEntry, "lab-wall", "target", "lab_hand.wall:observe"),
     "graspsense_conformance_checks": (
         ConformanceCheckEntry,
         "fingers-have-names",
-        {"hook": "lab_hand_fingers"},
+        "hook",
+        "lab_hand_fingers",
     ),
+    "graspsense_pipelines": (PipelineEntry, "lab", "resource", "lab_hand:pipelines/lab.toml"),
+    "graspsense_commands": (CommandEntry, "home-hand", "target", "lab_hand.cli:home"),
+    "graspsense_identifiers": (IdentifierEntry, "lab-sim", "target", "lab_sim.identification:identify"),
+    "graspsense_experiments": (
+        ExperimentEntry,
+        "worn-cans",
+        "resource",
+        "lab_study:experiments/worn_cans.toml",
+    ),
+    "graspsense_experiment_kinds": (ExperimentKindEntry, "wear", "run", "lab_study.wear:run"),
 }
-"""Hooks of resources; the kind, the name and the fields of what its example gives."""
+"""Hooks of resources; the kind, the name, and a field with its value of what its example gives."""
 OBSERVERS = {
     "graspsense_run_starting": ("run_starting", (RUN,), "started", 7),
     "graspsense_grasp_event": ("grasp_event", (RUN, EVENT), "events", "both pads touch"),
-    "graspsense_run_finished": ("run_finished", (RUN, trial()), "outcomes", "never steady"),
+    "graspsense_run_finished": ("run_finished", (RUN, a_trial()), "outcomes", "steady"),
 }
 """Hooks that observe a grasp; how they are called, and what the example appends to which list."""
+ASKED = {
+    "graspsense_diagnose": (
+        ("these settings", 0.25),
+        lambda self, config, timeout_s: [Finding("what I was told", "ok", f"{config} for {timeout_s} s")],
+        Finding("what I was told", "ok", "these settings for 0.25 s"),
+        {"state": "problem", "numbers": {"baud": 115200}},
+    ),
+    "graspsense_probe_devices": (
+        (0.25,),
+        lambda self, timeout_s: [FoundDevice("mine", str(timeout_s), "bus 1", ready=True)],
+        FoundDevice("mine", "0.25", "bus 1", ready=True),
+        {"advice": "add yourself to the group dialout"},
+    ),
+}
+"""Hooks that ask for devices: with what, an answer that repeats it, and fields of what the example gives."""
 
 
-@every_case("hook", HOOKS)
-def test_every_hook_has_a_test(hook):
-    assert hook in {*COMPONENTS, *RESOURCES, *OBSERVERS} or f"test_hook_{hook}" in globals()
+def test_every_hook_has_a_test():
+    assert set(HOOKS) == {*COMPONENTS, *RESOURCES, *OBSERVERS, *ASKED}
 
 
 @every_case("hook", RESOURCES)
 def test_a_resource_hook_gives_its_resource(hook):
-    kind, name, fields = RESOURCES[hook]
+    kind, name, field, value = RESOURCES[hook]
     (resource,) = IsolatedPlugins(example(hook), builtins=False).resources(kind)
 
-    assert resource.name == name
-    assert {field: getattr(resource.entry, field) for field in fields} == fields
+    assert (resource.name, getattr(resource.entry, field)) == (name, value)
 
 
 @every_case("hook", OBSERVERS)
@@ -150,108 +149,66 @@ def test_a_component_hook_gives_components_of_its_role(hook):
 
 
 def test_the_documented_hand_has_the_channels_of_its_fingers():
-    (code,) = (
-        source
-        for source in re.findall(r"```python\n(from .*?)```", DOCS, re.DOTALL)
-        if "class LabHand(" in source
-    )
+    sources = re.findall(r"```python\n(from .*?)```", DOCS, re.DOTALL)
+    (code,) = (source for source in sources if "class LabHand(" in source)
     names: dict = {}
     exec(compile(code, "hooks.md", "exec", dont_inherit=True), names)
 
     class Hand(names["LabHand"]):
         open = read = apply = tare = close = None
 
-    config = names["LabHandConfig"]
-    assert [channel.name for channel in Hand(config()).channels] == ["gap", "velocity"]
-    assert [channel.name for channel in Hand(config(fingers="force-sensing")).channels][2:] == [
-        "force_left",
-        "force_right",
-    ]
+    def channels(**settings):
+        return [channel.name for channel in Hand(names["LabHandConfig"](**settings)).channels]
+
+    assert channels() == ["gap", "velocity"]
+    assert channels(fingers="force-sensing") == ["gap", "velocity", "force_left", "force_right"]
 
 
-def test_hook_graspsense_pipelines():
-    plugins = IsolatedPlugins(example("graspsense_pipelines"))
-
-    assert [pipeline.name for pipeline in plugins.resources(PipelineEntry)] == ["best", "default", "lab"]
-    assert "[gripper]" in plugins.resource(PipelineEntry, "graspsense/default").file().read_text()
-
-
-def test_hook_graspsense_commands():
-    again = CommandEntry("again", "click:Command", "a class that is there to be imported")
-    plugin = implementing("graspsense_commands", lambda self: [again])
-    plugins = IsolatedPlugins(example("graspsense_commands"), plugin)
-
-    assert [command.name for command in plugins.resources(CommandEntry)] == ["again", "home-hand"]
-    assert plugins.resource(CommandEntry, "again").load() is click.Command
-
-
-def test_hook_graspsense_identifiers():
+def test_an_identifier_that_is_not_there_is_told_with_what_to_install():
     plugins = IsolatedPlugins(example("graspsense_identifiers"))
 
-    assert plugins.resource(IdentifierEntry, "lab-sim").entry.target == "lab_sim.identification:identify"
     with pytest.raises(UnknownName, match=r"graspsense-identify:\n.*graspsense\[identify\]"):
         plugins.resource(IdentifierEntry, "sim")
     with pytest.raises(UnknownName, match=r"'replay'.*lab-sim"):
         plugins.resource(IdentifierEntry, "replay")
 
 
-def test_hook_graspsense_experiment_kinds():
-    plugins = IsolatedPlugins(example("graspsense_experiment_kinds"))
+def test_a_kind_of_experiment_names_what_it_runs_and_its_keys():
+    kind = IsolatedPlugins(example("graspsense_experiment_kinds")).resource(ExperimentKindEntry, "wear")
 
-    assert plugins.resource(ExperimentKindEntry, "wear").targets == ("run", "keys", "result", "findings")
+    assert kind.targets == ("run", "keys", "result", "findings")
     with pytest.raises(ValueError, match="both 'run' and 'keys'"):
         ExperimentKindEntry(name="wear", run="lab_study.wear:run", summary="without keys")
 
 
-def test_hook_graspsense_experiments():
+def test_a_file_of_a_plugin_that_cannot_be_imported_is_unavailable():
     plugins = IsolatedPlugins(example("graspsense_experiments"))
 
-    worn = plugins.resource(ExperimentEntry, "graspsense-test/worn-cans")
-    assert worn.entry.resource == "lab_study:experiments/worn_cans.toml"
     with pytest.raises(PluginUnavailable, match="lab_study"):
-        worn.file()
+        plugins.resource(ExperimentEntry, "graspsense-test/worn-cans").file()
 
 
-def test_hook_graspsense_diagnose():
-    def told(self, config, timeout_s):
-        return [Finding("what I was told", "ok", f"{config} for {timeout_s} s")]
-
-    hook = "graspsense_diagnose"
+@every_case("hook", ASKED)
+def test_a_hook_that_asks_for_devices_has_the_answer_or_the_error_of_each_plugin(hook):
+    arguments, repeating, repeated, fields = ASKED[hook]
     plugins = IsolatedPlugins(builtins=False)
-    plugins.add(implementing(hook, raising(PermissionError("cannot list the bus"))), "lab-a")
-    plugins.add(example(hook), "lab-b")
-    plugins.add(implementing(hook, told), "lab-c")
+    failing = implementing(hook, raising(PermissionError("cannot list the bus")))
+    wrong = implementing(hook, lambda self: ["/dev/ttyUSB0"])
+    for number, plugin in enumerate((failing, example(hook), implementing(hook, repeating), wrong)):
+        plugins.add(plugin, f"lab-{number}")
 
-    failed, diagnoses, told_findings = plugins.diagnose("these settings", 0.25)
+    failed, shown, told, other = getattr(plugins, hook.removeprefix("graspsense_"))(*arguments)
 
-    assert (failed.given, failed.error) == ((), "PermissionError: cannot list the bus")
-    assert (diagnoses.given[0].state, diagnoses.given[0].numbers) == ("problem", {"baud": 115200})
-    assert told_findings.given[0].words == "these settings for 0.25 s"
+    assert (failed.distribution, failed.given) == ("lab-0", ())
+    assert failed.error == "PermissionError: cannot list the bus"
+    assert (shown.error, {field: getattr(shown.given[0], field) for field in fields}) == ("", fields)
+    assert told.given == (repeated,)
+    assert other.error == f"{hook} gave '/dev/ttyUSB0': it takes {type(repeated).__name__} only"
 
 
 def test_a_finding_is_in_one_of_three_states():
     with pytest.raises(ValueError, match=r"'state' is 'fine'; there are ok, note, problem"):
         Finding("cable", "fine", "straight")  # type: ignore[arg-type]
-
-
-def test_hook_graspsense_probe_devices():
-    def timed(self, timeout_s):
-        return [FoundDevice("mine", str(timeout_s), "bus 1", ready=True)]
-
-    hook = "graspsense_probe_devices"
-    plugins = IsolatedPlugins(builtins=False)
-    plugins.add(implementing(hook, raising(PermissionError("cannot list the bus"))), "lab-a")
-    plugins.add(example(hook), "lab-b")
-    plugins.add(implementing(hook, timed), "lab-c")
-    plugins.add(implementing(hook, lambda self: ["/dev/ttyUSB0"]), "lab-d")
-
-    failed, devices, timed_devices, other = plugins.probe_devices(0.25)
-
-    assert (failed.distribution, failed.given) == ("lab-a", ())
-    assert failed.error == "PermissionError: cannot list the bus"
-    assert (devices.error, devices.given[0].advice) == ("", "add yourself to the group dialout")
-    assert timed_devices.given[0].serial == "0.25"
-    assert other.error == "graspsense_probe_devices gave '/dev/ttyUSB0': it takes FoundDevice only"
 
 
 @pytest.mark.parametrize("failure", [RuntimeError("no room on the disk"), SystemExit("no room on the disk")])

@@ -7,7 +7,7 @@ import tomllib
 from math import inf, nan
 
 import pytest
-from attrs import evolve, field, frozen
+from attrs import asdict, evolve, field, frozen
 from kept import BENCH, keep
 
 from graspsense.core.components.registry import installed
@@ -46,35 +46,30 @@ class Hand:
 
 
 def test_settings_are_read_back_as_they_were():
-    values = {"name": "inf", "limit_n": inf, "floor_n": -inf, "levels": [1.0, inf]}
-    values["cable"] = {"vanishes_s": inf}
-
+    values = asdict(Hand())
     assert settings_from_json(json.loads(json_text(values)), Hand) == values
 
 
-@pytest.fixture
-def emulated():
+def test_a_model_is_trained_on_a_store_that_was_collected_with_infinite_settings(tmp_path):
     """Settings of a gripper whose config has infinite defaults."""
-    return resolve(
-        flags=[Flag("--gripper", "gripper.type", "pr2")],
-        options=["gripper.transport=emulated", "classifier.type=none"],
+    flags, options = (
+        [Flag("--gripper", "gripper.type", "pr2")],
+        ["gripper.transport=emulated", "classifier.type=none"],
     )
-
-
-def test_a_model_is_trained_on_a_store_that_was_collected_with_infinite_settings(tmp_path, emulated):
+    emulated = resolve(flags=flags, options=options)
     settings = to_toml(emulated)
     assert tomllib.loads(settings)["gripper"]["faults"]["stall_at_s"] == inf
     with Store.open(tmp_path / "trials") as store:
         for k in range(6):
             label, values = ("can:full_open", "can:empty_open")[k % 2], (0.06 + 0.002 * (k % 2), 5.0 + k)
             keep(store, label, values=values, ticks=2, settings=settings, device=REAL)
-    component = installed().find("classifier", "tree")
+    trials, component = labelled_store(str(tmp_path / "trials")), installed().find("classifier", "tree")
 
-    model = train(component, component.config_class()(), labelled_store(str(tmp_path / "trials")), name="m")
+    model = train(component, component.config_class()(), trials, name="m")
     write_model(tmp_path / "m.json", model)
     again = load_model(str(tmp_path / "m.json"), installed())
 
     content = json.loads((tmp_path / "m.json").read_text(), parse_constant=pytest.fail)
     assert content["provenance"]["settings"]["gripper"]["faults"]["stall_at_s"] == "inf"
-    features = labelled_store(str(tmp_path / "trials")).table.row(0)
-    assert again.predict(features, emulated).warnings == model.predict(features, emulated).warnings == ()
+    for known in (model, again):
+        assert known.predict(trials.table.row(0), emulated).warnings == ()

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 from collections import deque
-from math import nan
 
 import pytest
+from attrs import evolve
 from cases import every_case
 from commands import graspsense, printed
 
@@ -19,11 +19,11 @@ from graspsense.plugin_api import (
     VELOCITY,
     Channel,
     Command,
-    DeviceInfo,
     Frame,
     Reading,
     SensorBackend,
 )
+from graspsense.testing.samples import a_trial
 
 RATE_HZ = 200.0
 FRICTION_N = 5.0
@@ -42,14 +42,12 @@ class DelayedGripper(SensorBackend[None]):
         self._block_m, self._gap_m, self._effort_n, self._ticks = block_m, 0.08, 0.0, 0
         self.largest_n = 0.0
 
-    def info(self):
-        return DeviceInfo(
-            name="delayed", clock="virtual", rate_hz=RATE_HZ, effort_limit_n=100.0, speed_limit_m_s=0.2,
-            opening=Command(VELOCITY, 0.05, 20.0, 0.05), relaxed=Command(VELOCITY, 0.0, 20.0, 0.2),
-        )  # fmt: skip
-
     def open(self, seed):
-        return self.info()
+        commands = {
+            "opening": Command(VELOCITY, 0.05, 20.0, 0.05),
+            "relaxed": Command(VELOCITY, 0.0, 20.0, 0.2),
+        }
+        return evolve(a_trial().device, rate_hz=RATE_HZ, **commands)
 
     def apply(self, command):
         self._waiting.append(command)
@@ -65,13 +63,7 @@ class DelayedGripper(SensorBackend[None]):
 
     def read(self, timeout_s):
         self._ticks += 1
-        frame = Frame(
-            self._ticks / RATE_HZ, 1 / RATE_HZ, self._gap_m, 0.0, self._effort_n, nan, nan, nan, nan, 0
-        )
-        return Reading(frame, NO_PADS)
-
-    def tare(self, images):
-        pass
+        return Reading(Frame(self._ticks / RATE_HZ, 1 / RATE_HZ, self._gap_m, 0.0, self._effort_n), NO_PADS)
 
     def close(self):
         pass
@@ -80,7 +72,7 @@ class DelayedGripper(SensorBackend[None]):
 @every_case("delay", [0, 3, 17])
 def test_a_known_delay_is_measured_to_a_frame(delay):
     gripper = DelayedGripper(delay)
-    measured = measured_latency(gripper, gripper.accepts, gripper.info(), RunConfig(), 3)
+    measured = measured_latency(gripper, gripper.accepts, gripper.open(0), RunConfig(), 3)
     # The frame in which the effect is seen is the next after the command acts.
     expected_s = [(delay + 1) / RATE_HZ] * 3
     assert measured.motion_s == pytest.approx(expected_s)
@@ -92,20 +84,20 @@ def test_a_delay_longer_than_declared_is_a_problem():
     states = {}
     for declared_s in (0.0, 0.1, 0.02):
         gripper = DelayedGripper(8, declared_s=declared_s)
-        motion, force = latency_findings(gripper, gripper.accepts, gripper.info(), RunConfig(), 1)
+        motion, force = latency_findings(gripper, gripper.accepts, gripper.open(0), RunConfig(), 1)
         states[declared_s] = motion.state, force.state
     assert states == {0.0: ("ok", "ok"), 0.1: ("ok", "ok"), 0.02: ("ok", "problem")}
 
 
 def test_without_a_block_or_enough_force_it_is_said_why_there_is_none():
     gripper = DelayedGripper(2, block_m=0.0)
-    measured = measured_latency(gripper, gripper.accepts, gripper.info(), RunConfig(), 2)
+    measured = measured_latency(gripper, gripper.accepts, gripper.open(0), RunConfig(), 2)
     assert len(measured.motion_s) == 2
     assert not measured.force_s
     assert "block" in measured.no_force
     gripper = DelayedGripper(2)
     with pytest.raises(CalibrationFailed, match="first_effort_n"):
-        measured_latency(gripper, gripper.accepts, gripper.info(), RunConfig(first_effort_n=4.0), 1)
+        measured_latency(gripper, gripper.accepts, gripper.open(0), RunConfig(first_effort_n=4.0), 1)
 
 
 @pytest.mark.slow

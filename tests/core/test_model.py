@@ -10,23 +10,20 @@ from attrs import evolve
 from cases import every_case
 from commands import graspsense
 from test_classifiers import NAMES, UNITS, trials
-from test_conformal import bottles
+from test_conformal import bottles, model_of
 from test_damaged_models import resealed
 
 from graspsense.core.components.registry import IsolatedPlugins, installed
 from graspsense.core.components.setting import worded
 from graspsense.core.learn.labelled import Labelled
-from graspsense.core.learn.model_file import as_json, load_model, write_model
+from graspsense.core.learn.model_file import load_model, write_model
 from graspsense.core.learn.training import train
 from graspsense.core.pipeline.pipeline import model_for
 from graspsense.core.settings.layers import Flag
 from graspsense.core.settings.resolved import resolve
-from graspsense.core.settings.selected import SelectedComponent
-from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError, DataDamaged, UnknownName
 from graspsense.core.values.features import UNKNOWN, Features
-from graspsense.core.values.signals import EFFORT, Command
-from graspsense.evaluation.doubt import calibrated
+from graspsense.testing.samples import a_trial
 
 CAN = Features(names=NAMES, values=(0.0661, 8.0, 0.0), units=UNITS)
 
@@ -47,28 +44,7 @@ def file(tmp_path):
 
 
 def device(clock):
-    relaxed = Command(EFFORT, 0.0, 1.0, 1.0)
-    return DeviceInfo(
-        name="x",
-        clock=clock,
-        rate_hz=1e3,
-        effort_limit_n=1.0,
-        speed_limit_m_s=1.0,
-        opening=None,
-        relaxed=relaxed,
-    )
-
-
-@pytest.mark.parametrize("name", ["c45", "knn"])
-def test_a_file_gives_back_the_model(tmp_path, name):
-    made = model(name)
-    write_model(tmp_path / "kept.json", made)
-    again = load_model(str(tmp_path / "kept.json"), installed())
-
-    table, _ = trials(seed=9)
-    assert (again.classifier.probabilities(table) == made.classifier.probabilities(table)).all()
-    assert as_json(again) == as_json(made)
-    assert again.predict(CAN).label == "can:full"
+    return evolve(a_trial().device, clock=clock, simulated=clock == "virtual")
 
 
 def test_a_pipeline_reads_a_model_once_and_again_when_its_file_has_changed(tmp_path):
@@ -85,43 +61,34 @@ def test_a_pipeline_reads_a_model_once_and_again_when_its_file_has_changed(tmp_p
 
 def test_the_file_says_what_it_was_trained_on(file):
     kept = json.loads(file.read_text())
-
+    said = kept["provenance"]
     assert kept["classifier"] == "graspsense-c45/c45"
     assert kept["features"] == [["p_first", "m"], ["f_steady", "N"], ["noise", ""]]
-    assert kept["provenance"]["source"] == "a test"
-    assert kept["provenance"]["by_label"] == {"bottle:empty": 40, "bottle:full": 40, "can:full": 40}
-    assert kept["provenance"]["seed"] == 4
-    assert kept["provenance"]["versions"].keys() == {"graspsense", "graspsense-c45", "numpy", "python"}
+    assert (said["source"], said["seed"]) == ("a test", 4)
+    assert said["by_label"] == {"bottle:empty": 40, "bottle:full": 40, "can:full": 40}
+    assert said["versions"].keys() == {"graspsense", "graspsense-c45", "numpy", "python"}
 
 
 def test_a_thing_unlike_anything_is_unknown_and_says_why():
     said = model().predict(Features(names=NAMES, values=(0.03, 8.0, 0.0), units=UNITS))
 
     assert said.label == UNKNOWN
-    assert said.because[0].words.startswith(
-        "p_first = 30 mm is unlike everything trained on: the nearest, bottle:"
-    )
-    assert said.because[1].words.startswith("of the known labels, the nearest is bottle:")
+    unlike, nearest = (reason.words for reason in said.because[:2])
+    assert unlike.startswith("p_first = 30 mm is unlike everything trained on: the nearest, bottle:")
+    assert nearest.startswith("of the known labels, the nearest is bottle:")
 
 
 @every_case(
-    ("features", "why"),
+    ("names", "values", "units", "why"),
     [
-        (
-            Features(
-                names=NAMES, values=(math.nan,) * 3, units=UNITS, reasons=dict.fromkeys(NAMES, "no contact")
-            ),
-            "no feature is defined: no contact",
-        ),
-        (Features(names=("p_first",), values=(0.06,), units=("m",)), "there is no f_steady, noise here"),
-        (
-            Features(names=NAMES, values=(0.06, 8.0, 0.0), units=("m", "counts", "")),
-            "takes f_steady in N; here it is in",
-        ),
+        (NAMES, (math.nan,) * 3, UNITS, "no feature is defined: no contact"),
+        (("p_first",), (0.06,), ("m",), "there is no f_steady, noise here"),
+        (NAMES, (0.06, 8.0, 0.0), ("m", "counts", ""), "takes f_steady in N; here it is in"),
     ],
 )
-def test_no_features_other_ones_or_other_units_cannot_be_judged(features, why):
-    said = model().predict(features)
+def test_no_features_other_ones_or_other_units_cannot_be_judged(names, values, units, why):
+    reasons = {name: "no contact" for name, value in zip(names, values, strict=True) if math.isnan(value)}
+    said = model().predict(Features(names=names, values=values, units=units, reasons=reasons))
 
     assert said.label == UNKNOWN
     assert why in said.because[0].words
@@ -147,53 +114,43 @@ def test_simulated_training_is_said_and_louder_on_a_real_gripper():
     assert model().predict(CAN, None, device("device")).warnings == ()
 
 
-def test_another_force_speed_or_gripper_is_said():
-    values = resolve().values
-    trained = model(simulated=True, settings={t: values[t] for t in ("gripper", "controller", "features")})
+DEFAULTS = {table: resolve().values[table] for table in ("gripper", "controller", "features")}
 
-    def warned(*options, gripper=None):
-        flags = [Flag("--gripper", "gripper.type", gripper)] if gripper else []
-        return trained.predict(CAN, resolve(options=options, flags=flags)).warnings[1:]
 
-    assert warned() == ()
-    assert warned("gripper.object=can:empty_open", "run.seed=4") == ()
-    told = ("gripper.explain=true", "gripper.compile=never", "gripper.expected_force_n=20")
-    assert warned(*told) == ()
-    assert warned("controller.probing_force_n=17") == (
-        "trained on simulated grasps with probing force 20 N, this one was with 17 N (controller.probing_force_n)",
-    )
-    assert warned("controller.closing_speed_m_s=0.05") == (
-        "trained on simulated grasps with closing speed 10 mm/s, this one was with 50 mm/s "
-        "(controller.closing_speed_m_s)",
-    )
-    assert warned("gripper.transmission=pr2_paper") == (
-        "trained on simulated grasps with transmission pr2, this one was with pr2_paper (gripper.transmission)",
-    )
-    assert warned("gripper.recording=icub:some/file.txt", gripper="replay") == (
-        "trained on simulated grasps with gripper graspsense-sim-gripper/sim, this one was with graspsense/replay",
-    )
+@every_case(
+    ("options", "gripper", "said"),
+    [
+        ("", None, ""),
+        ("gripper.object=can:empty_open run.seed=4", None, ""),
+        ("gripper.explain=true gripper.compile=never gripper.expected_force_n=20", None, ""),
+        ("controller.probing_force_n=17", None, "probing force 20 N, this one was with 17 N"),
+        ("controller.closing_speed_m_s=0.05", None, "closing speed 10 mm/s, this one was with 50 mm/s"),
+        ("gripper.transmission=pr2_paper", None, "transmission pr2, this one was with pr2_paper"),
+        (
+            "gripper.recording=icub:x.txt",
+            "replay",
+            "gripper graspsense-sim-gripper/sim, this one was with grasp",
+        ),
+    ],
+)
+def test_another_force_speed_or_gripper_is_said(options, gripper, said):
+    trained = model(simulated=True, settings=DEFAULTS)
+    flags = [Flag("--gripper", "gripper.type", gripper)] if gripper else []
+
+    warnings = trained.predict(CAN, resolve(options=options.split(), flags=flags)).warnings[1:]
+
+    assert len(warnings) == bool(said)
+    assert all(warning.startswith(f"trained on simulated grasps with {said}") for warning in warnings)
+    # A key is named where it is not the gripper itself.
+    assert all(options.split("=")[0] in warning for warning in warnings if not gripper)
 
 
 def test_no_figure_is_given_that_was_not_measured_under_the_settings_of_the_grasp():
-    component = installed().find("classifier", "c45")
-    values = resolve().values
-    provenance = {
-        "simulated": True,
-        "settings": {t: values[t] for t in ("gripper", "controller", "features")},
-    }
-    bottled = bottles(20, spread=0.3)
-    measured = evolve(
-        calibrated(
-            train(component, component.config_class()(), bottled, name="m"),
-            SelectedComponent(component, component.config_class()()),
-            bottled,
-            0,
-        ),
-        provenance=provenance,
-    )
+    bottled, provenance = bottles(20, spread=0.3), {"simulated": True, "settings": DEFAULTS}
+    measured = evolve(model_of(bottled, "c45"), provenance=provenance)
     row = bottled.table.row(0)
     same, other = resolve(), resolve(options=("controller.probing_force_n=15",))
-    changed = {**provenance, "settings": {**provenance["settings"], "controller": other.values["controller"]}}
+    changed = {**provenance, "settings": {**DEFAULTS, "controller": other.values["controller"]}}
 
     for said in (measured.predict(row, same), measured.predict(row, provenance=provenance)):
         assert said.certainty is not None
@@ -225,11 +182,10 @@ def test_the_sets_of_an_earlier_version_are_left_out_and_it_says_what_to_do(file
 def test_a_model_of_other_features_is_refused_before_the_grasp_with_what_to_do():
     given = ("-o", "features.type=curve", "--gripper", "sim")
     for command in (("run",), ("run", "-o", "run.stop_when_sure=true"), ("config", "validate")):
-        done = graspsense(*command, *given)
-        assert done.returncode == 2
-        assert "approach" not in done.stderr
-        assert "p_first" in done.stderr
-        assert "-o features.type=curve --classifier c45" in done.stderr
+        code, _, told = graspsense(*command, *given)
+        assert code == 2
+        words = ("approach", "p_first", "-o features.type=curve --classifier c45")
+        assert [word in told for word in words] == [False, True, True]
 
 
 @every_case(
@@ -265,14 +221,13 @@ def test_a_file_of_a_later_version_or_an_unknown_classifier_is_refused(file, cha
 
 
 def test_no_such_file_or_name(tmp_path):
-    with pytest.raises(ConfigError, match="cannot be read"):
-        load_model(str(tmp_path / "none.json"), installed())
-    with pytest.raises(UnknownName, match=r"write its name with \.json"):
-        load_model("nosuch", installed())
-    with (
-        IsolatedPlugins() as plugins,
-        pytest.raises(UnknownName, match="provided by graspsense-sim-gripper"),
+    for name, error, says in (
+        (str(tmp_path / "none.json"), ConfigError, "cannot be read"),
+        ("nosuch", UnknownName, r"write its name with \.json"),
     ):
+        with pytest.raises(error, match=says):
+            load_model(name, installed())
+    with IsolatedPlugins() as plugins, pytest.raises(UnknownName, match="by graspsense-sim-gripper"):
         load_model("default", plugins)
 
 
