@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 from cases import every_case
-from commands import graspsense
+from commands import printed
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -54,13 +54,12 @@ def weather(tmp_path):
     return path
 
 
-def shapes(folder, seed=0, trials=60):
+def shapes(folder):
     """Write trials whose label is decided by a text and a number together, with some texts missing."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     lines = []
-    for i in range(trials):
+    for i, weight in enumerate(rng.uniform(0.0, 1.0, 60)):
         colour = ("red", "green", "blue")[i % 3]
-        weight = rng.uniform(0.0, 1.0)
         label = "a" if colour == "red" or (colour == "blue" and weight > 0.5) else "b"
         lines.append(f"{label},{colour if i % 20 else ''},{weight:.6f}")
     path = folder / "shapes.csv"
@@ -70,25 +69,14 @@ def shapes(folder, seed=0, trials=60):
 
 @pytest.mark.parametrize(
     "classifier",
-    [
-        "c45",
-        "knn",
-        "tree",
-        *(pytest.param(name, marks=pytest.mark.slow) for name in ("ebm", "forest", "svm", "boosted")),
-    ],
+    ["c45", "knn", "tree", *(pytest.param(name, marks=pytest.mark.slow) for name in ("ebm", "svm"))],
 )
 def test_a_text_reaches_every_classifier(tmp_path, classifier):
     trials = read_labelled(shapes(tmp_path), "what")
     assert trials.table.names == ("colour=blue", "colour=green", "colour=red", "weight")
-    few = {"forest": {"trees": 10}, "boosted": {"stages": 20}}.get(classifier, {})
-    evaluation = evaluate(
-        select_component("classifier", classifier, **few),
-        trials,
-        classifier=classifier,
-        folds=5,
-        controls=False,
-        learning_curve=False,
-    )
+    component = select_component("classifier", classifier)
+    options = {"folds": 5, "controls": False, "learning_curve": False}
+    evaluation = evaluate(component, trials, classifier=classifier, **options)
     # The weight alone decides for one of three colours: 2 of 3 and no more are right without the colour.
     assert evaluation.headline.rate > 0.8
 
@@ -107,29 +95,22 @@ def test_c45_grows_the_published_tree_of_the_weather_data(weather):
         ("windy = TRUE", "no", 2.0, 0.0),
         ("windy = FALSE", "yes", 3.0, 0.0),
     ]
-    restored = select_component("classifier", "c45").create()
-    restored.from_json(json.loads(json.dumps(classifier.to_json())))
-    np.testing.assert_array_equal(
-        restored.probabilities(trials.table), classifier.probabilities(trials.table)
-    )
-    because = [reason.words for reason in restored.explain(trials.table.row(13)).because]
-    assert "outlook = very rainy" in because
-    assert "windy = TRUE" in because
+    because = {reason.words for reason in classifier.explain(trials.table.row(13)).because}
+    assert {"outlook = very rainy", "windy = TRUE"} <= because
+    with pytest.raises(ConfigError, match="no column 'x'"):
+        load_trials(str(weather), label="x")
 
 
 def test_a_model_of_nominal_features_predicts_from_other_tables(weather, tmp_path):
-    model = tmp_path / "m.json"
-    assert graspsense("train", weather, "--out", model).returncode == 0
-    other = tmp_path / "other.csv"
+    model, other = tmp_path / "m.json", tmp_path / "other.csv"
+    printed("train", weather, "--out", model)
     other.write_text(
         "windy,humidity,outlook,temperature\nTRUE,70,overcast,60\nFALSE,90,sunny,80\nTRUE,80,foggy,70\n"
     )
-    done = graspsense("predict", model, other, "--json")
-    assert done.returncode == 0
-    load = json.loads(done.stdout)["predictions"]
-    assert [prediction["label"] for prediction in load[:2]] == ["yes", "no"]
+    predictions = json.loads(printed("predict", model, other, "--json"))["predictions"]
+    assert [prediction["label"] for prediction in predictions[:2]] == ["yes", "no"]
     # A value that the training did not have is as a missing one.
-    assert any("outlook is missing" in reason["words"] for reason in load[2]["because"])
+    assert any("outlook is missing" in reason["words"] for reason in predictions[2]["because"])
 
 
 def test_arff_is_read_as_it_is_written(tmp_path):
@@ -148,28 +129,31 @@ def test_arff_is_read_as_it_is_written(tmp_path):
         "4 '?' x '2026-11-28' ?\r\n" * 4
     )
     trials = read_labelled(path, None)
+    table, values = trials.table, trials.table.values[:4]
     assert trials.labels == ("a", "b", "a", "b") * 4
-    nominal = ("level=1", "level=2", "level=none", "level=?", "note=it's", "note=x")
-    assert trials.table.names == ("p first", *nominal)
-    assert trials.table.units[0] == "m"
-    np.testing.assert_array_equal(trials.table.values[:4, 0], [1.5e-3, np.nan, 2.5, 4.0])
-    np.testing.assert_array_equal(trials.table.values[:4, 1:5].argmax(axis=1), [0, 2, 1, 3])
-    assert np.isnan(trials.table.values[1, 5:]).all()
-    assert any("4 trials" in note for note in trials.notes)
-    assert any("weights" in note for note in trials.notes)
+    assert table.names == ("p first", "level=1", "level=2", "level=none", "level=?", "note=it's", "note=x")
+    assert table.units[0] == "m"
+    np.testing.assert_array_equal(values[:, 0], [1.5e-3, np.nan, 2.5, 4.0])
+    np.testing.assert_array_equal(values[:, 1:5].argmax(axis=1), [0, 2, 1, 3])
+    assert np.isnan(values[1, 5:]).all()
+    for said in ("4 trials", "weights"):
+        assert any(said in note for note in trials.notes)
     assert "class=b" in read_labelled(path, "level").table.names
+
+
+ROW, WINDY = "sunny,85,85,FALSE,no", "@attribute windy {TRUE, FALSE}"
 
 
 @every_case(
     ("old", "new", "line"),
     [
-        ("sunny,85,85,FALSE,no", "snowy,85,85,FALSE,no", "line 11.*snowy"),
-        ("sunny,85,85,FALSE,no", "sunny,85,85,FALSE", "line 11.*4 values"),
-        ("sunny,85,85,FALSE,no", "sunny,hot,85,FALSE,no", "line 11.*hot"),
-        ("sunny,85,85,FALSE,no", "sunny,'85,85,FALSE,no", "line 11.*quote"),
-        ("@attribute windy {TRUE, FALSE}", "@attribute windy relational", "line 7.*relational"),
-        ("@attribute windy {TRUE, FALSE}", "@attribute windy {TRUE, TRUE}", "line 7.*once"),
-        ("@attribute windy {TRUE, FALSE}", "@attribute outlook {TRUE, FALSE}", "line 7.*outlook"),
+        (ROW, "snowy,85,85,FALSE,no", "line 11.*snowy"),
+        (ROW, "sunny,85,85,FALSE", "line 11.*4 values"),
+        (ROW, "sunny,hot,85,FALSE,no", "line 11.*hot"),
+        (ROW, "sunny,'85,85,FALSE,no", "line 11.*quote"),
+        (WINDY, "@attribute windy relational", "line 7.*relational"),
+        (WINDY, "@attribute windy {TRUE, TRUE}", "line 7.*once"),
+        (WINDY, "@attribute outlook {TRUE, FALSE}", "line 7.*outlook"),
         ("@data", "@rows", "@rows"),
     ],
 )
@@ -177,9 +161,6 @@ def test_a_damaged_arff_file_is_told_with_its_line(weather, old, new, line):
     weather.write_text(WEATHER.replace(old, new, 1))
     with pytest.raises(DataDamaged, match=line):
         load_trials(str(weather))
-    weather.write_text(WEATHER)
-    with pytest.raises(ConfigError, match="no column 'x'"):
-        load_trials(str(weather), label="x")
 
 
 @every_case(
@@ -207,16 +188,12 @@ def test_texts_that_identify_trials_are_no_features(tmp_path, texts, said):
 )
 def test_a_nominal_feature_is_found_again_in_its_columns(codes, values):
     columns = np.array([[np.nan] * 4 if k is None else [float(k == j) for j in range(4)] for k in codes])
-    table = FeatureTable(
-        names=(*(value_name("colour", value) for value in values), "w"),
-        units=("", "", "", "", "m"),
-        values=np.column_stack([columns, np.arange(len(codes))]),
-    )
+    names = (*(value_name("colour", value) for value in values), "w")
+    columns = np.column_stack([columns, np.arange(len(codes))])
+    table = FeatureTable(names=names, units=("", "", "", "", "m"), values=columns)
     features, coded = with_codes(table)
-    assert [(nominal.name, nominal.unit, nominal.values) for nominal in features] == [
-        ("colour", "", tuple(values)),
-        ("w", "m", None),
-    ]
+    expected = [("colour", "", tuple(values)), ("w", "m", None)]
+    assert [(nominal.name, nominal.unit, nominal.values) for nominal in features] == expected
     np.testing.assert_array_equal(coded[:, 0], [np.nan if k is None else k for k in codes])
     np.testing.assert_array_equal(codes_of(features, table), coded)
 

@@ -53,24 +53,28 @@ PLUGIN = offering(
 
 
 @pytest.fixture
-def calibrate(monkeypatch):
+def calibrate(monkeypatch, tmp_path):
+    """Return a function that calibrates a gripper in this folder, from readings with this text."""
     monkeypatch.setitem(sys.modules, __name__, HERE)
 
-    def calibrate(gripper, *arguments):
+    def calibrate(kind, text=None, gripper="counting"):
+        readings, folder = tmp_path / "readings.csv", f"gripper.calibration={tmp_path}"
+        readings.write_text(text or "")
+        given = [kind, *([] if text is None else [readings])]
+        folder = ["-o", folder] if gripper == "counting" else []
         with IsolatedPlugins(PLUGIN):
-            done = graspsense("calibrate", *arguments, "--gripper", gripper, "-o", "classifier.type=none")
+            done = graspsense(
+                "calibrate", *given, "--gripper", gripper, "-o", "classifier.type=none", *folder
+            )
         return done.returncode, done.stderr
 
     return calibrate
 
 
 def test_zero_and_force_are_stored_and_found_by_serial_number(calibrate, tmp_path):
-    readings = tmp_path / "readings.csv"
-    readings.write_text("side,pad_counts,load_n\nleft,2200,1.1\nleft,4400,2.2\nright,2200,1\nright,4400,2\n")
-    folder = ("-o", f"gripper.calibration={tmp_path}")
-    assert calibrate("counting", "tare", *folder) == (0, "")
-    assert calibrate("counting", "load-cell", str(readings), *folder)[0] == 0
-
+    assert calibrate("tare") == (0, "")
+    rows = "left,2200,1.1\nleft,4400,2.2\nright,2200,1\nright,4400,2\n"
+    assert calibrate("load-cell", "side,pad_counts,load_n\n" + rows)[0] == 0
     calibrations = calibrations_of(tmp_path, "H7", NUMBERS)
     left, right = stored_zero(calibrations["tare"])
     assert (len(left), set(left), set(right)) == (22, {3000.0}, {3000.0})
@@ -79,22 +83,17 @@ def test_zero_and_force_are_stored_and_found_by_serial_number(calibrate, tmp_pat
 
 
 def gains_text(scale=1.0, cells=22, whole=""):
-    lines = ["side,cell,counts,load_n"]
-    for side, factor in (("left", 1.0), ("right", 2.0)):
-        for cell in range(cells):
-            lines += [
-                f"{side},{cell}{whole},{scale * factor * (100 + cell) * load_n},{load_n}"
-                for load_n in (0.5, 2.0)
-            ]
-    return "\n".join(lines)
+    rows = [
+        f"{side},{cell}{whole},{scale * factor * (100 + cell) * load_n},{load_n}"
+        for side, factor in (("left", 1.0), ("right", 2.0))
+        for cell in range(cells)
+        for load_n in (0.5, 2.0)
+    ]
+    return "\n".join(["side,cell,counts,load_n", *rows])
 
 
 def test_the_gain_of_each_cell_is_fitted_stored_and_used(calibrate, tmp_path):
-    readings = tmp_path / "readings.csv"
-    readings.write_text(gains_text())
-    folder = ("-o", f"gripper.calibration={tmp_path}")
-    assert calibrate("counting", "gain", str(readings), *folder) == (0, "")
-
+    assert calibrate("gain", gains_text()) == (0, "")
     left, right = stored_gain(calibrations_of(tmp_path, "H7", NUMBERS)["gain"])
     assert left == pytest.approx([100 + cell for cell in range(22)])
     assert right == pytest.approx([200 + 2 * cell for cell in range(22)])
@@ -117,16 +116,10 @@ def test_the_gain_of_each_cell_is_fitted_stored_and_used(calibrate, tmp_path):
     ],
 )
 def test_readings_that_give_no_gain_are_refused(calibrate, tmp_path, text, said):
-    readings = tmp_path / "readings.csv"
-    readings.write_text(text)
-    code, told = calibrate("counting", "gain", str(readings), "-o", f"gripper.calibration={tmp_path}")
-    assert code in (2, 5)
-    assert said in told
-    assert not (tmp_path / "H7").exists()
+    code, told = calibrate("gain", text)
+    assert (code in (2, 5), said in told, (tmp_path / "H7").exists()) == (True, True, False), told
 
 
 def test_a_gripper_without_the_setting_is_told_what_it_takes(calibrate):
-    code, said = calibrate("keyless", "tare")
-    assert code == 2
-    assert "no key 'calibration'" in said
-    assert "calibrations_of" in said
+    code, said = calibrate("tare", gripper="keyless")
+    assert (code, "no key 'calibration'" in said, "calibrations_of" in said) == (2, True, True)

@@ -43,21 +43,6 @@ class Late(Scripted):
         return Reading(*later, signals)
 
 
-class Stopped(Scripted):
-    """The user presses Ctrl-C in its squeeze."""
-
-    def read(self, timeout_s):
-        if self.k == 1300:
-            self.k += 1
-            raise KeyboardInterrupt
-        return super().read(timeout_s)
-
-
-class Absent(Scripted):
-    def open(self, seed):
-        raise NoDevice("no gripper at port 7")
-
-
 def grasping(backend, seen=None, name=""):
     """Return the grasp of a member of a pair, which fails for the other as `graspsense run` says.
 
@@ -79,29 +64,24 @@ def grasping(backend, seen=None, name=""):
 
 def test_two_grippers_on_virtual_clocks_advance_together_whatever_their_rates():
     seen = []
-
     fast, slow = run_pair(
         grasping(Scripted(squeezing, bottle), seen, "fast"), grasping(Slow(squeezing, bottle), seen, "slow")
     )
-
     assert fast.outcome == slow.outcome == Outcome.STEADY
-    latest = {"fast": None, "slow": None}
+    latest = {}
     ends = min(grasp.trace.t_s[-1] for grasp in (fast, slow))
     for name, t_s in seen:
         latest[name] = t_s
-        if None not in latest.values() and t_s < ends:
+        if len(latest) == 2 and t_s < ends:
             assert abs(latest["fast"] - latest["slow"]) <= 0.02 + 1e-9
 
 
 @pytest.mark.slow
 def test_a_grasp_of_a_pair_is_the_grasp_alone():
-    run = RunConfig(hold_s=0.05)
-    alone = run_grasp(Scripted(squeezing, bottle), create("controller", "hybrid"), run)
-
+    alone, *_ = grasping(Scripted(squeezing, bottle))(SimpleNamespace(gripper=lambda backend: backend))
     left, right = run_pair(
         grasping(Scripted(squeezing, bottle)), grasping(Scripted(squeezing, bottle, clock="device"))
     )
-
     assert left.outcome == right.outcome == alone.outcome
     assert left.trace.t_s.tolist() == alone.trace.t_s.tolist()
     assert left.trace.force_left_n.tolist() == alone.trace.force_left_n.tolist()
@@ -111,13 +91,9 @@ def test_a_grasp_of_a_pair_is_the_grasp_alone():
 @every_case(("lost", "place"), [("lose_at", 0), ("silent_from", 1)])
 def test_both_let_go_if_one_is_lost(lost, place):
     sound, broken = Scripted(squeezing, bottle), Scripted(squeezing, bottle, **{lost: 1300})
-    both = [sound, broken] if place else [broken, sound]
-
-    grasps = run_pair(*map(grasping, both))
-
+    grasps = run_pair(*map(grasping, [sound, broken] if place else [broken, sound]))
     kept, gone = grasps[1 - place], grasps[place]
-    assert gone.outcome == Outcome.DEVICE_LOST
-    assert kept.outcome == Outcome.ABORTED
+    assert (kept.outcome, gone.outcome) == (Outcome.ABORTED, Outcome.DEVICE_LOST)
     assert "of this pair" in kept.reason
     # It was lost in the squeeze, 1.3 s after the begin: the other one opens from the same time on, then relaxes.
     assert kept.trace.t_s[-1] == pytest.approx(1.3, abs=0.01)
@@ -126,22 +102,24 @@ def test_both_let_go_if_one_is_lost(lost, place):
 
 
 def test_both_let_go_if_the_user_ends_the_run():
+    class Stopped(Scripted):
+        """The user presses Ctrl-C in its squeeze."""
+
+        def read(self, timeout_s):
+            if self.k == 1300:
+                self.k += 1
+                raise KeyboardInterrupt
+            return super().read(timeout_s)
+
     sound = Scripted(squeezing, bottle)
-
     stopped, other = run_pair(grasping(Stopped(squeezing, bottle)), grasping(sound))
-
     assert stopped.outcome == other.outcome == Outcome.ABORTED
-    assert stopped.interrupted
-    assert "interrupted" in other.reason
-    assert sound.closed == 1
+    assert (stopped.interrupted, "interrupted" in other.reason, sound.closed) == (True, True, 1)
 
 
 def test_the_clock_of_a_device_is_shifted_to_the_common_axis_with_its_images():
-    _, shifted = run_pair(
-        grasping(Scripted(squeezing, bottle, clock="device")),
-        grasping(Late(squeezing, bottle, clock="device")),
-    )
-
+    first, later = (kind(squeezing, bottle, clock="device") for kind in (Scripted, Late))
+    _, shifted = run_pair(grasping(first), grasping(later))
     assert 0.0 <= shifted.trace.t_s[0] < 50.0
     assert -100.1 < shifted.report["clock_offset_s"] < 0.0
     # Images follow the frames in which they came by less than their period.
@@ -151,25 +129,22 @@ def test_the_clock_of_a_device_is_shifted_to_the_common_axis_with_its_images():
 def test_a_gripper_of_a_pair_declares_what_it_declares_alone():
     gripper = Scripted(squeezing, bottle)
     gripper.command_delay_s, gripper.least_force_n, gripper.closes_itself = 0.25, 3.0, {"force": "at 20 mm/s"}
-
     paired = Member(Condition()).gripper(gripper)
-
     # Of the role, so that what a gripper may declare some day is here as well.
-    for name in (
-        name for name, value in vars(SensorBackend).items() if not callable(value) and name[0] != "_"
-    ):
-        if name != "channels":
-            assert getattr(paired, name) == getattr(gripper, name), name
+    declared = {name for name, value in vars(SensorBackend).items() if not callable(value) and name[0] != "_"}
+    for name in declared - {"channels"}:
+        assert getattr(paired, name) == getattr(gripper, name), name
 
 
 def test_a_gripper_that_is_not_there_is_told_and_the_other_is_closed():
-    sound = Scripted(squeezing, bottle)
+    class Absent(Scripted):
+        def open(self, seed):
+            raise NoDevice("no gripper at port 7")
 
+    sound = Scripted(squeezing, bottle)
     with pytest.raises(NoDevice, match="port 7"):
         run_pair(grasping(sound), grasping(Absent(squeezing, bottle)))
-
-    assert sound.commands == []
-    assert sound.closed == 1
+    assert (sound.commands, sound.closed) == ([], 1)
 
 
 @pytest.mark.slow
@@ -180,11 +155,9 @@ def test_the_trials_of_a_pair_are_kept_and_name_each_other(tmp_path):
         '[controller]\ntype = "hybrid"\n[features]\ntype = "chitta"\n'
     )
     simple = ("--object", "block", "-o", "classifier.type=none", "-o", "gripper.rate_hz=250")
-    told = printed("run", "--beside", plain, *simple, "--save", store, "--json")
-
-    left, right = json.loads(told)["grippers"]
-    assert {left["kept"]["trial"], right["kept"]["trial"]} == {1, 2}
-    named = {left["labels"]["beside"], right["labels"]["beside"]}
+    both = json.loads(printed("run", "--beside", plain, *simple, "--save", store, "--json"))["grippers"]
+    assert {each["kept"]["trial"] for each in both} == {1, 2}
+    named = {each["labels"]["beside"] for each in both}
     paths = list((store / "recordings").glob("*.mcap"))
     assert named == {path.name for path in paths}
     for path in paths:
@@ -192,6 +165,5 @@ def test_the_trials_of_a_pair_are_kept_and_name_each_other(tmp_path):
 
 
 def test_what_is_of_one_grasp_does_not_go_with_a_pair():
-    done = graspsense("run", "--beside", "default", "--dry-run")
-    assert done.returncode == 2
-    assert "--beside" in done.stderr
+    code, _, said = graspsense("run", "--beside", "default", "--dry-run")
+    assert (code, "--beside" in said) == (2, True)

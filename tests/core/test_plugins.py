@@ -9,7 +9,7 @@ import pytest
 
 from graspsense.core.components.entries import PipelineEntry
 from graspsense.core.components.firstparty import provider
-from graspsense.core.components.registry import IsolatedPlugins, canonical, installed
+from graspsense.core.components.registry import IsolatedPlugins, installed
 from graspsense.core.components.roles import SensorBackend
 from graspsense.core.settings.selected import select_component
 from graspsense.core.values.errors import PluginUnavailable, UnknownName
@@ -18,21 +18,21 @@ HEAD = """
     from graspsense.plugin_api import Channel, ControllerEntry, PipelineEntry, SensorBackendEntry, hookimpl
     GRASPSENSE_API = (2, 0)
 """
-
 BROKEN = HEAD + "    import no_such_driver"
-
-
-def backend(name: str, module: str = "somewhere", needs: str = "") -> str:
-    return (
-        HEAD
-        + f"""
+BACKEND = """
     @hookimpl
     def graspsense_sensor_backends():
-        yield SensorBackendEntry(
-            name="{name}", target="{module}:Backend", config="{module}:Config", summary="a gripper",
-            channels=(Channel("gap", "m", 100.0),), accepts=("effort",), needs={needs!r},
+        given = dict(
+            name="a", target="somewhere:Backend", config="somewhere:Config", summary="a gripper",
+            channels=(Channel("gap", "m", 100.0),), accepts=("effort",),
         )
-    """
+        yield SensorBackendEntry(**given | dict({}))
+"""
+
+
+def backend(name, **changes):
+    return HEAD + BACKEND.format(
+        ", ".join(f"{key}={value!r}" for key, value in {"name": name, **changes}.items())
     )
 
 
@@ -59,13 +59,10 @@ def test_an_installed_plugin_is_found_and_its_driver_left_alone_until_used(site)
         class Config:
             port: str = "usb"
         class Backend(SensorBackend):
-            def open(self, seed): ...
-            def read(self, timeout_s): ...
-            def apply(self, command): ...
-            def tare(self, images): ...
-            def close(self): ...
+            open = read = apply = tare = close = lambda self, *given: None
         """
-    site.install("lab-hand", backend("hand", "lab_hand_driver"), version="1.4", lab_hand_driver=driver)
+    given = {"target": "lab_hand_driver:Backend", "config": "lab_hand_driver:Config"}
+    site.install("lab-hand", backend("hand", **given), version="1.4", lab_hand_driver=driver)
 
     plugins = site.discover()
     component = plugins.find("sensor-backend", "hand")
@@ -82,22 +79,9 @@ def test_an_installed_plugin_is_found_and_its_driver_left_alone_until_used(site)
 def test_built_in_parts_need_no_metadata(site):
     plugins = site.discover()
 
-    assert [component.qualified for component in plugins.components("controller")] == [
-        "graspsense/force",
-        "graspsense/hybrid",
-        "graspsense/send-and-watch",
-        "graspsense/velocity",
-    ]
-    entry = plugins.find("feature-set", "chitta").declared()
-    assert [(feature.name, feature.unit) for feature in entry.features] == [
-        ("p_first", "m"),
-        ("p_steady", "m"),
-        ("f_steady", "N"),
-        ("delta_t", "s"),
-        ("dp_dt", "m/s"),
-        ("df_dt", "N/s"),
-    ]
-    assert entry.width == "p_first"
+    names = [component.qualified for component in plugins.components("controller")]
+    assert names == [f"graspsense/{name}" for name in ("force", "hybrid", "send-and-watch", "velocity")]
+    assert plugins.find("feature-set", "chitta").declared().width == "p_first"
 
 
 def test_what_the_built_in_entries_point_at_is_there():
@@ -116,9 +100,7 @@ def test_a_broken_plugin_is_listed_with_its_reason_and_the_others_work(site):
     assert states(plugins) == {"graspsense": "loaded", "graspsense-hid": "broken", "lab-hand": "loaded"}
     assert reason_of(plugins, "graspsense-hid") == "ModuleNotFoundError: No module named 'no_such_driver'"
     assert plugins.find("sensor-backend", "hand").distribution == "lab-hand"
-    traceback = next(
-        statuse.traceback for statuse in plugins.statuses if statuse.distribution == "graspsense-hid"
-    )
+    (traceback,) = (status.traceback for status in plugins.statuses if status.state == "broken")
     assert "import no_such_driver" in traceback
 
 
@@ -177,12 +159,10 @@ def test_text_for_a_name_that_two_distributions_provide(site):
 
 
 def test_one_entry_point_name_in_two_distributions_drops_neither(site):
-    site.install("lab-a", backend("a"), entry="gripper")
-    site.install("lab-b", backend("b"), entry="gripper")
+    for name in ("a", "b"):
+        site.install(f"lab-{name}", backend(name), entry="gripper")
 
-    names = [component.name for component in site.discover().components("sensor-backend")]
-
-    assert names == ["a", "b", "replay"]
+    assert [part.name for part in site.discover().components("sensor-backend")] == ["a", "b", "replay"]
 
 
 def test_a_distribution_found_twice_on_the_path_is_loaded_once(site, tmp_path, monkeypatch):
@@ -195,28 +175,29 @@ def test_a_distribution_found_twice_on_the_path_is_loaded_once(site, tmp_path, m
 
 
 @pytest.mark.parametrize(
-    ("environ", "loaded", "reason"),
+    ("environ", "loaded"),
     [
-        ({"GRASPSENSE_PLUGINS": ""}, [], "not in GRASPSENSE_PLUGINS"),
-        ({"GRASPSENSE_PLUGINS": "Lab_B, lab-x"}, ["lab-b"], "not in GRASPSENSE_PLUGINS"),
-        ({"GRASPSENSE_DISABLED_PLUGINS": "lab.a"}, ["lab-b"], "in GRASPSENSE_DISABLED_PLUGINS"),
+        ({"GRASPSENSE_PLUGINS": ""}, []),
+        ({"GRASPSENSE_PLUGINS": "Lab_B, lab-x"}, ["lab-b"]),
+        ({"GRASPSENSE_DISABLED_PLUGINS": "Lab..a"}, ["lab-b"]),
     ],
 )
-def test_a_disabled_plugin_is_not_even_imported(site, environ, loaded, reason):
-    site.install("lab-a", backend("a"))
-    site.install("lab-b", backend("b"))
+def test_a_disabled_plugin_is_not_even_imported(site, environ, loaded):
+    for name in ("a", "b"):
+        site.install(f"lab-{name}", backend(name))
 
     plugins = site.discover(**environ)
 
-    assert [component.distribution for component in plugins.components("sensor-backend")] == [
-        *loaded,
-        "graspsense",
-    ]
+    distributions = [component.distribution for component in plugins.components("sensor-backend")]
+    assert distributions == [*loaded, "graspsense"]
     assert states(plugins)["lab-a"] == "disabled"
-    assert reason_of(plugins, "lab-a") == reason
+    assert reason_of(plugins, "lab-a").endswith(f"in {next(iter(environ))}")
     assert "lab_a_plugin" not in sys.modules
-    with pytest.raises(UnknownName, match=f"lab-a 0.2 is installed but disabled: {reason}"):
+    with pytest.raises(UnknownName, match=r"lab-a 0\.2 is installed but disabled: "):
         plugins.find("sensor-backend", "a")
+
+
+NEWER = "it is written for plugin API {}, graspsense 0.1.0 has 2.0: upgrade graspsense"
 
 
 @pytest.mark.parametrize(
@@ -224,15 +205,9 @@ def test_a_disabled_plugin_is_not_even_imported(site, environ, loaded, reason):
     [
         ("", "lab_a_plugin has no GRASPSENSE_API: add GRASPSENSE_API = (2, 0)"),
         ("GRASPSENSE_API = 1", "GRASPSENSE_API is 1: it must be two integers, as (2, 0)"),
-        *(
-            (
-                f"GRASPSENSE_API = ({version.replace('.', ', ')})",
-                f"it is written for plugin API {version}, graspsense 0.1.0 has 2.0: upgrade graspsense",
-            )
-            for version in ("2.1", "3.0")
-        ),
+        ("GRASPSENSE_API = (2, 1)", NEWER.format("2.1")),
+        ("GRASPSENSE_API = (3, 0)", NEWER.format("3.0")),
         ("GRASPSENSE_API = (1, 0)", "graspsense 0.1.0 has 2.0: upgrade lab-a. If it is yours: "),
-        ("GRASPSENSE_API = (1, 0)", "All changes: docs/from-1-to-2.md"),
     ],
 )
 def test_a_plugin_for_another_api_is_refused_before_its_hooks_are_looked_at(site, line, reason):
@@ -241,20 +216,20 @@ def test_a_plugin_for_another_api_is_refused_before_its_hooks_are_looked_at(site
     assert reason in reason_of(site.discover(), "lab-a")
 
 
+HOOK = "@hookimpl\n    def graspsense_controllers(): "
+
+
 @pytest.mark.parametrize(
     ("body", "reason"),
     [
         ("@hookimpl\n    def graspsense_controlers(): return []", "Did you mean 'graspsense_controllers'?"),
         ("def graspsense_controllers(): return []", "write @hookimpl above it"),
         ("@hookimpl(wrapper=True)\n    def graspsense_controllers(): return (yield)", "is a wrapper"),
-        ("@hookimpl\n    def graspsense_controllers(): pass", "returned None: return the entries"),
         ("@hookimpl\n    def graspsense_controllers(config): return []", "Argument(s) {'config'}"),
-        ("@hookimpl\n    def graspsense_controllers(): return 'hybrid'", "returned 'hybrid': return a list"),
-        ("@hookimpl\n    def graspsense_controllers(): yield 3", "gave 3: it takes ControllerEntry"),
-        (
-            "@hookimpl\n    def graspsense_controllers(): raise OSError('no such file')",
-            "OSError: no such file",
-        ),
+        (HOOK + "pass", "returned None: return the entries"),
+        (HOOK + "return 'hybrid'", "returned 'hybrid': return a list"),
+        (HOOK + "yield 3", "gave 3: it takes ControllerEntry"),
+        (HOOK + "raise OSError('no such file')", "OSError: no such file"),
         ("Channel('gap', 'mm')", "channel 'gap' is in m, not in 'mm'"),
         ("Channel('temperature', '')", "channel 'temperature' is not one of gap, velocity"),
         ("raise SystemExit(3)", "SystemExit: 3"),
@@ -270,40 +245,29 @@ def test_a_plugin_that_breaks_the_rules_is_broken_and_says_which(site, body, rea
 
 
 @pytest.mark.parametrize(
-    ("field", "reason"),
+    ("wrong", "reason"),
     [
+        ({"accepts": ("torque",)}, "'accepts' has the unknown command kind 'torque'; there are effort, vel"),
         (
-            'accepts=("torque",)',
-            "'accepts' has the unknown command kind 'torque'; there are effort, velocity, ",
+            {"name": "Two Words"},
+            "'name' is 'Two Words': write small letters, digits, hyphens and underscores",
         ),
-        ('channels=(Channel("gap", "m"), Channel("gap", "m"))', "'channels' names channel 'gap' twice"),
-        (
-            'name="Two Words"',
-            "'name' is 'Two Words': write small letters, digits, hyphens and underscores, a letter first, "
-            "without spaces",
-        ),
-        ('target="module.Class"', "'target' must match regex"),
+        ({"target": "module.Class"}, "'target' must match regex"),
     ],
 )
-def test_a_wrong_entry_breaks_its_plugin_alone(site, field, reason):
-    site.install(
-        "lab-a",
-        HEAD
-        + f"""
-    @hookimpl
-    def graspsense_sensor_backends():
-        given = dict(name="a", target="m:B", config="m:C", summary="", channels=(), accepts=())
-        yield SensorBackendEntry(**given | dict({field}))
-    """,
-    )
+def test_a_wrong_entry_breaks_its_plugin_alone(site, wrong, reason):
+    site.install("lab-a", backend(**{"name": "a", **wrong}))
 
     assert reason in reason_of(site.discover(), "lab-a")
 
 
-def test_one_distribution_cannot_declare_one_name_twice(site):
+def test_one_distribution_cannot_declare_one_name_twice_nor_an_entry_one_channel(site):
     site.install("lab-a", backend("a").replace("yield", "for _ in range(2): yield"))
+    site.install("lab-b", backend("b").replace("100.0),)", "100.0),) * 2"))
 
-    assert reason_of(site.discover(), "lab-a") == "lab-a declares sensor backend 'a' twice"
+    plugins = site.discover()
+    assert reason_of(plugins, "lab-a") == "lab-a declares sensor backend 'a' twice"
+    assert "'channels' names channel 'gap' twice" in reason_of(plugins, "lab-b")
 
 
 def test_metadata_that_cannot_be_read_is_a_broken_plugin(site):
@@ -313,27 +277,15 @@ def test_metadata_that_cannot_be_read_is_a_broken_plugin(site):
     assert states(site.discover()) == {"graspsense": "loaded", "lab-a": "broken", "lab-b": "loaded"}
 
 
-@pytest.mark.parametrize(
-    ("plugin", "environ", "told"),
-    [
-        (HEAD + "    print('hello from the lab')", {}, "hello from the lab"),
-        (
-            backend("a"),
-            {"GRASPSENSE_TRACE_PLUGINS": "1"},
-            "hook graspsense_sensor_backends() of lab-a:main returned ",
-        ),
-    ],
-)
-def test_what_a_plugin_prints_and_the_trace_of_its_hooks_do_not_reach_stdout(
-    site, capsys, plugin, environ, told
-):
-    site.install("lab-a", plugin)
+def test_what_a_plugin_prints_and_the_trace_of_its_hooks_do_not_reach_stdout(site, capsys):
+    site.install("lab-a", backend("a") + "    print('hello from the lab')")
 
-    site.discover(**environ)
+    site.discover(GRASPSENSE_TRACE_PLUGINS="1")
 
     out, err = capsys.readouterr()
     assert out == ""
-    assert told in err
+    assert "hello from the lab" in err
+    assert "hook graspsense_sensor_backends() of lab-a:main returned " in err
 
 
 def test_strict_raises_the_plugins_own_error(site):
@@ -344,23 +296,28 @@ def test_strict_raises_the_plugins_own_error(site):
     assert caught.value.__notes__ == ["while loading main of lab-a 0.2"]
 
 
+NOT_WHOLE = """
+    from graspsense.plugin_api import SensorBackend
+    class Backend(SensorBackend):
+        open = read = close = lambda self, *given: None
+    """
+
+
 @pytest.mark.parametrize(
     ("driver", "why"),
     [
         (None, "ModuleNotFoundError: No module named 'lab_driver'"),
-        ("import no_such_library", "ModuleNotFoundError: No module named 'no_such_library'"),
         ("1 +", "SyntaxError: invalid syntax (lab_driver.py, line 1)"),
         ("", "AttributeError: module 'lab_driver' has no attribute 'Backend'"),
         ("class Backend: pass", "lab_driver:Backend is not a subclass of SensorBackend"),
         (
-            "from graspsense.plugin_api import SensorBackend\nclass Backend(SensorBackend):\n"
-            "    def open(self, seed): ...\n    def read(self, timeout_s): ...\n    def close(self): ...",
+            NOT_WHOLE,
             "lab_driver:Backend does not implement apply, which SensorBackend of plugin_api requires",
         ),
     ],
 )
 def test_text_for_a_component_whose_code_cannot_be_used(site, driver, why):
-    site.install("lab-a", backend("a", "lab_driver", needs="pip install lab-driver"))
+    site.install("lab-a", backend("a", target="lab_driver:Backend", needs="pip install lab-driver"))
     if driver is not None:
         site.write(lab_driver=driver)
 
@@ -373,26 +330,17 @@ def test_text_for_a_component_whose_code_cannot_be_used(site, driver, why):
 
 
 def test_a_config_must_be_an_attrs_class(site):
-    site.install("lab-a", backend("a", "lab_driver"), lab_driver="class Config: pass")
+    site.install("lab-a", backend("a", config="lab_driver:Config"), lab_driver="class Config: pass")
 
     with pytest.raises(PluginUnavailable, match="lab_driver:Config is not an attrs class"):
         site.discover().find("sensor-backend", "a").config_class()
 
 
 def test_a_pipeline_file_left_out_of_the_wheel_is_named(site):
-    site.install(
-        "lab-a",
-        HEAD
-        + """
-    @hookimpl
-    def graspsense_pipelines():
-        return [PipelineEntry(name="mine", resource="graspsense:no/such.toml", summary="")]
-    """,
-    )
+    entry = 'PipelineEntry(name="mine", resource="graspsense:no/such.toml", summary="")'
+    site.install("lab-a", HEAD + f"    @hookimpl\n    def graspsense_pipelines(): return [{entry}]")
 
-    with pytest.raises(
-        PluginUnavailable, match=r"there is no file 'no/such\.toml' in the package 'graspsense'"
-    ):
+    with pytest.raises(PluginUnavailable, match=r"no file 'no/such\.toml' in the package 'graspsense'"):
         site.discover().resource(PipelineEntry, "mine").file()
 
 
@@ -405,7 +353,3 @@ def test_isolated_plugins_do_not_discover_and_raise_what_a_plugin_raises(site):
     assert installed() is not plugins
     with pytest.raises(Exception, match="mine has no GRASPSENSE_API"):
         IsolatedPlugins(types.ModuleType("mine"))
-
-
-def test_names_are_canonical_as_packaging_has_it():
-    assert canonical("Lab_Hand..Driver") == "lab-hand-driver"

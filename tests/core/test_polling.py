@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -14,14 +15,18 @@ PERIOD_S = 0.01
 class OwnTime:
     """A clock that passes while somebody sleeps."""
 
-    def __init__(self) -> None:
-        self.now_s = 0.0
+    now_s = 0.0
 
-    def monotonic(self) -> float:
+    def monotonic(self):
         return self.now_s
 
-    def sleep(self, seconds: float) -> None:
+    def sleep(self, seconds):
         self.now_s += seconds
+
+
+@pytest.fixture
+def clock():
+    return OwnTime()
 
 
 @given(st.lists(st.floats(0.0, 0.009), min_size=2, max_size=50))
@@ -34,15 +39,11 @@ def test_the_duration_of_an_exchange_does_not_lower_the_rate(exchanges_s):
         clock.sleep(exchange_s)
         polling.frame(0.05)
     assert asked_s == pytest.approx([k * PERIOD_S for k in range(len(exchanges_s))])
-    assert polling.report() == {
-        "frames": len(exchanges_s),
-        "repeated": 0,
-        "frame_uncertainty_s": pytest.approx(max(exchanges_s)),
-    }
+    longest_s = pytest.approx(max(exchanges_s))
+    assert polling.report() == {"frames": len(exchanges_s), "repeated": 0, "frame_uncertainty_s": longest_s}
 
 
-def test_lost_time_is_not_made_up():
-    clock = OwnTime()
+def test_lost_time_is_not_made_up(clock):
     polling = Polling(1.0 / PERIOD_S, clock)
     polling.wait(1.0)
     clock.sleep(0.095)
@@ -51,42 +52,37 @@ def test_lost_time_is_not_made_up():
     assert asked_s == pytest.approx([0.095, 0.095, 0.105, 0.115])
 
 
-def test_a_wait_that_is_too_long_ends_at_its_time():
-    clock = OwnTime()
+def test_a_wait_that_is_too_long_ends_at_its_time(clock):
     polling = Polling(1.0 / PERIOD_S, clock)
-    assert polling.wait(0.0)
-    assert not polling.wait(0.004)
-    assert clock.now_s == pytest.approx(0.004)
-    assert polling.wait(0.1)
-    assert clock.now_s == pytest.approx(PERIOD_S)
+    ended = [(polling.wait(timeout_s), clock.now_s) for timeout_s in (0.0, 0.004, 0.1)]
+    assert ended == [(True, 0.0), (False, pytest.approx(0.004)), (True, pytest.approx(PERIOD_S))]
 
 
-@pytest.mark.parametrize("speed_m_s", [-0.02, 0.0, 0.05])
+@every_case("speed_m_s", [-0.02, 0.0, 0.05])
 def test_the_rate_of_the_gap_is_that_of_the_newest_frames(speed_m_s):
-    clock = OwnTime()
+    clock, frames = OwnTime(), []
     polling = Polling(1.0 / PERIOD_S, clock)
-    frames = []
     for tick in range(30):
         polling.wait(1.0)
         clock.sleep(0.001 * (tick % 3))
         # The fingers turn after ten frames: what was before them is forgotten.
         gap_m = 0.05 + (speed_m_s if tick > 10 else -0.1) * clock.now_s
         frames.append(polling.frame(gap_m, 3.0, 4))
-    assert frames[0].velocity_m_s == 0.0
-    assert frames[-1].velocity_m_s == pytest.approx(speed_m_s, abs=1e-9)
-    assert frames[-1].t_s - frames[-2].t_s == pytest.approx(frames[-1].dt_s)
-    assert (frames[-1].effort_n, frames[-1].status) == (3.0, 4)
+    last = frames[-1]
+    assert (frames[0].velocity_m_s, last.velocity_m_s) == (0.0, pytest.approx(speed_m_s, abs=1e-9))
+    assert last.t_s - frames[-2].t_s == pytest.approx(last.dt_s)
+    assert (last.effort_n, last.status) == (3.0, 4)
 
 
-@pytest.mark.parametrize("failures", [0, 1, 2, 3])
+@every_case("failures", [0, 1, 2, 3])
 def test_an_exchange_is_repeated_twice_and_after_another_error_not(failures):
-    polling, left = Polling(1.0 / PERIOD_S, OwnTime()), [failures]
+    polling, answers = Polling(1.0 / PERIOD_S, OwnTime()), [TimeoutError()] * failures + ["reply"]
 
     def exchange():
-        left[0] -= 1
-        if left[0] >= 0:
-            raise TimeoutError
-        return "reply"
+        answer = answers.pop(0)
+        if isinstance(answer, str):
+            return answer
+        raise answer
 
     if failures < 3:
         assert polling.tried(exchange, TimeoutError) == "reply"

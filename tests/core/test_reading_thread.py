@@ -29,8 +29,10 @@ class Wire:
             raise value
         return value
 
-    def drained(self):
-        """Wait until the thread has taken all values, and come back for more."""
+    def give(self, *values):
+        """Give these values, and wait until the thread has taken them all and come back for more."""
+        for value in values:
+            self.values.put(value)
         while not self.values.empty():
             self.idle.acquire()
         while self.idle.acquire(blocking=False):
@@ -60,27 +62,21 @@ def reading(wire):
 def test_the_newest_value_is_given_once_and_the_replaced_are_counted(wire, reading):
     thread = reading()
     assert thread.age_s() == float("inf")
-    for value in range(5):
-        wire.values.put(value)
-    wire.drained()
-    assert thread.newest(60.0) == 4
-    assert thread.replaced == 4
+    wire.give(*range(5))
+    assert (thread.newest(60.0), thread.replaced) == (4, 4)
     assert 0.0 <= thread.age_s() < 60.0
     assert thread.newest(0.0) is None
 
 
 def test_values_that_nobody_asked_for_are_joined(wire, reading):
     thread = reading(joined=lambda earlier, now: earlier + now)
-    for value in ([1], [2], [3]):
-        wire.values.put(value)
-    wire.drained()
+    wire.give([1], [2], [3])
     assert thread.newest(60.0) == [1, 2, 3]
 
 
 def test_an_error_comes_after_the_values_before_it_and_stays(wire, reading):
     thread = reading()
-    wire.values.put(7)
-    wire.drained()
+    wire.give(7)
     wire.values.put(DeviceLost("unplugged"))
     assert thread.newest(60.0) == 7
     for _ in range(2):

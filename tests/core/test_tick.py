@@ -28,13 +28,16 @@ CLOSING = Command(EFFORT, 9.0, inf, inf)
 LIMITS = GuardParams(100.0, 0.2, inf, inf, 0.625)
 
 
+FAILED = STEADY + 3
+
+
 def law_that_ends_at(t_end, outcome=STEADY):
     """A law that approaches, squeezes from 1 s on, and ends with `outcome` at `t_end`."""
 
     def step(params, state, reading):
-        frame = reading.frame
-        phase, ended = (SQUEEZE if frame.t_s >= 1.0 else APPROACH), RUNNING
-        if frame.t_s >= t_end:
+        t_s = reading.frame.t_s
+        phase, ended = (SQUEEZE if t_s >= 1.0 else APPROACH), RUNNING
+        if t_s >= t_end:
             phase, ended = HOLD, outcome
         return CLOSING, VelocityState(phase, ended, None, 0.0)
 
@@ -42,22 +45,33 @@ def law_that_ends_at(t_end, outcome=STEADY):
 
 
 def walk(
-    step, gap_of, ticks, opens=1, tare_images=3, hold_s=0.25, timeout_s=5.0, images_every=41, releases=1
+    gap_of,
+    ticks=5000,
+    t_end=1.5,
+    outcome=STEADY,
+    opens=1,
+    tare_images=3,
+    hold_s=0.25,
+    timeout_s=5.0,
+    releases=1,
 ):
-    """Run `ticks` ticks of 1 ms; return (t, phase, command value) of each and the last state."""
-    params = TickParams(
-        Schedule(opens, OPENING, RELAXED, tare_images, hold_s, timeout_s, releases), LIMITS, ()
-    )
+    """Run so many ticks of 1 ms with a law that ends; return (t, phase, command value) of each and the last state."""
+    schedule = Schedule(opens, OPENING, RELAXED, tare_images, hold_s, timeout_s, releases)
     state = first_state(VelocityState(APPROACH, RUNNING, None, 0.0))
-    bound, seen = bind(tick, step=step), []
+    bound, seen = bind(tick, step=law_that_ends_at(t_end, outcome)), []
     for k in range(ticks):
         t = k * 0.001
-        frame = Frame(t, 0.001, gap_of(t), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
-        command, state = bound(params, state, Reading(frame, Pads(t, 1 + k // images_every, (), ())))
+        frame = Frame(t, 0.001, gap_of(t), *[0.0] * 6, 0)
+        reading = Reading(frame, Pads(t, 1 + k // 41, (), ()))
+        command, state = bound(TickParams(schedule, LIMITS, ()), state, reading)
         seen.append((t, state.phase, command.value))
         if state.done:
             break
     return seen, state
+
+
+def still(t):
+    return 0.05
 
 
 def first_of(seen, phase):
@@ -66,64 +80,52 @@ def first_of(seen, phase):
 
 def test_opened_means_slower_than_1_mm_s_for_a_tenth_of_a_second():
     # Opens at 2 mm/s until 0.3 s, then creeps at 0.5 mm/s: that counts as open.
-    def gap(t):
-        return 0.05 + 0.002 * min(t, 0.3) + 0.0005 * max(t - 0.3, 0.0)
-
-    seen, _ = walk(law_that_ends_at(9.0), gap, 600)
-    assert first_of(seen, Phase.TARING) == pytest.approx(0.4, abs=0.06)
-    assert all(value == -20.0 for t, p, value in seen if p == Phase.OPENING)
+    creeping, _ = walk(lambda t: 0.05 + 0.002 * min(t, 0.3) + 0.0005 * max(t - 0.3, 0.0), 600, 9.0)
+    assert first_of(creeping, Phase.TARING) == pytest.approx(0.4, abs=0.06)
+    assert {value for _, p, value in creeping if p == Phase.OPENING} == {-20.0}
     # Fingers that go on opening faster than that are not open, until the time is over.
-    seen, state = walk(law_that_ends_at(9.0), lambda t: 0.02 + 0.0015 * t, 600)
+    seen, state = walk(lambda t: 0.02 + 0.0015 * t, 600, 9.0)
     assert {p for _, p, _ in seen} == {Phase.OPENING} == {state.phase}
-    seen, _ = walk(law_that_ends_at(9.0), lambda t: 0.02 + 0.02 * t, 1200, timeout_s=1.0)
+    seen, _ = walk(lambda t: 0.02 + 0.02 * t, 1200, 9.0, timeout_s=1.0)
     assert first_of(seen, Phase.TARING) == pytest.approx(1.0, abs=0.0011)
 
 
 def test_the_taring_waits_for_its_images_relaxed():
-    seen, _ = walk(law_that_ends_at(9.0), lambda t: 0.086, 400)
-    taring, approach = first_of(seen, Phase.TARING), first_of(seen, Phase.APPROACH)
-    assert taring == pytest.approx(0.1, abs=0.0011)
+    seen, _ = walk(still, 400, 9.0)
+    assert first_of(seen, Phase.TARING) == pytest.approx(0.1, abs=0.0011)
     # Three images from the one that was there: at 123, 164, 205 ms.
-    assert approach == pytest.approx(0.205, abs=0.0011)
+    assert first_of(seen, Phase.APPROACH) == pytest.approx(0.205, abs=0.0011)
     # The tick that finds the fingers open still opens them; from then on they are relaxed.
     values = [value for _, p, value in seen if p == Phase.TARING]
-    assert values[0] == -20.0
-    assert set(values[1:]) == {0.0}
+    assert (values[0], set(values[1:])) == (-20.0, {0.0})
     # No images wanted, no waiting.
-    seen, _ = walk(law_that_ends_at(9.0), lambda t: 0.086, 400, tare_images=0)
+    seen, _ = walk(still, 400, 9.0, tare_images=0)
     assert first_of(seen, Phase.APPROACH) - first_of(seen, Phase.TARING) == pytest.approx(0.001)
 
 
 def test_a_steady_grasp_is_held_then_released_then_done():
-    seen, state = walk(law_that_ends_at(1.5), lambda t: 0.086 if t < 1.0 else 0.05, 5000)
+    seen, state = walk(lambda t: 0.086 if t < 1.0 else 0.05)
     assert first_of(seen, Phase.HOLD) == pytest.approx(1.5)
     assert first_of(seen, Phase.RELEASE) == pytest.approx(1.75, abs=0.0021)
-    assert state.done == 1
     # Released is: still for a tenth of a second.
-    assert seen[-1][0] == pytest.approx(1.85, abs=0.004)
-    assert seen[-1][2] == -20.0
+    assert (state.done, seen[-1][0], seen[-1][2]) == (1, pytest.approx(1.85, abs=0.004), -20.0)
     # Any other ending is released at once.
-    seen, _ = walk(law_that_ends_at(1.5, outcome=STEADY + 3), lambda t: 0.05, 5000)
-    assert first_of(seen, Phase.RELEASE) == pytest.approx(1.5)
+    assert first_of(walk(still, outcome=FAILED)[0], Phase.RELEASE) == pytest.approx(1.5)
 
 
 def test_where_no_release_is_needed_a_held_grasp_ends_with_its_first_tick_and_any_other_is_released():
-    held, state = walk(law_that_ends_at(1.5), lambda t: 0.05, 5000, releases=0)
+    held, state = walk(still, releases=0)
     assert state.done == 1
     assert [phase for _, phase, _ in held[-2:]] == [Phase.HOLD, Phase.RELEASE]
-    whole, _ = walk(law_that_ends_at(1.5), lambda t: 0.05, 5000)
-    assert held == whole[: len(held)]
-    failed, _ = walk(law_that_ends_at(1.5, outcome=STEADY + 3), lambda t: 0.05, 5000, releases=0)
-    assert failed == walk(law_that_ends_at(1.5, outcome=STEADY + 3), lambda t: 0.05, 5000)[0]
+    assert held == walk(still)[0][: len(held)]
+    assert walk(still, outcome=FAILED, releases=0)[0] == walk(still, outcome=FAILED)[0]
     # Without a tick of the phase HOLD nothing was held.
-    at_once, state = walk(law_that_ends_at(1.5), lambda t: 0.05, 5000, hold_s=0.0, releases=0)
-    assert (at_once, state) == walk(law_that_ends_at(1.5), lambda t: 0.05, 5000, hold_s=0.0)
+    assert walk(still, hold_s=0.0, releases=0) == walk(still, hold_s=0.0)
 
 
 def test_a_recording_has_no_opening_and_no_release():
-    seen, state = walk(law_that_ends_at(1.5), lambda t: 0.05, 5000, opens=0)
-    assert seen[0][1] == Phase.APPROACH
-    assert state.done == 1
+    seen, state = walk(still, opens=0)
+    assert (seen[0][1], state.done) == (Phase.APPROACH, 1)
     assert seen[-1][0] == pytest.approx(1.75, abs=0.0021)
     assert {p for _, p, _ in seen} == {Phase.APPROACH, Phase.SQUEEZE, Phase.HOLD}
 
@@ -131,6 +133,6 @@ def test_a_recording_has_no_opening_and_no_release():
 def test_without_a_controller_it_says_so():
     params = TickParams(Schedule(0, OPENING, RELAXED, 0, 0.0, 1.0), LIMITS, ())
     state = first_state(VelocityState(APPROACH, RUNNING, None, 0.0))
-    frame = Frame(0.0, 0.001, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
+    reading = Reading(Frame(0.0, 0.001, 0.05, *[0.0] * 6, 0), Pads(0.0, 0, (), ()))
     with pytest.raises(TypeError, match="no controller"):
-        tick(params, state, Reading(frame, Pads(0.0, 0, (), ())))
+        tick(params, state, reading)

@@ -12,11 +12,14 @@ from graspsense.core.values.units import display_unit, in_column, in_words
         (2.5e-4, "m2", "250 mm2"),
         (2.5e-4, "m^2", "250 mm^2"),
         (5e-4, "m3", "500 cm3"),
-        (0.0578, "m", "57.8 mm"),
+        (0.05786, "m", "57.86 mm"),
+        (-0.0102, "m/s", "-10.2 mm/s"),
+        (7.3, "N", "7.3 N"),
+        (1.452, "1", "1.452"),
         (9.81, "m/s2", "9.81 m/s2"),
     ],
 )
-def test_areas_and_volumes_are_in_units_of_a_grasp(value, unit, words):
+def test_values_are_in_units_of_a_grasp(value, unit, words):
     assert in_words(value, unit) == words
 
 

@@ -8,6 +8,7 @@ import os
 import sqlite3
 import struct
 import zipfile
+from contextlib import closing
 
 import lz4.frame
 import numpy as np
@@ -25,6 +26,7 @@ from graspsense.recording.reader import read_recorded
 from graspsense.recording.unpacked import Unpacked
 from graspsense.sources.formats.array_format import read_arrays
 from graspsense.sources.formats.numpy_files import npy_array, npz_arrays
+from graspsense.sources.formats.ros_format import read_bag
 
 MB = 1_000_000
 BOMB = 700 * MB
@@ -64,11 +66,12 @@ def read_with_little_memory(call, memory=MEMORY):
     return ran.stdout
 
 
-def assert_refused(told, path):
+def assert_refused(path, call):
+    """Check that a small file is refused by a process with little memory, with its name, the limit and its setting."""
+    assert path.stat().st_size < 4 * MB
+    told = read_with_little_memory(call.format(repr(str(path))))
     assert told.startswith("TooLarge"), told
-    assert str(path) in told
-    assert UNPACKED_MB.variable in told
-    assert "512 MB" in told
+    assert all(part in told for part in (str(path), UNPACKED_MB.variable, "512 MB")), told
 
 
 def zeros(size):
@@ -78,25 +81,24 @@ def zeros(size):
         yield piece
 
 
-def deflated_npz(path, size, shape=None):
+def deflated_npz(path, size):
     header = io.BytesIO()
     np.lib.format.write_array_header_1_0(
-        header, {"descr": "<f8", "fortran_order": False, "shape": shape or (size // 8,)}
+        header, {"descr": "<f8", "fortran_order": False, "shape": (size // 8,)}
     )
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("a.npy", "w") as member:
-        member.write(header.getvalue())
-        for piece in zeros(size):
+        for piece in (header.getvalue(), *zeros(size)):
             member.write(piece)
 
 
-def chunked_mcap(path, compression, chunk, declared=None):
+def chunked_mcap(path, compression, chunk, declared=BOMB):
     """Write an MCAP file whose one chunk is this compressed data, with a profile of ROS 2."""
     with path.open("wb") as file:
         writer = McapWriter(file, compression=CompressionType.NONE)
         writer.start(profile="ros2")
         writer.finish()
     whole = path.read_bytes()
-    body = struct.pack("<QQQI", 0, 0, declared if declared is not None else BOMB, 0)
+    body = struct.pack("<QQQI", 0, 0, declared, 0)
     body += struct.pack("<I", len(compression)) + compression.encode() + struct.pack("<Q", len(chunk)) + chunk
     after_header = 8 + 9 + struct.unpack("<Q", whole[9:17])[0]
     record = struct.pack("<BQ", 6, len(body)) + body
@@ -107,13 +109,9 @@ def compressed(kind, size):
     if kind == "zstd":
         writer = zstandard.ZstdCompressor().compressobj(size=size)
         return b"".join([*map(writer.compress, zeros(size)), writer.flush()])
-    if kind == "bz2":
-        packer = bz2.BZ2Compressor()
-        return b"".join([*map(packer.compress, zeros(size)), packer.flush()])
     out = io.BytesIO()
     with lz4.frame.open(out, "wb") as file:
-        for piece in zeros(size):
-            file.write(piece)
+        file.writelines(zeros(size))
     return out.getvalue()
 
 
@@ -131,7 +129,7 @@ def test_the_limit_is_a_setting(monkeypatch):
             Unpacked("some.file")
 
 
-@pytest.mark.parametrize("kind", ["zstd", "lz4", "bz2"])
+@every_case("kind", ["zstd", "lz4", "bz2"])
 def test_what_is_unpacked_is_what_was_packed_and_is_counted(kind, monkeypatch):
     data = os.urandom(1000) * 1100
     packed = {"zstd": zstandard.compress, "lz4": lz4.frame.compress, "bz2": bz2.compress}[kind](data)
@@ -159,17 +157,22 @@ def test_a_raised_limit_reads_the_file(tmp_path, monkeypatch):
 def test_npz(tmp_path):
     path = tmp_path / "bomb.npz"
     deflated_npz(path, BOMB)
-    assert path.stat().st_size < MB
-    assert_refused(read_with_little_memory(f"read_exported({str(path)!r})"), path)
-    assert_refused(read_with_little_memory(f"read_arrays(Path({str(path)!r}))"), path)
+    assert_refused(path, "read_exported({})")
+    assert_refused(path, "read_arrays(Path({}))")
+
+
+def npy(descr, shape):
+    """Return the header of an array that says this."""
+    header = (
+        f"{{'descr': {descr!r}, 'fortran_order': False, 'shape': {shape!r}, }}".encode().ljust(117) + b"\n"
+    )
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header
 
 
 @every_case("shape", [(10**15,), (2**62, 4), (-5,), (10**9, 0, 0), (0, 10**12), (3.5,), (2**70,), (True,)])
 @every_case("ending", ["npy", "npz"])
 def test_an_array_that_says_more_than_there_is(tmp_path, ending, shape):
-    path = tmp_path / f"a.{ending}"
-    header = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape!r}, }}".encode().ljust(117) + b"\n"
-    content = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header + bytes(80)
+    path, content = tmp_path / f"a.{ending}", npy("<f8", shape) + bytes(80)
     if ending == "npz":
         with zipfile.ZipFile(path, "w") as archive:
             archive.writestr("a.npy", content)
@@ -188,11 +191,7 @@ OBJECTS = "Python objects in it are not loaded, because that can run any code"
 )
 def test_an_array_of_what_is_no_number_is_refused(tmp_path, descr, says):
     path = tmp_path / "a.npy"
-    header = (
-        f"{{'descr': {descr!r}, 'fortran_order': False, 'shape': (1000000000,), }}".encode().ljust(117)
-        + b"\n"
-    )
-    path.write_bytes(b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header)
+    path.write_bytes(npy(descr, (1000000000,)))
     with pytest.raises(DataDamaged, match=rf"a\.npy.*{says}"):
         npy_array(path)
 
@@ -210,27 +209,24 @@ def test_arrays_come_back_as_numpy_wrote_them(tmp_path):
     for save in (np.savez, np.savez_compressed):
         save(tmp_path / "a.npz", **arrays)
         for name, array in npz_arrays(tmp_path / "a.npz").items():
-            assert array.dtype == arrays[name].dtype
-            assert array.shape == arrays[name].shape
-            assert (array == arrays[name]).all()
+            np.testing.assert_array_equal(array, arrays[name], strict=True)
             np.save(tmp_path / "b.npy", arrays[name])
-            assert (npy_array(tmp_path / "b.npy") == array).all()
+            np.testing.assert_array_equal(npy_array(tmp_path / "b.npy"), array)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "declared"), [("zstd", None), ("lz4", 1000)])
+@pytest.mark.parametrize(("kind", "declared"), [("zstd", BOMB), ("lz4", 1000)])
 def test_mcap_of_ros(tmp_path, kind, declared):
     path = tmp_path / "bomb.mcap"
     chunked_mcap(path, kind, compressed(kind, BOMB), declared)
-    told = read_with_little_memory(f"read_bag(Path({str(path)!r}))")
-    assert_refused(told, path)
+    assert_refused(path, "read_bag(Path({}))")
 
 
-@pytest.mark.parametrize("declared", [None, 1000])
+@every_case("declared", [30 * MB, 1000])
 def test_our_mcap(tmp_path, declared, monkeypatch):
     monkeypatch.setenv(UNPACKED_MB.variable, "20")
     path = tmp_path / "bomb.mcap"
-    chunked_mcap(path, "zstd", compressed("zstd", 30 * MB), declared if declared else 30 * MB)
+    chunked_mcap(path, "zstd", compressed("zstd", 30 * MB), declared)
     for salvage in (False, True):
         with pytest.raises(TooLarge, match=rf"bomb\.mcap.*20 MB.*{UNPACKED_MB.variable}"):
             read_recorded(path, salvage=salvage)
@@ -246,16 +242,17 @@ def test_many_chunks_count_together(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("opcode", "error"),
+@every_case(
+    ("record", "error"),
     [
-        pytest.param(1, "DataDamaged", id="header"),
-        pytest.param(6, "TooLarge", id="chunk"),
-        pytest.param(9, "DataDamaged", id="attachment"),
-        pytest.param(12, "DataDamaged", id="metadata"),
+        ("header", "DataDamaged"),
+        ("chunk", "TooLarge"),
+        ("attachment", "DataDamaged"),
+        ("metadata", "DataDamaged"),
     ],
 )
-def test_lengths_behind_the_end_of_an_mcap_allocate_nothing(opcode, error, tmp_path):
+def test_lengths_behind_the_end_of_an_mcap_allocate_nothing(record, error, tmp_path):
+    opcode = {"header": 1, "chunk": 6, "attachment": 9, "metadata": 12}[record]
     path = tmp_path / "g.mcap"
     write_recording(path, 20, ended())
     data = path.read_bytes()
@@ -275,8 +272,7 @@ def test_parquet(tmp_path):
     with pq.ParquetWriter(path, pyarrow.schema([("a", pyarrow.float64())])) as writer:
         for _ in range(9):
             writer.write_table(pyarrow.table({"a": column}))
-    assert path.stat().st_size < MB
-    assert_refused(read_with_little_memory(f"read_parquet(Path({str(path)!r}))"), path)
+    assert_refused(path, "read_parquet(Path({}))")
 
 
 def test_a_long_text_that_is_repeated_takes_its_place_once(tmp_path):
@@ -299,9 +295,8 @@ def test_mat(tmp_path, monkeypatch):
     from scipy.io import savemat
 
     path = tmp_path / "a.mat"
-    savemat(
-        path, {"t": np.arange(MB / 5.0), "cells": np.array([[1, "a"]], dtype=object)}, do_compression=True
-    )
+    arrays = {"t": np.arange(MB / 5.0), "cells": np.array([[1, "a"]], dtype=object)}
+    savemat(path, arrays, do_compression=True)
     assert read_arrays(path)[0].numbers["t"].shape == (MB // 5,)
     monkeypatch.setenv(UNPACKED_MB.variable, "1")
     with pytest.raises(TooLarge, match=r"a\.mat"):
@@ -313,6 +308,13 @@ def test_mat(tmp_path, monkeypatch):
         read_arrays(path)
 
 
+def message_of(store, size):
+    """Return the name of a type of messages, and one of so many bytes of zeros."""
+    name = "std_msgs/msg/Float64MultiArray"
+    layout = store.types["std_msgs/msg/MultiArrayLayout"]([], 0)
+    return name, store.types[name](layout, np.zeros(size // 8))
+
+
 @pytest.mark.parametrize(
     "kind", [pytest.param("lz4", marks=pytest.mark.slow), pytest.param("bz2", marks=pytest.mark.long)]
 )
@@ -322,45 +324,36 @@ def test_ros1_bag(tmp_path, kind):
 
     path = tmp_path / "bomb.bag"
     store = get_typestore(Stores.ROS1_NOETIC)
-    name = "std_msgs/msg/Float64MultiArray"
-    layout = store.types["std_msgs/msg/MultiArrayLayout"]([], 0)
-    message = store.serialize_ros1(store.types[name](layout, np.zeros(BOMB // 8)), name)
+    name, message = message_of(store, BOMB)
     writer = rosbag1.Writer(path)
     writer.set_compression(getattr(rosbag1.Writer.CompressionFormat, kind.upper()))
     with writer:
         connection = writer.add_connection("/a", name, typestore=store)
-        writer.write(connection, 1, message)
+        writer.write(connection, 1, store.serialize_ros1(message, name))
     del message
-    assert path.stat().st_size < 4 * MB
-    told = read_with_little_memory(f"read_bag(Path({str(path)!r}))")
-    assert_refused(told, path)
+    assert_refused(path, "read_bag(Path({}))")
 
 
-def ros2_bag(path, **options):
+def ros2_bag(path, compression=None):
     rosbag2 = pytest.importorskip("rosbags.rosbag2")
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS2_HUMBLE)
-    name = "std_msgs/msg/Float64MultiArray"
-    layout = store.types["std_msgs/msg/MultiArrayLayout"]([], 0)
-    message = store.serialize_cdr(store.types[name](layout, np.zeros(3 * MB // 8)), name)
-    writer = rosbag2.Writer(path, version=9, **options.pop("writer", {}))
-    if "compression" in options:
-        mode = getattr(rosbag2.CompressionMode, options["compression"])
+    name, message = message_of(store, 3 * MB)
+    kept_as = rosbag2.StoragePlugin.MCAP if compression == "STORAGE" else rosbag2.StoragePlugin.SQLITE3
+    writer = rosbag2.Writer(path, version=9, storage_plugin=kept_as)
+    if compression:
+        mode = getattr(rosbag2.CompressionMode, compression)
         writer.set_compression(mode, rosbag2.CompressionFormat.ZSTD)
     with writer:
         connection = writer.add_connection("/a", name, typestore=store)
         for t in range(1, 4):
-            writer.write(connection, t, message)
+            writer.write(connection, t, store.serialize_cdr(message, name))
 
 
-@pytest.mark.parametrize("compression", ["FILE", "MESSAGE", "STORAGE"])
+@every_case("compression", ["FILE", "MESSAGE", "STORAGE"])
 def test_ros2_bags(tmp_path, compression, monkeypatch):
-    rosbag2 = pytest.importorskip("rosbags.rosbag2")
-    from graspsense.sources.formats.ros_format import read_bag
-
-    plugin = rosbag2.StoragePlugin.MCAP if compression == "STORAGE" else rosbag2.StoragePlugin.SQLITE3
-    ros2_bag(tmp_path / "bag", compression=compression, writer={"storage_plugin": plugin})
+    ros2_bag(tmp_path / "bag", compression)
     monkeypatch.setenv(UNPACKED_MB.variable, "120")
     assert len(read_bag(tmp_path / "bag")[0]) == 3  # three messages of 3 MB
     monkeypatch.setenv(UNPACKED_MB.variable, "7")
@@ -383,19 +376,16 @@ ENDLESS = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n)"
 )
 def test_a_ros2_bag_that_computes_is_refused(tmp_path, statement):
     ros2_bag(tmp_path / "bag")
-    from graspsense.sources.formats.ros_format import read_bag
-
     (path,) = (tmp_path / "bag").glob("*.db3")
-    connection = sqlite3.connect(path)
-    connection.executescript(statement)
-    connection.close()
+    with closing(sqlite3.connect(path)) as connection:
+        connection.executescript(statement)
     original = path.read_bytes()
     with pytest.raises(DataDamaged, match="is computed"):
         read_bag(tmp_path / "bag")
     assert path.read_bytes() == original
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("definition", "more", "says"),
     [
         ("geometry_msgs/Vector3[900000000] x\n", "geometry_msgs/Vector3:float64 x", "900000000"),
@@ -407,15 +397,11 @@ def test_a_ros2_bag_that_computes_is_refused(tmp_path, statement):
 def test_definitions_of_messages_that_cannot_be_built(definition, more, says, tmp_path):
     """An array of four thousand million messages without fields takes four bytes."""
     pytest.importorskip("rosbags")
-    from mcap.writer import Writer
-
-    from graspsense.sources.formats.ros_format import read_bag
-
     path = tmp_path / "a.mcap"
     name, _, fields = more.partition(":")
     text = definition + (f"{'=' * 80}\nMSG: {name}\n{fields}\n" if name else "")
     with path.open("wb") as file:
-        writer = Writer(file)
+        writer = McapWriter(file)
         writer.start(profile="ros2")
         schema = writer.register_schema("lab/msg/A", "ros2msg", text.encode())
         channel = writer.register_channel("/a", "cdr", schema)

@@ -17,9 +17,7 @@ from graspsense.core.values.errors import ConfigError
 VARIABLES = ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME", "NUMBA_CACHE_DIR")
 STRANGER = """
 import pwd, sys
-def unknown(uid):
-    raise KeyError(f"getpwuid(): uid not found: {uid}")
-pwd.getpwuid = unknown
+pwd.getpwuid = {}.__getitem__
 from graspsense.cli.main import main
 main(sys.argv[1:])
 """
@@ -28,12 +26,9 @@ main(sys.argv[1:])
 
 @pytest.fixture
 def homeless(monkeypatch):
-    def unknown(uid):
-        raise KeyError(f"getpwuid(): uid not found: {uid}")
-
     for name in VARIABLES:
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(pwd, "getpwuid", unknown)
+    monkeypatch.setattr(pwd, "getpwuid", {}.__getitem__)  # of a user without an entry: KeyError
 
 
 def graspsense(folder, *arguments, code=0, **environ):
@@ -44,19 +39,17 @@ def graspsense(folder, *arguments, code=0, **environ):
     return done.stdout + done.stderr
 
 
-def test_folders_are_where_the_variables_say_and_else_in_the_home(monkeypatch, tmp_path):
+def test_folders_are_where_the_variables_say_and_else_in_the_home(monkeypatch):
     for name in VARIABLES:
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("HOME", "/home/ada")
-    assert config_folder() == Path("/home/ada/.config/graspsense")
-    assert data_folder() == Path("/home/ada/.local/share/graspsense")
-    assert cache_folder() == Path("/home/ada/.cache/graspsense")
-    monkeypatch.setenv("XDG_CONFIG_HOME", "/c")
-    monkeypatch.setenv("XDG_DATA_HOME", "/d")
-    monkeypatch.setenv("XDG_CACHE_HOME", "/e")
-    assert (config_folder(), data_folder(), cache_folder()) == tuple(
-        Path(home) / "graspsense" for home in ("/c", "/d", "/e")
-    )
+    homes = ("/home/ada/.config", "/home/ada/.local/share", "/home/ada/.cache")
+    for chosen in (homes, ("/c", "/d", "/e")):
+        assert (config_folder(), data_folder(), cache_folder()) == tuple(
+            Path(h) / "graspsense" for h in chosen
+        )
+        for name, folder in zip(VARIABLES[1:4], ("/c", "/d", "/e"), strict=True):
+            monkeypatch.setenv(name, folder)
     # In a folder of somebody else's data, a relative one would name a part of that data.
     monkeypatch.setenv("XDG_CACHE_HOME", "e")
     assert cache_folder() == Path("/home/ada/.cache/graspsense")

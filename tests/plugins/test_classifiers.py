@@ -13,7 +13,6 @@ from attrs import evolve
 from cases import every_case
 from commands import python
 
-from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import Features, FeatureTable
 from graspsense.plugin_api import create
 
@@ -60,68 +59,52 @@ def rate(classifier, table, labels):
     return np.mean([classifier.classes()[k] == label for k, label in zip(answers, labels, strict=True)])
 
 
+def stored(name, classifier, **config):
+    """Return a classifier as it comes back from JSON, in which it is the same."""
+    again = create("classifier", name, **config)
+    again.from_json(json.loads(json.dumps(classifier.to_json(), allow_nan=False)))
+    assert again.to_json() == classifier.to_json()
+    return again
+
+
 @pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")  # mlp, on few trials
 @pytest.mark.parametrize("name", ALL)
 class TestEvery:
-    def test_it_learns_what_can_be_learned(self, name):
+    def test_it_learns_what_can_be_learned_whatever_the_order_of_columns(self, name):
         classifier = learned(name)
-
-        assert set(classifier.classes()) == {"bottle:full", "bottle:empty", "can:full"}
-        assert rate(classifier, *trials(seed=1)) > 0.95
+        table, labels = trials(seed=1)
+        assert set(classifier.classes()) == set(labels)
+        assert rate(classifier, table, labels) > 0.95
+        turned = table.columns(("noise", "p_first", "f_steady"))
+        assert (classifier.probabilities(turned) == classifier.probabilities(table)).all()
 
     def test_missing_values_in_training_and_in_a_trial_have_an_answer(self, name):
         learned_with_gaps = fitted(name, *trials(missing=0.2), seed=3)
         table, labels = trials(seed=1, missing=0.1)
         # As a model that was stored answers them.
-        classifier = create("classifier", name, **FAST.get(name, {}))
-        classifier.from_json(json.loads(json.dumps(learned_with_gaps.to_json(), allow_nan=False)))
-
+        classifier = stored(name, learned_with_gaps, **FAST.get(name, {}))
         assert (classifier.probabilities(table) == learned_with_gaps.probabilities(table)).all()
         assert classifier.explain(table.row(0)) == learned_with_gaps.explain(table.row(0))
-        assert classifier.to_json() == learned_with_gaps.to_json()
         assert rate(classifier, table, labels) > 0.75
-        row = Features(
-            names=NAMES,
-            values=(0.0661, math.nan, 0.0),
-            units=UNITS,
-            reasons={"f_steady": "the fingers never came to rest"},
-        )
+        reason = {"f_steady": "the fingers never came to rest"}
+        row = Features(names=NAMES, values=(0.0661, math.nan, 0.0), units=UNITS, reasons=reason)
         said = classifier.explain(row)
         assert said.label == "can:full"
-        assert any(
-            "f_steady is missing" in reason.words and "never came to rest" in reason.words
-            for reason in said.because
-        )
+        missing = [words for words in (each.words for each in said.because) if "f_steady is missing" in words]
+        assert any("never came to rest" in words for words in missing)
 
     def test_a_feature_that_no_trial_had_and_one_that_is_constant(self, name):
         table, labels = trials()
         values = np.column_stack((table.values, np.full(len(labels), np.nan), np.full(len(labels), 7.0)))
         wide = FeatureTable(names=(*NAMES, "none", "same"), units=(*UNITS, "", ""), values=values)
         classifier = fitted(name, wide, labels)
-
         assert rate(classifier, wide, labels) > 0.95
         assert np.isfinite(classifier.probabilities(wide)).all()
 
     def test_values_too_small_to_be_squared_are_told_apart(self, name):
         table, labels = trials()
         small = evolve(table, values=table.values * 1e-310)
-
         assert rate(fitted(name, small, labels), small, labels) > 0.95
-
-    def test_the_order_of_columns_does_not_matter(self, name):
-        classifier = learned(name)
-        table, _ = trials(n=4, seed=3)
-
-        turned = table.columns(("noise", "p_first", "f_steady"))
-        assert (classifier.probabilities(turned) == classifier.probabilities(table)).all()
-
-    def test_two_labels(self, name):
-        table, labels = trials()
-        two = [label.partition(":")[0] for label in labels]
-        result = fitted(name, table, two, seed=5)
-
-        assert result.classes() == ("bottle", "can")
-        assert rate(result, table, two) > 0.95
 
 
 @every_case("kept", [("bottle:full", "can:full"), ("bottle:empty", "bottle:full", "can:full")])
@@ -129,14 +112,10 @@ def test_the_weights_of_a_network_are_the_network(kept):
     table, labels = trials()
     rows = np.flatnonzero(np.isin(labels, kept))
     network = fitted("mlp", table.rows(rows), [labels[i] for i in rows], kept_as="weights")
-    stored = json.loads(json.dumps(network.to_json()))
-    again = create("classifier", "mlp", kept_as="weights")
-    again.from_json(stored)
-
-    assert "trials" not in stored
+    again = stored("mlp", network, kept_as="weights")
+    assert "trials" not in network.to_json()
     assert again.classes() == network.classes()
     assert (again.probabilities(table) == network.probabilities(table)).all()
-    assert again.to_json() == stored
 
 
 def test_another_version_of_scikit_learn_is_said():
@@ -148,49 +127,19 @@ def test_another_version_of_scikit_learn_is_said():
     assert "made with scikit-learn 0.1 and made again, or read, with" in warning
 
 
-def test_trees_tell_their_path_in_the_features_own_units():
-    table, labels = trials()
+def test_trees_tell_their_path_in_the_features_own_units_and_neighbours_their_votes():
     row = Features(names=NAMES, values=(0.0661, 8.0, 0.0), units=UNITS)
     for name in ("c45", "tree"):
-        because = fitted(name, table, labels).explain(row).because
-        assert any(
-            reason.words.startswith("p_first = 66.1 mm > ") and reason.words.endswith(" mm")
-            for reason in because
-        )
-        assert "training trials" in because[-1].words
-
-
-def test_neighbours_tell_their_votes():
-    row = Features(names=NAMES, values=(0.0661, 8.0, 0.0), units=UNITS)
-    because = fitted("knn", *trials(), neighbours=7).explain(row).because
-
-    assert because[-1].words.startswith("7 of the 7 nearest training trials are can:full; the nearest is ")
+        *path, last = (reason.words for reason in learned(name).explain(row).because)
+        assert any(words.startswith("p_first = 66.1 mm > ") and words.endswith(" mm") for words in path)
+        assert "training trials" in last
+    last = fitted("knn", *trials(), neighbours=7).explain(row).because[-1].words
+    assert last.startswith("7 of the 7 nearest training trials are can:full; the nearest is ")
 
 
 def test_more_neighbours_than_trials():
     table, labels = trials(n=1)
-
     assert fitted("knn", table, labels, neighbours=50).probabilities(table).shape == (3, 3)
-
-
-def test_settings_are_checked():
-    with pytest.raises(ConfigError, match="confidence_factor"):
-        create("classifier", "c45", confidence_factor=1.5)
-    with pytest.raises(ConfigError, match="neighbours"):
-        create("classifier", "knn", neighbours=0)
-
-
-def test_pruning_against_held_out_trials_makes_a_smaller_tree():
-    table, labels = trials()
-    rng = np.random.default_rng(0)
-    noisy = [label if rng.random() > 0.2 else "can:full" for label in labels]
-    whole = fitted("c45", table, noisy, pruning="none", mdl_correction=False)
-    pruned = fitted("c45", table, noisy, pruning="reduced_error", mdl_correction=False)
-
-    def nodes(tree):
-        return len(tree.to_json()["nodes"]["feature"])
-
-    assert nodes(pruned) < nodes(whole)
 
 
 @pytest.mark.slow
@@ -208,8 +157,7 @@ table = FeatureTable(names=("a",), units=("",), values=np.arange(20.0)[:, None])
 classifier.fit(table, ["x"] * 10 + ["y"] * 10, 0)
 assert ("sklearn" in sys.modules) is {name != "c45"}
 """
-    ran = python("-c", code)
-    assert ran.returncode == 0, ran.stderr
+    assert python("-c", code).returncode == 0
 
 
 def test_a_machine_with_the_range_as_scale_does_not_depend_on_units_and_fits_less_than_with_deviations():
@@ -246,4 +194,4 @@ def test_the_network_takes_the_steps_of_the_published_rule():
 
 
 def test_the_network_has_half_as_many_units_as_features_and_labels():
-    assert fitted("backprop", *trials())._fitted.estimator._hidden.shape == (3, 4)
+    assert learned("backprop")._fitted.estimator._hidden.shape == (3, 4)

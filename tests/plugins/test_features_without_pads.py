@@ -39,6 +39,9 @@ def grasp(effort_of):
         # One spike, and noise in free air.
         lambda effort_n, gap_m: 20.0 if abs(gap_m - 0.07) < 1e-4 else effort_n,
         lambda effort_n, gap_m: effort_n + 8.0 * (round(gap_m * 1e4) % 3 == 0),
+        # With half the scale, the 10.5 N of a contact are reached under the 25 N of the squeeze, at 50 mm, and after
+        # the fingers have stopped.
+        lambda effort_n, gap_m: 0.5 * effort_n,
     ],
 )
 def test_an_effort_that_fingers_pass_unhindered_is_no_contact(effort_of):
@@ -48,34 +51,21 @@ def test_an_effort_that_fingers_pass_unhindered_is_no_contact(effort_of):
 
 
 @every_case(
-    "effort_of",
+    ("effort_of", "contact_m"),
     [
-        lambda effort_n, gap_m: effort_n,
+        (lambda effort_n, gap_m: effort_n, CONTACT_M),
         # What sets the fingers in motion; and steps of a coarse current.
-        lambda effort_n, gap_m: 20.0 if gap_m > 0.0795 else effort_n,
-        lambda effort_n, gap_m: 1.5 * round(effort_n / 1.5),
+        (lambda effort_n, gap_m: 20.0 if gap_m > 0.0795 else effort_n, CONTACT_M),
+        (lambda effort_n, gap_m: 1.5 * round(effort_n / 1.5), CONTACT_M),
+        # An effort at the limit of the approach need not rise before the squeeze: a soft object takes all of 11 N from
+        # 60 mm on, and the fingers move on to 50 mm; the squeeze allows 25 N.
+        (lambda effort_n, gap_m: effort_n if effort_n > 20.0 or gap_m > 0.06 else 11.0, 0.06),
     ],
 )
-def test_an_effort_that_rises_with_the_resistance_tells_the_contact(effort_of):
+def test_an_effort_that_rises_with_the_resistance_tells_the_contact(effort_of, contact_m):
     features = FEATURES.extract(grasp(effort_of))
     assert not features.reasons
-    assert features["p_first"] == pytest.approx(CONTACT_M, abs=1e-3)
-
-
-def test_an_effort_that_shows_a_contact_only_after_the_fingers_have_stopped_tells_none():
-    """With half the scale, the 10.5 N of a contact are reached under the 25 N of the squeeze, at 50 mm."""
-    features = FEATURES.extract(grasp(lambda effort_n, gap_m: 0.5 * effort_n))
-    assert set(features.reasons) == {"p_first", "delta_t", "dp_dt"}
-    assert features["p_steady"] == pytest.approx(REST_M, abs=4e-4)
-
-
-def test_an_effort_at_the_limit_of_the_approach_need_not_rise_before_the_squeeze():
-    """A soft object takes all of 11 N from 60 mm on, and the fingers move on to 50 mm; the squeeze allows 25 N."""
-    features = FEATURES.extract(
-        grasp(lambda effort_n, gap_m: effort_n if effort_n > 20.0 or gap_m > 0.06 else 11.0)
-    )
-    assert not features.reasons
-    assert features["p_first"] == pytest.approx(0.06, abs=5e-4)
+    assert features["p_first"] == pytest.approx(contact_m, abs=1e-3 if contact_m == CONTACT_M else 5e-4)
 
 
 def test_the_effort_that_starts_the_fingers_is_not_a_contact():

@@ -10,11 +10,12 @@ from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
+from parts import offering
 from repository import ROOT
 
 from graspsense import load_pipeline
 from graspsense.core.components.registry import IsolatedPlugins
-from graspsense.plugin_api import Reading, SensorBackendEntry, hookimpl
+from graspsense.plugin_api import Reading, SensorBackendEntry
 from graspsense.testing import examine
 
 LATE_S = 0.15
@@ -23,17 +24,10 @@ PAGE = (ROOT / "docs" / "tcp_gripper.md").read_text(encoding="utf-8")
 EXAMPLE = ROOT / "examples" / "tcp_gripper"
 
 
-class Plugin:
-    GRASPSENSE_API = (2, 0)
-
-    @hookimpl
-    def graspsense_sensor_backends(self):
-        return [
-            SensorBackendEntry(name="lab-hand", target="tcp_hand:TcpHand", summary="a hand on a socket"),
-            SensorBackendEntry(
-                name="seeing", target="tcp_hand:TcpHandWithCamera", summary="a hand with a camera"
-            ),
-        ]
+PLUGIN = offering(
+    SensorBackendEntry(name="lab-hand", target="tcp_hand:TcpHand", summary="a hand on a socket"),
+    SensorBackendEntry(name="seeing", target="tcp_hand:TcpHandWithCamera", summary="a hand with a camera"),
+)
 
 
 @pytest.fixture
@@ -64,26 +58,24 @@ def hand(monkeypatch):
 @pytest.fixture
 def plugins(hand):
     with IsolatedPlugins() as plugins:
-        plugins.add(Plugin(), "lab-hand")
+        plugins.add(PLUGIN, "lab-hand")
         yield plugins
 
 
-def grasp(plugins, *options):
-    fixed = ["gripper.type=lab-hand/lab-hand", "gripper.patience_s=60", "classifier.type=none"]
+def grasp(plugins, *options, name="lab-hand"):
+    fixed = [f"gripper.type=lab-hand/{name}", "gripper.patience_s=60", "classifier.type=none"]
     return load_pipeline(options=[*fixed, *options], plugins=plugins).grasp()
 
 
 @pytest.mark.slow
 def test_it_conforms(plugins):
-    examined = examine(
+    report = examine(
         "lab-hand/lab-hand",
         keys={"patience_s": 60.0},
         unplugged={"vanishes_s": 0.5},
         absent={"address": "127.0.0.1:9"},
         plugins=plugins,
-    )
-    report = examined.report()
-
+    ).report()
     assert report.failures == []
     assert {result.check for result in report.results if result.state == "skipped"} <= {
         *("images-count-up", "pads-can-be-zeroed", "same-seed-same-frames"),
@@ -93,41 +85,33 @@ def test_it_conforms(plugins):
     }
 
 
-def test_it_grasps_with_the_default_pipeline(plugins):
-    trial = grasp(plugins)
-
+@pytest.mark.parametrize("late_s", [0.0, pytest.param(LATE_S, marks=pytest.mark.slow)])
+def test_it_grasps_with_the_default_pipeline_and_asks_again_for_late_answers(plugins, late_s):
+    trial = grasp(plugins, f"gripper.late_s={late_s}")
+    features = trial.features.as_dict()
     assert trial.outcome.words == "steady"
-    assert trial.features.as_dict()["p_first"] == pytest.approx(0.05, abs=1e-3)
-    assert trial.features.as_dict()["f_steady"] == pytest.approx(20.0, abs=1.5)
+    assert features["p_first"] == pytest.approx(0.05, abs=1e-3)
+    assert features["f_steady"] == pytest.approx(20.0, abs=1.5)
+    if late_s:
+        assert trial.report["repeated"] > 0
+        assert trial.counts["lost_frames"] > 0
+        assert f"{trial.counts['lost_frames']} frames" in trial.reason
 
 
 @pytest.mark.slow
 def test_its_camera_conforms_and_sees_the_force(hand, plugins):
     keys = {"patience_s": 60.0}
-    examined = examine("lab-hand/seeing", keys=keys, unplugged={"vanishes_s": 0.5}, plugins=plugins)
-    report = examined.report()
+    report = examine("lab-hand/seeing", keys=keys, unplugged={"vanishes_s": 0.5}, plugins=plugins).report()
     assert report.failures == []
     passed = {result.check for result in report.results if result.state == "passed"}
     assert {"images-stay-as-they-were-delivered", "what-it-delivers-is-kept"} <= passed
 
-    options = ["gripper.type=lab-hand/seeing", "gripper.patience_s=60", "classifier.type=none"]
-    trace = load_pipeline(options=options, plugins=plugins).grasp().trace
+    trace = grasp(plugins, name="seeing").trace
     eye = trace.signals["eye"]
     assert eye.cells.shape == (len(eye.t_s), *hand.EYE.shape)
     forces = np.interp(eye.t_s, trace.t_s, trace.force_left_n)
     assert eye.cells[:, 100, 150, 0] == pytest.approx(40 + np.minimum(10 * forces, 200), abs=1)
     assert (eye.cells[:, 0, 0] == 40).all()
-
-
-@pytest.mark.slow
-def test_answers_that_are_late_are_asked_for_again_and_counted(plugins):
-    trial = grasp(plugins, f"gripper.late_s={LATE_S}")
-
-    assert trial.outcome.words == "steady"
-    assert trial.features.as_dict()["f_steady"] == pytest.approx(20.0, abs=1.5)
-    assert trial.report["repeated"] > 0
-    assert trial.counts["lost_frames"] > 0
-    assert f"{trial.counts['lost_frames']} frames" in trial.reason
 
 
 @pytest.mark.parametrize("right_force_n", [nan, pytest.param(0.0, marks=pytest.mark.slow)])
@@ -140,7 +124,6 @@ def test_a_second_pad_without_a_force_never_touches(hand, plugins, monkeypatch, 
 
     monkeypatch.setattr(hand.TcpHand, "read", one_pad)
     trial = grasp(plugins)
-
     assert trial.features.as_dict()["p_first"] is None
     assert trial.outcome.words != "steady"
 
@@ -148,5 +131,4 @@ def test_a_second_pad_without_a_force_never_touches(hand, plugins, monkeypatch, 
 def test_every_option_of_the_checks_is_explained():
     named = re.findall(r"^\| `(\w+)` \|", PAGE.partition("## Conformance checks")[2], re.MULTILINE)
     options = [name for name in inspect.signature(examine).parameters if name != "name"]
-
     assert named[: len(options)] == options

@@ -18,59 +18,52 @@ def extract(trace):
     return create("feature-set", "quant").extract(trace)
 
 
-def trace(t_s, gap, left, right):
+def made(t_s, gap, left, right):
     return made_trace(np.column_stack((gap, left, right)), phase=Phase.APPROACH, t_s=t_s)
 
 
 def ramp():
     """Fingers that close at 10 mm/s for 2 s and touch nothing; the pads have an offset, the left one a ripple."""
-    t_s = np.linspace(5.0, 7.0, 201)
-    since = t_s - 5.0
-    force = 0.1 * np.ones(len(t_s))
-    return trace(t_s, 0.080 - 0.010 * since, force + 0.05 * np.sin(2.0 * np.pi * 8.0 * since), force - 0.06)
+    since = np.linspace(0.0, 2.0, 201)
+    left = 0.1 + 0.05 * np.sin(2.0 * np.pi * 8.0 * since)
+    return made(5.0 + since, 0.080 - 0.010 * since, left, np.full(len(since), 0.04))
 
 
 def test_a_straight_course_without_contact_has_its_values_and_rates():
     f = extract(ramp())
-
     assert not f.reasons
-    assert f["duration"] == pytest.approx(2.0)
-    assert f["gap_value_1of1_q1of32"] == pytest.approx(0.060)
-    assert f["gap_value_1of1_q31of32"] == pytest.approx(0.060 + 0.020 * 30.0 / 31.0)
-    # Every second quantile is less the mean: the largest of 32 is.
-    assert f["gap_value_1of1_q32of32"] == pytest.approx(0.080 - 0.070)
-    # The second of four parts has the points 32 to 63 of 0 to 127.
-    assert f["gap_value_2of4_q1of8"] == pytest.approx(0.080 - 0.020 * 63.0 / 127.0)
-    assert f["gap_rate_8of16_q1of2"] == pytest.approx(-0.010)
-    assert f["gap_rate2_8of16_q1of2"] == pytest.approx(0.0, abs=1e-9)
-    assert f["low_force_value_1of1_q1of32"] == pytest.approx(0.04)
-
-
-def test_the_spectrum_tells_the_frequency_of_a_ripple():
-    """16 periods in the recording: about the 16th of 65 frequencies, which is in the eighth of 32 parts."""
-    f = extract(ramp())
-    lower = [f[f"high_force_fourier_{k}of32_q1of1"] for k in range(2, 33)]
-
-    assert 2 + int(np.argmax(lower)) in (8, 9)
+    values = {
+        "duration": 2.0,
+        "gap_value_1of1_q1of32": 0.060,
+        "gap_value_1of1_q31of32": 0.060 + 0.020 * 30.0 / 31.0,
+        # Every second quantile is less the mean: the largest of 32 is.
+        "gap_value_1of1_q32of32": 0.080 - 0.070,
+        # The second of four parts has the points 32 to 63 of 0 to 127.
+        "gap_value_2of4_q1of8": 0.080 - 0.020 * 63.0 / 127.0,
+        "gap_rate_8of16_q1of2": -0.010,
+        "gap_rate2_8of16_q1of2": 0.0,
+        "low_force_value_1of1_q1of32": 0.04,
+    }
+    assert {name: f[name] for name in values} == pytest.approx(values, abs=1e-9)
+    # 16 periods of the ripple: about the 16th of 65 frequencies, which is in the eighth of 32 parts.
+    spectrum = [f[f"high_force_fourier_{k}of32_q1of1"] for k in range(2, 33)]
+    assert 2 + int(np.argmax(spectrum)) in (8, 9)
 
 
 def test_the_quantiles_are_those_of_numpy():
     values = np.random.default_rng(2).normal(size=128)
-    f = extract(trace(np.arange(128.0), values, values, values))
+    f = extract(made(np.arange(128.0), values, values, values))
     part = values[64:96]
     expected = np.quantile(part, np.linspace(0.0, 1.0, 8))
     expected[1::2] -= part.mean()
     assert [f[f"gap_value_3of4_q{k}of8"] for k in range(1, 9)] == pytest.approx(expected.tolist())
-    shifted = values[48:80]
-    assert f["gap_value_2of4shifted_q1of8"] == pytest.approx(shifted.min())
+    assert f["gap_value_2of4shifted_q1of8"] == pytest.approx(values[48:80].min())
 
 
 def test_a_recording_without_gap_has_the_features_of_the_forces():
     f = extract(evolve(ramp(), units={**SI_UNITS, "gap": NO_GAP}))
-    missing = set(f.reasons)
-
-    assert missing == {name for name in f.names if name.startswith("gap_")}
-    assert set(f.reasons.values()) == {"no gap was recorded"}
+    gaps = {name for name in f.names if name.startswith("gap_")}
+    assert f.reasons == dict.fromkeys(gaps, "no gap was recorded")
 
 
 def test_single_samples_that_are_lost_change_little():

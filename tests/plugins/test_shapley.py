@@ -5,24 +5,14 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from cases import every_case
-from test_classifiers import fitted, trials
-from test_reasons import FULL_CAN, MISSING, total
 
-from graspsense.core.values.reasons import FeatureValue
 from graspsense.plugins.classifiers.shapley import shapley_values
-
-NAMES = ("svm", "mlp", "backprop", "knn")
 
 
 def interacting(rows):
     """A function in which the contribution of a feature depends on the others."""
-    return (
-        0.1
-        + 0.2 * rows[:, 0] * rows[:, 1]
-        + 0.3 * np.maximum(rows[:, 2], rows[:, 0])
-        + 0.01 * rows.sum(axis=1)
-    )
+    a, b, c = rows[:, :3].T
+    return 0.1 + 0.2 * a * b + 0.3 * np.maximum(c, a) + 0.01 * rows.sum(axis=1)
 
 
 def by_definition(trial, medians):
@@ -59,28 +49,3 @@ def test_many_features_are_sampled_alike_in_every_call_and_add_up():
     assert parts[:3] == pytest.approx(expected, abs=0.1)
     assert parts[3:] == pytest.approx((0.01 * trial[3:]).tolist(), abs=1e-12)
     assert shapley_values(interacting, trial, medians) == (start, parts)
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
-@every_case("name", NAMES)
-@every_case("features", [FULL_CAN, MISSING])
-def test_contributions_add_up_to_the_probability(name, features):
-    said = fitted(name, *trials(missing=0.1)).explain(features)
-
-    given = [reason for reason in said.because if reason.contribution is not None]
-    assert total(said) == pytest.approx(said.probabilities[said.label], abs=1e-9)
-    assert {(reason.contribution.scale, reason.contribution.label) for reason in given} == {
-        ("probability", said.label)
-    }
-    # The median stands for a missing feature, so it contributes nothing.
-    assert all(FeatureValue("f_steady", None, "N") not in reason.features for reason in given)
-
-
-@pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
-@every_case("name", NAMES)
-def test_the_feature_that_tells_the_labels_apart_contributes_most(name):
-    reason = fitted(name, *trials()).explain(FULL_CAN).because[0]
-
-    assert reason.features == (FeatureValue("p_first", 0.0661, "m"),)
-    assert reason.words.startswith("p_first = 66.1 mm: +")

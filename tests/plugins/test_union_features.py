@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from cases import every_case
 
 from graspsense.core.components.registry import installed
 from graspsense.core.values.errors import ConfigError, UnknownName
@@ -27,7 +28,6 @@ def test_each_set_gives_what_it_gives_alone():
 
 def test_the_thresholds_of_the_union_are_those_of_its_sets():
     strict = union(sets=("chitta", "curve"), contact_force_n=1000.0).extract(squeeze())
-
     assert all(math.isnan(value) for value in strict.values)
     assert set(strict.reasons) == set(strict.names)
 
@@ -35,17 +35,19 @@ def test_the_thresholds_of_the_union_are_those_of_its_sets():
 def test_it_declares_the_features_of_its_sets_and_one_width():
     component = installed().find("feature-set", "graspsense/union")
     declared = component.declared(union(sets=("curve", "chitta")).config)
-
     assert [feature.name for feature in declared.features if feature.width] == ["contact_gap"]
     assert {require.name for require in declared.requires} == {"gap", "force_left", "force_right"}
 
 
-@pytest.mark.parametrize("sets", [(), ("curve", "curve"), ("curve", "union")])
-def test_a_list_that_cannot_be_united_is_refused(sets):
-    with pytest.raises(ConfigError, match="sets"):
+@every_case(
+    ("sets", "error", "says"),
+    [
+        ((), ConfigError, "sets"),
+        (("curve", "curve"), ConfigError, "sets"),
+        (("curve", "union"), ConfigError, "sets"),
+        (("curv",), UnknownName, "curv"),
+    ],
+)
+def test_a_list_that_cannot_be_united_is_refused(sets, error, says):
+    with pytest.raises(error, match=says):
         union(sets=sets).extract(squeeze())
-
-
-def test_a_set_that_is_not_installed_is_named():
-    with pytest.raises(UnknownName, match="curv"):
-        union(sets=("curv",)).extract(squeeze())
