@@ -109,10 +109,6 @@ def test_named_arrays_are_told_apart_by_a_pattern(ending, tmp_path):
     assert "arrays" in str(refused.error)
 
 
-def test_arrays_without_a_column_have_numbered_columns(tmp_path):
-    scipy.io.savemat(tmp_path / "all.mat", {f"jar_{k}": solid()[k] for k in range(3)})
-    grasps = recordings(tmp_path, f'files = "all.mat"\narrays = "{{label}}_{{order:d}}"\n{COLUMNS}')
-    assert peaks(grasps) == pytest.approx([FORCE.max() * k for k in (1, 2, 3)])
 
 
 def test_groups_of_hdf5_are_grasps(tmp_path):

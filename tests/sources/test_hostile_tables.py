@@ -69,11 +69,6 @@ def test_what_needs_backtracking_or_is_too_large_is_refused_with_the_reason(tmp_
             regular_expression(pattern)
 
 
-def test_named_groups_are_fields(tmp_path):
-    started = f"grasp jar 7\n{GRASP}grasp can 8\n{GRASP}"
-    text = MANIFEST.replace('label = "jar"\n', r"start = 'grasp (?P<label>\w+) (?P<order>\d+)'")
-    recordings = list(read_recordings(str(manifest(tmp_path, text, started))))
-    assert [(recording.label, recording.order) for recording in recordings] == [("jar", 7.0), ("can", 8.0)]
 
 
 @every_case(
@@ -190,12 +185,6 @@ def test_a_long_text_of_short_lines_is_read(tmp_path, monkeypatch, end):
         read_text(path)
 
 
-def test_errors_list_a_few_of_many_columns(tmp_path):
-    path = tmp_path / "wide.csv"
-    path.write_text(",".join(f"column{k}" for k in range(5000)) + "\n" + ",".join(["1"] * 5000) + "\n")
-    with pytest.raises(ConfigError, match="and 4976 more") as refused:
-        CsvColumns(path).column("colunm1", "the label")
-    assert len(str(refused.value)) < 1000
 
 
 def test_long_texts_take_linear_time(tmp_path):
@@ -240,21 +229,6 @@ def test_as_many_labels_as_half_of_the_trials_are_refused_by_every_command(tmp_p
         assert limits.CLASSES.variable in done.stderr
 
 
-def test_too_many_labels_and_features_of_trials_of_any_source_are_refused(monkeypatch):
-    def trials(labels, features):
-        names = tuple(f"x{k}" for k in range(features))
-        return Labelled(
-            source="trials",
-            table=FeatureTable(names=names, units=("",) * features, values=np.zeros((labels, features))),
-            labels=tuple(f"c{k}" for k in range(labels)),
-        )
-
-    with pytest.raises(ConfigError, match=limits.CLASSES.variable):
-        trials(20_000, 1)
-    with pytest.raises(ConfigError, match=limits.FEATURES.variable):
-        trials(2, 20_000)
-    monkeypatch.setenv(limits.CLASSES.variable, "300")
-    assert len(trials(300, 1).classes) == 300
 
 
 @every_case(

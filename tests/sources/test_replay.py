@@ -132,15 +132,6 @@ def test_gap_falls_as_thumb_and_fingers_flex(
     assert opened.velocity_m_s == 0.0
 
 
-def test_each_of_the_five_fingers_is_kept_beside_the_two_forces(tmp_path: Path) -> None:
-    pressed = frame_lines(pressed={0: 20, 1: 5, 3: 50})
-    recording = read_recording(str(write(tmp_path / "g.txt", frame_lines(), pressed)))
-
-    last = recording.readings[-1]
-
-    assert [channel.name for channel in recording.channels] == list(last.signals._fields)
-    assert list(last.signals) == pytest.approx([2.0, 0.5, 0.0, 5.0, 0.0])
-    assert (last.frame.force_left_n, last.frame.force_right_n) == pytest.approx((2.0, 5.0))
 
 
 @given(data=st.data())

@@ -66,26 +66,8 @@ def test_the_table_as_csv(folder, tmp_path):
     assert (rows[1]["f_steady [N]"], rows[2]["label"], rows[3]["outcome"]) == ("", "", "aborted")
 
 
-def test_an_exported_csv_comes_back_as_the_trials_of_the_store(folder, tmp_path):
-    export(folder, tmp_path / "t.csv")
-    trials, stored = read_labelled(tmp_path / "t.csv", "label"), labelled_store(str(folder))
-
-    assert trials.table.names == stored.table.names
-    assert trials.table.units == stored.table.units
-    assert trials.table.values.tobytes() == stored.table.values.tobytes()
-    assert (trials.labels, trials.instances, trials.order) == (stored.labels, stored.instances, (0, 1))
-    assert trials.provenance["simulated"] == stored.provenance["simulated"]
 
 
-def test_an_empty_column_of_an_export_is_not_a_feature(tmp_path):
-    with Store.open(tmp_path / "trials") as store:
-        for k in range(4):
-            keep(store, ("can:full", "can:empty")[k % 2], None, values=(0.05 + 0.01 * (k % 2), None))
-    export(tmp_path / "trials", tmp_path / "t.csv")
-    trials = read_labelled(tmp_path / "t.csv", "label")
-
-    assert trials.table.names == ("p_first", "f_steady")
-    assert trials.instances is None
 
 
 def test_the_table_as_arff_is_read_by_scipy(folder, tmp_path):

@@ -62,11 +62,6 @@ def test_a_trial_comes_back_as_it_was_kept(store):
     assert kept.recording.is_file()
 
 
-def test_a_page_holds_the_newest_that_fit_newest_first(store):
-    for k in range(7):
-        keep(store, "can:full_open" if k % 2 else "can:empty_open")
-    assert [summary.id for summary in store.page(limit=3)] == [7, 6, 5]
-    assert [summary.id for summary in store.page(label="can:empty_open")] == [7, 5, 3, 1]
 
 
 def test_what_is_set_aside_stays_but_does_not_count(store):
