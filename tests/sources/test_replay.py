@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import re
 from collections.abc import Sequence
@@ -25,7 +24,7 @@ from graspsense.core.settings.layers import Flag
 from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError, DataDamaged, DeviceLost, RecordingEnded
-from graspsense.core.values.signals import EFFORT, NO_PADS, VELOCITY, Command, Frame, Phase
+from graspsense.core.values.signals import EFFORT, VELOCITY, Command, Frame, Phase
 from graspsense.core.values.trace import PAD_COLUMNS, TICK_COLUMNS
 from graspsense.sources.recordings.icub import IcubGrasp, read_grasp, read_recording, relative_readings
 from graspsense.sources.recordings.replay import ReplayBackend, ReplayConfig
@@ -82,20 +81,6 @@ def test_reader_keeps_what_the_file_says(tmp_path: Path) -> None:
     assert grasp.taxels.sum() == 2 * 60 * 240 - 7
 
 
-def test_times_are_frame_numbers_and_what_was_not_recorded_is_missing(tmp_path: Path) -> None:
-    path = write(tmp_path / "g.txt", *[frame_lines()] * 3)
-    readings = list(relative_readings(read_grasp(path)))
-    assert [(reading.frame.t_s, reading.frame.dt_s) for reading in readings] == [(0, 1), (1, 1), (2, 1)]
-    frame = readings[0].frame
-    assert all(math.isnan(v) for v in (frame.effort_n, frame.edge_left_n, frame.edge_right_n))
-    assert readings[0].pads == NO_PADS
-    _, info = opened(path)
-    assert info.units["t"] == "frame"
-    said = " ".join(info.notes)
-    assert "times are frame numbers, not seconds" in said
-    assert "nominal" in said
-
-
 def test_thumb_is_left_and_the_strongest_finger_is_right(tmp_path: Path) -> None:
     path = write(
         tmp_path / "g.txt",
@@ -130,8 +115,6 @@ def test_gap_falls_as_thumb_and_fingers_flex(
     assert (opened.gap_m - last.gap_m) * 1e3 == pytest.approx(closed_mm)
     assert last.velocity_m_s == pytest.approx(last.gap_m - opened.gap_m)
     assert opened.velocity_m_s == 0.0
-
-
 
 
 @given(data=st.data())
