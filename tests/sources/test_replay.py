@@ -71,16 +71,6 @@ def frames_of(path: Path) -> list[Frame]:
     return [reading.frame for reading in relative_readings(read_grasp(path))]
 
 
-def test_reader_keeps_what_the_file_says(tmp_path: Path) -> None:
-    grasp = read_grasp(write(tmp_path / "g.txt", frame_lines(), frame_lines(moved(j12=8.0), {LITTLE: 7})))
-    assert len(grasp) == 2
-    assert grasp.encoders_deg[1].tolist() == [20.0, 80.0, 10.0, 40.0, 30.0, 58.0, 32.0, 45.0, 5.0]
-    assert grasp.maxima[1].tolist() == [15, 15, 15, 15, 22]
-    assert grasp.taxels.shape == (2, 5, 12)
-    assert grasp.taxels[1, LITTLE, 3] == 233
-    assert grasp.taxels.sum() == 2 * 60 * 240 - 7
-
-
 def test_thumb_is_left_and_the_strongest_finger_is_right(tmp_path: Path) -> None:
     path = write(
         tmp_path / "g.txt",
@@ -88,20 +78,22 @@ def test_thumb_is_left_and_the_strongest_finger_is_right(tmp_path: Path) -> None
         frame_lines(pressed={THUMB: 25, MIDDLE: 30, INDEX: 9}),
         frame_lines(pressed={THUMB: 25, MIDDLE: 70, RING: 12}),
     )
-    frames = frames_of(path)
+    recording = read_recording(str(path))
+    frames = [reading.frame for reading in recording.readings]
     assert [frame.force_left_n for frame in frames] == pytest.approx([0.0, 2.0, 2.0])
     assert [frame.force_right_n for frame in frames] == pytest.approx([0.0, 0.9, 4.0])
+    # Each of the five fingers is kept beside the two forces.
+    assert [channel.name for channel in recording.channels] == list(recording.readings[-1].signals._fields)
+    assert list(recording.readings[-1].signals) == pytest.approx([2.0, 0.0, 4.0, 1.2, 0.0])
 
 
 @every_case(
     ("joints", "closed_mm"),
     [
-        ({"j9": 8.0}, 2.0),  # half the mean of two joints of the thumb
-        ({"j10": 8.0}, 2.0),
-        ({"j11": 8.0}, 1.0),  # half the mean of four joints of index and middle finger
-        ({"j12": 8.0}, 1.0),
-        ({"j13": 8.0}, 1.0),
-        ({"j14": 8.0}, 1.0),
+        *(({joint: 8.0}, 2.0) for joint in ("j9", "j10")),  # half the mean of two joints of the thumb
+        *(
+            ({joint: 8.0}, 1.0) for joint in ("j11", "j12", "j13", "j14")
+        ),  # of four of index and middle finger
         ({"j9": 1.0, "j10": 1.0, "j11": 1.0, "j12": 1.0, "j13": 1.0, "j14": 1.0}, 1.0),
         ({"j7": 8.0, "j8": 8.0, "j15": 8.0}, 0.0),
         ({"j10": -4.0}, -1.0),
@@ -241,6 +233,12 @@ def test_backend_gives_each_frame_once_and_then_ends(tmp_path: Path) -> None:
         with pytest.raises(RecordingEnded):
             backend.read(timeout_s=0.0)
     assert backend.report()["frames_read"] == 3
+    for _ in range(2):
+        backend.close()
+    with pytest.raises(DeviceLost, match="not open"):
+        backend.read(timeout_s=0.0)
+    backend.open(seed=1)
+    assert repr(backend.read(timeout_s=0.0)) == repr(readings[0])
 
 
 def test_backend_tells_a_force_that_is_the_same_all_along(tmp_path: Path) -> None:
@@ -254,17 +252,6 @@ def test_backend_tells_a_force_that_is_the_same_all_along(tmp_path: Path) -> Non
     info = ReplayBackend(ReplayConfig(f"manifest:{tmp_path}/m.toml#1")).open(seed=0)
     assert [note for note in info.notes if "the left pad does not change" in note]
     assert not [note for note in info.notes if "the right pad does not change" in note]
-
-
-def test_backend_closes_twice_and_plays_again(tmp_path: Path) -> None:
-    backend, _ = opened(write(tmp_path / "g.txt", frame_lines()))
-    frame = backend.read(timeout_s=0.0)
-    backend.close()
-    backend.close()
-    with pytest.raises(DeviceLost, match="not open"):
-        backend.read(timeout_s=0.0)
-    backend.open(seed=1)
-    assert repr(backend.read(timeout_s=0.0)) == repr(frame)
 
 
 @real_data
