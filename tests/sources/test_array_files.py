@@ -40,6 +40,7 @@ def solid(grasps=3):
 
 
 COLUMNS = 'time = "c1"\ngap = "c2"\nforce = "c3"\n'
+SAVE = {"npz": lambda path, arrays: np.savez(path, **arrays), "mat": scipy.io.savemat}
 
 
 @every_case("ending", ["npy", "npz", "mat", "h5"])
@@ -47,13 +48,11 @@ def test_an_array_of_three_dimensions_is_read_alike_in_every_file_and_asked_abou
     path = tmp_path / f"jar.{ending}"
     if ending == "npy":
         np.save(path, solid())
-    elif ending == "npz":
-        np.savez(path, data=solid(), kind=np.array([3, 4, 5]))
-    elif ending == "mat":
-        scipy.io.savemat(path, {"data": solid()})
-    else:
+    elif ending == "h5":
         with h5py.File(path, "w") as file:
             file["data"] = solid()
+    else:
+        SAVE[ending](path, {"data": solid()} | ({"kind": np.array([3, 4, 5])} if ending == "npz" else {}))
     text = f'files = "{{label}}.{ending}"\norder = "{{part}}"\n{COLUMNS}'
     grasps = recordings(tmp_path, text)
     assert peaks(grasps) == pytest.approx([FORCE.max() * k for k in (1, 2, 3)])
@@ -86,53 +85,20 @@ def test_the_order_of_the_axes_is_that_of_the_manifest(tmp_path):
         recordings(tmp_path, text + 'axes = "time, width, column"\n')
 
 
-@pytest.mark.parametrize("ending", ["mat", "npz"])
+@every_case("ending", ["mat", "npz"])
 def test_named_arrays_are_told_apart_by_a_pattern(ending, tmp_path):
     names = [(label, k) for label in ("jar", "tin_can") for k in range(1, 12)]
     parts = {f"{label}_{k}_gap": GAP for label, k in names}
     parts |= {f"{label}_{k}_force": k * FORCE / 10.0 for label, k in names}
-    save = scipy.io.savemat if ending == "mat" else lambda path, given: np.savez(path, **given)
-    save(tmp_path / f"all.{ending}", {**parts, "t": T_S})
+    SAVE[ending](tmp_path / f"all.{ending}", {**parts, "t": T_S})
     text = f'files = "all.{ending}"\narrays = "{{label}}_{{order:d}}_{{column}}"\n'
     text += 'time = "t"\ngap = "gap"\nforce = "force"\n'
-    grasps = recordings(tmp_path, text)
-    assert len(grasps) == 22
-    assert {recording.label for recording in grasps} == {"jar", "tin_can"}
-    by_order = sorted(
-        (recording.order, peak)
-        for recording, peak in zip(grasps, peaks(grasps), strict=True)
-        if recording.label == "jar"
-    )
-    assert [peak for _, peak in by_order] == pytest.approx([k * FORCE.max() / 10.0 for k in range(1, 12)])
+    grasps = sorted(recordings(tmp_path, text), key=lambda recording: (recording.label, recording.order))
+    assert [(recording.label, recording.order) for recording in grasps] == names
+    assert peaks(grasps) == pytest.approx([k * FORCE.max() / 10.0 for _, k in names])
     (refused,) = recordings(tmp_path, text.replace("{label}_", "grasp_{label}_"))
     assert isinstance(refused, UnreadableRecording)
     assert "arrays" in str(refused.error)
-
-
-def test_arrays_without_a_column_have_numbered_columns(tmp_path):
-    scipy.io.savemat(tmp_path / "all.mat", {f"jar_{k}": solid()[k] for k in range(3)})
-    grasps = recordings(tmp_path, f'files = "all.mat"\narrays = "{{label}}_{{order:d}}"\n{COLUMNS}')
-    assert peaks(grasps) == pytest.approx([FORCE.max() * k for k in (1, 2, 3)])
-
-
-def test_groups_of_hdf5_are_grasps(tmp_path):
-    with h5py.File(tmp_path / "all.h5", "w") as file:
-        for k in (1, 2):
-            group = file.create_group(f"trials/jar_{k}")
-            group.create_dataset("pose/gap", data=GAP * 1e3, compression="gzip")
-            group["force"] = k * FORCE
-            group["who"] = "Ann"
-    text = """
-        files = "all.h5"
-        arrays = "trials/{label}_{order:d}/**/{column}"
-        rate_hz = 100
-        gap = "gap [mm]"
-        force = "force"
-        instance = "{who}"
-        """
-    grasps = recordings(tmp_path, text)
-    assert peaks(grasps) == pytest.approx([FORCE.max(), 2 * FORCE.max()])
-    assert {recording.instance for recording in grasps} == {"Ann"}
 
 
 def test_a_mat_file_of_version_7_3_is_read_in_the_axes_of_matlab(tmp_path):
@@ -221,48 +187,54 @@ def test_a_store_of_recordings_with_a_constant_gap_has_no_width(begin_s, tmp_pat
     assert_no_width(load_trials(f"store:{tmp_path / 'store'}"))
 
 
-def test_the_attribute_units_of_an_array_of_hdf5_is_its_unit(tmp_path):
+def test_groups_of_hdf5_are_grasps_and_the_attribute_units_is_the_unit_of_an_array(tmp_path):
     """Times in ms, gaps in mm and forces in mN, in the groups of two grasps."""
-    columns = {"t": (T_S * 1e3, "ms"), "pos": (GAP * 1e3, b"millimeter"), "F": (FORCE * 1e3, "mN")}
+    columns = {"t": (T_S * 1e3, "ms"), "pose/gap": (GAP * 1e3, b"millimeter"), "F": (FORCE * 1e3, "mN")}
     with h5py.File(tmp_path / "a.h5", "w") as file:
         for k in (1, 2):
             for name, (values, unit) in columns.items():
-                array = file.create_dataset(f"jar/{k}/{name}", data=values * (k if name == "F" else 1))
-                array.attrs["units"] = unit
-    text = 'files = "*.h5"\narrays = "{label}/{order:d}/{column}"\ntime = "t"\ngap = "pos"\nforce = "F"\n'
-    grasps = recordings(tmp_path, text)
+                scaled = values * (k if name == "F" else 1)
+                file.create_dataset(f"trials/jar_{k}/{name}", data=scaled, compression="gzip").attrs[
+                    "units"
+                ] = unit
+            file[f"trials/jar_{k}/who"] = "Ann"
+    text = 'files = "a.h5"\narrays = "trials/{label}_{order:d}/**/{column}"\ninstance = "{who}"\n'
+    grasps = recordings(tmp_path, text + 'time = "t"\ngap = "gap"\nforce = "F"\n')
     assert peaks(grasps) == pytest.approx([FORCE.max(), 2.0 * FORCE.max()])
     last = grasps[0].recording.readings[-1].frame
     assert (last.t_s, last.gap_m) == pytest.approx((1.19, 0.05))
-    assert [grasp.label for grasp in grasps] == ["jar", "jar"]
+    assert [(grasp.label, grasp.instance) for grasp in grasps] == [("jar", "Ann")] * 2
 
 
-def test_packed_numbers_of_netcdf_are_unpacked(tmp_path):
-    """Forces in steps of 0.01 N above -5 N, as whole numbers, and a gap in which -1 stands for no number."""
+# 60000 is stored as -5536 in 16 bits with a sign; so is the largest valid number, and the filling 65535 as -1.
+UNSIGNED = np.array([0, 40000, 60000, 60001, 65535], dtype="u2").view("i2")
+
+
+@every_case(
+    ("stored", "attributes", "expected"),
+    [
+        # Steps of 0.01 above -5, as whole numbers.
+        (
+            np.int16([500, 501, 812]),
+            {"scale_factor": np.array([0.01]), "add_offset": -5.0},
+            [0.0, 0.01, 3.12],
+        ),
+        ([0.5, -1.0, 0.7], {"_FillValue": np.array([-1.0])}, [0.5, np.nan, 0.7]),
+        (
+            UNSIGNED,
+            {
+                "_Unsigned": "true",
+                "_FillValue": np.int16(-1),
+                "valid_max": np.int16(-5536),
+                "scale_factor": 0.001,
+            },
+            [0.0, 40.0, 60.0, np.nan, np.nan],
+        ),
+        ([-9.0, 0.0, 0.05, 9.0], {"valid_range": np.array([0.0, 0.1])}, [np.nan, 0.0, 0.05, np.nan]),
+        (np.int16([-5, 3]), {"_Unsigned": "false", "valid_min": np.int16(0)}, [np.nan, 3.0]),
+    ],
+)
+def test_numbers_of_netcdf_are_unpacked_and_invalid_ones_are_missing(tmp_path, stored, attributes, expected):
     with h5py.File(tmp_path / "a.nc", "w") as file:
-        file["t"] = T_S
-        packed = file.create_dataset("F", data=np.round((FORCE + 5.0) * 100.0).astype("i2"))
-        packed.attrs.update(scale_factor=np.array([0.01]), add_offset=-5.0)
-        gap = file.create_dataset("pos", data=np.where(np.arange(len(T_S)) == 3, -1.0, GAP))
-        gap.attrs["_FillValue"] = np.array([-1.0])
-    arrays = hdf5_arrays(tmp_path / "a.nc")
-    assert arrays["F"] == pytest.approx(FORCE, abs=0.006)
-    assert np.flatnonzero(np.isnan(arrays["pos"])).tolist() == [3]
-
-
-def test_numbers_without_a_sign_and_outside_of_their_valid_range_are_those_of_netcdf(tmp_path):
-    """60000 is stored as -5536 in 16 bits with a sign; so is the largest valid number, and the filling 65535 as -1."""
-    stored = np.array([0, 40000, 60000, 60001, 65535], dtype="u2").view("i2")
-    with h5py.File(tmp_path / "a.nc", "w") as file:
-        unsigned = file.create_dataset("F", data=stored)
-        unsigned.attrs.update(
-            _Unsigned="true", _FillValue=np.int16(-1), valid_max=np.int16(-5536), scale_factor=0.001
-        )
-        ranged = file.create_dataset("pos", data=np.array([-9.0, 0.0, 0.05, 9.0]))
-        ranged.attrs["valid_range"] = np.array([0.0, 0.1])
-        signed = file.create_dataset("x", data=np.array([-5, 3], dtype="i2"))
-        signed.attrs.update(_Unsigned="false", valid_min=np.int16(0))
-    arrays = hdf5_arrays(tmp_path / "a.nc")
-    assert arrays["F"] == pytest.approx([0.0, 40.0, 60.0, np.nan, np.nan], nan_ok=True)
-    assert arrays["pos"] == pytest.approx([np.nan, 0.0, 0.05, np.nan], nan_ok=True)
-    assert arrays["x"] == pytest.approx([np.nan, 3.0], nan_ok=True)
+        file.create_dataset("F", data=np.asarray(stored)).attrs.update(attributes)
+    assert hdf5_arrays(tmp_path / "a.nc")["F"] == pytest.approx(expected, nan_ok=True)

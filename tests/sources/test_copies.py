@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 from attrs import evolve
@@ -80,11 +78,6 @@ def test_coarse_features_that_are_equal_by_chance_count_and_it_is_said(values):
     assert any("by chance" in note for note in kept.notes)
 
 
-def test_copies_of_coarse_trials_are_found_where_chance_cannot_make_them():
-    values = np.random.default_rng(2).integers(0, 50, size=(30, 6))
-    assert len(without_copies(labelled(np.concatenate([values, values])))) == 30
-
-
 def test_of_a_grasp_with_a_damaged_copy_the_one_with_more_features_is_kept():
     values = measured(4)
     values[1, 1:] = np.nan
@@ -136,25 +129,6 @@ def test_the_part_of_a_recording_is_of_the_same_grasp():
     still = readings(0.0)
     curves = [readings(0.1)[:25], readings(0.1), readings(0.2), readings(0.1), still, still[:20]]
     assert grasp_numbers([curve_bytes(curve) for curve in curves]) == [1, 1, 2, 1, 4, 5]
-
-
-def table_of_noise(path, copies):
-    rng = np.random.default_rng(3)
-    lines = [f"{'ab'[i % 2]},{rng.normal():.4f},{rng.normal():.4f}" for i in range(40)]
-    path.write_text("object,w,s\n" + "\n".join(lines * copies) + "\n")
-    return str(path)
-
-
-@pytest.mark.slow
-def test_doubling_the_lines_of_a_table_changes_no_rate(tmp_path):
-    rates = []
-    for copies in (1, 2):
-        path = table_of_noise(tmp_path / f"{copies}.csv", copies)
-        done = graspsense("evaluate", path, "--label", "object", "--folds", 2, "--json")
-        assert done.returncode == 0
-        rates.append(json.loads(done.stdout))
-    assert rates[0]["headline"] == rates[1]["headline"]
-    assert any("copies" in note for note in rates[1]["notes"])
 
 
 COARSE = ("-o", "classifier.type=none", "-o", "gripper.rate_hz=250", "-o", "gripper.sensor=ideal")

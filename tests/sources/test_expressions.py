@@ -44,6 +44,13 @@ def test_a_value_is_that_of_arithmetic(text, expected):
     assert value(text) == pytest.approx(expected)
 
 
+def test_the_unit_behind_an_expression_is_told_from_a_component():
+    texts = ("60 - Pos  [mm] ", "force[2]", "force [2]", "'a [b]'", "F [m/s]")
+    units = ("mm", "", "", "", "m/s")
+    assert tuple(parse(text).unit for text in texts) == units
+    assert parse(texts[0]).text == "60 - Pos"
+
+
 @every_case(
     ("text", "says"),
     [

@@ -12,7 +12,7 @@ from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.features import FeatureTable
 from graspsense.sources.trial_source import load_trials
-from graspsense.sources.trial_table.features_csv import read_labelled, read_table, write_labelled
+from graspsense.sources.trial_table.features_csv import read_labelled, write_labelled
 
 GOOD = "what,p_first [m],f_steady\n" + "".join(
     f"{'ab'[i % 2]},{0.05 + 0.001 * (i % 3)},{6 + i % 2}\n" for i in range(8)
@@ -27,34 +27,6 @@ def csv(tmp_path):
         return path
 
     return write
-
-
-def test_names_units_labels_and_the_width(csv):
-    trials = read_labelled(csv(GOOD), "what")
-
-    assert trials.table.names == ("p_first", "f_steady")
-    assert trials.table.units == ("m", "")
-    assert trials.labels == ("a", "b") * 4
-    assert trials.width is not None
-    assert trials.instances is None
-    assert trials.no_instances == "no column names the instance (instance=COLUMN)"
-
-
-@every_case("separator", [",", ";", "\t"])
-@every_case("prefix", ["", "\ufeff"])
-@every_case("ending", ["\n", "\r\n"])
-def test_separators_byte_order_marks_and_line_ends(csv, separator, prefix, ending):
-    text = prefix + GOOD.replace(",", separator).replace("\n", ending)
-    read, expected = (read_labelled(csv(given), "what").table.values.tolist() for given in (text, GOOD))
-    assert read == expected
-
-
-@every_case("gap", ["", "nan", "NaN", "NA", "?", "null", " "])
-def test_what_counts_as_missing(csv, gap):
-    trials = read_labelled(csv(GOOD.replace("a,0.05,6", f"a,{gap},6", 1)), "what")
-
-    assert math.isnan(trials.table.values[0, 0])
-    assert any(note.endswith("of all values are missing") for note in trials.notes)
 
 
 @every_case(
@@ -111,62 +83,6 @@ def test_a_unit_in_every_cell_is_that_of_the_column_and_labels_keep_theirs(csv):
     assert read.table.values[:2, 0].tolist() == [6.0, 7.1]
 
 
-def test_units_that_differ_within_a_column_are_no_numbers(csv):
-    rows = "".join(f"{'ab'[i % 2]},{i * 7 % 5},{i % 4} {'m' if i == 3 else 'mm'}\n" for i in range(8))
-    read = read_labelled(csv("what,force,gap\n" + rows), "what")
-    assert read.table.names == ("force",)
-    assert any("gap" in note for note in read.notes)
-
-
-def test_counters_and_texts_are_no_features_unless_asked_for(csv):
-    lines = [f"{'ab'[i % 2]},{i},{100.5 + i * i},{i % 3},x{i}" for i in range(8)]
-    path = csv("what,trial,time,p,comment\n" + "\n".join(lines) + "\n")
-
-    trials = read_labelled(path, "what")
-    assert trials.table.names == ("p",)
-    assert any("trial, time (use columns to include them)" in note for note in trials.notes)
-    assert any("hardly repeat" in note and "comment" in note for note in trials.notes)
-    assert read_labelled(path, "what", features=["trial", "p"]).table.names == ("trial", "p")
-
-
-def test_constant_and_empty_columns_are_noted(csv):
-    lines = [f"{'ab'[i % 2]},{i % 3},7,," for i in range(8)]
-    trials = read_labelled(
-        csv("what,p,same,empty,\n".replace(",\n", ",void\n") + "\n".join(lines) + "\n"), "what"
-    )
-
-    assert "constant, and so without information: same" in trials.notes
-    assert "not used, because they have no values: empty, void (use columns to include them)" in trials.notes
-    assert trials.table.names == ("p", "same")
-
-
-@every_case(
-    "other",
-    [
-        *("Tin_can 1", "tin-can 01", "tin  can 1", "tin can \uff11"),
-        *("tin c\u0430n 1", "\u03a4in can 1", "t\u0131n can 1"),
-    ],
-)
-def test_labels_that_differ_in_spelling_only_are_noted(csv, other):
-    text = GOOD.replace("\na,", "\ntin can 1,")
-    trials = load_trials(str(csv(text.replace("tin can 1", other, 1))), label="what")
-
-    assert any("differ in spelling only" in note for note in trials.notes)
-    assert not any("spelling" in note for note in load_trials(str(csv(text)), label="what").notes)
-
-
-def test_a_letter_of_another_alphabet_is_shown_by_its_code_and_a_selector_is_left_out(csv):
-    text = GOOD.replace("\na,", "\ncan,")
-    (note,) = (
-        note
-        for note in load_trials(str(csv(text.replace("\ncan,", "\nc\u0430n,", 1))), label="what").notes
-        if "spelling" in note
-    )
-    assert note.endswith("'can' and 'c\\u0430n'")
-    selected = load_trials(str(csv(text.replace("\ncan,", "\ncan\ufe0f,", 1))), label="what")
-    assert set(selected.labels) == set(load_trials(str(csv(text)), label="what").labels)
-
-
 def test_instances_order_and_what_is_known_before_the_contact(csv):
     lines = [f"{'ab'[i % 2]},thing{i % 4},{100 - i},{i % 3},{i % 5}" for i in range(12)]
     path = csv("what,thing,when,start,p\n" + "\n".join(lines) + "\n")
@@ -198,59 +114,10 @@ def test_what_is_written_reads_back_to_the_bit(tmp_path_factory, rows):
     assert (again.labels, again.instances, again.table.units) == (labels, things, ("m", ""))
 
 
-def test_a_table_without_labels(csv):
-    trials, _ = read_table(csv(GOOD), ["f_steady", "p_first"])
-
-    assert trials.names == ("f_steady", "p_first")
-    assert trials.values[0].tolist() == [6.0, 0.05]
-
-
-@every_case("word", ["mean", "Total", "Average:", "std", "median", "Summe", "Std. Dev."])
-def test_statistics_below_the_trials_are_left_out_and_told(csv, word):
-    for content in (GOOD + f"{word},0.05,6\n", GOOD + f"{word},0.05,6\nmax,0.07,7\n"):
-        trials = read_labelled(csv(content), "what")
-        assert trials.labels == ("a", "b") * 4
-        assert any(word in note for note in trials.notes)
-
-
-@every_case("lines", [["a mean,0.05,6", "mean (b),0.05,6"], ["Summary,,", "mean,0.05,6", "N,8,8"]])
-@every_case("begin", [1, 4, 9])
-def test_statistics_of_labels_and_their_heading_are_left_out(csv, begin, lines):
-    given = GOOD.strip().splitlines()
-    lines = lines if begin != 4 else lines[:1]
-    trials = read_labelled(csv("\n".join([*given[:begin], *lines, *given[begin:], ""])), "what")
-    assert trials.labels == ("a", "b") * 4
-
-
-def test_a_trial_without_values_or_with_the_remark_max_is_one(csv):
-    given = [f"{line},{'max' if k == 4 else 'x'}" for k, line in enumerate(GOOD.strip().splitlines())]
-    trials = read_labelled(csv("\n".join([*given[:5], "a,,,", "c,,,", "c,,,", *given[5:], ""])), "what")
-    assert trials.labels == ("a", "b", "a", "b", "a", "c", "c", "a", "b", "a", "b")
-
-
-def test_trials_may_be_numbered_by_a_sign_that_begins_comments(csv):
-    lines = [f"#{k},{line}" if k else f"nr,{line}" for k, line in enumerate(GOOD.strip().splitlines())]
-    assert len(read_labelled(csv("\n".join(["# by hand", *lines, ""])), "what")) == 8
-
-
-def test_tables_that_were_joined_with_their_marks_of_encoding_are_one(csv):
-    assert len(read_labelled(csv(f"\ufeff{GOOD}\ufeff{GOOD}"), "what")) == 16
-
-
 def test_a_table_with_a_line_for_each_feature_is_refused(csv):
     lines = [f"{k},{'ab'[k % 2]},{name},{k}.5" for k in range(12) for name in ("peak", "width")]
     with pytest.raises(DataDamaged, match="one line per trial"):
         read_labelled(csv("\n".join(["trial,what,variable,value", *lines, ""])), "what")
-
-
-def test_a_mean_of_each_object_is_known_by_the_column_of_trial_numbers(csv):
-    lines = [f"{k},{what},{k * 0.31 % 1:.3f}" for what in ("can", "jar") for k in range(6)]
-    table = "\n".join(["trial,what,peak", *lines[:6], "mean,can,0.5", *lines[6:], "mean,jar,0.5", ""])
-    assert read_labelled(csv(table), "what").labels == ("can",) * 6 + ("jar",) * 6
-
-
-def test_an_object_may_have_the_name_of_a_statistic(csv):
-    assert set(read_labelled(csv(GOOD.replace("b,", "total,")), "what").labels) == {"a", "total"}
 
 
 def test_a_table_that_is_repeated_gives_the_notes_of_its_lines(csv):
@@ -287,3 +154,82 @@ def test_objects_that_a_column_names_are_held_out_unless_a_column_is_named(csv):
         read_labelled(table(kinds, things, [thing.upper() for thing in things], forces), "what").instances
         is None
     )
+
+
+HEAD, *TRIALS = GOOD.strip().splitlines()
+ANNOTATED = [f"{line},x" for line in TRIALS]
+STATISTICS = ["mean", "Total", "Average:", "std", "median", "Summe", "Std. Dev."]
+OBJECTS = [f"{k},{what},{k * 0.31 % 1:.3f}" for what in ("can", "jar") for k in range(6)]
+
+
+@every_case(
+    ("lines", "labels"),
+    [
+        *(([HEAD, *TRIALS, f"{word},0.05,6"], "abababab") for word in STATISTICS),
+        ([HEAD, *TRIALS, "mean,0.05,6", "max,0.07,7"], "abababab"),
+        # Statistics of labels, with their heading, above, among and below the trials.
+        *(([HEAD, *TRIALS[:k], "a mean,0.05,6", "mean (b),0.05,6", *TRIALS[k:]], "abababab") for k in (0, 8)),
+        ([HEAD, *TRIALS[:3], "a mean,0.05,6", *TRIALS[3:]], "abababab"),
+        *(([HEAD, *TRIALS[:k], "Summary,,", "mean,0.05,6", "N,8,8", *TRIALS[k:]], "abababab") for k in (0, 8)),
+        # A trial without values, or with the remark `max`, is one.
+        ([f"{HEAD},x", *ANNOTATED[:3], f"{TRIALS[3]},max", "a,,,", "c,,,", "c,,,", *ANNOTATED[4:]], "ababaccabab"),
+        # An object may have the name of a statistic.
+        ([HEAD, *(line.replace("b,", "total,") for line in TRIALS)], ("a", "total") * 4),
+        # A mean of each object is known by the column of trial numbers.
+        (["trial,what,peak", *OBJECTS[:6], "mean,can,0.5", *OBJECTS[6:], "mean,jar,0.5"], ("can",) * 6 + ("jar",) * 6),
+        # Trials that are numbered by a sign that begins comments.
+        (["# by hand", f"nr,{HEAD}", *(f"#{k},{line}" for k, line in enumerate(TRIALS))], "abababab"),
+        # Tables that were joined with their marks of encoding.
+        ([f"\ufeff{HEAD}", *TRIALS, f"\ufeff{HEAD}", *TRIALS], "abababababababab"),
+    ],
+)  # fmt: skip
+def test_the_trials_are_read_whatever_is_between_them(csv, lines, labels):
+    assert read_labelled(csv("\n".join([*lines, ""])), "what").labels == tuple(labels)
+
+
+@every_case(
+    ("columns", "rows", "names", "notes"),
+    [
+        # Counters and texts are no features unless they are asked for.
+        ("trial,time,p,comment", [f"{i},{100.5 + i * i},{i % 3},x{i}" for i in range(8)], ("p",),
+         ["trial, time (use columns to include them)", "hardly repeat"]),
+        ("p,same,empty,void", [f"{i % 3},7,," for i in range(8)], ("p", "same"),
+         ["constant, and so without information: same", "no values: empty, void (use columns to include them)"]),
+        # Units that differ within a column are no numbers.
+        ("force,gap", [f"{i * 7 % 5},{i % 4} {'m' if i == 3 else 'mm'}" for i in range(8)], ("force",), ["gap"]),
+        *(("p,f", [f"{gap if i == 3 else i % 3},{i % 2}" for i in range(8)], ("p", "f"), ["of all values are missing"])
+          for gap in ("", "nan", "NaN", "NA", "?", "null", " ")),
+    ],
+)  # fmt: skip
+def test_what_is_no_feature_or_is_missing_is_noted(csv, columns, rows, names, notes):
+    path = csv("\n".join([f"what,{columns}", *(f"{'ab'[i % 2]},{row}" for i, row in enumerate(rows)), ""]))
+    trials = read_labelled(path, "what")
+    assert trials.table.names == names
+    assert all(any(words in note for note in trials.notes) for words in notes)
+    asked = columns.split(",")[:3:2]
+    assert read_labelled(path, "what", features=asked).table.names == tuple(asked)
+
+
+@every_case(
+    "other",
+    [
+        "Tin_can 1",
+        "tin-can 01",
+        "tin  can 1",
+        "tin can \uff11",
+        "tin c\u0430n 1",
+        "\u03a4in can 1",
+        "t\u0131n can 1",
+    ],
+)
+def test_labels_that_differ_in_spelling_only_are_noted(csv, other):
+    """A letter of another alphabet is shown by its code, and a selector of a form is left out."""
+
+    def spelling(changed, label):
+        text = GOOD.replace("\na,", f"\n{label},").replace(f"\n{label},", f"\n{changed},", 1)
+        return [note for note in load_trials(str(csv(text)), label="what").notes if "spelling" in note]
+
+    assert len(spelling(other, "tin can 1")) == 1
+    assert spelling("c\u0430n", "can")[0].endswith("'can' and 'c\\u0430n'")
+    assert not spelling("can\ufe0f", "can")
+    assert not spelling("tin can 1", "tin can 1")

@@ -10,12 +10,10 @@ from repository import ROOT
 
 from graspsense.core.components.channels import from_json
 from graspsense.core.files.toml_text import MOST_NESTED, TomlError, toml_values
-from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.target_value import name_and_unit
 from graspsense.core.settings.layers import Layer, Merged, option_layers, read_layer
 from graspsense.core.values import limits
 from graspsense.core.values.errors import ConfigError, DataDamaged, suggestion
-from graspsense.core.values.features import FeatureTable
 from graspsense.experiments.experiment_file import read_experiment
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.sources.formats.csv_columns import CsvColumns
@@ -69,17 +67,9 @@ def test_what_needs_backtracking_or_is_too_large_is_refused_with_the_reason(tmp_
             regular_expression(pattern)
 
 
-def test_named_groups_are_fields(tmp_path):
-    started = f"grasp jar 7\n{GRASP}grasp can 8\n{GRASP}"
-    text = MANIFEST.replace('label = "jar"\n', r"start = 'grasp (?P<label>\w+) (?P<order>\d+)'")
-    recordings = list(read_recordings(str(manifest(tmp_path, text, started))))
-    assert [(recording.label, recording.order) for recording in recordings] == [("jar", 7.0), ("can", 8.0)]
-
-
 @every_case(
     ("template", "path", "fields"),
     [
-        ("{label}/{label}_{order:d}.csv", "jar/jar_3.csv", {"label": "jar", "order": "3"}),
         ("{label}/{label}_{order:d}.csv", "jar/can_3.csv", None),
         ("{a}_{a}.csv", "x_y_x_y.csv", {"a": "x_y"}),  # the longest first text alone does not fit twice
         ("{label}/**/{label}_{rest}.csv", "jar/a/b/jar_1_2.csv", {"label": "jar", "rest": "1_2"}),
@@ -124,7 +114,6 @@ def test_thousands_of_equal_column_names_are_numbered(tmp_path):
         (limits.LINE_CHARACTERS, "a,b,c\n1,2,333333333333333333333\n1,2,3\n"),
         (limits.COLUMNS, ",".join("abcdefghijklm") + "\n" + ",".join("1234567890123") + "\n"),
         (limits.CELLS, "a,b,c\n" + "1,2,3\n" * 20),
-        (limits.CELLS, "a\n" + "1\n" * 3 + "\n" * 50),
     ],
 )
 def test_a_table_beyond_a_limit_is_damaged_and_the_limit_can_be_raised(
@@ -161,10 +150,8 @@ def test_every_limit_is_documented():
         "label,x\na,1\n".encode("utf-16")[:-1],
         "label,x\na,1\n".encode("utf-32"),
         "label,x\nж,1\n".encode("cp1251"),
-        b'label,x\na,"1\nb,2\n' * 3,
         b'label,x\na,"' + b"1" * 200_000 + b'"\n',
         b"",
-        b"label,x\n",
         b"label,x\na,1e400\nb,2\na,3\nb,4\n",
         b"label," + b"x" * 600 + b"\na,1\n",
     ],
@@ -188,14 +175,6 @@ def test_a_long_text_of_short_lines_is_read(tmp_path, monkeypatch, end):
     path.write_bytes(path.read_bytes() + f"{'1' * 20} 2 3{end}".encode())
     with pytest.raises(DataDamaged, match="line 52"):
         read_text(path)
-
-
-def test_errors_list_a_few_of_many_columns(tmp_path):
-    path = tmp_path / "wide.csv"
-    path.write_text(",".join(f"column{k}" for k in range(5000)) + "\n" + ",".join(["1"] * 5000) + "\n")
-    with pytest.raises(ConfigError, match="and 4976 more") as refused:
-        CsvColumns(path).column("colunm1", "the label")
-    assert len(str(refused.value)) < 1000
 
 
 def test_long_texts_take_linear_time(tmp_path):
@@ -240,23 +219,6 @@ def test_as_many_labels_as_half_of_the_trials_are_refused_by_every_command(tmp_p
         assert limits.CLASSES.variable in done.stderr
 
 
-def test_too_many_labels_and_features_of_trials_of_any_source_are_refused(monkeypatch):
-    def trials(labels, features):
-        names = tuple(f"x{k}" for k in range(features))
-        return Labelled(
-            source="trials",
-            table=FeatureTable(names=names, units=("",) * features, values=np.zeros((labels, features))),
-            labels=tuple(f"c{k}" for k in range(labels)),
-        )
-
-    with pytest.raises(ConfigError, match=limits.CLASSES.variable):
-        trials(20_000, 1)
-    with pytest.raises(ConfigError, match=limits.FEATURES.variable):
-        trials(2, 20_000)
-    monkeypatch.setenv(limits.CLASSES.variable, "300")
-    assert len(trials(300, 1).classes) == 300
-
-
 @every_case(
     "option",
     [
@@ -282,16 +244,12 @@ def test_thousands_of_features_or_checkpoints_and_a_seed_out_of_range_are_wrong_
 @every_case(
     "text",
     [
-        "x = " + "[" * 5000 + "]" * 5000,
         "x = " + "[" * (MOST_NESTED + 1) + "]" * (MOST_NESTED + 1),
         "a." * 100_000 + "a = 1",
-        '"a".' * 60 + "a = 1",
         "[" + "a." * 5000 + "a]",
         "x = " + "{a = " * 3000 + "1" + "}" * 3000,
         "x = 9223372036854775808",
-        "x = [1, -9223372036854775809]",
         "x = 0x" + "f" * 100_000,
-        "x = " + "9" * 5000,
         "x = 1\nx = 2",
         "#" * (limits.SETTINGS_BYTES.default + 1),
     ],
@@ -319,19 +277,19 @@ def test_every_command_refuses_toml_out_of_bounds(tmp_path):
         assert graspsense(*command).returncode == 2
 
 
-def test_toml_within_the_bounds_is_read():
-    nested = "x = " + "[" * (MOST_NESTED - 1) + "1" + "]" * (MOST_NESTED - 1)
-    assert toml_values(nested)
-    assert toml_values("x = 9223372036854775807\ny = -9223372036854775808")["x"] == 2**63 - 1
-    assert toml_values("x = [" + "1.5, " * 1000 + "1.5]")
-    assert toml_values("x = '" + "a." * 1000 + "'")
-
-
 def test_thousands_of_unknown_keys_are_told_in_a_few_lines(tmp_path):
     path = manifest(tmp_path, "".join(f"k{i} = 1\n" for i in range(2_000)))
     with pytest.raises(ConfigError, match="1980 more") as refused:
         read_manifest(path)
     assert len(str(refused.value).splitlines()) < 30
+
+
+def test_the_largest_toml_is_read():
+    nested = "x = " + "[" * (MOST_NESTED - 1) + "1" + "]" * (MOST_NESTED - 1)
+    values = toml_values(
+        f"{nested}\ny = -9223372036854775808\nz = [{'1.5, ' * 1000}1.5]\nw = '{'a.' * 1000}'"
+    )
+    assert values["y"] == -(2**63)
 
 
 @every_case("value", ["0x" + "f" * 9999, "9" * 5000, str(2**63), "[" * 3000, "a." * 3000])
@@ -343,16 +301,12 @@ def test_an_option_out_of_bounds_is_wrong_use(value):
 @every_case(
     "key",
     [
-        'zero = "99999999999999999999999999 samples"',
         f'zero = "{"9" * 5000} samples"',
-        f'zero = "{"9" * 400} s"',
         "rate_hz = 1e308",
         "channels = {" + ", ".join(f'k{i} = "F"' for i in range(501)) + "}",
-        "values = {" + ", ".join(f'k{i} = "F"' for i in range(501)) + "}",
         'folder = "~nobody_of_this_name/x"',
         'folder = "a\\u0000b"',
         'recorded = "1e308"',
-        'order = "1e308"',
     ],
 )
 def test_a_key_of_a_manifest_out_of_bounds_is_answered(tmp_path, key):
@@ -391,27 +345,20 @@ def test_too_many_samples_or_grasps_or_no_force_are_refused_for_the_recording(tm
 @every_case(
     "text",
     [
-        "[data]\ntotal = 9223372036854775808",
         "[data]\ntotal = 9223372036854775807",
-        "[data]\ntrials = 9223372036854775807",
         "[data]\ninstances = 9223372036854775807",
         "[data]\ninstances = 1000\ntrials = 1000000",
         "[[data.groups]]\ntotal = 1000000\n" * 1001,
         "[data.named]\n" + "".join(f'k{i} = "can:full_open"\n' for i in range(2_000)),
         "[data]\ncheckpoints_s = [" + ", ".join(str(k) for k in range(1, 2000)) + "]\n[judge]\nfolds = 1",
         "seeds = 9223372036854775807",
-        "seeds = [9223372036854775807]",
         "[sweep]\n" + "".join(f'"controller.k{i}" = [1, 2, 3, 4, 5, 6, 7, 8]\n' for i in range(40)),
         "".join(f'[[variants]]\nname = "v{i}"\n' for i in range(1001)),
         "pipelines = [" + '"default", ' * 1001 + "]",
         "classifiers = [" + '"tree", ' * 1001 + "]",
         "parts = [" + '"probing_force", ' * 1001 + "]",
         "[judge]\nfolds = 9223372036854775807",
-        "[judge]\ngrasps = 9223372036854775807",
         'classifiers = [{ type = "forest", trees = 9223372036854775807 }]',
-        'classifiers = [{ type = "mlp", hidden = 9223372036854775807 }]',
-        'classifiers = [{ type = "ebm", bins = 9223372036854775807 }]',
-        'classifiers = [{ type = "knn", neighbours = 9223372036854775807 }]',
         'classifiers = [{ type = "c45", rep_folds = 9223372036854775807 }]',
         "[gripper]\npad_cells = 9223372036854775807",
     ],
@@ -462,22 +409,6 @@ def test_an_expression_over_more_cells_than_the_limit_is_refused(monkeypatch):
     assert parse("sum('*')").numbers(columns, 10).shape == (10,)
     with pytest.raises(ExpressionError, match=limits.CELLS.variable):
         parse("sum('*', '*')").numbers(columns, 10)
-
-
-@every_case(
-    ("text", "body", "unit"),
-    [
-        ("Pos [mm]", "Pos", "mm"),
-        ("60 - Pos  [mm] ", "60 - Pos", "mm"),
-        ("force[2]", "force[2]", ""),
-        ("force [2]", "force [2]", ""),
-        ("'a [b]'", "'a [b]'", ""),
-        ("F [m/s]", "F", "m/s"),
-    ],
-)
-def test_the_unit_behind_an_expression(text, body, unit):
-    parsed = parse(text)
-    assert (parsed.text, parsed.unit) == (body, unit)
 
 
 # ARFF

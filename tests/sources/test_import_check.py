@@ -61,14 +61,6 @@ def test_check_on_a_table_tells_each_channel_and_draws_its_squeezes(tmp_path):
 
 
 @pytest.mark.slow
-def test_check_on_a_table_in_words(tmp_path):
-    table(tmp_path / "jar.csv", TABLE)
-    code, out, _ = graspsense("import", tmp_path / "jar.csv", "--check", "--plot", tmp_path / "x.png")
-    assert code == 0
-    assert all(word in out for word in ("RESOLUTION", "AGE, s", "2 in F (N)", "t (ms)' [ms]"))
-
-
-@pytest.mark.slow
 def test_check_on_a_bag_shows_a_topic_that_died(tmp_path):
     pytest.importorskip("rosbags", reason="needs the extra ros")
     from rosbags.rosbag1 import Writer
@@ -80,16 +72,6 @@ def test_check_on_a_bag_shows_a_topic_that_died(tmp_path):
     assert by_name["/hand/gap.data"]["rate_hz"] == pytest.approx(100.0)
     assert by_name["/hand/force.data"]["rate_hz"] == pytest.approx(50.0)
     assert by_name["/hand/force.data"]["age_s"] > 1.5
-
-
-@pytest.mark.slow
-def test_check_of_a_manifest_tells_each_channel(tmp_path):
-    table(tmp_path / "jar_1.csv", {"t": T_S, "pos": GAP_MM, "F": FORCE_N})
-    (tmp_path / "m.toml").write_text(PLAIN)
-    by_name = {channel["name"]: channel for channel in checked(tmp_path / "m.toml")["measured"]}
-    assert by_name["gap"]["resolution"] == pytest.approx(1e-4)
-    assert by_name["gap"]["age_s"] == pytest.approx(1.99)
-    assert by_name["force_left"]["unit"] == "N"
 
 
 def rests_of(folder, *points):

@@ -88,22 +88,6 @@ def test_a_name_that_makes_no_sense_is_told(squeeze, query, says):
         read_squeeze(f"{squeeze}{query}")
 
 
-@every_case(
-    ("line", "says"),
-    [
-        ("5000;1;1;1;x", "line 4: the time goes from .* it must increase"),
-        ("5002;inf;1;1;x", r"line 4: the gap is missing or infinite"),
-        ("5002;wide;1;1;x", r"opening \(gap\) is not a column of numbers: line 4 has 'wide'"),
-        ("5002;1;1;1", "line 4: 4 values, but there are 5 columns"),
-    ],
-)
-def test_a_line_that_is_no_squeeze_is_told_with_its_number(squeeze, line, says):
-    lines = squeeze.read_text().splitlines()
-    squeeze.write_text("\n".join([*lines[:3], line, *lines[4:]]))
-    with pytest.raises(DataDamaged, match=says):
-        read_squeeze(name_of(squeeze))
-
-
 def test_it_is_kept_whole_with_its_label_and_its_features_worked_out_by_hand(squeeze, tmp_path):
     forces = ("--force", "F left", "--force", "F right")
     columns = ("--time", "stamp ms*0.001", "--gap", "opening*0.001", *forces, "--label", "jar:full#3")

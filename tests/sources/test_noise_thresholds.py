@@ -24,69 +24,6 @@ def squeeze(peak_n=8.0, force_noise_n=0.01, gap_noise_m=0.0, step_s=0.001, seed=
     return made_recording(1.0 / step_s, times, gap, *pads.T, **more)
 
 
-def test_defaults_that_fit_are_kept_and_said():
-    chosen = thresholds_for([squeeze(seed=k) for k in range(5)])
-    assert chosen.settings == {}
-    assert "the defaults, which fit the noise" in chosen.words
-
-
-def test_weak_forces_get_a_contact_threshold_above_their_noise_and_below_their_peak():
-    """A hand whose fingers feel 0.5 N at most never touches by the default of 0.625 N."""
-    chosen = thresholds_for([squeeze(peak_n=0.5, seed=k) for k in range(5)])
-    force = chosen.settings["controller.contact_force_n"]
-    assert 4 * 0.01 < force < 0.25
-    assert f"contact_force_n {force:g} N" in chosen.words
-    assert "default 0.625 N" in chosen.words
-
-
-def test_noisy_forces_get_a_contact_threshold_that_noise_does_not_reach():
-    recordings = [squeeze(peak_n=40.0, force_noise_n=0.5, seed=k) for k in range(5)]
-    force = thresholds_for(recordings).settings["controller.contact_force_n"]
-    free = [reading.frame.force_left_n for recording in recordings for reading in recording.readings[:1000]]
-    assert max(free) < force < 20.0
-
-
-@pytest.mark.parametrize(("gap_noise_m", "step_s"), [(2e-5, 0.001), (2e-5, 0.05)], ids=["noise", "slow"])
-def test_rest_is_within_the_noise_and_several_samples(gap_noise_m, step_s):
-    chosen = thresholds_for([squeeze(gap_noise_m=gap_noise_m, step_s=step_s, seed=k) for k in range(5)])
-    speed, window = (chosen.settings[f"controller.{key}"] for key in ("rest_speed_m_s", "rest_window_s"))
-    assert speed * window >= 4 * gap_noise_m
-    assert window >= 5 * step_s
-    # Closing at 0.01 to 0.02 m/s is not rest.
-    assert speed < 0.005
-
-
-def test_the_thresholds_of_rest_are_not_those_of_open_fingers():
-    """A hold of 0.3 s on a coarse gap, a release, and a second of open fingers: a window of that length fits both."""
-    times = np.arange(0.0, 4.5, 0.01)
-    gap = np.interp(times, [0.0, 1.0, 3.0, 3.3, 3.6], [0.07, 0.06, 0.054, 0.054, 0.07])
-    gap = np.round(gap / 5e-5) * 5e-5
-    force = np.interp(times, [1.0, 3.0, 3.3, 3.4], [0.0, 8.0, 8.0, 0.0])
-    recording = made_recording(100.0, times, gap, force, force)
-    assert thresholds_for([recording]).settings["controller.rest_window_s"] <= 0.3
-
-
-def test_recordings_that_begin_close_to_the_object_are_not_too_wide():
-    whole = squeeze()
-    close = evolve(whole, readings=whole.readings[980:])
-    assert thresholds_for([whole]).settings == {}
-    chosen = thresholds_for([whole, close])
-    assert chosen.settings == {"controller.too_wide_m": 0.0}
-    assert "1 of 2 recordings touch within 1 mm of their beginning" in chosen.words
-
-
-def test_a_force_that_grows_from_the_first_sample_is_not_taken_for_noise():
-    """Recordings that begin in contact: the first third of a slow squeeze up to 25 N reaches 1.6 N."""
-    whole = [squeeze(peak_n=25.0, seed=k) for k in range(5)]
-    squeezed = [evolve(recording, readings=recording.readings[1000:]) for recording in whole]
-    assert "controller.contact_force_n" not in thresholds_for(squeezed).settings
-
-
-def test_forces_that_are_no_more_than_noise_are_doubted():
-    chosen = thresholds_for([squeeze(peak_n=0.0, force_noise_n=1.0, seed=k) for k in range(3)])
-    assert "check the unit and the zero" in chosen.words
-
-
 def reframed(recording, change, **more):
     """Return the recording with other fields in its frames: those that `change` makes of each frame."""
     readings = tuple(
@@ -145,12 +82,6 @@ def test_thresholds_follow_from_recordings_in_any_unit(factors, units):
             assert settings["too_wide_m"] < 0.0
 
 
-def test_a_data_set_that_counts_frames_keeps_the_defaults():
-    """Its metres and newtons are nominal, and were chosen for these thresholds."""
-    frames = [in_units(squeeze(peak_n=0.5, step_s=0.1), {"t": "frame"}, time=10.0)]
-    assert thresholds_for(frames).settings == {}
-
-
 def coarse(recording, step_m):
     return reframed(recording, lambda frame: {"gap_m": round(frame.gap_m / step_m) * step_m})
 
@@ -203,20 +134,6 @@ def test_a_window_that_is_given_decides_the_speed():
     assert settings["controller.rest_speed_m_s"] == pytest.approx(1e-4 / 0.3, rel=0.1)
 
 
-@pytest.mark.parametrize("step_s", [0.1, 0.05])
-def test_the_contact_force_at_a_low_rate_is_not_that_of_a_steep_rise(step_s):
-    for peak_n in (8.0, 0.5):
-        recordings = [squeeze(peak_n=peak_n, step_s=step_s, seed=k) for k in range(5)]
-        force = thresholds_for(recordings).settings.get("controller.contact_force_n", 0.625)
-        assert 0.03 < force <= 0.2 * peak_n
-
-
-def test_an_object_of_two_millimetres_is_not_nothing():
-    chosen = thresholds_for([reframed(squeeze(), lambda frame: {"gap_m": frame.gap_m - 0.0535})])
-    assert chosen.settings["controller.closed_gap_m"] < 0.0015
-    assert "closed_gap_m" in chosen.words
-
-
 def test_slow_recordings_whose_gap_is_still_at_rest_keep_the_thresholds_of_rest():
     """Coarse steps while the fingers move are not noise: with these thresholds rest is where the gap stays."""
     slow = [squeeze(step_s=0.05, seed=k) for k in range(5)]
@@ -226,18 +143,6 @@ def test_slow_recordings_whose_gap_is_still_at_rest_keep_the_thresholds_of_rest(
             times, gap = series(recording, "t_s", "gap_m")
             since, _ = first_rest(times, gap, np.ones(len(times), dtype=bool), REST_SPEED_M_S, REST_WINDOW_S)
             assert times[since] == pytest.approx(1.5, abs=0.051)
-
-
-def test_the_contact_force_stays_where_three_of_four_recordings_reach_it():
-    strong, weak = [squeeze(peak_n=1.0, seed=k) for k in range(4)], [squeeze(peak_n=0.4, seed=9)]
-    assert thresholds_for([*strong, *weak]).settings == {}
-    assert "controller.contact_force_n" in thresholds_for([*strong[:2], *weak]).settings
-
-
-def test_a_time_out_that_is_shorter_than_a_recording_is_extended():
-    chosen = thresholds_for([squeeze()], {"move_timeout_s": 10.0, "steady_timeout_s": 1.5})
-    assert chosen.settings == {"controller.steady_timeout_s": 2.0}
-    assert "steady_timeout_s 2 s (recordings last up to 2 s)" in chosen.words
 
 
 def test_recordings_that_begin_in_contact_with_different_forces_are_in_contact_from_the_beginning():
@@ -256,39 +161,101 @@ def test_recordings_that_begin_in_contact_with_different_forces_are_in_contact_f
     assert "from the beginning" in thresholds.words
 
 
+FORCE, REST_SPEED, REST_WINDOW = (
+    f"controller.{key}" for key in ("contact_force_n", "rest_speed_m_s", "rest_window_s")
+)
+WHOLE = squeeze()
+CLOSE = evolve(WHOLE, readings=WHOLE.readings[980:])
+STRONG, WEAK = [squeeze(peak_n=1.0, seed=k) for k in range(4)], [squeeze(peak_n=0.4, seed=9)]
+
+
+def several(count=5, begin=0, **given):
+    return [
+        evolve(made, readings=made.readings[begin:])
+        for made in (squeeze(seed=k, **given) for k in range(count))
+    ]
+
+
 @every_case(
-    ("rest_mm", "rest_n", "goes_on"),
+    ("recordings", "settings", "words"),
     [
-        (64.0, 3.6, True),
-        (64.0, 7.5, False),
-        (63.0, 3.6, True),
-        (61.7, 3.6, False),
-        (61.6, 7.9, False),
-        (61.6, 0.1, True),  # the force is gone, and the fingers have not opened
+        (several(), {}, "the defaults, which fit the noise"),
+        # A hand whose fingers feel 0.5 N at most never touches by the default: above the noise, and below the peak.
+        (several(peak_n=0.5), {FORCE: (0.04, 0.25)}, "default 0.625 N"),
+        # Above what the noise of 0.5 N reaches in 10 000 samples.
+        (several(peak_n=40.0, force_noise_n=0.5), {FORCE: (1.8, 20.0)}, "contact_force_n"),
+        # At a low rate it is not that of a steep rise.
+        *((several(peak_n=0.5, step_s=step_s), {FORCE: (0.03, 0.1)}, "") for step_s in (0.1, 0.05)),
+        # A slow squeeze that begins in contact: its first third reaches 1.6 N of 25 N, which is no noise.
+        (several(peak_n=25.0, begin=1000), {FORCE: None}, ""),
+        # Three of four recordings reach the default.
+        ([*STRONG, *WEAK], {}, ""),
+        ([*STRONG[:2], *WEAK], {FORCE: (0.0, 0.4)}, ""),
+        (several(3, peak_n=0.0, force_noise_n=1.0), {}, "check the unit and the zero"),
+        # Metres and newtons of a data set that counts frames are nominal, and were chosen for the defaults.
+        ([in_units(squeeze(peak_n=0.5, step_s=0.1), {"t": "frame"}, time=10.0)], {}, ""),
+        ([WHOLE, CLOSE], {"controller.too_wide_m": (0.0, 0.0)}, "1 of 2 recordings touch within 1 mm"),
+        # An object of two millimetres is not nothing.
+        (
+            [reframed(WHOLE, lambda frame: {"gap_m": frame.gap_m - 0.0535})],
+            {"controller.closed_gap_m": (-1.0, 0.0015)},
+            "closed_gap_m",
+        ),
+        # The window is several samples; closing at 0.01 to 0.02 m/s is not rest.
+        (several(gap_noise_m=2e-5), {REST_SPEED: (0.0, 0.005), REST_WINDOW: (0.005, 1.0)}, ""),
+        (several(gap_noise_m=2e-5, step_s=0.05), {REST_SPEED: (0.0, 0.005), REST_WINDOW: (0.25, 1.0)}, ""),
+    ],
+)
+def test_thresholds_are_those_of_the_recordings(recordings, settings, words):
+    chosen = thresholds_for(recordings)
+    assert words in chosen.words
+    assert settings or not chosen.settings or "check" in words
+    for key, limits in settings.items():
+        assert (
+            key not in chosen.settings if limits is None else limits[0] <= chosen.settings[key] <= limits[1]
+        )
+    if REST_SPEED in settings:
+        assert chosen.settings[REST_SPEED] * chosen.settings[REST_WINDOW] >= 4 * 2e-5
+
+
+def test_a_time_out_that_is_shorter_than_a_recording_is_extended():
+    chosen = thresholds_for([WHOLE], {"move_timeout_s": 10.0, "steady_timeout_s": 1.5})
+    assert chosen.settings == {"controller.steady_timeout_s": 2.0}
+    assert "recordings last up to 2 s" in chosen.words
+
+
+def test_the_thresholds_of_rest_are_not_those_of_open_fingers():
+    """A hold of 0.3 s on a coarse gap, a release, and a second of open fingers: a window of that length fits both."""
+    times = np.arange(0.0, 4.5, 0.01)
+    gap = np.interp(times, [0.0, 1.0, 3.0, 3.3, 3.6], [0.07, 0.06, 0.054, 0.054, 0.07])
+    force = np.interp(times, [1.0, 3.0, 3.3, 3.4], [0.0, 8.0, 8.0, 0.0])
+    recording = coarse(made_recording(100.0, times, gap, force, force), 5e-5)
+    assert thresholds_for([recording]).settings[REST_WINDOW] <= 0.3
+
+
+SQUEEZED = slow_squeeze(hold_s=1.0)
+STUCK = coarse(SQUEEZED, 0.032)
+# The gap closes by 12 mm, and by 0.1 mm of them after the contact.
+RIGID = reframed(SQUEEZED, lambda frame: {"gap_m": frame.gap_m - (23 / 24) * min(frame.gap_m - 0.064, 0.0)})
+
+
+@every_case(
+    ("recording", "rest_mm", "rest_n", "goes_on"),
+    [
+        # The squeeze closes from 64 to 61.6 mm with up to 8 N, or stays at 64 mm.
+        (STUCK, 64.0, 3.6, True),
+        (STUCK, 64.0, 7.5, False),
+        (SQUEEZED, 63.0, 3.6, True),
+        (SQUEEZED, 61.7, 3.6, False),
+        (SQUEEZED, 61.6, 7.9, False),
+        (SQUEEZED, 61.6, 0.1, True),  # the force is gone, and the fingers have not opened
+        (RIGID, 63.9, 5.0, True),
+        (RIGID, 63.9, 7.5, False),
     ],
 )
 def test_a_rest_before_most_of_the_force_is_doubted_also_where_the_gap_shows_no_travel(
-    rest_mm, rest_n, goes_on
+    recording, rest_mm, rest_n, goes_on
 ):
-    """The squeeze closes from 64 to 61.6 mm with up to 8 N, or stays at 64 mm if the rest is there."""
-    squeezed = slow_squeeze(hold_s=1.0)
-    if rest_mm == 64.0:
-        squeezed = coarse(squeezed, 0.032)
-    names, units = ("p_first", "p_steady", "f_steady"), ("m", "m", "N")
-    features = Features(names=names, values=(0.064, rest_mm / 1e3, rest_n), units=units)
-    assert presses_on(features, squeezed) is goes_on
-
-
-@every_case(("rest_n", "goes_on"), [(5.0, True), (7.5, False)])
-def test_a_rest_of_a_rigid_object_before_much_of_its_force_is_doubted(rest_n, goes_on):
-    """The gap closes by 12 mm, and by 0.1 mm of them after the contact; the force goes on to 8 N."""
-    squeezed = slow_squeeze(hold_s=1.0)
-    frames = [reading.frame for reading in squeezed.readings]
-    stiff = iter(
-        [frame.gap_m if frame.gap_m >= 0.064 else 0.064 - (0.064 - frame.gap_m) / 24.0 for frame in frames]
-    )
-    rigid = reframed(squeezed, lambda frame: {"gap_m": next(stiff)})
-    names, units = ("p_first", "p_steady", "f_steady"), ("m", "m", "N")
-    narrowest = min(reading.frame.gap_m for reading in rigid.readings)
-    features = Features(names=names, values=(0.064, narrowest, rest_n), units=units)
-    assert presses_on(features, rigid) is goes_on
+    values = (0.064, rest_mm / 1e3, rest_n)
+    features = Features(names=("p_first", "p_steady", "f_steady"), values=values, units=("m", "m", "N"))
+    assert presses_on(features, recording) is goes_on

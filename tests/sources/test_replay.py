@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import re
 from collections.abc import Sequence
@@ -25,7 +24,7 @@ from graspsense.core.settings.layers import Flag
 from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError, DataDamaged, DeviceLost, RecordingEnded
-from graspsense.core.values.signals import EFFORT, NO_PADS, VELOCITY, Command, Frame, Phase
+from graspsense.core.values.signals import EFFORT, VELOCITY, Command, Frame, Phase
 from graspsense.core.values.trace import PAD_COLUMNS, TICK_COLUMNS
 from graspsense.sources.recordings.icub import IcubGrasp, read_grasp, read_recording, relative_readings
 from graspsense.sources.recordings.replay import ReplayBackend, ReplayConfig
@@ -72,30 +71,6 @@ def frames_of(path: Path) -> list[Frame]:
     return [reading.frame for reading in relative_readings(read_grasp(path))]
 
 
-def test_reader_keeps_what_the_file_says(tmp_path: Path) -> None:
-    grasp = read_grasp(write(tmp_path / "g.txt", frame_lines(), frame_lines(moved(j12=8.0), {LITTLE: 7})))
-    assert len(grasp) == 2
-    assert grasp.encoders_deg[1].tolist() == [20.0, 80.0, 10.0, 40.0, 30.0, 58.0, 32.0, 45.0, 5.0]
-    assert grasp.maxima[1].tolist() == [15, 15, 15, 15, 22]
-    assert grasp.taxels.shape == (2, 5, 12)
-    assert grasp.taxels[1, LITTLE, 3] == 233
-    assert grasp.taxels.sum() == 2 * 60 * 240 - 7
-
-
-def test_times_are_frame_numbers_and_what_was_not_recorded_is_missing(tmp_path: Path) -> None:
-    path = write(tmp_path / "g.txt", *[frame_lines()] * 3)
-    readings = list(relative_readings(read_grasp(path)))
-    assert [(reading.frame.t_s, reading.frame.dt_s) for reading in readings] == [(0, 1), (1, 1), (2, 1)]
-    frame = readings[0].frame
-    assert all(math.isnan(v) for v in (frame.effort_n, frame.edge_left_n, frame.edge_right_n))
-    assert readings[0].pads == NO_PADS
-    _, info = opened(path)
-    assert info.units["t"] == "frame"
-    said = " ".join(info.notes)
-    assert "times are frame numbers, not seconds" in said
-    assert "nominal" in said
-
-
 def test_thumb_is_left_and_the_strongest_finger_is_right(tmp_path: Path) -> None:
     path = write(
         tmp_path / "g.txt",
@@ -103,20 +78,22 @@ def test_thumb_is_left_and_the_strongest_finger_is_right(tmp_path: Path) -> None
         frame_lines(pressed={THUMB: 25, MIDDLE: 30, INDEX: 9}),
         frame_lines(pressed={THUMB: 25, MIDDLE: 70, RING: 12}),
     )
-    frames = frames_of(path)
+    recording = read_recording(str(path))
+    frames = [reading.frame for reading in recording.readings]
     assert [frame.force_left_n for frame in frames] == pytest.approx([0.0, 2.0, 2.0])
     assert [frame.force_right_n for frame in frames] == pytest.approx([0.0, 0.9, 4.0])
+    # Each of the five fingers is kept beside the two forces.
+    assert [channel.name for channel in recording.channels] == list(recording.readings[-1].signals._fields)
+    assert list(recording.readings[-1].signals) == pytest.approx([2.0, 0.0, 4.0, 1.2, 0.0])
 
 
 @every_case(
     ("joints", "closed_mm"),
     [
-        ({"j9": 8.0}, 2.0),  # half the mean of two joints of the thumb
-        ({"j10": 8.0}, 2.0),
-        ({"j11": 8.0}, 1.0),  # half the mean of four joints of index and middle finger
-        ({"j12": 8.0}, 1.0),
-        ({"j13": 8.0}, 1.0),
-        ({"j14": 8.0}, 1.0),
+        *(({joint: 8.0}, 2.0) for joint in ("j9", "j10")),  # half the mean of two joints of the thumb
+        *(
+            ({joint: 8.0}, 1.0) for joint in ("j11", "j12", "j13", "j14")
+        ),  # of four of index and middle finger
         ({"j9": 1.0, "j10": 1.0, "j11": 1.0, "j12": 1.0, "j13": 1.0, "j14": 1.0}, 1.0),
         ({"j7": 8.0, "j8": 8.0, "j15": 8.0}, 0.0),
         ({"j10": -4.0}, -1.0),
@@ -130,17 +107,6 @@ def test_gap_falls_as_thumb_and_fingers_flex(
     assert (opened.gap_m - last.gap_m) * 1e3 == pytest.approx(closed_mm)
     assert last.velocity_m_s == pytest.approx(last.gap_m - opened.gap_m)
     assert opened.velocity_m_s == 0.0
-
-
-def test_each_of_the_five_fingers_is_kept_beside_the_two_forces(tmp_path: Path) -> None:
-    pressed = frame_lines(pressed={0: 20, 1: 5, 3: 50})
-    recording = read_recording(str(write(tmp_path / "g.txt", frame_lines(), pressed)))
-
-    last = recording.readings[-1]
-
-    assert [channel.name for channel in recording.channels] == list(last.signals._fields)
-    assert list(last.signals) == pytest.approx([2.0, 0.5, 0.0, 5.0, 0.0])
-    assert (last.frame.force_left_n, last.frame.force_right_n) == pytest.approx((2.0, 5.0))
 
 
 @given(data=st.data())
@@ -267,6 +233,12 @@ def test_backend_gives_each_frame_once_and_then_ends(tmp_path: Path) -> None:
         with pytest.raises(RecordingEnded):
             backend.read(timeout_s=0.0)
     assert backend.report()["frames_read"] == 3
+    for _ in range(2):
+        backend.close()
+    with pytest.raises(DeviceLost, match="not open"):
+        backend.read(timeout_s=0.0)
+    backend.open(seed=1)
+    assert repr(backend.read(timeout_s=0.0)) == repr(readings[0])
 
 
 def test_backend_tells_a_force_that_is_the_same_all_along(tmp_path: Path) -> None:
@@ -280,17 +252,6 @@ def test_backend_tells_a_force_that_is_the_same_all_along(tmp_path: Path) -> Non
     info = ReplayBackend(ReplayConfig(f"manifest:{tmp_path}/m.toml#1")).open(seed=0)
     assert [note for note in info.notes if "the left pad does not change" in note]
     assert not [note for note in info.notes if "the right pad does not change" in note]
-
-
-def test_backend_closes_twice_and_plays_again(tmp_path: Path) -> None:
-    backend, _ = opened(write(tmp_path / "g.txt", frame_lines()))
-    frame = backend.read(timeout_s=0.0)
-    backend.close()
-    backend.close()
-    with pytest.raises(DeviceLost, match="not open"):
-        backend.read(timeout_s=0.0)
-    backend.open(seed=1)
-    assert repr(backend.read(timeout_s=0.0)) == repr(frame)
 
 
 @real_data

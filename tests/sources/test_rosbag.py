@@ -204,37 +204,6 @@ def test_bag_is_the_grasp_that_was_written(case: str, grasp: Any, tmp_path: Path
     )
 
 
-def test_bag_replays_to_the_features_of_the_grasp(grasp: Any, tmp_path: Path) -> None:
-    path = tmp_path / "grasp.bag"
-    write(path, grasp, ros=1, source="/joint_states", kind=PRESSURE_NOW)
-    options = ["gripper.type=replay", f'gripper.recording="rosbag:{path}"', "classifier.type=none",
-               "features.rest_speed_m_s=2e-4"]  # fmt: skip
-    replayed = load_pipeline(options=options).grasp()
-    assert replayed.outcome == grasp.outcome
-    p_first, p_steady, f_steady = grasp.features.values[:3]
-    assert replayed.features.values[0] == pytest.approx(
-        p_first, abs=3e-4
-    )  # 10 ms at 10 mm/s, and an image later
-    assert replayed.features.values[1] == pytest.approx(p_steady, abs=1e-4)
-    assert replayed.features.values[2] == pytest.approx(f_steady, abs=0.1)
-
-
-def test_loads_beyond_the_sign_bit_do_not_wrap(tmp_path: Path) -> None:
-    bag = Bag(tmp_path / "a.bag", 1)
-    for i in range(12):
-        load = 0 if i < 6 else 100 * i
-        # Cell 0 tells one image from the next, as noise does on the robot.
-        cells = [ZERO + (load if cell >= 7 else i if cell == 0 else 0) for cell in range(22)]
-        pressure(bag, BEGAN_S + 0.041 * i, cells, cells, PRESSURE_NOW)
-        controller_state(bag, BEGAN_S + 0.041 * i, effort_n=-20.0)
-    bag.close()
-    frames = [reading.frame for reading in read_bag(str(tmp_path / "a.bag")).readings]
-    assert [f.force_left_n for f in frames] == pytest.approx(
-        [0.0] * 6 + [15 * 100 * i / 1600 for i in range(6, 12)]
-    )
-    assert {f.effort_n for f in frames} == {20.0}
-
-
 def motion(bag: Bag, t_s: float, gap_m: float = 0.05, side: str = "r") -> None:
     bag.add("/pr2_gripper_controller/state", STATE_2009, t_s, joint_commanded_effort=0.0, joint_applied_effort=0.0,
             joint_name=f"{side}_gripper_joint", joint_position=gap_m, joint_velocity=0.0)  # fmt: skip

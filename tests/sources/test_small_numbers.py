@@ -35,16 +35,6 @@ def test_a_classifier_recognises_what_differs_by_less_than_micrometres(classifie
     assert evaluation.headline.rate >= 0.9
 
 
-def test_c45_recognises_what_differs_by_a_small_share_of_itself():
-    evaluation = evaluate(
-        select_component("classifier", "c45"),
-        measured(1e-12, 1.0),
-        classifier="c45",
-        folds=4,
-        controls=False,
-        learning_curve=False,
-    )
-    assert evaluation.headline.rate >= 0.9
 
 
 def test_a_column_that_differs_by_rounding_alone_is_no_feature(tmp_path):

@@ -2,7 +2,6 @@
 
 import json
 from collections import Counter
-from types import SimpleNamespace
 
 import pytest
 from attrs import evolve
@@ -252,14 +251,6 @@ def test_an_object_from_a_file_can_have_any_label(tmp_path):
 
     assert done.returncode == 0, done.stderr
     assert held(tmp_path / "t") == [("sponge:dry", str(scene), True)]
-
-
-def test_a_gripper_that_cannot_be_told_takes_the_word_of_the_operator():
-    from graspsense.cli.collect import _label_selects_object
-
-    choice = SimpleNamespace(create=lambda: Scripted(squeezing, bottle))
-    asked = SimpleNamespace(gripper=choice, values=resolve("default").values)
-    assert not _label_selects_object(asked, ["jar:full"], object_is_named=False)
 
 
 @pytest.mark.slow

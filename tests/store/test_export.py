@@ -11,7 +11,7 @@ import pytest
 import scipy
 from attrs import evolve
 from cases import every_case
-from commands import graspsense, printed
+from commands import graspsense
 from kept import ended, frame, keep, pads, write_recording
 
 from graspsense.core.settings.selected import select_component
@@ -58,37 +58,18 @@ def rows_of(path):
         return list(csv.DictReader(file))
 
 
-def test_the_table_as_csv(folder, tmp_path):
-    export(folder, tmp_path / "t.csv")
+def test_the_table_is_read_by_programs_that_do_not_know_us(folder, tmp_path):
+    for ending in ("csv", "npz"):
+        export(folder, tmp_path / f"t.{ending}")
     rows = rows_of(tmp_path / "t.csv")
     assert [row["trial"] for row in rows] == ["1", "2", "3", "5"]
     assert float(rows[1]["p_first [m]"]) == 0.1 + 0.2
     assert (rows[1]["f_steady [N]"], rows[2]["label"], rows[3]["outcome"]) == ("", "", "aborted")
-
-
-def test_an_exported_csv_comes_back_as_the_trials_of_the_store(folder, tmp_path):
-    export(folder, tmp_path / "t.csv")
-    trials, stored = read_labelled(tmp_path / "t.csv", "label"), labelled_store(str(folder))
-
-    assert trials.table.names == stored.table.names
-    assert trials.table.units == stored.table.units
-    assert trials.table.values.tobytes() == stored.table.values.tobytes()
-    assert (trials.labels, trials.instances, trials.order) == (stored.labels, stored.instances, (0, 1))
-    assert trials.provenance["simulated"] == stored.provenance["simulated"]
-
-
-def test_an_empty_column_of_an_export_is_not_a_feature(tmp_path):
-    with Store.open(tmp_path / "trials") as store:
-        for k in range(4):
-            keep(store, ("can:full", "can:empty")[k % 2], None, values=(0.05 + 0.01 * (k % 2), None))
-    export(tmp_path / "trials", tmp_path / "t.csv")
-    trials = read_labelled(tmp_path / "t.csv", "label")
-
-    assert trials.table.names == ("p_first", "f_steady")
-    assert trials.instances is None
-
-
-def test_the_table_as_arff_is_read_by_scipy(folder, tmp_path):
+    with np.load(tmp_path / "t.npz", allow_pickle=False) as arrays:
+        assert arrays["features"].tolist() == ["p_first", "f_steady"]
+        assert arrays["units"].tolist() == ["m", "N"]
+        assert arrays["values"][0].tolist() == [0.066, 5.5]
+        assert arrays["label"].tolist() == ["can:full_open", "can:it's open", "", "can:full_open"]
     with Store.open(folder) as store:
         set_aside(store, [3], "no label")
     export(folder, tmp_path / "t.arff")
@@ -99,13 +80,44 @@ def test_the_table_as_arff_is_read_by_scipy(folder, tmp_path):
     assert data["label"][0] == b"can:full_open"
 
 
-def test_the_table_as_npz(folder, tmp_path):
-    export(folder, tmp_path / "t.npz")
-    with np.load(tmp_path / "t.npz", allow_pickle=False) as arrays:
-        assert arrays["features"].tolist() == ["p_first", "f_steady"]
-        assert arrays["units"].tolist() == ["m", "N"]
-        assert arrays["values"][:2].tolist()[0] == [0.066, 5.5]
-        assert arrays["label"].tolist() == ["can:full_open", "can:it's open", "", "can:full_open"]
+def test_parquet_is_read_by_pyarrow(folder, tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet", reason="needs the extra parquet")
+    export(folder, tmp_path / "t.parquet")
+    table = parquet.read_table(tmp_path / "t.parquet")
+    assert table["f_steady"].to_pylist() == [5.5, None, 1.0, None]
+    assert table.schema.field("p_first").metadata == {b"unit": b"m"}
+    export(f"{folder}#1", tmp_path / "one.parquet")
+    assert parquet.read_table(tmp_path / "one.parquet")["gap_m"].to_pylist()[5] == frame(5).gap_m
+    assert parquet.read_table(tmp_path / "one-pads.parquet").num_rows == 3
+
+
+@every_case("ending", ["csv", "npz", "parquet"])
+def test_the_table_of_a_store_is_no_grasp_to_import(stored, tmp_path, ending):
+    if ending == "parquet":
+        pytest.importorskip("pyarrow.parquet", reason="needs the extra parquet")
+    table = tmp_path / f"t.{ending}"
+    export(stored, table)
+    code, _, err = graspsense("import", table, "--save", tmp_path / "other")
+    assert code == 2
+    assert f"graspsense export DIR#12 --to FILE.{ending}" in err
+    learned = graspsense("train", table, "--label", "label", "--out", tmp_path / "model.json")
+    assert (learned.returncode, "name the store as store:DIR" in learned.stderr) == (
+        (0, False) if ending == "csv" else (2, True)
+    )
+
+
+def test_labelled_trials_of_a_store_are_a_data_set(folder):
+    trials = labelled_store(str(folder))
+    assert trials.table.names == ("p_first", "f_steady")
+    assert (trials.labels, trials.instances) == (("can:full_open", "can:it's open"), ("can#1", "can#2"))
+    assert trials.order == (0, 1)
+    assert trials.first_line is None  # that is of imports alone
+    assert str(trials.table.values.tolist()) == str([[0.066, 5.5], [0.1 + 0.2, math.nan]])
+    assert trials.before_contact.table.values.tolist() == [[0.08], [0.08]]
+    assert trials.width.table.names == ("p_first",)
+    assert trials.provenance["simulated"]
+    assert any("simulated" in note for note in trials.notes)
+    assert trials.provenance["settings"]["controller"]["probing_force_n"] == 20.0
 
 
 def test_one_grasp_tick_by_tick(folder, tmp_path):
@@ -146,33 +158,6 @@ def test_without_pyarrow_parquet_says_what_to_install(folder, tmp_path, monkeypa
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(PluginUnavailable, match=r"graspsense\[parquet\]"):
         write_parquet(tmp_path / "t.parquet", trial_table(folder))
-
-
-def test_parquet_is_read_by_pyarrow(folder, tmp_path):
-    parquet = pytest.importorskip("pyarrow.parquet", reason="needs the extra parquet")
-    export(folder, tmp_path / "t.parquet")
-    table = parquet.read_table(tmp_path / "t.parquet")
-    assert table["f_steady"].to_pylist() == [5.5, None, 1.0, None]
-    assert table.schema.field("p_first").metadata == {b"unit": b"m"}
-    export(f"{folder}#1", tmp_path / "one.parquet")
-    assert parquet.read_table(tmp_path / "one.parquet")["gap_m"].to_pylist()[5] == frame(5).gap_m
-    assert parquet.read_table(tmp_path / "one-pads.parquet").num_rows == 3
-
-
-def test_labelled_trials_of_a_store_are_a_data_set(folder):
-    trials = labelled_store(str(folder))
-    assert trials.labels == ("can:full_open", "can:it's open")
-    assert trials.instances == ("can#1", "can#2")
-    assert trials.order == (0, 1)
-    assert trials.first_line is None  # that is of imports alone
-    assert trials.table.names == ("p_first", "f_steady")
-    assert trials.table.values[0].tolist() == [0.066, 5.5]
-    assert math.isnan(trials.table.values[1, 1])
-    assert trials.before_contact.table.values.tolist() == [[0.08], [0.08]]
-    assert trials.width.table.names == ("p_first",)
-    assert trials.provenance["simulated"]
-    assert any("simulated" in note for note in trials.notes)
-    assert trials.provenance["settings"]["controller"]["probing_force_n"] == 20.0
 
 
 def test_a_store_without_labels_says_how_to_get_some(tmp_path):
@@ -228,36 +213,6 @@ def test_an_export_of_an_earlier_version_still_opens(folder, tmp_path):
     assert trials.table.names == ("p_first", "f_steady")
     assert (trials.labels, trials.order) == (("can:full_open", "can:it's open"), (0, 1))
     assert trials.before_contact is None
-
-
-@every_case("ending", ["csv", "npz", "parquet"])
-def test_the_table_of_a_store_is_no_grasp_to_import(stored, tmp_path, ending):
-    if ending == "parquet":
-        pytest.importorskip("pyarrow.parquet", reason="needs the extra parquet")
-    export(stored, tmp_path / f"t.{ending}")
-    code, _, err = graspsense("import", tmp_path / f"t.{ending}", "--save", tmp_path / "other")
-    assert code == 2
-    assert f"t.{ending} is the table of a store, with one row for each grasp" in err
-    assert f"graspsense export DIR#12 --to FILE.{ending}" in err
-
-
-def test_the_table_of_a_store_is_learned_from_as_the_message_says(folder, tmp_path):
-    export(folder, tmp_path / "t.csv")
-    refused = graspsense("import", tmp_path / "t.csv", "--save", tmp_path / "other")
-    command = refused.stderr.partition("graspsense train ")[2].partition(". ")[0]
-    model = tmp_path / "model.json"
-    words = {"FILE.csv": str(tmp_path / "t.csv"), "MODEL.json": str(model)}
-    printed("train", *(words.get(word, word) for word in command.split()))
-    assert model.exists()
-
-
-def test_a_table_of_arrays_is_refused_as_trials(folder, tmp_path):
-    table = tmp_path / "t.npz"
-    export(folder, table)
-    for command, *more in (("train", "--out", tmp_path / "m.json"), ("evaluate",)):
-        done = graspsense(command, table, *more)
-        assert done.returncode == 2
-        assert "write the table as FILE.csv. If it is of a store, name the store as store:DIR" in done.stderr
 
 
 @pytest.mark.parametrize("ending", ["npz", "PARQUET"])

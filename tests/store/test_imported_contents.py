@@ -27,11 +27,3 @@ def test_a_content_that_the_store_has_is_refused_until_its_trial_is_set_aside(tm
         ImportedContents(store).refuse("0" * 64, "other.csv")
         set_aside(store, [number], "wrong columns")
         ImportedContents(store).refuse(sha256, "again.csv")
-
-
-def test_what_the_same_command_imported_is_known(tmp_path):
-    with Store.open(tmp_path / "trials") as store:
-        contents = ImportedContents(store)
-        contents.add("a" * 64, 1)
-        with pytest.raises(ConfigError, match="trial 1"):
-            contents.refuse("a" * 64, "again.csv")

@@ -7,6 +7,7 @@ import signal
 import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 
 import pytest
 from attrs import evolve
@@ -116,7 +117,7 @@ def test_trials_that_are_set_aside_are_not_used_until_they_are_brought_back(stor
 @every_case(
     ("command", "says"),
     [
-        (("aside", 1, 9, "--why", "x"), "has no trial 9: its trials are 1 to 2"),
+        (("aside", 1, 9, "--why", "x"), "has no trial 9: its trials are 1 to 3"),
         (("aside", 1, 2, "--why", "x"), "trial 2 is set aside already: earlier"),
         (("restore", 2, 1), "trial 1 is not set aside"),
         (("relabel", 2, 1, "--label", "toy"), "trial 1 has the label toy already"),
@@ -124,12 +125,18 @@ def test_trials_that_are_set_aside_are_not_used_until_they_are_brought_back(stor
         (("relabel", 1), "give either --label CLASS:STATE or --as-recorded"),
         (("aside", 1, "--why", " "), "--why is empty"),
         (("aside", "1", "--why", "x"), "write DIR#NUMBER"),
+        (("aside", "typo#1", "--why", "x"), "there is no store in"),
+        (
+            ("relabel", 3, "--label", "block"),
+            "trial 3 was simulated with can:full_open, so it cannot be a block",
+        ),
     ],
 )
 def test_a_change_that_is_wrong_for_one_trial_changes_none(tmp_path, command, says):
     with Store.open(tmp_path / "my trials") as store:
         keep(store, "toy", device=REAL)
         keep(store, "block", device=REAL)
+        keep(store, "can:empty_open")  # simulated with can:full_open
         changes.set_aside(store, [2], "earlier")
         state = (labels(store), changes.history(store))
 
@@ -138,23 +145,6 @@ def test_a_change_that_is_wrong_for_one_trial_changes_none(tmp_path, command, sa
         assert code == 2
         assert says in err
         assert (labels(store), changes.history(store)) == state
-
-
-def test_a_simulated_trial_keeps_the_label_of_its_object(store):
-    keep(store, "can:empty_open")  # simulated with can:full_open
-
-    code, _, err = changed(store, "relabel", 1, "--label", "block")
-    assert code == 2
-    assert "trial 1 was simulated with can:full_open, so it cannot be a block" in err
-    assert changed(store, "relabel", 1, "--label", "can:full_open").returncode == 0
-
-
-def test_commands_on_a_folder_without_a_store_create_none(tmp_path):
-    code, _, err = graspsense("trials", "aside", f"{tmp_path / 'typo'}#1", "--why", "x")
-
-    assert code == 2
-    assert "there is no store in" in err
-    assert list(tmp_path.iterdir()) == []
 
 
 KILLED = """
@@ -199,55 +189,42 @@ def test_a_process_that_is_killed_within_a_change_leaves_the_store_as_it_was(sto
     assert [label for _, label, _ in labels(store)] == ["block", "toy"]
 
 
-@pytest.mark.parametrize(
-    ("statement", "says"),
-    [
-        ("DELETE FROM change", "its label is not the one of its history (toy)"),
-        ("UPDATE change SET \"after\" = 'ball'", "its label is not the one of its history (ball)"),
+def test_verify_finds_a_label_or_a_state_that_no_change_explains(store):
+    keep(store, "toy", device=REAL)
+    changes.relabel(store, [1], labels_of("block"), "")
+    for statement, says in (
         (
             "UPDATE trial SET set_aside = 'x'",
             "its history does not say that it was set aside or brought back",
         ),
-    ],
-)
-def test_verify_finds_a_label_or_a_state_that_no_change_explains(store, statement, says):
-    keep(store, "toy", device=REAL)
-    changes.relabel(store, [1], labels_of("block"), "")
-    store._connection.execute(statement)
-
-    assert verify_store(store.folder).problems == (f"trial 1: {says}",)
-
-
-def test_a_row_that_somebody_else_changed_is_not_made_valid_by_a_new_label(store):
-    keep(store, "toy", device=REAL)
+        ("UPDATE trial SET set_aside = NULL", None),
+        ("UPDATE change SET \"after\" = 'ball'", "its label is not the one of its history (ball)"),
+        ("DELETE FROM change", "its label is not the one of its history (toy)"),
+    ):
+        store._connection.execute(statement)
+        assert verify_store(store.folder).problems == ((f"trial 1: {says}",) if says else ())
+    # A row that somebody else changed is not made valid by a new label.
     store._connection.execute("UPDATE trial SET outcome = 'slipped'")
-
     with pytest.raises(DataDamaged, match=r"my trials .*trial 1 "):
-        changes.relabel(store, [1], labels_of("block"), "")
+        changes.relabel(store, [1], labels_of("ball"), "")
 
 
-def test_a_store_of_the_first_version_keeps_what_was_set_aside_in_it(tmp_path):
-    with Store.open(tmp_path / "old") as store:
+def test_a_store_of_the_first_version_keeps_what_was_set_aside_in_it(store):
+    for _ in range(2):
         keep(store)
-        keep(store)
-    connection = sqlite3.connect(tmp_path / "old" / "store.sqlite")
-    connection.executescript(
-        "DROP TABLE change; UPDATE trial SET set_aside = 'undone by the operator' WHERE id = 1; PRAGMA user_version = 1"
-    )
-    connection.close()
-
-    with Store.read(tmp_path / "old") as store:
-        (change,) = changes.history(store)
-        assert (change.trial, change.words, change.why) == (1, "set aside", "undone by the operator")
-        assert [summary.id for summary in store.page()] == [2]
-    assert verify_store(tmp_path / "old").problems == ()
-
-
-def test_a_store_in_which_everything_is_set_aside_says_so(store, tmp_path):
-    keep(store)
-    changes.set_aside(store, [1], "x")
-
-    with pytest.raises(ConfigError, match=r"my trials .*\(1 "):
+    store.close()
+    with closing(sqlite3.connect(store.folder / "store.sqlite")) as connection:
+        connection.executescript(
+            "DROP TABLE change; UPDATE trial SET set_aside = 'undone' WHERE id = 1; PRAGMA user_version = 1"
+        )
+    with Store.read(store.folder) as old:
+        (change,) = changes.history(old)
+        assert (change.trial, change.words, change.why) == (1, "set aside", "undone")
+        assert [summary.id for summary in old.page()] == [2]
+        changes.set_aside(store := Store.open(old.folder), [2], "x")
+        store.close()
+    assert verify_store(store.folder).problems == ()
+    with pytest.raises(ConfigError, match=r"my trials .*\(2 "):
         trial_table(store.folder)
 
 
