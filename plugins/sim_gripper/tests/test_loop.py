@@ -80,11 +80,6 @@ def test_every_object_and_law_gives_one_trace_plain_and_compiled(number, control
         assert_same(run.trace, fast[seed].trace)
 
 
-def test_as_many_seeds_as_scenes():
-    with pytest.raises(ValueError, match="2 scenes and 1 seeds"):
-        run_many(SimConfig(), HYBRID, ["block", "toy"], [1])
-
-
 # ------------------------------------------------------------------------- a law that cannot be compiled
 
 

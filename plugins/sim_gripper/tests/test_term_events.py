@@ -235,6 +235,7 @@ def test_a_force_that_is_not_finite_ends_the_grasp_with_the_name_of_the_term(stu
     assert f"term 'stuff' gave the force {value} at a compression of 2" in done.reason
     assert len(done.trace.t_s) > 100
     assert 4.0 < done.state.peak_n < 6.0
+    assert done.end() is done.end()  # computed once: its buffers are used again
 
 
 def test_a_single_grasp_names_the_term_too(stuff):
