@@ -587,7 +587,7 @@ def press(params, state, reading):
     begun_s = reading.frame.t_s if state.begun_s < 0.0 else state.begun_s
     outcome = STEADY if reading.frame.t_s - begun_s > 0.5 else RUNNING
     command = Command(EFFORT, 1.0 * params.effort_n, math.inf, math.inf)
-    return command, state._replace(outcome=outcome, begun_s=begun_s)
+    return command, PressState(APPROACH, outcome, begun_s)
 
 
 class PressState(NamedTuple):
