@@ -28,6 +28,17 @@ OPTIONS: list[dict[str, Any]] = [
 ]
 
 
+def schema_of(n_columns, n_classes):
+    return Schema(tuple(Attribute(f"x{i}") for i in range(n_columns)), tuple(range(n_classes)))
+
+
+def same_tree(table, options):
+    """Return the tree of a table, which is the same of both engines."""
+    plain, fast = (fit(table, Options(**options), engine=engine) for engine in ("plain", "fast"))
+    assert plain == fast, options
+    return plain
+
+
 def grasps(seed, n, decimals, weights):
     rng = np.random.default_rng(seed)
     n_classes = int(rng.integers(2, 12))
@@ -36,14 +47,8 @@ def grasps(seed, n, decimals, weights):
     values = centres[labels] + rng.uniform(0.5, 4) * rng.normal(0, 1, (n, 5))
     if decimals is not None:
         values = np.round(values, decimals)
-    given = {
-        "one": None,
-        "whole": rng.integers(0, 4, n).astype(float),
-        "any": rng.random(n) * 3,
-    }[weights]
-    return make_table(
-        Schema(tuple(Attribute(f"x{i}") for i in range(5)), tuple(range(n_classes))), values, labels, given
-    )
+    given = {"one": None, "whole": rng.integers(0, 4, n).astype(float), "any": rng.random(n) * 3}
+    return make_table(schema_of(5, n_classes), values, labels, given[weights])
 
 
 @pytest.mark.slow
@@ -53,12 +58,10 @@ def test_same_tree_and_predictions(weights, decimals):
     sizes = []
     for seed, options in enumerate(OPTIONS):
         table = grasps(seed, [40, 300, 1_500][seed % 3], decimals, weights)
-        plain_tree = fit(table, Options(**options), engine="plain")
-        fast_tree = fit(table, Options(**options), engine="fast")
-        assert plain_tree == fast_tree, options
-        predicted = [class_indices(plain_tree, table.values, engine) for engine in ("plain", "fast")]
-        assert predicted[0].tolist() == predicted[1].tolist()
-        sizes.append(plain_tree.node_count)
+        tree = same_tree(table, options)
+        predicted = [class_indices(tree, table.values, engine).tolist() for engine in ("plain", "fast")]
+        assert predicted[0] == predicted[1]
+        sizes.append(tree.node_count)
     assert max(sizes) > 50
 
 
@@ -67,9 +70,9 @@ def test_same_tree_where_branches_are_raised_and_pruned_again():
     raised = 0
     for seed in range(8):
         table = grasps(seed, 2_000, 1, "one")
-        trees = [fit(table, Options(min_objects=1), engine=engine) for engine in ("plain", "fast")]
-        assert trees[0] == trees[1]
-        raised += trees[0] != fit(table, Options(min_objects=1, subtree_raising=False), engine="fast")
+        raised += same_tree(table, {"min_objects": 1}) != fit(
+            table, Options(min_objects=1, subtree_raising=False), engine="fast"
+        )
     assert raised > 3
 
 
@@ -79,8 +82,7 @@ def test_same_tree_for_weights_of_any_size(factor):
     table = grasps(3, 60, 1, "any")
     weighted = make_table(table.schema, table.values, table.labels, table.weights * factor)
     for options in ({}, {"min_objects": 1}, {"criterion": "info_gain", "pruning": "reduced_error"}):
-        trees = [fit(weighted, Options(**options), engine=engine) for engine in ("plain", "fast")]
-        assert trees[0] == trees[1], options
+        same_tree(weighted, options)
 
 
 def nominal_and_missing(seed, missing):
@@ -98,29 +100,25 @@ def nominal_and_missing(seed, missing):
 def test_same_tree_for_nominal_and_missing_values(missing):
     for seed, options in enumerate([*OPTIONS, {"binary_splits": True}]):
         table = nominal_and_missing(seed, missing)
-        trees = [fit(table, Options(**options), engine=engine) for engine in ("plain", "fast")]
-        assert trees[0] == trees[1], options
+        tree = same_tree(table, options)
         if "pruning" not in options:
-            leaves = trees[0].class_weights[trees[0].splits.feature < 0]
+            leaves = tree.class_weights[tree.splits.feature < 0]
             assert leaves.sum() == pytest.approx(table.weights.sum(), rel=1e-9)
 
 
-def oracle_tables():
-    return sorted((Path(__file__).parent / "weka" / "data").glob("*.csv"))
+ORACLE_TABLES = sorted((Path(__file__).parent / "weka" / "data").glob("*.csv"))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", oracle_tables(), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", ORACLE_TABLES, ids=lambda path: path.stem)
 def test_same_tree_on_the_awkward_sets(path):
     lines = [line.split(",") for line in path.read_text().splitlines()[1:] if line.startswith("train")]
     values = np.array([[float(cell.replace("?", "nan")) for cell in row[1:-2]] for row in lines])
     labels = np.array([int(row[-2]) for row in lines])
     weights = np.array([float(row[-1] or 1) for row in lines])
-    schema = Schema(tuple(Attribute(f"x{i}") for i in range(values.shape[1])), tuple(range(labels.max() + 1)))
-    table = make_table(schema, values, labels, weights)
+    table = make_table(schema_of(values.shape[1], labels.max() + 1), values, labels, weights)
     for options in OPTIONS:
-        trees = [fit(table, Options(**options), engine=engine) for engine in ("plain", "fast")]
-        assert trees[0] == trees[1], options
+        same_tree(table, options)
 
 
 def test_auto_compiles_only_what_pays():

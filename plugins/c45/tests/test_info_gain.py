@@ -38,9 +38,7 @@ def best_cut(pairs, n_classes, min_objects, mdl):
             continue
         number += 1
         left, right = ([k for _, k in part] for part in (pairs[:i], pairs[i:]))
-        gain = (
-            whole - i / n * entropy(count(left, n_classes)) - (n - i) / n * entropy(count(right, n_classes))
-        )
+        gain = whole - sum(len(side) / n * entropy(count(side, n_classes)) for side in (left, right))
         if gain > best + EPSILON:
             best, place = gain, i
     if place is None:
@@ -58,9 +56,8 @@ def grow(rows, every, options, n_classes):
         return node
     best, chosen = 0.0, None
     for a in range(len(every[0])):
-        cut = best_cut(
-            [(x[a], k) for x, k in rows], n_classes, int(options.min_objects), options.mdl_correction
-        )
+        pairs = [(x[a], k) for x, k in rows]
+        cut = best_cut(pairs, n_classes, int(options.min_objects), options.mdl_correction)
         if cut is not None and cut[0] > best + EPSILON:
             best, chosen = cut[0], (a, cut[1])
     if chosen is None:
@@ -68,11 +65,8 @@ def grow(rows, every, options, n_classes):
     a, middle = chosen
     threshold = max(x[a] for x in every if x[a] <= middle)
     sides = [[r for r in rows if (r[0][a] <= threshold) == left] for left in (True, False)]
-    return node | {
-        "feature": a,
-        "threshold": threshold,
-        "children": [grow(side, every, options, n_classes) for side in sides],
-    }
+    children = [grow(side, every, options, n_classes) for side in sides]
+    return node | {"feature": a, "threshold": threshold, "children": children}
 
 
 def prune(node, held):
@@ -96,11 +90,8 @@ def prune(node, held):
 def shape(node):
     kept = {"class_weights": [int(c) for c in node["class_weights"]]}
     if "feature" in node:
-        kept |= {
-            "feature": node["feature"],
-            "threshold": node["threshold"],
-            "children": [shape(child) for child in node["children"]],
-        }
+        kept |= {key: node[key] for key in ("feature", "threshold")}
+        kept["children"] = [shape(child) for child in node["children"]]
     return kept
 
 

@@ -46,19 +46,16 @@ def test_estimates_are_quinlans():
 
 def test_estimates_at_the_ends():
     confidence = prepare_confidence(0.25)
-    assert estimated_errors(0.0, 0.0, confidence) == 0.0
-    assert estimated_errors(3.0, 3.0, confidence) == 3.0
+    assert [estimated_errors(n, n, confidence) for n in (0.0, 3.0)] == [0.0, 3.0]
     assert estimated_errors(3.0, 1.0, prepare_confidence(0.6)) == 1.0
     for weight in np.linspace(1.0, 50.0, 500).tolist():
         assert weight * 0.3 <= estimated_errors(weight, weight * 0.3, confidence) <= weight + 1e-12
 
 
 def test_least_side_weight_is_a_tenth_of_the_mean_class_within_bounds():
-    assert criteria.min_side_weight(100.0, 4, 2.0) == pytest.approx(2.5)
-    assert criteria.min_side_weight(100.0, 11, 2.0) == 2.0
-    assert criteria.min_side_weight(5_000.0, 4, 2.0) == 25.0
     # Quinlan's bound of 25 gives way to a larger minimum.
-    assert criteria.min_side_weight(5_000.0, 4, 200.0) == 200.0
+    cases = ((100.0, 4, 2.0), (100.0, 11, 2.0), (5_000.0, 4, 2.0), (5_000.0, 4, 200.0))
+    assert [criteria.min_side_weight(*case) for case in cases] == pytest.approx([2.5, 2.0, 25.0, 200.0])
 
 
 def best_place(numerators, limits):
@@ -84,9 +81,7 @@ def test_best_cut_is_the_first_of_those_within_the_tolerance():
         n, n_classes = int(rng.integers(2, 30)), int(rng.integers(1, 5))
         values, labels = sorted(rng.integers(0, 12, n).tolist()), rng.integers(0, n_classes, n).tolist()
         rows, weights = rng.permutation(n).tolist(), [1] * n
-        limits = Limits(
-            True, int(rng.integers(1, 4)), int(rng.integers(0, 2**40)), int(rng.integers(0, 2**40))
-        )
+        limits = Limits(True, int(rng.integers(1, 4)), *map(int, rng.integers(0, 2**40, 2)))
         by_class = [[w * (labels[row] == k) for k in range(n_classes)] for row, w in enumerate(weights)]
         numerators = {}
         for i in range(n - 1):

@@ -79,9 +79,9 @@ def test_rules_keep_the_tightest_bounds_only():
     x = np.arange(40.0)[:, None]
     labels = ((x[:, 0] >= 10) & (x[:, 0] < 20)) * 1 + ((x[:, 0] >= 20) & (x[:, 0] < 30)) * 2
     rules = to_rules(fit(make_table(Schema((Attribute("x"),), ("a", "b", "c")), x, labels)))
-    assert {rule.conditions for rule in rules if rule.label == "b"} == {("x > 9", "x <= 19")} or {
-        frozenset(rule.conditions) for rule in rules if rule.label == "b"
-    } == {frozenset(("x > 9", "x <= 19"))}
+    assert {frozenset(rule.conditions) for rule in rules if rule.label == "b"} == {
+        frozenset(("x > 9", "x <= 19"))
+    }
     assert all(len(rule.conditions) <= 2 for rule in rules)
 
 
@@ -91,9 +91,8 @@ def test_dot_has_every_node_and_edge_and_quotes():
     assert len(re.findall(r"^  n\d+ \[", dot, re.MULTILINE)) == tree.node_count
     assert len(re.findall(r"->", dot)) == tree.node_count - 1
     assert '[label="<= 0.542 s"]' in dot
-    quoted = fit(
-        make_table(Schema((Attribute('a "b"'),), ('"', "\\")), [[0.0]] * 3 + [[1.0]] * 3, [0] * 3 + [1] * 3)
-    )
+    schema = Schema((Attribute('a "b"'),), ('"', "\\"))
+    quoted = fit(make_table(schema, [[0.0]] * 3 + [[1.0]] * 3, [0] * 3 + [1] * 3))
     assert '[label="a \\"b\\""]' in to_dot(quoted)
 
 
@@ -125,7 +124,6 @@ def test_json_is_exact_and_says_its_version():
     document = to_document(tree)
     assert (document["format"], document["version"]) == ("graspsense-c45-tree", 1)
     assert from_json(to_json(tree)) == tree
-    assert from_json(to_json(tree)).to_dict() == tree.to_dict()
 
 
 @every_case(
@@ -152,34 +150,25 @@ def test_damaged_nodes_are_refused(key):
         document["nodes"][key][0] = wrong
         with pytest.raises(StoredTreeError):
             from_json(json.dumps(document))
-    with pytest.raises(StoredTreeError, match="not JSON"):
-        from_json(to_json(grasp_tree())[:-3])
 
 
-def test_children_that_point_upwards_are_refused():
-    document = to_document(grasp_tree())
-    document["nodes"]["n_children"] = [0, 2, 0, 3, 0, 0]
-    with pytest.raises(StoredTreeError, match="do not form a tree"):
-        from_json(json.dumps(document))
+UPWARDS = to_document(grasp_tree())
+UPWARDS["nodes"]["n_children"] = [0, 2, 0, 3, 0, 0]
+
+
+@every_case(
+    ("text", "words"), [(to_json(grasp_tree())[:-3], "not JSON"), (json.dumps(UPWARDS), "do not form a tree")]
+)
+def test_text_that_is_no_tree_is_refused(text, words):
+    with pytest.raises(StoredTreeError, match=words):
+        from_json(text)
 
 
 def test_numbers_as_weka_prints_them():
-    assert [weka_number(x) for x in (1.0, -0.25, 1e-9, 80282423097.21323, 2.5e15)] == [
-        "1",
-        "-0.25",
-        "0",
-        "80282423097.21323",
-        "2500000000000000",
-    ]
-    assert [weka_weight(x) for x in (13.0, 2.125, 0.004, 12345678.0)] == [
-        "13.0",
-        "2.13",
-        "0.0",
-        "1.2345678E7",
-    ]
+    numbers = (1.0, -0.25, 1e-9, 80282423097.21323, 2.5e15)
+    assert [*map(weka_number, numbers)] == ["1", "-0.25", "0", "80282423097.21323", "2500000000000000"]
+    assert [*map(weka_weight, (13.0, 2.125, 0.004, 12345678.0))] == ["13.0", "2.13", "0.0", "1.2345678E7"]
 
 
 def test_short_numbers():
-    assert short(0.61234) == "0.612"
-    assert short(0.54200001, 0.542) == "0.54200001"
-    assert short(2.0, 2.0) == "2"
+    assert [short(0.61234), short(0.54200001, 0.542), short(2.0, 2.0)] == ["0.612", "0.54200001", "2"]

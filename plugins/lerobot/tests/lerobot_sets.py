@@ -90,13 +90,7 @@ def info(version, states, names, changed):
     }
 
 
-def write_set(
-    folder,
-    version,
-    states=None,
-    names=NAMES,
-    **changed,
-):
+def write_set(folder, version, states=None, names=NAMES, **changed):
     """Write a data set of these episodes, whose tasks alternate; `changed` are keys of `meta/info.json`."""
     states = [episode(), episode(2, peak=3.0), episode(peak=5.0)] if states is None else states
     tasks = ["pick the red cup", "squeeze: sponge"]

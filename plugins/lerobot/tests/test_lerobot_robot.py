@@ -63,11 +63,8 @@ def test_conformance(check):
 def test_a_grasp_commands_the_gripper_alone_and_leaves_it_free():
     options = ["gripper.type=lerobot", "gripper.robot=fake_arm", "gripper.load=Present_Load"]
     options += ["controller.type=send-and-watch", "features.type=chitta-without-pads", "classifier.type=none"]
-    options += [
-        "controller.closing_speed_m_s=0.015",
-        "controller.probing_force_n=12",
-        "controller.rest_window_s=0.3",
-    ]
+    options += ["controller.closing_speed_m_s=0.015", "controller.probing_force_n=12"]
+    options += ["controller.rest_window_s=0.3"]
     trial = load_pipeline("default", options=options).grasp()
     (arm,) = FakeArm.made
 
@@ -80,26 +77,25 @@ def test_a_grasp_commands_the_gripper_alone_and_leaves_it_free():
     assert not arm.connected
 
 
-def greatest_force_n(command, ticks, **keys):
-    """Return the greatest force (N) of a gripper with these settings that is commanded for so many ticks."""
+def commanded(command, ticks, **keys):
+    """Yield the arm of a gripper with these settings, and its force (N), in each tick of a command and when closed."""
     driver = gripper(**keys)
     driver.open(1)
     (arm,) = FakeArm.made
-    forces = []
     for _ in range(ticks):
         driver.read(0.1)
         driver.apply(command)
-        forces.append(arm.force_n)
+        yield arm, arm.force_n
     driver.close()
-    return max(forces)
+    yield arm, 0.0
+
+
+def greatest_force_n(command, ticks, **keys):
+    return max(force_n for _, force_n in commanded(command, ticks, **keys))
 
 
 @pytest.mark.parametrize("load", ["none", "Present_Load"])
-@pytest.mark.parametrize(
-    ("kind", "value"),
-    [(POSITION, 0.0), (VELOCITY, -0.05), (FORCE, 6.0)],
-    ids=["position", "velocity", "force"],
-)
+@pytest.mark.parametrize(("kind", "value"), [(POSITION, 0.0), (VELOCITY, -0.05), (FORCE, 6.0)])
 def test_no_command_squeezes_harder_than_its_limit(kind, value, load):
     assert 4.0 < greatest_force_n(Command(kind, value, 6.0, 0.05), 120, load=load) <= 6.01
 
@@ -111,14 +107,9 @@ def test_a_stronger_servo_than_declared_is_held_back_by_the_measured_load():
 
 
 def test_close_stops_the_fingers_where_they_are():
-    driver = gripper()
-    driver.open(1)
+    squeezed_m = [arm.gap_m - arm.target_m for arm, _ in commanded(Command(POSITION, 0.0, 10.0, 0.05), 60)]
     (arm,) = FakeArm.made
-    for _ in range(60):
-        driver.read(0.1)
-        driver.apply(Command(POSITION, 0.0, 10.0, 0.05))
-    assert arm.target_m < arm.gap_m
-    driver.close()
+    assert squeezed_m[-2] > 0.0
     assert arm.target_m == pytest.approx(arm.gap_m, abs=1e-6)
     assert not arm.connected
 

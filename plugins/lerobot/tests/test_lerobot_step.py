@@ -9,6 +9,7 @@ from pathlib import Path
 import lerobot_stand_in  # noqa: F401
 import numpy as np
 import pytest
+from cases import every_case
 from commands import printed
 
 from graspsense import Phase
@@ -29,9 +30,8 @@ def grasp(width_m=0.05, stiffness_n_m=4000.0, most_n=17.0, speed_m_s=0.02):
     path += list(np.arange(closed_m, 0.07, speed_m_s / FPS)) + [0.07] * 5
     for gap_m in path:
         force_n = stiffness_n_m * max(width_m - gap_m, 0.0)
-        cells = {}
-        for finger, cell, axis in product("01", "01", "xyz"):
-            cells[f"f{finger}.p{cell}.f{axis}"] = force_n / 2 * (axis == "z")
+        names = product("01", "01", "xyz")
+        cells = {f"f{finger}.p{cell}.f{axis}": force_n / 2 * (axis == "z") for finger, cell, axis in names}
         observations.append({"shoulder.pos": 1.0, "gripper.pos": gap_m / 0.0008, **cells})
     return observations
 
@@ -53,26 +53,33 @@ def test_the_step_tells_contact_rest_and_end_of_each_grasp():
     assert events(seen) == ["contact", "rest", "end"] * 2
     touch = next(k for k, told in enumerate(seen) if told["graspsense.event"] == 1)
     assert observations[touch]["gripper.pos"] * 0.0008 == pytest.approx(0.05, abs=1e-3)
-    assert {int(told["graspsense.phase"]) for told in seen} == {
-        Phase.APPROACH,
-        Phase.SQUEEZE,
-        Phase.HOLD,
-        Phase.RELEASE,
-    }
+    phases = {Phase.APPROACH, Phase.SQUEEZE, Phase.HOLD, Phase.RELEASE}
+    assert {int(told["graspsense.phase"]) for told in seen} == phases
     assert all({*told} == {*given, *ADDED} for told, given in zip(seen, observations, strict=True))
     assert all(told["graspsense.prediction"] == 0 for told in seen)
 
 
-def test_a_model_predicts_at_the_end_of_the_grasp(tmp_path, monkeypatch):
+@pytest.fixture
+def end_of_grasp(tmp_path, monkeypatch):
+    """Return a function that trains a tree; it gives the step with it, and what this tells at the end of a grasp."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", ["graspsense"])
+
+    def told(observations, *training):
+        printed("train", *training, "--classifier", "tree", "--out", "model.json")
+        step = processor_step()("default", ["classifier.type=tree", "classifier.model=model.json"], READING)
+        seen = processed(step, observations)
+        (end,) = [told for told in seen if told["graspsense.event"] == EVENTS.index("end")]
+        return step, end
+
+    return told
+
+
+def test_a_model_predicts_at_the_end_of_the_grasp(end_of_grasp):
     samples = Path(__file__).parents[3] / "samples" / "trials"
-    printed("train", f"store:{samples}", "--classifier", "tree", "--out", "model.json")
-    options = ["classifier.type=tree", "classifier.model=model.json"]
-    step = processor_step()("default", options, READING)
     # As wide, stiff and slow as the cans of the training: what is unlike them would be unknown.
     can = grasp(width_m=0.0659, stiffness_n_m=2800.0, most_n=6.5, speed_m_s=0.01)
-    (end,) = [told for told in processed(step, can) if told["graspsense.event"] == EVENTS.index("end")]
+    step, end = end_of_grasp(can, f"store:{samples}")
 
     assert step.grasp.classes == ("can:empty_open", "can:full_open")
     assert end["graspsense.prediction"] in (1, 2)
@@ -80,16 +87,11 @@ def test_a_model_predicts_at_the_end_of_the_grasp(tmp_path, monkeypatch):
     assert all(math.isnan(end[f"graspsense.certainty{bound}"]) for bound in ("", "_low", "_high"))
 
 
-def test_a_certainty_that_was_measured_comes_with_its_interval(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "argv", ["graspsense"])
+def test_a_certainty_that_was_measured_comes_with_its_interval(end_of_grasp):
     widths = [("jar", 50.0 + 0.1 * k) if k % 2 else ("can", 66.0 + 0.1 * k) for k in range(-20, 20)]
-    Path("widths.csv").write_text(
-        "\n".join(["what,p_first [m]", *(f"{what},{mm / 1e3:g}" for what, mm in widths)])
-    )
-    printed("train", "widths.csv", "--label", "what", "--classifier", "tree", "--out", "model.json")
-    step = processor_step()("default", ["classifier.type=tree", "classifier.model=model.json"], READING)
-    (end,) = [told for told in processed(step, grasp()) if told["graspsense.event"] == EVENTS.index("end")]
+    rows = [f"{what},{mm / 1e3:g}" for what, mm in widths]
+    Path("widths.csv").write_text("\n".join(["what,p_first [m]", *rows]))
+    step, end = end_of_grasp(grasp(), "widths.csv", "--label", "what")
 
     assert step.grasp.classes[int(end["graspsense.prediction"]) - 1] == "jar"
     low, certainty, high = (end[f"graspsense.certainty{bound}"] for bound in ("_low", "", "_high"))
@@ -122,7 +124,7 @@ def test_the_step_declares_what_it_adds_and_can_be_stored():
     assert processor_step()(**kept).get_config() == kept
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("reading", "word"),
     [("", "metres"), ("gap=claw", "claw"), ("gap_m_per_unit=0.0008&force=nothing", "nothing")],
 )

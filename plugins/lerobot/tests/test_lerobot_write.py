@@ -1,17 +1,20 @@
 """A store written as a LeRobot data set v3.0: what others read of it, and that it is the same trials when read back."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from commands import graspsense, printed
-from lerobot_sets import episode, write_set
+from lerobot_sets import NAMES, episode, write_set
 
 from graspsense.store.store import Store
 from graspsense_lerobot.reader import recordings
 
+DATA, EPISODES = "data/chunk-000/file-000.parquet", "meta/episodes/chunk-000/file-000.parquet"
 SAMPLES = Path(__file__).parents[3] / "samples" / "trials"
 
 
@@ -19,29 +22,30 @@ SAMPLES = Path(__file__).parents[3] / "samples" / "trials"
 def written(tmp_path_factory):
     """Return the data set of a store of imported trials, and the store."""
     folder = tmp_path_factory.mktemp("lerobot")
-    write_set(folder / "set", 3)
-    printed(
-        "import",
-        f"lerobot:{folder / 'set'}?gap_m_per_unit=0.001&force_n_per_unit=0.5",
-        "--save",
-        folder / "s",
-    )
+    place = f"lerobot:{write_set(folder / 'set', 3)}?gap_m_per_unit=0.001&force_n_per_unit=0.5"
+    printed("import", place, "--save", folder / "s")
     printed("export", folder / "s", "--to", f"lerobot:{folder / 'out'}?fps=15")
     return folder / "out", folder / "s"
 
 
 def table_of(path):
-    import pandas as pd
-
-    return pd.read_parquet(path)
+    return pq.read_table(path).to_pandas()
 
 
 def frames(folder):
-    return table_of(folder / "data/chunk-000/file-000.parquet")
+    return table_of(folder / DATA)
+
+
+def json_of(path):
+    return json.loads(path.read_text())
 
 
 def info(folder):
-    return json.loads((folder / "meta/info.json").read_text())
+    return json_of(folder / "meta/info.json")
+
+
+def peak_n(recording):
+    return max(reading.frame.force_left_n for reading in recording.recording.readings)
 
 
 def test_the_description_agrees_with_the_frames(written):
@@ -61,7 +65,7 @@ def test_the_indices_are_those_that_lerobot_needs(written):
     rows = frames(written[0])
     assert rows["index"].tolist() == list(range(len(rows)))
     assert rows["timestamp"].dtype == np.float32
-    episodes = table_of(written[0] / "meta/episodes/chunk-000/file-000.parquet")
+    episodes = table_of(written[0] / EPISODES)
     for row in episodes.itertuples():
         own = rows[rows["episode_index"] == row.episode_index]
         assert (row.dataset_from_index, row.dataset_to_index) == (own["index"].min(), own["index"].max() + 1)
@@ -77,26 +81,25 @@ def test_the_tasks_are_the_index_of_their_table(written):
 
 
 def test_statistics_are_those_of_the_frames(written):
-    stats = json.loads((written[0] / "meta/stats.json").read_text())
+    stats = json_of(written[0] / "meta/stats.json")["observation.state"]
     state = np.stack(frames(written[0])["observation.state"])
-    assert stats["observation.state"]["max"] == pytest.approx(state.max(axis=0).tolist())
-    assert stats["observation.state"]["std"] == pytest.approx(state.std(axis=0).tolist(), rel=1e-4, abs=1e-6)
-    assert stats["observation.state"]["count"] == [len(state)]
+    assert stats["max"] == pytest.approx(state.max(axis=0).tolist())
+    assert stats["std"] == pytest.approx(state.std(axis=0).tolist(), rel=1e-4, abs=1e-6)
+    assert stats["count"] == [len(state)]
 
 
 def test_phase_event_and_prediction_have_a_meaning(written):
-    means, rows = json.loads((written[0] / "meta/graspsense.json").read_text()), frames(written[0])
+    means, rows = json_of(written[0] / "meta/graspsense.json"), frames(written[0])
     own = rows[rows["episode_index"] == 0]
     contact = next(number for number, name in means["graspsense.event"].items() if name == "contact")
     (touch,) = np.flatnonzero(own["graspsense.event"] == int(contact))
     phases = [means["graspsense.phase"][str(number)] for number in own["graspsense.phase"]]
-    assert phases[touch - 2] == "approach"
-    assert phases[touch + 1] == "squeeze"
+    assert (phases[touch - 2], phases[touch + 1]) == ("approach", "squeeze")
     assert means["graspsense.prediction"][str(own["graspsense.prediction"].iloc[-1])]
 
 
 def test_what_was_felt_and_the_features_are_columns_of_the_episodes(written):
-    episodes = table_of(written[0] / "meta/episodes/chunk-000/file-000.parquet")
+    episodes = table_of(written[0] / EPISODES)
     assert episodes["graspsense/felt"].all()
     assert not episodes["graspsense/crushed"].any()
     with Store.read(written[1]) as store:
@@ -115,37 +118,24 @@ def test_the_raw_rate_is_kept_beside(written):
 
 def test_what_was_written_reads_back_as_the_same_trials(written):
     squeezes = list(recordings(str(written[0])))
-    assert [recording.label for recording in squeezes] == [
-        "pick_the_red_cup",
-        "squeeze-_sponge",
-        "squeeze-_sponge",
-        "pick_the_red_cup",
-    ]
-    with Store.read(written[1]) as store:
-        assert len(squeezes) == len(store.page(limit=10))
+    cup, sponge = "pick_the_red_cup", "squeeze-_sponge"
+    assert [recording.label for recording in squeezes] == [cup, sponge, sponge, cup]
     for recording, peak in zip(squeezes, [12.0, 9.0, 9.75, 15.0], strict=True):
         assert not recording.recording.units  # metres and newtons, as the metadata says
-        assert max(reading.frame.force_left_n for reading in recording.recording.readings) == pytest.approx(
-            peak, rel=1e-5
-        )
+        assert peak_n(recording) == pytest.approx(peak, rel=1e-5)
         assert {channel.name for channel in recording.recording.channels} >= {"f0", "f1"}
 
 
 @pytest.mark.slow
 def test_simulated_trials_are_written(tmp_path):
     printed("export", SAMPLES, "--to", f"lerobot:{tmp_path / 'out'}")
-    rows, said = frames(tmp_path / "out"), info(tmp_path / "out")
-    names = said["features"]["observation.state"]["names"]
+    state = np.stack(frames(tmp_path / "out")["observation.state"])
+    names = info(tmp_path / "out")["features"]["observation.state"]["names"]
     assert {"gripper.pos", "left.force", "right.force"} <= set(names)
-    assert np.isfinite(np.stack(rows["observation.state"])).all()
-    efforts = [
-        reading.frame.effort_n
-        for recording in recordings(str(tmp_path / "out"))
-        for reading in recording.recording.readings
-    ]
-    assert max(efforts) == pytest.approx(
-        float(np.stack(rows["observation.state"])[:, names.index("gripper.effort")].max())
-    )
+    assert np.isfinite(state).all()
+    read = recordings(str(tmp_path / "out"))
+    most_n = max(reading.frame.effort_n for each in read for reading in each.recording.readings)
+    assert most_n == pytest.approx(float(state[:, names.index("gripper.effort")].max()))
     assert "synthetic" in (tmp_path / "out/README.md").read_text()
     assert ":" in table_of(tmp_path / "out/meta/tasks.parquet").index[0]
 
@@ -164,10 +154,7 @@ def test_an_existing_folder_and_a_single_trial_are_no_data_set(written, tmp_path
 
 
 def test_nothing_is_left_of_an_export_that_fails(written, tmp_path):
-    store = tmp_path / "s"
-    import shutil
-
-    shutil.copytree(written[1], store)
+    store = shutil.copytree(written[1], tmp_path / "s")
     next((store / "recordings").glob("*.mcap")).write_bytes(b"damaged")
     assert graspsense("export", store, "--to", f"lerobot:{tmp_path / 'out'}").returncode in (2, 5)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["s"]
@@ -176,27 +163,20 @@ def test_nothing_is_left_of_an_export_that_fails(written, tmp_path):
 def test_an_episode_of_an_array_feature_is_read(tmp_path):
     """`observation.tactile.left` as a whole: cells with three axes, or a grid."""
     folder = write_set(tmp_path / "set", 3, [episode()])
-    path = folder / "data/chunk-000/file-000.parquet"
+    path = folder / DATA
     table = pq.read_table(path)
     state = np.stack(table["observation.state"].to_pylist())
     cells = state[:, 3:15].reshape(-1, 4, 3).astype(np.float32)
     said = info(folder)
     said["features"]["observation.tactile.left"] = {"dtype": "float32", "shape": [4, 3], "names": None}
-    said["features"]["observation.state"] |= {
-        "shape": [3],
-        "names": said["features"]["observation.state"]["names"][:3],
-    }
+    said["features"]["observation.state"] |= {"shape": [3], "names": NAMES[:3]}
     (folder / "meta/info.json").write_text(json.dumps(said))
-    import pyarrow as pa
-
     table = table.set_column(0, "observation.state", pa.array(state[:, :3].tolist()))
     pq.write_table(table.append_column("observation.tactile.left", pa.array(cells.tolist())), path)
     (recording,) = recordings(str(folder))
     (array,) = [channel for channel in recording.recording.channels if channel.name == "tactile_left"]
     assert (array.cells, array.components) == (4, 3)
-    assert max(reading.frame.force_left_n for reading in recording.recording.readings) == pytest.approx(
-        24.0, rel=1e-5
-    )
+    assert peak_n(recording) == pytest.approx(24.0, rel=1e-5)
 
 
 @pytest.fixture(scope="module", params=[2, 3])
@@ -216,9 +196,7 @@ def contents(folder):
 
 
 def all_frames(folder):
-    import pandas as pd
-
-    return pd.concat([table_of(path) for path in sorted((folder / "data").rglob("*.parquet"))])
+    return pa.concat_tables(map(pq.read_table, sorted((folder / "data").rglob("*.parquet")))).to_pandas()
 
 
 def test_a_copy_has_what_it_had_and_phase_event_and_prediction(annotated):
@@ -230,7 +208,7 @@ def test_a_copy_has_what_it_had_and_phase_event_and_prediction(annotated):
     for key in old:
         assert np.array_equal(np.stack(old[key]), np.stack(new[key]))
     assert set(info(copy)["features"]) == set(new.columns) | {"observation.images.wrist"}
-    means = json.loads((copy / "meta/graspsense.json").read_text())
+    means = json_of(copy / "meta/graspsense.json")
     own = new[new["episode_index"] == 1]  # with two squeezes, and so two contacts
     contacts = [means["graspsense.event"][str(number)] for number in own["graspsense.event"] if number]
     assert contacts.count("contact") == 2
@@ -244,13 +222,11 @@ def test_a_copy_says_what_each_trial_of_an_episode_was(annotated):
     version, folder = annotated
     copy = folder / "copy"
     if version == 2:
-        rows = [json.loads(line) for line in (copy / "meta/episodes.jsonl").read_text().splitlines()]
-        trials = [
-            [(trial["graspsense/label"], trial["graspsense/felt"]) for trial in row["graspsense"]]
-            for row in rows
-        ]
+        rows = map(json.loads, (copy / "meta/episodes.jsonl").read_text().splitlines())
+        keys = ("graspsense/label", "graspsense/felt")
+        trials = [[tuple(trial[key] for key in keys) for trial in row["graspsense"]] for row in rows]
     else:
-        table = table_of(copy / "meta/episodes/chunk-000/file-000.parquet")
+        table = table_of(copy / EPISODES)
         both = zip(table["graspsense/label"], table["graspsense/felt"], strict=True)
         trials = [list(zip(labels.tolist(), felt.tolist(), strict=True)) for labels, felt in both]
     cup, sponge = ("pick_the_red_cup", True), ("squeeze-_sponge", True)
@@ -259,16 +235,11 @@ def test_a_copy_says_what_each_trial_of_an_episode_was(annotated):
 
 def test_an_annotated_copy_reads_as_the_original(annotated):
     _, folder = annotated
-    for a, b in zip(*(recordings(str(folder / name)) for name in ("set", "copy")), strict=True):
-        assert [reading.frame for reading in a.recording.readings] == [
-            reading.frame for reading in b.recording.readings
-        ]
-
-
-def test_trials_of_another_origin_annotate_nothing(tmp_path):
-    original = write_set(tmp_path / "set", 3)
-    assert_refused(SAMPLES, f"{tmp_path / 'copy'}?annotate={original}", "imported")
-    assert not (tmp_path / "copy").exists()
+    old, new = (
+        [[reading.frame for reading in each.recording.readings] for each in recordings(str(folder / name))]
+        for name in ("set", "copy")
+    )
+    assert old == new
 
 
 @pytest.mark.slow
@@ -284,12 +255,12 @@ def test_the_trials_of_another_data_set_annotate_nothing(annotated, tmp_path):
     version, folder = annotated
     other = write_set(tmp_path / "other", version, [episode(), episode(2, peak=3.5), episode() * 0.9])
     assert_refused(folder / "s", f"{tmp_path / 'wrong'}?annotate={other}", "data sets differ")
+    assert_refused(SAMPLES, f"{tmp_path / 'wrong'}?annotate={other}", "imported")
     assert not (tmp_path / "wrong").exists()
 
 
 def test_a_copy_within_the_original_is_refused(annotated):
-    _, folder = annotated
-    original = folder / "set"
+    folder, original = annotated[1], annotated[1] / "set"
     unchanged = contents(original)
     assert_refused(folder / "s", f"{original / 'copy'}?annotate={original}", "not changed")
     assert contents(original) == unchanged
@@ -299,10 +270,8 @@ def test_a_damaged_file_is_copied_and_counted(tmp_path):
     original = write_set(tmp_path / "set", 2)
     damaged = original / "data/chunk-000/episode_000000.parquet"
     damaged.write_bytes(damaged.read_bytes()[:500])
-    assert (
-        graspsense("import", f"lerobot:{original}?gap_m_per_unit=0.001", "--save", tmp_path / "s").returncode
-        == 5
-    )
+    place = f"lerobot:{original}?gap_m_per_unit=0.001"
+    assert graspsense("import", place, "--save", tmp_path / "s").returncode == 5
     done = graspsense("export", tmp_path / "s", "--to", f"lerobot:{tmp_path / 'copy'}?annotate={original}")
     assert done.returncode == 0
     assert "cannot be read and are as they were: 1" in done.stdout + done.stderr

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 from attrs import evolve
+from cases import every_case
+from random_scenes import record_of
 
-from graspsense.core.grasp.runner import run_grasp
-from graspsense.plugin_api import HOLD, STEADY, create
-from graspsense.simulator_api import RunConfig
+from graspsense.plugin_api import STEADY, create
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.error import GraspRecord, deviation
 from graspsense_sim_gripper.run.backend import SimBackend
@@ -24,16 +24,9 @@ def squeeze(dt=1e-3, late=0.0, stiffness=STIFFNESS, outcome=STEADY):
     speed = np.where(t < 0.1, SPEED, SPEED * np.exp(-after / TAU))
     gap = 0.0455 - travel
     force = stiffness * np.maximum(0.045 - gap, 0.0)
-    return GraspRecord(
-        outcome=outcome,
-        dt_s=dt,
-        gap_m=gap,
-        speed_m_s=-speed,
-        left_n=force,
-        right_n=force,
-        n_rows=len(t),
-        peak_n=float(force.max()),
-    )
+    peak_n, both = float(force.max()), {"left_n": force, "right_n": force}
+    rows = {"gap_m": gap, "speed_m_s": -speed, "n_rows": len(t), **both}
+    return GraspRecord(outcome=outcome, dt_s=dt, peak_n=peak_n, **rows)
 
 
 def test_the_quantities_are_those_of_the_motion_whatever_the_clock():
@@ -45,11 +38,9 @@ def test_the_quantities_are_those_of_the_motion_whatever_the_clock():
         assert quantities["p_first"] == pytest.approx(0.045 - 0.625 / STIFFNESS, abs=1e-9)
 
 
-@pytest.mark.parametrize("late", [1e-4, 3.7e-4, 9e-4])
+@every_case("late", [1e-4, 3.7e-4, 9e-4])
 def test_when_the_clock_ticks_hardly_matters(late):
-    delayed, other = squeeze(late=late).quantities, squeeze().quantities
-    for name, value in delayed.items():
-        assert value == pytest.approx(other[name], rel=2e-4), name
+    assert squeeze(late=late).quantities == pytest.approx(squeeze().quantities, rel=2e-4)
 
 
 def test_a_grasp_is_not_far_from_itself_and_a_stiffer_one_by_so_much():
@@ -78,14 +69,9 @@ def test_a_rest_before_the_hold_is_not_the_one_that_is_meant():
     gap, force = 0.0455 - way, STIFFNESS * np.maximum(way - 0.0005, 0.0)
     moving = (t < 0.2) | ((t >= 0.4) & (t < 0.6))
     speed = np.where(moving, -0.01, 0.0)
-    quantities = evolve(
-        squeeze(),
-        gap_m=gap,
-        speed_m_s=speed,
-        left_n=force,
-        right_n=force,
-        hold_from=int(np.sum(t < 0.7)),
-    ).quantities
+    forces = {"left_n": force, "right_n": force}
+    record = evolve(squeeze(), gap_m=gap, speed_m_s=speed, hold_from=int(np.sum(t < 0.7)), **forces)
+    quantities = record.quantities
     # Pressed by 10 mm/s for 0.4 s, of which 0.5 mm without contact: not by the half of it.
     assert quantities["f_steady"] == pytest.approx(STIFFNESS * 0.0035, rel=1e-3)
     assert quantities["p_steady"] == pytest.approx(0.0415, abs=1.5e-5)
@@ -102,18 +88,9 @@ def test_at_rest_from_the_very_contact_on_there_is_no_rate():
 @pytest.mark.slow
 def test_they_are_the_feature_sets_own_to_a_tick():
     backend = SimBackend(SimConfig(sensor="ideal", spread=False, open_gap_m=0.065))
-    trace = run_grasp(backend, create("controller", "hybrid"), RunConfig()).trace
-    drawn = create("feature-set", "chitta").extract(trace).as_dict()
-    quantities = GraspRecord(
-        outcome=STEADY,
-        dt_s=1e-3,
-        gap_m=trace.gap_m,
-        speed_m_s=trace.velocity_m_s,
-        left_n=trace.force_left_n,
-        right_n=trace.force_right_n,
-        n_rows=int(np.sum(trace.phase <= HOLD)),
-        peak_n=0.0,
-    ).quantities
+    (grasp,) = backend.run_many(create("controller", "hybrid"), ["odwalla:full_open"], [0], traces=True)
+    drawn = create("feature-set", "chitta").extract(grasp.trace).as_dict()
+    quantities = record_of(grasp, 1e-3).quantities
     # The feature set's rest is told from the way in 50 ms, which begins a little before the speed is as low.
     assert quantities["delta_t"] == pytest.approx(drawn["delta_t"], abs=0.05)
     assert quantities["p_first"] == pytest.approx(drawn["p_first"], abs=1.5e-5)

@@ -22,27 +22,22 @@ from graspsense_sim_gripper.scene.spec import ObjectSpec
 CONFIG = SimConfig(sensor="ideal", spread=False)
 
 
-def proposed(config, spec):
-    problem = Problem(config, spec)
-    return propose(problem, grip_of(problem))
-
-
-def decided(*terms, config=CONFIG):
-    spec = ObjectSpec(name="made up", width_m=0.05, terms=terms)
-    model = proposed(config, spec)
-    return {decision.subject: decision for decision in model.decisions}, model
+def decided(term, config):
+    """Return the decisions for an object of this term by their subjects."""
+    problem = Problem(config, ObjectSpec(name="made up", width_m=0.05, terms=(term,)))
+    return {decision.subject: decision for decision in propose(problem, grip_of(problem)).decisions}
 
 
 def test_a_contact_too_stiff_for_the_tick_is_said_to_be():
     rigid = evolve(CONFIG, pad_stiffness_n_m=math.inf)
-    soft, hard = (decided(("elastic", {"k1_n_m": k}), config=rigid)[0]["contact"] for k in (1e5, 1e9))
+    soft, hard = (decided(("elastic", {"k1_n_m": k}), rigid)["contact"] for k in (1e5, 1e9))
     assert (soft.decision, hard.decision) == ("trace resolved", "trace not verified")
     assert hard.number > 1.0
     # Light as it is, what stands behind a contact does not make it less stiff.
     light = {"mass_kg": 1e-6, "k_n_m": 1e6, "damping_n_s_m": 0.2}
     for stiffness, said in ((1e6, "trace resolved"), (1e7, "trace not verified")):
         surface = ("surface", {**light, "contact_n_m": stiffness})
-        assert decided(surface, config=rigid)[0]["contact"].decision == said
+        assert decided(surface, rigid)["contact"].decision == said
 
 
 def test_instances_share_the_steps_of_their_kind():

@@ -1,10 +1,11 @@
 """The reference against the differential equations of a grasp, written down once more and integrated by SciPy.
 
-Nothing of the simulator is called in the equations. They differ from it in form: the motion is that of the gap, with a
-mass that depends on the gap, where the simulator integrates the motor's angle; the compression and the states of the
-terms are ordinary states, where the simulator searches a balance of forces and uses the exact solution of each term;
-contact, separation, stopping, slipping and each change of a law are events of `solve_ivp`. The fingers start near the
-object at a set speed, squeeze it with one effort, with a larger one, and are then opened by a negative one.
+Nothing of the simulator is called in the equations: they have the numbers of its scenes. They differ from it in form:
+the motion is that of the gap, with a mass that depends on the gap, where the simulator integrates the motor's angle;
+the compression and the states of the terms are ordinary states, where the simulator searches a balance of forces and
+uses the exact solution of each term; contact, separation, stopping, slipping and each change of a law are events of
+`solve_ivp`. The fingers start near the object at a set speed, squeeze it with one effort, with a larger one, and are
+then opened by a negative one.
 """
 
 import cmath
@@ -46,7 +47,7 @@ class Term:
     damps = False
     first_part = 0
 
-    def __init__(self, **values):
+    def __init__(self, values):
         self.__dict__.update(values)
 
     def part(self, d, now):
@@ -281,19 +282,7 @@ class Slosh(Mass):
         return self.mass_kg * (2.0 * math.pi * self.frequency_hz) ** 2 * (r - s[1])
 
 
-EQUATIONS = {
-    "elastic": Elastic,
-    "rigid": Rigid,
-    "maxwell": Maxwell,
-    "gas": Gas,
-    "loss": Loss,
-    "foam": Foam,
-    "snap": Snap,
-    "worn": Worn,
-    "surface": Surface,
-    "liquid": Liquid,
-    "slosh": Slosh,
-}
+EQUATIONS = {kind.__name__.lower(): kind for kind in (*Term.__subclasses__(), *Mass.__subclasses__())}
 
 # ------------------------------------------------------------------------------------------- pads and object
 
@@ -445,35 +434,24 @@ class Straight:
 class Pr2:
     """A screw of the length L0 + s n is a side of the triangle a, b; the opposite angle turns the fingers r."""
 
-    per_turn, l0, a, b, r = (
-        4e-3 / ((729.0 / 25.0) * (22.0 / 16.0)),
-        37.5528e-3,
-        68.3698e-3,
-        43.3849e-3,
-        91.5e-3,
-    )
+    per_turn = 4e-3 / ((729.0 / 25.0) * (22.0 / 16.0))
+    l0, a, b, r = 37.5528e-3, 68.3698e-3, 43.3849e-3, 91.5e-3
     theta0, phi0, t0 = math.radians(3.6029), math.radians(29.7089), -0.1914e-3
     rotor_kg_m2 = 4e-7
 
-    def gap(self, turns):
-        side = self.l0 + self.per_turn * turns
-        theta = (
-            self.theta0 - self.phi0 + cmath.acos((self.a**2 + self.b**2 - side**2) / (2.0 * self.a * self.b))
-        )
-        return 2.0 * (self.t0 + self.r * (cmath.sin(theta) - math.sin(self.theta0)))
-
-    def jacobian(self, turns):
+    def triangle(self, turns):
+        """Return the side, the cosine of the opposite angle, and the angle of the fingers."""
         side = self.l0 + self.per_turn * turns
         u = (self.a**2 + self.b**2 - side**2) / (2.0 * self.a * self.b)
-        theta = self.theta0 - self.phi0 + cmath.acos(u)
-        return (
-            2.0
-            * self.r
-            * cmath.cos(theta)
-            * side
-            * self.per_turn
-            / (self.a * self.b * cmath.sqrt(1.0 - u * u))
-        )
+        return side, u, self.theta0 - self.phi0 + cmath.acos(u)
+
+    def gap(self, turns):
+        return 2.0 * (self.t0 + self.r * (cmath.sin(self.triangle(turns)[2]) - math.sin(self.theta0)))
+
+    def jacobian(self, turns):
+        side, u, theta = self.triangle(turns)
+        turned = side * self.per_turn / (self.a * self.b * cmath.sqrt(1.0 - u * u))
+        return 2.0 * self.r * cmath.cos(theta) * turned
 
     def mass(self, turns):
         # The derivative by a complex step.
@@ -483,9 +461,8 @@ class Pr2:
 
     def turns(self, gap):
         theta = math.asin((0.5 * gap - self.t0) / self.r + math.sin(self.theta0))
-        side = math.sqrt(
-            self.a**2 + self.b**2 - 2.0 * self.a * self.b * math.cos(theta - self.theta0 + self.phi0)
-        )
+        angle = theta - self.theta0 + self.phi0
+        side = math.sqrt(self.a**2 + self.b**2 - 2.0 * self.a * self.b * math.cos(angle))
         return (side - self.l0) / self.per_turn
 
 
@@ -545,9 +522,8 @@ class Gripper:
         if not self.direction:
             return [0.0, 0.0, 0.0, *halves]
         load = 0.5 * sum(self.pads_n(s))
-        net = (
-            load - self.effort(t) - self.direction * self.resisting(velocity, load) - self.damping * velocity
-        )
+        resisting = self.direction * self.resisting(velocity, load) + self.damping * velocity
+        net = load - self.effort(t) - resisting
         mass, change = self.link.mass(s[0])
         jacobian = self.link.jacobian(s[0]).real
         return [velocity / jacobian, velocity, (net - 0.5 * change * velocity**2) / mass, *halves]
@@ -639,85 +615,44 @@ class Gripper:
 
 # ------------------------------------------------------------------------------------------------- the scenes
 
-SHELL = {"k1_n_m": 6e3, "k3_n_m3": 4e7}
-OBJECTS = {
-    "elastic": {"elastic": SHELL},
-    "rigid": {"rigid": {"hertz_n_m15": 2e7}},
-    "rigid, breaks": {"rigid": {"hertz_n_m15": 5e6, "crush_force_n": 15.0, "broken_n_m": 9e3}},
-    "maxwell": {"elastic": SHELL, "maxwell": {"k_n_m": 8e3, "tau_s": 0.03}},
-    "gas, sealed": {"elastic": SHELL, "gas": {"volume_m3": 2e-5, "vent_m2": 0.0}},
-    "gas, with a vent": {"elastic": SHELL, "gas": {"volume_m3": 2e-5, "vent_m2": 4e-7, "area_slope_m": 0.05}},
-    "gas, with heat": {"elastic": SHELL, "gas": {"volume_m3": 1e-5, "heat_s": 0.05, "vent_m2": 1e-7}},
-    "loss": {"elastic": SHELL, "loss": {"damping_n_s_m": 900.0}},
-    "foam": {"foam": {"force_n": 20.0, "at_m": 2e-3, "exponent": 2.2}},
-    "foam, creeping": {
-        "foam": {
-            "force_n": 12.0,
-            "at_m": 2e-3,
-            "exponent": 1.6,
-            "arm1_n_m": 3e3,
-            "tau1_s": 0.01,
-            "arm2_n_m": 2e3,
-            "tau2_s": 0.2,
-        }
-    },
-    "snap, gradual": {
-        "elastic": {"k1_n_m": 2e3, "k3_n_m3": 0.0},
-        "snap": {"k1_n_m": 8e3, "critical_m": 8e-4, "drop_n": 3.0, "fall_m": 6e-4, "k2_n_m": 1.2e4},
-    },
-    "snap, sudden": {
-        "maxwell": {"k_n_m": 2e3, "tau_s": 0.05},
-        "snap": {"k1_n_m": 1e4, "critical_m": 8e-4, "drop_n": 5.0, "fall_m": 2e-4, "k2_n_m": 1.2e4},
-    },
-    "worn": {
-        "worn": {"k1_n_m": 8e3, "k3_n_m3": 1e7, "wear_j": 0.02, "softening": 0.5, "set_m": 1e-3},
-    },
-    "worn before": {
-        "worn": {
-            "k1_n_m": 9e3,
-            "k3_n_m3": 0.0,
-            "wear_j": 0.03,
-            "softening": 0.7,
-            "set_m": 2e-3,
-            "earlier_j": 0.02,
-        },
-        "loss": {"damping_n_s_m": 120.0},
-    },
-    "surface": {
-        "surface": {"mass_kg": 0.4, "k_n_m": 9e3, "damping_n_s_m": 12.0, "contact_n_m": 6e4},
-    },
-    "surface on a shell": {
-        "elastic": {"k1_n_m": 2e3, "k3_n_m3": 0.0},
-        "surface": {"mass_kg": 1.5, "k_n_m": 5e3, "damping_n_s_m": 3.0, "contact_n_m": 2e4},
-    },
-    "liquid": {
-        "elastic": {"k1_n_m": 2e3, "k3_n_m3": 0.0},
-        "liquid": {
-            "area_m2": 1.5e-3,
-            "neck_m2": 4e-5,
-            "column_m": 0.04,
-            "bulge_m3_pa": 3e-10,
-            "viscosity_pa_s": 0.02,
-        },
-    },
-    "slosh": {"elastic": SHELL, "slosh": {"mass_kg": 0.8, "frequency_hz": 9.0, "damping_ratio": 0.0}},
-    "slosh, damped": {
-        "elastic": SHELL,
-        "slosh": {"mass_kg": 0.5, "frequency_hz": 25.0, "damping_ratio": 0.4},
-    },
-    "slosh, overdamped": {
-        "elastic": SHELL,
-        "slosh": {"mass_kg": 0.5, "frequency_hz": 12.0, "damping_ratio": 2.5},
-    },
-}
+
+def made(kind, *values, **more):
+    """Return a term with these parameters, as a scene has it."""
+    return kind, TERMS[kind].params(*values, **more)._asdict()
+
+
+SHELL = made("elastic", 6e3, 4e7)
+SOFT = made("elastic", 2e3, 0.0)
 GAS = {"area_m2": 1.2e-3, "area_slope_m": 0.0, "pressure_pa": 101325.0, "exponent": 1.4, "bulge_m3_pa": 5e-11}
-DEFAULTS = {
-    "rigid": {"crush_force_n": math.inf, "broken_n_m": 0.0},
-    "gas": {**GAS, "vent_m2": 0.0, "heat_s": math.inf},
-    "foam": {"arm1_n_m": 0.0, "tau1_s": 1.0, "arm2_n_m": 0.0, "tau2_s": 1.0},
-    "worn": {"earlier_j": 0.0},
-    "liquid": {"density_kg_m3": 1000.0},
+OBJECTS = {
+    "elastic": [SHELL],
+    "rigid": [made("rigid", 2e7)],
+    "rigid, breaks": [made("rigid", 5e6, 15.0, 9e3)],
+    "maxwell": [SHELL, made("maxwell", 8e3, 0.03)],
+    "gas, sealed": [SHELL, made("gas", volume_m3=2e-5, **GAS)],
+    "gas, with a vent": [SHELL, made("gas", volume_m3=2e-5, vent_m2=4e-7, **GAS | {"area_slope_m": 0.05})],
+    "gas, with heat": [SHELL, made("gas", volume_m3=1e-5, heat_s=0.05, vent_m2=1e-7, **GAS)],
+    "loss": [SHELL, made("loss", 900.0)],
+    "foam": [made("foam", 20.0, 2e-3, 2.2)],
+    "foam, creeping": [made("foam", 12.0, 2e-3, 1.6, arm1_n_m=3e3, tau1_s=0.01, arm2_n_m=2e3, tau2_s=0.2)],
+    "snap, gradual": [SOFT, made("snap", 8e3, 8e-4, drop_n=3.0, fall_m=6e-4, k2_n_m=1.2e4)],
+    "snap, sudden": [
+        made("maxwell", 2e3, 0.05),
+        made("snap", 1e4, 8e-4, drop_n=5.0, fall_m=2e-4, k2_n_m=1.2e4),
+    ],
+    "worn": [made("worn", 8e3, 1e7, wear_j=0.02, softening=0.5, set_m=1e-3)],
+    "worn before": [
+        made("loss", 120.0),
+        made("worn", 9e3, 0.0, 0.03, softening=0.7, set_m=2e-3, earlier_j=0.02),
+    ],
+    "surface": [made("surface", 0.4, 9e3, 12.0, contact_n_m=6e4)],
+    "surface on a shell": [SOFT, made("surface", 1.5, 5e3, 3.0, contact_n_m=2e4)],
+    "liquid": [SOFT, made("liquid", 1.5e-3, 4e-5, 0.04, 3e-10, viscosity_pa_s=0.02)],
+    "slosh": [SHELL, made("slosh", 0.8, 9.0)],
+    "slosh, damped": [SHELL, made("slosh", 0.5, 25.0, 0.4)],
+    "slosh, overdamped": [SHELL, made("slosh", 0.5, 12.0, 2.5)],
 }
+"""Terms in the order in which the simulator has them."""
 RUBBING = (7.0, 8.0, 0.002, 0.5, 10.0)
 SMOOTH = (0.5, 0.8, 0.002, 0.05, 60.0)
 """Coulomb friction, breakaway, Stribeck speed, friction by load, and damping of the drive."""
@@ -747,12 +682,9 @@ def expected(name, place, gripper):
     """Return what the equations give for an object of this name."""
     link, friction, pads, lag_s = GRIPPERS[gripper]
     offset_m, held, mass_kg = PLACES[place]
-    terms = [
-        EQUATIONS[kind](**{**DEFAULTS.get(kind, {}), **values}) for kind, values in OBJECTS[name].items()
-    ]
-    return Gripper(terms, link(), friction, pads, lag_s, offset_m, held, 0.3 * mass_kg * 9.80665).follow(
-        EFFORTS
-    )
+    terms = [EQUATIONS[kind](values) for kind, values in OBJECTS[name]]
+    table_n = 0.3 * mass_kg * 9.80665
+    return Gripper(terms, link(), friction, pads, lag_s, offset_m, held, table_n).follow(EFFORTS)
 
 
 def simulated(name, place, gripper, **settings):
@@ -775,9 +707,9 @@ def simulated(name, place, gripper, **settings):
         drive_lag_s=lag_s,
         **{"fidelity": "reference", **settings},
     )
-    terms = tuple((kind, OBJECTS[name][kind]) for kind in TERMS if kind in OBJECTS[name])
-    terms = tuple((kind, {**DEFAULTS.get(kind, {}), **values}) for kind, values in terms)
-    spec = ObjectSpec(name=name, width_m=WIDTH_M, offset_m=offset_m, held=held, mass_kg=mass_kg, terms=terms)
+    spec = ObjectSpec(
+        name=name, width_m=WIDTH_M, offset_m=offset_m, held=held, mass_kg=mass_kg, terms=tuple(OBJECTS[name])
+    )
     setup = unverified_setup(config, spec, 0)
     drive = setup.plant.drive
     turns = revolutions_at(drive.link, setup.plant.object.width_m + 2.0 * abs(offset_m) + START_M)
@@ -815,12 +747,8 @@ QUICK = ("snap, gradual", "heavy, pushed back", "pr2, smooth, rigid pads, lag")
 def marked(most, few):
     """Return the scenes of `every(most)`: those of `every(few)` for CI, the others but one among the long tests."""
     ci = set(every(few))
-    return [
-        pytest.param(
-            *scene, marks=() if scene == QUICK else pytest.mark.slow if scene in ci else pytest.mark.long
-        )
-        for scene in every(most)
-    ]
+    marks = {scene: pytest.mark.slow if scene in ci else pytest.mark.long for scene in every(most)}
+    return [pytest.param(*scene, marks=() if scene == QUICK else mark) for scene, mark in marks.items()]
 
 
 @pytest.mark.parametrize(("name", "place", "gripper"), marked(8, 1))
@@ -833,10 +761,7 @@ def test_the_reference_is_the_solution_of_the_equations_for_every_term(name, pla
     [
         (1e-3, 1e-3),
         # The error of worn shells and of masses behind a contact is not that of the steps alone.
-        *(
-            pytest.param(accuracy, max(accuracy, 2e-4), marks=pytest.mark.long)
-            for accuracy in (0.1, 0.01, 1e-4)
-        ),
+        *(pytest.param(a, max(a, 2e-4), marks=pytest.mark.long) for a in (0.1, 0.01, 1e-4)),
     ],
 )
 @pytest.mark.parametrize(("name", "place", "gripper"), marked(2, 1))

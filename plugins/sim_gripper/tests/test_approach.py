@@ -1,5 +1,7 @@
 """Ticks of an approach that are run at once give what the same ticks give one by one, with the encoder's noise too."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from graspsense.plugin_api import APPROACH, create
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.batch import run_many
 
+slow = partial(pytest.param, marks=pytest.mark.slow)
 TICK_BY_TICK = {"fidelity": "fixed"}
 HYBRID = create("controller", "hybrid")
 RINGING = create("controller", "hybrid", velocity_gain_n_s_m=1500.0, integral_gain_n_m=1e5)
@@ -32,25 +35,21 @@ def closing_at(speed_m_s):
     [
         pytest.param(closing_at(0.04), "odwalla:full_closed", id="fast"),
         # The toy stands off the centre, and a finger pushes it across the table.
-        pytest.param(closing_at(0.04), "toy", id="pushed", marks=pytest.mark.slow),
-        pytest.param(closing_at(0.004), "toy", id="slow", marks=pytest.mark.slow),
-        pytest.param(HYBRID, "odwalla:full_closed", id="default", marks=pytest.mark.slow),
+        slow(closing_at(0.04), "toy", id="pushed"),
+        slow(closing_at(0.004), "toy", id="slow"),
+        slow(HYBRID, "odwalla:full_closed", id="default"),
         # A constant effort above friction accelerates the fingers up to the contact.
-        pytest.param(
-            create("controller", "force"), "odwalla:full_closed", id="accelerating", marks=pytest.mark.slow
-        ),
-        pytest.param(RINGING, "odwalla:full_closed", id="ringing", marks=pytest.mark.slow),
+        slow(create("controller", "force"), "odwalla:full_closed", id="accelerating"),
+        slow(RINGING, "odwalla:full_closed", id="ringing"),
         # Near the limit of 0.2 m/s, which the guard enforces.
-        pytest.param(closing_at(0.199), "odwalla:full_closed", id="limit", marks=pytest.mark.slow),
+        slow(closing_at(0.199), "odwalla:full_closed", id="limit"),
     ],
 )
 def test_the_fingers_move_as_they_do_tick_by_tick(sensor, law, scene):
     agree(sensor, law, scene)
 
 
-@pytest.mark.parametrize(
-    ("rate_hz", "speed_m_s"), [(200.0, 0.04), pytest.param(500.0, 0.1, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize(("rate_hz", "speed_m_s"), [(200.0, 0.04), slow(500.0, 0.1)])
 def test_a_run_of_long_ticks_ends_with_the_polynomial_of_the_linkage(rate_hz, speed_m_s):
     # The Jacobian changes by more than its polynomial is made for in fewer ticks than a run may have: beyond it, gaps
     # were 7 um off. Single ticks of this length have errors of their own.

@@ -48,8 +48,6 @@ from graspsense_sim_gripper.run.batch.worker import PlainProcess
 from graspsense_sim_gripper.run.compiled import loop_code
 from graspsense_sim_gripper.run.model_report import model_report
 from graspsense_sim_gripper.scene.library import catalogue, kinds_in, shipped_scenes
-from graspsense_sim_gripper.scene.terms.registry import TERMS
-from graspsense_sim_gripper.scene.terms.term import Term
 
 HYBRID = create("controller", "hybrid")
 FEATURES = create("feature-set", "chitta")
@@ -62,10 +60,7 @@ class Found(NamedTuple):
 
 
 def largest(params, ticks):
-    most = 0.0
-    for force in ticks.force_left_n:
-        most = max(most, force)
-    return Found(most, float(len(ticks.t_s)))
+    return Found(ticks.force_left_n.max(), float(len(ticks.t_s)))
 
 
 class Largest:
@@ -87,6 +82,10 @@ def many(scenes, seeds=None, config=None, law=HYBRID, **options):
     return run_many(
         config or SimConfig(), law, scenes, range(len(scenes)) if seeds is None else seeds, **options
     )
+
+
+def types_of_states(grasp):
+    return [type(state) for state in grasp.state.contact.left.states]
 
 
 def mixed(n):
@@ -114,13 +113,9 @@ def test_the_number_of_workers_decides_nothing_to_the_bit():
         assert a.state == b.state == c.state
     # What stands in the common composition for terms that an object lacks changes no bit, and is not handed back.
     odd = ["odwalla:full_open", "egg", "none"]
-    alone = many(odd, compiled=False)
-    common = many(odd, compiled=True)
-    for a, b in zip(alone, common, strict=True):
+    for a, b in zip(many(odd, compiled=False), many(odd, compiled=True), strict=True):
         np.testing.assert_allclose(b.trace.force_left_n, a.trace.force_left_n, rtol=1e-9, atol=1e-12)
-        assert [type(state) for state in b.state.contact.left.states] == [
-            type(state) for state in a.state.contact.left.states
-        ]
+        assert types_of_states(b) == types_of_states(a)
 
 
 @pytest.mark.slow
@@ -131,7 +126,6 @@ def test_what_is_drawn_may_keep_a_column_of_the_trace():
     whole = many(scenes, seeds, compiled=True)
 
     for grasp, other in zip(kept, whole, strict=True):
-        assert grasp.kept is None
         assert grasp.extracted.tobytes() == other.trace.gap_m.tobytes()
 
 
@@ -169,28 +163,20 @@ def test_grasps_that_compiled_code_draws_are_those_of_their_setups(sensor, monke
     """Of each object, one that breaks, one beyond its law, and with more images or ticks than buffers hold at first."""
     pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
     names = [*sorted(catalogue()), "odwalla:full_open#3", BREAKS, "none"]
-    config, options = (
-        SimConfig(sensor=sensor),
-        {"traces": False, "compiled": True, "extract": FEATURES.extract},
-    )
+    options = {"traces": False, "compiled": True, "extract": FEATURES.extract}
 
     def told(workers):
-        done = many(names, config=config, workers=workers, **options)
+        done = many(names, config=SimConfig(sensor=sensor), workers=workers, **options)
         for grasp, name in zip(done, names, strict=True):
             of_state = model_report(grasp.state, kinds_in(name))
             assert {key: grasp.report()[key] for key in of_state} == of_state
-        return [
-            (grasp.outcome, grasp.reason, repr(grasp.extracted), repr(grasp.state), grasp.report())
-            for grasp in done
-        ]
+        return [(g.outcome, g.reason, repr(g.extracted), repr(g.state), g.report()) for g in done]
 
     drawn = told(1)
     assert told(3) == drawn
-    for images in (48, 100):
-        monkeypatch.setattr(buffers, "IMAGES", images)
+    for name, size in (("IMAGES", 48), ("IMAGES", 100), ("TICKS", 700)):
+        monkeypatch.setattr(buffers, name, size)
         assert told(1) == drawn
-    monkeypatch.setattr(buffers, "TICKS", 700)
-    assert told(1) == drawn
     assert any(report["broken"] for *_, report in drawn)
 
 
@@ -229,13 +215,8 @@ except KeyboardInterrupt:
 @pytest.mark.slow
 def test_a_batch_ends_when_it_is_interrupted():
     pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
-    with subprocess.Popen(
-        [sys.executable, "-c", INTERRUPTED],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    ) as running:
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen([sys.executable, "-c", INTERRUPTED], start_new_session=True, **pipes) as running:
         assert running.stdout.readline() == "running\n"
         os.killpg(running.pid, signal.SIGINT)
         said, errors = running.communicate()
@@ -251,34 +232,6 @@ def test_a_named_tuple_that_is_measured_comes_back_as_one():
         assert grasp.extracted == ("Found", max(other.trace.force_left_n), float(len(other.trace.t_s)))
 
 
-class Failing(NamedTuple):
-    """A term that gives no number once it is pressed."""
-
-    k_n_m: float
-
-
-def no_number(params, state, d0, d1, h, v1):
-    return params.k_n_m * d1 * (1.0 if d1 < 0.001 else math.nan), state
-
-
-FAILS = """
-width_m = 0.05
-
-[[terms]]
-type = "failing"
-k_n_m = 2000.0
-"""
-
-
-@pytest.mark.slow
-def test_the_state_before_a_failure_is_computed_once_before_its_buffers_are_used_again(monkeypatch):
-    monkeypatch.setitem(TERMS, "failing", Term(name="failing", summary="", params=Failing, law=no_number))
-    config = SimConfig(sensor="ideal", fidelity="scene")
-    (grasp,) = many([FAILS], config=config, compiled=False, traces=False)
-    assert grasp.outcome == Outcome.ABORTED
-    assert grasp.end() is grasp.end()
-
-
 class Raising:
     """Extracts the number of events, in a form that raises where there are no ticks, or always, and in `result`."""
 
@@ -290,16 +243,12 @@ class Raising:
 
     def compiled_extraction(self):
         measure = {"no ticks": mean_n, "measure": raising}.get(self.where, largest)
-        return CompiledExtraction(
-            measure, (), raising_result if self.where == "result" else lambda measured: measured
-        )
+        result = raising_result if self.where == "result" else lambda measured: measured
+        return CompiledExtraction(measure, (), result)
 
 
 def mean_n(params, ticks):
-    total = 0.0
-    for force in ticks.force_left_n:
-        total += force
-    return total / len(ticks.t_s)
+    return ticks.force_left_n.sum() / len(ticks.t_s)
 
 
 def raising(params, ticks):
@@ -327,11 +276,6 @@ def test_a_compiled_form_that_raises_is_not_hidden_and_hides_no_events():
         extracted("result")
 
 
-def test_a_seed_is_a_whole_number():
-    with pytest.raises(TypeError, match="float"):
-        many(["block"], [2.7], traces=False)
-
-
 @pytest.mark.slow
 def test_features_that_cannot_be_compiled_are_extracted_from_traces():
     pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
@@ -355,38 +299,24 @@ def apart(monkeypatch):
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("apart")
-def test_plain_grasps_in_processes_are_those_of_this_one_to_the_bit():
+@every_case("traces", [True, False])
+def test_plain_grasps_in_processes_are_those_of_this_one_to_the_bit(traces):
+    """Without traces no release is read, and held grasps end with their hold."""
     n = 8
     scenes, seeds = mixed(n)
     told = []
-    apart = many(
-        scenes,
-        seeds,
-        compiled=False,
-        workers=2,
-        # A closure, which no other process could be handed.
-        extract=lambda trace: (len(told) >= 0, FEATURES.extract(trace)),
-        progress=lambda done, total: told.append((done, total)),
-    )
-    here = many(scenes, seeds, compiled=False, extract=FEATURES.extract)
+
+    def extract(trace):  # a closure, which no other process could be handed
+        return len(told) >= 0, FEATURES.extract(trace)
+
+    options = {"compiled": False, "extract": extract, "traces": traces}
+    here = many(scenes, seeds, **options)
+    apart = many(scenes, seeds, workers=2, progress=lambda *counts: told.append(counts), **options)
     for a, b in zip(apart, here, strict=True):
-        assert bits(a.trace) == bits(b.trace)
-        assert repr(a.extracted) == repr((True, b.extracted))
+        assert repr((a.state, a.extracted)) == repr((b.state, b.extracted))
+        assert not traces or bits(a.trace) == bits(b.trace)
     assert told[0] == (0, n)
     assert told[-1] == (n, n)
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("apart")
-def test_processes_end_held_grasps_with_their_hold_too_where_no_release_is_read():
-    scenes, seeds = mixed(8)
-    apart, here = (
-        many(scenes, seeds, compiled=False, workers=workers, extract=FEATURES.extract, traces=False)
-        for workers in (2, 1)
-    )
-    assert [repr((grasp.state, grasp.extracted)) for grasp in apart] == [
-        repr((grasp.state, grasp.extracted)) for grasp in here
-    ]
 
 
 @pytest.mark.slow
@@ -430,10 +360,8 @@ def plainly(job, scene, seed):
 
 
 def job(controller=HYBRID, **more):
-    return Job(
-        controller=controller,
-        **{"config": SimConfig(), "run": RunConfig(), "extract": None, "traces": True, **more},
-    )
+    given = {"config": SimConfig(), "run": RunConfig(), "extract": None, "traces": True, **more}
+    return Job(controller=controller, **given)
 
 
 @pytest.mark.slow
@@ -449,26 +377,19 @@ def test_odd_numbers_and_every_object_come_back_from_another_process_to_the_bit(
         here = plainly(odd, name, seed)
         assert (grasp.outcome, grasp.reason) == (here.outcome, here.reason)
         assert repr(grasp.state) == repr(here.state)
-        assert [type(part) for part in grasp.state.contact.left.states] == [
-            type(part) for part in here.state.contact.left.states
-        ]
+        assert types_of_states(grasp) == types_of_states(here)
         assert bits(grasp.trace) == bits(here.trace)
 
 
 @pytest.mark.slow
 def test_no_trace_is_handed_over_where_nobody_wants_one():
     run = RunConfig(grasp_timeout_s=0.01, opening_timeout_s=0.1)
-    with PlainProcess(Scenes(job(run=run, traces=False))) as process:
-        grasp = process.run("none", 0)
-    assert grasp.kept is None
-    assert grasp.extracted is None
     told = []
-    # A closure, which no other process could be handed: it is called here.
-    with PlainProcess(
-        Scenes(job(run=run, traces=False, extract=lambda trace: told.append(len(trace)) or "felt"))
-    ) as process:
-        grasp = process.run("none", 0)
-    assert (grasp.kept, grasp.extracted) == (None, "felt")
+    for extract, felt in ((None, None), (lambda trace: told.append(len(trace)) or "felt", "felt")):
+        # A closure, which no other process could be handed: it is called here.
+        with PlainProcess(Scenes(job(run=run, traces=False, extract=extract))) as process:
+            grasp = process.run("none", 0)
+        assert (grasp.kept, grasp.extracted) == (None, felt)
     assert told == [len(plainly(job(run=run), "none", 0).trace)]
 
 
@@ -516,22 +437,15 @@ def test_what_fails_in_another_process_is_said():
         @hookimpl
         def graspsense_controllers():
             yield ControllerEntry(
-                name="endless",
-                target=f"{__name__}:Endless",
+                name="endless", summary="", requires=(), commands=("effort",), target=f"{__name__}:Endless",
                 config="graspsense.plugins.controllers.hybrid:HybridConfig",
-                summary="",
-                requires=(),
-                commands=("effort",),
-            )
+            )  # fmt: skip
 
     with IsolatedPlugins(Here), PlainProcess(Scenes(job(Endless(HYBRID.config)))) as process:
         for _ in range(2):
             with pytest.raises(NotHandedOver, match="'graspsense-test/endless'"):
                 process.run("none", 0)
-    with (
-        PlainProcess(Scenes(job())) as process,
-        pytest.raises(NotHandedOver, match=r"UnknownName: .*'blok'"),
-    ):
+    with PlainProcess(Scenes(job())) as process, pytest.raises(NotHandedOver, match=r"UnknownName: .*'blok'"):
         process.run("blok", 0)
 
 
@@ -614,16 +528,22 @@ def test_traces_are_kept_only_where_they_are_asked_for():
     assert kept < 1e6
 
 
-def test_an_option_nobody_knows_is_refused():
-    with pytest.raises(TypeError, match=r"no \['wokers'\]; it has .*'workers'"):
-        SimBackend(SimConfig()).run_many(HYBRID, ["none"], [0], wokers=2)
-
-
-def test_a_name_nobody_knows_is_refused_before_anything_runs():
+@every_case(
+    ("scenes", "seeds", "options", "error", "says"),
+    [
+        (["block"], [2.7], {}, TypeError, "float"),
+        (["block", "toy"], [1], {}, ValueError, "2 scenes and 1 seeds"),
+        (["block"], [0], {"wokers": 2}, TypeError, r"no \['wokers'\]; it has .*'workers'"),
+        (["block"] * 3 + ["blok"], range(4), {}, UnknownName, "'blok'"),
+    ],
+)
+def test_wrong_use_is_refused_before_anything_runs(scenes, seeds, options, error, says):
     told = []
-    with pytest.raises(UnknownName, match="'blok'"):
-        many(["block"] * 3 + ["blok"], range(4), progress=lambda *counts: told.append(counts))
-    assert told == []
+    with pytest.raises(error, match=says):
+        SimBackend(SimConfig()).run_many(
+            HYBRID, scenes, seeds, progress=lambda *done: told.append(done), **options
+        )
+    assert {done for done, _ in told} <= {0}
 
 
 def endless(params, state, reading):
@@ -658,36 +578,30 @@ k3_n_m3 = 1e9
 """With a term twice, it has a loop of its own, which takes less time to compile than that of the whole catalogue."""
 
 
-class PressState(NamedTuple):
-    phase: int
-    outcome: int
-    begun_s: float
-
-
 class PressParams(NamedTuple):
     effort_n: float
 
 
 def press(params, state, reading):
     """Close with a constant effort for half a second."""
-    t_s = reading.frame.t_s
-    begun_s = t_s if state.begun_s < 0.0 else state.begun_s
-    outcome = STEADY if t_s - begun_s > 0.5 else RUNNING
-    return Command(EFFORT, 1.0 * params.effort_n, math.inf, math.inf), PressState(APPROACH, outcome, begun_s)
+    begun_s = reading.frame.t_s if state.begun_s < 0.0 else state.begun_s
+    outcome = STEADY if reading.frame.t_s - begun_s > 0.5 else RUNNING
+    command = Command(EFFORT, 1.0 * params.effort_n, math.inf, math.inf)
+    return command, PressState(APPROACH, outcome, begun_s)
 
 
-class Pressing(Controller[None]):
+class PressState(NamedTuple):
+    phase: int = APPROACH
+    outcome: int = RUNNING
+    begun_s: float = -1.0
+
+
+class Pressing(Controller[float]):
     step = staticmethod(press)
-
-    def __init__(self, effort_n):
-        super().__init__(None)
-        self.effort_n = effort_n
+    init = staticmethod(PressState)
 
     def params(self):
-        return PressParams(self.effort_n)
-
-    def init(self):
-        return PressState(APPROACH, RUNNING, -1.0)
+        return PressParams(self.config)
 
 
 @pytest.mark.slow

@@ -23,25 +23,15 @@ def drawn(name, seed):
 
 def test_a_numbered_thing_is_the_same_in_every_trial_and_state_but_placed_anew():
     bottle, again = drawn("odwalla:full_open#3", 1), drawn("odwalla:full_open#3", 2)
-    empty = drawn("odwalla:empty_open#3", 5)
+    empty, naked = drawn("odwalla:empty_open#3", 5), drawn("naked:full_open#3", 1)
 
     assert bottle.width_m == again.width_m == empty.width_m
     assert bottle.terms == again.terms
-    assert bottle.offset_m != again.offset_m
-    assert bottle.share != again.share
-
-
-def test_other_numbers_and_kinds_are_other_things():
-    widths = {drawn(f"odwalla:full_open#{k}", 1).width_m for k in range(20)}
-    odwalla, naked = drawn("odwalla:full_open#3", 1), drawn("naked:full_open#3", 1)
-    deviation = [
-        (instance.width_m - instance.spec.width_m) / instance.spec.width_spread_m
-        for instance in (odwalla, naked)
-    ]
-
+    assert (bottle.offset_m, bottle.share) != (again.offset_m, again.share)
     # Draws further out than two standard deviations are clipped to one width; the others all differ.
-    assert len(widths) >= 18
-    assert deviation[0] != deviation[1]
+    assert len({drawn(f"odwalla:full_open#{k}", 1).width_m for k in range(20)}) >= 18
+    deviations = {(each.width_m - each.spec.width_m) / each.spec.width_spread_m for each in (bottle, naked)}
+    assert len(deviations) == 2
 
 
 def test_the_number_changes_nothing_else_of_a_trial():

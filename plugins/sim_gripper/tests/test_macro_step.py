@@ -26,6 +26,7 @@ from graspsense_sim_gripper.solve.trend import UNKNOWN
 CONFIG = SimConfig(sensor="ideal", spread=False)
 TICK = 1e-3
 EFFORT_N = 20.0
+HYBRID = create("controller", "hybrid")
 FORCE_STEP = type(create("controller", "force")).step
 MACRO = Steps(inf, longest_s=TICK, growth=inf, macro_tolerance=3e-4)
 
@@ -113,10 +114,7 @@ def test_the_values_within_are_those_of_the_motion():
         within, expected = values_at(step.values, k / 8), plant.after(start, k * TICK) if k else start
         assert within.left_n == pytest.approx(expected.contact.left_n, rel=2e-4)
         assert within.motion.gap_m == pytest.approx(expected.motion.gap_m, abs=2e-9)
-        speed = within.motion.speed_rev_s * within.motion.jacobian_m_rev
-        assert speed == pytest.approx(
-            expected.motion.speed_rev_s * expected.motion.jacobian_m_rev, rel=1e-3, abs=1e-6
-        )
+        assert speed_m_s(within) == pytest.approx(speed_m_s(expected), rel=1e-3, abs=1e-6)
 
 
 def test_fingers_that_friction_holds_stay_while_the_object_relaxes():
@@ -130,6 +128,10 @@ def test_fingers_that_friction_holds_stay_while_the_object_relaxes():
     expected = plant.after(held, 32 * TICK, effort_n)
     assert expected.contact.left_n < held.contact.left_n
     assert step.after.contact.left_n == pytest.approx(expected.contact.left_n, rel=1e-4)
+
+
+def states(plant_state):
+    return plant_state.contact.left.states
 
 
 def just_before(plant, start, effort_n, happened):
@@ -154,9 +156,7 @@ def test_a_step_that_would_contain_an_event_is_not_taken():
         "end of travel": (toy, toy.state(opened_m - 1e-5, 0.05), -20.0),
         "breaking": (
             egg,
-            just_before(
-                egg, unbroken, 80.0, lambda now: now.contact.left.states != unbroken.contact.left.states
-            ),
+            just_before(egg, unbroken, 80.0, lambda now: states(now) != states(unbroken)),
             80.0,
         ),
     }
@@ -171,17 +171,20 @@ def test_a_step_that_is_repeated_ends_shortly_before_an_event_whose_place_is_kno
     too_long = plant.macro_step(start, -20.0, 64 * TICK)
     n = next_ticks(64, too_long.error, too_long.event_share)
     assert plant.macro_step(start, -20.0, n * TICK).error <= 1.0
-    assert plant.after(start, (n + 2) * TICK, -20.0).motion.gap_m == pytest.approx(
-        CONFIG.open_gap_m, abs=1e-12
-    )
+    opened_m = plant.after(start, (n + 2) * TICK, -20.0).motion.gap_m
+    assert opened_m == pytest.approx(CONFIG.open_gap_m, abs=1e-12)
+
+
+def both_ways(scene, law=None, options=None, **settings):
+    """Return a grasp in steps over several ticks, and the same in single ticks."""
+    return [
+        run_many(SimConfig(**settings, fidelity=fidelity), law or HYBRID, [scene], [4], **options or {})[0]
+        for fidelity in ("scene", "fixed")
+    ]
 
 
 def test_the_forces_of_a_release_are_those_of_single_ticks():
-    law = create("controller", "hybrid")
-    many, single = (
-        run_many(SimConfig(sensor="ideal", **fidelity), law, ["odwalla:full_closed"], [3])[0]
-        for fidelity in ({}, {"fidelity": "fixed"})
-    )
+    many, single = both_ways("odwalla:full_closed", sensor="ideal")
     forces = [grasp.trace.force_left_n[grasp.trace.phase == RELEASE] for grasp in (many, single)]
     assert len(forces[0]) == len(forces[1]) > 700
     # A hundredth of what is asked for, at a tenth of the steps.
@@ -194,11 +197,7 @@ def test_the_forces_of_a_release_are_those_of_single_ticks():
     [{"rate_hz": 250.0}, pytest.param({"rate_hz": 4000.0, "pad_delay_s": 0.017}, marks=pytest.mark.slow)],
 )
 def test_images_and_outcome_are_those_of_single_ticks(settings):
-    law = create("controller", "hybrid")
-    many, single = (
-        run_many(SimConfig(**settings, **fidelity), law, ["can:empty_open"], [4])[0]
-        for fidelity in ({}, {"fidelity": "fixed"})
-    )
+    many, single = both_ways("can:empty_open", **settings)
     assert many.model.chosen.steps.macro_tolerance > 0.0
     assert many.outcome == single.outcome
     n = min(len(many.trace.pad_t_s), len(single.trace.pad_t_s)) - 10
@@ -222,18 +221,8 @@ class Pulse(type(create("controller", "force"))):
 @pytest.mark.parametrize("compiled", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_a_command_within_a_step_takes_effect_in_its_tick(compiled):
     law = Pulse(create("controller", "force").config)
-    run = RunConfig(grasp_timeout_s=3.0)
-    many, single = (
-        run_many(
-            SimConfig(sensor="ideal", **fidelity),
-            law,
-            ["toy"],
-            [4],
-            compiled=compiled,
-            run=run,
-        )[0]
-        for fidelity in ({"fidelity": "scene"}, {"fidelity": "fixed"})
-    )
+    options = {"compiled": compiled, "run": RunConfig(grasp_timeout_s=3.0)}
+    many, single = both_ways("toy", law, options, sensor="ideal")
     assert many.model.chosen.steps.macro_tolerance > 0.0
     pressed_from = int(np.argmax(many.trace.force_left_n > 3.0))
     assert pressed_from == int(np.argmax(single.trace.force_left_n > 3.0))

@@ -1,12 +1,11 @@
 """The plant: a true stuck state, the balance of forces, energy, and the estimates it has to agree with."""
 
 import math
-from functools import cache
+from functools import cache, partial
 from math import inf
 
 import numpy as np
 import pytest
-from cases import every_case
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -36,25 +35,22 @@ from graspsense_sim_gripper.scene.terms.worn import Worn
 from graspsense_sim_gripper.solve.scheme import PlantParams, Steps
 from graspsense_sim_gripper.solve.state import PlantState
 
+slow = partial(pytest.param, marks=pytest.mark.slow)
 LINK = LINKAGES["pr2"]
 TICK = 1e-3
 FINE = Steps(2e-5)
 
 
 def drive(coulomb=7.0, breakaway=8.0, load=0.5, damping=10.0, link=LINK):
+    friction = Friction(coulomb, breakaway, 0.002, load, damping)
     return Drive(
-        link=link,
-        inertia=4 * math.pi**2 * 4e-7,
-        friction=Friction(
-            coulomb_n=coulomb,
-            breakaway_n=breakaway,
-            stribeck_m_s=0.002,
-            load_friction_coefficient=load,
-            damping_n_s_m=damping,
-        ),
-        closed_rev=revolutions_at(link, 0.0),
-        open_rev=revolutions_at(link, 0.086),
+        link, 4 * math.pi**2 * 4e-7, friction, revolutions_at(link, 0.0), revolutions_at(link, 0.086)
     )
+
+
+def powers(low, high):
+    """Powers of ten between these."""
+    return st.floats(low, high).map(lambda e: 10.0**e)
 
 
 def thing(*terms, width=0.05, table=0.0, skins=inf):
@@ -79,30 +75,18 @@ def run(params, state, effort, seconds, laws=(elastic,), dt=TICK):
     return state
 
 
-@every_case("effort", [-7.99, 0.0, 3.0, 7.99])
-def test_below_breakaway_nothing_moves_at_all(effort):
-    params = PlantParams(drive(), thing(*SPRING), FINE)
-    start = plant_at(0.06, (NoState(),))
-    after = run(params, start, effort, 10.0)
-    assert after.motion.revolutions == start.motion.revolutions
-    assert after.motion.speed_rev_s == 0.0
-
-
-def test_a_loaded_gripper_is_stuck_by_as_much_as_its_load_adds():
+def test_below_breakaway_nothing_moves_at_all_and_a_load_adds_to_it():
     # At 10 N on the pads breakaway is 8 + 0.5 * 10 = 13 N to either side of the balance.
     params = PlantParams(drive(), thing(*SPRING), FINE)
     pressed = ContactState(0.005, 10.0, 2000.0, (NoState(),))
     loaded = plant_at(0.045, (NoState(),))._replace(contact=Contact(10.0, 10.0, 0.0, 1, pressed, ()))
     free = plant_at(0.06, (NoState(),))
-    for start, effort, moves in (
-        *(
-            (loaded, effort, moves)
-            for effort, moves in ((22.9, False), (23.1, True), (-2.9, False), (-3.1, True))
-        ),
-        (free, 8.01, True),
-    ):
-        after = run(params, start, effort, 0.2)
-        assert (after.motion.revolutions != start.motion.revolutions) == moves, effort
+    stuck = [(loaded, 22.9), (loaded, -2.9), (free, -7.99), (free, 0.0), (free, 3.0), (free, 7.99)]
+    for start, effort in (*stuck, (loaded, 23.1), (loaded, -3.1), (free, 8.01)):
+        holds = (start, effort) in stuck
+        after = run(params, start, effort, 10.0 if holds else 0.2)
+        assert (after.motion.revolutions == start.motion.revolutions) == holds, effort
+        assert not holds or after.motion.speed_rev_s == 0.0
 
 
 @given(st.floats(-0.02, 0.02).filter(lambda v: abs(abs(v) - 0.009) > 1e-5))
@@ -156,12 +140,7 @@ def energy(params, state):
 
 
 @settings(max_examples=40, deadline=None)
-@given(
-    st.floats(3.0, 5.5).map(lambda e: 10.0**e),
-    st.floats(0.001, 0.2),
-    st.floats(0.0, 10.0),
-    st.floats(0.0, 1.0),
-)
+@given(powers(3.0, 5.5), st.floats(0.001, 0.2), st.floats(0.0, 10.0), st.floats(0.0, 1.0))
 def test_with_the_drive_off_stored_energy_never_rises(stiffness, speed, coulomb, load):
     params = PlantParams(drive(coulomb, coulomb, load, 0.0), thing(Elastic(stiffness, 0.0)), FINE)
     state = plant_at(0.0503, (NoState(),), speed_m_s=-speed)
@@ -227,10 +206,9 @@ def test_the_mass_of_a_surface_swings_on_when_the_shell_has_its_shape_again():
 
 def test_the_stops_hold_at_both_ends():
     params = PlantParams(drive(), thing(width=-1.0), FINE)
-    closed = run(params, plant_at(0.01, ()), 100.0, 2.0, laws=())
-    assert (closed.motion.gap_m, closed.motion.speed_rev_s) == (pytest.approx(0.0, abs=1e-9), 0.0)
-    opened = run(params, plant_at(0.08, ()), -100.0, 2.0, laws=())
-    assert (opened.motion.gap_m, opened.motion.speed_rev_s) == (pytest.approx(0.086, abs=1e-9), 0.0)
+    for begun_m, effort, end_m in ((0.01, 100.0, 0.0), (0.08, -100.0, 0.086)):
+        end = run(params, plant_at(begun_m, ()), effort, 2.0, laws=()).motion
+        assert (end.gap_m, end.speed_rev_s) == (pytest.approx(end_m, abs=1e-9), 0.0)
 
 
 @pytest.mark.parametrize("link", [LINK, STRAIGHT])
@@ -256,9 +234,7 @@ def test_no_moving_mass_is_too_light_for_the_stops(mass_share):
 
 def test_what_stands_is_looked_at_in_steps_no_longer_than_the_longest():
     # A light liquid behind soft covers swings some five times in the tick through which the fingers stand.
-    body = ObjectModel(
-        0.05, 0.0, PadCompliance(1.5e4), (Elastic(2000.0, 0.0), Liquid(1e-3, 1e-3, 0.02, 1e-11))
-    )
+    body = thing(Elastic(2000.0, 0.0), Liquid(1e-3, 1e-3, 0.02, 1e-11), skins=1.5e4)
     laws, states = [elastic, liquid], (NoState(), OscillatorState(0.0, 0.0))
     start = run(PlantParams(drive(), body, FINE), plant_at(0.0499, states, speed_m_s=-0.05), 15.0, 0.5, laws)
     assert start.motion.speed_rev_s == 0.0
@@ -294,11 +270,7 @@ def test_what_a_touch_begins_with_is_not_rounding_however_fine_the_steps():
 
 
 @settings(max_examples=60, deadline=None)
-@given(
-    st.floats(0.0, 9.0).map(lambda e: 10.0**e),
-    st.floats(2.0, 9.0).map(lambda e: 10.0**e),
-    st.booleans(),
-)
+@given(powers(0.0, 9.0), powers(2.0, 9.0), st.booleans())
 def test_covers_and_object_carry_one_force_however_stiff_they_are(stiffness, skins, hertz):
     law, params, state = (
         (rigid, Rigid(30.0 * stiffness), RigidState(0))  # as stiff as that where 0.5 mm deep
@@ -321,20 +293,15 @@ def test_covers_and_object_carry_one_force_however_stiff_they_are(stiffness, ski
             assert now.force_n == 0.0
 
 
-HELD = {
-    "foam": Foam(10.0, 0.01, 1.8, 200.0, 0.02, 100.0, 1.0),
-    "worn": Worn(2000.0, 2e6, 0.2, 0.4, 0.002),
-    "gas": Gas(1.2e-3, 0.02, 3e-5, 101325.0, 1.4, 1e-10, 1e-7, 2.0),
-    "slosh": Slosh(0.2, 4.0, 0.02),
-    "liquid": Liquid(1.2e-3, 5e-4, 0.08, 1e-10),
-}
-
-
 @pytest.mark.parametrize(
     ("name", "params"),
     [
         ("maxwell", Maxwell(250.0, 0.4)),
-        *(pytest.param(*held, marks=pytest.mark.slow) for held in HELD.items()),
+        slow("foam", Foam(10.0, 0.01, 1.8, 200.0, 0.02, 100.0, 1.0)),
+        slow("worn", Worn(2000.0, 2e6, 0.2, 0.4, 0.002)),
+        slow("gas", Gas(1.2e-3, 0.02, 3e-5, 101325.0, 1.4, 1e-10, 1e-7, 2.0)),
+        slow("slosh", Slosh(0.2, 4.0, 0.02)),
+        slow("liquid", Liquid(1.2e-3, 5e-4, 0.08, 1e-10)),
     ],
 )
 def test_a_stuck_gripper_does_not_creep_whatever_it_holds(name, params):
@@ -372,11 +339,8 @@ def pressed_again(steps):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "steps",
-    [
-        pytest.param(a_step_per_tick(), id="a step per tick"),
-        pytest.param(Steps(inf, TICK, growth=inf), id="fixed"),
-        pytest.param(Steps(3e-4, growth=1.1), id="by their error"),
-    ],
+    [a_step_per_tick(), Steps(inf, TICK, growth=inf), Steps(3e-4, growth=1.1)],
+    ids=["a step per tick", "fixed", "by their error"],
 )
 def test_fingers_meet_an_object_that_has_not_recovered_its_shape_where_it_ends(steps):
     # Without this event the dampers of the pads acted over the whole tick: 0.37 N too much where the force is 0.46 N.
@@ -387,9 +351,7 @@ def test_fingers_meet_an_object_that_has_not_recovered_its_shape_where_it_ends(s
     np.testing.assert_allclose(forces, expected, atol=0.012)
 
 
-@pytest.mark.parametrize(
-    "before_m", [1e-15, *(pytest.param(before_m, marks=pytest.mark.slow) for before_m in (0.0, 1e-12))]
-)
+@pytest.mark.parametrize("before_m", [1e-15, slow(0.0), slow(1e-12)])
 def test_the_steps_from_a_contact_that_is_off_by_rounding_are_those_from_the_contact(before_m):
     # The search for the contact went on in steps of down to 3e-11 s, over which the rate of compression is rounding.
     terms, laws = (Elastic(4e4, 0.0), Surface(30.0, 410.0, 11.0, 4e4)), (elastic, surface)
