@@ -10,6 +10,7 @@ import socket
 import struct
 import sys
 import threading
+from contextlib import closing
 
 import pytest
 from hypothesis import given, settings
@@ -33,6 +34,7 @@ from graspsense_pr2_gripper.emulator.usbip import (
 )
 from graspsense_pr2_gripper.protocol import (
     EFFORT_KIND,
+    LET_GO,
     OWN_LIMIT,
     REPORT_DESCRIPTOR,
     OutputReport,
@@ -42,209 +44,163 @@ from graspsense_pr2_gripper.protocol import (
 )
 
 PLUG = Plug(0x1209, 0x0001, "L7", "a gripper")
-CLEAR_HALT = struct.pack("<BBHHH", 0x02, 1, 0, 0x81, 0)
+CLEAR_HALT = (0x02, 1, 0, 0x81, 0)
 
 
 class Taken:
-    """A device that keeps what it is sent."""
+    """A device that takes whatever it is sent."""
 
-    def __init__(self):
-        self.stalled = False
-        self.outputs: list[bytes] = []
+    stalled = False
 
     def output(self, report):
-        self.outputs.append(report)
+        pass
 
     def feature(self, report_id):
         return bytes([report_id]) * 64 if report_id == 3 else None
 
 
 class Host:
-    """The other end of the socket: what the kernel's vhci_tx and vhci_rx do."""
-
-    def __init__(self, connection):
-        self.connection = connection
-        connection.settimeout(60.0)
-        self.number = 0
-
-    def submit(self, endpoint, into, length, setup=bytes(8), data=b""):
-        self.number += 1
-        asked = SUBMITTED.pack(0, length, 0, 0, 0, setup)
-        self.connection.sendall(
-            HEADER.pack(SUBMIT, self.number, 1 << 16 | 2, int(into), endpoint, asked) + data
-        )
-
-        return self.number
-
-    def unlink(self, victim):
-        self.number += 1
-        asked = struct.pack(">I24x", victim)
-        self.connection.sendall(HEADER.pack(UNLINK, self.number, 1 << 16 | 2, 0, 0, asked))
-        return self.number
-
-    def answer(self, reads=True):
-        """Return what came: kind, number, status, data."""
-        head = self.exactly(48)
-        kind, number, _, _, _, status, length, *_ = RETURN.unpack(head)
-        data = self.exactly(length) if kind == RET_SUBMIT and reads and status == 0 else b""
-        return kind, number, status, data
-
-    def exactly(self, size):
-        data = b""
-        while len(data) < size:
-            more = self.connection.recv(size - len(data))
-            assert more, "the device hung up"
-            data += more
-        return data
-
-    def control(self, kind, request, value, index, length):
-        setup = struct.pack("<BBHHH", kind, request, value, index, length)
-        self.submit(0, bool(kind & 0x80), length, setup)
-        _, _, status, data = self.answer(reads=bool(kind & 0x80))
-        return status, data
-
-
-class Served:
-    """A server with its thread, and the host at the other end."""
+    """The other end of the socket of a server: what the kernel's vhci_tx and vhci_rx do."""
 
     def __init__(self, server):
-        ours, theirs = socket.socketpair()
-        self.server = server
-        self.server.connect(ours)
-        self.thread = threading.Thread(target=self.server.serve)
+        self.server, self.number = server, 0
+        self.reads: dict[int, bool] = {}
+        """For each transfer that was submitted, whether the answer has data."""
+        self.theirs, self.connection = socket.socketpair()
+        self.connection.settimeout(60.0)
+        server.connect(self.theirs)
+        self.thread = threading.Thread(target=server.serve)
         self.thread.start()
-        self.ours, self.host = ours, Host(theirs)
 
     def close(self):
         self.server.hang_up()
         self.thread.join(60.0)
         assert not self.thread.is_alive()
-        self.ours.close()
-        self.host.connection.close()
+        self.theirs.close()
+        self.connection.close()
+
+    def submit(self, endpoint, into, length, setup=bytes(8), data=b""):
+        asked = SUBMITTED.pack(0, length, 0, 0, 0, setup)
+        number = self._request(SUBMIT, int(into), endpoint, asked + data)
+        self.reads[number] = into
+        return number
+
+    def unlink(self, victim):
+        return self._request(UNLINK, 0, 0, struct.pack(">I24x", victim))
+
+    def _request(self, kind, into, endpoint, asked):
+        self.number += 1
+        self.connection.sendall(
+            HEADER.pack(kind, self.number, 1 << 16 | 2, into, endpoint, asked[:28]) + asked[28:]
+        )
+        return self.number
+
+    def answer(self):
+        """Return what came: kind, number, status, data."""
+        kind, number, _, _, _, status, length, *_ = RETURN.unpack(self._exactly(48))
+        has_data = kind == RET_SUBMIT and self.reads[number] and status == 0
+        return kind, number, status, self._exactly(length) if has_data else b""
+
+    def _exactly(self, size):
+        data = self.connection.recv(size, socket.MSG_WAITALL)
+        assert len(data) == size, "the device hung up"
+        return data
+
+    def control(self, kind, request, value, index, length):
+        self.submit(0, bool(kind & 0x80), length, struct.pack("<BBHHH", kind, request, value, index, length))
+        return self.answer()[2:]
+
+    def squeeze(self):
+        """Command an effort of 20 N."""
+        self.submit(
+            1, False, 64, data=encode_output(OutputReport(1, EFFORT_KIND, 20_000_000, OWN_LIMIT, OWN_LIMIT))
+        )
+        assert self.answer()[2] == 0
 
 
 @pytest.fixture
-def device():
-    return Taken()
+def host():
+    with closing(Host(UsbipServer(Taken(), PLUG))) as host:
+        yield host
 
 
-@pytest.fixture
-def served(device):
-    server = Served(UsbipServer(device, PLUG))
-    yield server
-    server.close()
-
-
-def test_a_host_finds_the_device_that_the_document_describes(served):
-    host = served.host
+def test_a_host_finds_the_device_that_the_document_describes(host):
     status, about = host.control(0x80, 6, 1 << 8, 0, 18)
-    assert status == 0
-    assert struct.unpack_from("<HH", about, 8) == (0x1209, 0x0001)
+    assert (status, struct.unpack_from("<HH", about, 8)) == (0, (0x1209, 0x0001))
     _, short = host.control(0x80, 6, 2 << 8, 0, 9)
-    total = struct.unpack_from("<H", short, 2)[0]
     _, configuration = host.control(0x80, 6, 2 << 8, 0, 512)
-    assert len(configuration) == total
-    endpoints = [configuration[i : i + 7] for i in (total - 14, total - 7)]
-    assert [
-        (endpoint[2], endpoint[3], struct.unpack_from("<H", endpoint, 4)[0], endpoint[6])
-        for endpoint in endpoints
-    ] == [
-        (0x81, 3, 64, 1),
-        (0x01, 3, 64, 1),
-    ]
+    assert len(configuration) == struct.unpack_from("<H", short, 2)[0]
+    # Address, attributes, largest packet and interval of both interrupt endpoints.
+    endpoints = [struct.unpack("<BBHB", row[2:]) for row in (configuration[-14:-7], configuration[-7:])]
+    assert endpoints == [(0x81, 3, 64, 1), (0x01, 3, 64, 1)]
     assert host.control(0x81, 6, 0x22 << 8, 0, 512) == (0, REPORT_DESCRIPTOR)
-    _, serial = host.control(0x80, 6, 3 << 8 | 3, 0x409, 255)
-    assert serial[2:].decode("utf-16-le") == "L7"
+    assert host.control(0x80, 6, 3 << 8 | 3, 0x409, 255)[1][2:].decode("utf-16-le") == "L7"
     assert host.control(0xA1, 1, 3 << 8 | 3, 0, 64) == (0, b"\3" * 64)
     assert host.control(0xA1, 1, 3 << 8 | 9, 0, 64) == (-errno.EPIPE, b""), "a report that there is none of"
 
 
+ASKED = {
+    "in": (1, True, 64),
+    "out": (1, False, 64, bytes(8), bytes(64)),
+    "control": (0, True, 18, struct.pack("<BBHHH", 0x80, 6, 1 << 8, 0, 18)),
+}
+
+
 @settings(max_examples=60, deadline=None)
-@given(
-    st.lists(
-        st.one_of(
-            st.sampled_from(["in", "out", "control", "report", "stall", "well", "halt"]), st.integers(1, 12)
-        )
-    )
-)
+@given(st.lists(st.sampled_from([*ASKED, "report", "stall", "well", "halt"]) | st.integers(1, 12)))
 def test_every_unlink_is_answered_and_every_transfer_ends_once(does):
     """Whatever the device's mood. A host whose unlink is not answered hangs for good."""
     device = Taken()
-    served = Served(UsbipServer(device, PLUG))
-    host = served.host
-    try:
-        submitted = set()
-        unlinks = {}
-        ended = []
-        reading = {}
+    server = UsbipServer(device, PLUG)
+    ended = []
+    with closing(Host(server)) as host:
 
-        def hear():
-            head = host.exactly(48)
-            kind, number, _, _, _, status, length, *_ = RETURN.unpack(head)
-            if kind == RET_SUBMIT:
-                if reading[number] and status == 0:
-                    host.exactly(length)
-                ended.append(number)
-            else:
-                assert kind == RET_UNLINK
-                victim = unlinks.pop(number)
-                assert status in (0, -errno.ECONNRESET)
-                if status:
-                    ended.append(victim)
+        def unlink(victim):
+            asked = host.unlink(victim)
+            while (answer := host.answer())[0] == RET_SUBMIT:
+                ended.append(answer[1])
+            assert answer[:2] == (RET_UNLINK, asked)
+            assert answer[2] in (0, -errno.ECONNRESET)
+            if answer[2]:
+                ended.append(victim)
 
         for doe in does:
-            if doe == "in":
-                reading[host.submit(1, True, 64)] = True
-                submitted.add(host.number)
-            elif doe == "out":
-                reading[host.submit(1, False, 64, data=bytes(64))] = False
-                submitted.add(host.number)
-            elif doe == "control":
-                reading[host.submit(0, True, 18, struct.pack("<BBHHH", 0x80, 6, 1 << 8, 0, 18))] = True
-                submitted.add(host.number)
+            if doe in ASKED:
+                host.submit(*ASKED[doe])
             elif doe == "report":
-                served.server.send(bytes(64))
+                server.send(bytes(64))
             elif doe == "halt":
-                served.server.halt()
+                server.halt()
             elif isinstance(doe, int):
-                unlinks[host.unlink(doe)] = doe
-                while unlinks:
-                    hear()
+                unlink(doe)
             else:
                 device.stalled = doe == "stall"
         device.stalled = False
-        for victim in sorted(submitted - set(ended)):
+        for victim in host.reads:
             if victim not in ended:
-                unlinks[host.unlink(victim)] = victim
-                while unlinks:
-                    hear()
-        assert sorted(ended) == sorted(submitted)
-    finally:
-        served.close()
+                unlink(victim)
+        assert sorted(ended) == sorted(host.reads)
 
 
-def test_a_halted_endpoint_stalls_until_it_is_cleared(served):
-    host, server = served.host, served.server
-    server.send(b"\1" * 64)
+def test_a_halted_endpoint_stalls_until_it_is_cleared(host):
+    host.server.send(b"\1" * 64)
     host.submit(1, True, 64)
     assert host.answer()[3] == b"\1" * 64
-    server.halt()
+    host.server.halt()
     host.submit(1, True, 64)
     assert host.answer()[2] == -errno.EPIPE
-    host.submit(0, False, 0, CLEAR_HALT)
-    assert host.answer(reads=False)[2] == 0
+    assert host.control(*CLEAR_HALT) == (0, b"")
     host.submit(1, True, 64)
-    server.send(b"\2" * 64)
+    host.server.send(b"\2" * 64)
     assert host.answer()[3] == b"\2" * 64
 
 
-def test_the_endpoint_holds_one_report_and_what_comes_meanwhile_is_lost(served):
-    host, server = served.host, served.server
-    assert [server.send(bytes([n]) * 64) for n in range(3)] == [False, True, True]
+def test_the_endpoint_holds_one_report_and_what_comes_meanwhile_is_lost(host):
+    assert [host.server.send(bytes([n]) * 64) for n in range(3)] == [False, True, True]
     host.submit(1, True, 64)
     assert host.answer()[3] == b"\0" * 64
     host.submit(1, True, 64)
-    assert server.send(b"\3" * 64) is False
+    assert host.server.send(b"\3" * 64) is False
     assert host.answer()[3] == b"\3" * 64
 
 
@@ -253,20 +209,15 @@ class SocketPort(Port):
 
     def __init__(self, board, plug):
         self.server = UsbipServer(board, plug)
-        self.served: Served | None = None
-
-    @property
-    def host(self):
-        assert self.served is not None, "it is plugged in"
-        return self.served.host
+        self.host: Host | None = None
 
     def plug(self):
-        self.served = Served(self.server)
+        self.host = Host(self.server)
 
     def unplug(self):
-        if self.served is not None:
-            self.served.close()
-            self.served = None
+        if self.host is not None:
+            self.host.close()
+            self.host = None
 
     def send(self, report):
         return self.server.send(report)
@@ -335,7 +286,6 @@ def emulated(ports, clock):
     board.close()
 
 
-SQUEEZE = encode_output(OutputReport(1, EFFORT_KIND, 20_000_000, OWN_LIMIT, OWN_LIMIT))
 WATCHDOG_PERIODS = 100
 
 
@@ -359,26 +309,18 @@ def test_the_command_does_what_it_is_told_until_it_is_told_to_quit(ports, monkey
     said = capsys.readouterr()
     states = [json.loads(line) for line in said.out.splitlines()]
     assert ended.value.code == 0
-    assert [(state["did"], state["plugged"]) for state in states] == [
-        ("plug", True),
-        ("unplug", False),
-        ("state", False),
-        ("plug", True),
-    ]
+    plugged = [("plug", True), ("unplug", False), ("state", False), ("plug", True)]
+    assert [(state["did"], state["plugged"]) for state in states] == plugged
     assert "no word 'unplugg'" in said.err
     assert "Did you mean 'unplug'?" in said.err
     assert "complete nothing, in either direction" in said.err
-    assert ports[0].served is None, "it is gone with the command"
+    assert ports[0].host is None, "it is gone with the command"
 
 
 def test_a_pulled_plug_leaves_nothing_squeezing(emulated, clock):
     board, port = emulated
-    host = port.host
-    status, feature = host.control(0xA1, 1, 3 << 8 | 3, 0, 64)
-    assert status == 0
-    assert decode_identity(feature).serial == "L7"
-    host.submit(1, False, 64, data=SQUEEZE)
-    assert host.answer(reads=False)[2] == 0
+    assert decode_identity(port.host.control(0xA1, 1, 3 << 8 | 3, 0, 64)[1]).serial == "L7"
+    port.host.squeeze()
     board.tell("unplug")
     clock.let_pass(WATCHDOG_PERIODS // 2)
     assert board.state()["effort_n"] == 20.0, "it still hopes for a command"
@@ -388,15 +330,15 @@ def test_a_pulled_plug_leaves_nothing_squeezing(emulated, clock):
     port.host.submit(1, True, 64)
     clock.let_pass(1)
     report = decode_input(port.host.answer()[3])
-    assert report.echo == 1, "the board kept its power"
-    assert report.status & 1, "and says that it has let go"
+    assert (report.echo, report.status & LET_GO) == (1, LET_GO), (
+        "it kept its power, and says that it has let go"
+    )
 
 
 @pytest.mark.parametrize("word", ["silent", "stalled"])
 def test_a_mood_stops_the_reports_and_the_watchdog_lets_go(emulated, clock, word):
     board, port = emulated
-    port.host.submit(1, False, 64, data=SQUEEZE)
-    port.host.answer(reads=False)
+    port.host.squeeze()
     clock.let_pass(3)
     board.tell(word)
     assert (board.state()["sent"], board.state()["effort_n"]) == (3, 20.0)
