@@ -11,7 +11,7 @@ import numpy as np
 from graspsense.core.control.contact import CONTACT_FORCE_N, both_touch
 from graspsense.core.values.errors import DataDamaged
 from graspsense.sources.columns.grasp_columns import GraspColumns
-from graspsense.sources.columns.recording_notices import FEWEST, OPENED, STEADY, ZERO_SAMPLES, force_of_pads
+from graspsense.sources.columns.recording_notices import FEWEST, PART, ZERO_SAMPLES, force_of_pads
 from graspsense.sources.columns.usual_range import usual_range
 from graspsense.sources.manifest.closings import CLOSED, OPEN
 from graspsense.sources.manifest.steps import NOISE, squeezes
@@ -105,7 +105,7 @@ def _of_gap(columns: GraspColumns) -> Iterator[str]:
             f"the gap goes down to {gap.min() * 1e3:.3g} mm, and fingers meet at 0: is it measured from another zero? "
             'Then add the difference: gap = "POSITION + 20 [mm]"'
         )
-    if span > 0.0 and (pressed - began > 0.2 * span or pressed - touched > OPENED * span):
+    if span > 0.0 and (pressed - began > 0.2 * span or pressed - touched > PART * span):
         yield (
             "the gap rises while the force rises: is it a position that grows on closing? Write the gap as a "
             f'difference: gap = "{_opening(gap):g} - POSITION"'
@@ -213,7 +213,7 @@ def _falls_on_contact(columns: GraspColumns) -> bool:
     force, gap = columns.force_n, columns.gap_m
     fall, span = float(force[0] - force.min()), float(np.ptp(force))
     closed = float(gap[0] - gap[int(force.argmin())])
-    falls = fall > (1.0 - STEADY) * span > 0.0 and closed > 0.5 * float(np.ptp(gap)) > 0.0
+    falls = fall > (1.0 - PART) * span > 0.0 and closed > 0.5 * float(np.ptp(gap)) > 0.0
     return bool(columns.units.get("force")) and falls and _is_steady(force)
 
 
@@ -225,7 +225,7 @@ def _is_felt(force: Numbers) -> bool:
 
 def _is_steady(force: Numbers) -> bool:
     """Return whether the first samples have one force, so that a zero can be taken from them."""
-    return float(np.ptp(force[:ZERO_SAMPLES])) <= STEADY * float(np.ptp(force))
+    return float(np.ptp(force[:ZERO_SAMPLES])) <= PART * float(np.ptp(force))
 
 
 def _has_several_squeezes(columns: GraspColumns) -> bool:
