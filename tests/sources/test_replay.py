@@ -172,7 +172,7 @@ def damaged_files() -> list[tuple[str, bytes, str]]:
     return [
         ("empty", b"", "is empty"),
         ("other", b"t,gap\n0,1\n", "line 1: it starts with 't,gap'"),
-        ("binary", bytes(range(256)), "line 1: it is not plain text"),
+        ("binary", bytes(range(256)), "line 2: byte 0x80 is not UTF-8"),
         ("first_line_only", b"-10000\r\n", "line 1: there is no frame"),
         (
             "mid_frame",

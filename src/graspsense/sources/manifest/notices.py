@@ -143,7 +143,8 @@ def _of_zero(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
     force = columns.force_n
     low, high = usual_range(force)
     felt = _is_felt(force)
-    steady, touched = _is_steady(force), not columns.units.get("force") and _both_touch_at_first(columns)
+    steady, begins = _is_steady(force), (float(columns.left_n[0]), float(columns.right_n[0]))
+    touched = not columns.units.get("force") and both_touch(*begins, CONTACT_FORCE_N)
     if _falls_on_contact(columns):
         yield (
             "the force falls while the gap closes: does the sensor fall on contact? Turn its sign and write its zero: "
@@ -166,10 +167,6 @@ def _of_zero(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
             offset = abs(float(pad[:ZERO_SAMPLES].mean()))
             if _is_felt(pad) and _is_steady(pad) and offset > OFFSET * (most - least):
                 yield f'{name} does not begin at zero: if the fingers were free then, write zero = "10 samples"'
-
-
-def _both_touch_at_first(columns: GraspColumns) -> bool:
-    return both_touch(float(columns.left_n[0]), float(columns.right_n[0]), CONTACT_FORCE_N)
 
 
 def _of_time(columns: GraspColumns) -> Iterator[str]:

@@ -22,14 +22,12 @@ import numpy as np
 from attrs import frozen
 
 from graspsense.core.components.channels import signal_type
-from graspsense.core.files.whole_file import first_bytes
 from graspsense.core.values.errors import ConfigError, DataDamaged, suggestion
 from graspsense.core.values.fingers import PREFIX, FingerForce, opposed_forces
-from graspsense.core.values.limits import TEXT_BYTES
 from graspsense.core.values.signals import NO_PADS, Frame, Reading
-from graspsense.recording.readable import not_opened
 from graspsense.recording.replayable import Recording
 from graspsense.sources.formats.table import Numbers
+from graspsense.sources.formats.text_table import text_of
 
 FIRST_LINE: Final = "-10000"
 DATA_FOLDER: Final = "iCubGraspDataset"
@@ -107,15 +105,7 @@ def read_grasp(path: Path) -> IcubGrasp:
 
     Raises ConfigError if the file cannot be read, DataDamaged if its content is not a complete grasp.
     """
-    try:
-        content = first_bytes(path, TEXT_BYTES.most)
-        if too_large := TEXT_BYTES.exceeded(len(content)):
-            raise DataDamaged(f"{path}: {too_large}")
-        text = content.decode("ascii")
-    except UnicodeDecodeError:
-        raise _damaged(path, 1, "it is not plain text") from None
-    except OSError as error:
-        raise not_opened(path, error) from error
+    text = text_of(path)
     lines = text.splitlines()
     if not lines:
         raise DataDamaged(f"{path} is empty: a grasp of the iCub data set starts with the line {FIRST_LINE}")

@@ -121,8 +121,16 @@ _DOUBTS: Final[Mapping[str, tuple[str, str]]] = {
         "it is written with fewer digits for some labels than for others",
         "Digits tell the labels: round all values alike, or ",
     ),
+    "rising": (
+        "every line has more than the one before, or every line less",
+        "If it is a time or a counter, ",
+    ),
+    "target": (
+        "it is the number to predict in another unit",
+        "If it is not measured apart from it, ",
+    ),
 }
-"""Why a column may reveal the labels: what shows it, and what to do about it."""
+"""Why a column may reveal the labels, or the number to predict: what shows it, and what to do about it."""
 
 
 def doubts(
@@ -132,16 +140,19 @@ def doubts(
     target: Sequence[float] | None = None,
 ) -> list[str]:
     """Return notes on those columns that are features and may reveal the labels, or the number to predict."""
-    if target is not None:
-        return _doubts_of_target(columns, target, table)
     used = [name for name in columns.names if set(columns.columns_of(name)) <= set(table.names)]
     numbers = _numbers(columns, [name for name in used if not columns.is_nominal(name)])
     doubted: dict[str, list[str]] = {}
-    for name in used:
-        missing = np.isnan(table.columns(columns.columns_of(name)[:1]).values[:, 0]).tolist()
-        reasons = [*_of_recording(columns, name, labels)]
-        reasons += ["missing"] if says_of_labels(missing, labels) else []
-        reasons += _of_numbers(name, columns.units[name], numbers[name], labels) if name in numbers else []
+    for name in used if target is None else numbers:
+        if target is not None:
+            reasons = [*_of_target(numbers[name], np.array(target))]
+        else:
+            missing = np.isnan(table.columns(columns.columns_of(name)[:1]).values[:, 0]).tolist()
+            reasons = [*_of_recording(columns, name, labels)]
+            reasons += ["missing"] if says_of_labels(missing, labels) else []
+            reasons += (
+                _of_numbers(name, columns.units[name], numbers[name], labels) if name in numbers else []
+            )
         for reason in reasons:
             doubted.setdefault(reason, []).append(name)
     leave_out = f"leave it out ({option('features', python='columns')})"
@@ -192,23 +203,12 @@ def _of_numbers(name: str, unit: str, values: Numbers, labels: Sequence[str]) ->
         yield "digits"
 
 
-def _doubts_of_target(columns: CsvColumns, target: Sequence[float], table: FeatureTable) -> list[str]:
-    """Return notes on features that may be the number to predict itself, or that hold two kinds of numbers."""
-    numbers = _numbers(columns, [name for name in columns.names if name in table.names])
-    rising = [name for name, values in numbers.items() if keeps_rising(values)]
-    same = [name for name, values in numbers.items() if is_proportional(values, np.array(target))]
-    notes = []
-    if rising:
-        notes.append(
-            f"used, although every line has more than the one before, or every line less: {listed(rising)}. If it is a "
-            f"time or a counter, leave it out ({option('features', python='columns')})"
-        )
-    if same:
-        notes.append(
-            f"used, although it is the number to predict in another unit: {listed(same)}. If it is not measured "
-            f"apart from it, leave it out ({option('features', python='columns')})"
-        )
-    return notes + _mixed(numbers)
+def _of_target(values: Numbers, target: Numbers) -> Iterator[str]:
+    """Yield why the numbers of a column may be the number to predict itself, or when it was measured."""
+    if keeps_rising(values):
+        yield "rising"
+    if is_proportional(values, target):
+        yield "target"
 
 
 def keeps_rising(values: Sequence[float] | Numbers) -> bool:
