@@ -75,22 +75,20 @@ def read_labelled(
     Raises ConfigError if a column does not exist or cannot be a label, DataDamaged if the file is not a valid table.
     """
     columns = columns_of_file(path)
-    label = label or columns.default_label
     notes = list(columns.notes)
     export = exported(columns)
+    label = label or columns.default_label or ("label" if export is not None else None)
     if export is not None:
-        label = label or "label"
         export.keep_complete_trials(label if value is None else None, notes)
         features = features or export.features
     elif isinstance(columns, ArffColumns) and value is None:
         notes += columns.without_label(label)
     target = None if value is None else _target(columns, value, export, notes)
     labels = _labels(columns, label, notes, required=target is None)
-    ranks, no_order = (
-        (_ranks(columns, order, notes), "") if order is not None or export is None else export.order()
-    )
+    ranks, no_order = export.order() if export and order is None else (_ranks(columns, order, notes), "")
+    # No feature of an exported store identifies trials: a feature set made it.
     lines = _lines_once(columns, {order, columns.index}, labels)
-    identified = _measured if export is not None else _identifying(columns, labels, ranks, lines)
+    identified = (lambda _: "") if export is not None else _identifying(columns, labels, ranks, lines)
     if instance is None and (target is None or export is not None):
         instance = _object_column(columns, {label, order, columns.index, *features}, identified, notes)
     instances = None if instance is None else tuple(columns.complete_column(instance, "the instance"))
@@ -292,11 +290,6 @@ def _loses_digits(cells: Sequence[str], values: Sequence[float]) -> bool:
     if len(known) and 0.0 < _span(known) < min(SMALL, _ROUNDING * float(np.abs(known).max())):
         return True
     return len(set(values)) < len(set(cells)) and any(abs(value) >= LARGEST_WHOLE for value in values)
-
-
-def _measured(_name: str) -> str:
-    """Return that no feature of an exported store identifies trials: a feature set made it."""
-    return ""
 
 
 def _feature_table(
