@@ -51,6 +51,8 @@ def notices_of(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
     if len(columns) < 2:
         return
     pulls = list(_of_sign(columns))
+    if not pulls and columns.units.get("force") and _is_steady(columns.force_n):
+        pulls = [*filter(None, [falls_on_closing(columns)])]
     yield from pulls
     if not columns.units.get("force"):
         yield from _of_unit(columns)
@@ -81,8 +83,9 @@ def falls_on_closing(columns: GraspColumns) -> str:
             turned = least < -2.0 * abs(most) and 2.0 * abs(float(pad[known][:ZERO_SAMPLES].mean())) < -least
         if turned:
             return (
-                f"{name} falls where the fingers close. Turn its sign, -FORCE, or that of a position that grows on "
-                'closing: gap = "OPENING - POSITION"'
+                f"{name} falls where the fingers close. Turn its sign and write its zero (-FORCE and zero = "
+                '"10 samples", or 999 - FORCE), or turn that of a position that grows on closing: gap = "OPENING - '
+                'POSITION"'
             )
     return ""
 
@@ -145,12 +148,7 @@ def _of_zero(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
     felt = _is_felt(force)
     steady, begins = _is_steady(force), (float(columns.left_n[0]), float(columns.right_n[0]))
     touched = not columns.units.get("force") and both_touch(*begins, CONTACT_FORCE_N)
-    if _falls_on_contact(columns):
-        yield (
-            "the force falls while the gap closes: does the sensor fall on contact? Turn its sign and write its zero: "
-            'force = "-FORCE" and zero = "10 samples", or force = "999 - FORCE" where 999 is its value without contact'
-        )
-    elif felt and (force[0] - low > BEGINS_LOADED * (high - low) or (touched and not steady)):
+    if felt and (force[0] - low > BEGINS_LOADED * (high - low) or (touched and not steady)):
         if zeroed:
             yield (
                 "the recording begins in contact, so the zero of its first samples removes a part of the force: leave "
@@ -203,15 +201,6 @@ def _of_holes(columns: GraspColumns) -> Iterator[str]:
             f"there are no samples from {begin:.4g} to {end:.4g} {t}, and the force changes from {force[k]:.3g} to "
             f"{force[k + 1]:.3g} {columns.units.get('force') or 'N'}: a contact or a rest in this time is seen too late"
         )
-
-
-def _falls_on_contact(columns: GraspColumns) -> bool:
-    """Return whether a force in counts is steady at first and then falls by most of its range as the gap closes."""
-    force, gap = columns.force_n, columns.gap_m
-    fall, span = float(force[0] - force.min()), float(np.ptp(force))
-    closed = float(gap[0] - gap[int(force.argmin())])
-    falls = fall > (1.0 - PART) * span > 0.0 and closed > 0.5 * float(np.ptp(gap)) > 0.0
-    return bool(columns.units.get("force")) and falls and _is_steady(force)
 
 
 def _is_felt(force: Numbers) -> bool:

@@ -99,12 +99,11 @@ def thresholds_for(
     newtons are nominal, keep the defaults.
     """
     long_enough = [recording for recording in recordings if len(recording.readings) > _FEW]
-    if not long_enough:
-        return Thresholds(settings={}, words="thresholds of contact and rest: the defaults")
-    units = Counter(tuple(sorted(recording.units.items())) for recording in long_enough).most_common(1)[0][0]
+    counts = Counter(tuple(sorted(recording.units.items())) for recording in long_enough)
+    units = max(counts, key=counts.__getitem__, default=())
     used = [recording for recording in long_enough if tuple(sorted(recording.units.items())) == units]
     scale = _Scale.in_units(dict(units))
-    if scale.is_nominal:
+    if not used or scale.is_nominal:
         return Thresholds(settings={}, words="thresholds of contact and rest: the defaults")
     measured = [_Noise.measured_in(recording, scale) for recording in used]
     force, force_words = _contact_force(measured, scale)
