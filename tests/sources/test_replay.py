@@ -27,7 +27,7 @@ from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError, DataDamaged, DeviceLost, RecordingEnded
 from graspsense.core.values.signals import EFFORT, NO_PADS, VELOCITY, Command, Frame, Phase
 from graspsense.core.values.trace import PAD_COLUMNS, TICK_COLUMNS
-from graspsense.sources.recordings.icub import IcubGrasp, read_grasp, read_recording, relative_readings
+from graspsense.sources.recordings.icub import IcubGrasp, read_grasp, read_recording, recording_of
 from graspsense.sources.recordings.replay import ReplayBackend, ReplayConfig
 from graspsense.store.record_grasp import record_grasp
 from graspsense.store.store import Store
@@ -69,7 +69,7 @@ def moved(**joints_deg: float) -> tuple[float, ...]:
 
 
 def frames_of(path: Path) -> list[Frame]:
-    return [reading.frame for reading in relative_readings(read_grasp(path))]
+    return [reading.frame for reading in recording_of(read_grasp(path), "g").readings]
 
 
 def test_reader_keeps_what_the_file_says(tmp_path: Path) -> None:
@@ -84,7 +84,7 @@ def test_reader_keeps_what_the_file_says(tmp_path: Path) -> None:
 
 def test_times_are_frame_numbers_and_what_was_not_recorded_is_missing(tmp_path: Path) -> None:
     path = write(tmp_path / "g.txt", *[frame_lines()] * 3)
-    readings = list(relative_readings(read_grasp(path)))
+    readings = list(recording_of(read_grasp(path), "g").readings)
     assert [(reading.frame.t_s, reading.frame.dt_s) for reading in readings] == [(0, 1), (1, 1), (2, 1)]
     frame = readings[0].frame
     assert all(math.isnan(v) for v in (frame.effort_n, frame.edge_left_n, frame.edge_right_n))
@@ -153,7 +153,7 @@ def test_mapping_depends_on_no_later_frame_and_on_no_offset(data: st.DataObject)
         grasp = IcubGrasp(
             encoders_deg=encoders[:up_to] + angle, maxima=np.zeros((up_to, 5)), taxels=taxels[:up_to] + counts
         )
-        return [reading.frame for reading in relative_readings(grasp)]
+        return [reading.frame for reading in recording_of(grasp, "g").readings]
 
     whole, cut = frames(n, 0.0, 0.0), frames(n - 1, 0.0, 0.0)
     # A list of frames with NaN in it equals another only by its repr.
@@ -262,7 +262,7 @@ def test_backend_gives_each_frame_once_and_then_ends(tmp_path: Path) -> None:
     for command in (Command(VELOCITY, -0.01, 20.0, 0.1), Command(EFFORT, 99.0, 99.0, 0.1), info.relaxed):
         readings.append(backend.read(timeout_s=0.0))
         backend.apply(command)
-    assert repr(readings) == repr(list(relative_readings(read_grasp(path))))
+    assert repr(readings) == repr(list(recording_of(read_grasp(path), "g").readings))
     for _ in range(2):
         with pytest.raises(RecordingEnded):
             backend.read(timeout_s=0.0)
