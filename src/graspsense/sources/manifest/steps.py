@@ -84,17 +84,16 @@ def squeezes(columns: GraspColumns) -> list[GraspColumns]:
             )
             parts[k] = evolve(parts[k], warnings=(*parts[k].warnings, told))
     weak = _weak_runs(columns, force, runs)
-    missed = without_rise(columns, [*runs, *weak])
-    parts[0] = evolve(parts[0], warnings=(*parts[0].warnings, *missed))
+    missed = [*without_rise(columns, [*runs, *weak])]
     if weak:
         strongest = max(float(np.ptp(force[begin - 1 : end])) for begin, end in weak)
         unit = columns.units.get("force") or "N"
-        note = (
+        missed.append(
             f"{counted(len(weak), 'rise')} of the force by at most {strongest:.2g} {unit} (the first at "
             f"{columns.t_s[weak[0][0]]:.4g} s) is taken for no squeeze: less than {100 * WEAKEST:.0f} % of the usual "
             "force. If fingers closed then, split by a column"
         )
-        parts[0] = evolve(parts[0], warnings=(*parts[0].warnings, note))
+    parts[0] = evolve(parts[0], warnings=(*parts[0].warnings, *missed))
     return parts
 
 

@@ -46,14 +46,14 @@ def read_exported(name: str) -> Recording:
     PluginUnavailable for Parquet without pyarrow.
     """
     path = Path(name).expanduser()
-    if path.suffix.lower() in TABLE_SUFFIXES:
-        arrays, declared = _tables(path)
-    else:
-        arrays = npz_arrays(path)
-        refuse_table_of_store(path, arrays)
-        declared = str(arrays.get(DECLARED, "no JSON"))
     foreign = ". Arrays of other programs are imported by a manifest (docs/import.md)"
     with readable(path, "a grasp of `graspsense export`", foreign):
+        if path.suffix.lower() in TABLE_SUFFIXES:
+            arrays, declared = _tables(path)
+        else:
+            arrays = npz_arrays(path)
+            refuse_table_of_store(path, arrays)
+            declared = str(arrays.get(DECLARED, "no JSON"))
         about = json.loads(declared)
         channels = tuple(from_json(channel) for channel in about["channels"])
         return Recording(
@@ -100,34 +100,22 @@ def _tables(path: Path) -> tuple[Columns, str]:
     """
     declared = declared_beside(path)
     if path.exists() and not declared.exists():
-        table = raw_tables(path)[0]
-        refuse_table_of_store(path, (*table.numbers, *table.texts))
+        undeclared = raw_tables(path)[0]
+        refuse_table_of_store(path, (*undeclared.numbers, *undeclared.texts))
         raise ConfigError(
             f"{declared.name} is missing beside {path}: `graspsense export` writes it together with the columns. For a "
             "file of another program name its columns, or write a manifest (docs/import.md)"
         )
-    try:
-        return _read_tables(path, declared)
-    except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
-        raise DataDamaged(
-            f"{path} is not as `graspsense export` writes it: {type(error).__name__}: {error}"
-        ) from error
-
-
-def _read_tables(path: Path, declared: Path) -> tuple[Columns, str]:
-    """Return the arrays, and the text that declares them. What does not fit ends in an error of Python."""
     ticks = _columns(path)
     missing = [name for name in TICK_FIELDS if name not in ticks]
     if missing:
         raise DataDamaged(f"{path} is not an exported grasp: it has no column {missing[0]!r}")
-    try:
+    with readable(declared):
         text = text_of(declared)
         about = json.loads(text)
         channels = further(tuple(from_json(channel) for channel in about["channels"]))
         tables = frozenset(about["tables"])
         cells = int(about["cells"])
-    except (ConfigError, ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
-        raise DataDamaged(f"{declared} is damaged: {type(error).__name__}: {error}") from error
     if too_many := CHANNEL_NUMBERS.exceeded(cells):
         raise DataDamaged(f"{declared} is damaged: the fingertips have {too_many}")
 
