@@ -797,7 +797,7 @@ def test_counts_that_fall_on_contact_are_asked_about(tmp_path):
     counts = np.round(999.0 - 60.0 * force + rng.normal(size=len(force)))
     pandas_csv(tmp_path / "jar_0.csv", {"t": T_S, "gap": gap, "F": counts})
     (recording,) = recordings(tmp_path, COUNTS)
-    assert any("fall on contact" in notice for notice in recording.notices)
+    assert any("falls where the fingers close" in notice for notice in recording.notices)
     (turned,) = recordings(tmp_path, COUNTS.replace("F [counts]", "999 - F [counts]"))
     assert not turned.notices
     # A hold that relaxes falls too, but is never steady at first.
@@ -806,7 +806,7 @@ def test_counts_that_fall_on_contact_are_asked_about(tmp_path):
         tmp_path / "jar_0.csv", {"t": T_S, "gap": 0.05 - 0.001 * np.arange(len(gap)) / len(gap), "F": hold}
     )
     (held,) = recordings(tmp_path, COUNTS)
-    assert not any("fall on contact" in notice for notice in held.notices)
+    assert not any("falls where the fingers close" in notice for notice in held.notices)
 
 
 @pytest.mark.parametrize(

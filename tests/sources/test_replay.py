@@ -26,7 +26,7 @@ from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError, DataDamaged, DeviceLost, RecordingEnded
 from graspsense.core.values.signals import EFFORT, VELOCITY, Command, Frame, Phase
 from graspsense.core.values.trace import PAD_COLUMNS, TICK_COLUMNS
-from graspsense.sources.recordings.icub import IcubGrasp, read_grasp, read_recording, relative_readings
+from graspsense.sources.recordings.icub import IcubGrasp, read_grasp, read_recording, recording_of
 from graspsense.sources.recordings.replay import ReplayBackend, ReplayConfig
 from graspsense.store.record_grasp import record_grasp
 from graspsense.store.store import Store
@@ -68,9 +68,36 @@ def moved(**joints_deg: float) -> tuple[float, ...]:
 
 
 def frames_of(path: Path) -> list[Frame]:
-    return [reading.frame for reading in relative_readings(read_grasp(path))]
+    return [reading.frame for reading in recording_of(read_grasp(path), "g").readings]
 
 
+<<<<<<< HEAD
+=======
+def test_reader_keeps_what_the_file_says(tmp_path: Path) -> None:
+    grasp = read_grasp(write(tmp_path / "g.txt", frame_lines(), frame_lines(moved(j12=8.0), {LITTLE: 7})))
+    assert len(grasp) == 2
+    assert grasp.encoders_deg[1].tolist() == [20.0, 80.0, 10.0, 40.0, 30.0, 58.0, 32.0, 45.0, 5.0]
+    assert grasp.maxima[1].tolist() == [15, 15, 15, 15, 22]
+    assert grasp.taxels.shape == (2, 5, 12)
+    assert grasp.taxels[1, LITTLE, 3] == 233
+    assert grasp.taxels.sum() == 2 * 60 * 240 - 7
+
+
+def test_times_are_frame_numbers_and_what_was_not_recorded_is_missing(tmp_path: Path) -> None:
+    path = write(tmp_path / "g.txt", *[frame_lines()] * 3)
+    readings = list(recording_of(read_grasp(path), "g").readings)
+    assert [(reading.frame.t_s, reading.frame.dt_s) for reading in readings] == [(0, 1), (1, 1), (2, 1)]
+    frame = readings[0].frame
+    assert all(math.isnan(v) for v in (frame.effort_n, frame.edge_left_n, frame.edge_right_n))
+    assert readings[0].pads == NO_PADS
+    _, info = opened(path)
+    assert info.units["t"] == "frame"
+    said = " ".join(info.notes)
+    assert "times are frame numbers, not seconds" in said
+    assert "nominal" in said
+
+
+>>>>>>> h-s1
 def test_thumb_is_left_and_the_strongest_finger_is_right(tmp_path: Path) -> None:
     path = write(
         tmp_path / "g.txt",
@@ -119,7 +146,7 @@ def test_mapping_depends_on_no_later_frame_and_on_no_offset(data: st.DataObject)
         grasp = IcubGrasp(
             encoders_deg=encoders[:up_to] + angle, maxima=np.zeros((up_to, 5)), taxels=taxels[:up_to] + counts
         )
-        return [reading.frame for reading in relative_readings(grasp)]
+        return [reading.frame for reading in recording_of(grasp, "g").readings]
 
     whole, cut = frames(n, 0.0, 0.0), frames(n - 1, 0.0, 0.0)
     # A list of frames with NaN in it equals another only by its repr.
@@ -138,7 +165,7 @@ def damaged_files() -> list[tuple[str, bytes, str]]:
     return [
         ("empty", b"", "is empty"),
         ("other", b"t,gap\n0,1\n", "line 1: it starts with 't,gap'"),
-        ("binary", bytes(range(256)), "line 1: it is not plain text"),
+        ("binary", bytes(range(256)), "line 2: byte 0x80 is not UTF-8"),
         ("first_line_only", b"-10000\r\n", "line 1: there is no frame"),
         (
             "mid_frame",
@@ -228,7 +255,7 @@ def test_backend_gives_each_frame_once_and_then_ends(tmp_path: Path) -> None:
     for command in (Command(VELOCITY, -0.01, 20.0, 0.1), Command(EFFORT, 99.0, 99.0, 0.1), info.relaxed):
         readings.append(backend.read(timeout_s=0.0))
         backend.apply(command)
-    assert repr(readings) == repr(list(relative_readings(read_grasp(path))))
+    assert repr(readings) == repr(list(recording_of(read_grasp(path), "g").readings))
     for _ in range(2):
         with pytest.raises(RecordingEnded):
             backend.read(timeout_s=0.0)

@@ -90,8 +90,8 @@ def test_a_slow_topic_is_not_told_from_a_clock_that_is_a_little_off(ahead_s: flo
     """With fingers at 30 mm/s, the gap of the contact is wrong by 6 mm if it is the clock."""
     common = common_clock("bag", {"/hand": HEALTHY, "/tip": messages(T_S, T_S + ahead_s)})
     assert common.topics["/tip"].ns[0] - common.topics["/hand"].ns[0] == pytest.approx(ahead_s * S)
-    assert "200 ms older" in common.notices[0]
-    assert not common_clock("bag", {"/hand": HEALTHY, "/tip": messages(T_S, delay_s=0.03)}).notices
+    assert common.delays_ns["/tip"] - common.delays_ns["/hand"] == pytest.approx(-ahead_s * S)
+    assert not any("header" in notice for notice in common.notices)
 
 
 @every_case("delay_s", [0.0, 0.1, 3600.0])
@@ -216,8 +216,15 @@ RISES = (T_S < 1.5) | (T_S > 2.0)
         (T_S >= 0.03, T_S, 297, None),
         (ALL, T_S - 20.0, 300, "another clock"),
         (ALL, T_S - 0.03, 298, "headers of the force are 30 ms older"),
+        (ALL, T_S - 0.2, 281, "headers of the force are 200 ms older"),
     ],
-    ids=["a topic that dies", "one that begins late", "another clock", "a clock that is off by a little"],
+    ids=[
+        "a topic that dies",
+        "one that begins late",
+        "another clock",
+        "a clock off by little",
+        "a clock off by more",
+    ],
 )
 def test_a_bag_is_read_where_its_topics_overlap_on_one_clock(
     written: Any, pr2: bool, kept: Any, stamped_s: Any, samples: int, notice: str | None
@@ -226,7 +233,7 @@ def test_a_bag_is_read_where_its_topics_overlap_on_one_clock(
     force = frames(recording.recording, "force_left_n")
     assert len(force) == pytest.approx(samples, abs=1)
     assert np.isfinite(force).all()
-    assert [notice in told for told in recording.notices] == [True] if notice else not recording.notices
+    assert any(notice in told for told in recording.notices) if notice else not recording.notices
     scale = 15 * 100 / 1600 if pr2 else 1.0
     assert force[-1] == pytest.approx(scale * FORCE_N[np.flatnonzero(kept)[-1]], abs=0.1)
 

@@ -54,6 +54,16 @@ WITHOUT_UNIT: Final = ("", "-", "1")
 """What a line of units has for a column without one."""
 
 
+_DATES_S: Final = (946_684_800.0, 4_102_444_800.0)
+"""The years 2000 and 2100, in seconds since 1970."""
+
+
+def unit_since_1970(time: float) -> str:
+    """Return the unit in which a number is a time of this century, empty if that is s, or if it is none."""
+    low, high = _DATES_S
+    return next((unit for unit in ("ms", "us", "ns") if low <= time * TO_SI["time"][unit] < high), "")
+
+
 def known_unit(text: str, quantity: str) -> str:
     """Return the unit of a quantity that a text means, empty if it means none.
 

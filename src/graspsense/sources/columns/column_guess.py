@@ -14,7 +14,7 @@ import numpy as np
 from attrs import frozen
 
 from graspsense.sources.formats.table import ColumnTable, Numbers
-from graspsense.sources.units import GRAM_FORCE, WITHOUT_UNIT, known_unit
+from graspsense.sources.units import GRAM_FORCE, TO_SI, WITHOUT_UNIT, known_unit, unit_since_1970
 
 TIME_WORDS: Final = frozenset((
     "t", "time", "times", "timestamp", "stamp", "stamps", "seconds", "sec", "elapsed", "clock",
@@ -27,7 +27,6 @@ FORCE_WORDS: Final = frozenset((
     "force", "forces", "load", "f", "n", "newton", "newtons", "pressure", "pdc", "fsr", "gram", "grams", "g",
     "weight", "eucl", "taxels", "taxel", "tactile", "biotac",
 ))  # fmt: skip
-TO_S: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _LONGEST_STEP_S: Final = 0.25
 """The time between the samples of a grasp, where no unit is stated."""
 _EVEN, _MOSTLY = 0.2, 0.9
@@ -166,18 +165,16 @@ def _time(table: ColumnTable, name: str) -> Guess:
     if stated:
         return Guess(key="time", value=f"{quoted(name)} [{stated}]")
     step = float(np.median(np.diff(values)))
-    if abs(float(values[0])) > 1e11:  # since 1970: in ms, us or ns, which the reader tells
+    if unit_since_1970(float(values[0])):  # which the reader tells
         return Guess(key="time", value=quoted(name))
-    unit = next((unit for unit, factor in TO_S.items() if step * factor <= _LONGEST_STEP_S), "s")
+    to_s = TO_SI["time"]
+    unit = next((unit for unit in ("s", "ms", "us", "ns") if step * to_s[unit] <= _LONGEST_STEP_S), "s")
+    rate_hz = 1.0 / (step * to_s[unit]) if step > 0.0 else math.nan
     return Guess(
         key="time",
         value=f"{quoted(name)} [{unit}]",
-        check=f"no unit is stated: [{unit}] gives {_rate(step, unit):.3g} Hz",
+        check=f"no unit is stated: [{unit}] gives {rate_hz:.3g} Hz",
     )
-
-
-def _rate(step: float, unit: str) -> float:
-    return 1.0 / (step * TO_S[unit]) if step > 0.0 else math.nan
 
 
 def _gap(table: ColumnTable, names: Sequence[str], force: Numbers | None) -> Guess:
@@ -213,14 +210,14 @@ def _effort(table: ColumnTable, force: Numbers | None) -> Iterator[Guess]:
 def _channels(table: ColumnTable) -> Iterator[Guess]:
     """Yield a line for the arrays, which are kept as channels."""
     arrays = [name for name, values in table.numbers.items() if values.ndim == 2]
-    named = {re.sub("[^a-z0-9]+", "_", name.lower()).strip("_") or "array": name for name in arrays}
+    named = {_channel_name(name) or "array": name for name in arrays}
     lines = [f'{key} = "{quoted(name)} [counts]"' for key, name in named.items() if key[0].isalpha()]
     if lines:
         yield Guess(key="channels", value=f"{{ {', '.join(lines)} }}", check="the units of the arrays")
 
 
-def _prefix(pattern: str) -> str:
-    return re.sub("[^A-Za-z0-9]+", "_", pattern).strip("_")
+def _channel_name(name: str) -> str:
+    return re.sub("[^a-z0-9]+", "_", name.lower()).strip("_")
 
 
 def _forces(table: ColumnTable, names: Sequence[str]) -> Iterator[Guess]:
@@ -263,7 +260,7 @@ def _forces_of_cells(table: ColumnTable, cells: Mapping[str, Sequence[str]]) -> 
     else:
         yield Guess(key="left", value=f"mean({', '.join(patterns[:-1])}) {unit}", check=said)
         yield Guess(key="right", value=f"mean({patterns[-1]}) {unit}", check=said)
-    named = ", ".join(f'{_prefix(pattern).lower()} = "{pattern} {unit}"' for pattern in patterns)
+    named = ", ".join(f'{_channel_name(pattern)} = "{pattern} {unit}"' for pattern in patterns)
     yield Guess(key="channels", value=f"{{ {named} }}", check="the names of the groups")
 
 

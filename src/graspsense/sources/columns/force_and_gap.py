@@ -15,7 +15,7 @@ from graspsense.sources.formats.table import Numbers
 
 LEAST_S: Final = 0.015
 MOST_S: Final = 0.05
-"""Delays of two topics that differ by less (s) are usual; those that differ by more are told when they are read."""
+"""Delays of two topics that differ by less (s) are usual; those that differ by more are always told."""
 BEGUN: Final = 0.05
 LOADED: Final = 0.2
 """Shares of its range at which the force has begun, and at which that was no noise."""
@@ -36,11 +36,11 @@ def doubtful_delay(t_s: Numbers, gap: Numbers, force: Numbers, later_s: float) -
     `later_s` is how much later the messages of the force are recorded, after the time in their headers, than those of
     the gap: the force is slow, or the clock in one of the headers is off by this time.
     """
-    if not LEAST_S < abs(later_s) <= MOST_S:
+    if not abs(later_s) > LEAST_S:
         return ""
     known = np.isfinite(t_s) & np.isfinite(gap) & np.isfinite(force)
     apart_s = _slows_after_force(t_s[known], gap[known], force[known])
-    if apart_s is not None and abs(apart_s) < 0.5 * abs(later_s):
+    if apart_s is not None and abs(apart_s) < 0.5 * abs(later_s) <= 0.5 * MOST_S:
         return ""
     older, newer = ("force", "gap") if later_s > 0.0 else ("gap", "force")
     return (

@@ -43,7 +43,7 @@ PLAUSIBLE: Final = {
 """Quantity to its plausible range, the unit of that, and the units that a column out of range is most likely in."""
 
 
-_NAMES: Final = ("t_s", "gap_m", "left_n", "right_n", "effort_n", "velocity_m_s")
+NAMES: Final = ("t_s", "gap_m", "left_n", "right_n", "effort_n", "velocity_m_s")
 """The columns of a grasp that are no further channels."""
 
 
@@ -104,7 +104,7 @@ class GraspColumns:
 
     def rows(self, which: Any, part: str = "") -> GraspColumns:
         """Return these samples (a slice, numbers, or a mask); `part` says in words which they are."""
-        named = {name: values[which] for name in _NAMES if (values := getattr(self, name)) is not None}
+        named = {name: values[which] for name in NAMES if (values := getattr(self, name)) is not None}
         return evolve(
             self,
             source=f"{self.source}, {part}" if part else self.source,
@@ -276,7 +276,7 @@ def _misfits(columns: GraspColumns) -> Iterator[str]:
         if len(wrong) or not np.isfinite(time_s).all():
             place = str(int(wrong[0]) + 2) if len(wrong) else "that is no number"
             yield f"the times of {name!r} do not increase at sample {place}"
-    named = {name: values for name in _NAMES if (values := getattr(columns, name)) is not None}
+    named = {name: values for name in NAMES if (values := getattr(columns, name)) is not None}
     for name, values in (*named.items(), *columns.scalars.items(), *columns.arrays.items()):
         dimensions, needed = (2, "row") if name in columns.arrays else (1, "number")
         if np.ndim(values) != dimensions:

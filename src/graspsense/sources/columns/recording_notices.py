@@ -1,13 +1,19 @@
-"""What looks wrong in the forces and the gap of a recording, whatever it was read from."""
+"""What looks wrong in the forces and the gap of a recording, whatever it was read from.
+
+Each check asks how a signal leaves its course: by which share of its range, in how many samples, and under which load.
+Ranges are without glitches. The noise of a force is its usual second difference, its course the median around a sample.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import cached_property
 from itertools import pairwise
 from typing import Final
 
 import numpy as np
-from attrs import evolve
+from attrs import evolve, frozen
+from numpy.typing import NDArray
 
 from graspsense.core.control.contact import CONTACT_FORCE_N
 from graspsense.core.values.fingers import FingerForce
@@ -17,88 +23,52 @@ from graspsense.sources.columns.usual_range import usual_range
 from graspsense.sources.formats.table import Numbers
 
 FEWEST: Final = 20
-"""Fewest samples from which on a force that has stopped is told from one that is steady."""
-STOPPED: Final = 0.1
-"""Share of a recording for which a force in coarse counts repeats its last value when its sensor has stopped."""
-CHANGES: Final = 20.0
-"""Number of changes that a force would have had in the time in which its sensor has stopped."""
-LARGEST_COUNTS: Final = frozenset(float(2**bits - 1) for bits in (8, 10, 12, 14, 15, 16))
-"""The ends of the ranges of converters, in counts."""
-TURNS: Final = 0.3
-"""Share of the changes without a load that go against the one before, where they are noise."""
-LARGE_TURNS: Final = 0.1
-"""Share of the changes without a load that turn and exceed the least one, where the steps of a force are fine."""
-FEWEST_IN_COURSE: Final = 30
-"""Fewest samples from which on the course of a force is told from a glitch."""
+"""Fewest samples of a recording, of a load, and of a value that stays, from which on something is told of them."""
+SLIGHT: Final = 0.02
+"""Share of its range up to which a force or a gap is the same,"""
+PART: Final = 0.1
+"""from which on it is another one, and share of the samples from which on something is told of them,"""
+FREE: Final = 0.2
+"""and up to which a force is that of free fingers,"""
+LOADED: Final = 0.5
+"""and from which on they press."""
+NOISE: Final = 10.0
+"""What is no noise is at least so many times as large."""
+ZERO_SAMPLES: Final = 10
+"""Samples at an end of a recording that a zero is taken from, if they differ by a `PART` of the range at most."""
 GLITCH_SAMPLES: Final = 3
 GLITCH_S: Final = 0.05
 """Most samples and longest time (s) of one glitch: what lasts longer can be a tap."""
+FAR_SAMPLES: Final = 10
+FAR_S: Final = 0.2
+FAR: Final = 2.0
+"""The same of a glitch that exceeds so many times the range of a force under a load."""
 MOST_GLITCHES: Final = 0.05
 """Largest share of all samples that are glitches: what is more frequent is the course of the force."""
-FREE_GLITCH: Final = 0.1
-LOADED_GLITCH: Final = 0.5
-"""Share of its range by which a force leaves its course in a glitch: up to this share of the force, and above it."""
-GLITCH_NOISE: Final = 10.0
-"""A glitch is at least so many times the usual distance from the course."""
-NUMB: Final = 0.02
-"""Share of the range of the other pad up to which a pad feels nothing,"""
-NUMB_SHARE: Final = 0.1
-"""and of the samples in which the other one is loaded, from which on that is told."""
-UNEQUAL: Final = 0.12
-"""Share of the force of both pads by which that of one is away from a half, or changes under load,"""
-UNEQUAL_REST: Final = 0.1
-"""without this share of the samples at each end, in which a pad can touch first or let go last."""
-PARTED: Final = 0.1
-"""Share of its range by which the force of a loaded pad leaves that of the other one at once, or rises,"""
-LOADED_SAMPLES: Final = 5
-"""after so many samples under a load."""
-ROUGH_S: Final = 0.1
-ROUGH: Final = 0.02
-"""Time (s) over which a force is averaged, and the share of its range that it usually is away from that,"""
-COARSE: Final = 0.05
-"""and half a step of it, from which on a single value is not known."""
-OPENS: Final = 0.02
-"""Share of its range by which a gap is wider than at the contact when no object can press any more,"""
-STILL: Final = 0.01
-"""and by which it changes where the fingers begin to open,"""
-LATE_S: Final = 0.04
-LATE_SAMPLES: Final = 2.0
-"""if that lasts for more than so long (s), and so many samples,"""
-GOES_ON: Final = 0.2
-"""and share of its speed with which a gap that comes late goes on after the contact."""
-FAR: Final = 2.0
-FAR_S: Final = 0.2
-FAR_SAMPLES: Final = 10
-"""A force under a load that leaves its course by so many times the range of that is a glitch if it takes no longer."""
-ZERO_SAMPLES: Final = 10
-STEADY: Final = 0.1
-"""Share of its range by which a force may change in the samples that its zero is taken from."""
-OPENED: Final = 0.1
-"""Share of its range by which a gap is wider than at the largest force where the fingers are open."""
-DRIFT: Final = 0.1
-"""Share of its range by which a force may end from where it began."""
-JUMP_SPEED_M_S: Final = 1.0
-JUMP_M_S2: Final = 10.0
-"""Speed beyond which no finger moves, and acceleration,"""
-JUMP: Final = 3.0
-"""and how many times farther than the third largest step of the gap a jump goes, since a glitch is two steps."""
-USUAL_HOLDS: Final = 3.0
-"""A gap stays for so many times as long as it usually has a value, at least, when its sensor has stopped."""
+LEAP: Final = 3.0
+"""A leap is so many times the third largest step, since a glitch is two; a stop is so many times a usual hold."""
+LEAP_SPEED_M_S: Final = 1.0
+LEAP_M_S2: Final = 10.0
+"""Speed beyond which no finger moves, and acceleration."""
 STOPPED_STEPS: Final = 5.0
 """Least steps of a gap that one goes on by, at least, when its sensor had stopped."""
+LOADED_SAMPLES: Final = 5
+"""A force that leaps after so many samples under a load is not that of a contact."""
+UNEQUAL: Final = 0.12
+"""Share of the force of both pads by which that of one is away from a half, or changes under load."""
+ROUGH_S: Final = 0.1
+"""Time (s) over which a force is averaged: single values that are usually farther away than `SLIGHT` are not known."""
+LATE_S: Final = 0.04
+"""A force or a gap that is later than this (s), and than two samples, is late."""
 SELDOM_S: Final = 0.05
 SELDOM_ROWS: Final = 5
 """A force or gap that keeps each value for so long, and so many samples, is measured more rarely than the rows."""
-LARGE_CHANGE: Final = 0.2
-LARGE_STEP: Final = 0.1
-"""Share of its range by which such a force, or such a gap, changes at once where contact and rest are seen too late."""
-FEWEST_CHANGES: Final = 2
-SELDOM_SHARE: Final = 0.1
-"""Share of the changes of such a force that may be closer to the one before."""
-FREE: Final = 0.2
-"""Share of its range up to which a force is that of free fingers."""
-BUMP_TRAVEL: Final = 0.05
-"""Share of its range by which the gap closes after a bump."""
+CHANGES: Final = 20.0
+"""Number of changes that a force would have had in the time in which its sensor has stopped."""
+TURNS: Final = 0.3
+"""Share of the changes without a load that go against the one before, where they are noise."""
+LARGEST_COUNTS: Final = frozenset(float(2**bits - 1) for bits in (8, 10, 12, 14, 15, 16))
+"""The ends of the ranges of converters, in counts."""
 
 
 def with_notices(labelled: LabelledRecording) -> LabelledRecording:
@@ -111,385 +81,84 @@ def with_notices(labelled: LabelledRecording) -> LabelledRecording:
     return evolve(labelled, notices=notices, recording=evolve(labelled.recording, notices=notices))
 
 
+@frozen(eq=False)
+class _Force:
+    """A force and the gap by time, where all have a number, and what is measured of the force."""
+
+    what: str
+    t: Numbers
+    gap: Numbers
+    n: Numbers
+    units: Mapping[str, str]
+
+    def __len__(self) -> int:
+        return len(self.n)
+
+    @cached_property
+    def low(self) -> float:
+        return usual_range(self.n)[0]
+
+    @cached_property
+    def span(self) -> float:
+        return usual_range(self.n)[1] - self.low
+
+    @cached_property
+    def noise(self) -> float:
+        return NOISE * float(np.median(np.abs(np.diff(self.n, 2))))
+
+    def above(self, share: float) -> NDArray[np.bool_]:
+        """Return which samples are above this share of the range."""
+        return self.n > self.low + share * self.span
+
+    def when(self, k: int) -> str:
+        """Return the time of a sample in words."""
+        return f"{self.t[k]:.4g} {self.units.get('t', 's')}"
+
+    def amount(self, force: float, form: str = ".3g") -> str:
+        """Return a force in words."""
+        return f"{force:{form}} {self.units.get('force_left', 'N')}"
+
+
 def signal_notices(recording: Recording) -> Iterator[str]:
     """Return what looks wrong in the forces of the pads and in the gap.
 
     A force has no number, one value all along, or a value that stays; a glitch; or a zero that drifts. The gap jumps,
     or stays while the force changes.
     """
-    times = np.array([reading.frame.t_s for reading in recording.readings])
-    gap = np.array([reading.frame.gap_m for reading in recording.readings])
-    left = np.array([reading.frame.force_left_n for reading in recording.readings])
-    right = np.array([reading.frame.force_right_n for reading in recording.readings])
+    frames = [reading.frame for reading in recording.readings]
+    t, gap, left, right = np.array([(f.t_s, f.gap_m, f.force_left_n, f.force_right_n) for f in frames]).T
+    measured = [np.isfinite(signal) for signal in (gap, left, right)]
+    known = np.logical_and.reduce([finite for finite in measured if finite.any()] or measured)
     pads = force_of_pads(left, right)
-    told = [text for what, force in pads.items() for text in _of_sensor(what, times, force, recording.units)]
-    if not told and len(pads) > 1:
-        for what, other in zip(pads, (right, left), strict=True):
-            told += _numb(what, times, gap, pads[what], other, recording.units)
-        hand = any(isinstance(channel, FingerForce) for channel in recording.channels)
-        told += _unequal(left, right, recording.units) if not told and not hand else ()
-        told += _parted(times, left, right, recording.units) if not told and not hand else ()
-    for what, force in pads.items():
-        known = np.isfinite(force)
-        if int(known.sum()) >= FEWEST:
-            of_pad = times[known], force[known]
-            if "t" not in recording.units:
-                doubtful = bool(told)
-                told += [*_glitches(what, *of_pad, recording.units), *_seldom(what, *of_pad, LARGE_CHANGE)]
-                told += [] if doubtful else _rough(what, *of_pad)
-            told += _drift(what, gap[known], force[known], recording.units)
-    yield from told or _rises_at_once(times, (left + right) / 2.0, recording.units)
-    if not {"gap", "t"} & recording.units.keys() and len(gap) >= FEWEST:
-        yield from _bump(times, gap, (left + right) / 2.0, recording.units)
-        yield from next(filter(None, ([*_late(what, times, gap, force)] for what, force in pads.items())), ())
-        yield from _jump(times, gap)
-        steps = np.abs(np.diff(gap))
-        # The steps of a coarse gap are alike.
-        if JUMP * steps.min(initial=np.inf, where=steps > 0.0) < steps.max():
-            yield from _seldom("the gap", times, gap, LARGE_STEP)
-        yield from _stopped_gap(times, gap, (left + right) / 2.0)
-
-
-def _of_sensor(what: str, times: Numbers, force: Numbers, units: Mapping[str, str]) -> Iterator[str]:
-    """Yield what tells that a force was not measured, or not all the time."""
-    finite = np.isfinite(force)
-    known, known_times = force[finite], times[finite]
-    if len(force) > 1 and not len(known):
-        yield f"{what} has no number: was the sensor connected?"
-    elif len(known) > 2 and known.min() == known.max():
-        yield f"{what} does not change during the recording: is it another column, or did its sensor stop?"
-    elif (held := _held(known)) is not None:
-        begin, end = known_times[held.start], known_times[held.stop - 1]
-        repeats = (
-            "its last value to the end"
-            if held.stop == len(known)
-            else f"one value from {begin:.4g} to {end:.4g} {units.get('t', 's')}"
-        )
-        yield (
-            f"{what} repeats {repeats}, although it varied before: did its sensor stop, or is it "
-            "at the end of its range?"
-        )
-
-
-def _numb(
-    what: str, times: Numbers, gap: Numbers, force: Numbers, other: Numbers, units: Mapping[str, str]
-) -> Iterator[str]:
-    """Yield that a pad feels nothing but its noise while the other one is loaded, and the gap has not opened.
-
-    One that touches the object late does so for a while; one that felt it before and feels it again had failed.
-    """
-    known = np.isfinite(force) & np.isfinite(other)
-    t, gap, force, other = times[known], gap[known], force[known], other[known]
-    if len(force) < FEWEST:
+    forces = [
+        _Force(what, t[known], gap[known], force[known], recording.units)
+        for what, force in pads.items()
+        if np.isfinite(force).any()
+    ]
+    told = [f"{what} has no number: was the sensor connected?" for what in pads if len(t) > 1]
+    told = [text for text in told if not any(text.startswith(f"{force.what} has") for force in forces)]
+    told += [text for force in forces for text in _of_sensor(force)]
+    if int(known.sum()) < FEWEST or not forces:
+        yield from told
         return
-    low, span = usual_range(other)[0], float(np.ptp(other))
-    noise = max(float(np.median(np.abs(np.diff(part, 2)))) for part in (force, other))
-    loaded = other > low + 0.5 * span
-    begin = int(loaded.argmax())
-    free = np.flatnonzero(other[:begin] < low + FREE_GLITCH * span)
-    if not len(free) or not span > GLITCH_NOISE * noise:
-        return
-    loaded &= gap <= gap[begin]
-    zero = float(np.median(force[free]))
-    numb = np.flatnonzero(loaded & (np.abs(force - zero) < max(GLITCH_NOISE * noise, NUMB * span)))
-    felt = np.flatnonzero(np.abs(force - zero) > FREE * span)
-    lost = numb[(numb > felt[0]) & (numb < felt[-1])] if len(felt) else felt
-    if len(numb) < FEWEST or len(numb) <= NUMB_SHARE * np.count_nonzero(loaded):
-        numb = lost
-    if len(numb) > GLITCH_SAMPLES:
-        yield (
-            f"{what} stays at {zero:.3g} {units.get('force_left', 'N')} from {t[numb[0]]:.4g} to {t[numb[-1]]:.4g} "
-            f"{units.get('t', 's')}, while the other pad feels up to {other[numb].max():.3g}: does its fingertip not "
-            "answer, or did one finger alone touch?"
-        )
-
-
-def _unequal(left: Numbers, right: Numbers, units: Mapping[str, str]) -> Iterator[str]:
-    """Yield that two pads do not bear the same force, or not all the time: as opposed pads they have to.
-
-    Counts of two sensors need not be the same, but what they are of each other stays.
-    """
-    known = np.isfinite(left) & np.isfinite(right)
-    left, right = left[known], right[known]
-    if len(left) < FEWEST or not any(map(_is_clear, (left, right))):
-        return
-    left, right = (force - np.median(force[:ZERO_SAMPLES]) for force in (left, right))
-    magnitude = np.abs(left) + np.abs(right)
-    low, high = usual_range(magnitude)
-    loaded = magnitude > low + 0.5 * (high - low)
-    if np.count_nonzero(loaded) < FEWEST:
-        return
-    least, usual, most = np.quantile(
-        right[loaded] / magnitude[loaded], (UNEQUAL_REST, 0.5, 1.0 - UNEQUAL_REST)
-    )
-    if most - least > UNEQUAL or (abs(usual - 0.5) > UNEQUAL and "force_left" not in units):
-        yield (
-            f"the right pad bears {100 * least:.0f} % to {100 * most:.0f} % of the force of both under load, and half "
-            "is due: were the pads exchanged, does one read wrong, or did the object lie on one of them only in part?"
-        )
-
-
-def _parted(times: Numbers, left: Numbers, right: Numbers, units: Mapping[str, str]) -> Iterator[str]:
-    """Yield that the forces of two loaded pads part at once: one failed or came back, or they were exchanged."""
-    known = np.isfinite(left) & np.isfinite(right)
-    t, left, right = times[known], left[known], right[known]
-    if len(left) < FEWEST:
-        return
-    left, right = (force - np.median(force[:ZERO_SAMPLES]) for force in (left, right))
-    low, high = usual_range((left + right) / 2.0)
-    span = high - low
-    loaded = np.minimum(left, right) > FREE * span
-    if not loaded.any():
-        return
-    scale = float(np.median(left[loaded] / right[loaded]))
-    steps = np.abs(np.diff(_course(left - scale * right, GLITCH_SAMPLES)))
-    larger = np.maximum(left, right)
-    # Where fingers meet an object, or let it go, one of them can be first.
-    held = np.flatnonzero(larger > 0.5 * larger.max())
-    begin, end = min(int(loaded.argmax()), int(held[0])), int(held[-1])
-    within = (loaded[1:] | loaded[:-1]) & (np.arange(1, len(t)) > begin) & (np.arange(1, len(t)) < end)
-    k = int(np.argmax(steps * within))
-    least = max(PARTED * span, GLITCH_NOISE * float(np.median(steps)), JUMP * float(np.sort(steps)[-3]))
-    if steps[k] > least and within[k]:
-        yield (
-            f"the forces of the pads part by {steps[k]:.3g} {units.get('force_left', 'N')} at {t[k + 1]:.4g} "
-            f"{units.get('t', 's')}: did one of them fail for a while, or were they exchanged?"
-        )
-
-
-def _rough(what: str, times: Numbers, force: Numbers) -> Iterator[str]:
-    """Yield that a force varies so much around its mean course, or has so coarse steps, that no value tells it."""
-    low, high = usual_range(force)
-    span, step_s = high - low, float(np.median(np.diff(times)))
-    width = 2 * max(2, round(0.5 * ROUGH_S / step_s)) + 1
-    if len(force) < 2 * width or not span > 0.0:
-        return
-    around = np.pad(force, width // 2, mode="edge")
-    course = np.convolve(around, np.full(width, 1.0 / width), mode="valid")
-    varies = float(np.median(np.abs(force - course)))
-    apart = np.diff(np.unique(force))
-    coarse = 0.5 * float(apart.min())
-    in_steps = np.allclose(apart / (2.0 * coarse), np.round(apart / (2.0 * coarse)))
-    if varies > ROUGH * span:
-        share = f"{100 * varies / span:.0f} %"
-        yield f"{what} varies by {share} of its range around its course, and so does each feature of it"
-    elif in_steps and coarse > COARSE * span:
-        share = f"{200 * coarse / span:.0f} %"
-        yield f"{what} has steps of {share} of its range: each value is up to half a step off"
-
-
-def _rises_at_once(times: Numbers, force: Numbers, units: Mapping[str, str]) -> Iterator[str]:
-    """Yield that a force under a load rises within a sample, as where some are missing, or after its sensor stopped."""
-    known = np.isfinite(force)
-    t, force = times[known], force[known]
-    if len(force) < FEWEST_IN_COURSE:
-        return
-    low, high = usual_range(force)
-    steps = np.diff(_course(force, GLITCH_SAMPLES))
-    free = np.flatnonzero(force <= low + FREE * (high - low))
-    samples, usual = np.arange(len(steps)), float(np.sort(np.abs(steps))[-3])
-    steps[samples - free[np.searchsorted(free, samples, side="right") - 1] < LOADED_SAMPLES] = 0.0
-    k, noise = int(steps.argmax()), float(np.median(np.abs(np.diff(force, 2))))
-    if steps[k] > max(PARTED * (high - low), GLITCH_NOISE * noise, JUMP * usual):
-        yield (
-            f"the force rises by {steps[k]:.3g} {units.get('force_left', 'N')} at once at {t[k + 1]:.4g} "
-            f"{units.get('t', 's')}, under a load: are samples missing there, or did its sensor stop before?"
-        )
-
-
-def _is_clear(force: Numbers) -> bool:
-    """Return whether a force is far above its noise."""
-    return bool(np.ptp(force) > GLITCH_NOISE * np.median(np.abs(np.diff(force, 2))))
-
-
-def _glitches(what: str, times: Numbers, force: Numbers, units: Mapping[str, str]) -> Iterator[str]:
-    """Yield that a force leaves its course for a few samples: without a load, or by most of its range anywhere."""
-    changes = np.flatnonzero(np.diff(force)) + 1
-    # A sensor that is slower than the rows repeats its values.
-    every = max(1, round(float(np.median(np.diff(changes))))) if len(changes) > 1 else 1
-    sampled, sampled_times = force[::every], times[::every]
-    if len(sampled) < FEWEST_IN_COURSE:
-        return
-    step_s = float(np.median(np.diff(sampled_times)))
-    course = _course(sampled, min(GLITCH_SAMPLES, int(GLITCH_S / step_s)))
-    apart, span = np.abs(sampled - course), float(np.ptp(sampled))
-    free = course < course.min() + FREE_GLITCH * np.ptp(course)
-    noise = float(np.median(apart))
-    left = (apart > np.where(free, FREE_GLITCH, LOADED_GLITCH) * span) & (apart > GLITCH_NOISE * noise)
-    # Under a load, nothing exceeds all other forces several times and then comes back, however rarely it is measured.
-    wide = _course(sampled, min(FAR_SAMPLES, max(1, int(FAR_S / step_s))))
-    loaded = wide > wide.min() + FREE_GLITCH * np.ptp(wide)
-    far = np.abs(sampled - wide)
-    left |= loaded & (far > max(FAR * float(np.ptp(wide)), GLITCH_NOISE * float(np.median(far))))
-    count = int(left.sum())
-    if not 0 < count <= MOST_GLITCHES * len(sampled):
-        return
-    k = int(np.argmax(left))
-    others = f", and {count - 1} more" if count > 1 else ""
-    yield (
-        f"{what} leaves its course for a moment ({sampled[k]:.4g} {units.get('force_left', 'N')} at "
-        f"{sampled_times[k]:.4g} s{others}): if that is a glitch, take it out, since it can "
-        "pass for a contact"
-    )
-
-
-def _course(force: Numbers, longest: int) -> Numbers:
-    """Return a force without what lasts at most so many samples."""
-    around = np.pad(force, longest, mode="reflect")
-    return np.median(np.lib.stride_tricks.sliding_window_view(around, 2 * longest + 1), axis=1)
-
-
-def _seldom(what: str, times: Numbers, values: Numbers, large: float) -> Iterator[str]:
-    """Yield that values are new so rarely (s) that they change by a `large` share of their range at once."""
-    changes = np.flatnonzero(np.diff(values)) + 1
-    if len(changes) < FEWEST_CHANGES:
-        return
-    every_s = float(np.quantile(np.diff(times[changes]), SELDOM_SHARE))
-    rows = float(np.quantile(np.diff(changes), SELDOM_SHARE))
-    largest = float(np.abs(np.diff(values)).max())
-    if every_s >= SELDOM_S and rows >= SELDOM_ROWS and largest > large * np.ptp(values):
-        yield (
-            f"{what} has a new value every {every_s:.2g} s only, more rarely than the rows: a contact is seen up to so "
-            "much too late, and a rest with an older value"
-        )
-
-
-def _drift(what: str, gap: Numbers, force: Numbers, units: Mapping[str, str]) -> Iterator[str]:
-    """Yield that a force does not come back when the fingers are open again."""
-    span = float(np.ptp(force))
-    changes = np.flatnonzero(np.diff(force))
-    if len(changes) < FEWEST:  # measured too rarely, unless its last value stays for longer than others did
-        held = len(force) - 1 - int(changes[-1]) if len(changes) > 1 else 0
-        if held <= max(FEWEST, USUAL_HOLDS * float(np.diff(changes).max(initial=0))):
-            return
-    ends = force[:ZERO_SAMPLES], force[-ZERO_SAMPLES:]
-    steady = max(float(np.ptp(part)) for part in ends) <= STEADY * span
-    first_load = int(np.argmax(force > force[0] + FREE * span))
-    peak = int(force.argmax())
-    opened = gap[-1] >= gap[first_load] and min(gap[0], gap[-1]) > gap[peak] + OPENED * np.ptp(gap)
-    apart = float(ends[1].mean() - ends[0].mean())
-    if steady and opened and abs(apart) > DRIFT * span:
-        yield (
-            f"{what} ends {apart:+.3g} {units.get('force_left', 'N')} from where it began, although the fingers are "
-            "open again: its zero drifts, and all forces have a part of that, or its sensor stopped"
-        )
-
-
-def _bump(times: Numbers, gap: Numbers, force: Numbers, units: Mapping[str, str]) -> Iterator[str]:
-    """Yield that a force comes, is gone while the gap (m) closes further, and comes back, by time (s)."""
-    known = np.isfinite(force) & np.isfinite(gap)
-    t_s, gap, force = times[known], gap[known], force[known]
-    if len(force) < FEWEST_IN_COURSE:
-        return
-    course = _course(force, 1)
-    low, span = usual_range(course)[0], float(np.ptp(course))
-    contact = FREE_GLITCH * span if "force_left" in units else min(FREE_GLITCH * span, CONTACT_FORCE_N)
-    contact = max(contact, GLITCH_NOISE * float(np.median(np.abs(np.diff(force, 2)))))
-    felt = course - low > contact
-    begin = int(felt.argmax())
-    gone = np.flatnonzero(course[begin:] - low < 0.5 * contact)
-    if not felt.any() or not len(gone):
-        return
-    end = begin + int(gone[0])
-    back = np.flatnonzero(felt[end:])
-    if not len(back):
-        return
-    again = end + int(back[0])
-    closes = float(gap[end] - gap[again])
-    glitch = end - begin <= GLITCH_SAMPLES and t_s[end] - t_s[begin] <= GLITCH_S
-    if closes > BUMP_TRAVEL * np.ptp(gap) and gap[end:again].max() <= gap[begin] and not glitch:
-        yield (
-            f"a force comes at {t_s[begin]:.4g} s and is gone at {t_s[end]:.4g} s, the fingers close by "
-            f"{closes * 1e3:.3g} mm more, and it comes back at {t_s[again]:.4g} s: the contact is the first of these. "
-            "If the fingers touched something on their way, cut that out; or the object broke"
-        )
-
-
-def _late(what: str, times: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
-    """Yield that a force (N) stays while the fingers open, or that the gap (m) follows late, by time (s)."""
-    known = np.isfinite(force) & np.isfinite(gap)
-    t_s, gap, force = times[known], gap[known], force[known]
-    if len(force) < FEWEST_IN_COURSE:
-        return
-    low, high = usual_range(force)
-    loaded = np.flatnonzero(force > low + 0.5 * (high - low))
-    free = np.flatnonzero(force < low + FREE_GLITCH * (high - low))
-    if not len(loaded) or not len(onset := free[free < loaded[0]]) or not np.ptp(gap) > 0.0:
-        return
-    gone = free[free > loaded[-1]]
-    begin, opened = int(onset[-1]), OPENS * float(np.ptp(gap))
-    least_s = max(LATE_S, LATE_SAMPLES * float(np.median(np.diff(t_s))))
-    wide = loaded[(gap[loaded] > gap[begin] + opened) & (loaded > loaded[gap[loaded].argmin()])]
-    if len(wide) and len(gone) and t_s[wide[-1]] - t_s[wide[0]] > least_s:
-        yield (
-            f"{what} stays until {t_s[wide[-1]]:.4g} s, although the fingers are wider than at the contact from "
-            f"{t_s[wide[0]]:.4g} s on: does the force come late, or did its sensor stop?"
-        )
-    elif len(gone):
-        end, still = int(gone[0]), STILL * float(np.ptp(gap))
-        opens = end + int((gap[end:] > gap[begin : end + 1].min() + still).argmax())
-        late_s = float(t_s[opens] - t_s[end])
-        around_s = t_s[begin] + late_s * np.arange(-1, 2)
-        approach, further = -np.diff(np.interp(around_s, t_s, gap))
-        closes = float(np.interp(t_s[end] - late_s, t_s, gap)) - gap[end] > GOES_ON * approach
-        goes_on = further > GOES_ON * approach > still
-        if late_s > least_s and around_s[0] >= t_s[0] and goes_on and not closes:
-            yield (
-                f"the fingers go on as fast after the force begins (at {t_s[begin]:.4g} s), and open {late_s:.2g} s "
-                "after it is gone: does the gap come late?"
-            )
-
-
-def _jump(times: Numbers, gap: Numbers) -> Iterator[str]:
-    """Yield that a gap (m) jumps faster (s) than fingers move, and farther than it does elsewhere."""
-    known = np.isfinite(gap)
-    t_s, steps = times[known], np.abs(np.diff(gap[known]))
-    changes = np.flatnonzero(steps)
-    if len(changes) < FEWEST:
-        return
-    k, usual = int(steps.argmax()), float(np.sort(steps)[-3])
-    seconds = max(float(np.diff(t_s)[k]), float(np.median(np.diff(t_s))))
-    # A gap that is measured more rarely than the rows moves in the time between its values.
-    measured_s = max(seconds, float(np.median(np.diff(t_s[changes]))))
-    faster = steps[k] > JUMP_SPEED_M_S * seconds or steps[k] - usual > JUMP_M_S2 * measured_s**2
-    if faster and steps[k] > JUMP * usual:
-        yield (
-            f"the gap jumps by {steps[k] * 1e3:.3g} mm within {seconds * 1e3:.3g} ms (at {t_s[k + 1]:.4g} s), "
-            "as no finger does: is it a glitch, or did its sensor stop before?"
-        )
-
-
-def _stopped_gap(times: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
-    """Yield that a gap (m) stays, by time (s), as the gap of a rigid object does, and yet does not end so.
-
-    It jumps to another value at once, and the force does not. Or it does not open, and the force is gone.
-    """
-    begins = np.concatenate(([0], np.flatnonzero(np.diff(gap)) + 1, [len(gap)])).tolist()
-    # The gap can have fewer values than rows.
-    usual = int(np.median(np.diff(begins)))
-    longest = max(FEWEST, USUAL_HOLDS * usual)
-    changes = np.abs(np.diff(gap[begins[:-1]])).tolist()
-    span = float(np.ptp(force))
-    for k, (begin, end) in enumerate(pairwise(begins)):
-        during = force[begin:end]
-        if end - begin < longest or k == 0 or not float(np.ptp(during)) > FREE * span:
-            continue
-        stays = (
-            f"the gap stays at {gap[begin] * 1e3:.4g} mm from {times[begin]:.4g} to {times[end - 1]:.4g} s"
-        )
-        if end == len(gap):
-            if during.max() - force.min() > 0.5 * span and during[-1] - force.min() < FREE_GLITCH * span:
-                yield f"{stays}, although the force is gone: did its sensor stop?"
-        elif end + usual < len(gap):
-            moves_on = end + longest > begins[k + 2] < len(gap)
-            around = max(changes[k - 1], changes[k + 1] if moves_on else 0.0)
-            across = force[max(begin, end - usual)], force[min(end + usual, len(force)) - 1]
-            calm = abs(float(across[1] - across[0])) < FREE_GLITCH * span
-            if changes[k] > JUMP * around and changes[k] > STOPPED_STEPS * min(changes) and calm:
-                yield (
-                    f"{stays} while the force changes, and then jumps by {changes[k] * 1e3:.3g} mm: did its sensor "
-                    "stop?"
-                )
+    mean = evolve(forces[0], what="the force", n=np.mean([force.n for force in forces], axis=0))
+    hand = any(isinstance(channel, FingerForce) for channel in recording.channels)
+    if not told and len(forces) > 1:
+        told += [text for pair in (forces, forces[::-1]) for text in _numb(*pair)]
+        told += _unequal(*forces) if not told and not hand else ()
+        told += _parted(*forces) if not told and not hand else ()
+    for force in forces:
+        if "t" not in recording.units:
+            doubtful = bool(told)
+            told += [*_glitches(force), *_seldom(force.what, force.t, force.n, FREE)]
+            told += [] if doubtful else _rough(force)
+        told += _drift(force)
+    yield from told or _rises_at_once(mean)
+    if not {"gap", "t"} & recording.units.keys() and mean.gap.any():
+        yield from _bump(mean)
+        yield from next(filter(None, map(list, map(_late, forces))), ())
+        yield from _gap_leaps(mean.t, mean.gap)
+        yield from _stopped_gap(mean)
 
 
 def force_of_pads(left: Numbers, right: Numbers) -> dict[str, Numbers]:
@@ -499,33 +168,320 @@ def force_of_pads(left: Numbers, right: Numbers) -> dict[str, Numbers]:
     return {"the force of the left pad": left, "the force of the right pad": right}
 
 
-def _held(force: Numbers) -> slice | None:
+def _course(values: Numbers, longest: int) -> Numbers:
+    """Return values without what lasts at most so many samples."""
+    around = np.pad(values, longest, mode="reflect")
+    return np.median(np.lib.stride_tricks.sliding_window_view(around, 2 * longest + 1), axis=1)
+
+
+def _leap(steps: Numbers, within: NDArray[np.bool_], least: float) -> int | None:
+    """Return the sample to which a signal leaps: by more than this, and than elsewhere; None if it does not."""
+    k = int(np.argmax(steps * within))
+    return k + 1 if steps[k] * within[k] > max(least, LEAP * float(np.sort(np.abs(steps))[-3])) else None
+
+
+def _runs(values: Numbers) -> list[tuple[int, int]]:
+    """Return the first sample of each time in which a value stays, and the one after its last."""
+    return [*pairwise([0, *(np.flatnonzero(np.diff(values)) + 1).tolist(), len(values)])]
+
+
+def _of_sensor(force: _Force) -> Iterator[str]:
+    """Yield that a force was not measured, or not all the time."""
+    if len(force) > 2 and not np.ptp(force.n):
+        yield f"{force.what} does not change during the recording: is it another column, or did its sensor stop?"
+    elif len(force) >= FEWEST and (held := _held(force.n)) is not None:
+        begin, end = held
+        to_end = "its last value to the end"
+        repeats = (
+            to_end if end == len(force) else f"one value from {force.t[begin]:.4g} to {force.when(end - 1)}"
+        )
+        yield (
+            f"{force.what} repeats {repeats}, although it varied before: did its sensor stop, or is it "
+            "at the end of its range?"
+        )
+
+
+def _held(force: Numbers) -> tuple[int, int] | None:
     """Return the samples in which a force that varies also without a load, by its noise, repeats a value; else None.
 
     A value in coarse counts can stay within its step. It is told only if it stays to the end, and for long, or if it is
     the largest of a converter.
     """
-    if len(force) < FEWEST:
-        return None
-    steps = np.diff(force)
+    steps, runs = np.diff(force), _runs(force)
     changed = steps != 0.0
     free = force[:-1] < force.min() + FREE * np.ptp(force)
-    begins = np.concatenate(([0], np.flatnonzero(changed) + 1, [len(force)])).tolist()
-    runs = [slice(begin, end) for begin, end in pairwise(begins)]
-    for run in (runs[-1], max(runs, key=lambda run: run.stop - run.start)):
+    for begin, end in (runs[-1], max(runs, key=lambda run: run[1] - run[0])):
         others = free.copy()
-        others[run.start : run.stop - 1] = False
-        repeated = run.stop - run.start - 1
-        if repeated >= FEWEST and force[run.start] == force.max() and force.max() in LARGEST_COUNTS:
-            return run
-        if not others.any() or repeated * changed[others].mean() < CHANGES:
-            continue
+        others[begin : end - 1] = False
+        repeated = end - begin - 1
+        if repeated >= FEWEST and force[begin] == force.max() and force.max() in LARGEST_COUNTS:
+            return begin, end
         noise = steps[others & changed]
         turns = noise[1:] * noise[:-1] < 0.0  # noise goes up and down, and a force that is built up does not
-        if len(turns) == 0 or turns.mean() < TURNS:
+        if len(turns) == 0 or repeated * changed[others].mean() < CHANGES or turns.mean() < TURNS:
             continue
         large = np.abs(noise) > 1.5 * np.abs(steps[changed]).min()
-        fine = (large[1:] & large[:-1] & turns).mean() > LARGE_TURNS
-        if fine or (run is runs[-1] and repeated >= STOPPED * len(force)):
-            return run
+        fine = (large[1:] & large[:-1] & turns).mean() > PART
+        if fine or (end == len(force) and repeated >= PART * len(force)):
+            return begin, end
     return None
+
+
+def _numb(pad: _Force, other: _Force) -> Iterator[str]:
+    """Yield that a pad feels nothing but its noise while the other one is loaded, and the gap has not opened.
+
+    One that touches the object late does so for a while; one that felt it before and feels it again had failed.
+    """
+    loaded, noise = other.above(LOADED), max(pad.noise, other.noise)
+    begin = int(loaded.argmax())
+    free = ~other.above(PART)[:begin]
+    if not free.any() or not other.span > noise:
+        return
+    zero = float(np.median(pad.n[:begin][free]))
+    away = np.abs(pad.n - zero)
+    loaded &= pad.gap <= pad.gap[begin]
+    numb, felt = loaded & (away < max(noise, SLIGHT * other.span)), np.flatnonzero(away > FREE * other.span)
+    if np.count_nonzero(numb) < max(FEWEST, PART * np.count_nonzero(loaded)):
+        numb[: felt[0] if len(felt) else None] = False
+        numb[felt[-1] if len(felt) else 0 :] = False
+    if np.count_nonzero(numb) > GLITCH_SAMPLES:
+        from_k, until_k = np.flatnonzero(numb)[[0, -1]].tolist()
+        yield (
+            f"{pad.what} stays at {pad.amount(zero)} from {pad.t[from_k]:.4g} to {pad.when(until_k)}, while the other "
+            f"pad feels up to {other.n[numb].max():.3g}: does its fingertip not answer, or did one finger alone touch?"
+        )
+
+
+def _unequal(left: _Force, right: _Force) -> Iterator[str]:
+    """Yield that two pads do not bear the same force, or not all the time: as opposed pads they have to.
+
+    Counts of two sensors need not be the same, but what they are of each other stays.
+    """
+    magnitudes = [np.abs(pad.n - np.median(pad.n[:ZERO_SAMPLES])) for pad in (left, right)]
+    both = evolve(left, n=magnitudes[0] + magnitudes[1])
+    loaded = both.above(LOADED)
+    if np.count_nonzero(loaded) < FEWEST or not any(pad.span > pad.noise for pad in (left, right)):
+        return
+    shares = magnitudes[1][loaded] / both.n[loaded]
+    least, usual, most = np.quantile(shares, (PART, 0.5, 1.0 - PART))  # a pad can touch first or let go last
+    if most - least > UNEQUAL or (abs(usual - 0.5) > UNEQUAL and "force_left" not in left.units):
+        yield (
+            f"the right pad bears {100 * least:.0f} % to {100 * most:.0f} % of the force of both under load, and half "
+            "is due: were the pads exchanged, does one read wrong, or did the object lie on one of them only in part?"
+        )
+
+
+def _parted(left: _Force, right: _Force) -> Iterator[str]:
+    """Yield that the forces of two loaded pads part at once: one failed or came back, or they were exchanged."""
+    forces = [pad.n - np.median(pad.n[:ZERO_SAMPLES]) for pad in (left, right)]
+    span = evolve(left, n=(forces[0] + forces[1]) / 2.0).span
+    larger, loaded = np.maximum(*forces), np.minimum(*forces) > FREE * span
+    if not loaded.any():
+        return
+    scale = float(np.median(forces[0][loaded] / forces[1][loaded]))
+    steps = np.abs(np.diff(_course(forces[0] - scale * forces[1], GLITCH_SAMPLES)))
+    # Where fingers meet an object, or let it go, one of them can be first.
+    held = np.flatnonzero(larger > LOADED * larger.max())
+    within = loaded[1:] | loaded[:-1]
+    within[: min(int(loaded.argmax()), int(held[0]))] = False
+    within[held[-1] - 1 :] = False
+    k = _leap(steps, within, max(PART * span, NOISE * float(np.median(steps))))
+    if k is not None:
+        yield (
+            f"the forces of the pads part by {left.amount(steps[k - 1])} at {left.when(k)}: did one of them fail for a "
+            "while, or were they exchanged?"
+        )
+
+
+def _rises_at_once(force: _Force) -> Iterator[str]:
+    """Yield that a force under a load rises within a sample, as where some are missing, or after its sensor stopped."""
+    steps = np.diff(_course(force.n, GLITCH_SAMPLES))
+    samples, free = np.arange(len(steps)), np.flatnonzero(~force.above(FREE))
+    loaded = samples - free[np.searchsorted(free, samples, side="right") - 1] >= LOADED_SAMPLES
+    k = _leap(steps, loaded, max(PART * force.span, force.noise))
+    if k is not None:
+        yield (
+            f"the force rises by {force.amount(steps[k - 1])} at once at {force.when(k)}, under a load: are samples "
+            "missing there, or did its sensor stop before?"
+        )
+
+
+def _rough(force: _Force) -> Iterator[str]:
+    """Yield that a force varies so much around its mean course, or has so coarse steps, that no value tells it."""
+    width = 2 * max(2, round(0.5 * ROUGH_S / float(np.median(np.diff(force.t))))) + 1
+    if len(force) < 2 * width or not force.span > 0.0:
+        return
+    around = np.pad(force.n, width // 2, mode="edge")
+    course = np.convolve(around, np.full(width, 1.0 / width), mode="valid")
+    varies = float(np.median(np.abs(force.n - course))) / force.span
+    steps = np.diff(np.unique(force.n))
+    counts = steps / steps.min()
+    if varies > SLIGHT:
+        share = f"{100 * varies:.0f} %"
+        yield f"{force.what} varies by {share} of its range around its course, and so does each feature of it"
+    elif steps.min() > PART * force.span and np.allclose(counts, np.round(counts)):
+        yield (
+            f"{force.what} has steps of {100 * steps.min() / force.span:.0f} % of its range: each value is up to half "
+            "a step off"
+        )
+
+
+def _glitches(force: _Force) -> Iterator[str]:
+    """Yield that a force leaves its course for a few samples: without a load, or by most of its range anywhere."""
+    changes = np.flatnonzero(np.diff(force.n)) + 1
+    # A sensor that is slower than the rows repeats its values.
+    every = max(1, round(float(np.median(np.diff(changes))))) if len(changes) > 1 else 1
+    sampled, t = force.n[::every], force.t[::every]
+    if len(sampled) < FEWEST:
+        return
+    step_s, span = float(np.median(np.diff(t))), float(np.ptp(sampled))
+    left = np.zeros(len(sampled), dtype=np.bool_)
+    # Under a load, nothing exceeds all other forces several times and then comes back, however rarely it is measured.
+    for samples, longest_s, free_share, loaded_share in (
+        (GLITCH_SAMPLES, GLITCH_S, PART * span, LOADED * span),
+        (FAR_SAMPLES, max(FAR_S, step_s), np.inf, FAR),
+    ):
+        course = _course(sampled, min(samples, int(longest_s / step_s)))
+        apart, free = np.abs(sampled - course), course < course.min() + PART * np.ptp(course)
+        loaded_share *= np.ptp(course) if loaded_share == FAR else 1.0
+        left |= (apart > np.where(free, free_share, loaded_share)) & (apart > NOISE * np.median(apart))
+    count, k = int(left.sum()), int(np.argmax(left))
+    if 0 < count <= MOST_GLITCHES * len(sampled):
+        others = f", and {count - 1} more" if count > 1 else ""
+        yield (
+            f"{force.what} leaves its course for a moment ({force.amount(sampled[k], '.4g')} at {t[k]:.4g} s{others}): "
+            "if that is a glitch, take it out, since it can pass for a contact"
+        )
+
+
+def _seldom(what: str, t_s: Numbers, values: Numbers, large: float) -> Iterator[str]:
+    """Yield that values are new so rarely (s) that they change by a `large` share of their range at once."""
+    changes = np.flatnonzero(np.diff(values)) + 1
+    if len(changes) < 2:
+        return
+    every_s = float(np.quantile(np.diff(t_s[changes]), PART))
+    rows = float(np.quantile(np.diff(changes), PART))
+    if every_s >= SELDOM_S and rows >= SELDOM_ROWS and np.abs(np.diff(values)).max() > large * np.ptp(values):
+        yield (
+            f"{what} has a new value every {every_s:.2g} s only, more rarely than the rows: a contact is seen up to so "
+            "much too late, and a rest with an older value"
+        )
+
+
+def _drift(force: _Force) -> Iterator[str]:
+    """Yield that a force does not come back when the fingers are open again."""
+    runs, span, gap = _runs(force.n), float(np.ptp(force.n)), force.gap
+    if len(runs) <= FEWEST:  # measured too rarely, unless its last value stays for longer than others did
+        longest = max((end - begin for begin, end in runs[1:-1]), default=0)
+        if len(runs) < 3 or runs[-1][1] - runs[-1][0] <= max(FEWEST, LEAP * longest):
+            return
+    begin, end = force.n[:ZERO_SAMPLES], force.n[-ZERO_SAMPLES:]
+    first_load, peak = int(np.argmax(force.n > force.n[0] + FREE * span)), int(force.n.argmax())
+    opened = gap[-1] >= gap[first_load] and min(gap[0], gap[-1]) > gap[peak] + PART * np.ptp(gap)
+    apart = float(end.mean() - begin.mean())
+    if max(np.ptp(begin), np.ptp(end)) <= PART * span < abs(apart) and opened:
+        yield (
+            f"{force.what} ends {force.amount(apart, '+.3g')} from where it began, although the fingers are "
+            "open again: its zero drifts, and all forces have a part of that, or its sensor stopped"
+        )
+
+
+def _bump(force: _Force) -> Iterator[str]:
+    """Yield that a force comes, is gone while the gap (m) closes further, and comes back, by time (s)."""
+    gap, course = force.gap, _course(force.n, 1)
+    course = course - usual_range(course)[0]
+    least = PART * float(np.ptp(course))
+    contact = max(least if "force_left" in force.units else min(least, CONTACT_FORCE_N), force.noise)
+    felt, free = np.flatnonzero(course > contact), np.flatnonzero(course < 0.5 * contact)
+    free = free[free > felt[0]] if len(felt) else free[:0]
+    felt = felt[felt > free[0]] if len(free) else felt[:0]
+    if not len(felt):
+        return
+    begin, end, again = int((course > contact).argmax()), int(free[0]), int(felt[0])
+    closes = float(gap[end] - gap[again])
+    glitch = end - begin <= GLITCH_SAMPLES and force.t[end] - force.t[begin] <= GLITCH_S
+    if closes > 0.5 * PART * np.ptp(gap) and gap[end:again].max() <= gap[begin] and not glitch:
+        yield (
+            f"a force comes at {force.when(begin)} and is gone at {force.when(end)}, the fingers close by "
+            f"{closes * 1e3:.3g} mm more, and it comes back at {force.when(again)}: the contact is the first of these. "
+            "If the fingers touched something on their way, cut that out; or the object broke"
+        )
+
+
+def _late(force: _Force) -> Iterator[str]:
+    """Yield that a force stays while the fingers open, or that the gap (m) follows late, by time (s)."""
+    t, gap, span_m = force.t, force.gap, float(np.ptp(force.gap))
+    loaded, free = np.flatnonzero(force.above(LOADED)), np.flatnonzero(~force.above(PART))
+    onset, gone = free[free < loaded[:1].sum()], free[free > loaded[-1:].sum()]
+    if not len(loaded) or not len(onset) or not len(gone):
+        return
+    begin, end = int(onset[-1]), int(gone[0])
+    least_s = max(LATE_S, 2.0 * float(np.median(np.diff(t))))
+    wide = loaded[(gap[loaded] > gap[begin] + SLIGHT * span_m) & (loaded > loaded[gap[loaded].argmin()])]
+    if len(wide) and t[wide[-1]] - t[wide[0]] > least_s:
+        yield (
+            f"{force.what} stays until {force.when(wide[-1])}, although the fingers are wider than at the contact from "
+            f"{force.when(wide[0])} on: does the force come late, or did its sensor stop?"
+        )
+        return
+    still = 0.5 * SLIGHT * span_m
+    opens = end + int((gap[end:] > gap[begin : end + 1].min() + still).argmax())
+    late_s = float(t[opens] - t[end])
+    around_s = t[begin] + late_s * np.arange(-1, 2)
+    approach, further = -np.diff(np.interp(around_s, t, gap))
+    closes = float(np.interp(t[end] - late_s, t, gap)) - gap[end] > FREE * approach
+    if late_s > least_s and around_s[0] >= t[0] and further > FREE * approach > still and not closes:
+        yield (
+            f"the fingers go on as fast after the force begins (at {force.when(begin)}), and open {late_s:.2g} s "
+            "after it is gone: does the gap come late?"
+        )
+
+
+def _gap_leaps(t_s: Numbers, gap: Numbers) -> Iterator[str]:
+    """Yield that a gap (m) leaps faster (s) than fingers move, or has new values so rarely that it changes by much."""
+    steps, changes = np.abs(np.diff(gap)), np.flatnonzero(np.diff(gap))
+    if len(changes) >= FEWEST:
+        k, usual = int(steps.argmax()), float(np.sort(steps)[-3])
+        seconds = max(float(np.diff(t_s)[k]), float(np.median(np.diff(t_s))))
+        # A gap that is measured more rarely than the rows moves in the time between its values.
+        measured_s = max(seconds, float(np.median(np.diff(t_s[changes]))))
+        least = min(LEAP_SPEED_M_S * seconds, usual + LEAP_M_S2 * measured_s**2)
+        if _leap(steps, steps > 0.0, least) is not None:
+            yield (
+                f"the gap jumps by {steps[k] * 1e3:.3g} mm within {seconds * 1e3:.3g} ms (at {t_s[k + 1]:.4g} s), "
+                "as no finger does: is it a glitch, or did its sensor stop before?"
+            )
+    if (
+        LEAP * steps.min(initial=np.inf, where=steps > 0.0) < steps.max()
+    ):  # the steps of a coarse gap are alike
+        yield from _seldom("the gap", t_s, gap, PART)
+
+
+def _stopped_gap(force: _Force) -> Iterator[str]:
+    """Yield that a gap (m) stays, by time (s), as the gap of a rigid object does, and yet does not end so.
+
+    It jumps to another value at once, and the force does not. Or it does not open, and the force is gone.
+    """
+    gap, n, runs = force.gap, force.n, _runs(force.gap)
+    # The gap can have fewer values than rows.
+    usual = int(np.median([end - begin for begin, end in runs]))
+    longest = max(FEWEST, LEAP * usual)
+    changes = np.abs(np.diff(gap[[begin for begin, _ in runs]])).tolist()
+    for k, (begin, end) in enumerate(runs[1:], 1):
+        if end - begin < longest or not np.ptp(n[begin:end]) > FREE * force.span:
+            continue
+        stays = (
+            f"the gap stays at {gap[begin] * 1e3:.4g} mm from {force.t[begin]:.4g} to {force.when(end - 1)}"
+        )
+        if end == len(gap):
+            if force.above(LOADED)[begin:].any() and not force.above(PART)[-1]:
+                yield f"{stays}, although the force is gone: did its sensor stop?"
+        elif end + usual < len(gap):
+            moves_on = end + longest > runs[k + 1][1] < len(gap)
+            around = max(changes[k - 1], changes[k + 1] if moves_on else 0.0)
+            calm = abs(float(n[end + usual - 1] - n[max(begin, end - usual)])) < PART * force.span
+            if changes[k] > max(LEAP * around, STOPPED_STEPS * min(changes)) and calm:
+                yield (
+                    f"{stays} while the force changes, and then jumps by {changes[k] * 1e3:.3g} mm: did its sensor "
+                    "stop?"
+                )

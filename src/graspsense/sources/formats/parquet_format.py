@@ -53,20 +53,15 @@ def read_parquet(path: Path, wanted: Collection[str] | None = None) -> list[Colu
         return [ColumnTable(source=path.name, numbers=numbers, shapes=shapes, texts=texts)]
 
 
-def _expect_columns(path: Path, columns: int) -> None:
-    """Raise TooLarge if the columns have more values, or unpack to more, than the limit allows."""
-    size = parquet_size(path)
-    Unpacked(path).expect(size.unpacked_bytes)
-    Unpacked(path).expect(_BYTES_OF_A_NUMBER * max(size.values, size.rows * columns))
-
-
 def _table(path: Path, wanted: Collection[str] | None) -> Any:
     """Return the columns, read in parts that are counted. Texts stay numbers of a dictionary."""
     import pyarrow.parquet
     from pyarrow import types
 
+    size = parquet_size(path)
+    Unpacked(path).expect(size.unpacked_bytes)
     with pyarrow.parquet.ParquetFile(path) as file:
-        _expect_columns(path, len(file.schema_arrow))
+        Unpacked(path).expect(_BYTES_OF_A_NUMBER * max(size.values, size.rows * len(file.schema_arrow)))
         is_text = (types.is_string, types.is_large_string, types.is_binary)
         texts = [field.name for field in file.schema_arrow if any(test(field.type) for test in is_text)]
         names = None if wanted is None else [name for name in file.schema_arrow.names if name in wanted]

@@ -72,7 +72,8 @@ def wildcard(text: str) -> re.Pattern[str]:
         if closing > 0:
             inside = text[position + 1 : closing]
             negated = inside.startswith("!")
-            parts.append(f"[{'^' * negated}{_escaped_choice(inside[negated:])}]")
+            choice = re.sub(r"([\\\]\[^])", r"\\\1", inside[negated:])
+            parts.append(f"[{'^' * negated}{choice}]")
             position = closing
         else:
             parts.append({"*": ".*", "?": "."}.get(sign) or re2.escape(sign))
@@ -151,10 +152,6 @@ def _options() -> re2.Options:
     options = re2.Options()
     options.log_errors = False
     return options
-
-
-def _escaped_choice(signs: str) -> str:
-    return re.sub(r"([\\\]\[^])", r"\\\1", signs)
 
 
 def _joined(pieces: list[tuple[str, str]] | tuple[tuple[str, str], ...], known: Mapping[str, str]) -> str:

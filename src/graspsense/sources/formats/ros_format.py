@@ -115,12 +115,7 @@ def _held(times: TopicTimes, messages: Sequence[dict[str, Any]], rows_ns: Nanose
     """
     last, old = times.latest(rows_ns)
     columns: dict[str, Numbers] = {}
-    for name, example in messages[0].items():
-        width = np.size(example)
-        rows = [messages[k].get(name, np.full(width, np.nan)) for k in times.order]
-        if any(np.size(row) != width for row in rows):
-            continue  # an array whose length changes has no fixed columns
-        every = np.array(rows, dtype=np.float64).reshape(len(rows), -1)
+    for name, every in _columns(times, messages):
         held = every[np.maximum(last, 0)]
         following = every[np.minimum(last + 1, len(every) - 1)]
         with np.errstate(all="ignore"):
@@ -128,6 +123,15 @@ def _held(times: TopicTimes, messages: Sequence[dict[str, Any]], rows_ns: Nanose
         held[(old & (last + 1 < len(every)))[:, np.newaxis] & ~same] = np.nan
         columns[name] = held[:, 0] if held.shape[1] == 1 else held
     return columns
+
+
+def _columns(times: TopicTimes, messages: Sequence[dict[str, Any]]) -> Iterator[tuple[str, Numbers]]:
+    """Yield the numbers in the messages of a topic, as (messages, components); those whose length changes have none."""
+    for name, example in messages[0].items():
+        width = np.size(example)
+        rows = [messages[k].get(name, np.full(width, np.nan)) for k in times.order]
+        if all(np.size(row) == width for row in rows):
+            yield name, np.array(rows, dtype=np.float64).reshape(len(rows), -1)
 
 
 def _messages(path: Path, topics: Collection[str]) -> Iterator[tuple[str, int, Any]]:
@@ -206,13 +210,8 @@ def read_topics(path: Path) -> list[ColumnTable]:
     _, times, notices = on_one_clock(path.name, messages)
     tables = []
     for topic, rows in values.items():
-        numbers: dict[str, Numbers] = {}
-        for name, example in rows[0].items():
-            width = np.size(example)
-            if all(np.size(row.get(name, ())) == width for row in rows):
-                every = np.array([rows[k][name] for k in times[topic].order], dtype=np.float64)
-                every = every.reshape(len(rows), -1)
-                numbers[name] = every[:, 0] if width == 1 else every
+        columns = _columns(times[topic], rows)
+        numbers = {name: every[:, 0] if every.shape[1] == 1 else every for name, every in columns}
         t_s: Numbers = times[topic].ns.astype(np.float64) * 1e-9
         tables.append(ColumnTable(source=topic, numbers=numbers, t_s=t_s, warnings=notices))
     return tables

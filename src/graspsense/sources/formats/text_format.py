@@ -114,8 +114,8 @@ def _columns(path: Path, part: _Part, table: TextTable, *, several: bool) -> Col
     for name, column in columns_of_numbers(cells).items():
         if not isinstance(column, NotNumbers):
             numbers[name] = column
-            if np.isnan(column).any() and any(map(_is_word, cells[name])):
-                # As numbers `none` and `NA` are missing, and as labels they are not.
+            # As numbers `none` and `NA` are missing, and as labels they are not.
+            if np.isnan(column).any() and any(is_missing(c) and not is_missing_label(c) for c in cells[name]):
                 texts[name] = cells[name]
             continue
         lists = _lists(path, name, cells[name])
@@ -154,11 +154,6 @@ def _lists(path: Path, name: str, cells: Sequence[str]) -> Numbers | None:
     if too_many := CELLS.exceeded(sum(len(cell.replace(",", " ").split()) for cell in cells)):
         raise DataDamaged(f"{path}: the lists of column {name!r} have {too_many}")
     return rows_of_lists(cells)
-
-
-def _is_word(cell: str) -> bool:
-    """Return whether a cell is no number, and yet can be a label."""
-    return is_missing(cell) and not is_missing_label(cell)
 
 
 def _unit_in(heading: str) -> str:

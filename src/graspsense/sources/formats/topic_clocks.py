@@ -25,8 +25,6 @@ Nanoseconds = NDArray[np.int64]
 
 CLOCKS_APART_NS: Final = 300_000_000
 """Delays of two topics, or of two parts of a topic, that differ by more are from different clocks."""
-DELAYS_APART_NS: Final = 50_000_000
-"""Delays of two topics that differ by more can be from different clocks, or one topic is slow: nothing tells which."""
 PARTS: Final = 10
 """Parts of a recording whose delays are compared."""
 SET_NS: Final = 20_000_000
@@ -160,7 +158,6 @@ def common_clock(
     """
     began_ns, times, notices = on_one_clock(source, topics)
     delays = {} if notices else _delays({topic: topics[topic] for topic in needed or topics})
-    notices += tuple(_doubtful_delays(delays))
     wanted = {topic: times[topic] for topic in needed or times}
     lasting = {topic: stamps for topic, stamps in wanted.items() if stamps.usual_ns} or wanted
     begin = max(int(stamps.ns[0]) for stamps in lasting.values())
@@ -207,10 +204,7 @@ def _relative(
     stamped = {}
     for topic, messages in topics.items():
         known = np.array([ns != 0 for ns in messages.stamped_ns])
-        ns = np.array(
-            [stamp - began if stamp else 0 for stamp in messages.stamped_ns],
-            dtype=np.int64,
-        )
+        ns = np.array([stamp - began if stamp else 0 for stamp in messages.stamped_ns], dtype=np.int64)
         delay = int(np.median((recorded[topic] - ns)[known])) if known.any() else 0
         stamped[topic] = np.where(known, ns, recorded[topic] - delay)
     return stamped, recorded
@@ -220,17 +214,19 @@ def _apart(stamped: Mapping[str, Nanoseconds], recorded: Mapping[str, Nanosecond
     """Yield a sentence if the headers of the topics are not from one clock, although their recording is."""
     if any(len(ns) > 1 and ns.min() == ns.max() for ns in recorded.values()):
         return  # a bag that was written at once, by a program that did not record
-    least = {topic: _least_delays(recorded[topic], stamped[topic]) for topic in stamped}
-    changed = [topic for topic in stamped if _was_set(recorded[topic], stamped[topic])]
+    orders = {topic: np.argsort(ns, kind="stable") for topic, ns in recorded.items()}
+    times = {topic: (recorded[topic][order], stamped[topic][order]) for topic, order in orders.items()}
+    least = {topic: _least_delays(*pair) for topic, pair in times.items()}
+    changed = [topic for topic, pair in times.items() if _was_set(*pair)]
     lowest = min(min(delays) for delays in least.values())
     behind = max(least, key=lambda topic: min(least[topic]))
     apart = min(least[behind]) - lowest
     used = "the times at which the messages were recorded are used"
     if changed:
         yield f"the clock in the headers of {', '.join(changed)} was set during the recording: {used}"
-    elif drifting := _drifting(recorded, least):
+    elif drifting := _drifting(max(int(np.ptp(ns)) for ns in recorded.values()), least):
         yield f"the clock in the headers of {drifting} runs at another rate than that of another topic: {used}"
-    elif coarse := [topic for topic in stamped if _coarse(recorded[topic], stamped[topic])]:
+    elif coarse := [topic for topic, pair in times.items() if _coarse(*pair)]:
         yield f"the times in the headers of {', '.join(coarse)} have coarse steps, or stand still: {used}"
     elif apart > CLOCKS_APART_NS:
         yield (
@@ -240,63 +236,38 @@ def _apart(stamped: Mapping[str, Nanoseconds], recorded: Mapping[str, Nanosecond
 
 def _delays(topics: Mapping[str, Messages]) -> dict[str, int]:
     """Return the least delay from header to recording of each topic whose headers have times (ns)."""
-    return {
-        topic: min(delays)
-        for topic, messages in topics.items()
-        if (
-            delays := [
-                recorded - stamped
-                for recorded, stamped in zip(messages.recorded_ns, messages.stamped_ns, strict=True)
-                if stamped
-            ]
-        )
-    }
-
-
-def _doubtful_delays(delays: Mapping[str, int]) -> Iterator[str]:
-    """Yield a sentence if the delays of topics differ, so that one of their clocks may be off."""
-    behind, ahead = (
-        max(delays, key=delays.__getitem__, default=""),
-        min(delays, key=delays.__getitem__, default=""),
-    )
-    if delays and delays[behind] - delays[ahead] > DELAYS_APART_NS:
-        yield (
-            f"the headers of {behind} are {(delays[behind] - delays[ahead]) * 1e-6:.0f} ms older than those of {ahead} "
-            "when their messages are recorded: the topic is slow, or its clock is off, and then gap and force do not "
-            "belong together"
-        )
+    delays = {}
+    for topic, messages in topics.items():
+        times = zip(messages.recorded_ns, messages.stamped_ns, strict=True)
+        if known := [recorded - stamped for recorded, stamped in times if stamped]:
+            delays[topic] = min(known)
+    return delays
 
 
 def _least_delays(recorded: Nanoseconds, stamped: Nanoseconds) -> list[int]:
-    """Return the smallest delay from header to recording in each part of a topic."""
-    order = np.argsort(recorded, kind="stable")
-    delays = np.array_split((recorded - stamped)[order], min(PARTS, len(order)))
-    return [int(part.min()) for part in delays]
+    """Return the smallest delay from header to recording in each part of a topic, whose messages are in order."""
+    return [int(part.min()) for part in np.array_split(recorded - stamped, min(PARTS, len(recorded)))]
 
 
-def _drifting(recorded: Mapping[str, Nanoseconds], least: Mapping[str, list[int]]) -> str:
+def _drifting(duration_ns: int, least: Mapping[str, list[int]]) -> str:
     """Return the topic whose delays grow, or shrink, evenly against those of another topic; empty if none does."""
     parts = {topic: np.array(delays, dtype=float) for topic, delays in least.items() if len(delays) == PARTS}
     if not parts:
         return ""
     steady = min(parts.values(), key=lambda delays: float(abs(delays[-1] - delays[0])))
+    much = (1.0 - 1.0 / PARTS) * max(RATES_APART * duration_ns, RATES_APART_NS)
     for topic, delays in parts.items():
         apart = delays - steady
-        much = max(RATES_APART * int(np.ptp(recorded[topic])), RATES_APART_NS)
-        if abs(apart[-1] - apart[0]) > (1.0 - 1.0 / PARTS) * much:
-            correlation = np.corrcoef(apart, np.arange(PARTS))[0, 1]
-            if abs(float(correlation)) > EVENLY:
-                return topic
+        if abs(apart[-1] - apart[0]) > much and abs(np.corrcoef(apart, np.arange(PARTS))[0, 1]) > EVENLY:
+            return topic
     return ""
 
 
-def _was_set(recorded: Nanoseconds, stamped: Nanoseconds) -> bool:
+def _was_set(written: Nanoseconds, stamps: Nanoseconds) -> bool:
     """Return whether the times in headers jump, the recording goes on, and the delay stays what it then is.
 
     Messages that overtake others jump many times, and those that were held up have even times in their headers.
     """
-    order = np.argsort(recorded, kind="stable")
-    written, stamps = recorded[order], stamped[order]
     delays = written - stamps
     if len(stamps) < 2 * FEWEST_AROUND:
         return False
@@ -318,10 +289,8 @@ def _was_set(recorded: Nanoseconds, stamped: Nanoseconds) -> bool:
     return False
 
 
-def _coarse(recorded: Nanoseconds, stamped: Nanoseconds) -> bool:
+def _coarse(written: Nanoseconds, stamps: Nanoseconds) -> bool:
     """Return whether many messages have the time of the one before in their headers, or several for a long time."""
-    order = np.argsort(recorded, kind="stable")
-    written, stamps = recorded[order], stamped[order]
     steps = np.diff(written)
     if not len(steps):
         return False

@@ -229,43 +229,28 @@ def _too_many(keys: Manifest) -> list[tuple[tuple[str, ...], str]]:
     return [((name,), why) for name, entry in entries.items() if (why := ENTRIES.exceeded(len(entry)))]
 
 
-def _contradictions(keys: Manifest) -> list[tuple[tuple[str, ...], str]]:
-    """Return what is missing or contradicts itself, each with the key it belongs to."""
-    problems: list[tuple[tuple[str, ...], str]] = []
+def _contradictions(keys: Manifest) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Yield what is missing or contradicts itself, each with the key it belongs to."""
     if bool(keys.files) == bool(keys.list):
-        problems.append(
-            (("files",), 'name the files, either by patterns (files = "{label}/*.csv") or by a list')
-        )
+        yield ("files",), 'name the files, either by patterns (files = "{label}/*.csv") or by a list'
     if keys.force and (keys.left or keys.right):
-        problems.append((("force",), "force stands for both pads: give it alone, or left and right"))
-    if not keys.force and not keys.left and not keys.right and not keys.fingers:
-        problems.append((("force",), "a grasp needs its force: force, left and right, or fingers"))
-    problems += [
-        (
-            ("events", name),
-            f"write small letters, digits, spaces, - and _, a letter first, and not{NOT_KNOWN} at the end",
-        )
-        for name in keys.events
-        if not _EVENT.fullmatch(name) or name.endswith(NOT_KNOWN)
-    ]
+        yield ("force",), "force stands for both pads: give it alone, or left and right"
+    if not (keys.force or keys.left or keys.right or keys.fingers):
+        yield ("force",), "a grasp needs its force: force, left and right, or fingers"
+    for name in keys.events:
+        if not _EVENT.fullmatch(name) or name.endswith(NOT_KNOWN):
+            rule = (
+                f"write small letters, digits, spaces, - and _, a letter first, and not{NOT_KNOWN} at the end"
+            )
+            yield ("events", name), rule
     unknown = [name for name in texts_of(keys.fast) if name not in keys.channels]
     if unknown:
-        problems.append(
-            (("fast",), f"{unknown[0]!r} is not among the channels: name it there with its columns")
-        )
+        yield ("fast",), f"{unknown[0]!r} is not among the channels: name it there with its columns"
     elif keys.fast and keys.resample_hz:
-        problems.append(
-            (("resample_hz",), "fast channels cannot be resampled: leave out fast or resample_hz")
-        )
-    if (
-        not keys.label
-        and not keys.list
-        and not any("{label" in pattern for pattern in texts_of(keys.files))
-        and "?P<label>" not in keys.start
-        and "{label" not in keys.arrays
-    ):
-        problems.append((("label",), 'no label: write label = "{field}", or {label} in the pattern of files'))
-    return problems
+        yield ("resample_hz",), "fast channels cannot be resampled: leave out fast or resample_hz"
+    in_names = "".join((*texts_of(keys.files), keys.arrays))
+    if not keys.label and not keys.list and "{label" not in in_names and "?P<label>" not in keys.start:
+        yield ("label",), 'no label: write label = "{field}", or {label} in the pattern of files'
 
 
 def hand_of(keys: Manifest, unit: str) -> tuple[FingerForce, ...]:

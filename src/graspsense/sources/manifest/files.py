@@ -133,13 +133,11 @@ def _rows(where: str, row: dict[str, str]) -> tuple[int, int] | None:
     given = [row.pop(name, "") for name in ("first_row", "last_row")]
     if not any(given):
         return None
-    if not all(_is_row(cell) for cell in given) or not 1 <= int(given[0]) <= int(given[1]):
+    if not all(cell.isdecimal() and len(cell) < 16 for cell in given) or not 1 <= int(given[0]) <= int(
+        given[1]
+    ):
         raise ConfigError(
             f"{where}: first_row and last_row are {given[0]!r} and {given[1]!r}: give two numbers of "
             "rows, counted from 1, the first not behind the last"
         )
     return int(given[0]), int(given[1])
-
-
-def _is_row(text: str) -> bool:
-    return text.isdecimal() and len(text) < 16

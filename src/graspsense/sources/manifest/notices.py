@@ -11,7 +11,7 @@ import numpy as np
 from graspsense.core.control.contact import CONTACT_FORCE_N, both_touch
 from graspsense.core.values.errors import DataDamaged
 from graspsense.sources.columns.grasp_columns import GraspColumns
-from graspsense.sources.columns.recording_notices import FEWEST, OPENED, STEADY, ZERO_SAMPLES, force_of_pads
+from graspsense.sources.columns.recording_notices import FEWEST, PART, ZERO_SAMPLES, force_of_pads
 from graspsense.sources.columns.usual_range import usual_range
 from graspsense.sources.manifest.closings import CLOSED, OPEN
 from graspsense.sources.manifest.steps import NOISE, squeezes
@@ -51,6 +51,8 @@ def notices_of(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
     if len(columns) < 2:
         return
     pulls = list(_of_sign(columns))
+    if not pulls and columns.units.get("force") and _is_steady(columns.force_n):
+        pulls = [*filter(None, [falls_on_closing(columns)])]
     yield from pulls
     if not columns.units.get("force"):
         yield from _of_unit(columns)
@@ -81,8 +83,9 @@ def falls_on_closing(columns: GraspColumns) -> str:
             turned = least < -2.0 * abs(most) and 2.0 * abs(float(pad[known][:ZERO_SAMPLES].mean())) < -least
         if turned:
             return (
-                f"{name} falls where the fingers close. Turn its sign, -FORCE, or that of a position that grows on "
-                'closing: gap = "OPENING - POSITION"'
+                f"{name} falls where the fingers close. Turn its sign and write its zero (-FORCE and zero = "
+                '"10 samples", or 999 - FORCE), or turn that of a position that grows on closing: gap = "OPENING - '
+                'POSITION"'
             )
     return ""
 
@@ -105,7 +108,7 @@ def _of_gap(columns: GraspColumns) -> Iterator[str]:
             f"the gap goes down to {gap.min() * 1e3:.3g} mm, and fingers meet at 0: is it measured from another zero? "
             'Then add the difference: gap = "POSITION + 20 [mm]"'
         )
-    if span > 0.0 and (pressed - began > 0.2 * span or pressed - touched > OPENED * span):
+    if span > 0.0 and (pressed - began > 0.2 * span or pressed - touched > PART * span):
         yield (
             "the gap rises while the force rises: is it a position that grows on closing? Write the gap as a "
             f'difference: gap = "{_opening(gap):g} - POSITION"'
@@ -143,13 +146,9 @@ def _of_zero(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
     force = columns.force_n
     low, high = usual_range(force)
     felt = _is_felt(force)
-    steady, touched = _is_steady(force), not columns.units.get("force") and _both_touch_at_first(columns)
-    if _falls_on_contact(columns):
-        yield (
-            "the force falls while the gap closes: does the sensor fall on contact? Turn its sign and write its zero: "
-            'force = "-FORCE" and zero = "10 samples", or force = "999 - FORCE" where 999 is its value without contact'
-        )
-    elif felt and (force[0] - low > BEGINS_LOADED * (high - low) or (touched and not steady)):
+    steady, begins = _is_steady(force), (float(columns.left_n[0]), float(columns.right_n[0]))
+    touched = not columns.units.get("force") and both_touch(*begins, CONTACT_FORCE_N)
+    if felt and (force[0] - low > BEGINS_LOADED * (high - low) or (touched and not steady)):
         if zeroed:
             yield (
                 "the recording begins in contact, so the zero of its first samples removes a part of the force: leave "
@@ -166,10 +165,6 @@ def _of_zero(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
             offset = abs(float(pad[:ZERO_SAMPLES].mean()))
             if _is_felt(pad) and _is_steady(pad) and offset > OFFSET * (most - least):
                 yield f'{name} does not begin at zero: if the fingers were free then, write zero = "10 samples"'
-
-
-def _both_touch_at_first(columns: GraspColumns) -> bool:
-    return both_touch(float(columns.left_n[0]), float(columns.right_n[0]), CONTACT_FORCE_N)
 
 
 def _of_time(columns: GraspColumns) -> Iterator[str]:
@@ -208,15 +203,6 @@ def _of_holes(columns: GraspColumns) -> Iterator[str]:
         )
 
 
-def _falls_on_contact(columns: GraspColumns) -> bool:
-    """Return whether a force in counts is steady at first and then falls by most of its range as the gap closes."""
-    force, gap = columns.force_n, columns.gap_m
-    fall, span = float(force[0] - force.min()), float(np.ptp(force))
-    closed = float(gap[0] - gap[int(force.argmin())])
-    falls = fall > (1.0 - STEADY) * span > 0.0 and closed > 0.5 * float(np.ptp(gap)) > 0.0
-    return bool(columns.units.get("force")) and falls and _is_steady(force)
-
-
 def _is_felt(force: Numbers) -> bool:
     """Return whether a force leaves its noise: what noise looks like is neither a pull nor a contact."""
     noise = float(np.median(np.abs(np.diff(force, 2)))) if len(force) > 2 else 0.0
@@ -225,7 +211,7 @@ def _is_felt(force: Numbers) -> bool:
 
 def _is_steady(force: Numbers) -> bool:
     """Return whether the first samples have one force, so that a zero can be taken from them."""
-    return float(np.ptp(force[:ZERO_SAMPLES])) <= STEADY * float(np.ptp(force))
+    return float(np.ptp(force[:ZERO_SAMPLES])) <= PART * float(np.ptp(force))
 
 
 def _has_several_squeezes(columns: GraspColumns) -> bool:

@@ -24,14 +24,10 @@ from graspsense.sources.manifest.description import ReadManifest, hand_of, quant
 from graspsense.sources.manifest.events import labelled_events
 from graspsense.sources.manifest.expression import Expression
 from graspsense.sources.manifest.steps import without_duplicates
-from graspsense.sources.units import GRAM_FORCE, TO_SI, WITHOUT_UNIT, known_unit
+from graspsense.sources.units import GRAM_FORCE, TO_SI, WITHOUT_UNIT, known_unit, unit_since_1970
 
 EARLIEST_STAMP_S: Final = 1e6
 """A first time beyond this is a stamp of a clock, and times are counted from it."""
-EARLIEST_DATE_S: Final = 946_684_800.0
-"""The year 2000, in seconds since 1970."""
-LATEST_DATE_S: Final = 4_102_444_800.0
-"""The year 2100, in seconds since 1970."""
 QUANTITIES: Final = ("time", "gap", "force")
 """The quantities whose units are not those of another one."""
 _NAME: Final = re.compile(r"[a-z][a-z0-9_]*")
@@ -247,7 +243,7 @@ def _times(columns: AvailableColumns) -> tuple[Numbers, float, tuple[str, ...]]:
     missing = chosen is None or not columns.has(chosen)
     given = None if missing and manifest.keys.rate_hz else columns.value("time")
     if given is not None and chosen is not None:
-        unit = "" if columns.unit(chosen, "time") else _unit_since_1970(given[0])
+        unit = "" if columns.unit(chosen, "time") else unit_since_1970(float(given[0][0]))
         notes = (f"the time is in {unit} since 1970",) if unit else ()
         factor, origin = TO_SI["time"].get(unit, 1.0), _origin(given[0])
         return (given[0] - origin) * factor, origin * factor, notes
@@ -267,14 +263,6 @@ def _times(columns: AvailableColumns) -> tuple[Numbers, float, tuple[str, ...]]:
 def _origin(times: Numbers) -> float:
     """Return the first of these times where they are stamps of a clock such as seconds since 1970, else 0."""
     return float(times[0]) if abs(float(times[0])) > EARLIEST_STAMP_S else 0.0
-
-
-def _unit_since_1970(times: Numbers) -> str:
-    """Return the unit in which these numbers are times of this century, empty if that is s, or if they are none."""
-    for unit in ("ms", "us", "ns"):
-        if EARLIEST_DATE_S <= float(times[0]) * TO_SI["time"][unit] < LATEST_DATE_S:
-            return unit
-    return ""
 
 
 def _channels(columns: AvailableColumns) -> tuple[dict[str, Numbers], dict[str, Numbers], dict[str, str]]:

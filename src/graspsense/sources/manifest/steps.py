@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from attrs import evolve
@@ -14,6 +14,7 @@ from graspsense.core.grasp.gap_resolution import gap_resolution
 from graspsense.core.values.errors import DataDamaged, counted
 from graspsense.core.values.limits import SAMPLES
 from graspsense.sources.columns.grasp_columns import (
+    NAMES,
     PLAUSIBLE,
     GraspColumns,
     check_increasing,
@@ -83,17 +84,16 @@ def squeezes(columns: GraspColumns) -> list[GraspColumns]:
             )
             parts[k] = evolve(parts[k], warnings=(*parts[k].warnings, told))
     weak = _weak_runs(columns, force, runs)
-    missed = without_rise(columns, [*runs, *weak])
-    parts[0] = evolve(parts[0], warnings=(*parts[0].warnings, *missed))
+    missed = [*without_rise(columns, [*runs, *weak])]
     if weak:
         strongest = max(float(np.ptp(force[begin - 1 : end])) for begin, end in weak)
         unit = columns.units.get("force") or "N"
-        note = (
+        missed.append(
             f"{counted(len(weak), 'rise')} of the force by at most {strongest:.2g} {unit} (the first at "
             f"{columns.t_s[weak[0][0]]:.4g} s) is taken for no squeeze: less than {100 * WEAKEST:.0f} % of the usual "
             "force. If fingers closed then, split by a column"
         )
-        parts[0] = evolve(parts[0], warnings=(*parts[0].warnings, note))
+    parts[0] = evolve(parts[0], warnings=(*parts[0].warnings, *missed))
     return parts
 
 
@@ -275,31 +275,26 @@ def resampled(columns: GraspColumns, rate_hz: float) -> GraspColumns:
     contact = int((columns.force_n - columns.force_n.min() > LOADED * np.ptp(columns.force_n)).argmax())
     coarse = gap_resolution(t, columns.gap_m, contact).step_m > 0.0
 
-    def along(values: Numbers) -> Numbers:
-        if values.ndim == 1:
-            column: Numbers = np.interp(times, t, values)
-            return column
-        return np.column_stack([np.interp(times, t, column) for column in values.T])
+    def along(name: str, values: Numbers) -> Numbers:
+        if name in columns.times:
+            return values
+        parts = [np.interp(times, t, column) for column in values.reshape(len(t), -1).T]
+        return np.column_stack(parts).reshape(len(times), *values.shape[1:])
 
-    def along_own(name: str, values: Numbers) -> Numbers:
-        return values if name in columns.times else along(values)
-
-    scalars = {name: along_own(name, values) for name, values in columns.scalars.items()}
-    sides = (
-        finger_sides(columns.fingers, scalars)
-        if columns.fingers
-        else (along(columns.left_n), along(columns.right_n))
-    )
+    named: dict[str, Any] = {
+        name: along(name, values) for name in NAMES if (values := getattr(columns, name)) is not None
+    }
+    named["t_s"] = times
+    if coarse:
+        named["gap_m"] = columns.gap_m[np.searchsorted(t, times, side="right") - 1]
+    scalars = {name: along(name, values) for name, values in columns.scalars.items()}
+    if columns.fingers:
+        named["left_n"], named["right_n"] = finger_sides(columns.fingers, scalars)
     return evolve(
         columns,
         lines=None,
-        t_s=times,
-        gap_m=columns.gap_m[np.searchsorted(t, times, side="right") - 1] if coarse else along(columns.gap_m),
-        left_n=sides[0],
-        right_n=sides[1],
-        effort_n=None if columns.effort_n is None else along(columns.effort_n),
-        velocity_m_s=None if columns.velocity_m_s is None else along(columns.velocity_m_s),
         scalars=scalars,
-        arrays={name: along_own(name, values) for name, values in columns.arrays.items()},
+        arrays={name: along(name, values) for name, values in columns.arrays.items()},
         notes=(*columns.notes, f"resampled to {rate_hz:g} Hz"),
+        **named,
     )

@@ -10,11 +10,12 @@ from attrs import frozen
 
 from graspsense.core.values.errors import DataDamaged
 from graspsense.sources.columns.channel_facts import ChannelFacts, channel_facts
-from graspsense.sources.columns.column_guess import TO_S, force_columns, guesses, time_column
+from graspsense.sources.columns.column_guess import force_columns, guesses, time_column
 from graspsense.sources.columns.grasp_columns import GraspColumns
 from graspsense.sources.formats.raw_tables import raw_tables
 from graspsense.sources.formats.table import ColumnTable, Numbers
 from graspsense.sources.manifest.steps import squeezes
+from graspsense.sources.units import TO_SI, unit_since_1970
 
 
 @frozen(kw_only=True, eq=False)
@@ -72,12 +73,7 @@ def _times(table: ColumnTable) -> tuple[Numbers, bool]:
     guess = next(guess for guess in guesses(table) if guess.key == "time")
     unit = guess.value.rpartition("[")[2].rstrip("]") if guess.value.endswith("]") else ""
     values = table.numbers[name]
-    factor = TO_S.get(unit, 1.0) if unit else TO_S[_unit_since_1970(float(values[0]))]
-    return (values - values[0]) * factor, True
-
-
-def _unit_since_1970(value: float) -> str:
-    return "ns" if value > 1e17 else "us" if value > 1e14 else "ms" if value > 1e11 else "s"
+    return (values - values[0]) * TO_SI["time"].get(unit or unit_since_1970(float(values[0])), 1.0), True
 
 
 def _squeezes(

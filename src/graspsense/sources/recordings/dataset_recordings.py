@@ -41,7 +41,7 @@ def datasets_to_write() -> tuple[str, ...]:
 def write_dataset(kind: str, place: str, store: str) -> dict[str, int]:
     """Write the trials of a store as a data set, and return what was counted. Raises ConfigError, DataDamaged."""
     dataset = installed().resource(DatasetEntry, kind)
-    with _failing_as(dataset.qualified):
+    with failing_as(f"data set {dataset.qualified}"):
         return dict(dataset.load("export")(stored_grasps(store), place))
 
 
@@ -66,7 +66,7 @@ def recordings_of(
     read = dataset.recordings()
     number = 0
     try:
-        with readable(f"{kind}:{place}"), _failing_as(dataset.qualified):
+        with readable(f"{kind}:{place}"), failing_as(f"data set {dataset.qualified}"):
             for recording in read(place):
                 if not isinstance(recording, LabelledRecording | UnreadableRecording):
                     raise PluginUnavailable(
@@ -96,8 +96,8 @@ def _checked(recording: LabelledRecording | UnreadableRecording) -> LabelledReco
 
 
 @contextmanager
-def _failing_as(dataset: str) -> Iterator[None]:
-    """Turn what a reader of a plugin raises, beside errors of ours, into an error that names it."""
+def failing_as(component: str) -> Iterator[None]:
+    """Turn what a component of a plugin raises, beside errors of ours, into an error that names it."""
     try:
         yield
     except (GraspsenseError, MemoryError, OSError):
@@ -105,7 +105,7 @@ def _failing_as(dataset: str) -> Iterator[None]:
     except Exception as error:
         if is_mistake(error):
             raise
-        raise ComponentFailed(f"data set {dataset} failed: {named(error)}") from error
+        raise ComponentFailed(f"{component} failed: {named(error)}") from error
 
 
 def numbered_recording(kind: str, name: str) -> LabelledRecording:

@@ -6,8 +6,6 @@ a file; the recording itself (.mcap) keeps it.
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -17,30 +15,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graspsense.core.components.channels import from_json, further
-from graspsense.core.files.csv_text import text_of_cell
-from graspsense.core.files.whole_file import first_bytes
 from graspsense.core.values.channel import FLOATS, Channel, FastChannel, TactileArray
 from graspsense.core.values.errors import ConfigError, DataDamaged
-from graspsense.core.values.limits import CELLS, CHANNEL_NUMBERS
+from graspsense.core.values.limits import CHANNEL_NUMBERS
 from graspsense.core.values.mounting import mounting_from_json
 from graspsense.core.values.signals import Frame, Pads, Reading, no_pads
-from graspsense.core.values.written_numbers import NotNumbers, columns_of_numbers
 from graspsense.recording.export_trace import beside, declared_beside, images_beside
 from graspsense.recording.layout import PADS_TOPIC, SCALARS_TOPIC, SIGNAL_TOPIC, TICK_FIELDS
 from graspsense.recording.readable import readable
 from graspsense.recording.replayable import REPLAY_NOTE, Recording
 from graspsense.sources.columns.fast_samples import latest_values, signals_in_ticks, values_in_ticks
 from graspsense.sources.formats.numpy_files import npz_arrays
+from graspsense.sources.formats.raw_tables import raw_tables
 from graspsense.sources.formats.table import Numbers
-from graspsense.sources.formats.text_table import check_columns, check_lines, text_of
+from graspsense.sources.formats.text_table import text_of
 
 Columns = dict[str, NDArray[Any]]
 
 DECLARED: Final = "declared"
 """The array of one JSON text with the channels, units and rate of the gripper."""
 TABLE_SUFFIXES: Final = (".csv", ".parquet")
-HEADER_BYTES: Final = 2**20
-"""Bytes in which the first line of a file is looked for."""
 _ABOUT_TRIALS: Final = ("trial", "made_at", "outcome", "recording")
 """Columns of every table of a store."""
 
@@ -52,14 +46,14 @@ def read_exported(name: str) -> Recording:
     PluginUnavailable for Parquet without pyarrow.
     """
     path = Path(name).expanduser()
-    if path.suffix.lower() in TABLE_SUFFIXES:
-        arrays, declared = _tables(path)
-    else:
-        arrays = npz_arrays(path)
-        refuse_table_of_store(path, arrays)
-        declared = str(arrays.get(DECLARED, "no JSON"))
     foreign = ". Arrays of other programs are imported by a manifest (docs/import.md)"
     with readable(path, "a grasp of `graspsense export`", foreign):
+        if path.suffix.lower() in TABLE_SUFFIXES:
+            arrays, declared = _tables(path)
+        else:
+            arrays = npz_arrays(path)
+            refuse_table_of_store(path, arrays)
+            declared = str(arrays.get(DECLARED, "no JSON"))
         about = json.loads(declared)
         channels = tuple(from_json(channel) for channel in about["channels"])
         return Recording(
@@ -106,33 +100,22 @@ def _tables(path: Path) -> tuple[Columns, str]:
     """
     declared = declared_beside(path)
     if path.exists() and not declared.exists():
-        refuse_table_of_store(path, _names(path))
+        undeclared = raw_tables(path)[0]
+        refuse_table_of_store(path, (*undeclared.numbers, *undeclared.texts))
         raise ConfigError(
             f"{declared.name} is missing beside {path}: `graspsense export` writes it together with the columns. For a "
             "file of another program name its columns, or write a manifest (docs/import.md)"
         )
-    try:
-        return _read_tables(path, declared)
-    except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
-        raise DataDamaged(
-            f"{path} is not as `graspsense export` writes it: {type(error).__name__}: {error}"
-        ) from error
-
-
-def _read_tables(path: Path, declared: Path) -> tuple[Columns, str]:
-    """Return the arrays, and the text that declares them. What does not fit ends in an error of Python."""
     ticks = _columns(path)
     missing = [name for name in TICK_FIELDS if name not in ticks]
     if missing:
         raise DataDamaged(f"{path} is not an exported grasp: it has no column {missing[0]!r}")
-    try:
+    with readable(declared):
         text = text_of(declared)
         about = json.loads(text)
         channels = further(tuple(from_json(channel) for channel in about["channels"]))
         tables = frozenset(about["tables"])
         cells = int(about["cells"])
-    except (ConfigError, ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
-        raise DataDamaged(f"{declared} is damaged: {type(error).__name__}: {error}") from error
     if too_many := CHANNEL_NUMBERS.exceeded(cells):
         raise DataDamaged(f"{declared} is damaged: the fingertips have {too_many}")
 
@@ -180,48 +163,10 @@ def refuse_table_of_store(path: Path, names: Iterable[str]) -> None:
         )
 
 
-def _names(path: Path) -> Sequence[str]:
-    """Return the names of the columns of a file."""
-    if path.suffix.lower() == ".parquet":
-        from graspsense.sources.formats.parquet_format import read_parquet
-
-        table = read_parquet(path)[0]
-        return (*table.numbers, *table.texts)
-    return header_of(path)
-
-
-def header_of(path: Path) -> Sequence[str]:
-    """Return the names in the first line of a CSV file; none if it cannot be read."""
-    try:
-        text = first_bytes(path, HEADER_BYTES).decode("utf-8", errors="replace")
-        return [text_of_cell(cell) for cell in next(csv.reader(io.StringIO(text, newline="")), ())]
-    except (OSError, ValueError, csv.Error):
-        return ()
-
-
 def _columns(path: Path) -> Columns:
     """Return the columns of one file. Raises ConfigError, DataDamaged, PluginUnavailable."""
-    if path.suffix.lower() == ".parquet":
-        from graspsense.sources.formats.parquet_format import read_parquet
-
-        return dict(read_parquet(path)[0].numbers)
-    text = text_of(path)
-    check_lines(path, text)
-    try:
-        rows = csv.reader(io.StringIO(text, newline=""))
-        names = next(rows, [])
-        check_columns(path, names)
-        if too_many := CELLS.exceeded(text.count("\n") * len(names)):
-            raise DataDamaged(f"{path}: {too_many}")
-        cells = list(zip(*rows, strict=True)) or [()] * len(names)
-        columns = columns_of_numbers(
-            {text_of_cell(name): column for name, column in zip(names, cells, strict=True)}
-        )
-    except (ValueError, csv.Error) as error:
-        raise DataDamaged(f"{path} is not as `graspsense export` writes it: {error}") from error
-    numbers: Columns = {}
-    for name, parsed in columns.items():
-        if isinstance(parsed, NotNumbers):
-            raise DataDamaged(f"{path}, line {parsed.row + 2}: {name} is {parsed.words}")
-        numbers[name] = parsed
-    return numbers
+    table = raw_tables(path)[0]
+    if texts := [name for name in table.texts if name not in table.numbers]:
+        where = table.not_numbers.get(texts[0], "a text")
+        raise DataDamaged(f"{path}: {texts[0]} is not a column of numbers: {where}")
+    return dict(table.numbers)

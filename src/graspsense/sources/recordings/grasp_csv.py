@@ -15,7 +15,6 @@ from typing import Final
 from urllib.parse import parse_qsl, urlencode
 
 from graspsense.core.values.errors import ConfigError, DataDamaged, suggestion
-from graspsense.recording.readable import not_opened
 from graspsense.recording.replayable import Recording
 from graspsense.sources.columns.grasp_columns import checked_recording
 from graspsense.sources.formats.table import ColumnTable
@@ -24,7 +23,7 @@ from graspsense.sources.manifest.description import QUANTITIES as MAPPED
 from graspsense.sources.manifest.description import Manifest, ReadManifest
 from graspsense.sources.manifest.expression import Expression, ExpressionError, parse
 from graspsense.sources.manifest.samples import samples
-from graspsense.sources.recordings.exported_grasp import header_of, refuse_table_of_store
+from graspsense.sources.recordings.exported_grasp import refuse_table_of_store
 
 REQUIRED: Final = ("time", "gap", "force")
 QUANTITIES: Final = (*REQUIRED, "effort", "velocity")
@@ -47,14 +46,11 @@ def read_squeeze(name: str) -> Recording:
                 + suggestion(quantity, QUANTITIES)
             )
         columns_of.setdefault(quantity, []).append(column)
+    path = Path(file or name).expanduser()
+    tables = read_text(path)
     missing = [quantity for quantity in REQUIRED if quantity not in columns_of]
     if missing:
-        path = Path(file or name).expanduser()
-        try:
-            path.stat()
-        except OSError as error:
-            raise not_opened(path, error) from error
-        refuse_table_of_store(Path(file or name), header_of(path))
+        refuse_table_of_store(path, (*tables[0].numbers, *tables[0].texts))
         raise ConfigError(
             f"which column of {file or name} is {' and which '.join(missing)}? Write FILE.csv?time=COLUMN&gap=COLUMN"
             "&force=COLUMN, or give --time, --gap and --force to `import`. If a column is not in s, m or N, add a "
@@ -64,8 +60,6 @@ def read_squeeze(name: str) -> Recording:
         allowed = 2 if quantity == "force" else 1
         if len(names) > allowed:
             raise ConfigError(f"{len(names)} columns are given for {quantity}; at most {allowed} can be")
-    path = Path(file).expanduser()
-    tables = read_text(path)
     given = {
         quantity: [_expression(tables[0], quantity, text) for text in names]
         for quantity, names in columns_of.items()

@@ -10,7 +10,7 @@ The encoders are joints 7 to 15 of an iCub arm: 7 spreads the fingers, 8 opposes
 thumb's proximal and distal flexion, 11 and 12 the index finger's, 13 and 14 the middle finger's, 15 closes
 ring and little finger together (https://icub-tech-iit.github.io/documentation, page "iCub Joints").
 
-`relative_readings` maps them onto a gripper with two fingers; docs/icub.md explains its numbers.
+`recording_of` maps them onto a gripper with two fingers; docs/icub.md explains its numbers.
 """
 
 from __future__ import annotations
@@ -21,15 +21,12 @@ from typing import Final
 import numpy as np
 from attrs import frozen
 
-from graspsense.core.components.channels import signal_type
-from graspsense.core.files.whole_file import first_bytes
 from graspsense.core.values.errors import ConfigError, DataDamaged, suggestion
-from graspsense.core.values.fingers import PREFIX, FingerForce, opposed_forces
-from graspsense.core.values.limits import TEXT_BYTES
-from graspsense.core.values.signals import NO_PADS, Frame, Reading
-from graspsense.recording.readable import not_opened
+from graspsense.core.values.fingers import PREFIX, FingerForce
 from graspsense.recording.replayable import Recording
+from graspsense.sources.columns.grasp_columns import GraspColumns, checked_recording, finger_sides
 from graspsense.sources.formats.table import Numbers
+from graspsense.sources.formats.text_table import text_of
 
 FIRST_LINE: Final = "-10000"
 DATA_FOLDER: Final = "iCubGraspDataset"
@@ -39,8 +36,6 @@ _LINES: Final = (("encoder", 9), ("maximum", 5), *((f"{finger} taxel", 12) for f
 _FULL_TURN_DEG: Final = 360.0
 _FULL_SCALE: Final = 255.0
 
-UNITS: Final = {"t": "frame", "velocity": "m/frame"}
-"""Units of a recording that are not SI: without time stamps, time is counted in frames."""
 HAND: Final = tuple(
     FingerForce(f"{PREFIX}{name}", "N", side="left" if name == "thumb" else "right", touch="any")
     for name in FINGERS
@@ -75,7 +70,7 @@ class IcubGrasp:
 
 
 def read_recording(name: str) -> Recording:
-    """Return the grasp in this file as a recording, mapped by `relative_readings`.
+    """Return the grasp in this file as a recording, mapped by `recording_of`.
 
     `name` is a file in the folder of the data set, or in the folder that contains `iCubGraspDataset`.
 
@@ -86,13 +81,28 @@ def read_recording(name: str) -> Recording:
 
 
 def recording_of(grasp: IcubGrasp, file: str) -> Recording:
-    """Return a grasp of this file as a recording."""
-    return Recording(
-        name=f"iCub hand, {file}",
-        readings=relative_readings(grasp),
-        rate_hz=1.0,
-        units=UNITS,
-        channels=HAND,
+    """Return a grasp of this file as a recording: thumb against fingers, relative to the first frame.
+
+    The left force is that of the thumb, the right force that of the finger with the most pressure in the frame. A force
+    is `FORCE_N_PER_COUNT` times the pressure above the first frame, summed over the taxels with its sign, so that noise
+    has no bias. The gap decreases from `START_GAP_M` by `GAP_M_PER_DEG` times the mean of two flexions: that of the
+    thumb, and that of the index and middle finger. Time is the frame number. No reading depends on a later frame.
+    """
+    pressure = FORCE_N_PER_COUNT * (grasp.taxels[0] - grasp.taxels).sum(axis=2)
+    thumb_deg = grasp.encoders_deg[:, [joint - FIRST_JOINT for joint in THUMB_FLEXION]].mean(axis=1)
+    finger_deg = grasp.encoders_deg[:, [joint - FIRST_JOINT for joint in FINGER_FLEXION]].mean(axis=1)
+    flexion_deg = (thumb_deg + finger_deg) / 2.0
+    forces = dict(zip((finger.name for finger in HAND), pressure.T, strict=True))
+    left, right = finger_sides(HAND, forces)
+    columns = GraspColumns(
+        source=f"iCub hand, {file}",
+        t_s=np.arange(float(len(grasp))),
+        gap_m=START_GAP_M - GAP_M_PER_DEG * (flexion_deg - flexion_deg[0]),
+        left_n=left,
+        right_n=right,
+        scalars=forces,
+        fingers=HAND,
+        units={"t": "frame"},  # without time stamps
         notes=(
             f"{len(grasp)} frames of an iCub hand without time stamps: times are frame numbers, not seconds",
             "metres and newtons are nominal: gap from the encoders, forces from the taxels, "
@@ -100,6 +110,7 @@ def recording_of(grasp: IcubGrasp, file: str) -> Recording:
             "the commands of the controller have no effect on a recording",
         ),
     )
+    return checked_recording(columns, rate_hz=1.0)
 
 
 def read_grasp(path: Path) -> IcubGrasp:
@@ -107,15 +118,7 @@ def read_grasp(path: Path) -> IcubGrasp:
 
     Raises ConfigError if the file cannot be read, DataDamaged if its content is not a complete grasp.
     """
-    try:
-        content = first_bytes(path, TEXT_BYTES.most)
-        if too_large := TEXT_BYTES.exceeded(len(content)):
-            raise DataDamaged(f"{path}: {too_large}")
-        text = content.decode("ascii")
-    except UnicodeDecodeError:
-        raise _damaged(path, 1, "it is not plain text") from None
-    except OSError as error:
-        raise not_opened(path, error) from error
+    text = text_of(path)
     lines = text.splitlines()
     if not lines:
         raise DataDamaged(f"{path} is empty: a grasp of the iCub data set starts with the line {FIRST_LINE}")
@@ -136,36 +139,6 @@ def read_grasp(path: Path) -> IcubGrasp:
         maxima=np.array(rows[1 :: len(_LINES)]),
         taxels=np.stack([np.array(rows[k :: len(_LINES)]) for k in range(2, len(_LINES))], axis=1),
     )
-
-
-def relative_readings(grasp: IcubGrasp) -> tuple[Reading, ...]:
-    """Return one reading per frame, thumb against fingers, relative to the first frame.
-
-    The left force is that of the thumb, the right force that of the finger with the most pressure in the frame. A force
-    is `FORCE_N_PER_COUNT` times the pressure above the first frame, summed over the taxels with its sign, so that noise
-    has no bias. The gap decreases from `START_GAP_M` by `GAP_M_PER_DEG` times the mean of two flexions: that of the
-    thumb, and that of the index and middle finger. Time is the frame number. No reading depends on a later frame.
-    """
-    pressure = FORCE_N_PER_COUNT * (grasp.taxels[0] - grasp.taxels).sum(axis=2)
-    thumb_deg = grasp.encoders_deg[:, [joint - FIRST_JOINT for joint in THUMB_FLEXION]].mean(axis=1)
-    finger_deg = grasp.encoders_deg[:, [joint - FIRST_JOINT for joint in FINGER_FLEXION]].mean(axis=1)
-    flexion_deg = (thumb_deg + finger_deg) / 2.0
-    gap_m = START_GAP_M - GAP_M_PER_DEG * (flexion_deg - flexion_deg[0])
-    velocity = np.diff(gap_m, prepend=gap_m[0])
-    forces, signals, sides = pressure.tolist(), signal_type(HAND), opposed_forces(HAND)
-    readings = []
-    for k, (gap, speed, force) in enumerate(zip(gap_m.tolist(), velocity.tolist(), forces, strict=True)):
-        left, right = sides(force)
-        frame = Frame(
-            t_s=float(k),
-            dt_s=1.0,
-            gap_m=gap,
-            velocity_m_s=speed,
-            force_left_n=left,
-            force_right_n=right,
-        )
-        readings.append(Reading(frame, NO_PADS, signals(*force)))
-    return tuple(readings)
 
 
 def _locate(name: str) -> Path:

@@ -1,6 +1,6 @@
 """The iCub Grasp Dataset as labelled trials: `icub:FOLDER`.
 
-`icub.relative_readings` turns each grasp into a trace, as for replay. All of it is in the phase `approach`, because no
+`icub.recording_of` turns each grasp into a trace, as for replay. All of it is in the phase `approach`, because no
 controller of graspsense was involved. Features are extracted from that trace, so they are relative to the first frame.
 The variant `absolute` adds the gap and the force of the first frame to `p_first`, `p_steady` and `f_steady`; contact
 and rest are the same. The control from before contact uses the 74 raw numbers of the first frame, in which nothing is

@@ -18,7 +18,7 @@ from graspsense.core.components.roles import FeatureSet
 from graspsense.core.learn.checkpoints import with_checkpoints
 from graspsense.core.learn.labelled import Labelled, class_of
 from graspsense.core.pipeline.wiring import check_recording
-from graspsense.core.values.errors import ComponentFailed, ConfigError, GraspsenseError, counted, named
+from graspsense.core.values.errors import ConfigError, counted
 from graspsense.core.values.features import Features, FeatureTable, table_of
 from graspsense.core.values.signals import APPROACH
 from graspsense.core.values.trace import SI_UNITS, Trace, trace_of
@@ -27,7 +27,7 @@ from graspsense.recording.controls import Controls, controls, without_constant_g
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import each_readable, error_of_all, note_on
 from graspsense.recording.replayable import Recording, curve_bytes, grasp_numbers, recorded_channels
-from graspsense.sources.recordings.dataset_recordings import readable_or_not
+from graspsense.sources.recordings.dataset_recordings import failing_as, readable_or_not
 from graspsense.sources.recordings.noise_thresholds import THRESHOLDS, thresholds_for
 from graspsense.store.first_line import NAMES, UNITS, numbers_of
 
@@ -109,13 +109,8 @@ def _features_of(recording: LabelledRecording, features: FeatureSet[Any]) -> tup
     """Return the features of a recording, and those from before contact. Raises WiringError if it lacks a channel."""
     check_recording(recorded_channels(recording.recording), recording.source, features)
     trace = trace_of_recording(recording.recording)
-    try:
-        extracted = features.extract(trace)
-    except (GraspsenseError, MemoryError):
-        raise
-    except Exception as error:
-        raise ComponentFailed(f"the feature set {type(features).__name__} failed: {named(error)}") from error
-    return ((extracted, before_contact(trace)),)
+    with failing_as(f"the feature set {type(features).__name__}"):
+        return ((features.extract(trace), before_contact(trace)),)
 
 
 def trace_of_recording(recording: Recording) -> Trace:

@@ -22,6 +22,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -98,12 +99,11 @@ def thresholds_for(
     newtons are nominal, keep the defaults.
     """
     long_enough = [recording for recording in recordings if len(recording.readings) > _FEW]
-    if not long_enough:
-        return Thresholds(settings={}, words="thresholds of contact and rest: the defaults")
-    units = Counter(tuple(sorted(recording.units.items())) for recording in long_enough).most_common(1)[0][0]
+    counts = Counter(tuple(sorted(recording.units.items())) for recording in long_enough)
+    units = max(counts, key=counts.__getitem__, default=())
     used = [recording for recording in long_enough if tuple(sorted(recording.units.items())) == units]
     scale = _Scale.in_units(dict(units))
-    if scale.is_nominal:
+    if not used or scale.is_nominal:
         return Thresholds(settings={}, words="thresholds of contact and rest: the defaults")
     measured = [_Noise.measured_in(recording, scale) for recording in used]
     force, force_words = _contact_force(measured, scale)
@@ -149,62 +149,81 @@ class _Scale:
         return (self.gap, self.t) == ("m", "s")
 
 
-@frozen(kw_only=True)
+@frozen(eq=False)
 class _Noise:
-    """What one recording says, in its own units."""
+    """What one recording says, in its own units: times, gap, and the forces of both pads."""
 
     times: Numbers
     gap: Numbers
-    both: Numbers
-    """The force that both pads feel."""
+    pads: tuple[Numbers, Numbers]
     baseline: float
     """The force without contact."""
-    free_force: float
-    """The largest force that noise without contact explains, over both pads."""
-    peak_force: float
-    """The largest force that both pads reach at the same time."""
-    noise: float
-    """The distance within which a gap at rest stays by its noise."""
-    step: float
-    """The least step of a coarse gap."""
-    period: float
-    """The time between measurements of the gap if rows repeat it."""
-    sampled: float
-    """The time between samples."""
-    closing: float
-    """The mean speed of the whole recording."""
-    squeezing: float
-    """The mean speed from a fifth of the peak force to all of it; 0 if the gap hardly moves."""
 
     @classmethod
     def measured_in(cls, recording: Recording, scale: _Scale) -> _Noise:
-        """Measure the noise of a recording."""
+        """Return what there is to measure in a recording."""
         frames = [reading.frame for reading in recording.readings]
-        times, gap, left, right = (
-            np.array([getattr(frame, name) for frame in frames], dtype=np.float64)
-            for name in ("t_s", "gap_m", "force_left_n", "force_right_n")
+        times, gap, left, right = np.array(
+            [(frame.t_s, frame.gap_m, frame.force_left_n, frame.force_right_n) for frame in frames]
+        ).T
+        return cls(times, gap, (left, right), 0.0 if scale.force == "N" else _baseline(np.fmin(left, right)))
+
+    @cached_property
+    def both(self) -> Numbers:
+        """The force that both pads feel."""
+        both: Numbers = np.fmin(*self.pads)
+        return both
+
+    @cached_property
+    def peak_force(self) -> float:
+        """The largest force that both pads reach at the same time; 0 if none is known."""
+        return float(np.fmax.reduce(self.both, initial=np.nan) if np.isfinite(self.both).any() else 0.0)
+
+    @property
+    def loaded(self) -> int:
+        """The first sample with a fifth of the peak force."""
+        return int((self.both >= self.baseline + _EARLY_SHARE * (self.peak_force - self.baseline)).argmax())
+
+    @property
+    def free_force(self) -> float:
+        """The largest force that noise without contact explains, over both pads."""
+        return max(_free_force(pad, self.baseline) for pad in self.pads)
+
+    @property
+    def noise(self) -> float:
+        """The distance within which a gap at rest stays by its noise, which shows best where the force is large."""
+        known = np.isfinite(self.gap)
+        pressed = known & (self.both >= _PRESSED * self.peak_force)
+        known = pressed if np.count_nonzero(pressed) > 2 * _FEW else known
+        return (
+            _GAP_SIGMAS * _scatter_of_differences(self.gap[known]) if np.count_nonzero(known) > _FEW else 0.0
         )
-        both = np.fmin(left, right)
-        known = not np.isnan(both).all()
-        peak = float(np.nanmax(both)) if known else 0.0
-        baseline = 0.0 if scale.force == "N" else _baseline(both)
-        loaded = _loaded(both, baseline)
-        resolution = gap_resolution(times, gap, loaded)
-        duration = float(times[-1] - times[0])
-        return cls(
-            times=times,
-            gap=gap,
-            both=both,
-            baseline=baseline,
-            free_force=max(_free_force(left, baseline), _free_force(right, baseline)),
-            peak_force=peak,
-            noise=_gap_at_rest(gap, both),
-            step=resolution.step_m,
-            period=resolution.period_s,
-            sampled=float(np.median(np.diff(times))),
-            closing=(float(np.fmax.reduce(gap) - np.fmin.reduce(gap)) / duration if duration > 0.0 else 0.0),
-            squeezing=_squeezing_speed(times, gap, both, loaded),
+
+    @cached_property
+    def steps(self) -> tuple[float, float, float]:
+        """The least step of a coarse gap, the time between its measurements if rows repeat it, and between samples."""
+        resolution = gap_resolution(self.times, self.gap, self.loaded)
+        return resolution.step_m, resolution.period_s, float(np.median(np.diff(self.times)))
+
+    @property
+    def closing(self) -> float:
+        """The mean speed of the whole recording."""
+        duration = float(self.times[-1] - self.times[0])
+        return (
+            float(np.fmax.reduce(self.gap) - np.fmin.reduce(self.gap)) / duration if duration > 0.0 else 0.0
         )
+
+    @property
+    def squeezing(self) -> float:
+        """The mean speed of the gap from a fifth of the peak force to 95 % of it; 0 if it does not close."""
+        begin, top = self.loaded, int((self.both >= 0.95 * self.peak_force).argmax())
+        closed = float(self.gap[begin] - self.gap[top])
+        return closed / float(self.times[top] - self.times[begin]) if top > begin and closed > 0.0 else 0.0
+
+    def travel(self, contact: float) -> float:
+        """Return how far the gap has closed when both pads touch; infinite if never, or from the first sample on."""
+        k = int((self.both >= contact).argmax())
+        return float(self.gap[0] - self.gap[k]) if k else math.inf
 
     def rests(self, contact: float, speed: float, window: float) -> bool:
         """Return whether it comes to rest after both pads have touched, and still presses where that shows."""
@@ -326,7 +345,7 @@ def _ends(measured: Sequence[_Noise], scale: _Scale, contact: float) -> tuple[di
             else f"nothing is too wide, closed or crushed by a gap in {scale.gap}"
         )
     else:
-        travels = [_travel(noise, contact) for noise in measured]
+        travels = [noise.travel(contact) for noise in measured]
         close = sum(travel < _SOON_M for travel in travels)
         thin = sum(bool((noise.gap[noise.both >= contact] <= _CLOSED_M).any()) for noise in measured)
         parts = []
@@ -355,12 +374,8 @@ def _ends(measured: Sequence[_Noise], scale: _Scale, contact: float) -> tuple[di
 
 def _steps(measured: Sequence[_Noise]) -> tuple[float, float, float]:
     """Return the least step of the gap, the time between its measurements, and that between samples."""
-    rows = np.array([(noise.step, noise.period, noise.sampled) for noise in measured])
-    return (
-        float(np.quantile(rows[:, 0], 0.9)),
-        float(np.quantile(rows[:, 1], 0.9)),
-        float(np.median(rows[:, 2])),
-    )
+    steps, periods, sampled = np.array([noise.steps for noise in measured]).T
+    return float(np.quantile(steps, 0.9)), float(np.quantile(periods, 0.9)), float(np.median(sampled))
 
 
 def _seen(measured: Sequence[_Noise], scale: _Scale) -> str:
@@ -393,30 +408,6 @@ def _timeouts(
     return chosen, f"{keys} {limit:g} {scale.t} (recordings last up to {longest:.3g} {scale.t})"
 
 
-def _travel(noise: _Noise, contact: float) -> float:
-    """Return how far the gap has closed when both pads touch; infinite if never, or from the first sample on."""
-    touched = np.flatnonzero(noise.both >= contact)
-    return float(noise.gap[0] - noise.gap[touched[0]]) if len(touched) and touched[0] else math.inf
-
-
-def _loaded(force: Numbers, baseline: float) -> int:
-    """Return the first sample with a fifth of the peak force."""
-    if np.isnan(force).all():
-        return 0
-    return int((force >= baseline + _EARLY_SHARE * (np.nanmax(force) - baseline)).argmax())
-
-
-def _squeezing_speed(times: Numbers, gap: Numbers, force: Numbers, loaded: int) -> float:
-    """Return the mean speed of the gap from a fifth of the peak force to 95 % of it; 0 if it does not close."""
-    if np.isnan(force).all():
-        return 0.0
-    top = int((force >= 0.95 * np.nanmax(force)).argmax())
-    if not top > loaded:
-        return 0.0
-    closed = float(gap[loaded] - gap[top])
-    return max(closed, 0.0) / float(times[top] - times[loaded]) if closed == closed else 0.0
-
-
 def _baseline(force: Numbers) -> float:
     """Return the force without contact of a sensor whose zero is not known: that of the first samples below a fifth."""
     known = force[~np.isnan(force)]
@@ -447,17 +438,6 @@ def _rises(force: Numbers) -> bool:
     a_third = max(len(force) // 3, 1)
     growth = float(np.median(force[-a_third:]) - np.median(force[:a_third]))
     return growth > _FORCE_SIGMAS * _scatter_of_differences(force)
-
-
-def _gap_at_rest(gap: Numbers, force: Numbers) -> float:
-    """Return the distance within which a gap at rest stays by its noise, which shows best where the force is large."""
-    known = np.isfinite(gap)
-    if not np.isnan(force).all():
-        pressed = known & (force >= _PRESSED * np.nanmax(force))
-        known = pressed if np.count_nonzero(pressed) > 2 * _FEW else known
-    if np.count_nonzero(known) <= _FEW:
-        return 0.0
-    return _GAP_SIGMAS * _scatter_of_differences(gap[known])
 
 
 def _scatter_of_differences(values: Numbers) -> float:

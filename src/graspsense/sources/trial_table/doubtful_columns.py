@@ -7,7 +7,7 @@ all.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from decimal import Decimal
 from itertools import groupby
 from typing import TYPE_CHECKING, Final
@@ -79,6 +79,58 @@ _ALIKE: Final = 1.0 / 3.0
 """Ratios of a pad to the other one below which they are far apart, and above which they are alike."""
 _PROPORTIONAL: Final = 1.0 - 1e-6
 """Correlation with the number to predict from which on a column is that number in another unit."""
+_RECORDED: Final = "If it tells when a trial was recorded, it reveals the labels: "
+_DOUBTS: Final[Mapping[str, tuple[str, str]]] = {
+    "same": (
+        "all trials of a label have the same value",
+        "If it is the label in other words, or tells of the recording, ",
+    ),
+    "mostly": (
+        "most trials of each label have the same one of its few values",
+        "If it is a setting of the experiment, or a prediction, it reveals the labels: ",
+    ),
+    "one label": (
+        "each of its values occurs with one label only",
+        "If it names sessions, devices or objects, or was measured once for each, it reveals the labels: ",
+    ),
+    "blocks": (
+        "each of its values is that of consecutive lines, as a month, a session or a version is",
+        "If it tells when or how a trial was recorded, it reveals the labels: ",
+    ),
+    "missing": (
+        "some labels have nearly all of its values, and others hardly any",
+        "If the recording is the reason, and not the object, it reveals the labels: ",
+    ),
+    "order": (
+        "its values follow the order of recording within each label, as a drifting zero, a battery or a clock does",
+        _RECORDED,
+    ),
+    "time": (
+        "its name is that of a time, or its values can be dates as spreadsheets and MATLAB number them",
+        "If it is the time of recording, it reveals the labels: ",
+    ),
+    "session": (
+        "it is from before the contact, or can drift in a session, by its name or unit",
+        _RECORDED,
+    ),
+    "without a gap": (
+        "its values pass from label to label without a gap or an overlap, as those of a clock or a counter do",
+        "If it is a time or a counter it reveals the labels: ",
+    ),
+    "digits": (
+        "it is written with fewer digits for some labels than for others",
+        "Digits tell the labels: round all values alike, or ",
+    ),
+    "rising": (
+        "every line has more than the one before, or every line less",
+        "If it is a time or a counter, ",
+    ),
+    "target": (
+        "it is the number to predict in another unit",
+        "If it is not measured apart from it, ",
+    ),
+}
+"""Why a column may reveal the labels, or the number to predict: what shows it, and what to do about it."""
 
 
 def doubts(
@@ -88,16 +140,26 @@ def doubts(
     target: Sequence[float] | None = None,
 ) -> list[str]:
     """Return notes on those columns that are features and may reveal the labels, or the number to predict."""
-    if target is not None:
-        return _doubts_of_target(columns, target, table)
     used = [name for name in columns.names if set(columns.columns_of(name)) <= set(table.names)]
     numbers = _numbers(columns, [name for name in used if not columns.is_nominal(name)])
-    checks = (*_of_recording(columns, labels, used, table), *_of_time_and_digits(columns, labels, numbers))
+    doubted: dict[str, list[str]] = {}
+    for name in used if target is None else numbers:
+        if target is not None:
+            reasons = [*_of_target(numbers[name], np.array(target))]
+        else:
+            missing = np.isnan(table.columns(columns.columns_of(name)[:1]).values[:, 0]).tolist()
+            reasons = [*_of_recording(columns, name, labels)]
+            reasons += ["missing"] if says_of_labels(missing, labels) else []
+            reasons += (
+                _of_numbers(name, columns.units[name], numbers[name], labels) if name in numbers else []
+            )
+        for reason in reasons:
+            doubted.setdefault(reason, []).append(name)
     leave_out = f"leave it out ({option('features', python='columns')})"
     notes = [
-        f"used, although {what}: {listed(doubted)}. {advice}{leave_out}"
-        for what, doubted, advice in checks
-        if doubted
+        f"used, although {what}: {listed(doubted[reason])}. {advice}{leave_out}"
+        for reason, (what, advice) in _DOUBTS.items()
+        if reason in doubted
     ]
     return notes + _mixed(numbers) + list(_pads_apart(numbers))
 
@@ -112,120 +174,41 @@ def not_held_out(columns: CsvColumns, names: Sequence[str], instances: Sequence[
     ]
 
 
-def _of_recording(
-    columns: CsvColumns, labels: Sequence[str], used: Sequence[str], table: FeatureTable
-) -> tuple[tuple[str, list[str], str], ...]:
-    """Return what may tell of labels, devices or objects: how, the names of the columns, and what to do."""
-    same = [name for name in used if says_the_label(columns.cells[name], labels)]
-    missing = {name: np.isnan(table.columns(columns.columns_of(name)[:1]).values[:, 0]) for name in used}
-    return (
-        (
-            "all trials of a label have the same value",
-            same,
-            "If it is the label in other words, or tells of the recording, ",
-        ),
-        (
-            "most trials of each label have the same one of its few values",
-            [
-                name
-                for name in used
-                if name not in same and mostly_says_the_label(columns.cells[name], labels)
-            ],
-            "If it is a setting of the experiment, or a prediction, it reveals the labels: ",
-        ),
-        (
-            "each of its values occurs with one label only",
-            [
-                name
-                for name in used
-                if name not in same
-                and (
-                    name_objects(columns.cells[name], labels)
-                    or (is_count(columns.units[name]) and values_have_one_label(columns.cells[name], labels))
-                )
-            ],
-            "If it names sessions, devices or objects, or was measured once for each, it reveals the labels: ",
-        ),
-        (
-            "each of its values is that of consecutive lines, as a month, a session or a version is",
-            [
-                name
-                for name in used
-                if name not in same
-                and (columns.is_nominal(name) or is_count(columns.units[name]))
-                and in_one_block_each(columns.cells[name], labels)
-            ],
-            "If it tells when or how a trial was recorded, it reveals the labels: ",
-        ),
-        (
-            "some labels have nearly all of its values, and others hardly any",
-            [name for name in used if says_of_labels(missing[name].tolist(), labels)],
-            "If the recording is the reason, and not the object, it reveals the labels: ",
-        ),
-    )
+def _of_recording(columns: CsvColumns, name: str, labels: Sequence[str]) -> Iterator[str]:
+    """Yield why the texts of a column may tell of labels, devices or objects."""
+    cells, is_number = columns.cells[name], is_count(columns.units[name])
+    if says_the_label(cells, labels):
+        yield "same"
+        return
+    if mostly_says_the_label(cells, labels):
+        yield "mostly"
+    if name_objects(cells, labels) or (is_number and values_have_one_label(cells, labels)):
+        yield "one label"
+    if (columns.is_nominal(name) or is_number) and in_one_block_each(cells, labels):
+        yield "blocks"
 
 
-def _of_time_and_digits(
-    columns: CsvColumns, labels: Sequence[str], numbers: dict[str, Numbers]
-) -> tuple[tuple[str, list[str], str], ...]:
-    """Return what may tell of times and rounding: how, the names of the columns, and what to do."""
-    counted = [name for name in numbers if is_count(columns.units[name]) or is_time(columns.units[name])]
-    return (
-        (
-            "its values follow the order of recording within each label, as a drifting zero, a battery or a clock does",
-            [
-                name
-                for name, values in numbers.items()
-                if (differs_by_label(values, labels) or are_in_blocks(labels))
-                and follow_lines(values, labels)
-            ],
-            "If it tells when a trial was recorded, it reveals the labels: ",
-        ),
-        (
-            "its name is that of a time, or its values can be dates as spreadsheets and MATLAB number them",
-            [name for name in counted if _is_named_as_time(name) or can_be_days(numbers[name])],
-            "If it is the time of recording, it reveals the labels: ",
-        ),
-        (
-            "it is from before the contact, or can drift in a session, by its name or unit",
-            [
-                name
-                for name, values in numbers.items()
-                if (_OF_A_SESSION & set(words_in(name)) or columns.units[name] in _TEMPERATURES)
-                and differs_by_label(values, labels)
-            ],
-            "If it tells when a trial was recorded, it reveals the labels: ",
-        ),
-        (
-            "its values pass from label to label without a gap or an overlap, as those of a clock or a counter do",
-            [name for name in counted if passes_without_a_gap(numbers[name], labels)],
-            "If it is a time or a counter it reveals the labels: ",
-        ),
-        (
-            "it is written with fewer digits for some labels than for others",
-            [name for name, values in numbers.items() if digits_tell_labels(values, labels)],
-            "Digits tell the labels: round all values alike, or ",
-        ),
-    )
+def _of_numbers(name: str, unit: str, values: Numbers, labels: Sequence[str]) -> Iterator[str]:
+    """Yield why the numbers of a column may tell of the time of recording, or of how they were written."""
+    of_time, differs = is_count(unit) or is_time(unit), differs_by_label(values, labels)
+    if (differs or are_in_blocks(labels)) and follow_lines(values, labels):
+        yield "order"
+    if of_time and (_is_named_as_time(name) or can_be_days(values)):
+        yield "time"
+    if differs and (_OF_A_SESSION & set(words_in(name)) or unit in _TEMPERATURES):
+        yield "session"
+    if of_time and passes_without_a_gap(values, labels):
+        yield "without a gap"
+    if digits_tell_labels(values, labels):
+        yield "digits"
 
 
-def _doubts_of_target(columns: CsvColumns, target: Sequence[float], table: FeatureTable) -> list[str]:
-    """Return notes on features that may be the number to predict itself, or that hold two kinds of numbers."""
-    numbers = _numbers(columns, [name for name in columns.names if name in table.names])
-    rising = [name for name, values in numbers.items() if keeps_rising(values)]
-    same = [name for name, values in numbers.items() if is_proportional(values, np.array(target))]
-    notes = []
-    if rising:
-        notes.append(
-            f"used, although every line has more than the one before, or every line less: {listed(rising)}. If it is a "
-            f"time or a counter, leave it out ({option('features', python='columns')})"
-        )
-    if same:
-        notes.append(
-            f"used, although it is the number to predict in another unit: {listed(same)}. If it is not measured "
-            f"apart from it, leave it out ({option('features', python='columns')})"
-        )
-    return notes + _mixed(numbers)
+def _of_target(values: Numbers, target: Numbers) -> Iterator[str]:
+    """Yield why the numbers of a column may be the number to predict itself, or when it was measured."""
+    if keeps_rising(values):
+        yield "rising"
+    if is_proportional(values, target):
+        yield "target"
 
 
 def keeps_rising(values: Sequence[float] | Numbers) -> bool:

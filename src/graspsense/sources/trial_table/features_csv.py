@@ -75,20 +75,20 @@ def read_labelled(
     Raises ConfigError if a column does not exist or cannot be a label, DataDamaged if the file is not a valid table.
     """
     columns = columns_of_file(path)
-    label = label or columns.default_label
     notes = list(columns.notes)
     export = exported(columns)
+    label = label or columns.default_label or ("label" if export is not None else None)
     if export is not None:
-        label = label or "label"
         export.keep_complete_trials(label if value is None else None, notes)
         features = features or export.features
     elif isinstance(columns, ArffColumns) and value is None:
         notes += columns.without_label(label)
     target = None if value is None else _target(columns, value, export, notes)
     labels = _labels(columns, label, notes, required=target is None)
-    ranks, no_order = _order(columns, order, export, notes)
+    ranks, no_order = export.order() if export and order is None else (_ranks(columns, order, notes), "")
+    # No feature of an exported store identifies trials: a feature set made it.
     lines = _lines_once(columns, {order, columns.index}, labels)
-    identified = _measured if export is not None else _identifying(columns, labels, ranks, lines)
+    identified = (lambda _: "") if export is not None else _identifying(columns, labels, ranks, lines)
     if instance is None and (target is None or export is not None):
         instance = _object_column(columns, {label, order, columns.index, *features}, identified, notes)
     instances = None if instance is None else tuple(columns.complete_column(instance, "the instance"))
@@ -205,15 +205,6 @@ def _target(columns: CsvColumns, value: str, export: ExportedTable | None, notes
     return TargetValue(name=value, unit=columns.units[name], values=tuple(columns.numbers(name)))
 
 
-def _order(
-    columns: CsvColumns, order: str | None, export: ExportedTable | None, notes: list[str]
-) -> tuple[tuple[int, ...] | None, str]:
-    """Return the position of each trial in the order of recording, or None with the reason. Raises DataDamaged."""
-    if order is None and export is not None:
-        return export.order()
-    return _ranks(columns, order, notes), ""
-
-
 def read_table(path: Path, names: Sequence[str]) -> tuple[FeatureTable, tuple[str, ...]]:
     """Return these columns of a CSV file, and what was left out of it. Raises ConfigError, DataDamaged."""
     columns = columns_of_file(path)
@@ -301,11 +292,6 @@ def _loses_digits(cells: Sequence[str], values: Sequence[float]) -> bool:
     return len(set(values)) < len(set(cells)) and any(abs(value) >= LARGEST_WHOLE for value in values)
 
 
-def _measured(_name: str) -> str:
-    """Return that no feature of an exported store identifies trials: a feature set made it."""
-    return ""
-
-
 def _feature_table(
     columns: CsvColumns,
     features: Sequence[str],
@@ -331,17 +317,16 @@ def _feature_names(
 ) -> list[str]:
     """Return the columns that are neither reserved nor identifiers. Raises ConfigError, DataDamaged."""
     _refuse_long_form(columns)
-    names, nominal, blank = [], [], []
+    names, nominal, blank = [], [], "have no values"
     if columns.index:
         notes.append(f"not used, because it is the index that pandas wrote: {columns.index}")
     identifiers: dict[str, list[str]] = {}
     for name in columns.names:
         if name in reserved or name == columns.index:
             continue
-        if columns.is_blank(name) and not columns.units[name]:
-            blank.append(name)
-        elif why := identified(name):
-            identifiers.setdefault(why, []).append(name)
+        unused = blank if columns.is_blank(name) and not columns.units[name] else identified(name)
+        if unused:
+            identifiers.setdefault(unused, []).append(name)
         else:
             names.append(name)
             nominal += [name] if columns.is_nominal(name) else []
@@ -350,15 +335,10 @@ def _feature_names(
             f"not used, because they {why}: {listed(identifier)} "
             f"(use {option('features', python='columns')} to include them)"
         )
-    if blank:
-        notes.append(
-            f"not used, because they have no values: {listed(blank)} "
-            f"(use {option('features', python='columns')} to include them)"
-        )
     if nominal:
         notes.append(f"nominal, with a feature for each of their values: {listed(nominal)}")
-    if blank and not names:
-        raise DataDamaged(f"{columns.path}: no feature has any value: {listed(blank)}")
+    if blank in identifiers and not names:
+        raise DataDamaged(f"{columns.path}: no feature has any value: {listed(identifiers[blank])}")
     if not names:
         unused = "".join(f". {note}" for note in notes if note.startswith("not used"))
         raise ConfigError(
