@@ -5,7 +5,6 @@ import json
 import math
 import os
 import signal
-import struct
 import time
 from collections import namedtuple
 from contextlib import contextmanager
@@ -84,8 +83,6 @@ def test_times_are_the_gripper_s_on_the_wall_clock_and_a_chunk_closes_every_50_m
     assert len(spans) >= 8
     assert max(spans) <= 51_000_000
     assert summary.statistics.message_count == 400 + 10
-
-
 
 
 def test_our_reader_gives_each_tick_with_the_image_it_had(tmp_path):

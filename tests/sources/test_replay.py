@@ -71,33 +71,6 @@ def frames_of(path: Path) -> list[Frame]:
     return [reading.frame for reading in recording_of(read_grasp(path), "g").readings]
 
 
-<<<<<<< HEAD
-=======
-def test_reader_keeps_what_the_file_says(tmp_path: Path) -> None:
-    grasp = read_grasp(write(tmp_path / "g.txt", frame_lines(), frame_lines(moved(j12=8.0), {LITTLE: 7})))
-    assert len(grasp) == 2
-    assert grasp.encoders_deg[1].tolist() == [20.0, 80.0, 10.0, 40.0, 30.0, 58.0, 32.0, 45.0, 5.0]
-    assert grasp.maxima[1].tolist() == [15, 15, 15, 15, 22]
-    assert grasp.taxels.shape == (2, 5, 12)
-    assert grasp.taxels[1, LITTLE, 3] == 233
-    assert grasp.taxels.sum() == 2 * 60 * 240 - 7
-
-
-def test_times_are_frame_numbers_and_what_was_not_recorded_is_missing(tmp_path: Path) -> None:
-    path = write(tmp_path / "g.txt", *[frame_lines()] * 3)
-    readings = list(recording_of(read_grasp(path), "g").readings)
-    assert [(reading.frame.t_s, reading.frame.dt_s) for reading in readings] == [(0, 1), (1, 1), (2, 1)]
-    frame = readings[0].frame
-    assert all(math.isnan(v) for v in (frame.effort_n, frame.edge_left_n, frame.edge_right_n))
-    assert readings[0].pads == NO_PADS
-    _, info = opened(path)
-    assert info.units["t"] == "frame"
-    said = " ".join(info.notes)
-    assert "times are frame numbers, not seconds" in said
-    assert "nominal" in said
-
-
->>>>>>> h-s1
 def test_thumb_is_left_and_the_strongest_finger_is_right(tmp_path: Path) -> None:
     path = write(
         tmp_path / "g.txt",

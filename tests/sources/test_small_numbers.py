@@ -35,8 +35,6 @@ def test_a_classifier_recognises_what_differs_by_less_than_micrometres(classifie
     assert evaluation.headline.rate >= 0.9
 
 
-
-
 def test_a_column_that_differs_by_rounding_alone_is_no_feature(tmp_path):
     path = tmp_path / "t.csv"
     lines = [f"{'ab'[k % 2]},{1.0 + 2.0**-52 * (k * 7 % 5)!r},{k * 7 % 11}" for k in range(40)]

@@ -4,6 +4,7 @@ import csv
 import io
 import itertools
 import math
+import re
 
 import numpy as np
 import pytest
@@ -31,6 +32,7 @@ FORMULAS = [
     "a;=1+1",
     "a\n=1+1",
     '"=1+1',
+    'a;"=1+1',
     "\uff1d1+1",
 ]
 """Texts that a spreadsheet takes for a formula, some of them only if it divides cells at other characters."""
@@ -40,13 +42,13 @@ def cells_of(text, separator=","):
     return [cell for row in csv.reader(io.StringIO(text, newline=""), delimiter=separator) for cell in row]
 
 
+NUMBER = re.compile(r"[-+]?[\d.]+(e[-+]?\d+)?(,|$)")
+
+
 def runs(cell):
-    """Whether a spreadsheet takes a cell for a formula; a number is none."""
-    try:
-        float(cell)
-    except ValueError:
-        return cell.lstrip().startswith(("=", "+", "-", "@", "\uff1d", "\uff0b", "\uff0d", "\uff20"))
-    return False
+    """Whether a spreadsheet takes a cell for a formula; a number is none, also where a comma does not divide cells."""
+    starts = cell.lstrip().startswith(("=", "+", "-", "@", "\uff1d", "\uff0b", "\uff0d", "\uff20"))
+    return starts and NUMBER.match(cell) is None
 
 
 @given(st.sampled_from(FORMULAS) | st.text(st.sampled_from("=+-@'\t\r\n;, ab1\"\uff1d")))

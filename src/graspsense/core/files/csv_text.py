@@ -14,8 +14,10 @@ from typing import Final
 
 _BEGINNING: Final = r"=+\-@\uff1d\uff0b\uff0d\uff20\u2212"
 """The characters that begin a formula, also in their full width."""
-_WRITTEN: Final = re.compile(rf"((?:^|[;\t\r\n])[^\S\t\r\n]*)('*[{_BEGINNING}])")
-_READ: Final = re.compile(rf"((?:^|[;\t\r\n])[^\S\t\r\n]*)'('*[{_BEGINNING}])")
+_DIVIDED: Final = r'(?:^|[;\t\r\n])(?:[^\S\t\r\n]|")*'
+"""Where another cell may begin; quotes there may be taken for those of the cell."""
+_WRITTEN: Final = re.compile(rf"({_DIVIDED})('*[{_BEGINNING}])")
+_READ: Final = re.compile(rf"({_DIVIDED})'('*[{_BEGINNING}])")
 _PASSED_OVER: Final = re.compile(r"'*[\t\r\n]")
 """What a spreadsheet passes over at the beginning of a cell."""
 _NUMBER: Final = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?")
