@@ -421,6 +421,16 @@ def test_settings_as_a_file_resolve_by_themselves_to_the_same_values(plugins, wr
     assert to_toml(again).replace("again.toml", "lab.toml") == to_toml(resolved)
 
 
+def test_with_origins_it_is_still_the_same_file(plugins, write):
+    settings = resolve(write(BASE), options=["gripper.filter.order=3"])
+    text = to_toml(settings, origins=True)
+
+    assert tomllib.loads(text) == tomllib.loads(to_toml(settings))
+    assert 'port = "a"                                # lab.toml:3\n' in text
+    assert "filter = { cutoff_hz = 50.0, order = 3 }  # default, -o\n" in text
+    assert "# serial is not set                       # default\n" in text
+
+
 TEXT = st.text(st.characters(exclude_categories=["Cs"]))
 PLAIN = st.recursive(
     st.booleans() | st.integers(-(2**63), 2**63 - 1) | st.floats(allow_nan=False) | TEXT,
