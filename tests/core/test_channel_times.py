@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from test_device_clock import fed
 
 from graspsense import load_pipeline
 from graspsense.core.drivers.device_clock import DeviceClock, clock_report
@@ -18,26 +19,17 @@ from graspsense.core.values.trial import apart_s
 PADS = ("force_left", "force_right", "pads")
 
 
-def fed(offset_s, drift, jitter_s, seed):
-    """Return a clock that took fifteen seconds of arrivals, and the errors of the host times it gave them."""
-    clock, draws, errors = DeviceClock(), np.random.default_rng(seed), []
-    for device_s in np.arange(0.0, 15.0, 0.02).tolist():
-        measured_s = device_s * (1.0 + drift) + offset_s
-        arrived_s = measured_s + draws.exponential(jitter_s)
-        errors.append(abs(arrived_s - clock.age_s(device_s, arrived_s) - measured_s))
-    return clock, errors
-
-
 @settings(max_examples=15, deadline=None)
 @given(st.floats(-1e-4, 1e-4), st.floats(-1e-4, 1e-4), st.integers(0, 10_000))
 def test_two_clocks_are_not_further_apart_than_is_said(leading, trailing, seed):
     """Two fingertips with clocks of their own, with delays that nobody knows: both err, and the sum bounds it."""
     report, errors = {}, []
     for name, drift in (("left", leading), ("right", trailing)):
-        clock, off = fed(5.0, drift, 0.001, seed)
+        clock = DeviceClock()
+        ages, delays = fed(clock, 15.0, drift, 5.0, seed, rate_hz=50.0)
         report |= clock_report(name, clock, (f"cells_{name}",))
         # What came in the first second is corrected by nobody.
-        errors.append(max(off[-250:]))
+        errors.append(np.abs(ages - delays)[-250:].max())
     trace = SimpleNamespace(pad_t_s=np.empty(0), t_s=np.arange(2.0))
     apart = apart_s(trace, report, "cells_left", "cells_right")
     assert 0.0 < apart < 0.01
@@ -47,7 +39,8 @@ def test_two_clocks_are_not_further_apart_than_is_said(leading, trailing, seed):
 def test_one_device_is_measured_at_once_and_an_unknown_clock_promises_nothing():
     trace = SimpleNamespace(pad_t_s=np.array([0.0, 0.02, 0.05]), t_s=np.array([0.0, 0.06]))
     trace.force_left_n = trace.force_right_n = np.array([1.0, 1.0, 2.0, 2.0, 3.0])
-    clock, _ = fed(0.0, 0.0, 0.001, 1)
+    clock = DeviceClock()
+    fed(clock, 15.0, 0.0, 0.0, 1)
     report = clock_report("tactile", clock, PADS)
     sure = clock.line().uncertainty_s
     assert apart_s(trace, report, "gap", "effort") == 0.0

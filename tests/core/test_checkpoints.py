@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from attrs import evolve, frozen
 from cases import every_case
+from test_conformal import model_of
+from test_evaluate import learner
 
 from graspsense.core.components.registry import installed
 from graspsense.core.components.run_config import RunConfig
@@ -21,19 +23,17 @@ from graspsense.core.learn.checkpoints import (
 )
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.model_file import load_model, write_model
-from graspsense.core.learn.training import train
 from graspsense.core.pipeline.anytime import Anytime, anytime_of
 from graspsense.core.settings.resolved import resolve
-from graspsense.core.settings.selected import SelectedComponent, build
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.features import CheckpointPrediction, Features, Prediction, table_of
 from graspsense.core.values.signals import Outcome, Phase
 from graspsense.evaluation.checkpoints import SURE, WHOLE, checkpoint_models, early_recognition
-from graspsense.evaluation.doubt import calibrated
 from graspsense.plugin_api import create
 from graspsense.testing.model_gripper import ModelGripper
 
 CHECKPOINTS = (0.02, 0.05)
+C45 = learner("c45")
 RUN = RunConfig(hold_s=0.1)
 
 
@@ -117,17 +117,10 @@ def trials_of(traces, checkpoints):
 
 
 @pytest.fixture(scope="module")
-def learner():
-    component = installed().find("classifier", "c45")
-    return SelectedComponent(component, build(component, {}))
-
-
-@pytest.fixture(scope="module")
-def model(trials, learner):
+def model(trials):
     *parts, whole = split_checkpoints(trials, CHECKPOINTS)
-    of_whole = train(learner.component, learner.config, whole.labelled, name="test")
-    of_whole = calibrated(of_whole, learner, whole.labelled, 0)
-    return evolve(of_whole, checkpoints=checkpoint_models(of_whole, learner, parts, 0))
+    of_whole = model_of(whole.labelled, "c45")
+    return evolve(of_whole, checkpoints=checkpoint_models(of_whole, C45, parts, 0))
 
 
 def watcher(model, *, stops=False):
@@ -260,18 +253,17 @@ def test_only_a_model_with_checkpoints_and_sets_can_stop_a_squeeze(model):
     for given, says in (
         (late, r"has no checkpoints.*train .*--checkpoints"),
         (None, r"run\.stop_when_sure.*classifier\.model"),
-        (evolve(model, checkpoints=unsure), r"run.stop_when_sure: model 'test'"),
+        (evolve(model, checkpoints=unsure), r"run.stop_when_sure: model 'm'"),
     ):
         with pytest.raises(ConfigError, match=says):
             anytime_of(given, curve(), settings)
     assert anytime_of(late, curve(), resolve("default")) is None
 
 
-def test_a_checkpoint_of_a_model_of_other_objects_is_refused(model, trials, learner, tmp_path):
+def test_a_checkpoint_of_a_model_of_other_objects_is_refused(model, trials, tmp_path):
     others = evolve(trials, labels=tuple({"soft": "egg", "stiff": "toy"}[label] for label in trials.labels))
     part, *_, whole = split_checkpoints(others, CHECKPOINTS)
-    of_others = train(learner.component, learner.config, whole.labelled, name="others")
-    mixed = evolve(model, checkpoints=checkpoint_models(of_others, learner, [part], 0))
+    mixed = evolve(model, checkpoints=checkpoint_models(model_of(whole.labelled, "c45"), C45, [part], 0))
     write_model(tmp_path / "mixed.json", mixed)
     with pytest.raises(DataDamaged, match="egg, toy"):
         load_model(str(tmp_path / "mixed.json"), installed())
@@ -291,9 +283,9 @@ def test_trials_without_traces_or_of_short_grasps_have_no_checkpoints(traces, tr
         split_checkpoints(trials_of(traces, (60.0,)), (60.0,))
 
 
-def test_recognition_against_seconds_and_newtons(trials, learner):
+def test_recognition_against_seconds_and_newtons(trials):
     """The later the answer, the more it costs; a sure squeeze costs no more than a whole one."""
-    recognition = early_recognition(learner, split_checkpoints(trials, CHECKPOINTS))
+    recognition = early_recognition(C45, split_checkpoints(trials, CHECKPOINTS))
     rows = {row.name: row for row in recognition.rows}
     assert list(rows) == ["0.02 s", "0.05 s", WHOLE, SURE]
     assert recognition.protocol == "instance_held_out"
@@ -309,9 +301,9 @@ def test_recognition_against_seconds_and_newtons(trials, learner):
     assert sure.covered.n == early
 
 
-def test_trials_without_enough_instances_have_rates_but_no_sets(trials, learner):
+def test_trials_without_enough_instances_have_rates_but_no_sets(trials):
     few = trials.rows(np.array([0, 1, 2, 15, 16, 17]))
-    recognition = early_recognition(learner, split_checkpoints(few, CHECKPOINTS), folds=3)
+    recognition = early_recognition(C45, split_checkpoints(few, CHECKPOINTS), folds=3)
     assert [row.name for row in recognition.rows] == ["0.02 s", "0.05 s", WHOLE]
     assert "90 % needs 9" in recognition.reason
     assert all(row.covered is None for row in recognition.rows)

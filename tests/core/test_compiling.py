@@ -319,25 +319,6 @@ def kept_in(tmp_path, monkeypatch):
     compiled_code_folder.cache_clear()
 
 
-def test_where_code_is_on_disk_what_a_function_calls_is_not_prepared_for_compiling(kept_in, monkeypatch):
-    monkeypatch.setattr(compiling, "_COMPILED", {})
-    assert compile_function(bind(_scaled, helper=_thrice))(2.0) == 12.0
-    monkeypatch.setattr(compiling, "_COMPILED", {})
-
-    def unexpected(*given):
-        raise AssertionError("it looked at the called functions")
-
-    monkeypatch.setattr(compiling, "called_functions", unexpected)
-    monkeypatch.setattr(compiling, "copies_if_inlined", unexpected)
-    loaded = compile_function(bind(_scaled, helper=_thrice))
-    assert loaded(2.0) == 12.0
-    with pytest.raises(AssertionError, match="called functions"):
-        loaded(2)
-    # What was interrupted is done again.
-    monkeypatch.undo()
-    assert loaded(2) == 12.0
-
-
 def test_a_called_function_that_is_replaced_before_the_first_call_is_not_kept_under_the_old_name(
     kept_in, monkeypatch
 ):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import tomllib
 from decimal import Decimal
 from pathlib import Path
@@ -181,15 +180,6 @@ def test_extends_lays_a_file_over_another_with_paths_from_its_own_folder(plugins
     assert settings.origins["controller.force_n"] == "shared/middle.toml:3"
     assert settings.origins["controller.speed_m_s"] == "top.toml:4"
     assert settings.origins["gripper.port"] == "shared/base.toml:3"
-
-
-def test_a_file_extends_a_named_pipeline(plugins, write):
-    top = write('extends = "default"\n[gripper]\ntype = "hand"\nport = "a"\n[classifier]\ntype = "none"\n')
-
-    settings = resolve(top)
-
-    assert settings.controller.component.qualified == "graspsense/hybrid"
-    assert re.fullmatch(r"pipeline graspsense/default:\d+", settings.origins["controller.probing_force_n"])
 
 
 OTHER = (Flag("--gripper", "gripper.type", "other"),)
@@ -410,35 +400,35 @@ def test_a_recipe_makes_the_same_component_again():
             recipe_of("controller", made)
 
 
-class TestToToml:
-    def test_the_file_resolves_by_itself_to_the_same_values(self, plugins, write):
-        resolved = resolve(
-            write(BASE),
-            options=[
-                'gripper.port="C:\\\\tty\\n\\u007f\\"x\\" ü 🤖"',
-                "gripper.rate_hz=inf",
-                "gripper.offsets_n=[0.1, 1e-300, -3]",
-                'gripper.gains={ left = 2, "to the right" = 1 }',
-                "gripper.log=out/run.log",
-                "gripper.echo=true",
-                "run.seed=7",
-                "classifier.type=guess",
-            ],
-        )
-        again = resolve(write(to_toml(resolved), "again.toml"))
+def test_settings_as_a_file_resolve_by_themselves_to_the_same_values(plugins, write):
+    resolved = resolve(
+        write(BASE),
+        options=[
+            'gripper.port="C:\\\\tty\\n\\u007f\\"x\\" ü 🤖"',
+            "gripper.rate_hz=inf",
+            "gripper.offsets_n=[0.1, 1e-300, -3]",
+            'gripper.gains={ left = 2, "to the right" = 1 }',
+            "gripper.log=out/run.log",
+            "gripper.echo=true",
+            "run.seed=7",
+            "classifier.type=guess",
+        ],
+    )
+    again = resolve(write(to_toml(resolved), "again.toml"))
 
-        assert (again.values, again.run) == (resolved.values, resolved.run)
-        assert {origin.partition(":")[0] for origin in again.origins.values()} == {"default", "again.toml"}
-        assert to_toml(again).replace("again.toml", "lab.toml") == to_toml(resolved)
+    assert (again.values, again.run) == (resolved.values, resolved.run)
+    assert {origin.partition(":")[0] for origin in again.origins.values()} == {"default", "again.toml"}
+    assert to_toml(again).replace("again.toml", "lab.toml") == to_toml(resolved)
 
-    def test_with_origins_it_is_still_the_same_file(self, plugins, write):
-        settings = resolve(write(BASE), options=["gripper.filter.order=3"])
-        text = to_toml(settings, origins=True)
 
-        assert tomllib.loads(text) == tomllib.loads(to_toml(settings))
-        assert 'port = "a"                                # lab.toml:3\n' in text
-        assert "filter = { cutoff_hz = 50.0, order = 3 }  # default, -o\n" in text
-        assert "# serial is not set                       # default\n" in text
+def test_with_origins_it_is_still_the_same_file(plugins, write):
+    settings = resolve(write(BASE), options=["gripper.filter.order=3"])
+    text = to_toml(settings, origins=True)
+
+    assert tomllib.loads(text) == tomllib.loads(to_toml(settings))
+    assert 'port = "a"                                # lab.toml:3\n' in text
+    assert "filter = { cutoff_hz = 50.0, order = 3 }  # default, -o\n" in text
+    assert "# serial is not set                       # default\n" in text
 
 
 TEXT = st.text(st.characters(exclude_categories=["Cs"]))

@@ -229,6 +229,14 @@ def test_whatever_a_classifier_raises_on_a_file_is_damage_of_the_file(mean):
         classifier_from(StoredValues(kept), component, component.config_class()(), model.names, model.units)
 
 
+def refuse_text(tmp_path, name, text, says):
+    path = tmp_path / "m.json"
+    write_model(path, trained(name, kept_as="skops"))
+    resealed(path, lambda content: content["model"].update(skops=text))
+    with pytest.raises(DataDamaged, match=says):
+        load_model(str(path), installed())
+
+
 @pytest.mark.slow
 class TestKeptAsSkops:
     """The compiled code of scikit-learn trusts its arrays; each that does not fit is refused before it is used."""
@@ -241,14 +249,9 @@ class TestKeptAsSkops:
     def refused(tmp_path, name, change):
         from graspsense.plugins.classifiers.skops_text import as_text
 
-        path = tmp_path / "m.json"
-        model = trained(name, kept_as="skops")
-        write_model(path, model)
-        estimator = copy.deepcopy(model.classifier._fitted.estimator)
+        estimator = copy.deepcopy(trained(name, kept_as="skops").classifier._fitted.estimator)
         change(estimator)
-        resealed(path, lambda content: content["model"].update(skops=as_text(estimator)))
-        with pytest.raises(DataDamaged, match=r"model\.skops"):
-            load_model(str(path), installed())
+        refuse_text(tmp_path, name, as_text(estimator), r"model\.skops")
 
     @every_case(
         ("attribute", "change"),
@@ -323,15 +326,12 @@ class TestKeptAsSkops:
         self.refused(tmp_path, "extra-trees", lambda trees: setattr(trees, "estimators_", other_trees(trees)))
 
     def test_an_archive_that_is_larger_than_it_looks(self, tmp_path):
-        path, header = tmp_path / "m.json", BytesIO()
+        header = BytesIO()
         shape = {"descr": "<f8", "fortran_order": False, "shape": (10**12,)}
         np.lib.format.write_array_header_1_0(header, shape)
         for compression in (ZIP_DEFLATED, ZIP_STORED):
             data = BytesIO()
             with ZipFile(data, "w", compression) as archive:
                 archive.writestr("x.npy", header.getvalue())
-            write_model(path, trained("tree", kept_as="skops"))
             text = base64.b64encode(data.getvalue()).decode()
-            resealed(path, lambda content, text=text: content["model"].update(skops=text))
-            with pytest.raises(DataDamaged, match=r"compressed|not as long as it says"):
-                load_model(str(path), installed())
+            refuse_text(tmp_path, "tree", text, r"compressed|not as long as it says")

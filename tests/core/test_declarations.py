@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from math import inf, nan
 from textwrap import dedent
 from typing import Literal
@@ -10,6 +9,7 @@ from typing import Literal
 import parts
 import pytest
 from attrs import field, frozen
+from cases import every_case
 from commands import python
 from parts import GentleState, Hand, HandConfig, Peak, PeakConfig
 
@@ -31,8 +31,6 @@ from graspsense.plugin_api import (
     FeatureSetEntry,
     SensorBackendEntry,
 )
-
-HERE = sys.modules[__name__]
 
 
 class Summit(Peak):
@@ -88,11 +86,6 @@ def part(cls, role="feature-set", entry=FeatureSetEntry, **given):
     return component(role, entry("a", f"{__name__}:{cls.__name__}", "a thing", **given))
 
 
-@pytest.fixture(autouse=True)
-def importable(monkeypatch):
-    monkeypatch.setitem(sys.modules, __name__, HERE)
-
-
 def test_an_entry_is_completed_by_the_class():
     peak = part(Summit)
 
@@ -106,26 +99,30 @@ def test_the_config_class_is_that_of_the_nearest_base():
     assert config_of(parts.Nearest, Classifier) is parts.ClassifierConfig
 
 
-def test_a_class_that_does_not_declare_what_is_needed(monkeypatch):
-    class Bare(FeatureSet):
-        def extract(self, trace):
-            raise NotImplementedError
+class Bare(FeatureSet):
+    def extract(self, trace):
+        raise NotImplementedError
 
-    class Mute(Peak):
-        requires = ()
 
-    class Wrong(Summit):
-        requires = (Channel("force_left", "N"), "gap")
+class Mute(Peak):
+    requires = ()
 
-    for cls in (Bare, Mute, Wrong):
-        monkeypatch.setattr(HERE, cls.__name__, cls, raising=False)
-    for ask, says in (
+
+class Wrong(Summit):
+    requires = (Channel("force_left", "N"), "gap")
+
+
+@every_case(
+    ("ask", "says"),
+    [
         (part(Bare).config_class, r"write class Bare\(FeatureSet\[Config\]\), where Config"),
         (part(Mute).declared, r"Mute does not declare `features`: write features = \(Feature"),
         (part(Wrong).declared, r"Wrong: 'requires' must be <class '.*Channel'>"),
-    ):
-        with pytest.raises(PluginUnavailable, match=says):
-            ask()
+    ],
+)
+def test_a_class_that_does_not_declare_what_is_needed(ask, says):
+    with pytest.raises(PluginUnavailable, match=says):
+        ask()
 
 
 class Sided(Peak, FeatureSet[PeakConfig]):

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 from graspsense.gripper_api import DeviceClock
 
 
-def fed(clock, seconds, drift, offset_s, seed, rate_hz=200.0, least_s=0.0):
+def fed(clock, seconds, drift, offset_s, seed, rate_hz=200.0):
     """Let arrivals of this clock come with random delays, some of them long; return their ages and true delays."""
     rng = np.random.default_rng(seed)
     device_s = np.arange(0.0, seconds, 1.0 / rate_hz)
     delays_s = rng.exponential(0.002, device_s.size) + np.where(rng.random(device_s.size) < 0.02, 0.2, 0.0)
-    host_s = device_s * (1.0 + drift) + offset_s + delays_s + least_s
+    host_s = device_s * (1.0 + drift) + offset_s + delays_s
     order = np.argsort(host_s)
     ages = [clock.age_s(float(device_s[i]), float(host_s[i])) for i in order]
     return np.array(ages), delays_s[order]

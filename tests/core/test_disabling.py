@@ -122,8 +122,8 @@ def test_the_list_says_what_is_to_be_done(home, site):
 
 def test_a_distribution_that_is_installed_twice_is_told_of(site, tmp_path, monkeypatch):
     site.install("lab-peak", FEATURES.format(name="peak"))
-    second = type(site)(tmp_path / "second", monkeypatch)
-    second.metadata("lab-peak", "0.1", "[graspsense.plugins]\nmain = lab_peak_plugin\n")
+    other = type(site)(tmp_path / "second", monkeypatch)
+    other.metadata("lab-peak", "0.1", "[graspsense.plugins]\nmain = lab_peak_plugin\n")
     monkeypatch.syspath_prepend(tmp_path / "second")
 
     mine = [source for source in installed_sources() if source.distribution == "lab-peak"]
