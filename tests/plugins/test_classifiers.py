@@ -101,10 +101,15 @@ class TestEvery:
         assert rate(classifier, wide, labels) > 0.95
         assert np.isfinite(classifier.probabilities(wide)).all()
 
-    def test_values_too_small_to_be_squared_are_told_apart(self, name):
+    @pytest.mark.filterwarnings("error::RuntimeWarning")
+    @every_case("factor", [1e-320, 1e-310, 1e90])
+    def test_values_of_any_size_are_told_apart(self, name, factor):
+        """Those below the square root of the least number may count as constant; the answer is still one."""
         table, labels = trials()
-        small = evolve(table, values=table.values * 1e-310)
-        assert rate(fitted(name, small, labels), small, labels) > 0.95
+        table = evolve(table, values=table.values * factor)
+        classifier = fitted(name, table, labels)
+        assert classifier.probabilities(table).sum(axis=1) == pytest.approx(np.ones(len(labels)))
+        assert factor == 1e-320 or rate(classifier, table, labels) > 0.95
 
 
 @every_case("kept", [("bottle:full", "can:full"), ("bottle:empty", "bottle:full", "can:full")])
