@@ -84,13 +84,6 @@ def test_built_in_parts_need_no_metadata(site):
     assert plugins.find("feature-set", "chitta").declared().width == "p_first"
 
 
-def test_what_the_built_in_entries_point_at_is_there():
-    with IsolatedPlugins() as plugins:
-        for component in plugins.components():
-            assert component.component_class()
-            assert component.config_class()
-
-
 def test_a_broken_plugin_is_listed_with_its_reason_and_the_others_work(site):
     site.install("graspsense-hid", BROKEN)
     site.install("lab-hand", backend("hand"))
