@@ -84,19 +84,6 @@ def test_built_in_parts_need_no_metadata(site):
     assert plugins.find("feature-set", "chitta").declared().width == "p_first"
 
 
-def test_a_broken_plugin_is_listed_with_its_reason_and_the_others_work(site):
-    site.install("graspsense-hid", BROKEN)
-    site.install("lab-hand", backend("hand"))
-
-    plugins = site.discover()
-
-    assert states(plugins) == {"graspsense": "loaded", "graspsense-hid": "broken", "lab-hand": "loaded"}
-    assert reason_of(plugins, "graspsense-hid") == "ModuleNotFoundError: No module named 'no_such_driver'"
-    assert plugins.find("sensor-backend", "hand").distribution == "lab-hand"
-    (traceback,) = (status.traceback for status in plugins.statuses if status.state == "broken")
-    assert "import no_such_driver" in traceback
-
-
 def test_text_for_an_unknown_name(site):
     site.install("lab-pr2", backend("pr2"))
     site.install("graspsense-hid", BROKEN)
@@ -279,14 +266,6 @@ def test_what_a_plugin_prints_and_the_trace_of_its_hooks_do_not_reach_stdout(sit
     assert out == ""
     assert "hello from the lab" in err
     assert "hook graspsense_sensor_backends() of lab-a:main returned " in err
-
-
-def test_strict_raises_the_plugins_own_error(site):
-    site.install("lab-a", BROKEN)
-
-    with pytest.raises(ModuleNotFoundError) as caught:
-        site.discover(GRASPSENSE_STRICT_PLUGINS="1")
-    assert caught.value.__notes__ == ["while loading main of lab-a 0.2"]
 
 
 NOT_WHOLE = """
