@@ -199,6 +199,10 @@ def test_a_single_pad_suffices(absent):
     f = FEATURES.extract(evolve(both, force_right_n=np.full(len(both), absent)))
     assert set(f.reasons) == {"pad_difference"}
     assert_close(f, FEATURES.extract(both), set(NAMES) - {"pad_difference"}, rel=1e-6)
+    nothing = FEATURES.extract(
+        evolve(both, force_left_n=0.0 * EVEN, force_right_n=np.full(len(both), absent))
+    )
+    assert "never felt 0.625 N" in nothing.reasons["peak_force"]
 
 
 def test_a_rigid_object_has_forces_but_no_stiffness():

@@ -63,9 +63,9 @@ def test_a_number_too_large_to_predict_is_refused_by_name():
 def table(tmp_path):
     """Return a function that writes a table to learn from, with one extreme cell."""
     rng = np.random.default_rng(0)
+    rows = [[i % 2 + 0.1 * rng.normal(), rng.normal()] for i in range(24)]
 
     def table(cell):
-        rows = [[i % 2 + 0.1 * rng.normal(), rng.normal()] for i in range(24)]
         rows[6] = [cell, 0.5]
         lines = [f"{'ab'[i % 2]},{width},{force_n}" for i, (width, force_n) in enumerate(rows)]
         path = tmp_path / f"{cell}.csv"

@@ -73,7 +73,7 @@ def grasped(names=PADLESS, thing="a soft object", run=RUN, **keys):
     [
         (PADLESS, "a soft object", "position"),
         (WITH_PADS, "a hard object", "force"),
-        pytest.param(PADLESS, "a hard object", "velocity", marks=pytest.mark.slow),
+        (PADLESS, "a hard object", "velocity"),
         pytest.param(WITH_PADS, "a soft object", "velocity", marks=pytest.mark.slow),
     ],
 )
