@@ -148,9 +148,7 @@ WEAK = {"left": 0.7, "right": 0.7, "phase": SQUEEZE}
         (DRIFT, {**WEAK, "effort": lambda: 10.0 + 0.05 * RNG.standard_normal()}, "contact in free air"),
     ],
 )
-def test_fingers_that_press_alone_or_squeeze_free_air_are_released_after_three_tenths_of_a_second(
-    steps, felt, name
-):
+def test_fingers_that_press_alone_or_squeeze_free_air_are_released_after_0_3_s(steps, felt, name):
     assert Approach(*steps).go(**felt) == (name, pytest.approx(0.3, abs=0.02))
 
 
@@ -257,9 +255,7 @@ def test_commands_of_a_velocity_are_not_compared_but_fingers_that_open_on_one_th
         (0.0, 0.02, POSITION, {"motor reversed"}),
     ],
 )
-def test_fingers_that_rebound_from_what_they_met_in_the_approach_are_not_reversed(
-    closes_m, opens_m, kind, names
-):
+def test_fingers_that_rebound_in_the_approach_are_not_reversed(closes_m, opens_m, kind, names):
     """The widest rebound of the simulated catalogue is 7.6 mm, of the block at 100 mm/s.
 
     A motor that keeps a position, and has closed the fingers before, turns the right way: they can be opened.
@@ -274,18 +270,14 @@ def test_fingers_that_rebound_from_what_they_met_in_the_approach_are_not_reverse
 
 
 @every_case(("answer_n", "told"), [(20.0, False), (18.5, False), (17.0, True), (23.0, True)])
-def test_a_motor_that_answers_a_tenth_less_or_more_in_the_hold_is_told_and_does_not_end_the_grasp(
-    answer_n, told
-):
+def test_a_motor_that_answers_a_tenth_less_or_more_in_the_hold_is_only_told(answer_n, told):
     frames = course(0.3, velocity=0.0, effort=answer_n)
     faults = motor_faults(frames, Command(EFFORT, 20.0, inf, inf), HOLD)
     assert names_of(fault for _, fault in faults) == ({("motor off", False)} if told else set())
 
 
 @every_case(("change_m_s2", "is_reversed"), [(-0.3, False), (0.3, True)])
-def test_fingers_that_were_fast_and_slow_down_under_an_opening_command_are_not_reversed(
-    change_m_s2, is_reversed
-):
+def test_fast_fingers_that_slow_down_under_an_opening_command_are_not_reversed(change_m_s2, is_reversed):
     """From 100 mm/s at 0.3 m/s2, as after an egg that broke; a reversed motor closes faster and faster."""
     frames = course(
         0.33,

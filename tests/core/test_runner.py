@@ -478,9 +478,7 @@ def test_one_interrupt_opens_the_fingers_and_a_second_only_relaxes_them():
 
 
 @every_case(("stands_still", "openings"), [(False, 2000), (True, 200)])
-def test_fingers_that_do_not_come_to_rest_are_relaxed_after_the_opening_time(
-    monkeypatch, stands_still, openings
-):
+def test_restless_fingers_are_relaxed_after_the_opening_time(monkeypatch, stands_still, openings):
     """By the clock of the gripper; where that stands still, by the one on the wall, of which a frame takes 10 ms."""
 
     def restless(gripper, reading):

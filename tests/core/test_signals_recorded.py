@@ -236,9 +236,7 @@ def test_an_array_that_no_recording_holds_is_refused_where_it_is_declared():
 
 
 @every_case("cells", [0, 40_000, None])  # more than a message once held
-def test_fingertips_of_any_size_are_recorded_and_read_and_a_recording_without_images_has_none(
-    tmp_path, cells
-):
+def test_fingertips_of_any_size_or_without_images_are_recorded_and_read(tmp_path, cells):
     recorder = Recorder(tmp_path / "g.mcap")
     recorder.metadata(START, begun().section(START))
     sizes = [] if cells is None else [cells] * 3

@@ -314,9 +314,7 @@ def ros1_bomb(path):
         ("bomb.bag", ros1_bomb, "read_bag(Path({}))"),
     ],
 )
-def test_a_small_file_that_unpacks_to_a_lot_is_refused_with_its_name_and_the_limit(
-    tmp_path, name, write, call
-):
+def test_a_small_file_that_unpacks_to_a_lot_is_refused_by_name(tmp_path, name, write, call):
     path = tmp_path / name
     write(path)
     assert path.stat().st_size < 4 * MB

@@ -114,9 +114,7 @@ RAPID = "features lab/rapid needs the channel 'force_left' in N at 100 Hz or mor
         ("full", "fast", "nothing", "commands position, which gripper lab/full does not take", "controller"),
     ],
 )
-def test_one_misfit_is_told_with_both_sides_and_what_to_choose(
-    misfit, gripper, controller, features, says, choices
-):
+def test_one_misfit_is_told_with_what_to_choose(misfit, gripper, controller, features, says, choices):
     head, told, others = misfit(gripper, controller, features).splitlines()
     assert head == "two components do not fit together:"
     assert says in told
@@ -171,9 +169,7 @@ def test_every_misfit_is_told_at_once(misfit):
         ),
     ],
 )
-def test_channels_of_another_kind_rate_or_shape_are_told_before_the_grasp(
-    misfit, gripper, controller, features, says
-):
+def test_channels_of_another_kind_rate_or_shape_are_told(misfit, gripper, controller, features, says):
     told = misfit(gripper, controller, features)
     assert bool(told) == bool(says)
     assert says in told
