@@ -228,10 +228,7 @@ def test_a_plugin_that_breaks_the_rules_is_broken_and_says_which(site, body, rea
     ("wrong", "reason"),
     [
         ({"accepts": ("torque",)}, "'accepts' has the unknown command kind 'torque'; there are effort, vel"),
-        (
-            {"name": "Two Words"},
-            "'name' is 'Two Words': write small letters, digits, hyphens and underscores",
-        ),
+        ({"name": "Two Words"}, "'name' is 'Two Words': write small letters, digits, hyphens and unders"),
         ({"target": "module.Class"}, "'target' must match regex"),
     ],
 )

@@ -139,7 +139,6 @@ def test_a_pipeline_for_the_gripper_is_named():
 
 def test_every_misfit_is_told_at_once(misfit):
     said = misfit("bare", "hybrid", "chitta")
-
     assert said.startswith("the components do not fit together:\n")
     assert [line.split(",")[0].strip() for line in said.splitlines()[1:-1]] == [
         "controller graspsense/hybrid needs the channel 'velocity' in m/s",
@@ -165,7 +164,7 @@ def test_every_misfit_is_told_at_once(misfit):
             "rich",
             "still",
             "scalar",
-            "as one number a tick, but gripper lab/rich gives it as an array of 6 cells",
+            "one number a tick, but gripper lab/rich gives it as an array of 6 cells",
         ),
     ],
 )

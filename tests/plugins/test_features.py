@@ -151,10 +151,7 @@ def test_the_compiled_form_finds_contact_and_rest_where_the_search_in_the_interp
     ("rows", "why"),
     [
         ([(0.06 - 1e-4 * k, 5.0, 5.0) for k in range(150)], "not at rest within the 0.099 s"),
-        (
-            [(0.06, 0.0, 5.0)] * 100 + [(0.05, 0.0, 0.0)] * 20 + [(0.05, 5.0, 5.0)] * 30,
-            "only the right pad felt",
-        ),
+        ([(0.06, 0, 5)] * 100 + [(0.05, 0, 0)] * 20 + [(0.05, 5, 5)] * 30, "only the right pad felt"),
     ],
 )
 def test_a_held_grasp_without_rest_or_contact_has_the_same_reasons_without_its_release(rows, why):
