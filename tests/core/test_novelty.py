@@ -1,13 +1,12 @@
 from __future__ import annotations
 
-import json
 import math
 
 import numpy as np
 import pytest
 from cases import every_case
 
-from graspsense.core.learn.novelty import REACH, novelty_from, novelty_of
+from graspsense.core.learn.novelty import REACH, novelty_of
 from graspsense.core.values.features import Features, FeatureTable
 from graspsense.core.values.reasons import FeatureValue
 
@@ -76,10 +75,3 @@ def test_what_is_known_follows_from_the_classes(rows, labels, known, unknown):
 
     assert span.unlike(features(*known)) is None
     assert span.unlike(features(*unknown)) is not None
-
-
-def test_it_comes_back_from_json_the_same():
-    span = novelty_of(table([*ROWS, [0.07, math.nan]]), ["bottle", "bottle", "can", "can", "jar"])
-    again = novelty_from(NAMES, UNITS, json.loads(json.dumps(span.to_json(), allow_nan=False)))
-    for name in ("lowest", "highest", "spread", "classes", "featureless"):
-        np.testing.assert_array_equal(getattr(again, name), getattr(span, name))

@@ -23,6 +23,7 @@ from graspsense.plugin_api import NAMES_INPUT, SensorBackend, SensorBackendEntry
 
 HERE = sys.modules[__name__]
 NUMBERS = {"pad_counts_per_n": 2200.0}
+NO_MODEL = ("-o", "classifier.type=none")
 
 
 @frozen(kw_only=True)
@@ -63,9 +64,7 @@ def calibrate(monkeypatch, tmp_path):
         given = [kind, *([] if text is None else [readings])]
         folder = ["-o", folder] if gripper == "counting" else []
         with IsolatedPlugins(PLUGIN):
-            done = graspsense(
-                "calibrate", *given, "--gripper", gripper, "-o", "classifier.type=none", *folder
-            )
+            done = graspsense("calibrate", *given, *folder, "--gripper", gripper, *NO_MODEL)
         return done.returncode, done.stderr
 
     return calibrate

@@ -15,24 +15,15 @@ def squeeze(stiffness_n_m, depth_m, hysteresis=0.8):
     loaded = np.linspace(0.0, depth_m, 40)
     compression = np.concatenate((loaded, loaded[::-1]))
     force = stiffness_n_m * np.concatenate((loaded, hysteresis * loaded[::-1]))
-    return SqueezeFit(
-        name="one",
-        t_s=np.arange(80.0),
-        compression_m=compression,
-        measured_n=force,
-        fitted_n=force,
-        rms_n=0.0,
-        peak_n=float(force.max()),
-    )
+    given = {"t_s": np.arange(80.0), "compression_m": compression, "measured_n": force, "fitted_n": force}
+    return SqueezeFit(name="spring", **given, rms_n=0.0, peak_n=float(force.max()))
 
 
 def test_squeezes_are_compared_at_equal_compression_while_they_are_loaded():
     # Springs of 1000 and 1200 N/m differ by 200 N/m: a standard deviation of 141 N/m times the compression.
     fits = [squeeze(1000.0, 0.01), squeeze(1200.0, 0.02, hysteresis=0.1)]
     compression_m = np.linspace(0.001, 0.01, 20)
-
     expected = 200.0 / math.sqrt(2.0) * math.sqrt(np.mean(compression_m**2)) / 17.0
-
     assert repeatability(fits) == pytest.approx(expected, rel=1e-9)
 
 

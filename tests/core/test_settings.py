@@ -148,9 +148,7 @@ def test_an_implausible_value_is_told_once_with_the_other_errors_also_in_a_table
         ("import", "a.csv", "--save", "t"),
     ],
 )
-def test_every_command_with_settings_refuses_an_implausible_one_and_names_force(
-    tmp_path, monkeypatch, command
-):
+def test_every_command_refuses_an_implausible_setting_and_names_force(tmp_path, monkeypatch, command):
     monkeypatch.chdir(tmp_path)
     code, _, err = graspsense(*command, "-o", "features.contact_force_n=500")
     assert (code, list(tmp_path.iterdir())) == (2, [])

@@ -103,16 +103,6 @@ def test_the_taring_waits_for_its_images_relaxed():
     assert first_of(seen, Phase.APPROACH) - first_of(seen, Phase.TARING) == pytest.approx(0.001)
 
 
-def test_a_steady_grasp_is_held_then_released_then_done():
-    seen, state = walk(lambda t: 0.086 if t < 1.0 else 0.05)
-    assert first_of(seen, Phase.HOLD) == pytest.approx(1.5)
-    assert first_of(seen, Phase.RELEASE) == pytest.approx(1.75, abs=0.0021)
-    # Released is: still for a tenth of a second.
-    assert (state.done, seen[-1][0], seen[-1][2]) == (1, pytest.approx(1.85, abs=0.004), -20.0)
-    # Any other ending is released at once.
-    assert first_of(walk(still, outcome=FAILED)[0], Phase.RELEASE) == pytest.approx(1.5)
-
-
 def test_where_no_release_is_needed_a_held_grasp_ends_with_its_first_tick_and_any_other_is_released():
     held, state = walk(still, releases=0)
     assert state.done == 1
@@ -121,13 +111,6 @@ def test_where_no_release_is_needed_a_held_grasp_ends_with_its_first_tick_and_an
     assert walk(still, outcome=FAILED, releases=0)[0] == walk(still, outcome=FAILED)[0]
     # Without a tick of the phase HOLD nothing was held.
     assert walk(still, hold_s=0.0, releases=0) == walk(still, hold_s=0.0)
-
-
-def test_a_recording_has_no_opening_and_no_release():
-    seen, state = walk(still, opens=0)
-    assert (seen[0][1], state.done) == (Phase.APPROACH, 1)
-    assert seen[-1][0] == pytest.approx(1.75, abs=0.0021)
-    assert {p for _, p, _ in seen} == {Phase.APPROACH, Phase.SQUEEZE, Phase.HOLD}
 
 
 def test_without_a_controller_it_says_so():

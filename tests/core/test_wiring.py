@@ -114,9 +114,7 @@ RAPID = "features lab/rapid needs the channel 'force_left' in N at 100 Hz or mor
         ("full", "fast", "nothing", "commands position, which gripper lab/full does not take", "controller"),
     ],
 )
-def test_one_misfit_is_told_with_both_sides_and_what_to_choose(
-    misfit, gripper, controller, features, says, choices
-):
+def test_one_misfit_is_told_with_what_to_choose(misfit, gripper, controller, features, says, choices):
     head, told, others = misfit(gripper, controller, features).splitlines()
     assert head == "two components do not fit together:"
     assert says in told
@@ -141,7 +139,6 @@ def test_a_pipeline_for_the_gripper_is_named():
 
 def test_every_misfit_is_told_at_once(misfit):
     said = misfit("bare", "hybrid", "chitta")
-
     assert said.startswith("the components do not fit together:\n")
     assert [line.split(",")[0].strip() for line in said.splitlines()[1:-1]] == [
         "controller graspsense/hybrid needs the channel 'velocity' in m/s",
@@ -167,13 +164,11 @@ def test_every_misfit_is_told_at_once(misfit):
             "rich",
             "still",
             "scalar",
-            "as one number a tick, but gripper lab/rich gives it as an array of 6 cells",
+            "one number a tick, but gripper lab/rich gives it as an array of 6 cells",
         ),
     ],
 )
-def test_channels_of_another_kind_rate_or_shape_are_told_before_the_grasp(
-    misfit, gripper, controller, features, says
-):
+def test_channels_of_another_kind_rate_or_shape_are_told(misfit, gripper, controller, features, says):
     told = misfit(gripper, controller, features)
     assert bool(told) == bool(says)
     assert says in told

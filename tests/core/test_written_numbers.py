@@ -32,10 +32,8 @@ def numbers(*cells, **others):
         (["1 234.5", "1'000", "12\u202f000"], [1234.5, 1000, 12000]),
         (["1.5D-03", "\u22122", "+3e2"], [0.0015, -2, 300]),
         (["1", "", "NA", "--", "#N/A", "#DIV/0!", "NaN"], [1] + [math.nan] * 6),
-        (
-            ["1", "#WERT!", "#NV", "#\u00a1VALOR!", "Err:502", "-nan", "-nan(ind)", "1.#QNAN0"],
-            [1] + [math.nan] * 7,
-        ),
+        (["1", "#WERT!", "#NV", "#\u00a1VALOR!", "Err:502"], [1] + [math.nan] * 4),
+        (["1", "-nan", "-nan(ind)", "1.#QNAN0"], [1] + [math.nan] * 3),
         (["1", "<NA>", "NaT", "n.a.", r"\N", ".", "\u2014"], [1] + [math.nan] * 6),
         (["1,00,000", "12,34,567.5", "250"], [100000, 1234567.5, 250]),
         (["inf", "-Infinity"], [math.inf, -math.inf]),
@@ -102,7 +100,6 @@ def test_thousands_are_never_read_as_ones(values):
 
 
 def test_a_number_on_its_own():
-    assert [number_in(text) for text in ("0,5", "1.5", "1,000", "x", "nan", "inf", "")] == [0.5, 1.5] + [
-        None
-    ] * 5
+    read = [number_in(text) for text in ("0,5", "1.5", "1,000", "x", "nan", "inf", "")]
+    assert read == [0.5, 1.5, None, None, None, None, None]
     assert [plain_number(text) for text in ("1.5", " 2 ", "0,5", "1_0")] == [1.5, 2.0, None, None]

@@ -18,7 +18,6 @@ from graspsense.core.values.trace import SI_UNITS
 from graspsense.plugin_api import create
 from graspsense.plugins.features.curve import NAMES, CurveConfig, CurveFeatures
 from graspsense.sources.recordings.icub_dataset import read_dataset
-from graspsense.testing.samples import squeeze
 
 FEATURES = CurveFeatures(CurveConfig())
 HOLD_NAMES = {"relaxation", "relaxation_time", "creep", "hold_t25", "hold_t50", "hold_t75"}
@@ -110,18 +109,6 @@ SCALE = {"curvature": 1.0, "residual_compression": 0.004, "creep": 0.004, "hyste
 """The size of features that may be zero."""
 
 
-@settings(max_examples=15, deadline=None)
-@given(st.integers(0, 2**32 - 1), st.sampled_from([800, 1500]), st.sampled_from([0.7, 1.0, 1.8]))
-def test_uneven_samples_of_the_same_curve_give_the_same_features(seed, n, exponent):
-    """With samples closer than the window of the mean force, what they leave out of the curve is small."""
-    even = FEATURES.extract(grasp(EVEN, exponent=exponent))
-    other = FEATURES.extract(grasp(uneven_times(seed, n), exponent=exponent))
-    assert defined(other) == defined(even) == set(NAMES)
-    for name in NAMES:
-        rel = 0.15 if name == "relaxation_time" else 0.06
-        assert other[name] == pytest.approx(even[name], rel=rel, abs=0.02 * SCALE.get(name, 0.0)), name
-
-
 def with_samples_between(trace, t_s):
     """Return the trace with samples at further times, on the straight lines between its own."""
     t_s = np.union1d(trace.t_s, t_s[(t_s > trace.t_s[0]) & (t_s < trace.t_s[-1])])
@@ -161,14 +148,6 @@ def test_repeated_forces_between_cell_images_do_not_shift_the_curve():
     stairs, even = FEATURES.extract(repeated), FEATURES.extract(trace)
     assert_close(stairs, even, (*STIFFNESSES, "contact_gap", "unloading_stiffness"), rel=0.02)
     assert stairs["hysteresis"] == pytest.approx(even["hysteresis"], abs=0.03)
-
-
-@settings(max_examples=10, deadline=None)
-@given(st.floats(0.3, 1.0), st.floats(0.6, 2.0))
-def test_swapping_the_fingers_changes_nothing(second_share, exponent):
-    trace = grasp(EVEN[::4], second_share=second_share, exponent=exponent)
-    swapped = evolve(trace, force_left_n=trace.force_right_n, force_right_n=trace.force_left_n)
-    assert FEATURES.extract(swapped).values == pytest.approx(FEATURES.extract(trace).values, nan_ok=True)
 
 
 @settings(max_examples=10, deadline=None)
@@ -220,6 +199,10 @@ def test_a_single_pad_suffices(absent):
     f = FEATURES.extract(evolve(both, force_right_n=np.full(len(both), absent)))
     assert set(f.reasons) == {"pad_difference"}
     assert_close(f, FEATURES.extract(both), set(NAMES) - {"pad_difference"}, rel=1e-6)
+    nothing = FEATURES.extract(
+        evolve(both, force_left_n=0.0 * EVEN, force_right_n=np.full(len(both), absent))
+    )
+    assert "never felt 0.625 N" in nothing.reasons["peak_force"]
 
 
 def test_a_rigid_object_has_forces_but_no_stiffness():
@@ -259,7 +242,3 @@ def test_most_features_of_the_icub_recordings_are_defined_where_there_is_contact
     before_release = [name not in RELEASE_NAMES for name in table.names]
     assert known[touched][:, before_release].mean() > 0.85
     assert not known[:, np.logical_not(before_release)].any(), "the recordings end before the release"
-
-
-def test_the_synthetic_squeeze_of_the_checks_has_all_features():
-    assert defined(FEATURES.extract(squeeze())) == set(NAMES)

@@ -42,6 +42,7 @@ def test_a_stored_model_predicts_without_interpret(tmp_path):
 import json, sys
 sys.modules["interpret"] = None
 import numpy as np
+from graspsense.core.values.features import FeatureTable
 from graspsense.plugin_api import create
 again = create("classifier", "ebm")
 again.from_json(json.load(open({str(tmp_path / "m.json")!r})))
