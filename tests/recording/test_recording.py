@@ -92,17 +92,13 @@ def test_our_reader_gives_each_tick_with_the_image_it_had(tmp_path):
     assert [reading.pads for reading in readings] == [pads(k) for k in range(120)]
 
 
-def test_a_recording_that_is_being_written_has_another_name(tmp_path):
+def test_a_recording_has_another_name_while_it_is_written_and_is_never_written_over_another(tmp_path):
     file = write_recording(tmp_path / "g.mcap", finish=False)
     assert [path.name for path in tmp_path.iterdir()] == ["g.mcap.part"]
     with pytest.raises(ConfigError, match=r"g\.mcap\.part.*graspsense recover"):
         read_recorded(tmp_path / "g.mcap")
     file.finish()
     assert [path.name for path in tmp_path.iterdir()] == ["g.mcap"]
-
-
-def test_a_recording_is_never_written_over_another(tmp_path):
-    write_recording(tmp_path / "g.mcap")
     content = (tmp_path / "g.mcap").read_bytes()
     with pytest.raises(FileExistsError):
         RecordingWriter(tmp_path / "g.mcap")
@@ -200,15 +196,10 @@ def test_a_damaged_recording_is_told_and_not_used(tmp_path, spoil, says):
     assert str(path) in str(told.value)
 
 
-def test_a_recording_of_a_newer_layout_is_refused(tmp_path):
-    file = RecordingWriter(tmp_path / "g.mcap")
-    file.metadata(START, {**begun().section(START), "version": "3"})
-    file.finish()
-    with pytest.raises(DataDamaged, match=r"g\.mcap .*'3'.* 2$"):
-        read_recorded(tmp_path / "g.mcap")
-
-
-def test_somebody_else_s_mcap_is_no_recording_of_ours(tmp_path):
+def test_a_newer_layout_and_somebody_else_s_mcap_are_no_recordings_of_ours(tmp_path):
+    write_recording(tmp_path / "newer.mcap", version="3")
+    with pytest.raises(DataDamaged, match=r"newer\.mcap .*'3'.* 2$"):
+        read_recorded(tmp_path / "newer.mcap")
     from mcap.writer import Writer
 
     with (tmp_path / "g.mcap").open("wb") as file:

@@ -26,7 +26,6 @@ def value(text):
     [
         ("0.06 - Pos*0.001", [0.05, 0.04, 0.03]),
         ("max(f1, f2)", [3.0, 5.0, 0.5]),
-        ("min(f1, f2)", [1.0, 4.0, -2.0]),
         ("sum('f?')", [4.0, 9.0, -1.5]),
         ("mean(taxels)", [1.5, 3.5, 5.5]),
         ("norm(f1, f2)", [10.0**0.5, 41.0**0.5, 4.25**0.5]),
@@ -34,7 +33,6 @@ def value(text):
         ("'stamp ms'/1000", [0.0, 0.001, 0.002]),
         ("Pos - first(Pos)", [0.0, 10.0, 20.0]),
         ("peak(f1)", [5.0, 5.0, 5.0]),
-        ("taxels[1]", [2.0, 4.0, 6.0]),
         ("sum(taxels*2)", [6.0, 14.0, 22.0]),
         ("sum(taxels - first(taxels))", [0.0, 4.0, 8.0]),
         ("7", [7.0, 7.0, 7.0]),
@@ -66,11 +64,9 @@ def test_the_unit_behind_an_expression_is_told_from_a_component():
         ("taxels[2]", "there is no component 2: it has 2, counted from 0"),
         ("median(f1, f2)", r"no function median\. There are .*Did you mean 'mean'\?"),
         ("f1**2", r"there are \+ - \* /"),
-        ("f1 if f2 else 0", "IfExp is not allowed here"),
         ("", "is empty: name a column"),
         ("abs(f1, f2)", "abs takes one argument, and here are 2"),
         ("True", "True is not a number"),
-        ("(" * 80 + "f1" + ")" * 80 + "+", "not an expression"),
         ("-" * 90 + "f1", "nested too deep"),
     ],
 )

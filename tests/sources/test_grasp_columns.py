@@ -112,10 +112,7 @@ LONG = np.ones(N + 1)
     ("more", "says"),
     [
         ({"left_n": LONG}, "'left_n' has 101 samples, and t_s has 100"),
-        ({"gap_m": np.ones(3)}, "'gap_m' has 3 samples"),
-        ({"effort_n": LONG}, "'effort_n' has 101"),
         ({"velocity_m_s": np.ones((N, 2))}, "'velocity_m_s' has the shape"),
-        ({"scalars": {"heat": LONG}}, "'heat' has 101"),
         ({"arrays": {"palm": np.ones((N + 1, 6))}}, "'palm' has 101"),
         ({"arrays": {"palm": np.ones(N)}}, "'palm' has the shape"),
         ({"arrays": {"palm": np.ones((N, 6))}, "shapes": {"palm": (2, 2)}}, "'palm' has 6 numbers a sample.*2 x 2"),

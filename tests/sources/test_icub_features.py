@@ -34,9 +34,8 @@ def grasp(flexion, pressed):
 @pytest.fixture
 def folder(tmp_path):
     for k in range(1, 4):
-        (tmp_path / f"can_{k}.txt").write_text(
-            grasp([10 + k, 14 + k, 16 + k, 16 + k, 16 + k], [0, 0, 10, 20, 20])
-        )
+        flexion = [10 + k, 14 + k, 16 + k, 16 + k, 16 + k]
+        (tmp_path / f"can_{k}.txt").write_text(grasp(flexion, [0, 0, 10, 20, 20]))
         (tmp_path / f"none_{k}.txt").write_text(grasp([30, 40, 50, 60, 60], [0] * 5))
         (tmp_path / f"full_coke_{k}.txt").write_text(grasp([30, 40, 50, 60, 60], [0] * 5))
     (tmp_path / "README.txt").write_text("not a grasp")

@@ -81,7 +81,6 @@ def table(path, column, values, measured=True):
 
 SESSIONS = {
     "letters": ["ABCDEF"[i // 10] for i in range(N)],
-    "weekdays": [("Monday", "Tuesday", "Friday")[i // 20] for i in range(N)],
     "weekdays of others": [("Mo", "Di", "Fr")[i // 20] for i in range(N)],
     "predictions": ["can" if i % 40 < 30 else "jar" for i in range(N)],
     "names": [("cola", "tonic", "water", "beans", "honey", "jam")[i // 10] for i in range(N)],
@@ -100,7 +99,6 @@ KNOWN_IN_ANY_ORDER = {
         for name in ("a trial number", "seconds since 1970", "dates", "times", "times of the day")
     },
     "a tenth": [0.1 * i for i in range(N)],
-    "every seventh": [1000 + 7 * i for i in range(N)],
     "days of a table": [46_000.0 + i * 37 / 1440 + 1e-4 * (i % 3) for i in range(N)],
     "two lines each, falling": [(N - i) // 2 for i in range(N)],
     "three lines each": [(i + 1) // 3 for i in range(N)],
@@ -163,7 +161,6 @@ NAMED = {
     ],  # two for each label: too few to be known by their values
     "Robot ID": [f"arm {i // 20}" for i in range(N)],
     "Bediener": ["anna" if i < 27 else "ben" for i in range(N)],
-    "operator": ["anna" if i < 27 else "ben" for i in range(N)],
     "randomSeed": [1234 + 8765 * (i // 30) for i in range(N)],
     "day [day]": [i // 20 for i in range(N)],
     "predicted": ["can" if i < 28 else "jar" for i in range(N)],

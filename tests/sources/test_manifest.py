@@ -13,7 +13,6 @@ import scipy
 from cases import every_case
 from commands import graspsense, printed
 from recorded_files import write_topics
-from repository import ROOT
 
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.trace import signals_of
@@ -63,106 +62,6 @@ def pandas_csv(path, columns):
     path.write_text("\n".join(lines) + "\n")
 
 
-# The layouts of the public sets of docs/other_data.md, with the manifests of that page.
-
-
-def shipped(name):
-    return (ROOT / "docs" / "manifests" / f"{name}.toml").read_text()
-
-
-FRUIT = shipped("fruit")
-
-
-def test_fruit_squeezed_until_it_breaks(tmp_path):
-    gap, force = squeezing()
-    force[180:] *= 0.2
-    position = 60.0 - gap * 1e3
-    folder = tmp_path / "kiwi/trainingSet/20241124_151319"
-    time = np.repeat(T_S[::2], 2) + 1732432394.9
-    time[1:][np.diff(time) == 0.0] += np.where(np.arange(150) < 140, 0.01, 0.0)
-    pandas_csv(folder / "ForceData_20241124_151319.csv", {"Time": time, "Force": force, "Pos": position})
-    np.save(folder / "break_force.npy", np.float64(2.62))
-    (tmp_path / "banana/trainingSet").mkdir(parents=True)
-    np.save(tmp_path / "banana/trainingSet/data_7.npy", np.column_stack([position * 95.4929, force]))
-
-    banana, kiwi = recordings(tmp_path, FRUIT)
-
-    assert (banana.label, banana.instance) == ("banana", "7")
-    assert (kiwi.label, kiwi.instance) == ("kiwi", "20241124_151319")
-    assert (kiwi.values, banana.values) == ({"break_force [N]": 2.62}, {})
-    for fruit in (banana, kiwi):
-        assert column(fruit, "gap_m") == pytest.approx(gap[:180], abs=1e-12)
-        assert len(fruit.recording.readings) == 180  # up to the largest force before the rupture
-    dropped = "10 samples with the time of the one before were dropped"
-    assert any(dropped in note for note in kiwi.recording.notes)
-    assert banana.recording.rate_hz == pytest.approx(100.0)
-
-
-JACO = shipped("jaco")
-
-
-def jaco(path):
-    gap, force = squeezing()
-    lines = ["A,Number of samples,2"]
-    for order, (label, grows) in enumerate([(17, 1.0), (3, 0.5)]):
-        began = 1592233887442126035 + order * 60_000_000_000
-        lines.append(
-            f"header,seq,{order},stamp start,{began},stamp end,{began + 490_000_000},class label,{label}"
-        )
-        lines.append("timestep,eucl force 1,eucl force 2,eucl force 3,finger1_pos,finger2_pos,finger3_pos")
-        for k in range(len(T_S)):
-            f = force[k] * grows
-            position = 100.0 - gap[k] * 1e3
-            lines.append(f"{k + 1},{f},{0.5 * f},{f},{position - 3},{position},{position + 3}")
-    path.write_text("\n".join(lines) + "\n")
-    return gap, force
-
-
-def test_three_fingers_in_blocks_of_one_file_are_folded_and_kept(tmp_path):
-    gap, force = jaco(tmp_path / "000_real_life_data.csv")
-
-    finger_grasp, next_grasp = recordings(tmp_path, JACO)
-
-    assert (finger_grasp.label, next_grasp.label, finger_grasp.order) == ("object17", "object3", 0.0)
-    assert finger_grasp.recorded_at == "2020-06-15T15:11:27.442126+00:00"
-    assert column(finger_grasp, "t_s") == pytest.approx(T_S, abs=1e-6)
-    assert column(finger_grasp, "gap_m") == pytest.approx(gap)
-    assert column(next_grasp, "force_left_n") == pytest.approx(0.5 * force)
-    assert column(next_grasp, "force_right_n") == pytest.approx(0.5 * force)
-    channels = [(channel.name, channel.unit) for channel in finger_grasp.recording.channels]
-    assert channels[:4] == [("finger1", "N"), ("finger2", "N"), ("finger3", "N"), ("position1", "mm")]
-    # 3 less than the mean of the three.
-    assert finger_grasp.recording.readings[0].signals.position1 == pytest.approx(37.0)
-    assert finger_grasp.recording.readings[-1].signals.finger2 == pytest.approx(0.5 * force[-1])
-    assert "the left pad is max(finger1, finger2), the right pad is finger3" in finger_grasp.recording.notes
-
-
-BIOTAC = shipped("pr2_biotac")
-
-
-def test_matrices_of_a_mat_file_become_columns_and_arrays(tmp_path):
-    gap, force = squeezing(offset_n=1000.0)
-    (tmp_path / "data").mkdir()
-    variables = {
-        "JPos": gap[None], "JEff": -force[None], "F0pdc": force[None].astype(np.uint16), "F1pdc": force[None],
-        "F0Electrodes": np.arange(19 * 300).reshape(19, 300), "F1Electrodes": np.ones((19, 300)),
-    }  # fmt: skip
-    for trial in (2, 10):
-        scipy.io.savemat(tmp_path / f"data/black_foam_110_{trial}_HOLD.mat", variables)
-
-    later_press, tenth = recordings(tmp_path, BIOTAC)
-
-    assert (later_press.order, tenth.order) == (2.0, 10.0)  # not in the order of the texts
-    assert later_press.label == "black_foam"
-    assert later_press.recording.units == {"force_left": "counts", "force_right": "counts"}
-    assert column(later_press, "effort_n") == pytest.approx(force)
-    array, other = later_press.recording.channels
-    assert (array.name, array.unit, array.cells) == ("left_electrodes", "counts", 19)
-    assert other.name == "right_electrodes"
-    electrodes = later_press.recording.readings[5].signals.left_electrodes
-    assert electrodes.cells == tuple(5.0 + 300.0 * k for k in range(19))
-
-
 @pytest.mark.parametrize("ending", ["npz", "mat"])
 def test_images_and_blocks_of_samples_become_arrays_with_their_shape_and_fast_channels(tmp_path, ending):
     gap, force = squeezing()
@@ -202,52 +101,6 @@ def test_images_and_blocks_of_samples_become_arrays_with_their_shape_and_fast_ch
         recordings(tmp_path, text.replace('"sound"]', '"sounds"]'))
     with pytest.raises(ConfigError, match=r"manifest\.toml:7: .*resample_hz"):
         recordings(tmp_path, text + "resample_hz = 100")
-
-
-STABILITY = shipped("biotac_sp")
-
-
-def test_each_row_of_a_table_is_a_reading_with_its_arrays(tmp_path):
-    fingers = ("ff", "mf", "th")
-    names = ["object", "slipped", *(f"{finger}_biotac_{k}" for finger in fingers for k in range(1, 25))]
-    rows = [["pringles", 0, *range(72)], ["toy car", 1, *range(100, 172)]]
-    (tmp_path / "bts3v2_palm_down.csv").write_text(
-        "\n".join(",".join(map(str, row)) for row in [names, *rows]) + "\n"
-    )
-
-    stable, slipped = recordings(tmp_path, STABILITY)
-
-    assert (stable.label, slipped.label, slipped.instance) == ("slipped0", "slipped1", "toy_car")
-    (reading,) = slipped.recording.readings
-    assert (reading.frame.force_left_n, reading.frame.force_right_n) == (123.5, 159.5)
-    assert reading.signals.thumb.cells == tuple(range(148, 172))
-    assert slipped.recording.units["t"] == "sample"
-
-
-TAPS = shipped("barrett_taps")
-
-
-def test_taps_in_one_array_are_split_by_a_column(tmp_path):
-    gap, force = squeezing()
-    np.savez(
-        tmp_path / "felt.npz",
-        tap=np.repeat([1, 2], 300),
-        spread=np.tile(gap, 2) * 1e3,
-        taxels=np.tile(np.outer(10.0 * force, np.full(24, 1 / 24)) + 7.0, (2, 1)),
-    )
-
-    tap, next_tap = recordings(tmp_path, TAPS)
-
-    assert (tap.label, tap.order, next_tap.order) == ("felt", 1.0, 2.0)
-    assert column(next_tap, "force_left_n") == pytest.approx(force, abs=1e-9)
-    assert next_tap.recording.readings[0].signals.fingertip.cells == pytest.approx((0.0,) * 24)
-
-
-def test_the_page_of_public_data_sets_links_these_manifests_and_no_other():
-    docs = ROOT / "docs"
-    page = (docs / "other_data.md").read_text()
-    there = {path.name for path in (docs / "manifests").glob("*.toml")}
-    assert set(re.findall(r"\]\(manifests/([\w.]+)\)", page)) == there
 
 
 # Formats.
@@ -610,48 +463,6 @@ def test_a_mistake_in_a_manifest_is_told_with_what_is_allowed(text, says, tmp_pa
 # The commands.
 
 
-def test_a_whole_set_is_imported_evaluated_and_replayed(tmp_path):
-    _, force = jaco(tmp_path / "000_real_life_data.csv")
-    described, store = manifest(tmp_path, JACO), tmp_path / "store"
-
-    code, out, err = graspsense("import", described, "--save", store, "-o", "classifier.type=none", "--json")
-
-    assert code == 0, err
-    assert [trial["trial"] for trial in json.loads(out)["trials"]] == [1, 2]
-    with Store.read(store) as opened:
-        labels = [dict(opened.trial(number).record.labels) for number in (1, 2)]
-        recording = read_recorded(opened.trial(1).recording)
-        assert opened.trial(1).record.provenance["source"] == "000_real_life_data.csv, line 3"
-    assert labels[0] == {"label": "object17", "recorded_at": "2020-06-15T15:11:27.442126+00:00", "order": "0"}
-    assert recording.readings()[-1].signals.finger2 == pytest.approx(0.5 * force[-1])
-    assert [channel.name for channel in recording.channels][:3] == ["finger1", "finger2", "finger3"]
-    features = json.loads(graspsense("replay", f"{store}#1", "--json")[1])["features"]
-    same = json.loads(graspsense("replay", f"manifest:{described}#1", "--pipeline", "default",
-        "-o", "classifier.type=none", "--json")[1])["features"]  # fmt: skip
-    assert features["p_first"] == pytest.approx(same["p_first"], abs=2e-3)
-    code, _, err = graspsense("import", described, "--save", store, "-o", "classifier.type=none")
-    assert (code, "same content as trial 1" in err) == (2, True)
-
-
-@pytest.mark.slow
-def test_check_says_what_it_understood_and_draws_a_grasp_without_storing(tmp_path, monkeypatch):
-    pytest.importorskip("matplotlib", reason="needs the extra plot")
-    jaco(tmp_path / "000_real_life_data.csv")
-    monkeypatch.chdir(tmp_path)
-    described = manifest(tmp_path, JACO)
-
-    code, out, err = graspsense("import", described, "--check", "-o", "classifier.type=none")
-
-    assert code == 0, err
-    assert "object17  1       unknown  300      100       40 to 60  0 to 20  0 to 20" in out
-    assert "channels    finger1 [N], finger2 [N], finger3 [N], position1 [mm]" in out
-    assert "recorded    2020-06-15T15:11:27.442126+00:00 to 2020-06-15T15:12:27.442126+00:00" in out
-    assert (tmp_path / "import-check.png").read_bytes().startswith(b"\x89PNG")
-    assert not (tmp_path / "store").exists()
-    code, _, err = graspsense("import", described)
-    assert (code, "--save DIR. Or look at the recordings first: --check" in err) == (2, True)
-
-
 def test_a_bad_file_does_not_stop_an_import_and_a_second_run_takes_only_what_is_missing(tmp_path):
     for k in range(4):
         gap, force = squeezing(stiffness_n_m=1000.0 + 100.0 * k)
@@ -828,25 +639,3 @@ def test_features_are_of_the_whole_recording_and_not_of_what_the_controller_saw(
     whole = load_trials(f"manifest:{place}", options=["features.type=curve"]).table
     assert np.isfinite(stored.values[0, stored.names.index("hysteresis")])
     assert stored.values[0] == pytest.approx(whole.values[0], nan_ok=True)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("resample_hz", [0, 100, 1000])
-def test_rest_is_found_on_a_coarse_gap_at_any_rate(tmp_path, resample_hz):
-    """A squeeze of 2.4 mm in 3 s and a hold of 1.5 s, in steps of 0.1 mm at 45 Hz."""
-    times = np.arange(270) / 45.0
-    gap = np.round(np.interp(times, [0.0, 1.5, 4.5], [76.0, 64.0, 61.6]), 1)
-    for k in range(4):
-        force = np.interp(times, [1.5, 4.5], [0.0, 6.0 + k])
-        pandas_csv(tmp_path / f"jar_{k}.csv", {"t": times, "mm": gap, "F": force})
-    place = manifest(
-        tmp_path,
-        f'files = "{{label}}_{{order:d}}.csv"\ntime = "t"\ngap = "mm [mm]"\nforce = "F"\nresample_hz = {resample_hz}',
-    )
-    code, out, _ = graspsense("import", place, "--save", tmp_path / "trials")
-    assert code == 0
-    assert "rest_window_s" in out
-    assert "steps of 0.1 mm" in out
-    for source in (f"store:{tmp_path / 'trials'}", f"manifest:{place}"):
-        table = load_trials(source).table
-        assert table.values[:, table.names.index("f_steady")] == pytest.approx([6.0, 7.0, 8.0, 9.0], rel=0.05)

@@ -19,13 +19,11 @@ from graspsense.sources.formats.parquet_format import read_parquet  # noqa: E402
 NAN = float("nan")
 COLUMNS = {
     "double": (pyarrow.array([1.5, None, 2.5]), [1.5, NAN, 2.5]),
-    "integer": (pyarrow.array([1, None, 3], pyarrow.int16()), [1.0, NAN, 3.0]),
     "unsigned": (pyarrow.array([2**63, 0, 1], pyarrow.uint64()), [2.0**63, 0.0, 1.0]),
     "half": (pyarrow.array(np.float16([0.5, 1.5, 2.5])), [0.5, 1.5, 2.5]),
     "logical": (pyarrow.array([True, None, False]), [1.0, NAN, 0.0]),
     "nothing": (pyarrow.nulls(3), [NAN, NAN, NAN]),
     "written": (pyarrow.array(["1.5", None, "-2"]), [1.5, NAN, -2.0]),
-    "pairs": (pyarrow.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]), [[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]),
     "half known": (pyarrow.array([[1, None], [3, 4], [None, None]]), [[1.0, NAN], [3.0, 4.0], [NAN, NAN]]),
     "single": (pyarrow.array([[1.0], [2.0], [3.0]]), [1.0, 2.0, 3.0]),
     "fixed": (

@@ -131,10 +131,3 @@ def test_other_features_than_those_of_the_model_are_imported_without_a_predictio
     )
     assert own.exit_code
     assert "classifier" in words + own.output
-
-
-def test_a_union_needs_what_all_of_its_sets_need():
-    union = create("feature-set", "union", sets=("chitta", "contact-image"))
-    assert union.requires == ()
-    union = create("feature-set", "union", sets=("chitta", "chitta-without-pads"))
-    assert [require.name for require in union.requires] == ["gap"]

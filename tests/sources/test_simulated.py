@@ -12,12 +12,7 @@ from graspsense import load_pipeline
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.errors import ConfigError
-from graspsense.plugin_api import (
-    ObjectKind,
-    SensorBackend,
-    SensorBackendEntry,
-    setting,
-)
+from graspsense.plugin_api import ObjectKind, SensorBackend, SensorBackendEntry, setting
 from graspsense.sources.simulated import Group, plan_trials, simulated
 from graspsense.store.dataset import labelled_store
 from graspsense.store.labels import labels_of
@@ -51,7 +46,7 @@ LAB_HAND = offering(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("emulated", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("emulated", [False, True])
 def test_a_trial_is_simulated_where_the_gripper_says_so_and_not_by_its_settings(
     tmp_path, monkeypatch, emulated
 ):

@@ -319,18 +319,6 @@ def test_two_operators_on_a_store_undo_and_repeat_only_what_each_has_grasped(tmp
 
 
 @pytest.mark.slow
-def test_a_second_session_leaves_the_trials_of_an_earlier_one_alone(tmp_path):
-    folder = str(tmp_path / "t")
-    command = ("collect", "--labels", "block", "--save", folder, "-o", "classifier.type=none")
-    assert graspsense(*command, answers="\nq\n").returncode == 0
-    done = graspsense(*command, answers="u\nr\nq\n")
-    assert done.returncode == 0
-    assert done.stderr.count("no trial to undo") == 2
-    with Store.read(folder) as store:
-        assert [summary.set_aside for summary in store.page(set_aside=None)] == [None]
-
-
-@pytest.mark.slow
 def test_a_terminal_that_goes_ends_the_collection_though_nothing_can_be_printed(tmp_path):
     master, slave = pty.openpty()
     process = collecting(tmp_path / "t", "block,toy", *LONG, stream=slave, start_new_session=True)

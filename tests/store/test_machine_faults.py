@@ -65,7 +65,7 @@ def test_verify_tells_a_disk_that_fails_from_damage(failing):
 
 
 @needs_proc
-@pytest.mark.parametrize(
+@every_case(
     "command", [("replay", "{}#1"), ("export", "{}#1", "--to", "{}.csv"), ("verify", "{}/recordings/{name}")]
 )
 def test_a_recording_on_a_disk_that_fails_is_neither_lost_nor_damaged(failing, command):

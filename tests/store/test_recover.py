@@ -103,21 +103,17 @@ def test_a_recording_is_not_replaced_by_an_unfinished_one_of_its_name(store):
     assert verify_store(store.folder).problems == ()
 
 
-@pytest.mark.parametrize("bytes_written", [None, 0, 5, 60])
-def test_a_file_without_a_tick_makes_no_trial(store, bytes_written):
-    path = part(store, ticks=0)
-    path.write_bytes(path.read_bytes()[:bytes_written])  # a disk can be full at the first byte
-    assert [recovered.what for recovered in recover_store(store)] == ["empty"]
+def test_a_file_without_a_tick_makes_no_trial_and_unreadable_settings_are_told(store):
+    for k, bytes_written in enumerate((None, 0, 5, 60)):
+        path = part(store, f"{k}.mcap", ticks=0)
+        path.write_bytes(path.read_bytes()[:bytes_written])  # a disk can be full at the first byte
+    assert [recovered.what for recovered in recover_store(store)] == ["empty"] * 4
     assert store.page(set_aside=None) == []
-
-
-@pytest.mark.parametrize("settings", ["no TOML at all [", "[features]\n", ""])
-def test_a_recording_with_settings_that_nobody_can_read_is_told(store, settings):
-    path = store.recordings / "a.mcap"
-    write_recording(path, 100, ended(), settings=settings)
-    (recovered,) = recover_store(store)
-    assert recovered.what == "failed"
-    assert path.is_file()
+    for k, settings in enumerate(("no TOML at all [", "[features]\n", "")):
+        write_recording(store.recordings / f"settings{k}.mcap", 100, ended(), settings=settings)
+    failed = [recovered for recovered in recover_store(store) if recovered.what != "empty"]
+    assert [recovered.what for recovered in failed] == ["failed"] * 3
+    assert len(list(store.recordings.glob("settings*.mcap"))) == 3
 
 
 def test_a_feature_set_that_is_not_installed_does_not_lose_the_trial(store):
