@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import fcntl
 import math
-import signal
-import subprocess
-import sys
 from typing import ClassVar
 
 import numpy as np
@@ -14,11 +10,8 @@ import pytest
 from attrs import evolve
 from cases import every_case
 
-from graspsense import load_pipeline
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.plugin_api import Samples, create
-from graspsense.recording.export_trace import write_npz
-from graspsense.recording.reader import read_recorded
 from graspsense.simulator_api import RunConfig
 from graspsense_pr2_gripper import emulation
 from graspsense_pr2_gripper.accelerometer import CHANNEL, Accelerometer, word_of
@@ -156,65 +149,3 @@ def test_the_channel_can_be_left_out_by_the_settings():
     assert CHANNEL not in Pr2Backend(evolve(EMULATED, accelerometer=False)).channels
     _, readings = opened_and_read(accelerometer=False)
     assert {reading.signals for reading in readings} == {()}
-
-
-PROGRAM = """
-import os, signal, sys
-from pathlib import Path
-from graspsense import load_pipeline
-from graspsense.recording.layout import DEVICE, START
-from graspsense.recording.recorder import Recorder
-from graspsense.recording.trial_record import TrialRecord
-
-pipeline = load_pipeline(options=sys.argv[2:])
-record = TrialRecord.begin(pipeline.settings, {}, "run")
-recorder = Recorder(Path(sys.argv[1]))
-recorder.metadata(START, record.section(START))
-recorder.wait_ready()
-ticks = 0
-
-class Killing:
-    def take(self, reading, phase, command):
-        global ticks
-        ticks += 1
-        if ticks == 500:
-            os.kill(os.getpid(), signal.SIGKILL)
-
-pipeline.grasp(seed=1, sinks=[recorder, Killing()])
-"""
-
-
-@pytest.mark.slow
-def test_samples_survive_a_killed_program_a_replay_and_an_export_to_the_last_bit(tmp_path):
-    options = [
-        *("gripper.type=pr2", "gripper.transport=emulated", "gripper.calibration=none"),
-        *("gripper.object='can:empty_open'", "gripper.body_config.open_gap_m=0.075", "classifier.type=none"),
-    ]
-    path = tmp_path / "grasp.mcap"
-    killed = subprocess.run([sys.executable, "-c", PROGRAM, str(path), *options], check=False)
-    assert killed.returncode == -signal.SIGKILL
-    part = path.with_name("grasp.mcap.part")
-    with part.open("rb") as file:
-        # The writer holds the lock until it has written all that it was given.
-        fcntl.flock(file, fcntl.LOCK_SH)
-    trace = load_pipeline(options=options).grasp(seed=1).trace
-    complete = trace.signals["acceleration"]
-
-    read = read_recorded(part, salvage=True)
-    salvaged = read.trace().signals["acceleration"]
-    assert len(read) == 500
-    assert salvaged.values.tobytes() == complete.values[:1500].tobytes()
-    assert salvaged.t_s.tobytes() == complete.t_s[:1500].tobytes()
-    assert (
-        CHANNEL.samples
-        == next(channel for channel in read.channels if channel.name == "acceleration").samples
-    )
-
-    whole = tmp_path / "whole.mcap"
-    part.rename(whole)
-    options = ["gripper.type=replay", f"gripper.recording={whole}", "classifier.type=none"]
-    again = load_pipeline(options=options).grasp().trace.signals["acceleration"]
-    assert again.values.tobytes() == salvaged.values.tobytes()
-    write_npz(tmp_path / "grasp.npz", read)
-    with np.load(tmp_path / "grasp.npz") as exported:
-        assert exported["signal_acceleration"].tobytes() == salvaged.values.tobytes()
