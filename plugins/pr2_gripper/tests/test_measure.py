@@ -33,22 +33,6 @@ def tared(identity, config=None, tables=None):
     return measure
 
 
-@every_case("transmission", LINKAGES)
-def test_gap_of_every_encoder_tick_comes_back_to_a_nanometre(transmission, device_identity):
-    """Over the stroke 0 to 90 mm: ticks to metres by the driver, metres to ticks by the inverse."""
-    measure = Measure(device_identity(transmission=transmission), Pr2Config(), None, None)
-    link = LINKAGES[transmission]
-
-    def gap_m(ticks):
-        return measure.reading(report(round(ticks)), None).frame.gap_m
-
-    closed, last = (math.ceil(revolutions_at(link, gap) * 1200) for gap in (0.0, 0.09))
-    gaps = [gap_m(ticks) for ticks in range(closed, last, 97)]
-    assert [gap_m(revolutions_at(link, gap) * 1200) for gap in gaps] == pytest.approx(gaps, abs=1e-9, rel=0)
-    assert (gaps[0], gaps[-1]) == (pytest.approx(0.0, abs=1e-6), pytest.approx(0.09, abs=1e-4))
-    assert gaps == sorted(gaps)
-
-
 def test_velocity_is_the_motors_times_the_linkages_ratio(device_identity):
     """pr2 linkage at 50 mm: 0.3975 mm a revolution; one revolution a second is 1200 ticks."""
     measure = Measure(device_identity(), Pr2Config(), None, None)
