@@ -4,8 +4,7 @@ import pytest
 from cases import every_case
 
 from graspsense.plugin_api import EFFORT, Command, ConfigError, create
-from graspsense_pr2_gripper.config import IDENTITY_NUMBERS, FaultConfig, Pr2Config
-from graspsense_pr2_gripper.emulation import emulated_board
+from graspsense_pr2_gripper.config import FaultConfig
 from graspsense_pr2_gripper.protocol import (
     EFFORT_KIND,
     LEFT_ABSENT,
@@ -13,7 +12,6 @@ from graspsense_pr2_gripper.protocol import (
     RIGHT_ABSENT,
     SLICE_CELLS,
     OutputReport,
-    decode_identity,
     decode_input,
     encode_output,
 )
@@ -143,13 +141,6 @@ def test_clock_of_the_device_runs_at_another_rate(board, rate):
         round(1000 * rate * i) for i in range(400)
     ]
     assert [report.sequence for report in faulty] == list(range(600))
-
-
-@every_case("number", IDENTITY_NUMBERS)
-def test_feature_report_has_the_numbers_that_are_set(number):
-    body = {"accelerometer_g": 4}.get(number, 77)
-    config = Pr2Config(transport="emulated", faults=FaultConfig(identity={number: body}))
-    assert getattr(decode_identity(emulated_board(config, 0).wire.feature()), number) == body
 
 
 @every_case(

@@ -115,22 +115,6 @@ def test_hostile_laws_crush_nothing():
         assert row.outcome == "aborted", row
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_a_healthy_grasp_has_no_warnings(seed):
-    for name in ("hybrid", "force"):
-        grasp = grasped(name, seed, {})
-        assert (grasp.outcome.words, grasp.warnings) == ("steady", ())
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("drop", "body", "outcome"), [(0.05, NEAR, "steady"), (0.25, {}, "aborted")])
-def test_lost_reports_are_told_and_a_quarter_of_them_ends_the_grasp(drop, body, outcome):
-    grasp = grasped(body=body, drop=drop)
-    assert grasp.outcome.words == outcome
-    assert any(warning.startswith("reports lost") for warning in grasp.warnings)
-
-
 def test_a_pad_that_is_known_to_be_bad_refuses_the_grasp():
     grasp = grasped(pad_fault="absent", pad_side="right")
     assert grasp.outcome.words == "aborted"
