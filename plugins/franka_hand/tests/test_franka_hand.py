@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from traces import made_trace
 
 from graspsense import WiringError, load_pipeline
+from graspsense.core.grasp.calibration import load_of, load_table
 from graspsense.gripper_api import LoadTable, asked_force
 from graspsense.plugin_api import (
     APPROACH,
@@ -61,15 +62,13 @@ def test_conformance(check):
 
 def test_a_grasp_gives_width_and_time_and_opens_the_fingers():
     trial = load_pipeline("franka", options=EMULATED).grasp()
-
+    features, trace = trial.features, trial.trace
     assert trial.outcome.words == "steady", trial.reason
-    assert not trial.features.reasons
-    features = trial.features
+    assert not features.reasons
     # The object of the simulator is 50 mm wide, and gives way by millimetres between 30 and 60 N.
     assert 0.045 < features["p_steady"] < features["p_first"] < 0.05
     assert features["squeezed"] == pytest.approx(features["p_first"] - features["p_steady"])
     assert features["delta_t"] > 0.0
-    trace = trial.trace
     assert np.isnan(trace.effort_n).all()
     assert set(np.unique(trace.signals["grasped"])) == {0.0, 1.0}
     assert trace.signals["temperature"] == pytest.approx(303.15)
@@ -87,26 +86,23 @@ def test_less_than_the_least_force_is_refused_before_anything_moves():
         load_pipeline("franka", options=["controller.approach_force_n=10"])
 
 
-def _trace(times, gaps):
-    return made_trace([(gap, np.nan, np.nan) for gap in gaps], phase=APPROACH, t_s=times)
+def _features(*gaps):
+    """Return the features of fingers that close at 20 mm/s for 1 s to 40 mm, and then stand at these gaps."""
+    gaps = [*(0.06 - 0.02 * k / 15.0 for k in range(15)), *gaps]
+    times = np.arange(len(gaps)) / 15.0
+    trace = made_trace([(gap, np.nan, np.nan) for gap in gaps], phase=APPROACH, t_s=times)
+    return create("feature-set", "width-and-time").extract(trace)
 
 
 def test_the_features_are_those_of_the_widths():
-    times = np.arange(30) / 15.0
-    # 20 mm/s for 1 s to 40 mm, 6 states there, two states to 38 mm, and rest until the end.
-    gaps = [0.06 - 0.02 * t for t in times[:15]] + [0.04] * 6 + [0.039] + [0.038] * 8
-    features = create("feature-set", "width-and-time").extract(_trace(times, gaps))
-    assert features["p_first"] == pytest.approx(0.04)
-    assert features["p_steady"] == pytest.approx(0.038)
-    assert features["squeezed"] == pytest.approx(0.002)
-    assert features["approach_t"] == pytest.approx(1.0)
-    assert features["delta_t"] == pytest.approx(times[22] - times[15])
+    """6 states at 40 mm, two to 38 mm, and rest until the end."""
+    features = _features(*[0.04] * 6, 0.039, *[0.038] * 8)
+    expected = {"p_first": 0.04, "p_steady": 0.038, "squeezed": 0.002, "approach_t": 1.0, "delta_t": 7 / 15.0}
+    assert {name: features[name] for name in expected} == pytest.approx(expected)
 
 
 def test_fingers_that_still_move_have_no_last_rest():
-    times = np.arange(26) / 15.0
-    gaps = [0.06 - 0.02 * t for t in times[:15]] + [0.04] * 6 + [0.039, 0.037, 0.035, 0.033, 0.031]
-    features = create("feature-set", "width-and-time").extract(_trace(times, gaps))
+    features = _features(*[0.04] * 6, 0.039, 0.037, 0.035, 0.033, 0.031)
     assert features["p_first"] == pytest.approx(0.04)
     assert set(features.reasons) == {"p_steady", "squeezed", "delta_t"}
 
@@ -117,47 +113,46 @@ def _opened(**settings):
     return driver
 
 
-def _closed(driver, command, frames=60):
-    read = [driver.read(1.0)]
+def _driven(driver, command, frames=60):
+    """Return the frames of a driver that is commanded this again and again."""
+    read = [driver.read(1.0).frame]
     for _ in range(frames):
         driver.apply(command)
-        read.append(driver.read(1.0))
-    return [reading.frame for reading in read]
+        read.append(driver.read(1.0).frame)
+    return read
 
 
 @pytest.mark.slow
-@every_case("kind", [VELOCITY, POSITION, FORCE])
-def test_every_kind_of_command_closes_at_its_speed_and_not_again_and_again(kind):
+@every_case(("kind", "value"), [(VELOCITY, -0.02), (POSITION, 0.0), (FORCE, 40.0)])
+def test_every_kind_of_command_closes_at_its_speed_and_not_again_and_again(kind, value):
     driver = _opened()
-    value = {VELOCITY: -0.02, POSITION: 0.0, FORCE: 40.0}[kind]
-    frames = _closed(driver, Command(kind, value, 40.0, 0.02))
+    frames = _driven(driver, Command(kind, value, 40.0, 0.02))
     assert driver.report()["orders"] == 1
     driver.close()
-    speeds = [frame.velocity_m_s for frame in frames[5:15]]
-    assert np.mean(speeds) == pytest.approx(-0.02, rel=0.1)
+    assert np.mean([frame.velocity_m_s for frame in frames[5:15]]) == pytest.approx(-0.02, rel=0.1)
     assert 0.04 < frames[-1].gap_m < 0.05
     assert driver.report()["true_peak_force_n"] < 45.0
 
 
 def test_a_stronger_grasp_waits_until_the_running_one_has_ended_and_an_opening_does_not():
-    driver = _opened()
-    driver.apply(Command(POSITION, 0.0, 30.0, 0.02))
-    for force_n in (35.0, 40.0, 45.0):
-        driver.read(1.0)
+    driver, orders = _opened(), []
+    for force_n in (30.0, 35.0, 40.0, 45.0):
         driver.apply(Command(POSITION, 0.0, force_n, 0.02))
-    assert driver.report()["orders"] == 1
+        orders.append(driver.report()["orders"])
+        driver.read(1.0)
     for _ in range(60):
         driver.read(1.0)
-    assert driver.report()["orders"] == 2
+    orders.append(driver.report()["orders"])
     driver.apply(Command(POSITION, 0.08, 30.0, 0.05))
-    assert driver.report()["orders"] == 3
+    orders.append(driver.report()["orders"])
     driver.close()
+    assert orders == [1, 1, 1, 1, 2, 3]
 
 
 def test_who_is_released_is_not_pressed():
     driver = _opened()
     hand = driver._link.hand
-    _closed(driver, Command(POSITION, 0.0, 40.0, 0.05))
+    _driven(driver, Command(POSITION, 0.0, 40.0, 0.05))
     assert hand.pressing
     driver.close()
     assert not hand.pressing
@@ -172,9 +167,13 @@ def test_a_hand_lost_in_a_grasp_ends_it(mood, at_s):
     assert 15 * (at_s - 0.8) <= len(trial.trace) <= 15 * at_s
 
 
-def test_another_version_is_no_device():
-    with pytest.raises(NoDevice, match="version"):
-        _opened(faults={"mood": "old"})
+@every_case(
+    ("fault", "error", "said"),
+    [({"mood": "old"}, NoDevice, "version"), ({"unplug_at_s": 0.3}, DeviceLost, "emulated")],
+)
+def test_another_version_is_no_device_and_a_lost_hand_is_told_with_its_address(fault, error, said):
+    with pytest.raises(error, match=said):
+        _driven(_opened(faults=fault), Command(POSITION, 0.0, 40.0, 0.05))
 
 
 def test_without_pylibfranka_the_user_is_told_what_to_install(monkeypatch):
@@ -184,30 +183,23 @@ def test_without_pylibfranka_the_user_is_told_what_to_install(monkeypatch):
     [finding] = diagnose(FrankaConfig(host="127.0.0.1"), 1.0)
     assert finding.state == "problem"
     assert "pip install pylibfranka" in finding.advice
-
-
-def test_without_an_address_a_note_says_how_a_hand_is_asked():
     [finding] = diagnose(None, 1.0)
     assert finding.state == "note"
-    assert "gripper.host=" in finding.advice
-
-
-def _hand():
-    hand = FrankaHand(FrankaConfig(host="emulated"), 1)
-    hand.look(0.1)
-    return hand
+    assert "gripper.host=" in finding.advice, "how a hand is asked"
 
 
 def test_the_hand_answers_each_command_as_libfranka_expects():
-    hand = _hand()
-    hand.ask(HandRequest(GRASP, 1, (0.0, 1.0, 1.0, 0.05, 40.0)), 0.1)
+    hand = FrankaHand(FrankaConfig(host="emulated"), 1)
+    grasp = (0.0, 1.0, 1.0, 0.05, 40.0)
+    hand.look(0.1)
+    hand.ask(HandRequest(GRASP, 1, grasp), 0.1)
     hand.ask(HandRequest(MOVE, 2, (0.07, 0.05)), 0.2)
-    assert hand.ended() == [(HandRequest(GRASP, 1, (0.0, 1.0, 1.0, 0.05, 40.0)), ABORTED)]
+    assert hand.ended() == [(HandRequest(GRASP, 1, grasp), ABORTED)]
     hand.look(2.0)
     assert [status for _, status in hand.ended()] == [SUCCESS]
     hand.ask(HandRequest(MOVE, 3, (0.2, 0.05)), 2.0)
     assert [status for _, status in hand.ended()] == [FAILED]
-    hand.ask(HandRequest(GRASP, 4, (0.0, 1.0, 1.0, 0.05, 40.0)), 2.1)
+    hand.ask(HandRequest(GRASP, 4, grasp), 2.1)
     hand.look(6.0)
     assert [status for _, status in hand.ended()] == [SUCCESS]
     assert hand.grasped
@@ -226,15 +218,12 @@ REQUESTS = st.one_of(
 
 
 @given(st.lists(REQUESTS, max_size=5), st.integers(1, 20))
-def test_requests_in_any_pieces_are_taken(given_requests, size):
-    data = b"".join(request_bytes(command, k, *values) for k, (command, *values) in enumerate(given_requests))
+def test_requests_in_any_pieces_are_taken(sent, size):
+    data = b"".join(request_bytes(command, k, *values) for k, (command, *values) in enumerate(sent))
     requests = HandRequests()
-    taken = [
-        request for start in range(0, len(data), size) for request in requests.fed(data[start : start + size])
-    ]
-    assert taken == [
-        HandRequest(command, k, tuple(values)) for k, (command, *values) in enumerate(given_requests)
-    ]
+    pieces = (data[start : start + size] for start in range(0, len(data), size))
+    taken = [request for piece in pieces for request in requests.fed(piece)]
+    assert taken == [HandRequest(command, k, tuple(values)) for k, (command, *values) in enumerate(sent)]
 
 
 @given(st.binary(max_size=200))
@@ -244,19 +233,15 @@ def test_any_bytes_are_requests_or_refused(data):
             assert request.command <= STOP
 
 
-@given(
-    st.lists(
-        st.tuples(st.floats(1.0, 100.0), st.floats(1.0, 100.0)),
-        min_size=2,
-        max_size=8,
-        unique_by=lambda x: round(x[0], 5),
-    ),
-    st.floats(0.0, 150.0),
+NEWTONS = st.floats(1.0, 100.0)
+READINGS = st.lists(
+    st.tuples(NEWTONS, NEWTONS), min_size=2, max_size=8, unique_by=lambda pair: round(pair[0], 5)
 )
+
+
+@given(READINGS, st.floats(0.0, 150.0))
 @example([(50.0, 0.5), (99.99999999999999, 1.0), (100.0, 4.0)], 3.0)
 def test_the_force_to_ask_for_never_delivers_more_than_is_wanted(readings, wanted_n):
-    from graspsense.core.grasp.calibration import load_of, load_table
-
     table = load_table(readings)
     asked_n = asked_force(table, wanted_n)
     assert asked_n >= 0.0
@@ -269,25 +254,15 @@ def _calibrated(tmp_path, rows):
     readings = tmp_path / "readings.csv"
     readings.write_text(f"asked_n,delivered_n\n{rows}\n")
     (tmp_path / "kept").mkdir(mode=0o700)
-    gripper = (
-        "--gripper",
-        "franka",
-        "-o",
-        "gripper.host=emulated",
-        "-o",
-        f"gripper.calibration={tmp_path}/kept",
-    )
-    return graspsense("calibrate", "delivered-force", readings, *gripper, "--json")
+    options = ("-o", "gripper.host=emulated", "-o", f"gripper.calibration={tmp_path}/kept", "--json")
+    return graspsense("calibrate", "delivered-force", readings, "--gripper", "franka", *options)
 
 
 def test_delivered_force_is_stored_and_used(tmp_path):
-    done = _calibrated(tmp_path, "20,30\n40,50\n60,70\n60,74")
-    assert done.returncode == 0, done.stderr
-    data = done.json["data"]
+    data = _calibrated(tmp_path, "20,30\n40,50\n60,70\n60,74").json["data"]
     assert data == {"asked_n": [0.0, 20.0, 40.0, 60.0], "delivered_n": [0.0, 30.0, 50.0, 72.0]}
 
-    driver = create("sensor-backend", "franka", host="emulated", calibration=f"{tmp_path}/kept")
-    assert set(driver.open(1).calibration) == {"delivered-force"}
+    driver = _opened(calibration=f"{tmp_path}/kept")
     # 50 N are wanted: 40 N are asked for.
     driver.apply(Command(POSITION, 0.0, 50.0, 0.05))
     assert driver._asked.force_n == pytest.approx(40.0)
@@ -302,10 +277,3 @@ def test_damaged_readings_are_refused_with_their_line(tmp_path):
 
 def test_a_table_that_stays_level_is_read():
     assert asked_force(LoadTable((0.0, 10.0, 20.0, 40.0), (0.0, 30.0, 30.0, 50.0)), 40.0) == 30.0
-
-
-def test_a_lost_hand_is_said_with_its_address():
-    driver = _opened(faults={"unplug_at_s": 0.3})
-    with pytest.raises(DeviceLost, match="emulated"):
-        [driver.read(1.0) for _ in range(10)]
-    driver.close()

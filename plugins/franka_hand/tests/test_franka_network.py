@@ -38,12 +38,10 @@ def _driver(hand):
 def _until(driver, command, condition):
     """Command this until a frame meets the condition."""
     until_s = time.monotonic() + PATIENT_S
-    while time.monotonic() < until_s:
-        reading = driver.read(PATIENT_S)
-        if condition(reading):
-            return reading
+    while not condition(reading := driver.read(PATIENT_S)):
+        assert time.monotonic() < until_s, "the condition was never met"
         driver.apply(command)
-    raise AssertionError("the condition was never met")
+    return reading
 
 
 PHASES = {
@@ -55,19 +53,14 @@ PHASES = {
 def test_a_grasp_with_pylibfranka(emulated):
     hand = emulated()
     # Held for longer than by default: a busy machine misses states, and a rest shows in three of them.
-    options = [
-        f"gripper.host={hand.where}",
-        f"run.frame_timeout_s={PATIENT_S / 10}",
-        "run.hold_s=3.0",
-        "gripper.calibration=none",
-    ]
+    patient = (f"run.frame_timeout_s={PATIENT_S / 10}", "run.hold_s=3.0")
+    options = [f"gripper.host={hand.where}", "gripper.calibration=none", *patient]
     trial = load_pipeline("franka", options=options).grasp()
 
     assert trial.outcome.words == "steady", trial.reason
     assert 0.04 < trial.features["p_steady"] < trial.features["p_first"] < 0.05
-    state = hand.state()
-    assert state["width_m"] > 0.078
-    assert not state["pressing"]
+    assert hand.state()["width_m"] > 0.078
+    assert not hand.state()["pressing"]
 
 
 @pytest.mark.parametrize("phase", ["closing", "holding"])
@@ -79,8 +72,7 @@ def test_whatever_becomes_of_its_messages_the_hand_is_told_to_stop(emulated, moo
     PHASES[phase](driver)
     assert hand.state()["pressing"]
     hand.tell(mood)
-    expected = nullcontext() if mood == "late" else pytest.raises(DeviceLost, match=hand.where)
-    with expected:
+    with nullcontext() if mood == "late" else pytest.raises(DeviceLost, match=hand.where):
         [driver.read(PATIENT_S) for _ in range(20)]
     driver.close()
     assert not hand.state()["pressing"]
@@ -108,12 +100,6 @@ def test_the_running_grasp_is_given_up_for_an_opening(emulated):
     driver.close()
 
 
-def test_another_version_is_no_device(emulated):
-    hand = emulated(faults=FrankaFaults(mood="old"))
-    with pytest.raises(NoDevice, match=r"[Vv]ersion"):
-        _driver(hand)
-
-
 def test_a_second_host_does_not_get_the_hand_and_the_first_keeps_it(emulated):
     hand = emulated()
     driver = _driver(hand)
@@ -134,12 +120,11 @@ def test_doctor_tells_a_hand_from_none_and_lets_it_hold_on(emulated):
     driver.close()
     assert hand.state()["pressing"], "who is killed tells nobody to stop"
     # The forks of the one that was killed let go of the hand at the next state.
-    until_s = time.monotonic() + PATIENT_S
-    while True:
+    until_s, state = time.monotonic() + PATIENT_S, ""
+    while state != "ok" and time.monotonic() < until_s:
         [finding] = diagnose(FrankaConfig(host=hand.where), PATIENT_S)
-        if finding.state == "ok" or time.monotonic() > until_s:
-            break
-    assert finding.state == "ok"
+        state = finding.state
+    assert state == "ok"
     assert finding.numbers["width_m"] == pytest.approx(hand.hand.width_m, abs=1e-4)
     assert hand.state()["pressing"]
     [finding] = diagnose(FrankaConfig(host="127.0.0.77"), PATIENT_S)
@@ -160,8 +145,10 @@ def test_a_hand_that_answers_is_listed_and_goes_on(emulated):
     assert hand.state()["pressing"] == earlier["pressing"]
 
 
-def test_another_version_is_listed_as_not_ready_and_another_device_is_not(emulated):
+def test_another_version_is_no_device_and_listed_as_not_ready_and_another_device_is_not(emulated):
     hand = emulated(faults=FrankaFaults(mood="old"))
+    with pytest.raises(NoDevice, match=r"[Vv]ersion"):
+        _driver(hand)
     [device] = found_devices(PATIENT_S, hand.where)
     assert not device.ready
     assert "version" in device.advice

@@ -14,13 +14,7 @@ from graspsense_mujoco_gripper import backend
 HYBRID = create("controller", "hybrid", sends="velocity", closing_speed_m_s=0.15)
 FEATURES = create("feature-set", "chitta")
 RUN = RunConfig(hold_s=0.05)
-GRASPS = [
-    ("block", 1),
-    ("can", 1),
-    ("block", 2),
-    ("can#1", 3),
-    ("egg", 1),
-]
+GRASPS = [("block", 1), ("can", 1), ("block", 2), ("can#1", 3), ("egg", 1)]
 GRIPPER = create("sensor-backend", "mujoco")
 
 

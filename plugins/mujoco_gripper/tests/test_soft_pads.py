@@ -1,16 +1,13 @@
 """The gripper with soft pads, its accelerometer, and scenes that are filled and put down. Simulated."""
 
-import mujoco
 import numpy as np
 import pytest
 from cases import every_case
 
-from graspsense import ConfigError, load_pipeline
 from graspsense.plugin_api import POSITION, Command, create
 from graspsense_mujoco_gripper.config import MujocoConfig
 from graspsense_mujoco_gripper.gripper_file import Finger, PalmSensor
 from graspsense_mujoco_gripper.prepared import prepare
-from graspsense_mujoco_gripper.scene import read_scene
 
 CELL_N_M = 1500.0
 STEP_S = 0.00033334
@@ -18,18 +15,16 @@ RIGID = 'solref="0.002 1" solimp="0.99 0.999 0.0001"'
 
 
 def opened(thing, **settings):
-    backend = create(
-        "sensor-backend",
-        "mujoco",
-        file="soft_pads",
-        object=str(thing),
-        timestep_s=STEP_S,
-        spread=False,
-        force_noise_n=0.0,
-        **settings,
-    )
+    exact = {"timestep_s": STEP_S, "spread": False, "force_noise_n": 0.0}
+    backend = create("sensor-backend", "mujoco", file="soft_pads", object=str(thing), **exact, **settings)
     backend.open(0)
     return backend
+
+
+@pytest.fixture
+def scene(scene_file):
+    """Opens a gripper around a block on a table, in a scene with these lines besides."""
+    return lambda *lines: opened(scene_file('thing = "block"', "table = true", *lines))
 
 
 def squeezed(backend, gap_m, ticks):
@@ -74,7 +69,7 @@ def test_a_flat_thing_presses_on_all_cells_alike(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_palm_feels_gravity_and_the_motion_of_the_fingers(tmp_path):
+def test_the_palm_feels_gravity_and_the_motion_of_the_fingers():
     backend = opened("none")
     still = [backend.read(1.0).signals.acceleration for _ in range(200)]
     assert still[-1].new == 3
@@ -89,14 +84,8 @@ def test_the_palm_feels_gravity_and_the_motion_of_the_fingers(tmp_path):
     assert np.concatenate([samples.values for samples in moving[100:]])[:, 1].std() > 5.0 * values[:, 1].std()
 
 
-def scene(folder, *lines):
-    path = folder / "scene.toml"
-    path.write_text("\n".join(['thing = "block"', "table = true", *lines]) + "\n")
-    return path
-
-
-def test_a_thing_that_is_filled_weighs_more(tmp_path):
-    backend = opened(scene(tmp_path, "fill = [[0.0, 0.0], [0.2, 0.3]]"))
+def test_a_thing_that_is_filled_weighs_more(scene):
+    backend = scene("fill = [[0.0, 0.0], [0.2, 0.3]]")
     squeezed(backend, 0.035, 700)
     model = backend._model
     masses = [model.body_mass[k] for k in range(model.nbody) if model.body(k).name.startswith("thing/")]
@@ -104,16 +93,16 @@ def test_a_thing_that_is_filled_weighs_more(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_table_rises_as_the_scene_says(tmp_path):
-    backend = opened(scene(tmp_path, "table_height = [[0.0, 0.0], [0.2, 0.02]]"))
+def test_the_table_rises_as_the_scene_says(scene):
+    backend = scene("table_height = [[0.0, 0.0], [0.2, 0.02]]")
     resting_m = float(backend._data.mocap_pos[0, 2])
     squeezed(backend, 0.035, 700)
     assert backend._data.mocap_pos[0, 2] - resting_m == pytest.approx(0.02)
 
 
 @pytest.mark.slow
-def test_roughness_disturbs_cells_that_slide_and_no_others(tmp_path):
-    backend = opened(scene(tmp_path, "friction = 0.05", "roughness_m = 4e-5"))
+def test_roughness_disturbs_cells_that_slide_and_no_others(scene):
+    backend = scene("friction = 0.05", "roughness_m = 4e-5")
     still = [squeezed(backend, 0.0395, 800 if k == 0 else 1).frame.force_left_n for k in range(100)]
     thing = next(k for k in range(backend._model.nbody) if backend._model.body(k).name.startswith("thing/"))
     sliding = []
@@ -121,11 +110,6 @@ def test_roughness_disturbs_cells_that_slide_and_no_others(tmp_path):
         backend._data.xfrc_applied[thing, 1] = 3.0
         sliding.append(squeezed(backend, 0.0395, 1).frame.force_left_n)
     assert np.std(sliding) > 5.0 * np.std(still)
-
-
-@every_case("name", ["tugged", "filled", "placed", "shaken"])
-def test_the_scenes_of_the_package_are_read(name):
-    assert isinstance(read_scene(name).spec, mujoco.MjSpec)
 
 
 @every_case(
@@ -142,24 +126,8 @@ def test_a_gripper_file_that_cannot_be_says_why(wrong, said):
         wrong()
 
 
-@pytest.mark.slow
-def test_a_trace_has_the_acceleration_and_the_cells():
-    trial = load_pipeline(
-        "default",
-        options=[
-            "gripper.type=mujoco",
-            "gripper.file=soft_pads",
-            "classifier.type=none",
-            "controller.sends=velocity",
-        ],
-    ).grasp(object="block")
-    assert trial.trace.signals["acceleration"].values.shape[1] == 3
-    assert trial.trace.pad_left.shape[1] == 15
-
-
-def bumped(tmp_path, *lines):
+def bumped(backend):
     """Close on a block that a scene bumps; return the forces on both edges over time."""
-    backend = opened(scene(tmp_path, "[bump]", "t_s = 0.2", *lines))
     edges = []
     for _ in range(1200):
         frame = squeezed(backend, 0.0395, 1).frame
@@ -168,8 +136,9 @@ def bumped(tmp_path, *lines):
 
 
 @pytest.mark.slow
-def test_a_bump_gives_the_edge_of_the_finger_the_momentum_of_the_ball(tmp_path):
-    left, right = bumped(tmp_path, "mass_kg = 0.02", "speed_m_s = 0.5", "touch_s = 0.03").T
+def test_a_bump_gives_the_edge_of_the_finger_the_momentum_of_the_ball(scene):
+    ball = ("mass_kg = 0.02", "speed_m_s = 0.5", "touch_s = 0.03")
+    left, right = bumped(scene("[bump]", "t_s = 0.2", *ball)).T
     # A rigid finger would return exp(-0.1 pi) = 73 % of the speed; one on a wrist that yields returns less.
     assert 1.0 < left.sum() * 1e-3 / (0.02 * 0.5) < 1.75
     assert np.flatnonzero(left).size == pytest.approx(30, abs=5)
@@ -177,14 +146,8 @@ def test_a_bump_gives_the_edge_of_the_finger_the_momentum_of_the_ball(tmp_path):
 
 
 @pytest.mark.slow
-def test_edges_do_not_feel_a_bump_into_the_thing(tmp_path):
-    assert not bumped(tmp_path, 'at = "thing"', "speed_m_s = 0.5").any()
-
-
-def test_a_finger_without_an_edge_sensor_is_not_bumped_into(tmp_path):
-    path = scene(tmp_path, "[bump]", "t_s = 0.2")
-    with pytest.raises(ConfigError, match="edge"):
-        create("sensor-backend", "mujoco", object=str(path)).open(0)
+def test_edges_do_not_feel_a_bump_into_the_thing(scene):
+    assert not bumped(scene("[bump]", "t_s = 0.2", 'at = "thing"', "speed_m_s = 0.5")).any()
 
 
 @pytest.mark.slow

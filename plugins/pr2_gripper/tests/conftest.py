@@ -67,7 +67,18 @@ def threads_have_time_to_end(monkeypatch):
 
 
 @pytest.fixture
-def answered(monkeypatch):
+def time_stands_still(monkeypatch):
+    """The driver judges no times of reports.
+
+    A board whose time stands still between two ticks looks old on a machine that is busy, and many ticks at once look
+    like a clock that jumps.
+    """
+    monkeypatch.setattr(link, "OLDEST_S", math.inf)
+    monkeypatch.setattr(device_time, "AHEAD_S", math.inf)
+
+
+@pytest.fixture
+def answered(monkeypatch, time_stands_still):
     """A paced board goes on once its last report was answered by a command, however late: no machine is too slow.
 
     Neither its watchdog nor the driver's bounds on the times of reports can then tell the machine's load.
@@ -96,8 +107,6 @@ def answered(monkeypatch):
     monkeypatch.setattr(emulated, "on_time", periods)
     monkeypatch.setattr(transport, "write", writes)
     monkeypatch.setattr(transport, "close", closes)
-    monkeypatch.setattr(link, "OLDEST_S", math.inf)
-    monkeypatch.setattr(device_time, "AHEAD_S", math.inf)
 
 
 @pytest.fixture(autouse=True)
@@ -142,7 +151,6 @@ class Fed(Transport):
 
 @pytest.fixture
 def fed():
-    """Makes a wire that hands over these reports."""
     return Fed
 
 
@@ -236,15 +244,11 @@ class Device:
 
 
 @pytest.fixture
-def machine(monkeypatch):
+def machine(monkeypatch, time_stands_still):
     made = Machine()
     module = ModuleType(LIBRARY)
     module.enumerate = made.enumerate
     module.device = lambda: Device(made)
     monkeypatch.setitem(sys.modules, LIBRARY, module)
     monkeypatch.setattr(opening, "POLL_S", 0.001)
-    # Its time stands still between two ticks, so on a machine that is busy every report looks old, and many ticks at
-    # once look like a clock that jumps.
-    monkeypatch.setattr(link, "OLDEST_S", math.inf)
-    monkeypatch.setattr(device_time, "AHEAD_S", math.inf)
     return made

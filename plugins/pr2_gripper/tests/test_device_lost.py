@@ -41,12 +41,9 @@ class Witness(Wire):
 def witnesses(monkeypatch):
     """The wires of the grasps so far, the newest last."""
     made = []
-
-    def wire(*given):
-        made.append(Witness(*given))
-        return made[-1]
-
-    monkeypatch.setattr("graspsense_pr2_gripper.emulation.Wire", wire)
+    monkeypatch.setattr(
+        "graspsense_pr2_gripper.emulation.Wire", lambda *given: made.append(Witness(*given)) or made[-1]
+    )
     return made
 
 

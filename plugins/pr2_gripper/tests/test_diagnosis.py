@@ -1,9 +1,11 @@
 """What the doctor says of a gripper, with hidapi's module at the outermost edge and the emulated board behind it."""
 
 import gc
+import re
 import threading
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from datetime import UTC, datetime, timedelta
+from itertools import count
 from types import SimpleNamespace
 
 import pytest
@@ -31,11 +33,8 @@ def doctor(monkeypatch):
 
     def run(*arguments):
         done = graspsense("doctor", "--json", "--timeout", "0.2", *arguments)
-        (ours,) = (
-            diagnosis
-            for diagnosis in done.json["diagnoses"]
-            if diagnosis["distribution"] == "graspsense-pr2-gripper"
-        )
+        diagnoses = {diagnosis["distribution"]: diagnosis for diagnosis in done.json["diagnoses"]}
+        ours = diagnoses["graspsense-pr2-gripper"]
         assert ours["error"] == ""
         return done.returncode, {finding["subject"]: finding for finding in ours["findings"]}
 
@@ -90,7 +89,7 @@ def test_no_gripper_is_a_problem_only_where_one_was_asked_for(doctor, machine):
     assert doctor()[1]["device"]["state"] == "note"
     code, said = doctor("--gripper", "pr2", "-o", "gripper.serial=R2")
     assert (code, said["device"]["state"]) == (1, "problem")
-    assert "1209:0001 with serial number 'R2'" in said["device"]["found"]
+    assert "'R2'" in said["device"]["found"]
     assert "transport hidraw" not in said
 
 
@@ -106,66 +105,69 @@ def test_a_gripper_is_measured_and_not_moved(doctor, machine, board, powered):
     with powered(machine):
         _, said = doctor("--gripper", "pr2")
     numbers = said["transport hidraw"]["numbers"]
-    assert (numbers["serial"], numbers["firmware"], numbers["rate_wanted_hz"]) == ("L7", "1.2.3", 1000.0)
-    assert numbers["reports"] > 0
-    assert (numbers["lost"], numbers["corrupt"], numbers["in_use"]) == (0, 0, False)
-    assert numbers["echoes"] > 0
-    assert said["transport hidraw"]["state"] == "ok"
+    sound = {
+        "serial": "L7",
+        "firmware": "1.2.3",
+        "rate_wanted_hz": 1000.0,
+        "lost": 0,
+        "corrupt": 0,
+        "in_use": False,
+    }
+    assert sound.items() <= numbers.items()
+    assert min(numbers["reports"], numbers["echoes"]) > 0
     assert 0.0 < numbers["latency_median_ms"] <= numbers["latency_99_ms"]
     assert 0.0 <= numbers["jitter_median_ms"] <= numbers["jitter_99_ms"] <= numbers["jitter_most_ms"]
     assert wire.firmware.effort_un == 0
-    assert said["calibration tare"]["state"] == "note"
+    assert (said["transport hidraw"]["state"], said["calibration tare"]["state"]) == ("ok", "note")
 
 
-def test_lost_and_damaged_reports_are_a_problem_with_a_remedy(doctor, machine, board, powered):
-    machine.plug("/dev/hidraw3", board(faults=FaultConfig(drop=0.2, corrupt=0.2)))
-    with powered(machine):
+LOST = FaultConfig(drop=0.2, corrupt=0.2)
+IMPLAUSIBLE = {"watchdog_ms": 65535, "effort_limit_un": 2_147_000_000}
+
+
+@every_case(
+    ("numbers", "reports", "advice"),
+    [
+        (
+            IMPLAUSIBLE,
+            False,
+            "(?s)(?=.*watchdog_ms is 65535 ms, allowed are 5 to).*effort_limit_un is 2147000000",
+        ),
+        ({}, False, "it sends no reports"),
+        # The last one, since it gives the doctor the time of the machine.
+        ({"faults": LOST}, True, "(?s)(?=.*another cable or port).*firmware is faulty"),
+    ],
+)
+def test_what_is_wrong_with_a_gripper_is_a_problem_with_a_remedy(
+    doctor, machine, board, powered, numbers, reports, advice
+):
+    machine.plugged.clear()
+    machine.plug("/dev/hidraw3", board(**numbers))
+    with powered(machine) if reports else nullcontext():
         code, said = doctor("--gripper", "pr2")
     finding = said["transport hidraw"]
     assert (code, finding["state"]) == (1, "problem")
-    assert finding["numbers"]["lost"] > 0
-    assert finding["numbers"]["corrupt"] > 0
-    assert "another cable or port" in finding["advice"]
-    assert "firmware is faulty" in finding["advice"]
-
-
-def test_board_with_implausible_numbers_is_a_problem_with_each_of_them(doctor, machine, board):
-    machine.plug("/dev/hidraw3", board(watchdog_ms=65535, effort_limit_un=2_147_000_000))
-    code, said = doctor("--gripper", "pr2")
-    finding = said["transport hidraw"]
-    assert (code, finding["state"]) == (1, "problem")
-    assert "watchdog_ms is 65535 ms, allowed are 5 to 100 ms" in finding["advice"]
-    assert "effort_limit_un is 2147000000" in finding["advice"]
-
-
-def test_a_silent_gripper_is_a_problem(doctor, machine, board):
-    machine.plug("/dev/hidraw3", board())
-    code, said = doctor("--gripper", "pr2")
-    assert (code, said["transport hidraw"]["state"]) == (1, "problem")
-    assert "it sends no reports" in said["transport hidraw"]["advice"]
+    assert re.search(advice, finding["advice"])
+    if reports:
+        assert min(finding["numbers"]["lost"], finding["numbers"]["corrupt"]) > 0
 
 
 def test_a_gripper_that_somebody_else_commands_is_left_alone(doctor, machine, board, powered):
     """A hidraw node is open to two programs at once: letting go here would drop what the other one holds."""
     wire = board()
     machine.plug("/dev/hidraw3", wire)
-    counter = 0
-    plain = machine.tick
+    counter, plain = count(1), machine.tick
 
     def tick():
-        nonlocal counter
-        counter += 1
-        wire.output(
-            encode_output(OutputReport(counter & 0xFFFF, EFFORT_KIND, 9_000_000, OWN_LIMIT, OWN_LIMIT))
-        )
+        effort = OutputReport(next(counter) & 0xFFFF, EFFORT_KIND, 9_000_000, OWN_LIMIT, OWN_LIMIT)
+        wire.output(encode_output(effort))
         plain()
 
     machine.tick = tick
     with powered(machine):
         _, said = doctor("--gripper", "pr2")
-    assert said["transport hidraw"]["numbers"]["in_use"] is True
-    assert said["transport hidraw"]["numbers"]["echoes"] == 0
-    assert wire.firmware.effort_un == 9_000_000
+    numbers = said["transport hidraw"]["numbers"]
+    assert (numbers["in_use"], numbers["echoes"], wire.firmware.effort_un) == (True, 0, 9_000_000)
 
 
 @pytest.mark.slow
@@ -182,10 +184,11 @@ def test_who_may_not_open_it_is_given_the_rule(doctor, machine, board, monkeypat
 
 def test_calibrations_are_told_with_their_age(doctor, machine, board, device_identity, powered):
     machine.plug("/dev/hidraw3", board())
-    made = datetime.now(UTC) - timedelta(days=3)
+    made = (datetime.now(UTC) - timedelta(days=3)).isoformat()
     zero = {"left": [3000.0] * 22, "right": [3000.0] * 22, "images": 24}
-    numbers = device_numbers(device_identity())
-    tare = Calibration(kind="tare", serial="L7", device=numbers, made=made.isoformat(), data=zero)
+    tare = Calibration(
+        kind="tare", serial="L7", device=device_numbers(device_identity()), made=made, data=zero
+    )
     write_calibration(calibration_path("", "L7", "tare"), tare)
     with powered(machine):
         _, said = doctor("--gripper", "pr2")
@@ -194,21 +197,12 @@ def test_calibrations_are_told_with_their_age(doctor, machine, board, device_ide
     assert said["calibration friction"]["advice"] == "graspsense calibrate friction --gripper pr2"
 
 
-@every_case(
-    ("platform", "says"),
-    [
-        ("darwin", "uhid is of the Linux kernel, and this is darwin"),
-        ("win32", "vhci-hcd is of the Linux kernel, and this is win32"),
-        ("linux", "modprobe"),
-    ],
-)
+@every_case(("platform", "says"), [("darwin", "darwin"), ("win32", "win32"), ("linux", "modprobe")])
 def test_where_no_device_can_be_emulated_it_says_why_and_offers_another(
     monkeypatch, platform, says, tmp_path
 ):
     monkeypatch.setattr(reasons.sys, "platform", platform)
     monkeypatch.setattr(reasons, "UHID_NODE", str(tmp_path / "uhid"))
     monkeypatch.setattr(reasons, "VHCI", tmp_path / "vhci")
-    with pytest.raises(NoDevice) as caught:
+    with pytest.raises(NoDevice, match=rf"(?s)uhid.*{says}.*vhci.*{says}.*-o gripper.transport=emulated"):
         emulate(Pr2Config(transport="emulated"), "", 0)
-    assert says in str(caught.value)
-    assert "-o gripper.transport=emulated" in str(caught.value)

@@ -3,6 +3,7 @@
 import gripper_faults
 import numpy as np
 import pytest
+from cases import every_case
 from gripper_faults import FAULTS
 
 from graspsense import load_pipeline
@@ -44,12 +45,6 @@ NEAR = {"open_gap_m": 0.062}
 """The fingers open to a few millimetres from the bottle: a grasp of less than half the ticks."""
 
 
-def rows_of(controller, faults=FAULTS, sides=("left", "right"), **body):
-    healthy, *rows = gripper_faults.injected((controller,), faults, sides, **body)
-    assert healthy.outcome == "steady", healthy
-    return healthy, rows
-
-
 def grasped(controller="hybrid", seed=0, body=NEAR, **faults):
     law = gripper_faults.controller_named(controller)
     return gripper_faults.grasped(law, FaultConfig(**faults), seed, **body)
@@ -67,15 +62,18 @@ def test_a_fault_in_the_squeeze_crushes_nothing_and_without_a_fault_nothing_is_t
     check(row, sound)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("fault", "told"),
     [
         ("absent", "left fingertip absent"),
         ("zero", "left pad dead"),
         ("stuck", "left pad stuck"),
+        # That the pads disagree follows from it.
+        ("numb", "left pad feels more on opening"),
     ],
 )
 def test_of_a_fingertip_that_fails_in_the_squeeze_the_cause_alone_is_told(fault, told):
+    """The squeeze begins after 0.785 s."""
     grasp = grasped(pad_fault=fault, pad_side="left", pad_at_s=0.8)
     assert [warning.split(":")[0] for warning in grasp.warnings] == [told]
     if grasp.outcome.words == "aborted":
@@ -95,11 +93,12 @@ def test_every_fault_in_every_phase_crushes_nothing(controller, faults, sides):
     """All of them under one law: what protects the object does not know the law."""
     # A drift is known by the way that the fingers go in free air.
     drifts, others = (
-        [fault for fault in faults if ("drift" in fault.name) is drifting] for drifting in (True, False)
+        [fault for fault in faults if ("drift" in fault.name) is drifts] for drifts in (True, False)
     )
     assert drifts
     for some, some_sides, body in ((drifts, ("right",), {}), (others, sides, NEAR)):
-        healthy, rows = rows_of(controller, some, some_sides, **body)
+        healthy, *rows = gripper_faults.injected((controller,), some, some_sides, **body)
+        assert healthy.outcome == "steady", healthy
         assert len(rows) == 5 * sum(len(some_sides) if fault.sided else 1 for fault in some)
         for row in rows:
             check(row, healthy)
@@ -116,30 +115,6 @@ def test_hostile_laws_crush_nothing():
         assert row.outcome == "aborted", row
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_a_healthy_grasp_has_no_warnings(seed):
-    for name in ("hybrid", "force"):
-        grasp = grasped(name, seed, {})
-        assert (grasp.outcome.words, grasp.warnings) == ("steady", ())
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("drop", "body", "outcome"), [(0.05, NEAR, "steady"), (0.25, {}, "aborted")])
-def test_lost_reports_are_told_and_a_quarter_of_them_ends_the_grasp(drop, body, outcome):
-    grasp = grasped(body=body, drop=drop)
-    assert grasp.outcome.words == outcome
-    assert any(warning.startswith("reports lost") for warning in grasp.warnings)
-
-
-@pytest.mark.slow
-def test_a_pad_that_grows_numb_in_the_squeeze_is_told():
-    # The squeeze begins after 0.785 s.
-    grasp = grasped(pad_fault="numb", pad_side="left", pad_at_s=0.8)
-    # That the pads disagree follows from it.
-    assert [warning.split(":")[0] for warning in grasp.warnings] == ["left pad feels more on opening"]
-
-
 def test_a_pad_that_is_known_to_be_bad_refuses_the_grasp():
     grasp = grasped(pad_fault="absent", pad_side="right")
     assert grasp.outcome.words == "aborted"
@@ -152,18 +127,19 @@ def test_a_pad_that_is_known_to_be_bad_refuses_the_grasp():
 def test_a_picture_and_a_notebook_show_the_reason_and_the_warnings():
     from graspsense.report.grasp_picture import _words
 
-    faults = ["pad_fault=stuck", "pad_side=left", "pad_at_s=0.4"]
-    options = [
-        "gripper.type=pr2",
-        "gripper.transport=emulated",
-        *(f"gripper.faults.{fault}" for fault in faults),
-    ]
-    trial = load_pipeline(options=options).grasp()
-    assert "left fingertip stuck" in _words(trial)[0]
-    assert any(
-        line.startswith("Object: ") and line.endswith(f"seed {trial.run.seed}") for line in _words(trial)
-    )
+    trial = emulated_grasp(pad_fault="stuck", pad_side="left", pad_at_s=0.4)
+    words = _words(trial)
+    assert "left fingertip stuck" in words[0]
+    assert any(line.startswith("Object: ") and line.endswith(f"seed {trial.run.seed}") for line in words)
     assert "left fingertip stuck" in trial._repr_html_()
+
+
+def emulated_grasp(*options, **faults):
+    """Return a grasp of the default pipeline with an emulated gripper that has these faults."""
+    faults = [f"gripper.faults.{key}={value}" for key, value in faults.items()]
+    return load_pipeline(
+        options=["gripper.type=pr2", "gripper.transport=emulated", *options, *faults]
+    ).grasp()
 
 
 @pytest.mark.slow
@@ -177,30 +153,21 @@ def test_a_motor_that_reports_what_it_was_told_presses_nothing_with_more():
 
 def test_no_certainty_is_given_to_a_grasp_in_which_a_fault_was_seen(tmp_path):
     """The features of a model's training, and so its certainty, are those of sound pads."""
-    rng = np.random.default_rng(0)
-    kinds, sizes = ("bottle", "can"), np.repeat([0.0586, 0.066], 30)
-    table = FeatureTable(
-        names=("p_first",), units=("m",), values=rng.normal(sizes, 0.0005, len(sizes))[:, np.newaxis]
-    )
-    trials = Labelled(source="a test", table=table, labels=tuple(np.repeat(kinds, 30).tolist()))
+    sizes = np.repeat([0.0586, 0.066], 30)
+    sizes = np.random.default_rng(0).normal(sizes, 0.0005)[:, np.newaxis]
+    table = FeatureTable(names=("p_first",), units=("m",), values=sizes)
+    trials = Labelled(source="a test", table=table, labels=("bottle",) * 30 + ("can",) * 30)
     component = installed().find("classifier", "c45")
     learner = SelectedComponent(component, component.config_class()())
     model = calibrated(train(component, learner.config, trials, name="m"), learner, trials, 0)
     write_model(tmp_path / "m.json", model)
-
-    def prediction(**faults):
-        options = (
-            "gripper.type=pr2",
-            "gripper.transport=emulated",
-            f"gripper.body_config.open_gap_m={NEAR['open_gap_m']}",
-            f"gripper.object={gripper_faults.OBJECT}",
-            f"classifier.model={tmp_path / 'm.json'}",
-            *(f"gripper.faults.{key}={value}" for key, value in faults.items()),
-        )
-        return load_pipeline(options=options).grasp().prediction
-
-    sound = prediction()
-    faulty = prediction(pad_fault="numb", pad_side="left", pad_at_s=0.7)
+    options = (
+        f"gripper.body_config.open_gap_m={NEAR['open_gap_m']}",
+        f"gripper.object={gripper_faults.OBJECT}",
+        f"classifier.model={tmp_path / 'm.json'}",
+    )
+    sound = emulated_grasp(*options).prediction
+    faulty = emulated_grasp(*options, pad_fault="numb", pad_side="left", pad_at_s=0.7).prediction
     assert sound.label == faulty.label == "bottle"
     assert sound.certainty > 0.8
     assert sound.prediction_set == ("bottle",)

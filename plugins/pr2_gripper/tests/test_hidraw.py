@@ -40,15 +40,15 @@ def following(backend, machine):
 
 def test_device_says_who_it_is(machine, board):
     machine.plug("/dev/hidraw3", board(effort_limit_un=50_000_000, speed_limit_um_s=100_000))
-    backend = Pr2Backend(Pr2Config())
-    info = backend.open(0)
-    backend.close()
+    with closing(Pr2Backend(Pr2Config())) as backend:
+        info = backend.open(0)
     assert (info.serial, info.firmware, info.clock, info.rate_hz) == ("L7", "1.2.3", "device", 1000.0)
     assert (info.effort_limit_n, info.speed_limit_m_s) == (50.0, 0.1)
     assert any("private tests" in note for note in info.notes)
 
 
 def test_frames_come_and_commands_arrive(opened, machine):
+    assert opened.read(0.01) is None, "silence is no loss yet"
     opening = following(opened, machine)
     assert opening.frame.t_s == 0.0
     assert opening.frame.gap_m == pytest.approx(0.086, abs=1e-6)
@@ -84,32 +84,19 @@ def test_a_stalled_write_is_a_loss_within_a_second(opened, machine, monkeypatch)
     stalled.set()
 
 
-def test_silence_is_no_frame_but_no_loss_yet(opened, machine):
-    assert opened.read(0.01) is None
-    assert following(opened, machine) is not None
-
-
 def test_writes_that_never_arrive_are_noticed_by_their_echo(machine, board):
     """uhid took 200 writes and dropped up to 76 of them in silence."""
-    backend = plugged_in(machine, board(faults=FaultConfig(drop_command=1.0)))
-
-    def commanding():
-        for _ in range(200):
-            following(backend, machine)
-            backend.apply(RELAX)
-
-    with pytest.raises(DeviceLost, match=r"101 .* 0\.1 s"):
-        commanding()
-    backend.close()
+    wire = board(faults=FaultConfig(drop_command=1.0))
+    with closing(plugged_in(machine, wire)) as backend, pytest.raises(DeviceLost, match=r"101 .* 0\.1 s"):
+        [backend.apply(RELAX) for _ in range(200) if following(backend, machine)]
 
 
 def test_a_host_that_stood_still_is_no_loss(machine, board):
     """One command without an echo, and 0.2 s of the device's time until the host reads again."""
-    backend = plugged_in(machine, board(faults=FaultConfig(drop_command=1.0)))
-    following(backend, machine)
-    backend.apply(RELAX)
-    assert all(following(backend, machine) is not None for _ in range(200))
-    backend.close()
+    with closing(plugged_in(machine, board(faults=FaultConfig(drop_command=1.0)))) as backend:
+        following(backend, machine)
+        backend.apply(RELAX)
+        assert all(following(backend, machine) is not None for _ in range(200))
 
 
 def test_closing_tells_the_gripper_to_let_go(machine, board):
@@ -133,8 +120,7 @@ def test_same_gripper_is_found_again_by_its_serial_at_another_path(machine, boar
     # First another gripper appears in its place, then ours elsewhere.
     machine.plug("/dev/hidraw3", board(serial="R2"), "R2")
     machine.appear.append((machine.listings + 4, "/dev/hidraw9", board(), "L7"))
-    info = backend.open(0)
-    assert info.serial == "L7"
+    assert backend.open(0).serial == "L7"
     assert machine.open_handles[0].path == "/dev/hidraw9"
     assert following(backend, machine).frame.t_s == 0.0
     backend.close()
@@ -164,11 +150,9 @@ def test_serial_of_the_usb_string_must_be_the_boards_own(machine, board):
 def test_a_report_that_waited_in_the_device_is_no_loss_of_all_that_came_after(machine, board):
     """An endpoint keeps a report until somebody asks: it may be hours old when the device is opened."""
     wire = board()
-    waiting = wire.step()[0]
+    machine.at_endpoint.append(wire.step()[0])
     for _ in range(500):
         wire.step()
-    machine.at_endpoint.append(waiting)
     with closing(plugged_in(machine, wire)) as backend:
         assert all(following(backend, machine) is not None for _ in range(3))
-        assert backend.report()["lost"] == 0
-        assert backend.report()["reports"] == 3
+        assert (backend.report()["lost"], backend.report()["reports"]) == (0, 3)

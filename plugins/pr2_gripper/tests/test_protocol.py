@@ -100,38 +100,33 @@ def value_at(data, heading, field):
     return values if count else values[0]
 
 
+def assert_placed(data, heading, fields):
+    """Assert that these values lie where the document says, with their checksum behind them."""
+    assert {field: value_at(data, heading, field) for field in fields} == fields
+    assert value_at(data, heading, "crc") == crc32(data[:60])
+
+
 @given(INPUTS)
 def test_input_fields_lie_where_the_document_says(report):
-    data, heading = encode_input(report), INPUT
-    for field in InputReport._fields:
-        if field == "samples":
-            assert value_at(data, heading, "sample_count") == len(report.samples)
-            assert value_at(data, heading, "samples")[: len(report.samples)] == report.samples
-        else:
-            assert value_at(data, heading, field) == getattr(report, field)
-    assert value_at(data, heading, "crc") == crc32(data[:60])
+    data, fields = encode_input(report), report._asdict()
+    samples = fields.pop("samples")
+    assert_placed(data, INPUT, fields | {"sample_count": len(samples)})
+    assert value_at(data, INPUT, "samples")[: len(samples)] == samples
     assert decode_input(data) == report
 
 
 @given(OUTPUTS)
 def test_output_fields_lie_where_the_document_says(report):
-    data, heading = encode_output(report), OUTPUT
-    for field in OutputReport._fields:
-        assert value_at(data, heading, field) == getattr(report, field)
-    assert value_at(data, heading, "crc") == crc32(data[:60])
+    data = encode_output(report)
+    assert_placed(data, OUTPUT, report._asdict())
     assert decode_output(data) == report
 
 
 def test_feature_fields_lie_where_the_document_says(device_identity):
     identity = device_identity()
-    data, heading = encode_identity(identity), FEATURE
-    assert bytes(value_at(data, heading, "magic")) == b"GSPR"
-    assert value_at(data, heading, "protocol") == 1
-    assert value_at(data, heading, "firmware") == (1, 2, 3)
-    assert bytes(value_at(data, heading, "serial")) == b"L7".ljust(16, b"\0")
-    assert value_at(data, heading, "transmission") == 0
-    for field in identity._fields[3:]:
-        assert value_at(data, heading, field) == getattr(identity, field)
+    data = encode_identity(identity)
+    texts = {"magic": tuple(b"GSPR"), "serial": tuple(b"L7".ljust(16, b"\0"))}
+    assert_placed(data, FEATURE, identity._asdict() | texts | {"protocol": 1, "transmission": 0})
     assert decode_identity(data) == identity
 
 
@@ -144,20 +139,16 @@ def test_document_numbers_the_transmissions_as_the_codec_does(name, device_ident
 
 def test_document_numbers_bits_results_and_kinds_as_the_codec_does():
     text = DOCUMENT.read_text()
-    bits = re.search(r"\| status bit .*?\n\n", text, re.S)
-    results = re.search(r"\| command result .*?\n\n", text, re.S)
-    assert bits
-    assert results
-    declared = {name: 1 << int(bit) for bit, name in re.findall(r"\| (\d+) \| (\w+) \|", bits[0])}
+    bits, results = (
+        re.search(rf"\| {what} .*?\n\n", text, re.S)[0] for what in ("status bit", "command result")
+    )
+    declared = {name: 1 << int(bit) for bit, name in re.findall(r"\| (\d+) \| (\w+) \|", bits)}
     assert declared == {name: getattr(protocol, name.upper()) for name in declared}
     assert len(declared) == 6
-    numbers = {name: int(n) for n, name in re.findall(r"\| (\d) \| (\w+) \|", results[0])}
-    assert numbers == {
-        "none": protocol.NO_COMMAND,
-        "accepted": protocol.ACCEPTED,
-        "clamped": protocol.CLAMPED,
-        "refused": protocol.REFUSED,
-    }
+    numbers = [name for _, name in sorted(re.findall(r"\| (\d) \| (\w+) \|", results))]
+    assert numbers == ["none", "accepted", "clamped", "refused"]
+    codes = (protocol.NO_COMMAND, protocol.ACCEPTED, protocol.CLAMPED, protocol.REFUSED)
+    assert codes == (0, 1, 2, 3)
     assert "0 let go, 1 effort" in text
     assert (protocol.RELEASE_KIND, protocol.EFFORT_KIND) == (0, 1)
 
@@ -167,16 +158,11 @@ def test_documents_report_descriptor_is_the_codecs_and_declares_63_byte_reports(
     descriptor = bytes.fromhex("".join(re.findall(r"\b[0-9A-F]{2}\b", block)))
     assert descriptor == protocol.REPORT_DESCRIPTOR
     # Items are a prefix byte (size in its two lowest bits) and their data; 0x94 is the report count, 0x84 the id.
-    items, position = [], 0
-    while position < len(descriptor):
-        size = (0, 1, 2, 4)[descriptor[position] & 3]
-        items.append(
-            (
-                descriptor[position] & 0xFC,
-                int.from_bytes(descriptor[position + 1 : position + 1 + size], "little"),
-            )
-        )
-        position += 1 + size
+    items, left = [], descriptor
+    while left:
+        size = (0, 1, 2, 4)[left[0] & 3]
+        items.append((left[0] & 0xFC, int.from_bytes(left[1 : 1 + size], "little")))
+        left = left[1 + size :]
     assert [data for tag, data in items if tag == 0x84] == [1, 2, 3]
     assert [data for tag, data in items if tag == 0x94] == [63, 63, 63]
     assert items[0] == (0x04, 0xFF00)
@@ -197,39 +183,33 @@ def test_limits_are_rounded_down_and_infinity_is_the_devices_own():
 
 
 @every_case(
-    ("changes", "what"),
+    ("what", "value"),
     [
-        ({"serial": ""}, "serial"),
-        ({"serial": "x" * 17}, "serial"),
-        ({"serial": "é"}, "serial"),
-        ({"transmission": "worm"}, "transmission"),
-        ({"report_rate_hz": 0}, "report_rate_hz"),
-        ({"encoder_ticks_rev": 0}, "encoder_ticks_rev"),
-        ({"pad_counts_per_n": 0}, "pad_counts_per_n"),
+        *(("serial", value) for value in ("", "x" * 17, "é")),
+        ("transmission", "worm"),
+        *((number, 0) for number in ("report_rate_hz", "encoder_ticks_rev", "pad_counts_per_n")),
     ],
 )
-def test_identity_that_means_nothing_is_refused(changes, what, device_identity):
+def test_identity_that_means_nothing_is_refused(what, value, device_identity):
     with pytest.raises(ProtocolError, match=what):
-        encode_identity(device_identity(**changes))
+        encode_identity(device_identity(**{what: value}))
 
 
-def test_another_protocol_says_which(device_identity):
+@every_case(("start", "bad", "said"), [(5, b"\2", "version 2.*version 1"), (1, b"ABCD", "b'ABCD'")])
+def test_another_protocol_says_which(start, bad, said, device_identity):
     body = bytearray(encode_identity(device_identity())[:60])
-    body[5] = 2
-    with pytest.raises(ProtocolError, match=r"version 2.*version 1"):
-        decode_identity(bytes(body) + struct.pack("<I", crc32(body)))
-    body[1:5] = b"ABCD"
-    with pytest.raises(ProtocolError, match="b'ABCD'"):
+    body[start : start + len(bad)] = bad
+    with pytest.raises(ProtocolError, match=said):
         decode_identity(bytes(body) + struct.pack("<I", crc32(body)))
 
 
 def mutated(chance, good):
     kind = chance.randrange(6)
+    data = bytearray(good)
     if kind == 0:
         return chance.randbytes(chance.randrange(130))
     if kind == 1:
         return chance.randbytes(64)
-    data = bytearray(good)
     if kind == 2:
         for _ in range(chance.randrange(1, 9)):
             data[chance.randrange(64)] = chance.randrange(256)
@@ -241,7 +221,7 @@ def mutated(chance, good):
         # Right CRC over nonsense: only the ranges are left to object.
         start = chance.randrange(1, 60)
         data[start:60] = chance.randbytes(60 - start)
-        return bytes(data[:60]) + struct.pack("<I", crc32(data[:60]))
+        data[60:] = struct.pack("<I", crc32(data[:60]))
     return bytes(data)
 
 
@@ -254,9 +234,8 @@ def test_random_and_mutated_reports_are_refused_unless_they_are_whole(count, see
         decode_output: encode_output(OutputReport(3, 1, -20_000_000, 100, 200)),
         decode_identity: encode_identity(device_identity()),
     }
-    decoders = list(good)
     for _ in range(count):
-        decode = decoders[chance.randrange(3)]
+        decode = chance.choice(list(good))
         data = mutated(chance, good[decode])
         try:
             decode(data)

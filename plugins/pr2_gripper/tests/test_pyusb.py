@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import array
 import errno
-import math
+import struct
 import threading
 from collections import deque
 from types import SimpleNamespace
@@ -19,18 +19,33 @@ import usb.backend.libusb1
 import usb.core
 
 from graspsense.plugin_api import EFFORT, Command, DeviceLost, NoDevice, PluginUnavailable
-from graspsense_pr2_gripper import device_time, link
 from graspsense_pr2_gripper.backend import Pr2Backend
 from graspsense_pr2_gripper.config import Pr2Config
+from graspsense_pr2_gripper.emulator.port import Plug
+from graspsense_pr2_gripper.emulator.usb_device import UsbDevice
 
-SERIAL_STRING = 3
+DEVICE = """bLength bDescriptorType bcdUSB bDeviceClass bDeviceSubClass bDeviceProtocol bMaxPacketSize0 idVendor
+idProduct bcdDevice iManufacturer iProduct iSerialNumber bNumConfigurations"""
+CONFIGURATION = """bLength bDescriptorType wTotalLength bNumInterfaces bConfigurationValue iConfiguration bmAttributes
+bMaxPower"""
+INTERFACE = """bLength bDescriptorType bInterfaceNumber bAlternateSetting bNumEndpoints bInterfaceClass
+bInterfaceSubClass bInterfaceProtocol iInterface"""
+
+
+def described(names, layout, data, start=0, **more):
+    """Return the fields of a descriptor under the names of the USB specification."""
+    fields = zip(names.split(), struct.unpack_from(layout, data, start), strict=True)
+    return SimpleNamespace(**dict(fields), extra_descriptors=[], **more)
 
 
 class Libusb(usb.backend.IBackend):
     """One board on a USB port. `usbhid` has claimed it, as the kernel does with every HID device."""
 
-    def __init__(self, wire, serial="L7"):
-        self.wire, self.serial = wire, serial
+    def __init__(self, wire):
+        self.wire = wire
+        board = SimpleNamespace(output=wire.output, feature=lambda report_id: wire.firmware.feature())
+        self.usb = UsbDevice(board, Plug(0x1209, 1, "L7", "a gripper"))
+        self.about, self.configuration = (self._asked(0x80, 6, kind << 8, 0, 255) for kind in (1, 2))
         self.plugged, self.stalled, self.naks = True, False, False
         self.driver_active, self.claimed, self.resets, self.reattached = True, False, 0, False
         self.reports: deque[bytes] = deque()
@@ -46,32 +61,29 @@ class Libusb(usb.backend.IBackend):
         if not self.plugged:
             raise usb.core.USBError("No such device (it may have been disconnected)", -4, errno.ENODEV)
 
+    def _asked(self, *setup):
+        answer = self.usb.control(struct.pack("<BBHHH", *setup), b"")
+        if answer is None:
+            raise usb.core.USBError("Pipe error", -9, errno.EPIPE)
+        return answer
+
     def enumerate_devices(self):
         return iter(["port"] if self.plugged else [])
 
     def get_device_descriptor(self, dev):
-        return SimpleNamespace(
-            bLength=18, bDescriptorType=1, bcdUSB=0x200, bDeviceClass=0, bDeviceSubClass=0, bDeviceProtocol=0,
-            bMaxPacketSize0=64, idVendor=0x1209, idProduct=1, bcdDevice=0x100, iManufacturer=1, iProduct=2,
-            iSerialNumber=SERIAL_STRING, bNumConfigurations=1, address=5, bus=1, port_number=1,
-            port_numbers=(1,), speed=2,
-        )  # fmt: skip
+        place = {"address": 5, "bus": 1, "port_number": 1, "port_numbers": (1,), "speed": 2}
+        return described(DEVICE, "<BBHBBBBHHHBBBB", self.about, **place)
 
     def get_configuration_descriptor(self, dev, config):
-        return SimpleNamespace(
-            bLength=9, bDescriptorType=2, wTotalLength=41, bNumInterfaces=1, bConfigurationValue=1,
-            iConfiguration=0, bmAttributes=0x80, bMaxPower=50, extra_descriptors=[],
-        )  # fmt: skip
+        return described(CONFIGURATION, "<BBHBBBBB", self.configuration)
 
     def get_interface_descriptor(self, dev, intf, alt, config):
         if intf or alt:
             raise IndexError
-        return SimpleNamespace(
-            bLength=9, bDescriptorType=4, bInterfaceNumber=0, bAlternateSetting=0, bNumEndpoints=2,
-            bInterfaceClass=3, bInterfaceSubClass=0, bInterfaceProtocol=0, iInterface=0, extra_descriptors=[],
-        )  # fmt: skip
+        return described(INTERFACE, "<9B", self.configuration, 9)
 
     def get_endpoint_descriptor(self, dev, ep, intf, alt, config):
+        # Other addresses than those of the emulated board.
         return SimpleNamespace(
             bLength=7, bDescriptorType=5, bEndpointAddress=(0x83, 0x04)[ep], bmAttributes=3, wMaxPacketSize=64,
             bInterval=1, bRefresh=0, bSynchAddress=0, extra_descriptors=[],
@@ -142,25 +154,15 @@ class Libusb(usb.backend.IBackend):
 
     def ctrl_transfer(self, handle, kind, request, value, index, data, timeout):
         self._there()
-        if (kind, request) == (0xA1, 1) and value == 0x0303:
-            answer = self.wire.firmware.feature()
-        elif (kind, request) == (0x80, 6) and value >> 8 == 3:
-            raw = b"\x09\x04" if value & 255 == 0 else self.serial.encode("utf-16le")
-            answer = bytes([2 + len(raw), 3]) + raw
-        else:
-            raise usb.core.USBError("Pipe error", -9, errno.EPIPE)
+        answer = self._asked(kind, request, value, index, len(data))
         data[: len(answer)] = array.array("B", answer)
         return len(answer)
 
 
 @pytest.fixture
-def port(monkeypatch, board):
+def port(monkeypatch, board, time_stands_still):
     backend = Libusb(board())
     monkeypatch.setattr(usb.backend.libusb1, "get_backend", lambda *a, **k: backend)
-    # Its time stands still between two ticks, so on a machine that is busy every report looks old, and many ticks at
-    # once look like a clock that jumps.
-    monkeypatch.setattr(link, "OLDEST_S", math.inf)
-    monkeypatch.setattr(device_time, "AHEAD_S", math.inf)
     return backend
 
 
@@ -185,11 +187,9 @@ def test_device_is_taken_from_the_kernel_and_given_back(port):
     backend = Pr2Backend(Pr2Config(transport="pyusb", serial="L7"))
     info = backend.open(0)
     assert (info.serial, info.clock) == ("L7", "device")
-    assert port.claimed
-    assert not port.driver_active
+    assert (port.claimed, port.driver_active) == (True, False)
     backend.close()
-    assert not port.claimed
-    assert port.reattached
+    assert (port.claimed, port.reattached) == (False, True)
     assert port.resets == 0, "a reset enumerates the device anew"
 
 

@@ -4,6 +4,7 @@ import sys
 from types import ModuleType
 
 import pytest
+from cases import every_case
 
 from graspsense.plugin_api import DeviceLost, NoDevice, PluginUnavailable
 from graspsense_pr2_gripper.backend import Pr2Backend
@@ -14,43 +15,32 @@ from graspsense_pr2_gripper.discovery import LIBRARY, found_devices, search
 NOBODYS = Pr2Config(vendor_id=0x1209, product_id=0xFFFF)
 
 
-def listing(*devices):
-    """The library at its outermost edge: a listing in the form that hidapi 0.15 gives."""
-    module = ModuleType(LIBRARY)
-    module.enumerate = lambda: list(devices)
-    return module
-
-
-def device(vendor_id, product_id, serial, path):
-    return {"vendor_id": vendor_id, "product_id": product_id, "serial_number": serial, "path": path.encode()}
-
-
 @pytest.fixture
 def two_grippers_and_a_mouse(monkeypatch):
-    listed = listing(
-        device(0x1209, 0x0001, "L7", "/dev/hidraw0"),
-        device(0x046D, 0xC077, "", "/dev/hidraw1"),
-        device(0x1209, 0x0001, "R2", "/dev/hidraw2"),
-    )
-    monkeypatch.setitem(sys.modules, LIBRARY, listed)
+    """The library at its outermost edge: a listing in the form that hidapi 0.15 gives."""
+    plugged = ((0x1209, 0x0001, "L7"), (0x046D, 0xC077, ""), (0x1209, 0x0001, "R2"))
+    listed = [
+        {"vendor_id": vendor, "product_id": product, "serial_number": serial, "path": b"/dev/hidraw%d" % i}
+        for i, (vendor, product, serial) in enumerate(plugged)
+    ]
+    module = ModuleType(LIBRARY)
+    module.enumerate = lambda: listed
+    monkeypatch.setitem(sys.modules, LIBRARY, module)
 
 
 def test_absent_device_says_what_was_looked_for_and_what_to_try():
     with pytest.raises(NoDevice) as caught:
         Pr2Backend(NOBODYS).open(seed=0)
-    said = str(caught.value)
     assert caught.value.exit_code == 3
-    assert "USB HID device 1209:ffff" in said
-    assert f"module {LIBRARY}" in said
-    assert "graspsense devices" in said
-    assert "--gripper sim" in said
+    for said in ("USB HID device 1209:ffff", f"module {LIBRARY}", "graspsense devices", "--gripper sim"):
+        assert said in str(caught.value)
 
 
 @pytest.mark.usefixtures("two_grippers_and_a_mouse")
 def test_device_is_known_by_its_numbers_and_serial():
-    assert [node.path for node in search(Pr2Config()).matching] == ["/dev/hidraw0", "/dev/hidraw2"]
-    assert [node.path for node in search(Pr2Config(serial="R2")).matching] == ["/dev/hidraw2"]
-    assert search(Pr2Config(serial="X")).matching == ()
+    matching = {serial: search(Pr2Config(serial=serial)).matching for serial in ("", "R2", "X")}
+    paths = {serial: [node.path for node in nodes] for serial, nodes in matching.items()}
+    assert paths == {"": ["/dev/hidraw0", "/dev/hidraw2"], "R2": ["/dev/hidraw2"], "X": []}
     assert search(Pr2Config()).total == 3
 
 
@@ -81,7 +71,7 @@ def test_nothing_moves_before_it_is_open():
         backend.read(timeout_s=0.1)
 
 
-@pytest.mark.parametrize("number", [-1, 0x10000])
+@every_case("number", [-1, 0x10000])
 def test_ids_are_sixteen_bits(number):
     with pytest.raises(ValueError):
         Pr2Config(vendor_id=number)

@@ -52,37 +52,35 @@ NOISE_OF_SUM = 6.0 * NOISE_COUNTS * CELLS**0.5
 REST = EmulatedFingertips(lambda: (0.0, 0.0)).rest
 
 
-@given(
-    st.lists(CELL, min_size=CELLS, max_size=CELLS),
-    st.integers(-32768, 32767),
-    st.integers(0, 2**64 - 1),
-    st.integers(0, 1),
+FINGER = st.integers(0, 1)
+FIELDS = st.tuples(
+    st.builds(Field, st.just(TIMESTAMP), FINGER, st.tuples(st.integers(0, 2**64 - 1))),
+    st.builds(Field, st.just(PRESSURE), FINGER, st.lists(CELL, min_size=CELLS, max_size=CELLS).map(tuple)),
+    st.builds(Field, st.just(DYNAMIC), FINGER, st.tuples(st.integers(-32768, 32767))),
 )
-def test_what_is_encoded_is_decoded(cells, change, stamp, finger):
-    fields = [
-        Field(TIMESTAMP, finger, (stamp,)),
-        Field(PRESSURE, finger, tuple(cells)),
-        Field(DYNAMIC, finger, (change,)),
-    ]
+
+
+@given(FIELDS.map(list))
+def test_what_is_encoded_is_decoded(fields):
     [(command, data)] = Packets().fed(encoded(fields))
-    assert command == READ
-    assert decoded(data) == fields
+    assert (command, decoded(data)) == (READ, fields)
 
 
 @given(st.binary(max_size=300), st.integers(1, 40))
 def test_any_bytes_in_any_pieces_are_taken(data, size):
-    whole, pieces = Packets(), Packets()
-    expected = whole.fed(data)
-    assert [
-        packet for start in range(0, len(data), size) for packet in pieces.fed(data[start : start + size])
-    ] == expected
+    expected, pieces = Packets().fed(data), Packets()
+    given_pieces = (data[start : start + size] for start in range(0, len(data), size))
+    assert [packet for piece in given_pieces for packet in pieces.fed(piece)] == expected
     for _, fields in expected:
         decoded(fields)
 
 
 def test_a_field_that_is_cut_or_unknown_makes_a_packet_damaged():
-    assert decoded(bytes((PRESSURE,)) + bytes(2 * CELLS - 1)) is None
-    assert decoded(b"\x00\x00") is None
+    assert decoded(bytes((PRESSURE,)) + bytes(2 * CELLS - 1)) is decoded(b"\x00\x00") is None
+    boards = FedBoard(), FedBoard()
+    for board in boards:
+        board.stream.fed(packet(READ, b"\x00"), 1.0)
+    assert TactileFingertips(boards).report()["tactile_damaged"] == 2, "those of both boards count"
 
 
 @pytest.fixture
@@ -107,10 +105,8 @@ def test_every_period_has_one_packet_and_images_come_at_60_hz(clock):
     # A packet each millisecond: the image of 16.7 ms is in that of 17 ms.
     assert 58 <= len(images) / 2 <= 61
     for image in images:
-        force_n = (2.0, 4.0)[image.finger]
-        assert sum(image.values) - sum(tips.rest[image.finger]) == pytest.approx(
-            force_n * COUNTS_PER_N, abs=NOISE_OF_SUM
-        )
+        counts = (2.0, 4.0)[image.finger] * COUNTS_PER_N
+        assert sum(image.values) - sum(tips.rest[image.finger]) == pytest.approx(counts, abs=NOISE_OF_SUM)
 
 
 def test_they_are_silent_until_asked_and_after_a_period_of_zero(clock):
@@ -125,11 +121,22 @@ def test_they_are_silent_until_asked_and_after_a_period_of_zero(clock):
 
 
 @pytest.fixture
-def port():
-    tips = EmulatedFingertips(lambda: (2.0, 4.0))
-    port = EmulatedPort("pty", tips.heard, tips.unasked, 0.001)
-    yield port
-    port.close()
+def ports():
+    """Makes the ports of so many boards, with 2 N on the left finger and 4 N on the right."""
+    made = []
+
+    def make(count):
+        boards = (
+            emulated_boards(count, lambda: (2.0, 4.0))
+            if count > 1
+            else [EmulatedFingertips(lambda: (2.0, 4.0))]
+        )
+        made.extend(EmulatedPort("pty", board.heard, board.unasked, 0.001) for board in boards)
+        return [port.where for port in made], boards
+
+    yield make
+    for port in made:
+        port.close()
 
 
 def taken_images(driver, count):
@@ -152,51 +159,43 @@ def assert_images_of_both(taken, rests):
             assert sum(cells) - sum(zeros) == pytest.approx(counts, abs=NOISE_OF_SUM)
 
 
-def test_the_driver_reads_images_in_a_thread_with_their_age(port):
-    driver = TactileFingertips(opened_boards([port.where]))
-    images = taken_images(driver, 5)
-    driver.close()
-    assert_images_of_both(images, REST)
-    report = driver.report()
-    assert report["tactile_channels"].split()[:3] == ["pads", "force_left", "force_right"]
-    assert report["tactile_latency_s"] >= 0.0
-    assert report["tactile_damaged"] == 0
-    taken = [signals[0].counter for _, signals in images]
-    assert taken == sorted(set(taken))
+ONE_BOARD = {"tactile_channels": "pads force_left force_right"}
+TWO_BOARDS = {
+    "tactile_left_channels": "force_left dynamic_left acceleration_left rotation_left",
+    "tactile_right_channels": "force_right dynamic_right acceleration_right rotation_right",
+    "pads_channels": "pads",
+}
 
 
-@pytest.fixture
-def ports():
-    """The ports of two boards."""
-    boards = emulated_boards(2, lambda: (2.0, 4.0))
-    ports = [EmulatedPort("pty", board.heard, board.unasked, 0.001) for board in boards]
-    yield ports, boards
-    for port in ports:
-        port.close()
-
-
-def test_two_boards_give_one_image_and_each_its_clock(ports):
-    ports, boards = ports
-    driver = TactileFingertips(opened_boards([port.where for port in ports]))
+@pytest.mark.parametrize(("count", "channels"), [(1, ONE_BOARD), (2, TWO_BOARDS)])
+def test_the_driver_reads_images_in_a_thread_with_their_age_and_each_board_has_its_clock(
+    ports, count, channels
+):
+    places, boards = ports(count)
+    driver = TactileFingertips(opened_boards(places))
     taken = taken_images(driver, 5)
     driver.close()
-    assert_images_of_both(taken, [board.rest[board.fingers[0]] for board in boards])
+    assert_images_of_both(taken, REST if count == 1 else [board.rest[board.fingers[0]] for board in boards])
     report = driver.report()
-    assert {key: value for key, value in report.items() if key.endswith("_channels")} == {
-        "tactile_left_channels": "force_left dynamic_left acceleration_left rotation_left",
-        "tactile_right_channels": "force_right dynamic_right acceleration_right rotation_right",
-        "pads_channels": "pads",
-    }
-    sides_s = max(report[f"tactile_{side}_uncertainty_s"] for side in ("left", "right"))
-    assert report["pads_uncertainty_s"] >= sides_s
+    told = {key: value for key, value in report.items() if key.endswith("_channels")}
+    assert told.keys() == channels.keys()
+    assert all(told[key].startswith(channels[key]) for key in channels)
     assert report["tactile_damaged"] == 0
+    if count == 1:
+        assert report["tactile_latency_s"] >= 0.0
+        counters = [signals[0].counter for _, signals in taken]
+        assert counters == sorted(set(counters))
+    else:
+        sides_s = max(report[f"tactile_{side}_uncertainty_s"] for side in ("left", "right"))
+        assert report["pads_uncertainty_s"] >= sides_s
 
 
-def test_of_two_boards_that_are_not_both_there_none_is_kept(port):
+def test_of_two_boards_that_are_not_both_there_none_is_kept(ports):
+    [where], _ = ports(1)
     with pytest.raises(OSError, match="nowhere"):
-        opened_boards([port.where, "/dev/nowhere"])
+        opened_boards([where, "/dev/nowhere"])
     # The port is exclusive.
-    [board] = opened_boards([port.where])
+    [board] = opened_boards([where])
     board.close()
 
 
@@ -260,23 +259,18 @@ def test_an_image_of_two_boards_has_the_time_of_the_older_half_and_tells_how_far
 
 def test_what_else_than_its_only_fingertip_a_board_sends_is_not_taken():
     stream = TactileStream(1)
-    for number, value in ((1, 7), (0, 9), (1, 8)):
-        data = stream.fed(
-            encoded([Field(DYNAMIC, number, (value,)), Field(PRESSURE, number, (value,) * CELLS)]), 1.0
-        )
-        if number == 0:
-            assert data is None
-        else:
-            assert data.image.cells == ((value,) * CELLS,)
-            assert data.rows[0] == ((value,),)
+
+    def sent(number, value):
+        fields = [Field(DYNAMIC, number, (value,)), Field(PRESSURE, number, (value,) * CELLS)]
+        return stream.fed(encoded(fields), 1.0)
+
+    of_first, of_other, data = sent(1, 7), sent(0, 9), sent(1, 8)
+    assert of_other is None
+    assert [(taken.image.cells[0][0], taken.rows[0]) for taken in (of_first, data)] == [
+        (7, ((7,),)),
+        (8, ((8,),)),
+    ]
     assert data.taken == 2
-
-
-def test_damaged_packets_of_both_boards_count():
-    boards = FedBoard(), FedBoard()
-    for board in boards:
-        board.stream.fed(packet(READ, b"\x00"), 1.0)
-    assert TactileFingertips(boards).report()["tactile_damaged"] == 2
 
 
 @pytest.mark.slow
@@ -347,7 +341,9 @@ def test_what_a_host_reads_late_is_not_lost():
     assert received == b"".join(chunks)
 
 
-def test_fingertips_that_are_unplugged_are_told(port):
+def test_fingertips_that_are_unplugged_are_told():
+    tips = EmulatedFingertips(lambda: (2.0, 4.0))
+    port = EmulatedPort("pty", tips.heard, tips.unasked, 0.001)
     driver = TactileBoard(port.where, 2)
     assert driver.newest(PATIENT_S) is not None
     port.close()
@@ -363,54 +359,47 @@ def test_the_forces_are_zero_after_a_tare_and_rise_on_contact(where):
     images = {}
     while len(images) < info.tare_images:
         pads = gripper.read(1.0).pads
-        if pads.counter:
-            images[pads.counter] = pads
+        images |= {pads.counter: pads} if pads.counter else {}
     gripper.tare(list(images.values()))
-    frame = gripper.read(1.0).frame
-    assert abs(frame.force_left_n) < 0.5
-    assert abs(frame.force_right_n) < 0.5
+    forces = felt(gripper)
+    assert max(map(abs, forces)) < 0.5
     for _ in range(2000):
-        gripper.apply(Command(POSITION, 0.0, 25.0, 0.03))
-        frame = gripper.read(1.0).frame
-        if min(frame.force_left_n, frame.force_right_n) > 3.0:
+        if min(forces) > 3.0:
             break
+        gripper.apply(Command(POSITION, 0.0, 25.0, 0.03))
+        forces = felt(gripper)
     gripper.close()
-    assert min(frame.force_left_n, frame.force_right_n) > 3.0
+    assert min(forces) > 3.0
+
+
+def felt(gripper):
+    frame = gripper.read(1.0).frame
+    return frame.force_left_n, frame.force_right_n
 
 
 @pytest.mark.parametrize("where", ["emulated", "emulated,emulated"])
 def test_each_packet_of_a_millisecond_is_a_sample_of_every_fast_channel(where):
     gripper = create("sensor-backend", "robotiq", port="emulated", tactile_port=where)
     gripper.open(1)
-    readings = [gripper.read(1.0) for _ in range(200)]
+    readings = [gripper.read(1.0).signals for _ in range(200)]
     gripper.close()
-    last = readings[-1]
-    assert last.signals._fields == (
-        "dynamic_left",
-        "dynamic_right",
-        "acceleration_left",
-        "acceleration_right",
-        "rotation_left",
-        "rotation_right",
-    )
-    for samples in zip(*(reading.signals for reading in readings), strict=True):
+    kinds = ("dynamic", "acceleration", "rotation")
+    assert readings[-1]._fields == tuple(f"{kind}_{side}" for kind in kinds for side in ("left", "right"))
+    for samples in zip(*readings, strict=True):
         # 10 ms a frame: none twice, none lost.
         assert {sample.new for sample in samples[1:]} == {10}
         assert {now.counter - earlier.counter for earlier, now in pairwise(samples)} == {10}
-    assert set(last.signals.acceleration_left.values[:10]) == {(0.0, 0.0, 16384.0)}
+    assert set(readings[-1].acceleration_left.values[:10]) == {(0.0, 0.0, 16384.0)}
 
 
 def test_what_was_not_asked_for_in_time_is_kept_up_to_three_frames():
     stream = TactileStream()
-    fields = [Field(DYNAMIC, finger, (7,)) for finger in (0, 1)]
-    data = stream.fed(encoded(fields) * 20, 1.0)
-    more = joined(data, stream.fed(encoded(fields) * 20, 1.02))
+    sent = encoded([Field(DYNAMIC, finger, (7,)) for finger in (0, 1)]) * 20
+    more = joined(stream.fed(sent, 1.0), stream.fed(sent, 1.02))
     assert more.taken == 40
-    samples = more.signals(0.0)[0]
-    assert (samples.counter, samples.new) == (40, 30)
-    # Nothing new: the counter stays.
-    samples = more.nothing_new().signals(0.0)[0]
-    assert (samples.counter, samples.new) == (40, 0)
+    # When nothing new has come, the counter stays.
+    samples = [data.signals(0.0)[0] for data in (more, more.nothing_new())]
+    assert [(sample.counter, sample.new) for sample in samples] == [(40, 30), (40, 0)]
 
 
 @pytest.mark.slow

@@ -1,8 +1,9 @@
 """The driver against the emulated gripper, over every connection."""
 
 import asyncio
+import struct
 import threading
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 
 import numpy as np
 import pytest
@@ -32,6 +33,8 @@ from graspsense_robotiq_2f.link import ModbusLink
 from graspsense_robotiq_2f.registers import INPUT, MODELS, OUTPUT, byte_of
 from graspsense_robotiq_2f.ur_cap import opened_link
 
+CLOSING = Command(VELOCITY, -0.03, 25.0, 0.15)
+
 
 @pytest.fixture
 def own_time(monkeypatch):
@@ -59,16 +62,25 @@ def test_conformance(check):
 
 
 @pytest.mark.usefixtures("own_time")
-@pytest.mark.parametrize("wire", ["pty", pytest.param("socket", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "wire", ["pty", *(pytest.param(wire, marks=pytest.mark.slow) for wire in ("socket", "ur"))]
+)
 def test_a_grasp_over_every_wire(emulated, wire):
+    """A UR cap has no effort, so that only the features that need none are taken."""
     gripper = emulated(wire)
     options = [f"gripper.port={gripper.where}", f"gripper.reply_timeout_s={PATIENT_S}"]
+    if wire == "ur":
+        assert gripper.where.startswith("ur:127.0.0.1:")
+        with pytest.raises(WiringError, match="effort"):
+            load_pipeline("robotiq", options=options)
+        options.append("features.type=width-and-time")
     trial = load_pipeline("robotiq", options=options).grasp()
 
     assert trial.outcome.words == "steady", trial.reason
     assert not trial.features.reasons
     # The fingers are 85 mm apart, and the block of the simulator is narrower.
     assert 0.05 < trial.features["p_steady"] <= trial.features["p_first"] < 0.08
+    assert np.isnan(trial.trace.effort_n).all() == (wire == "ur")
     assert gripper.state()["gap_m"] > 0.08
     assert not gripper.state()["going"]
 
@@ -77,49 +89,42 @@ def test_a_grasp_over_every_wire(emulated, wire):
     "model", [pytest.param(model, marks=() if model == "2f-85" else pytest.mark.slow) for model in MODELS]
 )
 def test_every_model_closes_with_its_own_limits(model):
+    speeds_m_s, forces_n = MODELS[model].speeds_m_s, MODELS[model].forces_n
     gripper = create("sensor-backend", "robotiq", model=model, port="emulated")
     info = gripper.open(1)
-    frames = []
-    for _ in range(400):
-        frames.append(gripper.read(0.1).frame)
-        gripper.apply(Command(POSITION, 0.0, 20.0, 0.03))
+    frames = driven(gripper, Command(POSITION, 0.0, 20.0, 0.03), 400)
     gripper.close()
 
-    assert (info.speed_limit_m_s, info.effort_limit_n) == (
-        MODELS[model].speeds_m_s[1],
-        MODELS[model].forces_n[1],
-    )
-    assert gripper.least_force_n == MODELS[model].forces_n[0]
+    assert (info.speed_limit_m_s, info.effort_limit_n) == (speeds_m_s[1], forces_n[1])
+    assert gripper.least_force_n == forces_n[0]
     # A gripper that is told to stop still has a target.
-    assert byte_of(info.relaxed.effort_limit_n, MODELS[model].forces_n) == 0
-    assert frames[0].gap_m - frames[-1].gap_m > 0.01
-    assert frames[-1].gap_m > 0.005, "it holds the thing"
+    assert byte_of(info.relaxed.effort_limit_n, forces_n) == 0
+    assert 0.005 < frames[-1].gap_m < frames[0].gap_m - 0.01, "it holds the thing"
     # A step of the current is 10 mA, 1.5 N.
     assert max(frame.effort_n for frame in frames) <= 20.0 + 1.5
     assert gripper.report()["true_peak_force_n"] < 40.0
+
+
+def opened(gripper):
+    """Return an open driver of this emulated gripper."""
+    driver = create("sensor-backend", "robotiq", port=gripper.where, reply_timeout_s=PATIENT_S)
+    driver.open(1)
+    return driver
+
+
+def driven(driver, command, ticks):
+    """Return the frames of so many ticks, each answered by this command."""
+    frames = []
+    for _ in range(ticks):
+        frames.append(driver.read(0.1).frame)
+        driver.apply(command)
+    return frames
 
 
 @every_case("at_s", [0.22, 0.7, 2.2])
 @every_case("fault", ["unplug", "silent"])
 def test_a_gripper_lost_in_a_grasp_ends_it_and_is_told(fault, at_s):
     assert_lost_in_a_grasp("robotiq", fault, at_s, "gripper.reply_timeout_s=0.5")
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("own_time")
-def test_a_grasp_through_a_ur_cap_has_no_effort_and_the_features_that_need_none(emulated):
-    gripper = emulated("ur")
-    assert gripper.where.startswith("ur:127.0.0.1:")
-    options = [f"gripper.port={gripper.where}", f"gripper.reply_timeout_s={PATIENT_S}"]
-    with pytest.raises(WiringError, match="effort"):
-        load_pipeline("robotiq", options=options)
-    trial = load_pipeline("robotiq", options=[*options, "features.type=width-and-time"]).grasp()
-
-    assert trial.outcome.words == "steady", trial.reason
-    assert not trial.features.reasons
-    assert 0.05 < trial.features["p_steady"] <= trial.features["p_first"] < 0.08
-    assert np.isnan(trial.trace.effort_n).all()
-    assert not gripper.state()["going"]
 
 
 def test_a_ur_cap_takes_all_bytes_and_answers_each_line(emulated):
@@ -137,24 +142,17 @@ def test_a_ur_cap_takes_all_bytes_and_answers_each_line(emulated):
 def test_whatever_becomes_of_replies_the_fingers_are_told_to_stop(emulated, wire, mood):
     """The gripper still hears: what it is told last is to stop."""
     gripper = emulated(wire, faults=SerialFaults(late_s=0.01))
-    driver = create("sensor-backend", "robotiq", port=gripper.where, reply_timeout_s=PATIENT_S)
-    driver.open(1)
-    for _ in range(20):
-        driver.read(0.1)
-        driver.apply(Command(VELOCITY, -0.03, 25.0, 0.15))
+    driver = opened(gripper)
+    driven(driver, CLOSING, 20)
     assert gripper.state()["going"]
     gripper.tell(mood)
-    if mood in ("damaged", "silent"):
+    lost = mood in ("damaged", "silent")
+    if lost:
         # No valid reply comes any more, so it need not be waited for.
         driver._link.close()
         driver._link = opened_link(gripper.where, driver.config.address, 0.02)
-    try:
-        for _ in range(4):
-            driver.read(0.1)
-    except DeviceLost:
-        assert mood in ("damaged", "silent")
-    else:
-        assert mood in ("late", "repeated")
+    with pytest.raises(DeviceLost) if lost else nullcontext():
+        [driver.read(0.1) for _ in range(4)]
     driver.close()
     assert not gripper.state()["going"]
 
@@ -164,11 +162,8 @@ def test_whatever_becomes_of_replies_the_fingers_are_told_to_stop(emulated, wire
 def test_fingers_that_open_slowly_begin_at_once(emulated):
     """The target of a slow closing is up to 4 mm ahead, within the object."""
     gripper = emulated()
-    driver = create("sensor-backend", "robotiq", port=gripper.where, reply_timeout_s=PATIENT_S)
-    driver.open(1)
-    for _ in range(400):
-        frame = driver.read(0.1).frame
-        driver.apply(Command(VELOCITY, -0.01, 25.0, 0.15))
+    driver = opened(gripper)
+    frame = driven(driver, Command(VELOCITY, -0.01, 25.0, 0.15), 400)[-1]
     driver.read(0.1)
     driver.apply(Command(POSITION, 0.085, 25.0, 0.01))
     driver.read(0.1)
@@ -178,14 +173,10 @@ def test_fingers_that_open_slowly_begin_at_once(emulated):
 
 def test_requests_that_come_together_are_all_answered(emulated):
     hand = emulated()._hand
-    asks = [
-        bytes([9, 23, *INPUT.to_bytes(2, "big"), 0, 3, *OUTPUT.to_bytes(2, "big"), 0, 1, 2, 9, go])
-        for go in (0, 8)
-    ]
+    asks = [struct.pack(">BBHHHHBBB", 9, 23, INPUT, 3, OUTPUT, 1, 2, 9, go) for go in (0, 8)]
     together = b"".join(ask + checksum(ask) for ask in asks)
     replies, left = answered(hand, 9, together + asks[0][:5], 1.0)
-    assert len(replies) == 2 * 11
-    assert left == asks[0][:5]
+    assert (len(replies), left) == (2 * 11, asks[0][:5])
 
 
 class OneBehind:
@@ -213,10 +204,8 @@ def test_a_late_reply_is_not_taken_for_that_to_the_stop(emulated):
 
 def closing(gripper):
     """Return an open driver that closes this gripper."""
-    driver = create("sensor-backend", "robotiq", port=gripper.where, reply_timeout_s=PATIENT_S)
-    driver.open(1)
-    driver.read(0.1)
-    driver.apply(Command(VELOCITY, -0.03, 25.0, 0.15))
+    driver = opened(gripper)
+    driven(driver, CLOSING, 1)
     driver.read(0.1)
     assert gripper.state()["going"]
     return driver
@@ -288,39 +277,32 @@ def test_a_late_reply_is_not_taken_for_that_of_the_next_request(emulated):
 @pytest.mark.usefixtures("own_time")
 def test_an_active_gripper_is_not_activated_again(emulated):
     """Activation runs the fingers over the whole stroke, and would drop what they hold."""
-    gripper = emulated()
+    gripper, activated = emulated(), set()
     for _ in range(2):
-        driver = create("sensor-backend", "robotiq", port=gripper.where, reply_timeout_s=PATIENT_S)
-        driver.open(1)
-        driver.close()
-        activated = gripper._hand.active_since_s
-    driver.open(1)
-    assert gripper._hand.active_since_s == activated
-    driver.close()
+        opened(gripper).close()
+        activated.add(gripper._hand.active_since_s)
+    assert len(activated) == 1
 
 
 def test_a_slow_velocity_is_a_target_that_moves():
     gripper = create("sensor-backend", "robotiq", port="emulated")
     gripper.open(0)
-    frames = []
-    for _ in range(200):
-        frames.append(gripper.read(0.1).frame)
-        gripper.apply(Command(VELOCITY, -0.01, 25.0, 0.15))
+    frames = driven(gripper, Command(VELOCITY, -0.01, 25.0, 0.15), 200)
     gripper.close()
-
     moved, seconds = frames[60].gap_m - frames[-1].gap_m, frames[-1].t_s - frames[60].t_s
     assert 0.006 < moved / seconds <= 0.0115
 
 
-@every_case(
-    "port", ["/dev/nowhere", "socket:127.0.0.1:1", "socket:nonsense", "ur:127.0.0.1:1", "ur:127.0.0.1:x"]
-)
+PORTS = ("/dev/nowhere", "socket:127.0.0.1:1", "socket:nonsense", "ur:127.0.0.1:1", "ur:127.0.0.1:x")
+
+
+@every_case("port", PORTS)
 def test_no_gripper_is_said_with_what_to_look_at(port):
     with pytest.raises(NoDevice, match=r"2F-85.*gripper\.port"):
         create("sensor-backend", "robotiq", port=port).open(0)
 
 
-@pytest.mark.parametrize("setting", ["controller.approach_force_n=5", "run.first_effort_n=12"])
+@every_case("setting", ["controller.approach_force_n=5", "run.first_effort_n=12"])
 def test_less_than_the_least_force_is_refused_before_anything_moves(setting):
     with pytest.raises(WiringError, match="20 N"):
         load_pipeline("robotiq", options=["gripper.port=/dev/nowhere", setting])
@@ -328,11 +310,11 @@ def test_less_than_the_least_force_is_refused_before_anything_moves(setting):
 
 def test_doctor_tells_a_gripper_from_a_silent_port_and_from_none(emulated):
     gripper = emulated()
-    states = {}
-    for port, address in ((gripper.where, 9), (gripper.where, 8), ("/dev/nowhere", 9)):
-        config = RobotiqConfig(port=port, address=address)
-        states[port, address] = next(iter(diagnose(config, 1.0))).state
-    assert list(states.values()) == ["ok", "problem", "problem"]
+    configs = [
+        RobotiqConfig(port=port, address=address)
+        for port, address in ((gripper.where, 9), (gripper.where, 8), ("/dev/nowhere", 9))
+    ]
+    assert [next(iter(diagnose(config, 1.0))).state for config in configs] == ["ok", "problem", "problem"]
     assert not gripper.state()["going"]
 
 
@@ -374,18 +356,14 @@ def test_the_simulator_server_of_pymodbus_takes_the_driver(pymodbus_server):
         driver.apply(Command(POSITION, 0.04, 100.0, 0.05))
         frame = driver.read(PATIENT_S).frame
     driver.close()
-    assert frame.gap_m == pytest.approx(0.085)
-    assert frame.effort_n == pytest.approx(0.12 * 150.0)
+    assert (frame.gap_m, frame.effort_n) == pytest.approx((0.085, 0.12 * 150.0))
     link = ModbusLink(pymodbus_server, 9, PATIENT_S)
     written = link._client.read_holding_registers(OUTPUT, count=3, device_id=9).registers
     link.close()
     model = MODELS["2f-85"]
     # The last word is to stop: the rest of the request is that of the grasp.
-    assert written == [
-        0x0100,
-        model.position(0.04),
-        byte_of(0.05, model.speeds_m_s) << 8 | byte_of(100.0, model.forces_n),
-    ]
+    speed_and_force = byte_of(0.05, model.speeds_m_s) << 8 | byte_of(100.0, model.forces_n)
+    assert written == [0x0100, model.position(0.04), speed_and_force]
 
 
 def test_the_checksum_is_that_of_the_manual():

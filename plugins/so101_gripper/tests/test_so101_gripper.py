@@ -1,6 +1,7 @@
 """The driver of the gripper's motor against the emulated arm."""
 
 import json
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
@@ -32,8 +33,6 @@ from graspsense_so101_gripper.discovery import diagnose
 from graspsense_so101_gripper.emulator.arm import EmulatedArm
 from graspsense_so101_gripper.registers import STATE, MotorRequest, motor_state
 
-FAST = Command(POSITION, 0.0, 8.0, 0.05)
-
 
 @pytest.fixture
 def own_time(monkeypatch):
@@ -47,11 +46,22 @@ def emulated():
 
 
 def driver_of(arm, **keys):
-    return create(
-        "sensor-backend",
-        "so101",
-        **{"port": arm.where, "reply_timeout_s": PATIENT_S, "calibration": "none", **keys},
-    )
+    keys = {"port": arm.where, "reply_timeout_s": PATIENT_S, "calibration": "none", **keys}
+    return create("sensor-backend", "so101", **keys)
+
+
+def opened(arm, **keys):
+    driver = driver_of(arm, **keys)
+    driver.open(1)
+    return driver
+
+
+def states_of(arm):
+    """Return the registers of each motor, as another host reads them."""
+    bus = ServoBus(arm.where, PATIENT_S)
+    states = {motor: bus.read(motor, *STATE) for motor in range(1, 7)}
+    bus.close()
+    return states
 
 
 @pytest.mark.slow
@@ -70,9 +80,7 @@ def test_conformance(check):
 @pytest.mark.usefixtures("own_time")
 def test_a_grasp_writes_to_no_other_motor_and_gives_the_gripper_back_as_it_was(emulated):
     arm = emulated()
-    bus = ServoBus(arm.where, PATIENT_S)
-    states = {motor: bus.read(motor, *STATE) for motor in range(1, 7)}
-    bus.close()
+    earlier = states_of(arm)
     options = [
         f"gripper.port={arm.where}",
         f"gripper.reply_timeout_s={PATIENT_S}",
@@ -86,19 +94,16 @@ def test_a_grasp_writes_to_no_other_motor_and_gives_the_gripper_back_as_it_was(e
     assert 0.05 < trial.features["p_steady"] <= trial.features["p_first"] < 0.08
     assert set(trial.trace.signals) == {channel.name for channel in backend.CHANNELS[3:]}
     assert arm.state()["written_to_others"] == 0
-    bus = ServoBus(arm.where, PATIENT_S)
-    after = {motor: bus.read(motor, *STATE) for motor in range(1, 7)}
-    bus.close()
-    assert {m: after[m] for m in range(1, 6)} == {m: states[m] for m in range(1, 6)}
-    asked, given = motor_state(after[6]).asked, motor_state(states[6]).asked
+    after = states_of(arm)
+    asked, given = (motor_state(states.pop(6)).asked for states in (after, earlier))
+    assert after == earlier
     assert asked._replace(goal_position=0) == given._replace(goal_position=0)
 
 
 @pytest.mark.usefixtures("own_time")
 def test_a_frame_is_one_read(emulated):
     arm = emulated()
-    driver = driver_of(arm)
-    driver.open(1)
+    driver = opened(arm)
     requests = arm.state()["requests"]
     frames = [driver.read(0.1).frame for _ in range(50)]
     assert arm.state()["requests"] - requests == 50
@@ -108,21 +113,18 @@ def test_a_frame_is_one_read(emulated):
 
 @pytest.mark.usefixtures("own_time")
 def test_it_closes_with_the_torque_limit_of_the_force_and_tells_load_current_and_supply(emulated):
-    arm = emulated()
-    driver = driver_of(arm, jaw_length_m=0.1, stall_torque_nm=2.0)
-    driver.open(1)
+    driver = opened(emulated(), jaw_length_m=0.1, stall_torque_nm=2.0)
     for _ in range(300):
         reading = driver.read(0.1)
-        driver.apply(FAST)
+        driver.apply(Command(POSITION, 0.0, 8.0, 0.05))
     driver.close()
     frame, signals = reading.frame, reading.signals
     # 2 N m at 0.1 m is 20 N, so that 8 N is 40 % of the load and of the 2.4 A.
-    assert signals.load == pytest.approx(0.4)
-    assert frame.effort_n == pytest.approx(8.0)
+    assert (signals.load, frame.effort_n) == pytest.approx((0.4, 8.0))
     # No load cell has measured it: it can be anything up to the full force.
     assert signals.effort_error == pytest.approx(20.0)
     assert signals.current == pytest.approx(0.4 * 2.4, abs=0.0065)
-    assert (signals.motor_voltage, signals.motor_temperature) == (pytest.approx(7.4), pytest.approx(303.15))
+    assert (signals.motor_voltage, signals.motor_temperature) == pytest.approx((7.4, 303.15))
     assert 0.005 < frame.gap_m < 0.08
 
 
@@ -143,20 +145,12 @@ def test_the_emulated_gripper_keeps_its_own_time_so_that_a_grasp_repeats_exactly
 @pytest.mark.slow
 @every_case(
     ("mood", "late_s", "outcome"),
-    [
-        ("damaged", 0.3, "device lost"),
-        ("late", 0.3, "device lost"),
-        ("late", 0.005, "steady"),
-    ],
+    [("damaged", 0.3, "device lost"), ("late", 0.3, "device lost"), ("late", 0.005, "steady")],
 )
 def test_the_emulated_gripper_without_a_port_has_the_faults_of_the_line(mood, late_s, outcome):
-    options = [
-        "gripper.port=emulated",
-        f"gripper.faults.mood={mood}",
-        "gripper.faults.mood_at_s=0.5",
-        f"gripper.faults.late_s={late_s}",
-    ]
-    trial = load_pipeline("so101", options=options).grasp()
+    faults = {"mood": mood, "mood_at_s": 0.5, "late_s": late_s}
+    options = [f"gripper.faults.{key}={value}" for key, value in faults.items()]
+    trial = load_pipeline("so101", options=["gripper.port=emulated", *options]).grasp()
     assert trial.outcome.words == outcome, trial.reason
 
 
@@ -165,36 +159,30 @@ def test_the_emulated_gripper_without_a_port_has_the_faults_of_the_line(mood, la
 def test_whatever_becomes_of_replies_the_jaw_is_told_to_stop(emulated, mood):
     """The motor still hears: what it is told last is to stay where it is, without torque, as it was found."""
     arm = emulated(faults=So101Faults(late_s=0.01))
-    driver = driver_of(arm)
-    driver.open(1)
+    driver = opened(arm)
     for _ in range(20):
         driver.read(0.1)
         driver.apply(Command(VELOCITY, -0.03, 8.0, 0.15))
     assert arm.state()["torque"]
     assert arm.state()["steps_to_go"] > 100
     arm.tell(mood)
-    if mood in ("damaged", "silent"):
+    lost = mood in ("damaged", "silent")
+    if lost:
         # No valid reply comes any more, so it need not be waited for.
         driver._bus.close()
         driver._bus = ServoBus(arm.where, 0.02)
-    try:
-        for _ in range(4):
-            driver.read(0.1)
-    except DeviceLost:
-        assert mood in ("damaged", "silent")
-    else:
-        assert mood in ("late", "repeated")
+    with pytest.raises(DeviceLost) if lost else nullcontext():
+        [driver.read(0.1) for _ in range(4)]
     driver.close()
     assert not arm.state()["torque"]
     assert arm.state()["written_to_others"] == 0
 
 
 @pytest.mark.usefixtures("own_time")
-@pytest.mark.parametrize(("word", "why"), [("takeover", "another program"), ("restart", "power")])
+@every_case(("word", "why"), [("takeover", "another program"), ("restart", "power")])
 def test_a_motor_that_is_not_asked_what_was_written_ends_the_grasp(emulated, word, why):
     arm = emulated()
-    driver = driver_of(arm)
-    driver.open(1)
+    driver = opened(arm)
     driver.read(0.1)
     arm.tell(word)
     with pytest.raises(DeviceLost, match=why):
@@ -219,17 +207,17 @@ def test_a_second_host_is_refused_the_port(emulated):
 
 def test_a_late_or_repeated_reply_is_not_taken_for_that_of_the_next_request(emulated):
     arm = emulated()
-    bus = ServoBus(arm.where, PATIENT_S)
+    bus, asked = ServoBus(arm.where, PATIENT_S), MotorRequest(0, 7, 2000, 0, 11, 300)
     for _ in range(2):
         arm.tell("repeated")
         assert len(bus.read(6, *STATE)) == STATE[1]
         arm.tell("well")
-        bus.write(6, STATE[0], MotorRequest(0, 7, 2000, 0, 11, 300).written())
-        assert motor_state(bus.read(6, *STATE)).asked == MotorRequest(0, 7, 2000, 0, 11, 300)
+        bus.write(6, STATE[0], asked.written())
+        assert motor_state(bus.read(6, *STATE)).asked == asked
     bus.close()
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("keys", "emulator", "why"),
     [
         ({}, {"faults": So101Faults(model_number=1284)}, "model 1284"),
@@ -242,17 +230,15 @@ def test_another_device_is_told_with_what_to_look_at_and_not_written_to(emulated
     arm = emulated(**emulator)
     with pytest.raises(NoDevice, match=why):
         driver_of(arm, **keys).open(1)
-    assert not arm.state()["torque"]
-    assert arm.state()["written_to_others"] == 0
+    assert (arm.state()["torque"], arm.state()["written_to_others"]) == (False, 0)
+
+
+JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll")
 
 
 def arm_file(path, **changed):
-    motors = {
-        name: {"id": i, "drive_mode": 0, "homing_offset": 10 * i, "range_min": 900, "range_max": 3000}
-        for i, name in enumerate(
-            ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll"), 1
-        )
-    }
+    motor = {"drive_mode": 0, "range_min": 900, "range_max": 3000}
+    motors = {name: {**motor, "id": i, "homing_offset": 10 * i} for i, name in enumerate(JOINTS, 1)}
     gripper = {"id": 6, "drive_mode": 0, "homing_offset": -120, "range_min": 1600, "range_max": 2179}
     path.write_text(json.dumps({**motors, "gripper": {**gripper, **changed}}))
     return str(path)
@@ -262,26 +248,19 @@ def arm_file(path, **changed):
 def test_the_calibration_of_lerobot_has_to_be_that_of_this_arm(emulated, tmp_path):
     arm = emulated()
     bus = ServoBus(arm.where, PATIENT_S)
-    opened = int.from_bytes(bus.read(6, 11, 2), "little")
+    most = int.from_bytes(bus.read(6, 11, 2), "little")
     bus.close()
-    driver = driver_of(arm, arm_calibration=arm_file(tmp_path / "arm.json", range_max=opened))
-    driver.open(1)
+    driver = opened(arm, arm_calibration=arm_file(tmp_path / "arm.json", range_max=most))
     assert driver.read(1.0).frame.gap_m == pytest.approx(0.086, abs=5e-4)
     driver.close()
-    for changed in ({"range_max": opened + 5}, {"homing_offset": 4, "range_max": opened}, {"id": 5}):
+    for changed in ({"range_max": most + 5}, {"homing_offset": 4, "range_max": most}, {"id": 5}):
         with pytest.raises(NoDevice, match="another arm"):
-            driver_of(arm, arm_calibration=arm_file(tmp_path / "other.json", **changed)).open(1)
+            opened(arm, arm_calibration=arm_file(tmp_path / "other.json", **changed))
 
 
 DAMAGED = (
-    "",
-    "[]",
-    "{}",
-    '{"gripper": 3}',
-    '{"gripper": {"id": "6"}}',
-    "\x00\xff",
-    '{"gripper": {}}',
-    "[" * 100_000,
+    *("", "[]", "{}", "\x00\xff", "[" * 100_000),
+    *('{"gripper": 3}', '{"gripper": {"id": "6"}}', '{"gripper": {}}'),
 )
 IMPOSSIBLE = ({"range_min": 3000}, {"homing_offset": 1e9}, {"id": True})
 
@@ -309,12 +288,11 @@ def test_less_than_moves_the_geared_motor_is_refused_before_anything_moves():
 @pytest.mark.slow
 def test_doctor_tells_the_gripper_from_another_motor_from_a_silent_bus_and_from_none(emulated):
     arm = emulated()
-    states = {}
+    states = []
     for port, motor in ((arm.where, 6), (arm.where, 2), (arm.where, 9), ("/dev/nowhere", 6)):
         config = So101Config(port=port, motor=motor, reply_timeout_s=1.0 if motor == 9 else PATIENT_S)
         finding = next(iter(diagnose(config, PATIENT_S)))
-        states[port, motor] = finding.state
-        if motor == 9:
-            assert "answer: 1, 2, 3, 4, 5, 6" in finding.words
-    assert list(states.values()) == ["ok", "problem", "problem", "problem"]
+        states.append(finding.state)
+        assert ("answer: 1, 2, 3, 4, 5, 6" in finding.words) == (motor == 9)
+    assert states == ["ok", "problem", "problem", "problem"]
     assert not arm.state()["torque"]

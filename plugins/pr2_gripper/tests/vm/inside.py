@@ -1,13 +1,12 @@
 """What is tried in the machine of `guest.py`, as root: the driver on the kernel's own HID and USB stack.
 
-    inside.py [uhid] [usb] [--pulls N]     a line for each try; exit code 1 where one failed
+    inside.py     a line for each try; exit code 1 where one failed
 
 Devices are `graspsense emulate pr2` in processes of their own, forked from this one: importing takes seconds here.
 """
 
 from __future__ import annotations
 
-import argparse
 import io
 import json
 import os
@@ -314,12 +313,12 @@ def lost_in_a_grasp(way: Way, device: Emulator, what: str, trial: Trial, moment:
         check(len(trial.trace) > 0, f"{words}: {len(trial.trace)} ticks are kept")
 
 
-def unplugged(way: Way, device: Emulator, pulls: int) -> None:
-    """At the worst moments that we know, then at random ones."""
+def unplugged(way: Way, device: Emulator) -> None:
+    """At the worst moments that we know, then at a random one."""
     chance = random.Random(way.name)
     phases = (Phase.APPROACH, Phase.SQUEEZE, Phase.HOLD)
     moments = [(Phase.TARING, 0), (Phase.APPROACH, 2), (Phase.SQUEEZE, 1), (Phase.HOLD, 2)]
-    moments += [(chance.choice(phases), chance.randrange(1, way.grasp_hz // 5)) for _ in range(pulls)]
+    moments.append((chance.choice(phases), chance.randrange(1, way.grasp_hz // 5)))
     for phase, tick in moments:
         moment, trial = grasp(way, phase, tick, lambda: device.say("unplug"))
         if moment.when_s:
@@ -489,12 +488,6 @@ def without_permission() -> None:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser()
-    parser.add_argument("wires", nargs="*", default=("uhid", "usb"))
-    parser.add_argument(
-        "--pulls", type=int, default=1, help="unplugs at random moments, for each wire and library"
-    )
-    asked = parser.parse_args()
     store = Path("/tmp/store")  # not on the share: SQLite maps memory that 9p has none of
     os.environ["XDG_DATA_HOME"] = "/tmp/data"
     # The root is changed to, and udevadm does not wait in what looks like somebody's chroot.
@@ -507,27 +500,17 @@ def main() -> int:
     installed()
     # Everything is imported once before anything is timed: reading files takes its time here.
     ran("doctor", "--json", "--timeout", "0.1")
-    ran(
-        "run",
-        "--json",
-        "--gripper",
-        "pr2",
-        "-o",
-        "gripper.transport=emulated",
-        "-o",
-        "gripper.body_config.rate_hz=100",
-        "--save",
-        "/tmp/warm",
-    )
+    emulated = "-o gripper.transport=emulated -o gripper.body_config.rate_hz=100"
+    ran(*f"run --json --gripper pr2 {emulated} --save /tmp/warm".split())
     print(f"ready after {time.monotonic():.1f} s", flush=True)
     without_permission()
-    for way in [way for way in WAYS if way.wire in asked.wires]:
+    for way in WAYS:
         with emulator(way, way.stream_hz) as device:
             stream(way, device, way.reports)
             stream(way, device, 150, pause_s=0.04)
         with emulator(way, way.grasp_hz) as device:
             ruled(way, device)
-            unplugged(way, device, asked.pulls)
+            unplugged(way, device)
             unplugged_and_kept(way, device, store)
             silent(way, device)
             if way.wire == "usb":
