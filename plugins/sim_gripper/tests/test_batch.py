@@ -381,18 +381,6 @@ def test_odd_numbers_and_every_object_come_back_from_another_process_to_the_bit(
         assert bits(grasp.trace) == bits(here.trace)
 
 
-@pytest.mark.slow
-def test_no_trace_is_handed_over_where_nobody_wants_one():
-    run = RunConfig(grasp_timeout_s=0.01, opening_timeout_s=0.1)
-    told = []
-    for extract, felt in ((None, None), (lambda trace: told.append(len(trace)) or "felt", "felt")):
-        # A closure, which no other process could be handed: it is called here.
-        with PlainProcess(Scenes(job(run=run, traces=False, extract=extract))) as process:
-            grasp = process.run("none", 0)
-        assert (grasp.kept, grasp.extracted) == (None, felt)
-    assert told == [len(plainly(job(run=run), "none", 0).trace)]
-
-
 @pytest.mark.usefixtures("apart")
 def test_a_process_that_is_killed_leaves_its_grasps_to_this_one(monkeypatch):
     class Doomed(PlainProcess):
