@@ -14,9 +14,7 @@ WEATHER = Path(__file__).parent / "weka" / "arff" / "weather.nominal.arff"
 
 
 def expected_failures(classifier):
-    why = (
-        "rows are held out by their place: a row left out or repeated moves others to other folds, as in J48"
-    )
+    why = "rows are held out by their place: one left out or repeated moves others to other folds, as in J48"
     check = "check_sample_weight_equivalence_on_dense_data"
     return {check: why} if classifier.pruning == "reduced_error" else {}
 

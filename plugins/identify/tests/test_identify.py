@@ -273,11 +273,8 @@ def shell(k1, critical_m, drop_n, fall_m, k2):
     def force(x):
         peak, beyond = k1 * critical_m, x - critical_m
         falling = peak - drop_n * beyond / fall_m
-        return np.where(
-            beyond <= 0.0,
-            k1 * x,
-            np.where(beyond < fall_m, falling, peak - drop_n + k2 * (beyond - fall_m)),
-        )
+        again = np.where(beyond < fall_m, falling, peak - drop_n + k2 * (beyond - fall_m))
+        return np.where(beyond <= 0.0, k1 * x, again)
 
     return force
 

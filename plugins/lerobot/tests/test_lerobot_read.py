@@ -35,16 +35,14 @@ def column(recording, name):
 @every_case("version", [2, 3])
 def test_each_squeeze_of_an_episode_is_a_trial_with_its_task_as_label(tmp_path, version):
     squeezes = read(write_set(tmp_path / "set", version))
-    assert [squeeze.label for squeeze in squeezes] == [
-        "pick_the_red_cup", "squeeze-_sponge", "squeeze-_sponge", "pick_the_red_cup",
-    ]  # fmt: skip
-    assert [int(squeeze.order) for squeeze in squeezes] == [0, 1, 1, 2]
+    cup, sponge = "pick_the_red_cup", "squeeze-_sponge"
+    told = [(squeeze.label, int(squeeze.order)) for squeeze in squeezes]
+    assert told == [(cup, 0), (sponge, 1), (sponge, 1), (cup, 2)]
     gap = column(squeezes[0], "gap_m")
     assert (gap.max(), gap.min()) == pytest.approx((100.0, 44.0), abs=0.02)
     # Four cells of 1, 2, 2 and 1 parts of the peak press along z; shear is not part of the force.
-    assert [float(column(squeeze, "force_left_n").max()) for squeeze in squeezes] == pytest.approx(
-        [24.0, 18.0, 19.5, 30.0], rel=1e-5
-    )
+    peaks_n = [float(column(squeeze, "force_left_n").max()) for squeeze in squeezes]
+    assert peaks_n == pytest.approx([24.0, 18.0, 19.5, 30.0], rel=1e-5)
     arrays = [channel for channel in squeezes[0].recording.channels if hasattr(channel, "components")]
     told = [(array.name, array.cells, array.components) for array in arrays]
     assert told == [("f0", 4, 3), ("f1", 4, 3)]

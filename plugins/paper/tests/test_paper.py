@@ -61,11 +61,8 @@ def with_gripper(planned, config):
 def test_printed_matrices_have_the_truth_where_it_is_said_to_be():
     tables = [published().matrix(f"table_{k}") for k in (2, 5, 6)]
     assert tables[0].true_class_is == "not stated"
-    rows, columns = (
-        np.array(tables[0].confusion.counts).sum(axis=1),
-        np.sum(tables[0].confusion.counts, axis=0),
-    )
-    assert (rows.tolist(), columns.tolist()) == ([60, 48, 44, 77], [66, 41, 42, 80])
+    sums = [np.sum(tables[0].confusion.counts, axis=axis).tolist() for axis in (1, 0)]
+    assert sums == [[60, 48, 44, 77], [66, 41, 42, 80]]
     rows = [np.sum(table.confusion.counts, axis=1).tolist() for table in tables[1:]]
     assert rows == [[24] * 4, [71, 68, 68, 68]]
     assert [table.confusion.correct for table in tables[1:]] == [89, 207]
