@@ -131,13 +131,3 @@ def test_paper_preset_prunes_on_the_held_out_rows(seed):
     expected = grow(as_rows(given, kept), given.values.tolist(), PAPER, len(given.schema.classes))
     prune(expected, as_rows(given, held))
     assert shape(fit(given, PAPER, np.array(held)).to_dict()) == shape(expected)
-
-
-def test_gain_and_ratio_differ_where_c45_says_so():
-    # x0 cuts one row off a class cleanly (large ratio, small gain); x1 nearly halves the rows (large gain).
-    labels = [0] * 10 + [1] * 10
-    x0 = [0.0] * 18 + [1.0] * 2
-    x1 = [0.0] * 9 + [1.0] + [0.0] * 2 + [1.0] * 8
-    given = make_table(Schema((Attribute("x0"), Attribute("x1")), (0, 1)), np.column_stack((x0, x1)), labels)
-    by_gain = fit(given, Options(criterion="info_gain", pruning="none", mdl_correction=False))
-    assert by_gain.to_dict()["feature"] == 1

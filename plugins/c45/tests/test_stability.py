@@ -87,26 +87,6 @@ def test_rows_that_nothing_can_be_learned_of_are_refused(values, labels, weights
         table(values, labels, weights, n_classes=2)
 
 
-def test_rows_of_weight_zero_do_not_vote():
-    values = [[0.0]] * 4 + [[1.0]] * 4 + [[0.0]] * 3
-    weights = [1.0] * 8 + [0.0] * 3
-    tree = fit(table(values, [0] * 4 + [1] * 4 + [1] * 3, weights))
-    assert tree.class_weights.tolist() == [[4.0, 4.0], [4.0, 0.0], [0.0, 4.0]]
-
-
-def test_whole_weights_are_repeated_rows():
-    rng = np.random.default_rng(0)
-    labels = rng.integers(0, 3, 60)
-    values = labels[:, None] + rng.normal(0, 0.8, (60, 2))
-    weights = rng.integers(1, 4, 60)
-    # With the least minimum, since J48 asks for twice that many rows, and counts them unweighted.
-    options = Options(min_objects=1)
-    weighted = fit(table(values, labels, weights), options)
-    repeated = fit(table(np.repeat(values, weights, axis=0), np.repeat(labels, weights)), options)
-    assert weighted == repeated
-    assert weighted.node_count > 1
-
-
 def test_infinite_values_have_no_answer():
     tree = fit(table([[0.0], [1.0]] * 4, [0, 1] * 4))
     for value in (np.inf, -np.inf):
@@ -180,24 +160,6 @@ def test_weights_add_up_and_json_is_exact(given_table):
             np.testing.assert_allclose(shares, tree.class_weights[node], atol=1e-6)
     assert from_json(to_json(tree)) == tree
     np.testing.assert_allclose(distributions(tree, given_table.values).sum(axis=1), 1.0, atol=1e-6)
-
-
-def test_the_order_of_the_columns_matters_in_ties_only():
-    rng = np.random.default_rng(5)
-    labels = rng.integers(0, 3, 200)
-    values = labels[:, None] * [0.5, 0.9, 1.3] + rng.normal(0, 1, (200, 3))
-    options = Options(min_objects=8)
-    straight = fit(table(values, labels), options).to_dict()
-    turned = fit(table(values[:, ::-1], labels), options).to_dict()
-    pairs, compared = [(straight, turned)], 0
-    while pairs:
-        node, other = pairs.pop()
-        assert node["class_weights"] == other["class_weights"]
-        if "feature" in node:
-            assert (node["feature"], node["threshold"]) == (2 - other["feature"], other["threshold"])
-            pairs += list(zip(node["children"], other["children"], strict=True))
-            compared += 1
-    assert compared >= 3
 
 
 def test_the_order_of_the_rows_decides_what_is_held_out():

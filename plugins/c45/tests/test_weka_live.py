@@ -22,16 +22,13 @@ ASK = Path(__file__).parent / "weka" / "AskWeka.java"
 OPTIONS: dict[str, dict[str, Any]] = {
     "-C 0.25 -M 2": {},
     "-U -O -J -doNotMakeSplitPointActualValue -M 2": {
-        "pruning": "none",
-        "collapse": False,
-        "mdl_correction": False,
-        "actual_split_value": False,
+        "pruning": "none", "collapse": False, "mdl_correction": False, "actual_split_value": False,
     },
     "-C 0.1 -M 1": {"confidence_factor": 0.1, "min_objects": 1},
     "-R -N 3 -Q 1 -M 2": {"pruning": "reduced_error"},
     "-B -A -C 0.25 -M 2": {"binary_splits": True, "laplace": True},
     "-S -C 0.25 -M 2": {"subtree_raising": False},
-}
+}  # fmt: skip
 
 
 def random_arff(rng):
@@ -63,11 +60,8 @@ def assert_same(ours, theirs):
     pairs = [(ours, theirs)]
     while pairs:
         mine, given = pairs.pop()
-        assert (mine.get("feature"), mine.get("threshold"), mine["class"]) == (
-            given.get("att"),
-            given.get("thr"),
-            given["class"],
-        )
+        ours = (mine.get("feature"), mine.get("threshold"), mine["class"])
+        assert ours == (given.get("att"), given.get("thr"), given["class"])
         assert mine["class_weights"] == pytest.approx(given["dist"], abs=1e-6)
         pairs += list(zip(mine.get("children", []), given.get("children", []), strict=True))
 

@@ -7,6 +7,7 @@ from graspsense.core.components.identification import RecordedSqueeze
 from graspsense.core.values.trace import Trace
 from graspsense.plugin_api import create
 from graspsense.simulator_api import RunConfig
+from graspsense_identify.prepare import prepared
 
 WIDTH_M = 0.05
 DEPTH_M = 0.008
@@ -21,23 +22,11 @@ def recorded(force_of=None, *, hold_s=1.0, speed_m_s=0.02, period_s=0.0):
     images = np.arange(0.001, t[-1], period_s) if period_s else np.empty(0)
     if period_s:
         force = force[np.searchsorted(t, images)][np.maximum(np.searchsorted(images, t, side="right") - 1, 0)]
-    nothing = np.full(len(t), np.nan)
-    trace = Trace(
-        t_s=t,
-        gap_m=gap,
-        velocity_m_s=nothing,
-        effort_n=nothing,
-        force_left_n=force,
-        force_right_n=force,
-        edge_left_n=nothing,
-        edge_right_n=nothing,
-        status=np.zeros(len(t), np.int64),
-        phase=np.zeros(len(t), np.int64),
-        command=nothing,
-        pad_t_s=images,
-        pad_left=np.empty((len(images), 0)),
-        pad_right=np.empty((len(images), 0)),
-    )
+    nothing, whole = np.full(len(t), np.nan), np.zeros(len(t), np.int64)
+    unknown = dict.fromkeys(("velocity_m_s", "effort_n", "edge_left_n", "edge_right_n", "command"), nothing)
+    cells = np.empty((len(images), 0))
+    felt = {"force_left_n": force, "force_right_n": force, "pad_left": cells, "pad_right": cells}
+    trace = Trace(t_s=t, gap_m=gap, pad_t_s=images, status=whole, phase=whole, **felt, **unknown)
     return RecordedSqueeze(name="one", sha256="0" * 64, trace=trace)
 
 
@@ -61,8 +50,10 @@ def delayed(squeeze, late_s):
     def late(force):
         return np.concatenate([np.full(ticks, force[0]), force[:last]])
 
-    left, right = late(trace.force_left_n), late(trace.force_right_n)
-    return evolve(
-        squeeze,
-        trace=evolve(trace, pad_t_s=trace.pad_t_s + late_s, force_left_n=left, force_right_n=right),
-    )
+    forces = {"force_left_n": late(trace.force_left_n), "force_right_n": late(trace.force_right_n)}
+    return evolve(squeeze, trace=evolve(trace, pad_t_s=trace.pad_t_s + late_s, **forces))
+
+
+def ready(force_of=None, **settings):
+    """Return the same squeeze as it is fitted, with the noise of no pad."""
+    return prepared(recorded(force_of, **settings), 0.0)

@@ -1,10 +1,12 @@
 """Identifying an object: a law that made the forces is found again, and what a recording cannot show is refused."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from attrs import evolve
 from cases import every_case
-from squeezes import DEPTH_M, WIDTH_M, grasped, recorded
+from squeezes import DEPTH_M, WIDTH_M, grasped, ready, recorded
 
 from graspsense.plugin_api import ConfigError
 from graspsense_identify.choose import choose
@@ -22,15 +24,12 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.pads import PadCompliance
 from graspsense_sim_gripper.scene.spec import parse_scene
 
+slow = partial(pytest.param, marks=pytest.mark.slow)
 PADS = PadCompliance(15000.0, 0.0, 0.0, 1.0)
 
 
-def with_forces(squeeze, forces):
-    return evolve(squeeze, force_n=forces)
-
-
 def test_contact_hold_and_speed_are_found_in_a_recording():
-    squeeze = prepared(recorded(), 0.0)
+    squeeze = ready()
     # The force exceeds 3 % of its peak 0.24 mm behind the contact.
     assert squeeze.width_m == pytest.approx(WIDTH_M, abs=3e-4)
     assert squeeze.stretches.hold_s == pytest.approx(1.0, abs=0.05)
@@ -38,7 +37,7 @@ def test_contact_hold_and_speed_are_found_in_a_recording():
 
 
 def test_a_force_of_the_pads_is_taken_at_the_time_of_its_image():
-    squeeze = prepared(recorded(period_s=0.041), 0.0)
+    squeeze = ready(period_s=0.041)
     loading = squeeze.gap_m[squeeze.sample] > WIDTH_M - 0.9 * DEPTH_M
     closure = np.maximum(WIDTH_M - squeeze.gap_m[squeeze.sample][loading], 0.0)
     # Taken at the ticks that repeat it, it would lag by 20 ms on average, which is 0.4 N here.
@@ -47,9 +46,7 @@ def test_a_force_of_the_pads_is_taken_at_the_time_of_its_image():
 
 def test_a_force_that_is_a_mean_is_compared_with_the_mean_of_the_law():
     t_s, sample = np.linspace(0.0, 1.0, 41), np.arange(0, 41, 4)
-    squeeze = evolve(
-        prepared(recorded(), 0.0), t_s=t_s, sample=sample, averaged_s2=np.full(len(sample), 0.01**2)
-    )
+    squeeze = evolve(ready(), t_s=t_s, sample=sample, averaged_s2=np.full(len(sample), 0.01**2))
     # The mean of 3 t^2 over times of variance v is 3 t^2 + 3 v.
     mean = squeeze.at_samples(3.0 * t_s**2)
     assert mean[1:-1] == pytest.approx(3.0 * t_s[sample[1:-1]] ** 2 + 3.0 * 0.01**2)
@@ -66,7 +63,7 @@ def test_the_mean_over_ticks_does_not_flatten_a_course_of_the_gap():
 
 def test_no_step_of_a_path_is_much_shorter_than_those_beside_it():
     for hold_s in (0.7, 1.0, 1.3):
-        squeeze = prepared(recorded(hold_s=hold_s), 0.0)
+        squeeze = ready(hold_s=hold_s)
         steps = np.diff(squeeze.t_s)
         # A step of 1e-15 s would make the rate of compression, and so every memory, arbitrary.
         assert np.min(steps[1:] / steps[:-1]) > 0.1
@@ -74,28 +71,24 @@ def test_no_step_of_a_path_is_much_shorter_than_those_beside_it():
 
 
 def test_a_path_begins_before_a_contact_whose_force_rises_slowly():
-    squeeze = prepared(recorded(lambda closure: 1e8 * closure**3), 0.0)
+    squeeze = ready(lambda closure: 1e8 * closure**3)
     assert squeeze.gap_m[0] > WIDTH_M
 
 
 @pytest.mark.slow
 def test_a_contact_whose_force_rises_slowly_does_not_bias_the_exponent():
-    squeeze = prepared(recorded(lambda closure: 1e8 * closure**3), 0.0)
+    squeeze = ready(lambda closure: 1e8 * closure**3)
     foam = static_candidates(scale_of([squeeze]))[4]
     # Begun in contact, the first sample has a force that no law explains, which biased the exponent.
     assert fit(ForwardModel(pads=RIGID_PADS), foam, [squeeze]).values[1] == pytest.approx(3.0, rel=1e-3)
 
 
 def test_every_force_has_the_error_of_the_scale_of_the_force_and_no_length_or_time_has():
-    scale = scale_of([prepared(recorded(), 0.0)])
+    scale = scale_of([ready()])
     laws = [*static_candidates(scale), *memories(scale)]
     is_force_of = {parameter.name: parameter.is_force for law in laws for parameter in law.free}
-    assert {name for name, is_force in is_force_of.items() if not is_force} == {
-        "exponent",
-        "tau_s",
-        "critical_m",
-        "fall_m",
-    }
+    others = {name for name, is_force in is_force_of.items() if not is_force}
+    assert others == {"exponent", "tau_s", "critical_m", "fall_m"}
 
 
 def test_of_many_recordings_thirty_of_as_many_objects_as_possible_are_used():
@@ -143,9 +136,9 @@ def test_recordings_without_contact_are_left_out_with_a_note_unless_all_are():
     empty = evolve(recorded(lambda closure: 0.0 * closure), name="empty")
     notes = []
 
-    ready, _ = _ready(SimConfig(), [recorded(), empty, recorded()], notes, has_cells=False)
+    used, _ = _ready(SimConfig(), [recorded(), empty, recorded()], notes, has_cells=False)
 
-    assert [squeeze.name for squeeze in ready] == ["one", "one"]
+    assert [squeeze.name for squeeze in used] == ["one", "one"]
     assert notes == ["left out: empty: no force exceeds the noise: nothing was touched"]
     pulled = evolve(empty, warnings=("the force is negative where it is largest",))
     with pytest.raises(ConfigError, match=r"nothing was touched\n  1 of the 1 recordings: the force is neg"):
@@ -153,9 +146,9 @@ def test_recordings_without_contact_are_left_out_with_a_note_unless_all_are():
 
 
 def test_a_ramp_at_one_speed_shows_no_memory_and_a_hold_does():
-    ramp = prepared(recorded(hold_s=0.0), 0.0)
-    faster = prepared(recorded(hold_s=0.0, speed_m_s=0.05), 0.0)
-    held = prepared(recorded(), 0.0)
+    ramp = ready(hold_s=0.0)
+    faster = ready(hold_s=0.0, speed_m_s=0.05)
+    held = ready()
     assert not shows_memory([ramp, ramp])
     assert shows_memory([ramp, faster])
     assert shows_memory([held])
@@ -168,13 +161,10 @@ def test_without_one_object_the_common_stiffness_is_the_mean_of_the_others():
     def force(closure, k):
         return (closure > 0.0) * (k * closure + 1e7 * closure**3) + 0.03 * rng.standard_normal(len(closure))
 
-    ready = [
-        prepared(recorded(lambda closure, k=k: force(closure, k)), 0.0)
-        for k in (900.0, 1200.0, 1000.0, 800.0, 1100.0)
-    ]
-    law = static_candidates(scale_of(ready))[2]
+    squeezes = [ready(lambda closure, k=k: force(closure, k)) for k in (900.0, 1200.0, 1000.0, 800.0, 1100.0)]
+    law = static_candidates(scale_of(squeezes))[2]
     model = ForwardModel(pads=RIGID_PADS)
-    again = refits(fit(model, law, ready), np.random.default_rng(0), has_lag=False)
+    again = refits(fit(model, law, squeezes), np.random.default_rng(0), has_lag=False)
 
     # Where it stayed that of all objects, the jackknife would find too little scatter between them.
     assert np.mean(np.log([refit.factors for refit in again.fits]), axis=1) == pytest.approx(0.0, abs=1e-9)
@@ -183,15 +173,10 @@ def test_without_one_object_the_common_stiffness_is_the_mean_of_the_others():
 def test_breaks_give_the_force_of_the_fracture_with_its_spread_and_what_is_left():
     forces = (4.0, 5.0, 6.5)
     squeezes = [
-        prepared(
-            recorded(
-                lambda closure, force=force: np.where(closure < force / 1000.0, 1000.0, 200.0) * closure
-            ),
-            0.0,
-        )
+        ready(lambda closure, force=force: np.where(closure < force / 1000.0, 1000.0, 200.0) * closure)
         for force in forces
     ]
-    whole = prepared(recorded(), 0.0)
+    whole = ready()
     assert whole.broken_n is None
     assert all(squeeze.broken_n is not None for squeeze in squeezes)
     rigid = ForwardModel(pads=RIGID_PADS)
@@ -228,16 +213,19 @@ def test_an_object_that_bears_the_force_again_in_its_next_squeeze_has_not_broken
     shards = of_object(1, lambda closure: 200.0 * closure)
     broken, whole, other = of_object(1, snapping), of_object(1), of_object(2, snapping)
 
-    def ready(*squeezes):
+    def fitted(*squeezes):
         return _ready(SimConfig(sensor="ideal"), squeezes, [], has_cells=False)[0]
 
-    assert [squeeze.broken_n is None for squeeze in ready(broken, whole)] == [True, True]
-    # After one fall that is none, the last squeeze of an object, or that of another one, shows none either.
-    assert [squeeze.broken_n is None for squeeze in ready(broken, broken, other)] == [True, True, True]
-    assert [squeeze.broken_n is None for squeeze in ready(broken, shards)] == [False, True]
-    # What another object bears says nothing, nor what this one bore before.
-    assert [squeeze.broken_n is None for squeeze in ready(whole, broken, of_object(3))] == [True, False, True]
-    assert [bears_again(ready(broken, shards, other), i) for i in range(3)] == [False, None, None]
+    for squeezes, are_whole in (
+        ((broken, whole), [True, True]),
+        # After one fall that is none, the last squeeze of an object, or that of another one, shows none either.
+        ((broken, broken, other), [True, True, True]),
+        ((broken, shards), [False, True]),
+        # What another object bears says nothing, nor what this one bore before.
+        ((whole, broken, of_object(3)), [True, False, True]),
+    ):
+        assert [squeeze.broken_n is None for squeeze in fitted(*squeezes)] == are_whole
+    assert [bears_again(fitted(broken, shards, other), i) for i in range(3)] == [False, None, None]
 
 
 def test_a_force_that_falls_while_the_fingers_open_is_no_break():
@@ -258,10 +246,8 @@ def test_a_force_that_falls_while_the_fingers_open_is_no_break():
     ("label", "sensor"),
     [
         ("odwalla:full_open", "pads"),
-        *(
-            pytest.param(label, sensor, marks=pytest.mark.slow)
-            for label, sensor in (("odwalla_worn:full_open", "pads"), ("naked:full_open", "ideal"))
-        ),
+        slow("odwalla_worn:full_open", "pads"),
+        slow("naked:full_open", "ideal"),
     ],
 )
 def test_the_release_of_a_container_with_contents_is_no_break(label, sensor):
@@ -287,11 +273,8 @@ def shell(k1, critical_m, drop_n, fall_m, k2):
     def force(x):
         peak, beyond = k1 * critical_m, x - critical_m
         falling = peak - drop_n * beyond / fall_m
-        return np.where(
-            beyond <= 0.0,
-            k1 * x,
-            np.where(beyond < fall_m, falling, peak - drop_n + k2 * (beyond - fall_m)),
-        )
+        again = np.where(beyond < fall_m, falling, peak - drop_n + k2 * (beyond - fall_m))
+        return np.where(beyond <= 0.0, k1 * x, again)
 
     return force
 
@@ -304,37 +287,24 @@ def fitted_snap(squeeze):
 
 @pytest.mark.parametrize(
     ("critical_m", "period_s", "k2"),
-    [
-        (0.0008, 0.041, 1200.0),
-        pytest.param(0.001, 0.02, 2500.0, marks=pytest.mark.slow),
-        pytest.param(0.001, 0.041, 1200.0, marks=pytest.mark.slow),
-    ],
+    [(0.0008, 0.041, 1200.0), slow(0.001, 0.02, 2500.0), slow(0.001, 0.041, 1200.0)],
 )
 def test_a_snap_through_early_in_a_squeeze_is_fitted_though_few_images_show_it(critical_m, period_s, k2):
-    squeeze = prepared(recorded(shell(3000.0, critical_m, 1.5, 0.0008, k2), period_s=period_s), 0.0)
+    squeeze = ready(shell(3000.0, critical_m, 1.5, 0.0008, k2), period_s=period_s)
 
     # From the grid of its own starts alone, the residual was 0.4 to 1.7 % of the peak.
     assert fitted_snap(squeeze).rms < 0.001
 
 
 @pytest.mark.parametrize(
-    "seed",
-    [
-        *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(6)),
-        *(pytest.param(seed, marks=pytest.mark.long) for seed in range(6, 12)),
-    ],
+    "seed", [*map(slow, range(6)), *(pytest.param(seed, marks=pytest.mark.long) for seed in range(6, 12))]
 )
 def test_a_snap_through_is_found_whatever_the_rounding_of_the_forces(seed):
     rng = np.random.default_rng(seed)
     critical_m, fall_m = rng.uniform(0.0006, 0.0015), rng.uniform(0.0004, 0.0016)
-    numbers = (
-        3000.0,
-        critical_m,
-        rng.uniform(0.3, 0.9) * 3000.0 * critical_m,
-        fall_m,
-        rng.uniform(800.0, 3000.0),
-    )
-    squeeze = prepared(recorded(shell(*numbers), period_s=(0.02, 0.041)[seed % 2]), 0.0)
+    drop_n, k2_n_m = rng.uniform(0.3, 0.9) * 3000.0 * critical_m, rng.uniform(800.0, 3000.0)
+    numbers = (3000.0, critical_m, drop_n, fall_m, k2_n_m)
+    squeeze = ready(shell(*numbers), period_s=(0.02, 0.041)[seed % 2])
     model = ForwardModel(pads=RIGID_PADS)
     true = model.forces(squeeze, static_candidates(scale_of([squeeze]))[5], numbers, WIDTH_M, 1.0)
     # A tick may be a millisecond from its image, so that the law itself misses the forces by about 0.1 % of the peak.
@@ -343,18 +313,18 @@ def test_a_snap_through_is_found_whatever_the_rounding_of_the_forces(seed):
     # Other kernels of the linear algebra round the last digit otherwise; here a change of the forces does.
     for _ in range(3):
         rounded = squeeze.force_n * (1.0 + 1e-12 * rng.standard_normal(len(squeeze.force_n)))
-        assert fitted_snap(with_forces(squeeze, rounded)).rms < 1.25 * max(own, 0.001)
+        assert fitted_snap(evolve(squeeze, force_n=rounded)).rms < 1.25 * max(own, 0.001)
 
 
 @pytest.mark.slow
 def test_the_law_that_made_the_forces_is_chosen_with_its_numbers():
-    squeeze = prepared(recorded(), 0.0)
+    squeeze = ready()
     scale, model = scale_of([squeeze]), ForwardModel(pads=PADS)
     true = static_candidates(scale)[2].joined(memories(scale)[1])
     values = (900.0, 1.5e7, 300.0, 0.15)
     rng = np.random.default_rng(0)
     clean = model.forces(squeeze, true, values, WIDTH_M, 1.0)
-    noisy = with_forces(squeeze, clean + 0.01 * rng.standard_normal(len(clean)))
+    noisy = evolve(squeeze, force_n=clean + 0.01 * rng.standard_normal(len(clean)))
     fitted = fit(model, true, [noisy])
     assert fitted.values == pytest.approx(values, rel=0.1)
     chosen = choose(model, [noisy], scale, True, lambda done, total: None)
@@ -363,21 +333,19 @@ def test_the_law_that_made_the_forces_is_chosen_with_its_numbers():
 
 @pytest.mark.slow
 def test_fingertips_that_harden_are_part_of_the_forward_model():
-    squeeze = prepared(recorded(), 0.0)
+    squeeze = ready()
     pads = PadCompliance(2000.0, 0.0, 0.0, 1.0, 0.002, 2.0)
     spring = static_candidates(scale_of([squeeze]))[0]
     forces = ForwardModel(pads=pads).forces(squeeze, spring, (1500.0,), WIDTH_M, 1.0)
     # Linear fingertips of 2000 N/m in series with the spring: 6.86 N at 8 mm.
     assert forces.max() > 8.0
-    fitted = fit(ForwardModel(pads=pads), spring, [with_forces(squeeze, forces)])
+    fitted = fit(ForwardModel(pads=pads), spring, [evolve(squeeze, force_n=forces)])
     assert fitted.values == pytest.approx((1500.0,), rel=1e-3)
 
 
 def test_the_table_identified_of_a_scene_is_checked():
-    good = (
-        'width_m = 0.05\n[identified]\nlabel = "cup"\n[identified.intervals]\n"elastic.k1_n_m" = [1.0, 2.0]\n'
-    )
-    assert parse_scene(good, "cup", "cup.toml").width_m == 0.05
+    good = '[identified]\nlabel = "cup"\n[identified.intervals]\n"elastic.k1_n_m" = [1.0, 2.0]\n'
+    assert parse_scene("width_m = 0.05\n" + good, "cup", "cup.toml").width_m == 0.05
     for bad, message in (
         ("[identified]\nlabl = 1\n", "identified.labl: no such key"),
         ("[identified.intervals]\nk = [1.0]\n", "identified.intervals.k: .* is not two numbers"),

@@ -6,7 +6,7 @@ from attrs import evolve
 from cases import every_case
 from identify import SCENES, scene_text, squeezes_of
 from scipy.stats import chi2, norm
-from squeezes import recorded
+from squeezes import ready
 
 from graspsense_identify.fit import fit
 from graspsense_identify.forward import RIGID_PADS, ForwardModel
@@ -91,7 +91,7 @@ def coverage(squeezes, ratio):
 
 
 def test_an_error_of_the_scale_of_the_force_changes_more_than_forces_behind_compliant_fingertips():
-    squeeze = prepared(recorded(lambda closure: 1e5 * closure**2), 0.0)
+    squeeze = ready(lambda closure: 1e5 * closure**2)
     foam = static_candidates(scale_of([squeeze]))[4]
     errors = np.sqrt(np.diag(_scale_errors(fit(ForwardModel(pads=RIGID_PADS), foam, [squeeze]), 0.05)))
     assert errors == pytest.approx((0.05, 0.0), abs=1e-4)
@@ -103,9 +103,7 @@ def test_an_error_of_the_scale_of_the_force_changes_more_than_forces_behind_comp
 @pytest.mark.slow
 def test_a_stiffness_that_the_fit_leaves_out_has_an_interval_in_proportion_to_the_force():
     rng = np.random.default_rng(0)
-    squeeze = prepared(
-        recorded(lambda closure: 2e7 * closure**3 + 0.02 * rng.standard_normal(len(closure))), 0.0
-    )
+    squeeze = ready(lambda closure: 2e7 * closure**3 + 0.02 * rng.standard_normal(len(closure)))
     cubic = static_candidates(scale_of([squeeze]))[2]
     fitted = fit(ForwardModel(pads=RIGID_PADS), cubic, [squeeze])
     none = evolve(fitted, values=(1e-3, fitted.values[1]))

@@ -15,18 +15,10 @@ from graspsense_identify.share import WHOLE
 from graspsense_identify.used_delay import Timed, with_delay
 from graspsense_sim_gripper.config import SimConfig
 
-SCENE = """width_m = 0.05
-share = 0.6
-[[terms]]
-type = "elastic"
-k1_n_m = 1200.0
-[[terms]]
-type = "maxwell"
-k_n_m = 500.0
-tau_s = 0.2
-"""
-
-
+SCENE = (
+    'width_m = 0.05\nshare = 0.6\n[[terms]]\ntype = "elastic"\nk1_n_m = 1200.0\n'
+    '[[terms]]\ntype = "maxwell"\nk_n_m = 500.0\ntau_s = 0.2\n'
+)
 GRIPPERS = ({"sensor": "ideal"}, {"sensor": "pads"}, {"sensor": "pads", "pad_delay_s": 0.01})
 LATE_S = (0.0, 0.01, 0.025)
 IN_CI = ((0, 0.0), (1, 0.025), (2, 0.01))
@@ -51,9 +43,8 @@ def test_a_known_delay_comes_back_and_does_not_bias_relaxation(gripper, late_s):
     assert delay.value == pytest.approx(settings_s + late_s, abs=0.002)
     assert delay.high - delay.low < 0.01
     assert tau.value == pytest.approx(0.2, rel=0.06)
-    assert [candidate.terms for candidate in result.candidates if candidate.chosen] == [
-        "elastic (k1) + maxwell"
-    ]
+    chosen = [candidate.terms for candidate in result.candidates if candidate.chosen]
+    assert chosen == ["elastic (k1) + maxwell"]
     used_s = tomllib.loads(result.scene)["identified"]["sensor"]["delay_s"]
     assert used_s == pytest.approx(settings_s + late_s, abs=0.002)
     assert delay.value == pytest.approx(used_s, rel=1e-5)
@@ -61,18 +52,20 @@ def test_a_known_delay_comes_back_and_does_not_bias_relaxation(gripper, late_s):
         assert used_s == settings_s
 
 
+def delay_of(used_s, shown_s, error_s):
+    interval = {"low_s": shown_s - error_s, "high_s": shown_s + error_s}
+    return Delay(settings_s=0.0, used_s=used_s, shown_s=shown_s, **interval)
+
+
 @every_case("shown_s", [-0.0011, 0.0, 0.0102, 0.03])
 def test_the_delay_that_is_reported_is_the_one_that_is_used(shown_s):
-    delay = Delay(settings_s=0.0, used_s=0.01, shown_s=shown_s, low_s=shown_s - 1e-3, high_s=shown_s + 1e-3)
+    delay = delay_of(0.01, shown_s, 1e-3)
     (parameter,) = delay.parameters
     assert parameter.value == delay.used_s
     assert parameter.low <= min(shown_s, 0.01) <= max(shown_s, 0.01) <= parameter.high
     excluded = not delay.low_s <= 0.01 <= delay.high_s
-    assert (delay.error_s > 0.0) == excluded
-    assert (
-        any("the recordings rather show" in undetermined.reason for undetermined in delay.undetermined)
-        == excluded
-    )
+    rather = any("the recordings rather show" in open_.reason for open_ in delay.undetermined)
+    assert (delay.error_s > 0.0, rather) == (excluded, excluded)
 
 
 @every_case(
@@ -90,14 +83,7 @@ def test_a_delay_is_used_only_if_the_terms_that_are_chosen_with_it_show_it(found
         return Timed(WHOLE, None, lag)
 
     def delay(used):
-        shown_s = shown(used.lag.lag_s)
-        return Delay(
-            settings_s=0.0,
-            used_s=used.lag.lag_s,
-            shown_s=shown_s,
-            low_s=shown_s - 0.00151,
-            high_s=shown_s + 0.00151,
-        )
+        return delay_of(used.lag.lag_s, shown(used.lag.lag_s), 0.00151)
 
     used, told = with_delay(timed, lambda choice: Lag(lag_s=found_s, error_s=1e-3), delay)
     assert told.used_s == pytest.approx(used_s, abs=1e-9)
@@ -108,9 +94,7 @@ def test_a_delay_is_used_only_if_the_terms_that_are_chosen_with_it_show_it(found
 def test_a_ramp_at_one_speed_does_not_show_the_delay_and_says_so():
     ramp = recorded(hold_s=0.0)
     result = identify(SimConfig(sensor="ideal", pad_stiffness_n_m=float("inf")), [ramp], lambda *_: None)
-    (refused,) = [
-        undetermined for undetermined in result.undetermined if undetermined.what == "delay of the sensor"
-    ]
+    (refused,) = [open_ for open_ in result.undetermined if open_.what == "delay of the sensor"]
     assert "at one speed" in refused.reason
     assert "changing speed" in refused.remedy
     assert not [parameter for parameter in result.parameters if parameter.name == "delay_s"]

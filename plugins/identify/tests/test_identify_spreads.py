@@ -6,13 +6,12 @@ import tomllib
 import numpy as np
 import pytest
 from attrs import evolve
-from squeezes import WIDTH_M, grasped, recorded
+from squeezes import WIDTH_M, grasped, ready
 
 from graspsense_identify.fit import Fitted
 from graspsense_identify.forward import ForwardModel
 from graspsense_identify.individual import alone
 from graspsense_identify.laws import DataScale, memories, static_candidates
-from graspsense_identify.prepare import prepared
 from graspsense_identify.random_effects import between, own_spreads
 from graspsense_identify.run import identify
 from graspsense_sim_gripper.config import SimConfig
@@ -28,7 +27,7 @@ def of_objects(law, values, varying, spread, seed):
     """Return the fit of the common values to noisy squeezes of objects whose stiffness differs by 10 %, and a parameter
     by its spread."""
     rng = np.random.default_rng(seed)
-    squeeze = prepared(recorded(period_s=1.0 / 60.0), 0.0)
+    squeeze = ready(period_s=1.0 / 60.0)
     factors = np.exp(0.1 * rng.standard_normal(OBJECTS))
     squeezes = []
     for k, factor in enumerate(factors):
@@ -37,20 +36,12 @@ def of_objects(law, values, varying, spread, seed):
         forces = MODEL.forces(squeeze, law, own, WIDTH_M, float(factor))
         noisy = forces + NOISE * forces.max() * rng.standard_normal(len(forces))
         squeezes.append(evolve(squeeze, force_n=noisy, instance=f"cup#{k}"))
-    fitted = Fitted(
-        model=MODEL,
-        candidate=law,
-        squeezes=squeezes,
-        values=tuple(values),
-        widths_m=(WIDTH_M,) * OBJECTS,
-        factors=tuple(factors.tolist()),
-        residuals=np.zeros(1),
-    )
-    return fitted
+    of_each = {"squeezes": squeezes, "widths_m": (WIDTH_M,) * OBJECTS, "factors": tuple(factors.tolist())}
+    return Fitted(model=MODEL, candidate=law, values=tuple(values), residuals=np.zeros(1), **of_each)
 
 
 def laws():
-    squeeze = prepared(recorded(period_s=1.0 / 60.0), 0.0)
+    squeeze = ready(period_s=1.0 / 60.0)
     scale = DataScale(squeeze.peak_n, squeeze.depth_m, 0.4, 1.4, 1.0 / 60.0)
     spring, _, stiffening = static_candidates(scale)[:3]
     relaxing = spring.joined(memories(scale)[1])

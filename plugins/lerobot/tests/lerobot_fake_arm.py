@@ -124,8 +124,7 @@ class FakeArm(Robot):
         rest_m = self.target_m
         if self.target_m < self.config.object_m:
             # Where the spring of the servo and that of the object balance.
-            rest_m = (SERVO_N_M * self.target_m + OBJECT_N_M * self.config.object_m) / (
-                SERVO_N_M + OBJECT_N_M
-            )
+            pulled_n = SERVO_N_M * self.target_m + OBJECT_N_M * self.config.object_m
+            rest_m = pulled_n / (SERVO_N_M + OBJECT_N_M)
         self.gap_m += min(max(rest_m - self.gap_m, -most_m), most_m)
         self.force_n = OBJECT_N_M * max(self.config.object_m - self.gap_m, 0.0)

@@ -28,22 +28,17 @@ def episode(squeezes=1, frames=90, peak=4.0):
 
 
 def features(names, version):
-    scalar = {
-        "timestamp": "float32", "frame_index": "int64", "episode_index": "int64", "index": "int64",
-        "task_index": "int64",
-    }  # fmt: skip
+    def feature(dtype, shape, names=None):
+        return {"dtype": dtype, "shape": shape, "names": names}
+
+    listed = list(names) if version == 3 else {"motors": list(names)}
     return {
-        "observation.state": {
-            "dtype": "float32",
-            "shape": [len(names)],
-            "names": list(names) if version == 3 else {"motors": list(names)},
-        },
-        "action": {"dtype": "float32", "shape": [1], "names": ["gripper.pos"]},
-        "observation.images.wrist": {
-            "dtype": "video", "shape": [64, 64, 3], "names": ["height", "width", "channels"],
-        },
-        **{name: {"dtype": dtype, "shape": [1], "names": None} for name, dtype in scalar.items()},
-    }  # fmt: skip
+        "observation.state": feature("float32", [len(names)], listed),
+        "action": feature("float32", [1], ["gripper.pos"]),
+        "observation.images.wrist": feature("video", [64, 64, 3], ["height", "width", "channels"]),
+        "timestamp": feature("float32", [1]),
+        **{f"{name}index": feature("int64", [1]) for name in ("frame_", "episode_", "", "task_")},
+    }
 
 
 def table(states, numbers, tasks, start):
@@ -64,16 +59,11 @@ def table(states, numbers, tasks, start):
 
 
 def info(version, states, names, changed):
-    paths = {
-        2: (
-            "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet",
-            "videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d}.mp4",
-        ),
-        3: (
-            "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
-            "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4",
-        ),
-    }
+    chunk, file = "chunk-{chunk_index:03d}", "file-{file_index:03d}"
+    data, video = f"data/{chunk}/{file}.parquet", f"videos/{{video_key}}/{chunk}/{file}.mp4"
+    if version == 2:
+        chunk, file = "chunk-{episode_chunk:03d}", "episode_{episode_index:06d}"
+        data, video = f"data/{chunk}/{file}.parquet", f"videos/{chunk}/{{video_key}}/{file}.mp4"
     return {
         "codebase_version": "v2.1" if version == 2 else "v3.0",
         "robot_type": "so101",
@@ -83,8 +73,8 @@ def info(version, states, names, changed):
         "chunks_size": 1000,
         "fps": FPS,
         "splits": {"train": f"0:{len(states)}"},
-        "data_path": paths[version][0],
-        "video_path": paths[version][1],
+        "data_path": data,
+        "video_path": video,
         "features": features(names, version),
         **changed,
     }
@@ -99,9 +89,8 @@ def write_set(folder, version, states=None, names=NAMES, **changed):
     (folder / "meta").mkdir(parents=True)
     (folder / "meta/info.json").write_text(json.dumps(info(version, states, names, changed)))
     if version == 2:
-        write_lines(
-            folder / "meta/tasks.jsonl", [{"task_index": k, "task": task} for k, task in enumerate(tasks)]
-        )
+        about = [{"task_index": k, "task": task} for k, task in enumerate(tasks)]
+        write_lines(folder / "meta/tasks.jsonl", about)
         rows = [{"episode_index": k, "tasks": [tasks[k % 2]], "length": n} for k, n in enumerate(lengths)]
         write_lines(folder / "meta/episodes.jsonl", rows)
         (folder / "data/chunk-000").mkdir(parents=True)
@@ -109,24 +98,20 @@ def write_set(folder, version, states=None, names=NAMES, **changed):
             part = table([state], [k], [k % 2], int(starts[k]))
             pq.write_table(part, folder / f"data/chunk-000/episode_{k:06d}.parquet")
         return folder
-    pq.write_table(
-        pa.table({"task_index": list(range(len(tasks))), "__index_level_0__": tasks}),
-        folder / "meta/tasks.parquet",
-    )
+    numbered = pa.table({"task_index": list(range(len(tasks))), "__index_level_0__": tasks})
+    pq.write_table(numbered, folder / "meta/tasks.parquet")
     (folder / "meta/episodes/chunk-000").mkdir(parents=True)
-    n = len(states)
+    n, video = len(states), "videos/observation.images.wrist"
+    places = [f"{part}/{index}_index" for part in ("data", video) for index in ("chunk", "file")]
     episodes = {
         "episode_index": list(range(n)),
         "tasks": [[tasks[k % 2]] for k in range(n)],
         "length": lengths,
         "dataset_from_index": starts[:-1].tolist(),
         "dataset_to_index": starts[1:].tolist(),
-        "data/chunk_index": [0] * n,
-        "data/file_index": [0] * n,
-        "videos/observation.images.wrist/chunk_index": [0] * n,
-        "videos/observation.images.wrist/file_index": [0] * n,
-        "videos/observation.images.wrist/from_timestamp": (starts[:-1] / FPS).tolist(),
-        "videos/observation.images.wrist/to_timestamp": (starts[1:] / FPS).tolist(),
+        **dict.fromkeys(places, [0] * n),
+        f"{video}/from_timestamp": (starts[:-1] / FPS).tolist(),
+        f"{video}/to_timestamp": (starts[1:] / FPS).tolist(),
     }
     pq.write_table(pa.table(episodes), folder / "meta/episodes/chunk-000/file-000.parquet")
     (folder / "data/chunk-000").mkdir(parents=True)

@@ -94,14 +94,10 @@ if not INSTALLED:
     module("lerobot.robots", Robot=Robot, RobotConfig=RobotConfig, make_robot_from_config=made)
     module("lerobot.utils")
     module("lerobot.utils.import_utils", register_third_party_plugins=lambda: None)
-    module(
-        "lerobot.processor", ObservationProcessorStep=ObservationProcessorStep, ProcessorStepRegistry=Registry
-    )
+    steps = {"ObservationProcessorStep": ObservationProcessorStep, "ProcessorStepRegistry": Registry}
+    module("lerobot.processor", **steps)
     module("lerobot.configs")
-    module(
-        "lerobot.configs.types",
-        PolicyFeature=SimpleNamespace,
-        FeatureType=SimpleNamespace(STATE="STATE"),
-        PipelineFeatureType=SimpleNamespace(OBSERVATION="OBSERVATION"),
-    )
+    types = {"FeatureType": SimpleNamespace(STATE="STATE"), "PolicyFeature": SimpleNamespace}
+    types["PipelineFeatureType"] = SimpleNamespace(OBSERVATION="OBSERVATION")
+    module("lerobot.configs.types", **types)
     module("draccus", decode=decode)

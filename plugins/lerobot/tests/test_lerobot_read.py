@@ -35,16 +35,14 @@ def column(recording, name):
 @every_case("version", [2, 3])
 def test_each_squeeze_of_an_episode_is_a_trial_with_its_task_as_label(tmp_path, version):
     squeezes = read(write_set(tmp_path / "set", version))
-    assert [squeeze.label for squeeze in squeezes] == [
-        "pick_the_red_cup", "squeeze-_sponge", "squeeze-_sponge", "pick_the_red_cup",
-    ]  # fmt: skip
-    assert [int(squeeze.order) for squeeze in squeezes] == [0, 1, 1, 2]
+    cup, sponge = "pick_the_red_cup", "squeeze-_sponge"
+    told = [(squeeze.label, int(squeeze.order)) for squeeze in squeezes]
+    assert told == [(cup, 0), (sponge, 1), (sponge, 1), (cup, 2)]
     gap = column(squeezes[0], "gap_m")
     assert (gap.max(), gap.min()) == pytest.approx((100.0, 44.0), abs=0.02)
     # Four cells of 1, 2, 2 and 1 parts of the peak press along z; shear is not part of the force.
-    assert [float(column(squeeze, "force_left_n").max()) for squeeze in squeezes] == pytest.approx(
-        [24.0, 18.0, 19.5, 30.0], rel=1e-5
-    )
+    peaks_n = [float(column(squeeze, "force_left_n").max()) for squeeze in squeezes]
+    assert peaks_n == pytest.approx([24.0, 18.0, 19.5, 30.0], rel=1e-5)
     arrays = [channel for channel in squeezes[0].recording.channels if hasattr(channel, "components")]
     told = [(array.name, array.cells, array.components) for array in arrays]
     assert told == [("f0", 4, 3), ("f1", 4, 3)]
@@ -139,22 +137,18 @@ def test_the_options_of_gap_and_time_are_used(tmp_path):
 def test_units_and_the_force_are_those_of_the_numbers_and_their_names(tmp_path, written, units, force_n):
     squeeze = read(write_set(tmp_path / "set", 3, **written))[0]
     told = squeeze.recording.units
-    assert {
-        key: told.get(key) for key in ("gap", "force_left") if told.get(key, "counts") != "counts"
-    } == units
+    named = {key: told.get(key) for key in ("gap", "force_left")}
+    assert {key: unit for key, unit in named.items() if unit not in (None, "counts")} == units
     assert column(squeeze, "force_right_n").max() == pytest.approx(force_n, rel=1e-5)
     assert "gap" in told or column(squeeze, "gap_m").max() == pytest.approx(0.1, rel=1e-3)
 
 
 def test_missing_frames_are_told_and_divide_the_episode(tmp_path):
     folder = write_set(tmp_path / "set", 3, [episode(2)])
-    data = folder / "data/chunk-000/file-000.parquet"
-    table = pq.read_table(data)
+    table = pq.read_table(folder / DATA)
     kept = [k for k in range(len(table)) if not 88 <= k < 96]
-    pq.write_table(table.take(kept), data)
-    episodes = folder / "meta/episodes/chunk-000/file-000.parquet"
-    rows = pq.read_table(episodes).to_pydict()
-    pq.write_table(pa.table({**rows, "length": [len(kept)]}), episodes)
+    pq.write_table(table.take(kept), folder / DATA)
+    _episodes(length=[len(kept)])(folder)
     assert any("gaps=cut" in notice for notice in read(folder)[0].notices)
     assert [len(squeeze.recording.readings) for squeeze in read(f"{folder}?gaps=cut")] == [88, 84]
 
@@ -169,22 +163,21 @@ def test_a_load_in_newtons_is_the_effort_too(tmp_path):
     assert stored_grasps(str(tmp_path / "s"))[0].features["p_first"] > 0.0
 
 
-STYLES = {
-    "left_taxel_3_fx": lambda finger, cell, axis: f"{('left', 'right')[finger]}_taxel_{cell}_f{axis}",
-    "Finger0.P3.FX": lambda finger, cell, axis: f"Finger{finger}.P{cell}.F{axis.upper()}",
-    "f0.p03.x": lambda finger, cell, axis: f"f{finger}.p{cell:02d}.{axis}",
-    "f0.fx.p03": lambda finger, cell, axis: f"f{finger}.f{axis}.p{cell:02d}",
-    "thumb0.cell_3.force_x": lambda finger, cell, axis: f"thumb{finger}.cell_{cell}.force_{axis}",
-    "tactile.finger0.3.x": lambda finger, cell, axis: f"tactile.finger{finger}.{cell}.{axis}",
-    "finger_0.row_1.col_1.x": lambda finger, cell, axis: (
-        f"finger_{finger}.row_{cell // 2}.col_{cell % 2}.{axis}"
-    ),
-}
+STYLES = ("{side}_taxel_{cell}_f{axis}", "Finger{finger}.P{cell}.F{upper}", "f{finger}.p{cell:02d}.{axis}")
+STYLES += ("f{finger}.f{axis}.p{cell:02d}", "thumb{finger}.cell_{cell}.force_{axis}")
+STYLES += ("tactile.finger{finger}.{cell}.{axis}", "finger_{finger}.row_{row}.col_{column}.{axis}")
 
 
 @every_case("style", STYLES)
 def test_cells_are_known_in_other_styles_of_names(style):
-    names = [STYLES[style](finger, cell, axis) for finger in range(2) for cell in range(4) for axis in "xyz"]
+    names = [
+        style.format(
+            finger=finger, side=side, cell=cell, row=cell // 2, column=cell % 2, axis=axis, upper=axis.upper()
+        )
+        for finger, side in enumerate(("left", "right"))
+        for cell in range(4)
+        for axis in "xyz"
+    ]
     arrays = meaning_of(["gripper.pos", *names]).arrays
     assert [(array.rows * array.columns, array.axes) for array in arrays] == [(4, "xyz"), (4, "xyz")]
     assert arrays[1].normal == tuple(names[14::3])
@@ -204,9 +197,9 @@ def test_numbered_joints_are_no_cells_and_cells_that_are_not_all_there_no_array(
 @every_case("names", [{"motors": NAMES[:9], "cells": NAMES[9:]}, [NAMES], {"axes": [NAMES]}])
 def test_names_in_lists_of_lists_are_those_of_the_numbers(tmp_path, names):
     folder = write_set(tmp_path / "set", 3)
-    about = json.loads((folder / "meta/info.json").read_text())
-    about["features"]["observation.state"]["names"] = names
-    damage_info(folder, features=about["features"])
+    features = json.loads((folder / META).read_text())["features"]
+    features["observation.state"]["names"] = names
+    damage_info(folder, features=features)
     assert [channel.name for channel in read(folder)[0].recording.channels] == ["gripper_load", "f0", "f1"]
 
 
@@ -234,12 +227,9 @@ def test_an_episode_whose_file_cannot_be_read_leaves_the_others(tmp_path, damage
 @every_case("times", [[5, 4], [np.nan, np.nan]])
 def test_times_that_do_not_increase_name_the_option_that_mends_them(tmp_path, times):
     folder = write_set(tmp_path / "set", 3, [episode()])
-    data = folder / "data/chunk-000/file-000.parquet"
-    table = pq.read_table(data)
-    stamps = table["timestamp"].to_numpy().copy()
+    stamps = pq.read_table(folder / DATA)["timestamp"].to_numpy().copy()
     stamps[4:6] = times
-    place = table.column_names.index("timestamp")
-    pq.write_table(table.set_column(place, "timestamp", pa.array(stamps)), data)
+    set_frames(folder, "timestamp", stamps)
     (refused,) = recordings(str(folder))
     assert "fps=30" in str(refused.error)
     assert len(read(f"{folder}?fps=30")[0].recording.readings) == 90
@@ -259,7 +249,7 @@ def _cut(name):
 
 
 def _other_schema(folder):
-    pq.write_table(pa.table({"a": [1, 2]}), folder / "data/chunk-000/file-000.parquet")
+    pq.write_table(pa.table({"a": [1, 2]}), folder / DATA)
 
 
 def _clone(folder):
@@ -270,12 +260,15 @@ def _tasks(folder):
     pq.write_table(pa.table({"task_index": [5], "__index_level_0__": ["x"]}), folder / "meta/tasks.parquet")
 
 
+def set_frames(folder, name, values):
+    frames = pq.read_table(folder / DATA)
+    place = frames.schema.get_field_index(name)
+    pq.write_table(frames.set_column(place, name, pa.array(values)), folder / DATA)
+
+
 def _ragged(folder):
-    path = folder / DATA
-    frames = pq.read_table(path)
-    states = [state[: 1 + k % 2] for k, state in enumerate(frames["observation.state"].to_pylist())]
-    number = frames.schema.get_field_index("observation.state")
-    pq.write_table(frames.set_column(number, "observation.state", pa.array(states)), path)
+    states = pq.read_table(folder / DATA)["observation.state"].to_pylist()
+    set_frames(folder, "observation.state", [state[: 1 + k % 2] for k, state in enumerate(states)])
 
 
 def _episodes(**changed):
@@ -344,7 +337,7 @@ def test_more_numbers_than_the_memory_should_hold_are_not_read(tmp_path):
     n = 20_000_000
     values = pa.DictionaryArray.from_arrays(pa.array(np.zeros(n, np.int8)), pa.array([1.0]))
     table = pa.table(dict.fromkeys(("timestamp", "frame_index", "episode_index", "index"), values))
-    pq.write_table(table, folder / "data/chunk-000/file-000.parquet")
+    pq.write_table(table, folder / DATA)
     with pytest.raises(TooLarge):
         _refusal(folder)
 

@@ -117,10 +117,8 @@ def test_close_stops_the_fingers_where_they_are():
 def test_degrees_and_a_reversed_scale_become_metres():
     keys = {"unit": "degrees", "open_position": -10.0, "closed_position": 30.0, "open_gap_m": 0.06}
     jaw = gripper(**keys).config
-    assert (jaw.gap_m(-10.0), jaw.gap_m(30.0), jaw.gap_m(10.0)) == pytest.approx((0.06, 0.0, 0.03))
-    assert (jaw.position_at(0.03), jaw.position_at(1.0), jaw.position_at(-1.0)) == pytest.approx(
-        (10.0, -10.0, 30.0)
-    )
+    assert [*map(jaw.gap_m, (-10.0, 30.0, 10.0))] == pytest.approx([0.06, 0.0, 0.03])
+    assert [*map(jaw.position_at, (0.03, 1.0, -1.0))] == pytest.approx([10.0, -10.0, 30.0])
 
 
 def test_a_damaged_answer_is_asked_again_and_a_lost_robot_is_told():

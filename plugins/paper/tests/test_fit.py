@@ -32,12 +32,8 @@ def test_the_splits_of_the_authors_tree():
     states = ["full_open", "full_closed", "empty_open", "empty_open", "empty_closed"]
     sorted_by = fit.by_the_splits(states, (long, hit, deep, weak, other))
     # One of the two empty, open ones is deep and one is weak; the rest lies where it belongs.
-    assert sorted_by == {
-        "tree_delta_t": 1.0,
-        "tree_peak": 1.0,
-        "tree_p_steady": 0.75,
-        "tree_f_steady": 0.75,
-    }
+    expected = {"tree_delta_t": 1.0, "tree_peak": 1.0, "tree_p_steady": 0.75, "tree_f_steady": 0.75}
+    assert sorted_by == expected
 
 
 def test_the_descent_finds_the_least_of_a_bowl_and_says_what_is_pinned():

@@ -59,14 +59,13 @@ def with_gripper(planned, config):
 
 
 def test_printed_matrices_have_the_truth_where_it_is_said_to_be():
-    paper = published()
-    either = paper.matrix("table_2").confusion.counts
-    assert paper.matrix("table_2").true_class_is == "not stated"
-    assert [sum(row) for row in either] == [60, 48, 44, 77]
-    assert [sum(column) for column in zip(*either, strict=True)] == [66, 41, 42, 80]
-    assert [sum(row) for row in paper.matrix("table_5").confusion.counts] == [24] * 4
-    assert [sum(row) for row in paper.matrix("table_6").confusion.counts] == [71, 68, 68, 68]
-    assert (paper.matrix("table_5").confusion.correct, paper.matrix("table_6").confusion.correct) == (89, 207)
+    tables = [published().matrix(f"table_{k}") for k in (2, 5, 6)]
+    assert tables[0].true_class_is == "not stated"
+    sums = [np.sum(tables[0].confusion.counts, axis=axis).tolist() for axis in (1, 0)]
+    assert sums == [[60, 48, 44, 77], [66, 41, 42, 80]]
+    rows = [np.sum(table.confusion.counts, axis=1).tolist() for table in tables[1:]]
+    assert rows == [[24] * 4, [71, 68, 68, 68]]
+    assert [table.confusion.correct for table in tables[1:]] == [89, 207]
 
 
 @every_case("rate", published().rates)
@@ -91,13 +90,9 @@ def test_every_published_rate_has_an_experiment_with_a_case_for_it():
 
 
 def test_numbers_of_trials_are_the_papers():
-    groups = {group.objects[0]: group for group in read_experiment("table_2").cases[0].data.groups}
-    assert {name: (group.total, group.instances) for name, group in groups.items()} == {
-        "odwalla": (66, 12),
-        "naked": (41, 10),
-        "can": (42, 12),
-        "water": (80, 16),
-    }
+    groups = read_experiment("table_2").cases[0].data.groups
+    numbers = {group.objects[0]: (group.total, group.instances) for group in groups}
+    assert numbers == {"odwalla": (66, 12), "naked": (41, 10), "can": (42, 12), "water": (80, 16)}
 
 
 def test_the_number_of_fitted_parameters_is_that_of_the_catalogue():
@@ -158,10 +153,8 @@ def test_without_the_figures_that_give_them_the_claims_do_not_hold():
         gripper = evolve(ours, spread=False, sensor="ideal")
         scene = f"width_m = 0.05\noffset_m = {offset_m}\n[[terms]]\ntype = 'elastic'\nk1_n_m = 2000.0\n"
         (done,) = run_many(gripper, create("controller", "hybrid"), [scene], [0])
-        left, right = (
-            np.argmax(force > 0.1) for force in (done.trace.force_left_n, done.trace.force_right_n)
-        )
-        return abs(int(left) - int(right)) * 0.001
+        forces = np.array([done.trace.force_left_n, done.trace.force_right_n])
+        return np.ptp((forces > 0.1).argmax(axis=1)) * 0.001
 
     assert lead_s(0.0) == 0.0
     assert lead_s(0.002) > 0.1
@@ -169,12 +162,8 @@ def test_without_the_figures_that_give_them_the_claims_do_not_hold():
 
 def test_every_number_of_the_model_of_the_gripper_has_an_origin():
     config = type(read_experiment("table_4").cases[0].settings.gripper.config)
-    without = {
-        field.name
-        for field in fields(config)
-        if isinstance(field.default, float) and not declared(field).origin
-    }
-    assert without == {"accuracy"}
+    numbers = [field for field in fields(config) if isinstance(field.default, float)]
+    assert {field.name for field in numbers if not declared(field).origin} == {"accuracy"}
 
 
 def test_each_bottle_may_be_used_in_one_state_only():
@@ -182,16 +171,14 @@ def test_each_bottle_may_be_used_in_one_state_only():
     plans = [plan_trials(case.settings, groups_of(case.data), 0) for case in (every, single)]
     assert sorted(plans[0].labels) == sorted(plans[1].labels)
     assert len(set(plans[1].instances)) == 50
-    labels_by_bottle = [
-        {i: {b for a, b in zip(p.instances, p.labels, strict=True) if a == i} for i in p.instances}
-        for p in plans
-    ]
-    assert all(len(labels) == 1 for labels in labels_by_bottle[1].values())
-    assert all(len(labels) >= 3 for labels in labels_by_bottle[0].values())
+    for plan, has_one in zip(plans, (False, True), strict=True):
+        labels = {instance: set() for instance in plan.instances}
+        for instance, label in zip(plan.instances, plan.labels, strict=True):
+            labels[instance].add(label)
+        assert all(len(states) == 1 if has_one else len(states) >= 3 for states in labels.values())
+    few = Group(objects=("odwalla",), instances=3, states_per_instance="one")
     with pytest.raises(ConfigError, match=r"3 instances .* 4 states"):
-        Group(objects=("odwalla",), instances=3, states_per_instance="one").planned(
-            simulated_objects(every.settings)
-        )
+        few.planned(simulated_objects(every.settings))
 
 
 def test_worn_bottles_are_compared_with_other_new_ones():
@@ -203,48 +190,43 @@ def test_worn_bottles_are_compared_with_other_new_ones():
 def test_the_answer_counts_no_rate_twice():
     rates = {rate.id: rate for rate in published().rates}
     assert rates["table_5"].repeats == "table_4_23"
-    ours = OverSeeds((0.9, 0.91, 0.92), 96)
-    held = [
-        RateComparison(published=rates[name], ours=ours, protocol="all", basis="fitted")
-        for name in ("table_4_23", "table_5")
-    ]
-    assert "of 1 fitted rates with each bottle in all states, 0 agree and 0 differ, and 1 cannot" in _answer(
-        held, []
-    )
+    held = [compared((0.9, 0.91, 0.92), name=name, basis="fitted") for name in ("table_4_23", "table_5")]
+    answer = _answer(held, [])
+    assert "of 1 fitted rates with each bottle in all states, 0 agree and 0 differ, and 1 cannot" in answer
 
 
-def compared(rates, n=96, name="table_4_17"):
+def compared(rates, n=96, name="table_4_17", basis="predicted"):
     published_rate = next(rate for rate in published().rates if rate.id == name)
-    return RateComparison(
-        published=published_rate, ours=OverSeeds(rates, n), protocol="all", basis="predicted"
-    )
+    return RateComparison(published=published_rate, ours=OverSeeds(rates, n), protocol="all", basis=basis)
 
 
-def test_two_seeds_say_nothing_of_a_rate_and_twenty_say_whether_it_agrees_or_differs():
-    # Table IV prints 67 of 96, 69.8 %, which is 60 to 78 % at 95 %.
-    assert compared((0.6, 0.8)).verdict == "cannot be told"
-    assert compared((0.69, 0.70, 0.71) * 7, n=2000).verdict == "cannot be told"
-    assert compared((0.84, 0.85, 0.86) * 7).verdict == "differs"
-    assert compared((0.95,) * 20, n=96).verdict == "differs"
-    # Table II prints 215 of 229.
-    assert compared((0.93, 0.94, 0.95) * 7, n=229, name="table_2").verdict == "agrees"
-    assert "21 seeds of 229 grasps" in compared((0.93, 0.94, 0.95) * 7, n=229, name="table_2").cells
+@every_case(
+    ("rates", "n", "name", "verdict"),
+    [
+        # Table IV prints 67 of 96, 69.8 %, which is 60 to 78 % at 95 %.
+        ((0.6, 0.8), 96, "table_4_17", "cannot be told"),
+        ((0.69, 0.70, 0.71) * 7, 2000, "table_4_17", "cannot be told"),
+        ((0.84, 0.85, 0.86) * 7, 96, "table_4_17", "differs"),
+        ((0.95,) * 20, 96, "table_4_17", "differs"),
+        # Table II prints 215 of 229.
+        ((0.93, 0.94, 0.95) * 7, 229, "table_2", "agrees"),
+    ],
+)
+def test_two_seeds_say_nothing_of_a_rate_and_twenty_say_whether_it_agrees_or_differs(rates, n, name, verdict):
+    comparison = compared(rates, n, name)
+    assert comparison.verdict == verdict
+    assert f"{len(rates)} seeds of {n} grasps" in comparison.cells
+
+
+def claim(verdict, number="", basis="predicted", **more):
+    return Claim(id="x", says="", rule="", basis=basis, verdict=verdict, number=number, n="", **more)
 
 
 def test_the_difference_of_two_rates_is_not_counted_again_as_a_claim():
-    claim = Claim(
-        id="probing_force",
-        says="",
-        rule="",
-        basis="predicted",
-        verdict="differs",
-        number="",
-        n="",
-        follows_from=("table_4_17", "table_4_23"),
-    )
+    difference = claim("differs", follows_from=("table_4_17", "table_4_23"))
     rates = [compared((0.84, 0.85, 0.86) * 7, name=name) for name in ("table_4_17", "table_4_23")]
-    assert "claims" not in _answer(rates, [claim])
-    assert "of 1 claims that are predicted, 0 agree and 1 differs" in _answer(rates[:1], [claim])
+    assert "claims" not in _answer(rates, [difference])
+    assert "of 1 claims that are predicted, 0 agree and 1 differs" in _answer(rates[:1], [difference])
 
 
 def eggs(broken, n):
@@ -260,8 +242,8 @@ def eggs(broken, n):
     [(0, 4, "cannot be told"), (0, 40, "agrees"), (2, 4, "differs"), (4, 40, "cannot be told")],
 )
 def test_four_unbroken_eggs_are_too_few_to_tell(broken, n, verdict):
-    (claim,) = claims(eggs(broken, n))
-    assert (claim.id, claim.verdict, claim.n) == ("egg", verdict, f"{n} grasps")
+    (told,) = claims(eggs(broken, n))
+    assert (told.id, told.verdict, told.n) == ("egg", verdict, f"{n} grasps")
 
 
 @every_case(
@@ -274,18 +256,14 @@ def test_four_unbroken_eggs_are_too_few_to_tell(broken, n, verdict):
     ],
 )
 def test_a_claim_that_depends_on_what_the_paper_does_not_say_cannot_be_told(verdicts, verdict):
-    claims = [
-        Claim(id="x", says="", rule="", basis="fitted", verdict=told, number=str(k), n="")
-        for k, told in enumerate(verdicts)
-    ]
-    assert _merged(claims).verdict == verdict
+    assert _merged([claim(told, str(k), "fitted") for k, told in enumerate(verdicts)]).verdict == verdict
 
 
-@given(
-    st.tuples(st.floats(-1, 1), st.floats(-1, 1)).map(sorted),
-    st.tuples(st.floats(-1, 1), st.floats(-1, 1)).map(sorted),
-    st.floats(0, 1),
-)
+INTERVALS = st.tuples(st.floats(-1, 1), st.floats(-1, 1)).map(sorted)
+LENGTHS = st.lists(st.floats(0, 10), min_size=1, max_size=12)
+
+
+@given(INTERVALS, INTERVALS, st.floats(0, 1))
 def test_a_wider_interval_never_tells_more(interval, limits, wider):
     verdict = within(tuple(interval), *limits)
     less = within((interval[0] - wider, interval[1] + wider), *limits)
@@ -293,9 +271,7 @@ def test_a_wider_interval_never_tells_more(interval, limits, wider):
     assert within(None, *limits) == "cannot be told"
 
 
-@given(
-    st.lists(st.floats(0, 10), min_size=1, max_size=12), st.lists(st.floats(0, 10), min_size=1, max_size=12)
-)
+@given(LENGTHS, LENGTHS)
 def test_a_split_is_between_guessing_and_perfect_and_the_same_either_way(low, other):
     share = split_by(low, other)
     assert 0.5 <= share <= 1.0
@@ -360,10 +336,9 @@ def test_parts_are_done_as_if_alone_and_the_resolved_file_means_the_same_tasks(t
     row = next(compared for compared in rows(summary, published()) if compared.published.id == "table_3_can")
     assert isinstance(row, RateComparison)
     assert row.ours.n == 6
-    checked = {claim["id"]: claim for claim in findings.values["claims"]}
-    assert "above in 0 of 1" in checked["fig_6_force"]["number"]
-    assert checked["fig_6_force"]["verdict"] == "cannot be told"  # one grasp shows nothing
-    assert checked["fig_6_force"]["n"] == "1 grasp"
+    (checked,) = [told for told in findings.values["claims"] if told["id"] == "fig_6_force"]
+    assert "above in 0 of 1" in checked["number"]
+    assert (checked["verdict"], checked["n"]) == ("cannot be told", "1 grasp")  # one grasp shows nothing
     page = experiment_page(summary, results).html()
     assert "Fig. 5: force control on the block" in page
     assert "Table III" in page

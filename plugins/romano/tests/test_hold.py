@@ -93,9 +93,8 @@ def test_a_tugged_block_is_held_with_more_force_from_the_first_slip_on():
 @pytest.mark.slow
 @pytest.mark.parametrize("when", ["contact", "holds"])
 def test_ctrl_c_opens_the_fingers(when):
-    running = subprocess.Popen(
-        [*COMMAND, "--seconds", "600", *PR2], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    running = subprocess.Popen([*COMMAND, "--seconds", "600", *PR2], **pipes)
     for line in running.stderr:
         if line.rstrip().endswith(when):
             running.send_signal(signal.SIGINT)
@@ -107,14 +106,10 @@ def test_ctrl_c_opens_the_fingers(when):
     assert float(opened.split()[-2]) > 80.0
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param("pick-and-place", marks=pytest.mark.slow),
-        pytest.param("grab", marks=pytest.mark.long),
-        pytest.param("event-detector", marks=pytest.mark.long),
-    ],
-)
+LAWS = {"pick-and-place": "slow", "grab": "long", "event-detector": "long"}
+
+
+@pytest.mark.parametrize("name", [pytest.param(law, marks=getattr(pytest.mark, LAWS[law])) for law in LAWS])
 def test_laws_give_the_same_grasp_compiled_and_plain(name):
     law, runs = create("controller", name), []
     for compiled in ("always", "never"):

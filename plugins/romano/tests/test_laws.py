@@ -49,16 +49,14 @@ def reading(t_s, force_n, signals=(), gap_m=0.05):
 
 def test_grab_takes_its_force_from_the_contact():
     """1 N at 20 mm/s with the published gain of 0.03 gives 1.5 N; the floor is 1.2 N."""
-    assert grab_force(1.0, 0.02, 0.03, 1.2, 20.0) == pytest.approx(1.5)
-    assert grab_force(0.2, 0.02, 0.03, 1.2, 20.0) == 1.2
-    assert grab_force(50.0, 0.02, 0.03, 1.2, 20.0) == 20.0
+    forces = [grab_force(felt_n, 0.02, 0.03, 1.2, 20.0) for felt_n in (1.0, 0.2, 50.0)]
+    assert forces == pytest.approx([1.5, 1.2, 20.0])
 
 
 def test_the_force_servo_looks_at_the_weaker_finger_and_closes_faster_than_it_opens():
     servo = Servo(0.0008, 0.0016, 0.5)
-    assert force_rate(servo, 5.0, 4.0, 9.0) == pytest.approx(-0.0016)
-    assert force_rate(servo, 5.0, 6.0, 9.0) == pytest.approx(0.0008)
-    assert force_rate(servo, 1e6, 0.0, 0.0) == -0.5
+    rates = [force_rate(servo, *forces) for forces in ((5.0, 4.0, 9.0), (5.0, 6.0, 9.0), (1e6, 0.0, 0.0))]
+    assert rates == pytest.approx([-0.0016, 0.0008, -0.5])
 
 
 def test_a_slip_of_one_pad_sample_adds_as_much_force_at_every_tick_rate():
@@ -74,12 +72,10 @@ def test_a_slip_of_one_pad_sample_adds_as_much_force_at_every_tick_rate():
 
 def test_a_slip_is_a_disturbance_while_the_force_itself_is_quiet():
     quiet, loud = NOT_BEGUN, NOT_BEGUN._replace(y1=0.19)
-    assert slips(PadSignal(1, 5.0, 0.05, quiet), 0.007, 0.048, 0.18)
-    assert not slips(PadSignal(1, 5.0, 0.047, quiet), 0.007, 0.048, 0.18)
-    assert not slips(PadSignal(1, 5.0, 0.05, loud), 0.007, 0.048, 0.18)
     # 0.7 % of 10 N is 0.07 N; of 100 N it would be 0.7 N, and 0.2 N is the most.
-    assert not slips(PadSignal(1, 10.0, 0.06, quiet), 0.007, 0.048, 0.18)
-    assert slips(PadSignal(1, 100.0, 0.21, quiet), 0.007, 0.048, 0.18)
+    slipping = [(5.0, 0.05, quiet), (100.0, 0.21, quiet)]
+    for signal in (*slipping, (5.0, 0.047, quiet), (5.0, 0.05, loud), (10.0, 0.06, quiet)):
+        assert slips(PadSignal(1, *signal), 0.007, 0.048, 0.18) == (signal in slipping)
 
 
 @every_case(("place_by", "with_shock", "with_slip"), [(0, 1, 0), (1, 0, 0), (2, 1, 1), (3, 0, 1), (4, 1, 0)])
@@ -122,9 +118,8 @@ def test_pads_are_sampled_every_41_ms_whatever_the_tick():
 
 def test_events_are_told_once():
     both = NOTHING._replace(left=1, right=1)
-    names = [EVENTS[k] for k in range(len(EVENTS)) if begun(NOTHING, both) >> k & 1]
-    assert names == ["left contact", "right contact", "both in contact"]
-    assert begun(both, both) == 0
+    assert EVENTS[:3] == ("left contact", "right contact", "both in contact")
+    assert (begun(NOTHING, both), begun(both, both)) == (0b111, 0)
 
 
 def spring(controller, *, ends_s=6.0, stiffness_n_m=2000.0, lost_s=inf, **settings):
@@ -143,8 +138,7 @@ def spring(controller, *, ends_s=6.0, stiffness_n_m=2000.0, lost_s=inf, **settin
 
 def test_find_contact_stops_where_both_pads_touch():
     states, forces = spring("find-contact", ends_s=2.0)
-    assert states[-1].outcome == STEADY
-    assert states[-1].phase == HOLD
+    assert (states[-1].outcome, states[-1].phase) == (STEADY, HOLD)
     # The high band tells of 20 mm/s * 2000 N/m = 40 N/s at the first image of the contact, within 41 ms.
     assert 0.1 < forces[-1] <= 40.0 * 0.083
     assert forces[-1] == forces[-500]
@@ -161,9 +155,7 @@ def test_grab_grips_a_hard_thing_harder_than_a_soft_one():
     assert hard[-1] > 1.5 * soft[-1]
 
 
-@pytest.mark.parametrize(
-    ("limit_n", "said"), [(20.0, "lost at 5.0 N"), (5.0, "too heavy or too smooth for 5 N")]
-)
+@every_case(("limit_n", "said"), [(20.0, "lost at 5.0 N"), (5.0, "too heavy or too smooth for 5 N")])
 def test_a_thing_that_is_lost_ends_the_grasp_with_a_reason(limit_n, said):
     states, _ = spring("slip-servo", force_n=5.0, lost_s=4.0, force_limit_n=limit_n)
     assert states[-1].outcome not in (RUNNING, STEADY)
@@ -218,8 +210,5 @@ def test_each_law_sends_each_kind(name, sends):
 
 def test_pick_and_place_says_that_it_has_no_acceleration():
     states, _ = spring("pick-and-place")
-    told = 0
-    for state in states:
-        told |= state.events
     assert "no acceleration" in EVENTS[7]
-    assert told >> 7 & 1
+    assert any(state.events >> 7 & 1 for state in states)

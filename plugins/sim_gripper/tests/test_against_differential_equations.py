@@ -59,6 +59,15 @@ class Term:
     def rates(self, d, r, s, part, up):
         return ()
 
+    def force_rate(self, d, r, s, part, up):
+        """Return the rate of the force along the motion, by a central difference of 0.1 us."""
+        rates = self.rates(d, r, s, part, up)
+        ahead, behind = (
+            self.force(d + h * r, r, [y + h * rate for y, rate in zip(s, rates, strict=True)], part)
+            for h in (1e-7, -1e-7)
+        )
+        return (ahead - behind) / 2e-7
+
     def jumped(self, d0, d1, s):
         """Return the states after a sudden change of the compression."""
         return s
@@ -68,18 +77,12 @@ class Elastic(Term):
     def force(self, d, r, s, part):
         return self.k1_n_m * d + self.k3_n_m3 * d**3
 
-    def force_rate(self, d, r, s, part, up):
-        return (self.k1_n_m + 3.0 * self.k3_n_m3 * d**2) * r
-
 
 class Rigid(Term):
     """Hertz, until the force exceeds the crush force; then a spring."""
 
     def force(self, d, r, s, part):
         return self.broken_n_m * d if part else self.hertz_n_m15 * math.copysign(abs(d) ** 1.5, d)
-
-    def force_rate(self, d, r, s, part, up):
-        return (self.broken_n_m if part else 1.5 * self.hertz_n_m15 * math.sqrt(abs(d))) * r
 
     def changes(self, d, s, part):
         return [] if part else [(self.force(d, 0.0, s, 0) - self.crush_force_n, 1)]
@@ -93,9 +96,6 @@ class Maxwell(Term):
 
     def rates(self, d, r, s, part, up):
         return (self.k_n_m * r - s[0] / self.tau_s,)
-
-    def force_rate(self, d, r, s, part, up):
-        return self.rates(d, r, s, part, up)[0]
 
     def jumped(self, d0, d1, s):
         return [s[0] + self.k_n_m * (d1 - d0)]
@@ -140,9 +140,6 @@ class Gas(Term):
             warming = -warm * ((self.exponent - 1.0) * (growing + flow) / volume + cooling)
         return rising, warming
 
-    def force_rate(self, d, r, s, part, up):
-        return self.area_slope_m * r * s[0] + self.area(d) * self.rates(d, r, s, part, up)[0]
-
 
 class Loss(Term):
     damps = True
@@ -159,10 +156,6 @@ class Foam(Term):
 
     def rates(self, d, r, s, part, up):
         return self.arm1_n_m * r - s[0] / self.tau1_s, self.arm2_n_m * r - s[1] / self.tau2_s
-
-    def force_rate(self, d, r, s, part, up):
-        slope = self.exponent * self.force_n / self.at_m * (max(d, 0.0) / self.at_m) ** (self.exponent - 1.0)
-        return slope * r + sum(self.rates(d, r, s, part, up))
 
     def jumped(self, d0, d1, s):
         return [s[0] + self.arm1_n_m * (d1 - d0), s[1] + self.arm2_n_m * (d1 - d0)]
@@ -199,21 +192,12 @@ class Worn(Term):
     def damage(self, work):
         return 1.0 - math.exp(-(self.earlier_j + work) / self.wear_j)
 
-    def shape(self, d, s):
-        e = d - self.set_m * (self.damage(s[0]) - self.damage(0.0))
-        return e, self.k1_n_m * e + self.k3_n_m3 * e**3, self.k1_n_m + 3.0 * self.k3_n_m3 * e**2
-
     def force(self, d, r, s, part):
-        return (1.0 - self.softening * self.damage(s[0])) * self.shape(d, s)[1]
+        e = d - self.set_m * (self.damage(s[0]) - self.damage(0.0))
+        return (1.0 - self.softening * self.damage(s[0])) * (self.k1_n_m * e + self.k3_n_m3 * e**3)
 
     def rates(self, d, r, s, part, up):
         return (self.force(d, r, s, part) * r if up else 0.0,)
-
-    def force_rate(self, d, r, s, part, up):
-        damaging = (1.0 - self.damage(s[0])) / self.wear_j * self.rates(d, r, s, part, up)[0]
-        _, curve, slope = self.shape(d, s)
-        left = 1.0 - self.softening * self.damage(s[0])
-        return left * slope * (r - self.set_m * damaging) - self.softening * damaging * curve
 
     def dent(self):
         return self.set_m * self.damage(0.0)
@@ -238,9 +222,6 @@ class Surface(Mass):
         mine = self.pull(d, s, part) - self.k_n_m * s[0] - self.damping_n_s_m * s[1]
         return s[1], mine / self.mass_kg
 
-    def force_rate(self, d, r, s, part, up):
-        return self.contact_n_m * (r - s[1]) if part else 0.0
-
     def changes(self, d, s, part):
         return [(s[0] - d, 0)] if part else [(d - s[0], 1)]
 
@@ -262,9 +243,6 @@ class Liquid(Mass):
         moving = (pressure - weight - viscous) / (self.density_kg_m3 * self.column_m)
         return s[1], moving * self.neck_m2 / self.area_m2
 
-    def force_rate(self, d, r, s, part, up):
-        return self.area_m2**2 / self.bulge_m3_pa * (r - s[1])
-
 
 class Slosh(Mass):
     @property
@@ -277,9 +255,6 @@ class Slosh(Mass):
 
     def rates(self, d, r, s, part, up):
         return s[1], self.force(d, r, s, part) / self.mass_kg
-
-    def force_rate(self, d, r, s, part, up):
-        return self.mass_kg * (2.0 * math.pi * self.frequency_hz) ** 2 * (r - s[1])
 
 
 EQUATIONS = {kind.__name__.lower(): kind for kind in (*Term.__subclasses__(), *Mass.__subclasses__())}

@@ -25,47 +25,16 @@ from graspsense_sim_gripper.scene.random_numbers import key_of
 
 pytest.importorskip("numba", reason="grasps are drawn in compiled code with the extra `fast`")
 
-HELD = """
-width_m = 0.04
-width_spread_m = 0.002
-stiffness_spread = 0.3
-offset_m = 0.001
-offset_spread_m = 0.001
-share = 0.9
-share_spread = 0.1
-patch = "point"
-held = true
-
-[[terms]]
-type = "elastic"
-k1_n_m = 900.0
-k3_n_m3 = 1e6
-spread = { k3_n_m3 = 0.5 }
-
-[[terms]]
-type = "maxwell"
-k_n_m = 300.0
-tau_s = 0.2
-spread = { k_n_m = 0.2, tau_s = 0.4 }
+HELD = """width_m = 0.04\nwidth_spread_m = 0.002\nstiffness_spread = 0.3\noffset_m = 0.001\noffset_spread_m = 0.001
+share = 0.9\nshare_spread = 0.1\npatch = "point"\nheld = true
+[[terms]]\ntype = "elastic"\nk1_n_m = 900.0\nk3_n_m3 = 1e6\nspread = { k3_n_m3 = 0.5 }
+[[terms]]\ntype = "maxwell"\nk_n_m = 300.0\ntau_s = 0.2\nspread = { k_n_m = 0.2, tau_s = 0.4 }
 """
-WIDE = """
-width_m = 0.084
-width_spread_m = 0.004
-
-[[terms]]
-type = "elastic"
-k1_n_m = 900.0
-k3_n_m3 = 0.0
+WIDE = """width_m = 0.084\nwidth_spread_m = 0.004
+[[terms]]\ntype = "elastic"\nk1_n_m = 900.0\nk3_n_m3 = 0.0
 """
-NAMES = [
-    *sorted(catalogue())[::4],
-    "odwalla:full_open#3",
-    "odwalla_worn:empty_open#7",
-    HELD,
-    f"{HELD}#4",
-    WIDE,
-    "none",
-]
+WORN = "odwalla_worn:empty_open#7"
+NAMES = [*sorted(catalogue())[::4], "odwalla:full_open#3", WORN, HELD, f"{HELD}#4", WIDE, "none"]
 CONFIGS = {
     "pads": SimConfig(),
     "ideal": SimConfig(sensor="ideal"),

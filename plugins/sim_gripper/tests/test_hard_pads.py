@@ -11,11 +11,7 @@ from graspsense_sim_gripper.plant.pads import PadCompliance, pad_compression
 from graspsense_sim_gripper.run.compiled.compose import all_active, contact_solver, uncompressed
 from graspsense_sim_gripper.scene.terms.elastic import Elastic
 
-SPRING = """width_m = 0.06
-[[terms]]
-type = "elastic"
-k1_n_m = 4000.0
-"""
+SPRING = 'width_m = 0.06\n[[terms]]\ntype = "elastic"\nk1_n_m = 4000.0\n'
 PADS = {"pad_stiffness_n_m": 2e4, "pad_hardening_m": 4e-4}
 
 
@@ -54,9 +50,8 @@ def test_pads_that_harden_from_afar_are_linear():
 def test_a_grasp_with_hard_pads_has_the_accuracy_that_is_asked_for_and_is_the_same_compiled():
     forces = []
     for settings in ({}, {"compile": "always"}, {"fidelity": "reference"}):
-        gripper = create(
-            "sensor-backend", "sim", sensor="ideal", spread=False, **{"compile": "never", **PADS, **settings}
-        )
+        chosen = {"sensor": "ideal", "spread": False, "compile": "never", **PADS, **settings}
+        gripper = create("sensor-backend", "sim", **chosen)
         done = gripper.run_many(create("controller", "hybrid"), [SPRING], [0], traces=True)[0]
         assert done.report["resolved"]
         forces.append(done.trace.force_left_n)

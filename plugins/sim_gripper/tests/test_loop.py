@@ -31,17 +31,6 @@ def assert_same(trace, other):
         np.testing.assert_allclose(given, expected, rtol=1e-9, atol=1e-15, err_msg=name)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("sensor", ["pads", "ideal"])
-def test_with_steps_over_several_ticks_the_plain_loop_and_the_compiled_loop_give_one_trace(sensor):
-    config = SimConfig(sensor=sensor)
-    plain = run_many(config, HYBRID, ["can:empty_open"], [5], compiled=False)[0]
-    fast = run_many(config, HYBRID, ["can:empty_open"], [5], compiled=True)[0]
-    assert plain.model.chosen.steps.macro_tolerance > 0.0
-    assert plain.outcome == fast.outcome
-    assert_same(plain.trace, fast.trace)
-
-
 @pytest.mark.parametrize(
     "controller", ["hybrid", *(pytest.param(law, marks=pytest.mark.slow) for law in ("velocity", "force"))]
 )

@@ -18,7 +18,7 @@ from graspsense_sim_gripper.run.binding import bind_reachable
 from graspsense_sim_gripper.run.compiled.compose import plant_move, step_parts, uncompressed
 from graspsense_sim_gripper.run.compiled.padding import composition_of
 from graspsense_sim_gripper.scene.terms.registry import laws_of
-from graspsense_sim_gripper.solve.macro_step import macro_step, next_ticks, values_at
+from graspsense_sim_gripper.solve.macro_step import macro_step, next_ticks
 from graspsense_sim_gripper.solve.scheme import Steps
 from graspsense_sim_gripper.solve.state import PlantState
 from graspsense_sim_gripper.solve.trend import UNKNOWN
@@ -106,17 +106,6 @@ def test_a_step_that_is_taken_is_as_exact_as_its_tolerance_says(scene):
     assert step.after.motion.gap_m == pytest.approx(expected.motion.gap_m, abs=1e-8)
 
 
-def test_the_values_within_are_those_of_the_motion():
-    plant, start = squeezing()
-    step = plant.macro_step(start, EFFORT_N, 8 * TICK)
-    assert step.error <= 1.0
-    for k in (0, 1, 3, 4, 7, 8):
-        within, expected = values_at(step.values, k / 8), plant.after(start, k * TICK) if k else start
-        assert within.left_n == pytest.approx(expected.contact.left_n, rel=2e-4)
-        assert within.motion.gap_m == pytest.approx(expected.motion.gap_m, abs=2e-9)
-        assert speed_m_s(within) == pytest.approx(speed_m_s(expected), rel=1e-3, abs=1e-6)
-
-
 def test_fingers_that_friction_holds_stay_while_the_object_relaxes():
     plant, start = squeezing()
     revolutions, _, gap, jacobian = start.motion
@@ -162,17 +151,6 @@ def test_a_step_that_would_contain_an_event_is_not_taken():
     }
     for what, (plant, start, effort_n) in cases.items():
         assert math.isinf(plant.macro_step(start, effort_n, 0.01).error), what
-
-
-@pytest.mark.parametrize("before_m", [3e-4, 1.3e-3])
-def test_a_step_that_is_repeated_ends_shortly_before_an_event_whose_place_is_known(before_m):
-    plant = Plant("toy")
-    start = plant.state(CONFIG.open_gap_m - plant.params.object.width_m - before_m, 0.05)
-    too_long = plant.macro_step(start, -20.0, 64 * TICK)
-    n = next_ticks(64, too_long.error, too_long.event_share)
-    assert plant.macro_step(start, -20.0, n * TICK).error <= 1.0
-    opened_m = plant.after(start, (n + 2) * TICK, -20.0).motion.gap_m
-    assert opened_m == pytest.approx(CONFIG.open_gap_m, abs=1e-12)
 
 
 def both_ways(scene, law=None, options=None, **settings):

@@ -24,12 +24,10 @@ from graspsense_sim_gripper.scene.terms.registry import TERMS
 def test_the_backend_declares_the_papers_containers_in_all_states_as_its_default_objects():
     kinds = SimBackend(SimConfig()).objects()
 
-    assert {kind.name: kind.states for kind in kinds if kind.default} == {
-        "odwalla": ("full_closed", "full_open", "empty_closed", "empty_open"),
-        "naked": ("full_closed", "full_open", "empty_closed", "empty_open"),
-        "can": ("full_closed", "full_open", "empty_open"),
-        "water": ("full_closed", "full_open", "empty_closed", "empty_open"),
-    }
+    every = ("full_closed", "full_open", "empty_closed", "empty_open")
+    can = ("full_closed", "full_open", "empty_open")
+    expected = {"odwalla": every, "naked": every, "can": can, "water": every}
+    assert {kind.name: kind.states for kind in kinds if kind.default} == expected
     assert {name for kind in kinds for name in kind.full_names} >= {*catalogue(), "sponge"}
 
 

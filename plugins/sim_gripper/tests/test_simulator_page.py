@@ -5,6 +5,7 @@ from pathlib import Path
 
 import attrs
 import pytest
+from cases import every_case
 
 from graspsense.plugin_api import create
 from graspsense_sim_gripper.config import SimConfig
@@ -38,26 +39,24 @@ def test_the_table_of_settings_has_the_defaults_of_its_keys():
     assert table == {key: defaults[key] for key in table}
 
 
-def test_the_table_of_objects_has_the_whole_catalogue():
-    named = {row[0].strip("`") for row in rows("Objects")}
-    assert named == {name.partition(":")[0] for name in catalogue()} | {"none"}
+# What is not written in the tables of a scene: `spreads` stands in the table of a term.
+KEYS = {field.name for field in attrs.fields(ObjectSpec)} - {
+    "name",
+    "reasons",
+    "fitted_to",
+    "file",
+    "spreads",
+}
+KINDS = {name.partition(":")[0] for name in catalogue()} | {"none"}
+
+
+@every_case(("title", "expected"), [("Objects", KINDS), ("A scene of your own", KEYS), ("Terms", {*TERMS})])
+def test_the_table_has_every_name(title, expected):
+    assert {name for row in rows(title) for name in re.findall(r"`(\w+)`", row[0])} == expected
+
+
+def test_every_shipped_scene_is_named():
     assert all(f"`{name}`" in section("Objects") for name in shipped_scenes())
-
-
-def test_the_table_of_a_scene_has_every_key():
-    named = {key for row in rows("A scene of your own") for key in re.findall(r"`(\w+)`", row[0])}
-    assert named == {field.name for field in attrs.fields(ObjectSpec)} - {
-        "name",
-        "reasons",
-        "fitted_to",
-        "file",
-        # Written in the table of a term.
-        "spreads",
-    }
-
-
-def test_the_table_of_terms_has_every_term():
-    assert [row[0].strip("`") for row in rows("Terms")] == list(TERMS)
 
 
 def test_the_table_of_the_report_has_every_key():
@@ -71,23 +70,25 @@ def test_the_table_of_the_report_has_every_key():
     assert {name for name in named if "." in name} <= nested
 
 
+def example(title, language="python"):
+    (text,) = re.findall(rf"```{language}\n(.*?)```", section(title), re.DOTALL)
+    return text
+
+
 def test_the_example_of_a_term_runs():
-    (code,) = re.findall(r"```python\n(.*?)```", section("A term of your own"), re.DOTALL)
     names = {}
-    exec(compile(code, "simulator.md", "exec"), names)
+    exec(compile(example("A term of your own"), "simulator.md", "exec"), names)
     (term,) = names["graspsense_sim_terms"]()
     force, _ = term.law(names["Gel"](1000.0, 0.01), term.at_rest, 0.0, 0.005, 1e-3, 5.0)
     assert force == pytest.approx(10.0)
 
 
 def test_the_example_of_many_grasps_runs():
-    (code,) = re.findall(r"```python\n(.*?)```", section("Many grasps"), re.DOTALL)
     names = {}
-    few = code.replace("* 500", "* 1").replace("range(1000)", "range(2)")
+    few = example("Many grasps").replace("* 500", "* 1").replace("range(1000)", "range(2)")
     exec(compile(few, "simulator.md", "exec"), names)
     assert [grasp.outcome.words for grasp in names["done"]] == ["steady", "steady"]
 
 
-def test_the_example_of_a_scene_is_one(tmp_path):
-    (text,) = re.findall(r"```toml\n(.*?)```", section("A scene of your own"), re.DOTALL)
-    assert parse_scene(text, "my_bottle", "my_bottle.toml").held
+def test_the_example_of_a_scene_is_one():
+    assert parse_scene(example("A scene of your own", "toml"), "my_bottle", "my_bottle.toml").held

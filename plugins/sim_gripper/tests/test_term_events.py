@@ -25,24 +25,17 @@ from graspsense_sim_gripper.scene.terms.registry import TERMS
 from graspsense_sim_gripper.solve.scheme import Steps
 
 slow = partial(pytest.param, marks=pytest.mark.slow)
-CRUSH = """
-width_m = 0.05
-[[terms]]
-type = "rigid"
-hertz_n_m15 = 2e7
-crush_force_n = 10.0
-broken_n_m = 2000.0
-"""
-FRACTURE = """
-width_m = 0.05
-[[terms]]
-type = "fracture"
-force_n = 9.0
-left = 0.3
-[[terms]]
-type = "elastic"
-k1_n_m = 4000.0
-"""
+
+
+def scene_of(*terms, **more):
+    """Return the text of a scene with these terms, whose parameters are numbers."""
+    tables = ({"type": f"'{kind}'", **values} for kind, values in terms)
+    parts = [{"width_m": 0.05, **more}, *tables]
+    return "[[terms]]\n".join("".join(f"{key} = {value}\n" for key, value in part.items()) for part in parts)
+
+
+CRUSH = scene_of(("rigid", {"hertz_n_m15": 2e7, "crush_force_n": 10.0, "broken_n_m": 2000.0}))
+FRACTURE = scene_of(("fracture", {"force_n": 9.0, "left": 0.3}), ("elastic", {"k1_n_m": 4000.0}))
 FORCED = {"tolerance": math.inf, "longest_s": 1e-3, "growth": math.inf}
 
 
@@ -185,16 +178,7 @@ LAWS = {
     "raises": lambda p, state, d0, d1, h, v1: (p.k_n_m * math.sqrt(p.limit - d1), state),
 }
 
-STUFF = """
-width_m = 0.05
-[[terms]]
-type = "elastic"
-k1_n_m = 500.0
-[[terms]]
-type = "stuff"
-k_n_m = 2000.0
-limit = 0.002
-"""
+STUFF = scene_of(("elastic", {"k1_n_m": 500.0}), ("stuff", {"k_n_m": 2000.0, "limit": 0.002}))
 
 
 @pytest.fixture
@@ -239,23 +223,17 @@ def test_a_law_that_raises_is_refused_by_name(stuff):
         run_many(SimConfig(spread=False), create("controller", "hybrid"), [stuff("raises")], [0])
 
 
-SLOSH = """
-width_m = 0.05
-[[terms]]
-type = "elastic"
-k1_n_m = 2000.0
-[[terms]]
-type = "slosh"
-mass_kg = {mass}
-frequency_hz = {frequency}
-"""
+def sloshing(frequency_hz):
+    return scene_of(
+        ("elastic", {"k1_n_m": 2000.0}), ("slosh", {"mass_kg": 0.1, "frequency_hz": frequency_hz})
+    )
 
 
 @pytest.mark.slow
 def test_steps_resolve_a_fast_oscillation_in_the_grasp_and_after_the_release():
     # The oscillation has the period of a tick: steps of a tick see it at one phase only, and are unstable after the
     # release. Fixed steps of 10 us peak at 17.738 N.
-    scene = SLOSH.format(mass=0.1, frequency=1000.0)
+    scene = sloshing(1000.0)
     for accuracy in (0.01, 0.001):
         # In the interpreter, the trial grasps would take half a minute.
         (done,) = grasped(scene, {"accuracy": accuracy, "compile": "always"}, open_gap_m=0.086)
@@ -267,7 +245,7 @@ def test_steps_resolve_a_fast_oscillation_in_the_grasp_and_after_the_release():
 @pytest.mark.parametrize(("frequency", "accuracy"), [(300.0, 1e-4), (420.0, 1e-4), (1000.0, 1e-3)])
 def test_steps_without_an_oscillation_do_not_verify_each_other(frequency, accuracy):
     # Without the slosh the peak is 17.121 N, 3.4 % less than with it.
-    scene = SLOSH.format(mass=0.1, frequency=frequency)
+    scene = sloshing(frequency)
     gripper = {"accuracy": accuracy, "compile": "always"}
     done, exact = grasped(scene, gripper, {**gripper, "fidelity": "reference"})
     peak_n, exact_n = done.report["true_peak_force_n"], exact.report["true_peak_force_n"]
@@ -275,7 +253,7 @@ def test_steps_without_an_oscillation_do_not_verify_each_other(frequency, accura
 
 
 def test_an_oscillation_that_is_too_fast_is_left_out_and_reported():
-    scene = SLOSH.format(mass=0.1, frequency=1e6)
+    scene = sloshing(1e6)
     gripper = create("sensor-backend", "sim", sensor="ideal", spread=False, object=scene)
     gripper.open(0)
     selection = gripper.report()["selection"]
