@@ -154,7 +154,7 @@ def signal_notices(recording: Recording) -> Iterator[str]:
             told += [] if doubtful else _rough(force)
         told += _drift(force)
     yield from told or _rises_at_once(mean)
-    if not {"gap", "t"} & recording.units.keys() and mean.gap.any():
+    if not {"gap", "t"} & recording.units.keys():
         yield from _bump(mean)
         yield from next(filter(None, map(list, map(_late, forces))), ())
         yield from _gap_leaps(mean.t, mean.gap)
