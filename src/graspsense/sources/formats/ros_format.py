@@ -49,8 +49,8 @@ def read_bag(path: Path, used: Collection[str] = ()) -> list[ColumnTable]:
         raise ConfigError(f"{path} cannot be read: there is no such file")
     values, times = _collected(path, used)
     clock = common_clock(path.name, times)
-    rows_ns = clock.topics[max(values, key=lambda topic: len(values[topic]))].ns
-    rows_ns = rows_ns[(rows_ns >= clock.begin_ns) & (rows_ns <= clock.end_ns)]
+    longest = max(values, key=lambda topic: len(values[topic]))
+    rows_ns = clock.topics[longest].between(clock.begin_ns, clock.end_ns)
     numbers: dict[str, Numbers] = {}
     for topic, value in values.items():
         numbers |= _held(clock.topics[topic], value, rows_ns)
