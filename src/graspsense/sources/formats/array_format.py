@@ -8,7 +8,7 @@ confirm that, unless another array that the manifest uses has a number for each 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -122,7 +122,8 @@ def _grasps(path: Path, arrays: Arrays, rules: TableRules) -> Iterator[ColumnTab
     if not solid or not axes:
         yield _of_arrays(path, arrays)
         return
-    turned = {name: _in_order(array, axes) for name, array in solid.items()}
+    order = [axes.index(axis) for axis in AXES if axis in axes]
+    turned = {name: np.transpose(array, order) for name, array in solid.items()}
     others = {name: array for name, array in arrays.items() if name not in solid}
     if GRASP not in axes:
         yield _of_arrays(path, {**others, **turned}, rows=next(iter(turned.values())).shape[0])
@@ -144,11 +145,6 @@ def _grasps(path: Path, arrays: Arrays, rules: TableRules) -> Iterator[ColumnTab
             fields={"part": str(k), **table.fields},
             warnings=(question,) if question else (),
         )
-
-
-def _in_order(array: NDArray[Any], axes: Sequence[str]) -> NDArray[Any]:
-    """Return an array with its axes in the order of `AXES`."""
-    return np.transpose(array, [axes.index(axis) for axis in AXES if axis in axes])
 
 
 def _have_a_time(arrays: Arrays, used: Collection[str]) -> bool:
