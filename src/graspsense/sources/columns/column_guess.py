@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from typing import Final
 
 import numpy as np
@@ -61,6 +61,11 @@ def words_of(name: str) -> tuple[str, ...]:
     return tuple(word.lower() for word in re.findall(r"[A-Z]?[a-z\u00b5]+|[A-Z]+(?![a-z])", name))
 
 
+def _with_words(names: Iterable[str], words: Set[str]) -> list[str]:
+    """Return the names in which one of these words stands."""
+    return [name for name in names if words & set(words_of(name))]
+
+
 def quoted(name: str) -> str:
     """Return a column as an expression names it."""
     return name if name.isidentifier() else f"'{name}'" if "'" not in name else f'"{name}"'
@@ -86,9 +91,9 @@ def guesses(table: ColumnTable) -> Iterator[Guess]:
 def time_column(table: ColumnTable) -> str | None:
     """Return the column that is most likely the time, None if none increases."""
     rising = [name for name, values in table.numbers.items() if values.ndim == 1 and _rises(values)]
-    named = [name for name in rising if TIME_WORDS & set(words_of(name))]
+    named = _with_words(rising, TIME_WORDS)
     states = [name for name in rising if known_unit(table.units.get(name, ""), "time")]
-    units = [name for name in rising if set(words_of(name)) & {"ms", "us", "ns", "sec"}]
+    units = _with_words(rising, {"ms", "us", "ns", "sec"})
     return next(iter((*states, *named, *units, *_evenly_rising(table, rising))), None)
 
 
@@ -110,22 +115,16 @@ def force_columns(table: ColumnTable, time: str | None) -> tuple[str, ...]:
     """Return the columns that are most likely forces."""
     columns = [name for name in table.numbers if name != time]
     stated = [name for name in columns if _unit(table.units.get(name, ""), "force")]
-    named = [
-        name
-        for name in columns
-        if FORCE_WORDS & set(words_of(name)) and not (GAP_WORDS | {"torque"}) & set(words_of(name))
-    ]
-    strong = [name for name in named if len(set(words_of(name)) & (FORCE_WORDS - {"f", "n", "g"}))]
+    others = _with_words(columns, GAP_WORDS | {"torque"})
+    named = [name for name in _with_words(columns, FORCE_WORDS) if name not in others]
+    strong = _with_words(named, FORCE_WORDS - {"f", "n", "g"})
     return tuple(stated or strong or named or _forces_of_fingers(table, columns))
 
 
 def _forces_of_fingers(table: ColumnTable, columns: Sequence[str]) -> list[str]:
     """Return the columns of both fingers if these are named by nothing else, and none moves before it is pressed."""
-    fingers = [
-        name
-        for name in columns
-        if FINGER_WORDS & set(words_of(name)) and not known_unit(table.units.get(name, ""), "gap")
-    ]
+    named = _with_words(columns, FINGER_WORDS)
+    fingers = [name for name in named if not known_unit(table.units.get(name, ""), "gap")]
     sided = any(_sided(fingers, pair) for pair in _SIDES)
     return fingers if sided and all(map(_rises_late, (table.numbers[name] for name in fingers))) else []
 
@@ -152,8 +151,7 @@ def _gap_columns(table: ColumnTable, taken: Sequence[str | None]) -> tuple[str, 
     """Return the column that is most likely the gap, or several of one kind, as the positions of fingers."""
     columns = [name for name, values in table.numbers.items() if name not in taken and values.ndim == 1]
     stated = [name for name in columns if known_unit(table.units.get(name, ""), "gap")]
-    named = [name for name in columns if GAP_WORDS & set(words_of(name))]
-    units = [name for name in columns if set(words_of(name)) & {"mm", "cm"}]
+    named, units = _with_words(columns, GAP_WORDS), _with_words(columns, {"mm", "cm"})
     able = [name for name in (*stated, *named, *units) if np.nanstd(table.numbers[name]) > 0.0]
     gaps = able or named
     return tuple(name for name in dict.fromkeys(gaps) if words_of(name) == words_of(gaps[0]))
@@ -199,7 +197,7 @@ def _gap(table: ColumnTable, names: Sequence[str], force: Numbers | None) -> Gue
 
 
 def _effort(table: ColumnTable, force: Numbers | None) -> Iterator[Guess]:
-    name = next((number for number in table.numbers if EFFORT_WORDS & set(words_of(number))), None)
+    name = next(iter(_with_words(table.numbers, EFFORT_WORDS)), None)
     if name is None or force is None or table.numbers[name].ndim > 1:
         return
     values = table.numbers[name]

@@ -154,7 +154,7 @@ def signal_notices(recording: Recording) -> Iterator[str]:
             told += [] if doubtful else _rough(force)
         told += _drift(force)
     yield from told or _rises_at_once(mean)
-    if not {"gap", "t"} & recording.units.keys() and mean.gap.any():
+    if not {"gap", "t"} & recording.units.keys():
         yield from _bump(mean)
         yield from next(filter(None, map(list, map(_late, forces))), ())
         yield from _gap_leaps(mean.t, mean.gap)
@@ -232,15 +232,16 @@ def _numb(pad: _Force, other: _Force) -> Iterator[str]:
 
     One that touches the object late does so for a while; one that felt it before and feels it again had failed.
     """
-    loaded, noise = other.above(LOADED), max(pad.noise, other.noise)
+    span, noise = float(np.ptp(other.n)), max(pad.noise, other.noise)
+    loaded = other.n > other.low + LOADED * span
     begin = int(loaded.argmax())
-    free = ~other.above(PART)[:begin]
-    if not free.any() or not other.span > noise:
+    free = other.n[:begin] < other.low + PART * span
+    if not free.any() or not span > noise:
         return
     zero = float(np.median(pad.n[:begin][free]))
     away = np.abs(pad.n - zero)
     loaded &= pad.gap <= pad.gap[begin]
-    numb, felt = loaded & (away < max(noise, SLIGHT * other.span)), np.flatnonzero(away > FREE * other.span)
+    numb, felt = loaded & (away < max(noise, SLIGHT * span)), np.flatnonzero(away > FREE * span)
     if np.count_nonzero(numb) < max(FEWEST, PART * np.count_nonzero(loaded)):
         numb[: felt[0] if len(felt) else None] = False
         numb[felt[-1] if len(felt) else 0 :] = False

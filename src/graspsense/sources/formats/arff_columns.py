@@ -15,7 +15,7 @@ from graspsense.core.learn.target_value import name_and_unit
 from graspsense.core.values.errors import DataDamaged, counted, listed
 from graspsense.core.values.limits import CELLS
 from graspsense.sources.formats.csv_columns import CsvColumns
-from graspsense.sources.formats.text_table import check_columns, check_lines, text_of
+from graspsense.sources.formats.text_table import check_columns, read_lines
 
 _TOKEN: Final = re.compile(
     r"""[\s,]*(?:'((?:\\.|[^'\\])*)'|"((?:\\.|[^"\\])*)"|([{}])|([^\s,{}'"][^\s,{}]*))"""
@@ -37,10 +37,8 @@ class ArffColumns(CsvColumns):
         self._numbers = None
         self._rows: list[list[str]] = []
         self.weighted = False
-        text = text_of(path)
-        check_lines(path, text)
         in_data = False
-        for self._line, line in enumerate(text.split("\n"), start=1):
+        for self._line, line in read_lines(path)[0]:
             line = line.strip()
             if not line or line.startswith("%"):
                 continue

@@ -8,12 +8,12 @@ confirm that, unless another array that the manifest uses has a number for each 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import evolve
 from numpy.typing import NDArray
 
 from graspsense.core.values.errors import ConfigError, DataDamaged, listed
@@ -22,7 +22,7 @@ from graspsense.sources.formats.hdf5_file import hdf5_arrays
 from graspsense.sources.formats.mat_file import mat_variables
 from graspsense.sources.formats.numpy_files import npy_array, npz_arrays
 from graspsense.sources.formats.patterns import file_template
-from graspsense.sources.formats.table import ColumnTable, Numbers
+from graspsense.sources.formats.table import ColumnTable, Numbers, TableRules
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -44,15 +44,6 @@ _UNITS: Final = ".units"
 """Ending of the name of a text that is the unit of an array, as the reader of HDF5 files gives it."""
 
 
-@frozen(kw_only=True)
-class ArrayRules:
-    """What a manifest says of arrays: the pattern of their names, the meaning of axes, and the columns that it uses."""
-
-    pattern: str = ""
-    axes: tuple[str, ...] = ()
-    used: Collection[str] = ()
-
-
 def arrays_in(path: Path) -> dict[str, NDArray[Any]]:
     """Return the arrays in a file by their names; the one of an NPY file has an empty name.
 
@@ -62,14 +53,17 @@ def arrays_in(path: Path) -> dict[str, NDArray[Any]]:
     return dict(_npy(path) if suffix == ".npy" else READERS[suffix](path))
 
 
-def read_arrays(path: Path, rules: ArrayRules = ArrayRules()) -> list[ColumnTable]:
+_NO_RULES: Final = TableRules()
+
+
+def read_arrays(path: Path, rules: TableRules = _NO_RULES) -> list[ColumnTable]:
     """Return the tables in a file of arrays: each array is a column, or several.
 
     Raises PluginUnavailable, ConfigError, TooLarge, DataDamaged.
     """
     return [
         table.with_fields(fields)
-        for fields, group in _groups(path, arrays_in(path), rules.pattern)
+        for fields, group in _groups(path, arrays_in(path), rules.arrays)
         for table in _grasps(path, group, rules)
     ]
 
@@ -113,11 +107,11 @@ def _groups(path: Path, arrays: Arrays, pattern: str) -> Iterator[tuple[dict[str
         yield dict(facts), group | {name: array for name, array in common.items() if name not in group}
 
 
-def _grasps(path: Path, arrays: Arrays, rules: ArrayRules) -> Iterator[ColumnTable]:
+def _grasps(path: Path, arrays: Arrays, rules: TableRules) -> Iterator[ColumnTable]:
     """Yield a table for each grasp in these arrays. Raises ConfigError, DataDamaged."""
     solid = {name: array for name, array in arrays.items() if array.ndim == 3 and array.dtype.kind in "fiub"}
     axes, question = rules.axes, ""
-    if solid and not axes and not _have_a_time(arrays, rules.used):
+    if solid and not axes and not _have_a_time(arrays, rules.samples):
         axes = (GRASP, TIME, COLUMN)
         name, shape = next((name, array.shape) for name, array in solid.items())
         question = (
@@ -128,7 +122,8 @@ def _grasps(path: Path, arrays: Arrays, rules: ArrayRules) -> Iterator[ColumnTab
     if not solid or not axes:
         yield _of_arrays(path, arrays)
         return
-    turned = {name: _in_order(array, axes) for name, array in solid.items()}
+    order = [axes.index(axis) for axis in AXES if axis in axes]
+    turned = {name: np.transpose(array, order) for name, array in solid.items()}
     others = {name: array for name, array in arrays.items() if name not in solid}
     if GRASP not in axes:
         yield _of_arrays(path, {**others, **turned}, rows=next(iter(turned.values())).shape[0])
@@ -150,11 +145,6 @@ def _grasps(path: Path, arrays: Arrays, rules: ArrayRules) -> Iterator[ColumnTab
             fields={"part": str(k), **table.fields},
             warnings=(question,) if question else (),
         )
-
-
-def _in_order(array: NDArray[Any], axes: Sequence[str]) -> NDArray[Any]:
-    """Return an array with its axes in the order of `AXES`."""
-    return np.transpose(array, [axes.index(axis) for axis in AXES if axis in axes])
 
 
 def _have_a_time(arrays: Arrays, used: Collection[str]) -> bool:

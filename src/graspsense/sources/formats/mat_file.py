@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from attrs import frozen
 from numpy.typing import NDArray
 
 from graspsense.core.values.errors import ConfigError
@@ -40,12 +39,6 @@ _COMPLEX: Final = 0x0800
 _STORED_BY_4: Final = ("f8", "f4", "i4", "i2", "u2", "u1")
 
 
-@frozen
-class _Element:
-    kind: int
-    data: bytes
-
-
 def mat_variables(path: Path) -> dict[str, NDArray[Any]]:
     """Return the variables in a MAT file by their names. Raises ConfigError, TooLarge, DataDamaged."""
     unpacked = Unpacked(path)
@@ -61,10 +54,10 @@ def mat_variables(path: Path) -> dict[str, NDArray[Any]]:
         if version >> 8 == 2:  # version 7.3
             return hdf5_arrays(path, "\n  or save the file in MATLAB with: save(NAME, '-v7')")
         variables = {}
-        for element in _elements(data[_HEADER_BYTES:], order):
-            if element.kind == _COMPRESSED:
-                (element,) = _elements(unpacked.unpack("zlib", element.data), order)
-            if element.kind == _MATRIX and (variable := _variable(element.data, order)) is not None:
+        for kind, content in _elements(data[_HEADER_BYTES:], order):
+            if kind == _COMPRESSED:
+                ((kind, content),) = _elements(unpacked.unpack("zlib", content), order)
+            if kind == _MATRIX and (variable := _variable(content, order)) is not None:
                 variables[variable[0]] = variable[1]
     if not variables:
         raise ConfigError(
@@ -74,8 +67,8 @@ def mat_variables(path: Path) -> dict[str, NDArray[Any]]:
     return variables
 
 
-def _elements(data: bytes, order: str) -> Iterator[_Element]:
-    """Yield the elements that follow each other in the data. Raises ValueError if one ends behind it."""
+def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
+    """Yield kind and content of the elements that follow each other. Raises ValueError if one ends behind the data."""
     position = 0
     while position + 8 <= len(data):
         kind, size = struct.unpack_from(f"{order}II", data, position)
@@ -84,7 +77,7 @@ def _elements(data: bytes, order: str) -> Iterator[_Element]:
             kind, size, begin = kind & 0xFFFF, kind >> 16, position + 4
         if begin + size > len(data):
             raise ValueError(f"an element of {size} bytes ends behind the file")
-        yield _Element(kind, data[begin : begin + size])
+        yield kind, data[begin : begin + size]
         position = begin + size
         if kind != _COMPRESSED:
             position += -position % 8
@@ -92,25 +85,26 @@ def _elements(data: bytes, order: str) -> Iterator[_Element]:
 
 def _variable(data: bytes, order: str) -> tuple[str, NDArray[Any]] | None:
     """Return name and value of a variable, None if it is of another class than those that are read."""
-    flags, dimensions, name, *values = _elements(data, order)
-    (word,) = struct.unpack_from(f"{order}I", flags.data)
-    shape = np.frombuffer(dimensions.data, dtype=f"{order}i4").tolist()
+    (_, flags), (_, dimensions), (_, name), *values = _elements(data, order)
+    (word,) = struct.unpack_from(f"{order}I", flags)
+    shape = np.frombuffer(dimensions, dtype=f"{order}i4").tolist()
     if not values or word & _COMPLEX or (word & 0xFF) not in (*_NUMERIC, _CHAR):
         return None
     if word & 0xFF == _CHAR:
-        text = _text(values[0], order)
-        return (name.data.decode("latin-1"), np.array([text])) if shape[:1] == [1] and text else None
-    numbers = np.frombuffer(values[0].data, dtype=f"{order}{_STORED[values[0].kind]}")
+        text = _text(*values[0], order)
+        return (name.decode("latin-1"), np.array([text])) if shape[:1] == [1] and text else None
+    kind, stored = values[0]
+    numbers = np.frombuffer(stored, dtype=f"{order}{_STORED[kind]}")
     if min(shape, default=0) < 0 or math.prod(shape) != len(numbers):
         raise ValueError(f"a variable of the shape {tuple(shape)} has {len(numbers)} numbers")
-    return name.data.decode("latin-1"), numbers.astype(_NUMERIC[word & 0xFF]).reshape(shape, order="F")
+    return name.decode("latin-1"), numbers.astype(_NUMERIC[word & 0xFF]).reshape(shape, order="F")
 
 
-def _text(element: _Element, order: str) -> str:
-    encoding = _CHARACTERS[element.kind]
+def _text(kind: int, data: bytes, order: str) -> str:
+    encoding = _CHARACTERS[kind]
     if encoding in ("utf-16", "utf-32"):
         encoding += "-le" if order == "<" else "-be"
-    return element.data.decode(encoding)
+    return data.decode(encoding)
 
 
 def _of_version_4(data: bytes) -> Iterator[tuple[str, NDArray[Any]]]:

@@ -2,34 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from pathlib import Path
 from typing import Final
 
-from attrs import field, frozen
-
 from graspsense.core.values.errors import ConfigError
 from graspsense.recording.readable import refuse_devices
-from graspsense.sources.formats.array_format import ARRAY_SUFFIXES, ArrayRules, read_arrays
-from graspsense.sources.formats.table import ColumnTable
+from graspsense.sources.formats.array_format import ARRAY_SUFFIXES, read_arrays
+from graspsense.sources.formats.table import ColumnTable, TableRules
 from graspsense.sources.formats.text_table import JSON_LINES, text_suffix
 
 TEXT_SUFFIXES: Final = (".csv", ".tsv", ".txt", ".dat", ".data", ".lvm", *JSON_LINES)
 BAG_SUFFIXES: Final = (".bag", ".mcap", ".db3")
 PARQUET_SUFFIXES: Final = (".parquet", ".pq")
 READ_SUFFIXES: Final = (*TEXT_SUFFIXES, *ARRAY_SUFFIXES, *BAG_SUFFIXES, *PARQUET_SUFFIXES)
-
-
-@frozen(kw_only=True)
-class TableRules:
-    """What a manifest says of the tables in its files: the line that begins each, their arrays, the columns of bags.
-
-    With no `used` columns, all topics of a bag are read.
-    """
-
-    start: str = ""
-    arrays: ArrayRules = field(factory=ArrayRules)
-    used: Collection[str] = ()
 
 
 def raw_tables(path: Path, rules: TableRules | None = None) -> list[ColumnTable]:
@@ -48,7 +33,7 @@ def raw_tables(path: Path, rules: TableRules | None = None) -> list[ColumnTable]
 
         return read_parquet(path)
     if suffix in ARRAY_SUFFIXES:
-        return read_arrays(path, given.arrays)
+        return read_arrays(path, given)
     if text_suffix(path) in TEXT_SUFFIXES or (rules is not None and not text_suffix(path)):
         from graspsense.sources.formats.text_format import read_text
 

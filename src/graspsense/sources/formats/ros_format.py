@@ -7,6 +7,7 @@ long as it is not too old (`topic_clocks`).
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -48,8 +49,8 @@ def read_bag(path: Path, used: Collection[str] = ()) -> list[ColumnTable]:
         raise ConfigError(f"{path} cannot be read: there is no such file")
     values, times = _collected(path, used)
     clock = common_clock(path.name, times)
-    rows_ns = clock.topics[max(values, key=lambda topic: len(values[topic]))].ns
-    rows_ns = rows_ns[(rows_ns >= clock.begin_ns) & (rows_ns <= clock.end_ns)]
+    longest = max(values, key=lambda topic: len(values[topic]))
+    rows_ns = clock.topics[longest].between(clock.begin_ns, clock.end_ns)
     numbers: dict[str, Numbers] = {}
     for topic, value in values.items():
         numbers |= _held(clock.topics[topic], value, rows_ns)
@@ -74,9 +75,10 @@ def _collected(
     DataDamaged.
     """
     columns: dict[str, dict[str, list[dict[str, Any]]]] = {}
+    topics = {name.partition(".")[0] for name in used if re.match(r"/[^.*?]+\.", name)}
     came: dict[tuple[str, str], Messages] = {}
     kept = Unpacked(path)
-    for topic, recorded_ns, message in _messages(path, {name.partition(".")[0] for name in used}):
+    for topic, recorded_ns, message in _messages(path, topics):
         numbers, names = dict(numbers_in(message, "")), _names_in(message)
         kept.add(sum(_NUMBER_BYTES + 8 * np.size(column) for column in numbers.values()))
         columns.setdefault(topic, {}).setdefault(names, []).append(numbers)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -15,6 +15,22 @@ Numbers = NDArray[np.float64]
 
 MOST_NAMES: Final = 20
 """A text column or a topic with more different names does not say by them what its numbers are of."""
+
+
+@frozen(kw_only=True)
+class TableRules:
+    """What a manifest says of the tables in its files.
+
+    `start` is the pattern of the line that begins each in a text, `arrays` that of the names of arrays, whose axes mean
+    `axes`. `samples` are the columns of time, gap and forces, `used` those and all others that it uses. With no topics
+    among them, all topics of a bag are read.
+    """
+
+    start: str = ""
+    arrays: str = ""
+    axes: tuple[str, ...] = ()
+    samples: Collection[str] = ()
+    used: Collection[str] = ()
 
 
 @frozen(kw_only=True, eq=False)

@@ -9,7 +9,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
-from attrs import define, field
 
 from graspsense.core.learn.target_value import name_and_unit
 from graspsense.core.values.errors import DataDamaged
@@ -36,13 +35,7 @@ from graspsense.sources.formats.text_table import (
     table_of,
 )
 
-
-@define
-class _Part:
-    """Consecutive lines that make up one table, with the facts of the line that begins them."""
-
-    fields: dict[str, str]
-    lines: list[Line] = field(factory=list)
+_Part = tuple[dict[str, str], Sequence[Line]]
 
 
 def read_text(path: Path, start: str = "") -> list[ColumnTable]:
@@ -68,34 +61,30 @@ def read_text(path: Path, start: str = "") -> list[ColumnTable]:
 
 def _part_table(path: Path, part: _Part, *, ended: bool, several: bool) -> ColumnTable | None:
     """Return the table of a part; None if it has no line with columns. Raises DataDamaged for the only part."""
+    fields, lines = part
     try:
-        table = table_of(path, part.lines, ended=ended)
-        return _columns(path, part, table, several=several) if table.names else None
+        table = table_of(path, lines, ended=ended)
+        return _columns(path, fields, table, several=several) if table.names else None
     except DataDamaged as error:
         if not several:
             raise
-        where = f", line {part.lines[0][0]}" if part.lines else ""
-        return ColumnTable(source=f"{path.name}{where}", fields=part.fields, damage=str(error))
+        where = f", line {lines[0][0]}" if lines else ""
+        return ColumnTable(source=f"{path.name}{where}", fields=fields, damage=str(error))
 
 
 def _parts(lines: Sequence[Line], start: str) -> Iterator[_Part]:
+    """Yield the lines of each table, with the facts of the line that begins it."""
     if not start:
-        yield _Part({}, list(lines))
+        yield {}, lines
         return
-    begins, part = regular_expression(start), None
-    for number, line in lines:
-        match = begins.search(line)
-        if match:
-            if part is not None:
-                yield part
-            part = _Part({name: value.strip() for name, value in match.groupdict(default="").items()})
-        elif part is not None:
-            part.lines.append((number, line))
-    if part is not None:
-        yield part
+    pattern = regular_expression(start)
+    begins = [(k, match) for k, (_, line) in enumerate(lines) if (match := pattern.search(line))]
+    for (k, match), end in zip(begins, [*(k for k, _ in begins[1:]), len(lines)], strict=True):
+        fields = {name: value.strip() for name, value in match.groupdict(default="").items()}
+        yield fields, lines[k + 1 : end]
 
 
-def _columns(path: Path, part: _Part, table: TextTable, *, several: bool) -> ColumnTable:
+def _columns(path: Path, fields: dict[str, str], table: TextTable, *, several: bool) -> ColumnTable:
     if not table.lines:
         raise DataDamaged(
             f"{path} names its columns in line {table.named_in}, and has no line of numbers after it"
@@ -139,7 +128,7 @@ def _columns(path: Path, part: _Part, table: TextTable, *, several: bool) -> Col
         source=f"{path.name}, line {table.named_in or table.lines[0]}" if several else path.name,
         numbers=numbers,
         texts=texts,
-        fields=part.fields,
+        fields=fields,
         units={name: unit for name, unit in units.items() if unit} | seconds,
         lines=np.array(table.lines, dtype=np.int64),
         not_numbers=not_numbers,

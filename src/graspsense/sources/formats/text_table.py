@@ -86,8 +86,13 @@ def read_lines(path: Path) -> tuple[list[Line], bool]:
     Raises ConfigError, TooLarge, DataDamaged.
     """
     text = text_of(path)
-    check_lines(path, text)
-    return list(enumerate(re.split("\r\n|[\r\n]", text), 1)), not text or text.endswith(("\n", "\r"))
+    if too_many := CELLS.exceeded(sum(map(text.count, _LINE_ENDS))):
+        raise DataDamaged(f"{path}: {too_many}")
+    lines = list(enumerate(re.split("\r\n|[\r\n]", text), 1))
+    for number, line in lines:
+        if too_long := LINE_CHARACTERS.exceeded(len(line)):
+            raise DataDamaged(f"{path}, line {number}: {too_long}")
+    return lines, not text or text.endswith(("\n", "\r"))
 
 
 def table_of(path: Path, lines: Sequence[Line], *, ended: bool = True) -> TextTable:
@@ -526,22 +531,6 @@ def _decimals(cell: str) -> int:
 def _lines_words(numbers: Sequence[int], what: str) -> str:
     some = ", ".join(map(str, numbers[:4])) + (", ..." if len(numbers) > 4 else "")
     return f"left out: {len(numbers)} {what} (line {some})"
-
-
-def check_lines(path: Path, text: str) -> None:
-    """Raise DataDamaged if a line of the text is too long, or if there are too many of them."""
-    if too_many := CELLS.exceeded(sum(map(text.count, _LINE_ENDS))):
-        raise DataDamaged(f"{path}: {too_many}")
-    most = LINE_CHARACTERS.most
-    if len(text) <= most:
-        return
-    start = number = 0
-    for number, match in enumerate(re.finditer("\r\n|[\r\n]", text), 1):
-        if match.start() - start > most:
-            raise DataDamaged(f"{path}, line {number}: {LINE_CHARACTERS.exceeded(match.start() - start)}")
-        start = match.end()
-    if too_long := LINE_CHARACTERS.exceeded(len(text) - start):
-        raise DataDamaged(f"{path}, line {number + 1}: {too_long}")
 
 
 def check_columns(path: Path, names: Sequence[str]) -> None:

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
 from attrs import field, frozen
 
 from graspsense.core.components.caller import set_option
@@ -81,19 +82,17 @@ def presses_on(features: Features, recording: Recording) -> bool:
     """
     known = dict(zip(features.names, features.values, strict=True))
     p_first, p_steady, f_steady = (known.get(name, math.nan) for name in ("p_first", "p_steady", "f_steady"))
-    later = [reading.frame for reading in recording.readings if reading.frame.gap_m <= p_steady]
-    if not later:  # also without a rest, or without a gap
+    frames = [reading.frame for reading in recording.readings]
+    gap, left, right = np.array([(each.gap_m, each.force_left_n, each.force_right_n) for each in frames]).T
+    later, both = gap <= p_steady, (left + right) / 2.0
+    if not later.any():  # also without a rest, or without a gap
         return False
-    narrowest = min(frame.gap_m for frame in later)
-    widest = max(reading.frame.gap_m for reading in recording.readings)
-    force = max((frame.force_left_n + frame.force_right_n) / 2.0 for frame in later)
+    narrowest, force = gap[later].min(), np.fmax.reduce(both[later])
+    still = RIGID * (np.fmax.reduce(gap) - narrowest)
+    lost = np.fmax.reduce(both[np.abs(gap - p_steady) <= still], initial=0.0) > LOST * max(f_steady, 0.0)
     travels_on = p_steady - narrowest >= MOST_TRAVEL * (p_first - narrowest)
-    still = RIGID * (widest - narrowest)
-    rigid = p_first - narrowest < still
-    stayed = [reading.frame for reading in recording.readings if abs(reading.frame.gap_m - p_steady) <= still]
-    if max((frame.force_left_n + frame.force_right_n) / 2.0 for frame in stayed) > LOST * max(f_steady, 0.0):
-        return True
-    return (rigid and force > PRESSED_RIGID * f_steady) or (travels_on and force > PRESSED * f_steady)
+    pressed = PRESSED_RIGID if p_first - narrowest < still else PRESSED if travels_on else math.inf
+    return bool(lost or force > pressed * f_steady)
 
 
 def refuse_useless(

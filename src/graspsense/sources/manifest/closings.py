@@ -44,22 +44,21 @@ def without_number(t_s: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
     """Yield a sentence if the force has no number in a closing."""
     known = np.isfinite(force)
     missed = [begin for begin, end in closings(gap) if known[begin:end].mean() < KNOWN]
-    if missed:
-        yield (
-            f"the fingers close {counted(len(missed), 'time')} while the force has no number (the first at "
-            f"{t_s[missed[0]]:.4g} s): these squeezes are missing"
-        )
+    yield from _told(t_s, missed, "while the force has no number", "these squeezes are missing")
 
 
 def without_rise(columns: GraspColumns, squeezes: Sequence[tuple[int, int]]) -> Iterator[str]:
     """Yield a sentence if the force does not rise in a closing; `squeezes` are the samples in which it does."""
     missed = [
-        (begin, end)
+        begin
         for begin, end in closings(columns.gap_m)
         if not any(rise < end and fall > begin for rise, fall in squeezes)
     ]
-    if missed:
-        yield (
-            f"the fingers close {counted(len(missed), 'time')} without a squeeze (the first at "
-            f"{columns.t_s[missed[0][0]]:.4g} s): was nothing between them, or did the force fail?"
-        )
+    asked = "was nothing between them, or did the force fail?"
+    yield from _told(columns.t_s, missed, "without a squeeze", asked)
+
+
+def _told(t_s: Numbers, begins: Sequence[int], how: str, asked: str) -> Iterator[str]:
+    if begins:
+        times = counted(len(begins), "time")
+        yield f"the fingers close {times} {how} (the first at {t_s[begins[0]]:.4g} s): {asked}"

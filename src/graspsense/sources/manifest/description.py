@@ -160,12 +160,12 @@ class ReadManifest:
     base: Path
     keys: Manifest
     expressions: Mapping[str, tuple[Expression, ...]]
-    channels: Mapping[str, Expression]
-    values: Mapping[str, Expression]
+    channels: Mapping[str, Expression] = field(factory=dict)
+    values: Mapping[str, Expression] = field(factory=dict)
     events: Mapping[str, Expression] = field(factory=dict)
     fast: frozenset[str] = frozenset()
     """Names of the channels that are fast channels."""
-    value_files: Mapping[str, str]
+    value_files: Mapping[str, str] = field(factory=dict)
     """Values that are in a file beside the recording: name to the name of that file."""
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import glob
 import math
 import os
-import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -22,9 +21,8 @@ from graspsense.recording.labelled_recording import LabelledRecording, Unreadabl
 from graspsense.recording.readable import each_readable
 from graspsense.recording.replayable import Recording
 from graspsense.sources.columns.grasp_columns import GraspColumns, checked_recording
-from graspsense.sources.formats.array_format import ArrayRules
-from graspsense.sources.formats.raw_tables import TableRules, raw_tables
-from graspsense.sources.formats.table import ColumnTable, Numbers
+from graspsense.sources.formats.raw_tables import raw_tables
+from graspsense.sources.formats.table import ColumnTable, Numbers, TableRules
 from graspsense.sources.formats.topic_clocks import NOTICED, PERIODS
 from graspsense.sources.manifest.description import ReadManifest, axes_of, read_manifest, texts_of
 from graspsense.sources.manifest.facts import (
@@ -255,15 +253,12 @@ def _rules(manifest: ReadManifest) -> TableRules:
     """Return what the manifest says of the tables in its files."""
     parts = [part for alternatives in manifest.expressions.values() for part in alternatives]
     further = (*manifest.channels.values(), *manifest.values.values(), *manifest.events.values())
-    texts = [part.text for part in (*parts, *further)]
     return TableRules(
         start=manifest.keys.start,
-        arrays=ArrayRules(
-            pattern=manifest.keys.arrays,
-            axes=axes_of(manifest.keys.axes),
-            used=frozenset(name for part in parts for name in part.names),
-        ),
-        used={name for text in texts for name in re.findall(r"['\"](/[^.'\"*?]+\.[^'\"]*)['\"]", text)},
+        arrays=manifest.keys.arrays,
+        axes=axes_of(manifest.keys.axes),
+        samples={name for part in parts for name in part.names},
+        used={name for part in (*parts, *further) for name in part.names},
     )
 
 

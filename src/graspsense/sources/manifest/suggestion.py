@@ -27,11 +27,10 @@ from graspsense.sources.formats.array_format import (
     COLUMN,
     GRASP,
     TIME,
-    ArrayRules,
     arrays_in,
 )
-from graspsense.sources.formats.raw_tables import READ_SUFFIXES, TEXT_SUFFIXES, TableRules, raw_tables
-from graspsense.sources.formats.table import ColumnTable
+from graspsense.sources.formats.raw_tables import READ_SUFFIXES, TEXT_SUFFIXES, raw_tables
+from graspsense.sources.formats.table import ColumnTable, TableRules
 from graspsense.sources.formats.text_table import read_lines, text_suffix
 from graspsense.sources.manifest.files import tree_below
 
@@ -203,7 +202,7 @@ def _table_of(path: Path) -> tuple[ColumnTable, list[Guess]]:
             axes = _axes(shape)
             if axes:
                 lines.append(Guess(key="axes", value=", ".join(axes), check=f"what the axes of {shape} are"))
-            return raw_tables(path, TableRules(arrays=ArrayRules(pattern=pattern, axes=axes)))[0], lines
+            return raw_tables(path, TableRules(arrays=pattern, axes=axes))[0], lines
     tables = raw_tables(path, TableRules())
     return max(tables, key=lambda table: len(table.numbers)), []
 

@@ -173,9 +173,7 @@ def threshold_factor(recordings: tuple[Recording, ...]) -> float:
     """
     if not any("force_left" in recording.units for recording in recordings):
         return 1.0
-    ranges = []
-    for recording in recordings:
-        forces = [reading.frame.force_left_n for reading in recording.readings]
-        ranges.append(max(forces) - min(forces))
-    middle = sorted(ranges)[len(ranges) // 2]
+    forces = ([reading.frame.force_left_n for reading in recording.readings] for recording in recordings)
+    ranges = sorted(max(force) - min(force) for force in forces)
+    middle = ranges[len(ranges) // 2]
     return float(10.0 ** (round(math.log10(middle)) - 1)) if middle > 0.0 else 1.0

@@ -70,13 +70,7 @@ def read_squeeze(name: str) -> Recording:
         place=path,
         base=path.parent,
         keys=Manifest(),
-        expressions={
-            **dict.fromkeys(MAPPED, ()),
-            **{quantity: tuple(parts) for quantity, parts in (given | sides).items()},
-        },
-        channels={},
-        values={},
-        value_files={},
+        expressions={quantity: tuple((given | sides).get(quantity, ())) for quantity in MAPPED},
     )
     return checked_recording(samples(described, tables[0]))
 

@@ -80,10 +80,6 @@ class ExportedTable:
         table = self._with_prefix(FIRST)
         return None if table is None or np.isnan(table.values).all() else table
 
-    def value_column(self, name: str) -> str:
-        """Return the column of a number to predict."""
-        return name if name in self.columns.cells else f"{VALUE}{name}"
-
     def _with_prefix(self, prefix: str) -> FeatureTable | None:
         names = [name for name in self.columns.names if name.startswith(prefix)]
         if not names:

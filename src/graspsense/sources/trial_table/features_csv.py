@@ -38,6 +38,7 @@ from graspsense.sources.trial_table.identifiers import (
     text_identifies,
 )
 from graspsense.sources.trial_table.summary_lines import without_summaries
+from graspsense.store.export_table import VALUE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -194,7 +195,7 @@ def _controls(
 
 def _target(columns: CsvColumns, value: str, export: ExportedTable | None, notes: list[str]) -> TargetValue:
     """Keep the lines that have the number to predict, and return the numbers. Raises ConfigError, DataDamaged."""
-    name = value if export is None else export.value_column(value)
+    name = value if export is None or value in columns.cells else f"{VALUE}{value}"
     columns.column(name, "the number to predict")
     having = [i for i, number in enumerate(columns.numbers(name)) if not math.isnan(number)]
     if not having:
