@@ -5,6 +5,7 @@ import re
 import sys
 import threading
 import time
+from functools import partial
 from math import nan
 from types import ModuleType, SimpleNamespace
 
@@ -14,6 +15,7 @@ from repository import ROOT
 
 from graspsense import load_pipeline
 from graspsense.core.components.registry import IsolatedPlugins
+from graspsense.gripper_api import Polling
 from graspsense.plugin_api import Reading, SensorBackendEntry, hookimpl
 from graspsense.testing import examine
 
@@ -58,6 +60,7 @@ def hand(monkeypatch):
         return now_s
 
     module.time = SimpleNamespace(monotonic=monotonic, sleep=sleep)
+    module.Polling = partial(Polling, clock=module.time)
     return module
 
 
