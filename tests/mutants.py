@@ -634,6 +634,7 @@ framing("channels-are-those-declared", "NaN in all", edge_left_n=nan)
 framing("time-runs-forward", "each is later than the last", t_s=1.0)
 framing("time-runs-forward", "dt_s is 1 s where", dt_s=1.0)
 framing("gap-is-in-metres", "divide by 1000", gap_m=lambda frame: 1000.0 * frame.gap_m)
+framing("gap-is-in-metres", "divide by 100)", gap_m=lambda frame: 100.0 * frame.gap_m)
 framing("forces-are-in-newtons", "give newtons", force_left_n=3000.0)
 framing(
     "velocity-is-the-rate-of-the-gap",
@@ -938,6 +939,14 @@ def _(reading):
     frame = reading.frame
     pressed = {"force_left_n": -frame.force_left_n, "force_right_n": -frame.force_right_n}
     return reading._replace(frame=frame._replace(**pressed))
+
+
+@giving("squeezes-with-what-it-is-asked", "give newtons")
+def _(reading):
+    """Forces in millinewtons, which are only seen where the fingers touch something."""
+    frame = reading.frame
+    in_mn = {"force_left_n": 1e3 * frame.force_left_n, "force_right_n": 1e3 * frame.force_right_n}
+    return reading._replace(frame=frame._replace(**in_mn)) if frame.force_left_n > 0.5 else reading
 
 
 @mutant("sensor-backend", "what-it-delivers-is-kept", "of its")

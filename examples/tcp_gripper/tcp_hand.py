@@ -8,7 +8,7 @@ from math import inf, nan
 
 from attrs import evolve, frozen
 
-from graspsense.gripper_api import DeviceClock, ReadingThread
+from graspsense.gripper_api import DeviceClock, Polling, ReadingThread
 from graspsense.plugin_api import (
     NAMES_INPUT,
     NO_PADS,
@@ -109,7 +109,7 @@ class TcpHand(SensorBackend[TcpHandConfig]):
             ) from error
         self._socket.settimeout(ANSWER_S)
         self._received, self._command, self._last_s, self._repeated = b"", (0.0, 0.0), nan, 0
-        self._clock, self._due_s = DeviceClock(), time.monotonic()
+        self._clock, self._polling = DeviceClock(), Polling(RATE_HZ)
         self._reader = ReadingThread(self._answer, name="hand")
         return DeviceInfo(
             name="hand on a socket",
@@ -125,13 +125,9 @@ class TcpHand(SensorBackend[TcpHandConfig]):
 
     def read(self, timeout_s):
         """Return the next frame; None if it is not due in this time."""
-        wait_s = self._due_s - time.monotonic()
-        if wait_s > timeout_s:
-            time.sleep(timeout_s)
-            return None
-        time.sleep(max(wait_s, 0.0))
         # Frames are due on a grid of times, so that the duration of an exchange does not lower the rate.
-        self._due_s = max(self._due_s, time.monotonic()) + 1.0 / RATE_HZ
+        if not self._polling.wait(timeout_s):
+            return None
         until_s = time.monotonic() + self.config.patience_s
         while (answer := self._exchange()) is None:
             if time.monotonic() > until_s:

@@ -151,3 +151,27 @@ def test_a_rate_with_groups_held_out_is_not_said_to_be_that_of_new_objects():
     assert evaluation.sets.unit == "groups"
     assert evaluation.headline.correct < evaluation.protocols["stratified_10_fold"].rate.correct
     assert "other grasps may have been used" in verdict(evaluation)
+
+
+def test_instances_that_are_named_by_days_of_several_classes_are_held_out_as_days():
+    rng = np.random.default_rng(2)
+    numbers = np.tile(np.repeat(np.arange(3), 4), 5)
+    days = np.repeat(["monday", "tuesday", "friday", "monday-2", "sunday"], 12)
+    values = things(numbers, rng)
+
+    def instances_of(names, **columns):
+        named = tuple(f"thing {k}#{name}" for k, name in zip(numbers, names, strict=True))
+        return without_copies(table_of(numbers, values, instances=named, **columns))
+
+    in_order = tuple(range(len(numbers)))
+    assert set(instances_of(days, order=in_order).instances) == set(days)
+    result = evaluate(learner(), instances_of(days, order=in_order))
+    assert result.headline.no_interval
+    # Numbers count the objects of a class; colours that were grasped in turns are no session; without a time, nothing
+    # tells which of them it is.
+    counted, colours = np.unique(days, return_inverse=True)[1], np.tile(["red", "green"], len(numbers) // 2)
+    assert len(set(instances_of(counted, order=in_order).instances)) == 15
+    assert len(set(instances_of(colours, order=in_order).instances)) == 6
+    unordered = instances_of(days)
+    assert len(set(unordered.instances)) == 15
+    assert unordered.notes

@@ -535,6 +535,8 @@ def test_pads_that_both_feel_more_than_the_motor_was_told():
     assert felt(100.0, 100.0, velocity=-0.01) is felt(25.0, 25.0, commands=(30.0, 0.0)) is None
     # One image that is wrong is no force.
     assert felt(100.0, 100.0, seconds=0.041) is None
+    # The default hold lasts 0.25 s: it is told within that, and ends the grasp only if it lasts longer.
+    assert not felt(41.0, 60.0, seconds=0.2).ends
 
 
 def eased(effort, friction=7.0, speed=0.01, kind=EFFORT):

@@ -5,6 +5,7 @@ import re
 import sys
 import threading
 import time
+from functools import partial
 from math import nan
 from types import ModuleType, SimpleNamespace
 
@@ -15,6 +16,7 @@ from repository import ROOT
 
 from graspsense import load_pipeline
 from graspsense.core.components.registry import IsolatedPlugins
+from graspsense.gripper_api import Polling
 from graspsense.plugin_api import Reading, SensorBackendEntry
 from graspsense.testing import examine
 
@@ -52,6 +54,7 @@ def hand(monkeypatch):
         return now_s
 
     module.time = SimpleNamespace(monotonic=monotonic, sleep=sleep)
+    module.Polling = partial(Polling, clock=module.time)
     return module
 
 

@@ -255,7 +255,8 @@ def squeezes_with_what_it_is_asked(subject: Subject) -> None:
         demand(
             most_n <= MARGIN * asked_n + grasp.device.friction_n + 1.0,
             f"it squeezes with a {name} of {most_n:.3g} where {KINDS[kind]} commands allow {asked_n:g} N: keep to "
-            "`effort_limit_n` of a command, or declare the least that it can do as `least_force_n` of its class",
+            "`effort_limit_n` of a command, or declare the least that it can do as `least_force_n` of its class"
+            + (", and give newtons" if most_n > grasp.device.effort_limit_n else ""),
         )
 
 

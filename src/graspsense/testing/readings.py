@@ -28,6 +28,7 @@ from graspsense.testing.session import sums_of
 from graspsense.testing.subject import Subject
 
 WIDEST_M: Final = 0.5
+WIDER: Final = ((20.0, "millimetres: divide by 1000"), (2.0, "centimetres: divide by 100"))
 FORGIVEN: Final = 0.25
 """Relative difference allowed between the measured and the declared rate."""
 
@@ -328,10 +329,11 @@ def gap_is_in_metres(subject: Subject) -> None:
         raise CheckSkipped("this gripper has no gap")
     if subject.session.info.units.get("gap", "m") != "m":
         raise CheckSkipped(f"a recording in {subject.session.info.units['gap']}")
+    looks = next((words for most, words in WIDER if max(gaps) > most), "")
     demand(
         min(gaps) >= -0.01 and max(gaps) <= WIDEST_M,
         f"gap_m goes from {min(gaps):g} to {max(gaps):g}: give the distance between the fingertip faces in metres"
-        + (" (this looks like millimetres: divide by 1000)" if max(gaps) > WIDEST_M else ""),
+        + (f" (these look like {looks})" if looks else ""),
     )
 
 

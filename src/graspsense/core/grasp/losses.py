@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
+from graspsense.core.values.errors import counted
 from graspsense.core.values.signals import Reading, Samples
 
 FRAMES: Final = "frames"
@@ -58,5 +59,7 @@ def lost_in_words(lost: Mapping[str, int]) -> str:
     >>> lost_in_words({"frames": 3, "pads": 1})
     'lost: 3 frames, 1 of pads'
     """
-    parts = [f"{count} {'' if name == FRAMES else 'of '}{name}" for name, count in lost.items()]
+    parts = [
+        counted(count, "frame") if name == FRAMES else f"{count} of {name}" for name, count in lost.items()
+    ]
     return f"lost: {', '.join(parts)}" if parts else ""

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import evolve
 
-from graspsense.core.learn.groups import grouped
+from graspsense.core.learn.groups import grouped, with_sessions
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import ConfigError, counted
 from graspsense.core.values.features import misfit
@@ -49,6 +49,7 @@ def without_copies(labelled: Labelled) -> Labelled:
 
     Of several copies, the one with the fewest missing features is kept; of these, the first.
     """
+    labelled = with_sessions(labelled)
     original, by_chance = _originals(labelled.table, labelled.content)
     left_out = np.flatnonzero(original != np.arange(len(labelled)))
     notes = list(labelled.notes)

@@ -7,17 +7,21 @@ to the next one, and fewer if there are more numbers to follow. More than that a
 Neighbours: where no instances are named, trials of a label that follow each other may be more alike than others, as
 grasps of one object, windows of one recording and a drifting sensor make them. They are held out in blocks, whose
 length is doubled as long as neighbouring blocks are alike. Of trials in another order, no values tell.
+
+Sessions: instances of several classes that are called by the same day or session are no objects of their class.
 """
 
 from __future__ import annotations
 
 from collections import Counter
+from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from attrs import evolve
 
 from graspsense.core.components.caller import option
+from graspsense.core.learn.labelled import class_of
 from graspsense.core.values.errors import counted
 
 if TYPE_CHECKING:
@@ -75,6 +79,41 @@ def grouped(labelled: Labelled) -> Labelled:
         grouped=labelled.instances is None,
         notes=(*labelled.notes, *notes),
     )
+
+
+def with_sessions(labelled: Labelled) -> Labelled:
+    """Return the trials with their sessions as instances, and a note, where instances are named by sessions.
+
+    Such a name is no number (`can#3` is the third can), belongs to several classes, and its trials were recorded in one
+    stretch. Without the order of recording, only a note tells of such names.
+    """
+    if labelled.instances is None:
+        return labelled
+    pairs = [tuple(instance.partition("#")[::2]) for instance in labelled.instances]
+    own = [class_of(label) for label in labelled.labels]
+    names = [name for _, name in pairs]
+    classes = {name: {kind for kind, other in pairs if other == name} for name in names}
+    if (
+        [kind for kind, _ in pairs] != own
+        or len(classes) < 2
+        or any(not name or name.isdecimal() or len(kinds) < 2 for name, kinds in classes.items())
+    ):
+        return labelled
+    if labelled.order is None:
+        note = (
+            f"instances of several classes have the same name, as {names[0]!r}, and count as different objects. If "
+            "they are sessions, state the order of recording: then whole sessions are held out"
+        )
+        return evolve(labelled, notes=(*labelled.notes, note))
+    in_time = [names[row] for row in np.argsort(labelled.order, kind="stable").tolist()]
+    stretches = 1 + sum(a != b for a, b in pairwise(in_time))
+    if stretches > len(classes):
+        return labelled
+    note = (
+        f"instances of several classes have the same name, as {names[0]!r}, and were recorded together: they are held "
+        "out as sessions, and not as objects"
+    )
+    return evolve(labelled, instances=tuple(names), notes=(*labelled.notes, note))
 
 
 def _to_the_first(group_of: Numbers) -> Numbers:

@@ -230,10 +230,10 @@ class Motor:
                 "is wrong, or something pushes them open; look at the encoder and the fingers",
                 ends=True,
             )
-        moved, commanded = ("open", "closing") if closes else ("close", "opening")
+        moved, commanded = ("open", "a closing") if closes else ("close", "an opening")
         return Fault(
             "motor reversed",
-            f"the fingers {moved} by {travel_m * 1e3:.1f} mm under a {commanded} command: check its wiring",
+            f"the fingers {moved} by {travel_m * 1e3:.1f} mm under {commanded} command: check its wiring",
             ends=True,
             relaxes=True,
         )
@@ -248,7 +248,8 @@ class FeltForce:
     """
 
     def __init__(self, rate_hz: float, pads_hz: float, friction_n: float = 0.0) -> None:
-        self._lasts_s = max(STRONG_S, PERIODS / rate_hz, 2.0 / pads_hz if pads_hz > 0.0 else 0.0)
+        self._told_s = max(OFF_S, PERIODS / rate_hz, 2.0 / pads_hz if pads_hz > 0.0 else 0.0)
+        self._ends_s = max(STRONG_S, self._told_s)
         self._friction_n = friction_n
         self._allowed_n = nan
         self._more_s = self._strong_s = 0.0
@@ -271,13 +272,13 @@ class FeltForce:
         strong = rests and self._friction_n > 0.0 and held_n > (1.0 + STRONG_SHARE) * allowed_n + STRONG_N
         self._more_s = lasting(self._more_s, more, frame.dt_s)
         self._strong_s = lasting(self._strong_s, strong, frame.dt_s)
-        if self._more_s <= self._lasts_s:
+        if self._more_s <= self._told_s:
             return None
         return Fault(
             "stronger than commanded",
             f"both pads feel {felt_n:.1f} N, and the motor was told {allowed_n:.1f} N at most: check the scale of the "
             "motor, and the calibration of the pads",
-            ends=self._strong_s > self._lasts_s,
+            ends=self._strong_s > self._ends_s,
         )
 
 

@@ -119,8 +119,8 @@ class Reports:
             return None
         return Fault(
             "frames lost",
-            f"{lost / self._expected * 100:.0f} % of the frames are missing: rates and times are less exact; check the "
-            "connection and the load of this computer",
+            f"{lost / self._expected * 100:.0f} % of the frames are missing, of {1.0 / self._period_s:.4g} a second: "
+            "rates and times are less exact; check the connection, the load of this computer and the declared rate",
             ends=lost >= ENDS_SHARE * self._expected,
         )
 
