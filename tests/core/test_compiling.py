@@ -274,7 +274,7 @@ def test_compositions_compiled_in_three_processes_stay_themselves_in_a_fourth(tm
 @pytest.mark.slow
 def test_an_edited_helper_or_constant_of_another_module_is_noticed(tmp_path):
     # numba itself looks at the file of the outermost function alone.
-    law = "import scales, helpers\n\ndef law(x):\n    return helpers.helper(x) * scales.SCALE\n"
+    law = "import scales\nfrom helpers import helper\n\ndef law(x):\n    return helper(x) * scales.SCALE\n"
     helper = "def helper(x):\n    return {} * x\n"
     told = []
     for factor, scale in ((2.0, 1.0), (2.0, 1.0), (3.0, 1.0), (3.0, 7.0)):
