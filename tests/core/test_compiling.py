@@ -319,6 +319,20 @@ def kept_in(tmp_path, monkeypatch):
     compiled_code_folder.cache_clear()
 
 
+def test_what_was_interrupted_while_it_was_compiled_is_compiled_again(kept_in, monkeypatch):
+    monkeypatch.setattr(compiling, "_COMPILED", {})
+    compiled = compile_function(bind(_scaled, helper=_thrice))
+
+    def interrupted(*given):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(compiling, "copies_if_inlined", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            compiled(2.0)
+    assert compiled(2.0) == 12.0
+
+
 def test_a_called_function_that_is_replaced_before_the_first_call_is_not_kept_under_the_old_name(
     kept_in, monkeypatch
 ):
