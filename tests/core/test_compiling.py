@@ -274,7 +274,7 @@ def test_compositions_compiled_in_three_processes_stay_themselves_in_a_fourth(tm
 @pytest.mark.slow
 def test_an_edited_helper_or_constant_of_another_module_is_noticed(tmp_path):
     # numba itself looks at the file of the outermost function alone.
-    law = "import scales, helpers\n\ndef law(x):\n    return helpers.helper(x) * scales.SCALE\n"
+    law = "import scales\nfrom helpers import helper\n\ndef law(x):\n    return helper(x) * scales.SCALE\n"
     helper = "def helper(x):\n    return {} * x\n"
     told = []
     for factor, scale in ((2.0, 1.0), (2.0, 1.0), (3.0, 1.0), (3.0, 7.0)):
@@ -317,6 +317,20 @@ def kept_in(tmp_path, monkeypatch):
     compiled_code_folder.cache_clear()
     yield tmp_path
     compiled_code_folder.cache_clear()
+
+
+def test_what_was_interrupted_while_it_was_compiled_is_compiled_again(kept_in, monkeypatch):
+    monkeypatch.setattr(compiling, "_COMPILED", {})
+    compiled = compile_function(bind(_scaled, helper=_thrice))
+
+    def interrupted(*given):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(compiling, "copies_if_inlined", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            compiled(2.0)
+    assert compiled(2.0) == 12.0
 
 
 def test_a_called_function_that_is_replaced_before_the_first_call_is_not_kept_under_the_old_name(
