@@ -118,8 +118,8 @@ def test_both_let_go_if_the_user_ends_the_run():
 
 
 def test_the_clock_of_a_device_is_shifted_to_the_common_axis_with_its_images():
-    first, later = (kind(squeezing, bottle, clock="device") for kind in (Scripted, Late))
-    _, shifted = run_pair(grasping(first), grasping(later))
+    sound, late = (kind(squeezing, bottle, clock="device") for kind in (Scripted, Late))
+    _, shifted = run_pair(grasping(sound), grasping(late))
     assert 0.0 <= shifted.trace.t_s[0] < 50.0
     assert -100.1 < shifted.report["clock_offset_s"] < 0.0
     # Images follow the frames in which they came by less than their period.

@@ -109,6 +109,18 @@ SCALE = {"curvature": 1.0, "residual_compression": 0.004, "creep": 0.004, "hyste
 """The size of features that may be zero."""
 
 
+@settings(max_examples=15, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([800, 1500]), st.sampled_from([0.7, 1.0, 1.8]))
+def test_uneven_samples_of_the_same_curve_give_the_same_features(seed, n, exponent):
+    """With samples closer than the window of the mean force, what they leave out of the curve is small."""
+    even = FEATURES.extract(grasp(EVEN, exponent=exponent))
+    other = FEATURES.extract(grasp(uneven_times(seed, n), exponent=exponent))
+    assert defined(other) == defined(even) == set(NAMES)
+    for name in NAMES:
+        rel = 0.15 if name == "relaxation_time" else 0.06
+        assert other[name] == pytest.approx(even[name], rel=rel, abs=0.02 * SCALE.get(name, 0.0)), name
+
+
 def with_samples_between(trace, t_s):
     """Return the trace with samples at further times, on the straight lines between its own."""
     t_s = np.union1d(trace.t_s, t_s[(t_s > trace.t_s[0]) & (t_s < trace.t_s[-1])])
