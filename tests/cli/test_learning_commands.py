@@ -190,29 +190,20 @@ def test_features_are_kept(csv, tmp_path):
 @every_case(
     ("arguments", "said"),
     [
-        (
-            ["evaluate", "nothing"],
-            "FILE.csv, recordings as manifest:FILE.toml, ",
-        ),
+        (["evaluate", "nothing"], "FILE.csv, recordings as manifest:FILE.toml, "),
         (["evaluate", "none.csv", "--label", "x"], "none.csv "),
         (["evaluate", "nosuch:x"], "'nosuch'. Known: icub"),
         (["evaluate", "icub:"], "names no folder"),
         (["evaluate", "icub:nowhere"], " nowhere"),
         (["evaluate", "icub:x", "--label", "y"], "--label "),
         (["evaluate", "x.csv", "--instances", "3"], "--instances "),
-        (
-            ["evaluate", "x.csv", "--states-per-instance", "one"],
-            "--states-per-instance ",
-        ),
+        (["evaluate", "x.csv", "--states-per-instance", "one"], "--states-per-instance "),
         (
             ["evaluate", "simulated", "--instances", "2", "--states-per-instance", "one"],
             "at least 4 instances",
         ),
         (["evaluate", "x.csv", "--label", "y", "--classifier", "treee"], "'treee'. Known: "),
-        (
-            ["evaluate", "x.csv", "--label", "y", "-o", "controller.ramp_s=1"],
-            "[classifier] and [features]",
-        ),
+        (["evaluate", "x.csv", "--label", "y", "-o", "controller.ramp_s=1"], "[classifier] and [features]"),
         (["evaluate", "x.csv", "--label", "y", "-o", "classifier.trees=3"], "'trees'"),
         (["evaluate", "simulated", "--instances", "0"], "1 to 1000"),
         (["evaluate", "simulated", "--trials", "0"], "0 trials per instance"),
