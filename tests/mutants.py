@@ -7,6 +7,7 @@ import random
 import sys
 import time
 from dataclasses import dataclass
+from functools import partial
 from math import inf, isnan, nan
 from typing import Any, NamedTuple
 
@@ -97,6 +98,9 @@ def override(base, check, says, *, entry=None, **attributes):
     mutant(check, says, **entry or {})(type(f"{base.__name__}{len(MUTANTS)}", (base,), body))
 
 
+peak, law, hand, nearest = (partial(override, part) for part in (Peak, Law, Hand, Nearest))
+
+
 def changed(sound, fields, *given):
     """Return a copy with these fields: values, or what a function makes of what is sound and given."""
     new = {name: value(sound, *given) if callable(value) else value for name, value in fields.items()}
@@ -150,7 +154,7 @@ class Reader(Peak):
 mutant("classes-can-be-imported", "No module named 'nowhere'", target="nowhere:Peak")(Peak)
 override(FeatureSet, "classes-can-be-imported", "does not implement extract")
 mutant("classes-can-be-imported", "does not declare `features`: write", features=None)(Peak)
-override(Peak, "declared-once", "requires stand both in the entry", requires=ENTRIES["feature-set"].requires)
+peak("declared-once", "requires stand both in the entry", requires=ENTRIES["feature-set"].requires)
 mutant("settings-have-types", "Annotate them", config=Untyped)(Peak)
 mutant("settings-declare-their-meaning", "declares no meaning", config=Undescribed)(Peak)
 mutant("settings-declare-their-meaning", 'unit="N"', config=Unitless)(Peak)
@@ -270,13 +274,8 @@ def measured_by(loop, **options):
 
 AS_EXTRACTED = "compiled-features-are-those-of-extract"
 
-override(
-    Peak, AS_EXTRACTED, "make `compiled` measure what `extract` does", compiled=measured_by(half_of_the_peak)
-)
-override(
-    *(Peak, AS_EXTRACTED, "the same tuple of floats for every grasp"),
-    compiled=measured_by(nothing_to_measure),
-)
+peak(AS_EXTRACTED, "make `compiled` measure what `extract` does", compiled=measured_by(half_of_the_peak))
+peak(AS_EXTRACTED, "the same tuple of floats for every grasp", compiled=measured_by(nothing_to_measure))
 reading(
     "handles-every-trace",
     "has no attribute 'samples'",
@@ -288,8 +287,9 @@ reading(
     "has no attribute 'time'",
     lambda trace: [event.time for event in trace.events],
 )
-override(
-    *(Peak, "reads-no-release-unless-it-says-so", "remove `reads_release=False`"),
+peak(
+    "reads-no-release-unless-it-says-so",
+    "remove `reads_release=False`",
     extract=lambda self, trace: peak_measured(self, last_gap((), trace), trace.units),
     compiled=measured_by(last_gap, reads_release=False),
 )
@@ -305,7 +305,7 @@ def commanding(check, says, **fields):
         command, after = step(params, state, reading)
         return changed(command, fields, reading.frame), after
 
-    override(Law, check, says, step=staticmethod(changed_step))
+    law(check, says, step=staticmethod(changed_step))
 
 
 def leaving(check, says, **fields):
@@ -315,7 +315,7 @@ def leaving(check, says, **fields):
         command, after = step(params, state, reading)
         return command, changed(after, fields, reading.frame)
 
-    override(Law, check, says, step=staticmethod(changed_step))
+    law(check, says, step=staticmethod(changed_step))
 
 
 class WholeParams(NamedTuple):
@@ -331,13 +331,10 @@ class Texts(NamedTuple):
 
 _grasps = itertools.count()
 
-override(Law, "step-is-a-plain-function", "staticmethod(step)", step=lambda self, *given: step(*given))
-override(Law, "params-are-numbers", "annotated float and is 1", params=lambda self: WholeParams(EFFORT, 1))
-override(Law, "state-is-numbers", "hold plain floats and ints", init=lambda self: Texts(2, 0, "calm"))
-override(
-    *(Law, "starts-in-the-approach", "begins as APPROACH"),
-    init=lambda self: Law.init(self)._replace(phase=SQUEEZE),
-)
+law("step-is-a-plain-function", "staticmethod(step)", step=lambda self, *given: step(*given))
+law("params-are-numbers", "annotated float and is 1", params=lambda self: WholeParams(EFFORT, 1))
+law("state-is-numbers", "hold plain floats and ints", init=lambda self: Texts(2, 0, "calm"))
+law("starts-in-the-approach", "begins as APPROACH", init=lambda self: Law.init(self)._replace(phase=SQUEEZE))
 leaving("types-do-not-change", "keep one type throughout", gap_m=1)
 leaving("ends-every-grasp", "leave RUNNING", outcome=0, phase=lambda after, _: min(after.phase, HOLD))
 leaving("phases-are-in-order", "one way", phase=lambda _, frame: SQUEEZE if frame.t_s < 0.5 else APPROACH)
@@ -402,7 +399,7 @@ class Teller(Law):
         return command, Telling(after.phase, after.outcome, told, after)
 
 
-override(Law, "events-are-declared", "no field `events: int`", events=("contact",))
+law("events-are-declared", "no field `events: int`", events=("contact",))
 
 
 class FreeState(NamedTuple):
@@ -487,7 +484,7 @@ def giving(check, says, **changes):
 
 def describing(check, says, **device):
     """Keep a mutant that describes itself otherwise."""
-    override(Hand, check, says, open=lambda self, seed: evolve(Hand.open(self, seed), **device))
+    hand(check, says, open=lambda self, seed: evolve(Hand.open(self, seed), **device))
 
 
 def framing(check, says, **fields):
@@ -620,18 +617,21 @@ def _(reading):
 
 
 FOLLOWING = "channels-follow-from-the-settings"
-override(
-    *(Hand, FOLLOWING, "once it is open"),
+hand(
+    FOLLOWING,
+    "once it is open",
     entry={"channels": None},
     channels=property(lambda self: DECLARED[: 8 if self._bench else 4]),
 )
-override(
-    *(Hand, FOLLOWING, "return a tuple of Channel"),
+hand(
+    FOLLOWING,
+    "return a tuple of Channel",
     entry={"channels": None},
     channels=property(lambda self: list(DECLARED)),
 )
-override(
-    *(Hand, "closing-closes", "close the fingers"),
+hand(
+    "closing-closes",
+    "close the fingers",
     apply=lambda self, command: Hand.apply(self, command._replace(value=-command.value)),
 )
 
@@ -650,19 +650,22 @@ class Unlimited(Hand):
 
 
 BECOMING = "says-what-commands-become"
-override(Hand, BECOMING, "take 'effort' out", closes_itself={"effort": "a target"})
-override(
-    *(Hand, BECOMING, "what a command of force becomes"),
+hand(BECOMING, "take 'effort' out", closes_itself={"effort": "a target"})
+hand(
+    BECOMING,
+    "what a command of force becomes",
     entry={"accepts": ("position", "force")},
     closes_itself={"position": "a target"},
 )
-override(
-    *(Hand, "accepts-every-declared-kind", "take it, or take 'force' out"),
+hand(
+    "accepts-every-declared-kind",
+    "take it, or take 'force' out",
     entry={"accepts": ("effort", "force")},
     apply=lambda self, command: Hand.apply(self, command) if command.kind == EFFORT else 1 / 0,
 )
-override(
-    *(Hand, "expect-accepts-any-controller", "raise in `open` instead"),
+hand(
+    "expect-accepts-any-controller",
+    "raise in `open` instead",
     expect=lambda self, controller, run: fail(ValueError("not that one")),
 )
 
@@ -674,15 +677,15 @@ class Objectless:
 
 
 GRASPED = "objects-can-be-grasped"
-override(Hand, GRASPED, "it holds the same thing under every label", objects=lambda self: ())
+hand(GRASPED, "it holds the same thing under every label", objects=lambda self: ())
 mutant(GRASPED, "no key 'object'", config=Objectless)(Hand)
-override(
-    *(Hand, GRASPED, "objects() gives that name"),
+hand(
+    GRASPED,
+    "objects() gives that name",
     with_object=lambda self, name: fail(UnknownName(f"no object named {name!r}")),
 )
-override(
-    *(Hand, GRASPED, "give each full name once"),
-    objects=lambda self: (ObjectKind(name="cup"), ObjectKind(name="cup")),
+hand(
+    GRASPED, "give each full name once", objects=lambda self: (ObjectKind(name="cup"), ObjectKind(name="cup"))
 )
 
 
@@ -702,10 +705,7 @@ class Unzeroed(Hand):
         self._zero = None
 
 
-@mutant("pads-can-be-zeroed", "raise TareRefused")
-class Blind(Hand):
-    def tare(self, images):
-        self._zero = images[-1]
+hand("pads-can-be-zeroed", "raise TareRefused", tare=lambda self, images: setattr(self, "_zero", images[-1]))
 
 
 @mutant("closes-in-any-state", "for the second time it raised")
@@ -774,8 +774,9 @@ class Clinging(Hand):
 override(
     *(Hand, "reports-plain-values", "numbers, text and booleans only"), report=lambda self: {"self": self}
 )
-override(
-    *(Hand, "dry-run-accepts-the-same-commands", "return a SensorBackend or None"),
+hand(
+    "dry-run-accepts-the-same-commands",
+    "return a SensorBackend or None",
     dry_run_backend=lambda self: "somebody",
 )
 
@@ -794,37 +795,31 @@ class Dicing(Nearest):
         self._model["mean"][0] += 1e-6 * _rng.random()
 
 
-class Relative(Nearest):
-    def probabilities(self, table):
-        centred = evolve(table, values=table.values - 0.1 * np.nanmean(table.values, axis=0))
-        return super().probabilities(centred)
-
-
-class Strict(Nearest):
-    def probabilities(self, table):
-        shares = super().probabilities(table)
-        shares[np.isnan(table.values).any(axis=1)] = nan
-        return shares
-
-
-class Careless(Nearest):
-    def fit(self, table, labels, seed):
-        if len(set(labels)) < 2:
-            raise ZeroDivisionError("division by zero")
-        super().fit(table, labels, seed)
-
-
-class Discriminant(Nearest):
-    def fit(self, table, labels, seed):
-        if len(labels) == len(set(labels)) == 3:
-            raise ZeroDivisionError("division by zero")
-        super().fit(table, labels, seed)
-
-
 class Filling(Nearest):
     def probabilities(self, table):
         np.nan_to_num(table.values, copy=False)
         return super().probabilities(table)
+
+
+def without_missing(self, table):
+    missing = np.isnan(table.values).any(axis=1)
+    return np.where(missing[:, None], nan, Nearest.probabilities(self, table))
+
+
+def of_all_trials(self, table):
+    centred = evolve(table, values=table.values - 0.1 * np.nanmean(table.values, axis=0))
+    return Nearest.probabilities(self, centred)
+
+
+def fitting(check, says, crashes):
+    """Keep a mutant that crashes where it is to learn such labels."""
+
+    def fit(self, table, labels, seed):
+        if crashes(labels):
+            raise ZeroDivisionError("division by zero")
+        Nearest.fit(self, table, labels, seed)
+
+    nearest(check, says, fit=fit)
 
 
 class Credulous(Nearest):
@@ -852,37 +847,50 @@ mutant("a-classifier-has-a-model-key", "extend graspsense.plugin_api.ClassifierC
 override(
     *(Nearest, "classes-are-the-labels", "a tuple of str"), classes=lambda self: list(Nearest.classes(self))
 )
-override(
-    *(Nearest, "probabilities-are-valid", "divide each row by its sum"),
+nearest(
+    "probabilities-are-valid",
+    "divide each row by its sum",
     probabilities=lambda self, table: 0.5 * Nearest.probabilities(self, table),
 )
-override(
-    *(Nearest, "probabilities-are-valid", "float64 of shape"),
+nearest(
+    "probabilities-are-valid",
+    "float64 of shape",
     probabilities=lambda self, table: Nearest.probabilities(self, table).astype(np.float32),
 )
-override(
-    *(Nearest, "separates-separable-trials", "is the order of `classes`"),
+nearest(
+    "separates-separable-trials",
+    "is the order of `classes`",
     classes=lambda self: Nearest.classes(self)[::-1],
 )
 mutant("same-seed-same-model", "draw everything from the seed")(Dicing)
-override(
-    *(Nearest, "survives-json", "keep every number in full"),
+nearest(
+    "survives-json",
+    "keep every number in full",
     to_json=lambda self: {**self._model, "mean": [round(mean, 2) for mean in self._model["mean"]]},
 )
-override(
-    *(Nearest, "survives-json", "what JSON cannot hold"),
+nearest(
+    "survives-json",
+    "what JSON cannot hold",
     to_json=lambda self: {**self._model, "mean": np.array(self._model["mean"])},
 )
-mutant("single-trials-agree", "predict each trial independently")(Relative)
-mutant("handles-missing-values", "fill or skip them")(Strict)
-mutant("one-label-is-refused-or-certain", "raise ValueError, or learn it")(Careless)
-mutant("few-trials-are-refused-or-learned", "fit on one trial of each label raised")(Discriminant)
-override(
-    *(Nearest, "explains-its-predictions", "explain says 'bottle:full_open'"),
+nearest("single-trials-agree", "predict each trial independently", probabilities=of_all_trials)
+nearest("handles-missing-values", "fill or skip them", probabilities=without_missing)
+fitting(
+    "one-label-is-refused-or-certain", "raise ValueError, or learn it", lambda labels: len(set(labels)) < 2
+)
+fitting(
+    "few-trials-are-refused-or-learned",
+    "fit on one trial of each label raised",
+    lambda labels: len(labels) == len(set(labels)) == 3,
+)
+nearest(
+    "explains-its-predictions",
+    "explain says 'bottle:full_open'",
     explain=lambda self, features: evolve(Nearest.explain(self, features), label="bottle:full_open"),
 )
-override(
-    *(Nearest, "explains-its-predictions", "give each reason in words and units"),
+nearest(
+    "explains-its-predictions",
+    "give each reason in words and units",
     explain=lambda self, features: evolve(Nearest.explain(self, features), because=()),
 )
 mutant("does-not-change-the-table", "work on a copy")(Filling)
