@@ -69,11 +69,6 @@ def test_a_gripper_with_nothing_to_trade_is_refused(capsys, tmp_path):
     assert "no accuracy to trade for time" in capsys.readouterr().err
 
 
-def test_the_group_lists_what_there_is(capsys):
-    assert ended(["tradeoff", "--help"]) == 0
-    assert "simulation" in capsys.readouterr().out
-
-
 @pytest.mark.slow
 def test_the_simulator_gets_better_with_finer_steps(capsys):
     arguments = ["--scene", "can:empty_open", "--seeds", "1", "--instances", "2", "--json"]

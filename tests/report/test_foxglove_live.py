@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import json
-import os
 import socket
 import struct
 import threading
@@ -274,23 +273,6 @@ def test_viewers_beyond_the_limit_are_refused(feed):
         for _ in range(16):
             viewers.enter_context(connect(feed.answer["address"], subprotocols=[SDK]))
         assert refused(feed) == 503
-
-
-@pytest.mark.slow
-def test_rubbish_and_a_thousand_connections_disturb_nobody(feed):
-    good = Viewer(feed)
-    crowd = []
-    for k in range(1000):
-        connection = socket.create_connection(("127.0.0.1", port_of(feed)))
-        crowd.append(connection)
-        if k % 100 == 0:
-            connection.sendall(os.urandom(20_000))
-    shown(feed)
-    good.wait_for_all()
-    for connection in crowd:
-        connection.close()
-    feed.close()
-    check_complete(good.ended())
 
 
 @pytest.mark.slow

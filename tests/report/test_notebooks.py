@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 import sys
-from html.parser import HTMLParser
 from xml.etree import ElementTree
 
 import pytest
 from attrs import evolve
 from cases import every_case
 from repository import ROOT
+from test_report import Reader
 
 from graspsense import Evaluation, Features, Prediction, load_pipeline
 from graspsense.core.components.moved_names import SPECIAL
@@ -23,36 +23,13 @@ PAGES = [*ROOT.glob("docs/**/*.md"), ROOT / "README.md", *ROOT.glob("examples/*/
 SOURCES = [*ROOT.glob("examples/**/*.py"), *ROOT.glob("src/graspsense/scaffold/templates/**/*.py.txt")]
 
 
-class Tags(HTMLParser):
-    """The balance of the tags of a piece of HTML, and its text."""
-
-    def __init__(self, html):
-        super().__init__()
-        self.open, self.text, self.seen = [], [], []
-        self.feed(html)
-
-    def handle_starttag(self, tag, attrs):
-        self.open.append(tag)
-        self.seen.append(tag)
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_startendtag(self, tag, attrs):
-        self.seen.append(tag)
-
-    def handle_data(self, data):
-        self.text.append(data)
-
-
 def shown(value):
     """Return the text of what a notebook shows; its tags are balanced, and it has no colours for text of its own."""
     html = value._repr_html_()
-    tags = Tags(html)
-    assert not tags.open
-    assert not {"script", "link", "img"} & set(tags.seen)
+    reader = Reader(html)
+    assert not reader.all("script") + reader.all("link") + reader.all("img")
     assert not re.search(r"background|[^-]color:", html)
-    return " ".join(tags.text)
+    return " ".join(reader.words)
 
 
 EVALUATION = Evaluation(
