@@ -35,13 +35,13 @@ def test_an_honest_rate_and_a_picture_of_ones_own_csv_in_one_command(csv, tmp_pa
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert "\nrate        9" in out
     assert out.startswith("c45 recognises the object and its state in 9")
-    for line in (
+    for line in [
         "instance_held_out",
         "stratified_10_fold",
         "before_contact",
         "width_only",
         "recording_order",
-    ):
+    ]:
         assert f"\n{line}" in out
     assert "confusion (rows are the truth)" in out
     assert "learning curve" in out

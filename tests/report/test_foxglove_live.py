@@ -193,22 +193,21 @@ def test_what_is_kept_for_viewers_who_come_later_does_not_grow(monkeypatch):
     assert 10_000 - len(tick) < kept[0] <= 10_000
 
 
-@every_case("path", ["", "wrong", "wrong/"])
-def test_without_the_token_nothing_is_answered(kept_feed, path):
-    assert refused(kept_feed, f"ws://127.0.0.1:{port_of(kept_feed)}/{path}") == 404
-
-
 @every_case(
-    "origin",
-    ["https://elsewhere.example", "null", "https://app.foxglove.dev.elsewhere.example"],
+    ("status", "path", "given"),
+    [
+        # Without the token, from the pages of others, and with another protocol or none.
+        *((404, path, {}) for path in ("", "wrong", "wrong/")),
+        (403, None, {"headers": {"Origin": "https://elsewhere.example"}}),
+        (403, None, {"headers": {"Origin": "null"}}),
+        (403, None, {"headers": {"Origin": "https://app.foxglove.dev.elsewhere.example"}}),
+        (400, None, {"protocols": ()}),
+        (400, None, {"protocols": ("chat",)}),
+    ],
 )
-def test_the_pages_of_others_cannot_listen(kept_feed, origin):
-    assert refused(kept_feed, headers={"Origin": origin}) == 403
-
-
-@every_case("protocols", [(), ("chat",)])
-def test_what_is_no_viewer_of_foxglove_is_told_so(kept_feed, protocols):
-    assert refused(kept_feed, protocols=protocols) == 400
+def test_only_a_viewer_of_foxglove_with_the_token_is_let_in(kept_feed, status, path, given):
+    address = None if path is None else f"ws://127.0.0.1:{port_of(kept_feed)}/{path}"
+    assert refused(kept_feed, address, **given) == status
 
 
 @every_case(

@@ -10,13 +10,13 @@ import pytest
 from attrs import evolve
 from cases import every_case
 from repository import ROOT
-from test_report import Reader
+from test_report import Reader, evaluated
 
-from graspsense import Evaluation, Features, Prediction, load_pipeline
+from graspsense import Features, Prediction, load_pipeline
 from graspsense.core.components.moved_names import SPECIAL
 from graspsense.core.values.errors import PluginUnavailable
 from graspsense.evaluation.intervals import RecognitionRate
-from graspsense.evaluation.results import Confusion, Measurement
+from graspsense.evaluation.results import Measurement
 from graspsense.testing_api import a_trial, squeeze, with_channels
 
 PAGES = [*ROOT.glob("docs/**/*.md"), ROOT / "README.md", *ROOT.glob("examples/*/README.md")]
@@ -32,23 +32,14 @@ def shown(value):
     return " ".join(reader.words)
 
 
-EVALUATION = Evaluation(
+EVALUATION = evolve(
+    evaluated(75, None),
     source="simulated <grasps>",
     classifier="c45",
-    target="both",
-    features=(("p_first", "m"),),
-    folds=4,
-    seed=0,
     protocol="stratified_4_fold",
     headline=RecognitionRate(15, 20),
-    confusion=Confusion(("a", "b"), ((8, 2), (3, 7))),
-    protocols={"stratified_4_fold": Measurement("4 folds", RecognitionRate(15, 20))},
     controls={"width_only": Measurement("the width alone", reason="there is no width")},
-    by_class={},
-    unknown=RecognitionRate(0, 20),
-    learning_curve=(),
     warnings=("the order alone reveals the label",),
-    notes=(),
 )
 
 
@@ -210,7 +201,6 @@ def test_a_notebook_of_what_the_page_shows_is_executed(tmp_path, monkeypatch):
     assert (tmp_path / "grasp.png").stat().st_size > 10_000
     assert "protocol or control" in evaluation["text/html"]
     assert evaluation["text/plain"].startswith("<Evaluation: ")
-    assert "<svg" in by_cell["trial.trace"]["text/html"]
-    assert "p_first" in by_cell["trial.features"]["text/html"]
-    assert "odwalla:full_open" in by_cell["trial.prediction"]["text/html"]
+    for cell, word in zip(shown_alone, ("<svg", "p_first", "odwalla:full_open"), strict=True):
+        assert word in by_cell[cell]["text/html"]
     assert "<Trial: steady, " in by_cell["repr(trial)"]["text/plain"]
