@@ -5,9 +5,11 @@ from __future__ import annotations
 import itertools
 import random
 import sys
-from dataclasses import dataclass, field
-from math import inf, nan
-from typing import Any, ClassVar, NamedTuple
+import time
+from dataclasses import dataclass
+from functools import partial
+from math import inf, isnan, nan
+from typing import Any, NamedTuple
 
 import attrs
 import numpy as np
@@ -20,10 +22,8 @@ from parts import (
     Hand,
     HandConfig,
     Law,
-    LawConfig,
     Nearest,
     Peak,
-    PeakConfig,
     channels,
 )
 
@@ -37,13 +37,16 @@ from graspsense.plugin_api import (
     STEADY,
     VELOCITY,
     Channel,
-    ClassifierConfig,
+    Classifier,
     Command,
+    Controller,
     Feature,
     Features,
+    FeatureSet,
     Image,
     ObjectKind,
     Reading,
+    SensorBackend,
     UnknownName,
     setting,
     signal_type,
@@ -58,56 +61,62 @@ class Mutant:
     check: str
     says: str
     entry: Any
-    keys: dict = field(default_factory=dict)
 
 
 MUTANTS: list[Mutant] = []
-_numbers = itertools.count()
+ROLES = {
+    FeatureSet: "feature-set",
+    Controller: "controller",
+    SensorBackend: "sensor-backend",
+    Classifier: "classifier",
+}
 _rng = random.Random(3)
 
 
-def mutant(role, check, says, *, config=None, keys=None, **changes):
+def mutant(check, says, *, config=None, **changes):
     """Keep a class as the mutant of a check, whose failure contains `says`; `changes` are to its entry."""
 
     def keep(cls):
         # What imports it finds it in this module.
         module = sys.modules[__name__]
-        name = f"Mutant{next(_numbers)}"
+        name = f"Mutant{len(MUTANTS)}"
         setattr(module, name, cls)
         where = {"target": f"mutants:{name}"}
         if config is not None:
             setattr(module, f"{name}Config", config)
             where["config"] = f"mutants:{name}Config"
-        MUTANTS.append(Mutant(role, check, says, evolve(ENTRIES[role], **{**where, **changes}), keys or {}))
+        (role,) = [role for kind, role in ROLES.items() if issubclass(cls, kind)]
+        MUTANTS.append(Mutant(role, check, says, evolve(ENTRIES[role], **{**where, **changes})))
         return cls
 
     return keep
 
 
+def override(base, check, says, *, entry=None, **attributes):
+    """Keep a mutant that has these attributes in place of those of `base`; `entry` are changes to its entry."""
+    body = {"__module__": __name__, **attributes}
+    mutant(check, says, **entry or {})(type(f"{base.__name__}{len(MUTANTS)}", (base,), body))
+
+
+peak, law, hand, nearest = (partial(override, part) for part in (Peak, Law, Hand, Nearest))
+
+
+def changed(sound, fields, *given):
+    """Return a copy with these fields: values, or what a function makes of what is sound and given."""
+    new = {name: value(sound, *given) if callable(value) else value for name, value in fields.items()}
+    return sound._replace(**new) if isinstance(sound, tuple) else evolve(sound, **new)
+
+
+def fail(error):
+    raise error
+
+
 # What holds for every component.
-
-mutant("feature-set", "classes-can-be-imported", "No module named 'nowhere'", target="nowhere:Peak")(Peak)
-
-
-@mutant("feature-set", "classes-can-be-imported", "does not implement extract")
-class Methodless(Peak.__mro__[1]):
-    pass
-
-
-mutant("feature-set", "classes-can-be-imported", "does not declare `features`: write", features=None)(Peak)
-
-
-@mutant("feature-set", "declared-once", "requires stand both in the entry and in")
-class Twice(Peak):
-    requires = ENTRIES["feature-set"].requires
 
 
 @attrs.frozen
 class Untyped:
     side = attrs.field(default="left")
-
-
-mutant("feature-set", "settings-have-types", "Annotate them", config=Untyped)(Peak)
 
 
 @frozen(kw_only=True)
@@ -120,16 +129,9 @@ class Unitless:
     threshold_n: float = setting(default=3.0, meaning="Least force.")
 
 
-mutant("feature-set", "settings-declare-their-meaning", "declares no meaning", config=Undescribed)(Peak)
-mutant("feature-set", "settings-declare-their-meaning", 'unit="N"', config=Unitless)(Peak)
-
-
 @frozen(kw_only=True)
 class WholeDefault:
     threshold_n: float = 3
-
-
-mutant("feature-set", "defaults-are-what-their-types-say", "write 3.0", config=WholeDefault)(Peak)
 
 
 @frozen(kw_only=True)
@@ -137,18 +139,11 @@ class Creeping:
     side_n: float = attrs.field(default=1.0, converter=lambda x: 2.0 * x)
 
 
-mutant("feature-set", "settings-survive-a-file", "A converter", config=Creeping)(Peak)
-
-
 @attrs.define(kw_only=True)
 class Mutable:
     side: str = "left"
 
 
-mutant("feature-set", "settings-cannot-be-changed", "@frozen", config=Mutable)(Peak)
-
-
-@mutant("feature-set", "making-one-does-nothing", "open a file")
 class Reader(Peak):
     def __init__(self, config):
         super().__init__(config)
@@ -156,99 +151,44 @@ class Reader(Peak):
             file.read()
 
 
-mutant("feature-set", "summary-is-one-line", "in one line", summary="two\nlines")(Peak)
+mutant("classes-can-be-imported", "No module named 'nowhere'", target="nowhere:Peak")(Peak)
+override(FeatureSet, "classes-can-be-imported", "does not implement extract")
+mutant("classes-can-be-imported", "does not declare `features`: write", features=None)(Peak)
+peak("declared-once", "requires stand both in the entry", requires=ENTRIES["feature-set"].requires)
+mutant("settings-have-types", "Annotate them", config=Untyped)(Peak)
+mutant("settings-declare-their-meaning", "declares no meaning", config=Undescribed)(Peak)
+mutant("settings-declare-their-meaning", 'unit="N"', config=Unitless)(Peak)
+mutant("defaults-are-what-their-types-say", "write 3.0", config=WholeDefault)(Peak)
+mutant("settings-survive-a-file", "A converter", config=Creeping)(Peak)
+mutant("settings-cannot-be-changed", "@frozen", config=Mutable)(Peak)
+mutant("making-one-does-nothing", "open a file")(Reader)
+mutant("summary-is-one-line", "in one line", summary="two\nlines")(Peak)
 
 
 # Feature sets.
 
 
-def featuring(check, says, **changes):
-    """Keep a mutant whose `extract` is the decorated function of the sound features and the trace."""
-
-    def keep(change):
-        class Changed(Peak):
-            def extract(self, trace):
-                return change(super().extract(trace), trace)
-
-        return mutant("feature-set", check, says, **changes)(Changed)
-
-    return keep
+def featuring(check, says, *, entry=None, **fields):
+    """Keep a mutant whose features have these fields, which a function makes of the sound ones and the trace."""
+    override(
+        *(Peak, check, says),
+        entry=entry,
+        extract=lambda self, trace: changed(Peak.extract(self, trace), fields, trace),
+    )
 
 
-@featuring("returns-the-declared-features", "make `features` and what extract returns the same")
-def _(features, trace):
-    return evolve(features, names=("summit",), reasons={"summit": "none"})
+def measuring(check, says, value):
+    """Keep a mutant whose only value is what a function makes of the sound one and the trace."""
+    featuring(check, says, values=lambda features, trace: (value(features.values[0], trace),))
 
 
-@featuring("returns-the-declared-features", "peak in mN")
-def _(features, trace):
-    return evolve(features, units=("mN",))
-
-
-@featuring(
-    "units-are-of-the-si", "'newton'", features=(Feature("peak", "newton", "the largest force of the pads"),)
-)
-def _(features, trace):
-    return evolve(features, units=("newton",))
-
-
-@featuring("values-are-floats", "write float(...)")
-def _(features, trace):
-    return evolve(features, values=(features.values[0] if features.reasons else int(features.values[0]),))
-
-
-@featuring("values-are-floats", "of type float64")
-def _(features, trace):
-    return evolve(features, values=(np.float64(features.values[0]),))
-
-
-@featuring("a-whole-grasp-has-features", "every feature is missing")
-def _(features, trace):
-    return evolve(features, values=(nan,), reasons={"peak": "too lazy"})
-
-
-@featuring("handles-every-trace", "ValueError")
-def _(features, trace):
-    trace.gap_m.max()
-    return features
-
-
-@featuring("handles-a-trace-that-ends-anywhere", "on trace.until(")
-def _(features, trace):
-    if 0.3 < trace.t_s[-1:].sum() < 0.4:
-        raise IndexError("no contact yet")
-    return features
-
-
-_calls = itertools.count()
-
-
-@featuring("same-trace-same-features", "keep no state between calls")
-def _(features, trace):
-    return evolve(features, values=(features.values[0] + next(_calls),))
-
-
-@featuring("does-not-change-the-trace", "force_left_n.copy()")
-def _(features, trace):
-    trace.force_left_n[:] = 0.0
-    return features
-
-
-@featuring("requires-what-it-reads", "add the channels that it reads to `requires`")
-def _(features, trace):
-    known = trace.force_right_n[~np.isnan(trace.force_right_n)]
-    return evolve(features, values=(features.values[0] + float(known.sum()),))
-
-
-@featuring("independent-of-the-start-of-the-clock", "use differences of times")
-def _(features, trace):
-    return evolve(features, values=(features.values[0] + float(trace.t_s[-1:].sum()),))
-
-
-@featuring("views-and-copies-agree", "the memory behind them")
-def _(features, trace):
-    whole = trace.gap_m.base if trace.gap_m.base is not None else trace.gap_m
-    return evolve(features, values=(features.values[0] + len(whole),))
+def reading(check, says, read, **entry):
+    """Keep a mutant that does this with the trace before it measures as it should."""
+    override(
+        *(Peak, check, says),
+        entry=entry,
+        extract=lambda self, trace: (read(trace), Peak.extract(self, trace))[1],
+    )
 
 
 class Complex(float):
@@ -260,9 +200,55 @@ class Complex(float):
     __hash__ = None
 
 
-@featuring("survives-json", "through JSON")
-def _(features, trace):
-    return evolve(features, values=(Complex(features.values[0]),))
+NEWTON = (Feature("peak", "newton", "the largest force of the pads"),)
+REQUIRED = ENTRIES["feature-set"].requires
+AS_DECLARED = "returns-the-declared-features"
+_calls = itertools.count()
+
+featuring(
+    AS_DECLARED,
+    "make `features` and what extract returns the same",
+    names=("summit",),
+    reasons={"summit": ""},
+)
+featuring(AS_DECLARED, "peak in mN", units=("mN",))
+featuring("units-are-of-the-si", "'newton'", entry={"features": NEWTON}, units=("newton",))
+featuring("a-whole-grasp-has-features", "every feature is missing", values=(nan,), reasons={"peak": "lazy"})
+measuring("values-are-floats", "write float(...)", lambda peak, trace: peak if isnan(peak) else int(peak))
+measuring("values-are-floats", "of type float64", lambda peak, trace: np.float64(peak))
+measuring("same-trace-same-features", "no state between calls", lambda peak, trace: peak + next(_calls))
+measuring("survives-json", "through JSON", lambda peak, trace: Complex(peak))
+measuring(
+    "requires-what-it-reads",
+    "add the channels that it reads to `requires`",
+    lambda peak, trace: peak + float(np.nansum(trace.force_right_n)),
+)
+measuring(
+    "independent-of-the-start-of-the-clock",
+    "use differences of times",
+    lambda peak, trace: peak + float(trace.t_s[-1:].sum()),
+)
+measuring(
+    "views-and-copies-agree",
+    "the memory behind them",
+    lambda peak, trace: peak + len(trace.gap_m if trace.gap_m.base is None else trace.gap_m.base),
+)
+
+
+def stop_early(trace):
+    if 0.3 < trace.t_s[-1:].sum() < 0.4:
+        raise IndexError("no contact yet")
+
+
+reading("handles-every-trace", "ValueError", lambda trace: trace.gap_m.max())
+reading("handles-a-trace-that-ends-anywhere", "on trace.until(", stop_early)
+reading("does-not-change-the-trace", "force_left_n.copy()", lambda trace: trace.force_left_n.fill(0.0))
+reading(
+    "does-not-change-the-trace",
+    "changed signals['acceleration'].values of the trace",
+    lambda trace: trace.signals["acceleration"].values.fill(0.0),
+    requires=(*REQUIRED, ACCELERATION),
+)
 
 
 def half_of_the_peak(params, ticks):
@@ -273,93 +259,68 @@ def nothing_to_measure(params, ticks):
     return ()
 
 
+def last_gap(params, ticks):
+    return (ticks.gap_m[-1] if len(ticks.gap_m) else 0.0,)
+
+
 def peak_measured(feature_set, measured, units):
     (peak,) = measured
     return Features(names=("peak",), values=(peak,), units=("N",))
 
 
-@mutant(
-    "feature-set", "compiled-features-are-those-of-extract", "make `compiled` measure what `extract` does"
+def measured_by(loop, **options):
+    return CompiledFeatures(loop, lambda feature_set: (), peak_measured, **options)
+
+
+AS_EXTRACTED = "compiled-features-are-those-of-extract"
+
+peak(AS_EXTRACTED, "make `compiled` measure what `extract` does", compiled=measured_by(half_of_the_peak))
+peak(AS_EXTRACTED, "the same tuple of floats for every grasp", compiled=measured_by(nothing_to_measure))
+reading(
+    "handles-every-trace",
+    "has no attribute 'samples'",
+    lambda trace: trace.signals["acceleration"].samples,
+    requires=(ACCELERATION,),
 )
-class CompiledForAnother(Peak):
-    compiled = CompiledFeatures(half_of_the_peak, lambda feature_set: (), peak_measured)
-
-
-@mutant("feature-set", "compiled-features-are-those-of-extract", "the same tuple of floats for every grasp")
-class CompiledWithoutNumbers(Peak):
-    compiled = CompiledFeatures(nothing_to_measure, lambda feature_set: (), peak_measured)
-
-
-@mutant("feature-set", "handles-every-trace", "has no attribute 'samples'", requires=(ACCELERATION,))
-class MisreadsSamples(Peak):
-    def extract(self, trace):
-        return peak_measured(self, (float(trace.signals["acceleration"].samples.max()),), trace.units)
-
-
-@mutant("feature-set", "a-whole-grasp-has-features", "has no attribute 'time'")
-class MisreadsEvents(Peak):
-    def extract(self, trace):
-        return peak_measured(self, [event.time for event in trace.events], trace.units)
-
-
-@mutant(
-    "feature-set",
-    "does-not-change-the-trace",
-    "changed signals['acceleration'].values of the trace",
-    requires=(*ENTRIES["feature-set"].requires, ACCELERATION),
+reading(
+    "a-whole-grasp-has-features",
+    "has no attribute 'time'",
+    lambda trace: [event.time for event in trace.events],
 )
-class ChangesSamples(Peak):
-    def extract(self, trace):
-        trace.signals["acceleration"].values[:] = 0.0
-        return super().extract(trace)
-
-
-def last_gap(params, ticks):
-    return (ticks.gap_m[-1] if len(ticks.gap_m) else 0.0,)
-
-
-@mutant("feature-set", "reads-no-release-unless-it-says-so", "remove `reads_release=False`")
-class ReadsTheRelease(Peak):
-    def extract(self, trace):
-        return peak_measured(self, last_gap((), trace), trace.units)
-
-    compiled = CompiledFeatures(last_gap, lambda feature_set: (), peak_measured, reads_release=False)
+peak(
+    "reads-no-release-unless-it-says-so",
+    "remove `reads_release=False`",
+    extract=lambda self, trace: peak_measured(self, last_gap((), trace), trace.units),
+    compiled=measured_by(last_gap, reads_release=False),
+)
 
 
 # Controllers.
 
 
-def ruling(check, says, **changes):
-    """Keep a mutant whose step is the decorated function of params, state, frame and the sound step's answer."""
+def commanding(check, says, **fields):
+    """Keep a mutant whose commands have these fields, which a function makes of the sound command and the frame."""
 
-    def keep(change):
-        class Changed(Law):
-            @staticmethod
-            def step(params, state, reading):
-                frame = reading.frame
-                command, after = step(params, state, reading)
-                return change(command, after, frame)
+    def changed_step(params, state, reading):
+        command, after = step(params, state, reading)
+        return changed(command, fields, reading.frame), after
 
-        return mutant("controller", check, says, **changes)(Changed)
-
-    return keep
+    law(check, says, step=staticmethod(changed_step))
 
 
-@mutant("controller", "step-is-a-plain-function", "staticmethod(step)")
-class Bound(Law):
-    def step(self, params, state, reading):
-        return step(params, state, reading)
+def leaving(check, says, **fields):
+    """Keep a mutant whose states have these fields, which a function makes of the sound state and the frame."""
+
+    def changed_step(params, state, reading):
+        command, after = step(params, state, reading)
+        return command, changed(after, fields, reading.frame)
+
+    law(check, says, step=staticmethod(changed_step))
 
 
 class WholeParams(NamedTuple):
     kind: int
     speed_m_s: float
-
-
-@mutant("controller", "params-are-numbers", "annotated float and is 1")
-class WholeSpeed(Law):
-    def params(self):
-        return WholeParams(EFFORT, 1)
 
 
 class Texts(NamedTuple):
@@ -368,59 +329,42 @@ class Texts(NamedTuple):
     mode: str
 
 
-@mutant("controller", "state-is-numbers", "hold plain floats and ints")
-class Moody(Law):
-    def init(self):
-        return Texts(2, 0, "calm")
+_grasps = itertools.count()
+
+law("step-is-a-plain-function", "staticmethod(step)", step=lambda self, *given: step(*given))
+law("params-are-numbers", "annotated float and is 1", params=lambda self: WholeParams(EFFORT, 1))
+law("state-is-numbers", "hold plain floats and ints", init=lambda self: Texts(2, 0, "calm"))
+law("starts-in-the-approach", "begins as APPROACH", init=lambda self: Law.init(self)._replace(phase=SQUEEZE))
+leaving("types-do-not-change", "keep one type throughout", gap_m=1)
+leaving("ends-every-grasp", "leave RUNNING", outcome=0, phase=lambda after, _: min(after.phase, HOLD))
+leaving("phases-are-in-order", "one way", phase=lambda _, frame: SQUEEZE if frame.t_s < 0.5 else APPROACH)
+leaving(
+    "handles-frames-of-nan",
+    "NaN gives the safe result",
+    phase=lambda after, frame: after.phase + 0 * int(frame.gap_m),
+)
+commanding("commands-are-numbers", "of type int: write a float", value=3)
+commanding("commands-are-of-declared-kinds", "add it to `commands`", kind=POSITION)
+commanding(
+    "commands-are-finite", "bound it", value=lambda command, frame: inf if frame.t_s > 1.0 else command.value
+)
+commanding("commands-are-finite", "a limit of 0 or more", effort_limit_n=nan)
+commanding(
+    "same-tick-same-command", "but its arguments", value=lambda command, _: command.value + _rng.random()
+)
+commanding(
+    "grasps-are-independent",
+    "keep no state in the class",
+    value=lambda command, _: command.value + 1e-6 * next(_grasps),
+)
+commanding(
+    "requires-what-it-reads",
+    "add what it reads to `requires`",
+    value=lambda command, frame: command.value * (frame.force_left_n <= 1.0),
+)
 
 
-@mutant("controller", "starts-in-the-approach", "begins as APPROACH")
-class Hasty(Law):
-    def init(self):
-        return super().init()._replace(phase=SQUEEZE)
-
-
-@ruling("types-do-not-change", "keep one type throughout")
-def _(command, after, frame):
-    return command, after._replace(gap_m=1)
-
-
-@ruling("commands-are-numbers", "of type int: write a float")
-def _(command, after, frame):
-    return command._replace(value=3), after
-
-
-@ruling("commands-are-of-declared-kinds", "add it to `commands`")
-def _(command, after, frame):
-    return command._replace(kind=POSITION), after
-
-
-@ruling("commands-are-finite", "bound it")
-def _(command, after, frame):
-    return (command._replace(value=inf) if frame.t_s > 1.0 else command), after
-
-
-@ruling("commands-are-finite", "a limit of 0 or more")
-def _(command, after, frame):
-    return command._replace(effort_limit_n=nan), after
-
-
-@ruling("same-tick-same-command", "nothing but its arguments")
-def _(command, after, frame):
-    return command._replace(value=command.value + _rng.random()), after
-
-
-class Hidden(NamedTuple):
-    """A state that loses what it remembers when it is written down."""
-
-    phase: int
-    outcome: int
-    begun_t_s: float
-    gap_m: float
-    still: Any
-
-
-@mutant("controller", "state-holds-everything", "keep everything in the state")
+@mutant("state-holds-everything", "keep everything in the state")
 class Forgetful(Law):
     @staticmethod
     def step(params, state, reading):
@@ -440,10 +384,9 @@ class Telling(NamedTuple):
     inner: Any
 
 
+@mutant("events-are-declared", "set bit i for the i-th name")
 class Teller(Law):
-    """A law that tells the event `contact` in the tick in which the squeeze begins."""
-
-    events = ("contact",)
+    """A law that tells an undeclared event in the tick in which the squeeze begins."""
 
     def init(self):
         inner = super().init()
@@ -454,6 +397,9 @@ class Teller(Law):
         command, after = step(params, state.inner, reading)
         told = int(after.phase > state.phase == APPROACH)
         return command, Telling(after.phase, after.outcome, told, after)
+
+
+law("events-are-declared", "no field `events: int`", events=("contact",))
 
 
 class FreeState(NamedTuple):
@@ -489,90 +435,35 @@ def free_end_that_forgets(params, state, n, effort_n, t_s):
     return state
 
 
-class FreeController(Law):
-    step = staticmethod(free_step)
-    free_motion = FreeMotion(free_begin, free_command, free_end)
-
-    def init(self):
-        return FreeState(APPROACH, 0, 0)
-
-
-@mutant("controller", "free-motion-is-step", "the law of free motion commands 2.0 N")
-class ControllerWithFreeMotionOfAnother(FreeController):
-    free_motion = FreeMotion(free_begin, free_command_of_another_law, free_end)
-
-
-@mutant("controller", "free-motion-is-step", "set every field that `step` changes")
-class ControllerWithForgettingFreeMotion(FreeController):
-    free_motion = FreeMotion(free_begin, free_command, free_end_that_forgets)
+for says, motion in (
+    ("the law of free motion commands 2.0 N", FreeMotion(free_begin, free_command_of_another_law, free_end)),
+    ("set every field that `step` changes", FreeMotion(free_begin, free_command, free_end_that_forgets)),
+):
+    override(
+        *(Law, "free-motion-is-step", says),
+        # A function of its own: the law of free motion is that of the step.
+        step=staticmethod(lambda *given: free_step(*given)),
+        init=lambda self: FreeState(APPROACH, 0, 0),
+        free_motion=motion,
+    )
 
 
 def pushing(params, state, reading):
-    _, after = step(params, state, reading)
-    return Command(VELOCITY, -0.01, 15.0, inf), after
+    return Command(VELOCITY, -0.01, 15.0, inf), step(params, state, reading)[1]
 
 
-@mutant("controller", "says-what-it-asks-for", "asked_force_n returns None", commands=("velocity",))
-class Silent(Law):
-    step = staticmethod(pushing)
-
-    def asked_speed_m_s(self):
-        return 0.01
-
-
-@mutant("controller", "says-what-it-asks-for", "return the force that it commands", commands=("velocity",))
-class Understating(Silent):
-    def asked_force_n(self):
-        return 5.0
-
-
-@mutant("controller", "says-what-it-asks-for", "return the speed that it commands", commands=("velocity",))
-class Overstating(Silent):
-    def asked_force_n(self):
-        return 15.0
-
-    def asked_speed_m_s(self):
-        return 0.02
-
-
-@mutant("controller", "events-are-declared", "set bit i for the i-th name")
-class TellsAnother(Teller):
-    events = ()
-
-
-@mutant("controller", "events-are-declared", "no field `events: int`")
-class TellsNothing(Law):
-    events = ("contact",)
-
-
-_grasps: list[float] = []
-
-
-@ruling("grasps-are-independent", "keep no state in the class")
-def _(command, after, frame):
-    _grasps.append(frame.t_s)
-    return command._replace(value=command.value + 1e-6 * len(_grasps)), after
-
-
-@ruling("requires-what-it-reads", "add what it reads to `requires`")
-def _(command, after, frame):
-    return (command._replace(value=0.0) if frame.force_left_n > 1.0 else command), after
-
-
-@ruling("handles-frames-of-nan", "NaN gives the safe result")
-def _(command, after, frame):
-    int(frame.gap_m)
-    return command, after
-
-
-@ruling("phases-are-in-order", "a grasp goes one way")
-def _(command, after, frame):
-    return command, after._replace(phase=SQUEEZE if frame.t_s < 0.5 else 2)
-
-
-@ruling("ends-every-grasp", "leave RUNNING")
-def _(command, after, frame):
-    return command, after._replace(outcome=0, phase=min(after.phase, HOLD))
+for says, force_n, speed_m_s in (
+    ("asked_force_n returns None", None, 0.01),
+    ("return the force that it commands", 5.0, 0.01),
+    ("return the speed that it commands", 15.0, 0.02),
+):
+    override(
+        *(Law, "says-what-it-asks-for", says),
+        entry={"commands": ("velocity",)},
+        step=staticmethod(pushing),
+        asked_force_n=lambda self, force_n=force_n: force_n,
+        asked_speed_m_s=lambda self, speed_m_s=speed_m_s: speed_m_s,
+    )
 
 
 # Grippers.
@@ -586,222 +477,178 @@ def giving(check, says, **changes):
             def read(self, timeout_s):
                 return change(super().read(timeout_s))
 
-        return mutant("sensor-backend", check, says, **changes)(Changed)
+        return mutant(check, says, **changes)(Changed)
 
     return keep
 
 
 def describing(check, says, **device):
     """Keep a mutant that describes itself otherwise."""
+    hand(check, says, open=lambda self, seed: evolve(Hand.open(self, seed), **device))
 
-    class Changed(Hand):
-        def open(self, seed):
-            return evolve(super().open(seed), **device)
 
-    mutant("sensor-backend", check, says)(Changed)
+def framing(check, says, **fields):
+    """Keep a mutant whose frames have these fields, which a function makes of the sound frame."""
+    giving(check, says)(lambda reading: reading._replace(frame=changed(reading.frame, fields)))
 
+
+def padding(check, says, **fields):
+    """Keep a mutant whose images of the pads have these fields, which a function makes of the sound image."""
+    giving(check, says)(lambda reading: reading._replace(pads=changed(reading.pads, fields)))
+
+
+def sampling(check, says, change):
+    """Keep a mutant whose block of samples is what a function makes of the sound one."""
+
+    @giving(check, says)
+    def _(reading):
+        block = change(reading.signals.acceleration)
+        return reading._replace(signals=reading.signals._replace(acceleration=block))
+
+
+def seeing(says, image):
+    """Keep a mutant with a camera, whose image this function makes of the pixels of the driver."""
+
+    class Seeing(Hand):
+        pixels = np.zeros((2, 2), np.uint8)
+
+        def read(self, timeout_s):
+            frame, pads, signals = super().read(timeout_s)
+            self.pixels[:] = frame.t_s * 100.0 % 256.0
+            seen = Image(frame.t_s, 1 + round(frame.t_s * 1000.0), image(self.pixels))
+            return Reading(frame, pads, signals._replace(camera=seen))
+
+    mutant("images-stay-as-they-were-delivered", says)(Seeing)
+
+
+def shown(pixels):
+    """Return the same pixels, read-only: numpy does not know who else writes to the memory."""
+    return np.frombuffer(memoryview(pixels).toreadonly(), np.uint8).reshape(2, 2)
+
+
+def turned(pixels):
+    copied = pixels.copy()
+    copied.setflags(write=False)
+    return copied.T
+
+
+HOT = StatusBit(mask=1, name="hot", meaning="too hot")
+MOTOR = Channel("motor_temperature", "K", 1.0)
+FINGERS = (FingerForce("force_thumb", "N", side="left"), FingerForce("force_index", "N", side="right"))
+DECLARED = ENTRIES["sensor-backend"].channels
+OF_HAND = "declares-what-protects"
+VELOCITY_CHECK = "velocity-is-the-rate-of-the-gap"
 
 describing("describes-itself", "must be above 0", rate_hz=0.0)
 describing("describes-itself", "in mm/s", speed_limit_m_s=200.0)
 describing("opening-and-relaxing-are-accepted", "of kind position", opening=Command(POSITION, 0.08, inf, inf))
 describing("rate-is-as-declared", "frames come at 1e+03 Hz", rate_hz=100.0)
-describing("declares-what-protects", "at most half of its effort limit", friction_n=80.0)
-describing(
-    "declares-what-protects", "a physical gripper can hurt what it holds", harmless=True, simulated=False
-)
-describing(
-    "declares-what-protects",
-    "is declared twice",
-    status_bits=(StatusBit(mask=1, name="hot", meaning="too hot"),) * 2,
-)
+describing(OF_HAND, "at most half of its effort limit", friction_n=80.0)
+describing(OF_HAND, "a physical gripper can hurt what it holds", harmless=True, simulated=False)
+describing(OF_HAND, "is declared twice", status_bits=(HOT, HOT))
 describing("hostile-laws-stay-below-the-ceiling", "exerts an effort", relaxed=Command(EFFORT, 5.0, inf, inf))
 describing("objects-can-be-grasped", "give DeviceInfo(simulated=True, ...)", simulated=False)
-
-
-def framing(check, says, **fields):
-    """Keep a mutant whose frames have these fields: values, or what a function makes of the sound frame."""
-
-    def changed(reading):
-        frame = reading.frame
-        new = {name: value(frame) if callable(value) else value for name, value in fields.items()}
-        return reading._replace(frame=frame._replace(**new))
-
-    giving(check, says)(changed)
-
 
 framing("frames-are-numbers", "gap_m of a frame is 0 of type int: write float(...)", gap_m=0)
 framing("channels-are-those-declared", "NaN in all", edge_left_n=nan)
 framing("time-runs-forward", "each is later than the last", t_s=1.0)
 framing("time-runs-forward", "dt_s is 1 s where", dt_s=1.0)
+framing("rate-is-as-declared", "stands still", t_s=0.0)
 framing("gap-is-in-metres", "divide by 1000", gap_m=lambda frame: 1000.0 * frame.gap_m)
 framing("gap-is-in-metres", "divide by 100)", gap_m=lambda frame: 100.0 * frame.gap_m)
 framing("forces-are-in-newtons", "give newtons", force_left_n=3000.0)
 framing(
-    "velocity-is-the-rate-of-the-gap",
-    "mm where the gap moved by",
-    velocity_m_s=lambda frame: 1000.0 * frame.velocity_m_s,
+    "squeezes-with-what-it-is-asked",
+    "is positive",
+    force_left_n=lambda frame: -frame.force_left_n,
+    force_right_n=lambda frame: -frame.force_right_n,
 )
+# Forces in millinewtons, which are only seen where the fingers touch something.
 framing(
-    "velocity-is-the-rate-of-the-gap",
-    "negative while it closes",
-    velocity_m_s=lambda frame: -frame.velocity_m_s,
+    "squeezes-with-what-it-is-asked",
+    "give newtons",
+    force_left_n=lambda frame: frame.force_left_n * (1e3 if frame.force_left_n > 0.5 else 1.0),
+    force_right_n=lambda frame: frame.force_right_n * (1e3 if frame.force_left_n > 0.5 else 1.0),
 )
+framing(VELOCITY_CHECK, "mm where the gap moved by", velocity_m_s=lambda frame: 1000.0 * frame.velocity_m_s)
+framing(VELOCITY_CHECK, "negative while it closes", velocity_m_s=lambda frame: -frame.velocity_m_s)
 framing("same-seed-same-frames", "draw everything from the seed", edge_left_n=lambda frame: _rng.random())
-framing("declares-what-protects", "declare each bit as a StatusBit", status=8)
+framing(OF_HAND, "declare each bit as a StatusBit", status=8)
 
-
-@giving("frames-are-numbers", "a tuple of 22 floats")
-def _(reading):
-    return Reading(reading.frame, reading.pads._replace(left=(0.0,) * 15), reading.signals)
-
-
-mutant(
-    "sensor-backend",
-    "signals-are-those-declared",
-    "declared are acceleration, camera, motor_temperature, and read delivers acceleration, camera",
-    channels=(*ENTRIES["sensor-backend"].channels, Channel("motor_temperature", "K", 1.0)),
-)(Hand)
-
-
-FINGERS = (FingerForce("force_thumb", "N", side="left"), FingerForce("force_index", "N", side="right"))
-
-
-@mutant(
-    "sensor-backend",
-    "fingers-are-those-declared",
-    "where the fingers bear 1, 2 N",
-    channels=(*ENTRIES["sensor-backend"].channels, *FINGERS),
+padding("frames-are-numbers", "a tuple of 22 floats", left=(0.0,) * 15)
+padding("images-count-up", "count up by one", counter=lambda pads: -pads.counter)
+padding("images-count-up", "while its counter stays", left=lambda pads: (float(next(_calls)),) * 22)
+padding(
+    "what-it-delivers-is-kept", "of its", counter=lambda pads: pads.counter * (1.0 if pads.counter > 9 else 1)
 )
-class OwnFrame(Hand):
-    def read(self, timeout_s):
-        reading = super().read(timeout_s)
-        signals = signal_type((ACCELERATION, CAMERA, *FINGERS))
-        return reading._replace(signals=signals(*reading.signals, 1.0, 2.0))
+# Every image has the same time.
+padding("what-it-delivers-is-kept", "'pad_t_s' is not in an export", t_s=0.0)
 
+SIGNALS = "signals-are-those-declared"
+UNBROKEN = "signals-have-no-gaps-or-repeats"
+sampling(SIGNALS, "give Samples of the declared shape (3, 3)", lambda block: block.values)
+sampling(SIGNALS, "no number of the declared channel", lambda block: block._replace(new=0))
+sampling(UNBROKEN, "every sample", lambda block: block._replace(counter=block.counter // 3))
+sampling(UNBROKEN, "they repeat old ones", lambda block: block._replace(new=2))
+
+seeing("can still be changed", lambda pixels: pixels.copy())
+seeing("changed after it was delivered", shown)
+seeing("is not contiguous", turned)
 
 mutant(
-    "sensor-backend",
-    "fingers-are-those-declared",
-    "declare two or more fingers",
-    channels=(*ENTRIES["sensor-backend"].channels, FINGERS[0]),
+    SIGNALS,
+    "declared are acceleration, camera, motor_temperature, and read delivers acceleration, camera",
+    channels=(*DECLARED, MOTOR),
 )(Hand)
-
-
-@giving("signals-are-those-declared", "give Samples of the declared shape (3, 3)")
-def _(reading):
-    return reading._replace(
-        signals=reading.signals._replace(acceleration=reading.signals.acceleration.values)
-    )
-
-
-@giving("signals-are-those-declared", "no number of the declared channel 'acceleration' came")
-def _(reading):
-    block = reading.signals.acceleration
-    return reading._replace(signals=reading.signals._replace(acceleration=block._replace(new=0)))
-
-
-@giving("signals-have-no-gaps-or-repeats", "count every sample that the sensor has taken")
-def _(reading):
-    block = reading.signals.acceleration
-    return reading._replace(
-        signals=reading.signals._replace(acceleration=block._replace(counter=block.counter // 3))
-    )
-
-
-@giving("signals-have-no-gaps-or-repeats", "they repeat old ones")
-def _(reading):
-    block = reading.signals.acceleration
-    return reading._replace(signals=reading.signals._replace(acceleration=block._replace(new=2)))
-
-
-def seeing(says):
-    """Keep a mutant with a camera, whose image the decorated function makes of the pixels of the driver."""
-
-    def keep(image):
-        class Seeing(Hand):
-            pixels = np.zeros((2, 2), np.uint8)
-
-            def read(self, timeout_s):
-                frame, pads, signals = super().read(timeout_s)
-                self.pixels[:] = frame.t_s * 100.0 % 256.0
-                seen = Image(frame.t_s, 1 + round(frame.t_s * 1000.0), image(self.pixels))
-                return Reading(frame, pads, signals._replace(camera=seen))
-
-        mutant("sensor-backend", "images-stay-as-they-were-delivered", says)(Seeing)
-
-    return keep
-
-
-@seeing("can still be changed")
-def _(pixels):
-    return pixels.copy()
-
-
-@seeing("changed after it was delivered")
-def _(pixels):
-    # Numpy does not know who else writes to the memory.
-    shown = np.frombuffer(memoryview(pixels).toreadonly(), np.uint8)
-    return shown.reshape(2, 2)
-
-
-@seeing("is not contiguous")
-def _(pixels):
-    turned = pixels.copy()
-    turned.setflags(write=False)
-    return turned.T
-
-
-@mutant("sensor-backend", "channels-follow-from-the-settings", "once it is open", channels=None)
-class Discovering(Hand):
-    @property
-    def channels(self):
-        return ENTRIES["sensor-backend"].channels[: 8 if self._bench else 4]
-
-
-@mutant("sensor-backend", "channels-follow-from-the-settings", "return a tuple of Channel", channels=None)
-class Listing(Hand):
-    @property
-    def channels(self):
-        return list(ENTRIES["sensor-backend"].channels)
-
-
+mutant("fingers-are-those-declared", "declare two or more fingers", channels=(*DECLARED, FINGERS[0]))(Hand)
 mutant(
-    "sensor-backend",
     "channels-are-those-declared",
     "declare Channel('edge_right', 'N', rate)",
     channels=channels("gap", "velocity", "effort", "force_left", "force_right", "edge_left", "pads"),
 )(Hand)
-
-
 mutant(
-    "sensor-backend",
     "rate-is-as-declared",
     "is declared at 5000 Hz",
     channels=(*channels(*CHANNELS_OF_HAND, rate_hz=5000.0), ACCELERATION, CAMERA),
 )(Hand)
 
 
-@giving("images-count-up", "count up by one")
+@giving("fingers-are-those-declared", "where the fingers bear 1, 2 N", channels=(*DECLARED, *FINGERS))
 def _(reading):
-    return Reading(reading.frame, reading.pads._replace(counter=-reading.pads.counter), reading.signals)
+    signals = signal_type((ACCELERATION, CAMERA, *FINGERS))
+    return reading._replace(signals=signals(*reading.signals, 1.0, 2.0))
 
 
-@giving("images-count-up", "while its counter stays")
+@giving("performs-a-whole-grasp", "ended as aborted")
 def _(reading):
-    return Reading(reading.frame, reading.pads._replace(left=(reading.frame.t_s,) * 22), reading.signals)
+    return Reading(reading.frame._replace(t_s=float(f"{reading.frame.t_s:.9f}")), "no pads")
 
 
-@mutant("sensor-backend", "closing-closes", "close the fingers")
-class Backwards(Hand):
-    def apply(self, command):
-        super().apply(command._replace(value=-command.value))
+FOLLOWING = "channels-follow-from-the-settings"
+hand(
+    FOLLOWING,
+    "once it is open",
+    entry={"channels": None},
+    channels=property(lambda self: DECLARED[: 8 if self._bench else 4]),
+)
+hand(
+    FOLLOWING,
+    "return a tuple of Channel",
+    entry={"channels": None},
+    channels=property(lambda self: list(DECLARED)),
+)
+hand(
+    "closing-closes",
+    "close the fingers",
+    apply=lambda self, command: Hand.apply(self, command._replace(value=-command.value)),
+)
 
 
-@mutant("sensor-backend", "stays-within-its-limits", "apply `effort_limit_n`")
+@mutant("stays-within-its-limits", "apply `effort_limit_n`")
 class Unlimited(Hand):
     def read(self, timeout_s):
         reading = super().read(timeout_s)
-        return Reading(reading.frame._replace(effort_n=self._asked), reading.pads, reading.signals)
+        return reading._replace(frame=reading.frame._replace(effort_n=self._asked))
 
     def apply(self, command):
         self._asked = 60.0 if command.value > 0.0 else 0.0
@@ -810,43 +657,25 @@ class Unlimited(Hand):
     _asked = 0.0
 
 
-@mutant("sensor-backend", "says-what-commands-become", "take 'effort' out")
-class Rushing(Hand):
-    closes_itself: ClassVar = {"effort": "a target"}
-
-
-mutant(
-    "sensor-backend",
-    "says-what-commands-become",
+BECOMING = "says-what-commands-become"
+hand(BECOMING, "take 'effort' out", closes_itself={"effort": "a target"})
+hand(
+    BECOMING,
     "what a command of force becomes",
-    accepts=("position", "force"),
-)(type("Taciturn", (Hand,), {"closes_itself": {"position": "a target"}}))
-
-
-mutant(
-    "sensor-backend",
+    entry={"accepts": ("position", "force")},
+    closes_itself={"position": "a target"},
+)
+hand(
     "accepts-every-declared-kind",
     "take it, or take 'force' out",
-    accepts=("effort", "force"),
-)(
-    type(
-        "Choosy",
-        (Hand,),
-        {"apply": lambda self, command: Hand.apply(self, command) if command.kind == EFFORT else 1 / 0},
-    )
+    entry={"accepts": ("effort", "force")},
+    apply=lambda self, command: Hand.apply(self, command) if command.kind == EFFORT else 1 / 0,
 )
-
-
-@mutant("sensor-backend", "expect-accepts-any-controller", "raise in `open` instead")
-class Picky(Hand):
-    def expect(self, controller, run):
-        raise ValueError("not that one")
-
-
-@mutant("sensor-backend", "objects-can-be-grasped", "it holds the same thing under every label")
-class Unchanging(Hand):
-    def objects(self):
-        return ()
+hand(
+    "expect-accepts-any-controller",
+    "raise in `open` instead",
+    expect=lambda self, controller, run: fail(ValueError("not that one")),
+)
 
 
 @frozen(kw_only=True)
@@ -855,53 +684,39 @@ class Objectless:
     here: bool = setting(default=True, meaning="Whether the gripper is connected.")
 
 
-mutant("sensor-backend", "objects-can-be-grasped", "no key 'object'", config=Objectless)(Hand)
+GRASPED = "objects-can-be-grasped"
+hand(GRASPED, "it holds the same thing under every label", objects=lambda self: ())
+mutant(GRASPED, "no key 'object'", config=Objectless)(Hand)
+hand(
+    GRASPED,
+    "objects() gives that name",
+    with_object=lambda self, name: fail(UnknownName(f"no object named {name!r}")),
+)
+hand(
+    GRASPED, "give each full name once", objects=lambda self: (ObjectKind(name="cup"), ObjectKind(name="cup"))
+)
 
 
-@mutant("sensor-backend", "objects-can-be-grasped", "objects() gives that name")
-class Promising(Hand):
-    def with_object(self, name):
-        raise UnknownName(f"no object named {name!r}")
-
-
-@mutant("sensor-backend", "objects-can-be-grasped", "give each full name once")
-class Repeating(Hand):
-    def objects(self):
-        return (ObjectKind(name="cup"), ObjectKind(name="cup"))
-
-
-@mutant("sensor-backend", "read-returns-within-its-timeout", "return None when nothing came in time")
-class Sluggish(Hand):
-    def read(self, timeout_s):
-        reading = super().read(timeout_s)
-        if 0.5 < reading.frame.t_s <= 0.501:
-            import time
-
-            until = time.perf_counter() + 1.3
-            while time.perf_counter() < until:
-                pass
-        return reading
-
-
-@giving("rate-is-as-declared", "stands still")
+@giving("read-returns-within-its-timeout", "return None when nothing came in time")
 def _(reading):
-    return reading._replace(frame=reading.frame._replace(t_s=0.0))
+    if 0.5 < reading.frame.t_s <= 0.501:
+        until = time.perf_counter() + 1.3
+        while time.perf_counter() < until:
+            pass
+    return reading
 
 
-@mutant("sensor-backend", "pads-can-be-zeroed", "subtract the zero")
+@mutant("pads-can-be-zeroed", "subtract the zero")
 class Unzeroed(Hand):
     def tare(self, images):
         super().tare(images)
         self._zero = None
 
 
-@mutant("sensor-backend", "pads-can-be-zeroed", "raise TareRefused")
-class Blind(Hand):
-    def tare(self, images):
-        self._zero = images[-1]
+hand("pads-can-be-zeroed", "raise TareRefused", tare=lambda self, images: setattr(self, "_zero", images[-1]))
 
 
-@mutant("sensor-backend", "closes-in-any-state", "for the second time it raised")
+@mutant("closes-in-any-state", "for the second time it raised")
 class Once(Hand):
     def close(self):
         if self._bench is None and hasattr(self, "_info"):
@@ -909,12 +724,7 @@ class Once(Hand):
         super().close()
 
 
-@giving("performs-a-whole-grasp", "ended as aborted")
-def _(reading):
-    return Reading(reading.frame._replace(t_s=float(f"{reading.frame.t_s:.9f}")), "no pads")
-
-
-@mutant("sensor-backend", "squeezes-with-what-it-is-asked", "`least_force_n`")
+@mutant("squeezes-with-what-it-is-asked", "`least_force_n`")
 class Forceful(Hand):
     """Squeezes with 19 N if it is to close at all, and does not say so."""
 
@@ -922,7 +732,7 @@ class Forceful(Hand):
         super().apply(command._replace(value=19.0) if command.value > 0.0 else command)
 
 
-@mutant("sensor-backend", "squeezes-with-what-it-is-asked", "`least_force_n`")
+@mutant("squeezes-with-what-it-is-asked", "`least_force_n`")
 class Restless(Hand):
     """Closes with ever more effort once it is to close, so that it never comes to rest."""
 
@@ -934,62 +744,16 @@ class Restless(Hand):
         super().apply(command._replace(value=max(command.value, self._effort_n)))
 
 
-@giving("squeezes-with-what-it-is-asked", "is positive")
-def _(reading):
-    frame = reading.frame
-    pressed = {"force_left_n": -frame.force_left_n, "force_right_n": -frame.force_right_n}
-    return reading._replace(frame=frame._replace(**pressed))
-
-
-@giving("squeezes-with-what-it-is-asked", "give newtons")
-def _(reading):
-    """Forces in millinewtons, which are only seen where the fingers touch something."""
-    frame = reading.frame
-    in_mn = {"force_left_n": 1e3 * frame.force_left_n, "force_right_n": 1e3 * frame.force_right_n}
-    return reading._replace(frame=frame._replace(**in_mn)) if frame.force_left_n > 0.5 else reading
-
-
-@mutant("sensor-backend", "what-it-delivers-is-kept", "of its")
-class Uncounted(Hand):
-    def read(self, timeout_s):
-        reading = super().read(timeout_s)
-        counter = reading.pads.counter
-        return reading._replace(
-            pads=reading.pads._replace(counter=float(counter) if counter > 9 else counter)
-        )
-
-
-@mutant("sensor-backend", "what-it-delivers-is-kept", "'pad_t_s' is not in an export")
-class Timeless(Hand):
-    """Gives every image the same time."""
-
-    def read(self, timeout_s):
-        reading = super().read(timeout_s)
-        return reading._replace(pads=reading.pads._replace(t_s=0.0))
-
-
-@mutant("sensor-backend", "reports-plain-values", "numbers, text and booleans only")
-class Talkative(Hand):
-    def report(self):
-        return {"self": self}
-
-
-@mutant("sensor-backend", "dry-run-accepts-the-same-commands", "return a SensorBackend or None")
-class Understudy(Hand):
-    def dry_run_backend(self):
-        return "somebody"
-
-
-@mutant("sensor-backend", "reports-a-lost-device", "turn what the driver raises into DeviceLost")
+@mutant("reports-a-lost-device", "turn what the driver raises into DeviceLost")
 class Rude(Hand):
     def read(self, timeout_s):
-        reading = super().read(timeout_s) if self.config.vanishes_s == inf else Hand.read(self, timeout_s)
+        reading = super().read(timeout_s)
         if reading.frame.t_s > self.config.vanishes_s - 0.1:
             raise OSError("Input/output error")
         return reading
 
 
-@mutant("sensor-backend", "reports-a-lost-device", "never raised DeviceLost")
+@mutant("reports-a-lost-device", "never raised DeviceLost")
 class Undead(Hand):
     def open(self, seed):
         info = super().open(seed)
@@ -997,14 +761,14 @@ class Undead(Hand):
         return info
 
 
-@mutant("sensor-backend", "reports-a-missing-device", "open succeeded where no gripper is")
+@mutant("reports-a-missing-device", "open succeeded where no gripper is")
 class Dreaming(Hand):
     def open(self, seed):
         self.config = HandConfig(vanishes_s=self.config.vanishes_s)
         return super().open(seed)
 
 
-@mutant("sensor-backend", "a-silent-pad-ends-the-grasp", "accept the relaxing command at any time")
+@mutant("a-silent-pad-ends-the-grasp", "accept the relaxing command at any time")
 class Clinging(Hand):
     squeezed = False
 
@@ -1015,6 +779,16 @@ class Clinging(Hand):
         super().apply(command)
 
 
+override(
+    *(Hand, "reports-plain-values", "numbers, text and booleans only"), report=lambda self: {"self": self}
+)
+hand(
+    "dry-run-accepts-the-same-commands",
+    "return a SensorBackend or None",
+    dry_run_backend=lambda self: "somebody",
+)
+
+
 # Classifiers.
 
 
@@ -1023,114 +797,44 @@ class NoModel:
     k: int = 3
 
 
-mutant(
-    "classifier",
-    "a-classifier-has-a-model-key",
-    "extend graspsense.plugin_api.ClassifierConfig",
-    config=NoModel,
-)(Nearest)
-
-
-@mutant("classifier", "classes-are-the-labels", "a tuple of str")
-class Listed(Nearest):
-    def classes(self):
-        return list(super().classes())
-
-
-@mutant("classifier", "probabilities-are-valid", "divide each row by its sum")
-class Votes(Nearest):
-    def probabilities(self, table):
-        return 0.5 * super().probabilities(table)
-
-
-@mutant("classifier", "probabilities-are-valid", "float64 of shape")
-class Coarse(Nearest):
-    def probabilities(self, table):
-        return super().probabilities(table).astype(np.float32)
-
-
-@mutant("classifier", "separates-separable-trials", "is the order of `classes`")
-class Mixed(Nearest):
-    def classes(self):
-        return super().classes()[::-1]
-
-
-@mutant("classifier", "same-seed-same-model", "draw everything from the seed")
 class Dicing(Nearest):
     def fit(self, table, labels, seed):
         super().fit(table, labels, seed)
         self._model["mean"][0] += 1e-6 * _rng.random()
 
 
-@mutant("classifier", "survives-json", "keep every number in full")
-class Rounded(Nearest):
-    def to_json(self):
-        return {**self._model, "mean": [round(mean, 2) for mean in self._model["mean"]]}
-
-
-@mutant("classifier", "survives-json", "what JSON cannot hold")
-class Raw(Nearest):
-    def to_json(self):
-        return {**self._model, "mean": np.array(self._model["mean"])}
-
-
-@mutant("classifier", "single-trials-agree", "predict each trial independently")
-class Relative(Nearest):
-    def probabilities(self, table):
-        centred = evolve(table, values=table.values - 0.1 * np.nanmean(table.values, axis=0))
-        return super().probabilities(centred)
-
-
-@mutant("classifier", "handles-missing-values", "fill or skip them")
-class Strict(Nearest):
-    def probabilities(self, table):
-        shares = super().probabilities(table)
-        shares[np.isnan(table.values).any(axis=1)] = nan
-        return shares
-
-
-@mutant("classifier", "one-label-is-refused-or-certain", "raise ValueError, or learn it")
-class Careless(Nearest):
-    def fit(self, table, labels, seed):
-        if len(set(labels)) < 2:
-            raise ZeroDivisionError("division by zero")
-        super().fit(table, labels, seed)
-
-
-@mutant("classifier", "few-trials-are-refused-or-learned", "fit on one trial of each label raised")
-class Discriminant(Nearest):
-    def fit(self, table, labels, seed):
-        if len(labels) == len(set(labels)) == 3:
-            raise ZeroDivisionError("division by zero")
-        super().fit(table, labels, seed)
-
-
-@mutant("classifier", "explains-its-predictions", "explain says 'bottle:full_open'")
-class Stubborn(Nearest):
-    def explain(self, features):
-        return evolve(super().explain(features), label="bottle:full_open")
-
-
-@mutant("classifier", "explains-its-predictions", "give each reason in words and units")
-class Silent(Nearest):
-    def explain(self, features):
-        return evolve(super().explain(features), because=())
-
-
-@mutant("classifier", "does-not-change-the-table", "work on a copy")
 class Filling(Nearest):
     def probabilities(self, table):
         np.nan_to_num(table.values, copy=False)
         return super().probabilities(table)
 
 
-@mutant("classifier", "refuses-an-invalid-model", "from_json takes a model")
+def without_missing(self, table):
+    missing = np.isnan(table.values).any(axis=1)
+    return np.where(missing[:, None], nan, Nearest.probabilities(self, table))
+
+
+def of_all_trials(self, table):
+    centred = evolve(table, values=table.values - 0.1 * np.nanmean(table.values, axis=0))
+    return Nearest.probabilities(self, centred)
+
+
+def fitting(check, says, crashes):
+    """Keep a mutant that crashes where it is to learn such labels."""
+
+    def fit(self, table, labels, seed):
+        if crashes(labels):
+            raise ZeroDivisionError("division by zero")
+        Nearest.fit(self, table, labels, seed)
+
+    nearest(check, says, fit=fit)
+
+
 class Credulous(Nearest):
     def from_json(self, model):
         self._model = {"classes": [], "mean": [], "scale": [], "centres": [], **model}
 
 
-@mutant("classifier", "refuses-an-invalid-model", "raise ValueError")
 class Crashing(Nearest):
     def from_json(self, model):
         if "centres" not in model:
@@ -1138,7 +842,6 @@ class Crashing(Nearest):
         super().from_json(model)
 
 
-@mutant("classifier", "a-damaged-model-raises-a-documented-error", "on a model that was changed at")
 class Trusting(Nearest):
     def from_json(self, model):
         super().from_json(model)
@@ -1146,4 +849,59 @@ class Trusting(Nearest):
             raise ZeroDivisionError("mean")
 
 
-__all__ = ["MUTANTS", "STEADY", "ClassifierConfig", "Features", "LawConfig", "Mutant", "PeakConfig"]
+mutant("a-classifier-has-a-model-key", "extend graspsense.plugin_api.ClassifierConfig", config=NoModel)(
+    Nearest
+)
+override(
+    *(Nearest, "classes-are-the-labels", "a tuple of str"), classes=lambda self: list(Nearest.classes(self))
+)
+nearest(
+    "probabilities-are-valid",
+    "divide each row by its sum",
+    probabilities=lambda self, table: 0.5 * Nearest.probabilities(self, table),
+)
+nearest(
+    "probabilities-are-valid",
+    "float64 of shape",
+    probabilities=lambda self, table: Nearest.probabilities(self, table).astype(np.float32),
+)
+nearest(
+    "separates-separable-trials",
+    "is the order of `classes`",
+    classes=lambda self: Nearest.classes(self)[::-1],
+)
+mutant("same-seed-same-model", "draw everything from the seed")(Dicing)
+nearest(
+    "survives-json",
+    "keep every number in full",
+    to_json=lambda self: {**self._model, "mean": [round(mean, 2) for mean in self._model["mean"]]},
+)
+nearest(
+    "survives-json",
+    "what JSON cannot hold",
+    to_json=lambda self: {**self._model, "mean": np.array(self._model["mean"])},
+)
+nearest("single-trials-agree", "predict each trial independently", probabilities=of_all_trials)
+nearest("handles-missing-values", "fill or skip them", probabilities=without_missing)
+fitting(
+    "one-label-is-refused-or-certain", "raise ValueError, or learn it", lambda labels: len(set(labels)) < 2
+)
+fitting(
+    "few-trials-are-refused-or-learned",
+    "fit on one trial of each label raised",
+    lambda labels: len(labels) == len(set(labels)) == 3,
+)
+nearest(
+    "explains-its-predictions",
+    "explain says 'bottle:full_open'",
+    explain=lambda self, features: evolve(Nearest.explain(self, features), label="bottle:full_open"),
+)
+nearest(
+    "explains-its-predictions",
+    "give each reason in words and units",
+    explain=lambda self, features: evolve(Nearest.explain(self, features), because=()),
+)
+mutant("does-not-change-the-table", "work on a copy")(Filling)
+mutant("refuses-an-invalid-model", "from_json takes a model")(Credulous)
+mutant("refuses-an-invalid-model", "raise ValueError")(Crashing)
+mutant("a-damaged-model-raises-a-documented-error", "on a model that was changed at")(Trusting)

@@ -35,13 +35,13 @@ def test_an_honest_rate_and_a_picture_of_ones_own_csv_in_one_command(csv, tmp_pa
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert "\nrate        9" in out
     assert out.startswith("c45 recognises the object and its state in 9")
-    for line in (
+    for line in [
         "instance_held_out",
         "stratified_10_fold",
         "before_contact",
         "width_only",
         "recording_order",
-    ):
+    ]:
         assert f"\n{line}" in out
     assert "confusion (rows are the truth)" in out
     assert "learning curve" in out
@@ -190,29 +190,20 @@ def test_features_are_kept(csv, tmp_path):
 @every_case(
     ("arguments", "said"),
     [
-        (
-            ["evaluate", "nothing"],
-            "FILE.csv, recordings as manifest:FILE.toml, ",
-        ),
+        (["evaluate", "nothing"], "FILE.csv, recordings as manifest:FILE.toml, "),
         (["evaluate", "none.csv", "--label", "x"], "none.csv "),
         (["evaluate", "nosuch:x"], "'nosuch'. Known: icub"),
         (["evaluate", "icub:"], "names no folder"),
         (["evaluate", "icub:nowhere"], " nowhere"),
         (["evaluate", "icub:x", "--label", "y"], "--label "),
         (["evaluate", "x.csv", "--instances", "3"], "--instances "),
-        (
-            ["evaluate", "x.csv", "--states-per-instance", "one"],
-            "--states-per-instance ",
-        ),
+        (["evaluate", "x.csv", "--states-per-instance", "one"], "--states-per-instance "),
         (
             ["evaluate", "simulated", "--instances", "2", "--states-per-instance", "one"],
             "at least 4 instances",
         ),
         (["evaluate", "x.csv", "--label", "y", "--classifier", "treee"], "'treee'. Known: "),
-        (
-            ["evaluate", "x.csv", "--label", "y", "-o", "controller.ramp_s=1"],
-            "[classifier] and [features]",
-        ),
+        (["evaluate", "x.csv", "--label", "y", "-o", "controller.ramp_s=1"], "[classifier] and [features]"),
         (["evaluate", "x.csv", "--label", "y", "-o", "classifier.trees=3"], "'trees'"),
         (["evaluate", "simulated", "--instances", "0"], "1 to 1000"),
         (["evaluate", "simulated", "--trials", "0"], "0 trials per instance"),

@@ -6,7 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
-from attrs import evolve, fields
+from attrs import fields
 from cases import every_case
 from commands import graspsense
 from hypothesis import given
@@ -18,11 +18,10 @@ from graspsense import evaluate, load_pipeline, load_trials
 from graspsense.core.compiling import compile_notice
 from graspsense.core.components.firstparty import EXAMPLES
 from graspsense.core.components.strict import ValidationFailed, nearest_path, structured
-from graspsense.core.learn.copies import without_copies
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.settings.layers import KINDS, toml_kind
 from graspsense.core.settings.resolved import resolve
-from graspsense.core.values.errors import ConfigError, counted
+from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import FeatureTable
 from graspsense.core.values.signals import Outcome
 from graspsense.experiments.experiment import Experiment
@@ -216,19 +215,6 @@ def some_trials(values):
     labels = tuple(("a", "b")[k % 2] for k in range(len(values)))
     table = FeatureTable(names=("f",), units=("N",), values=np.array(values, float).reshape(-1, 1))
     return Labelled(source="trials", table=table, labels=labels)
-
-
-def test_a_note_on_one_thing_is_in_the_singular():
-    trials = evolve(some_trials([1.0, 2.0, 3.0, 4.0]), instances=("a#1",) * 4)
-    assert counted(1, "trial is", "trials are") == "1 trial is"
-    assert counted(0, "trial") == "0 trials"
-    notes = evaluate("c45", trials, folds=2, permutations=1).notes
-    assert any("1 instance:" in note for note in notes)
-    doubled = some_trials([1.25, 2.5, 3.125, 4.75, 1.25])
-    doubled = evolve(doubled, labels=(*doubled.labels[:4], "b"), content=("p", "q", "r", "s", "p"))
-    (note,) = without_copies(doubled).notes
-    assert "1 trial is left out" in note
-    assert "1 of them has another label" in note
 
 
 def test_a_long_compilation_is_told_and_a_short_one_is_not():

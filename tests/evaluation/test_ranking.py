@@ -39,6 +39,9 @@ def test_features_without_information_are_worse_and_the_same_trials_are_compared
     assert ranking.chosen.rate <= ranking.candidates[0].rates["instance_held_out"].rate
     assert ranking.candidates[0].rates["instance_held_out"].interval == ranking.chosen.interval
     assert ranking.chosen.words in ranking.verdict
+    for candidate in ranking.candidates:
+        assert candidate.sets.covered.n == 180
+        assert 0.8 < candidate.sets.covered.rate <= 1.0
 
 
 @pytest.mark.slow
@@ -110,15 +113,6 @@ def test_answers_from_outside_are_compared_like_any_other():
     assert ranking.candidates[0].rates["instance_held_out"].rate == 1.0
     assert ranking.candidates[0].sets is None
     assert ranking.candidates[1].loss.value > 0.0
-
-
-@pytest.mark.slow
-def test_the_sets_of_every_candidate_are_measured_on_the_same_folds():
-    ranking = crossed()
-
-    for candidate in ranking.candidates:
-        assert candidate.sets.covered.n == 180
-        assert 0.8 < candidate.sets.covered.rate <= 1.0
 
 
 def test_an_unknown_name_is_refused_by_the_option_that_was_typed_before_any_grasp():

@@ -173,16 +173,8 @@ def cluster(lab):
         return process
 
     note = lab.folder / "scheduler.json"
-    scheduler = start(
-        "dask_scheduler",
-        "--host",
-        "127.0.0.1",
-        "--port",
-        "0",
-        "--no-dashboard",
-        "--scheduler-file",
-        str(note),
-    )
+    options = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file"]
+    scheduler = start("dask_scheduler", *options, str(note))
     lab.until(lambda: note.exists() and note.read_text().endswith("}"), scheduler)
     address = json.loads(note.read_text())["address"]
 

@@ -69,11 +69,6 @@ def test_a_gripper_with_nothing_to_trade_is_refused(capsys, tmp_path):
     assert "no accuracy to trade for time" in capsys.readouterr().err
 
 
-def test_the_group_lists_what_there_is(capsys):
-    assert ended(["tradeoff", "--help"]) == 0
-    assert "simulation" in capsys.readouterr().out
-
-
 @pytest.mark.slow
 def test_the_simulator_gets_better_with_finer_steps(capsys):
     arguments = ["--scene", "can:empty_open", "--seeds", "1", "--instances", "2", "--json"]
@@ -91,14 +86,8 @@ def test_the_simulator_gets_better_with_finer_steps(capsys):
     # Near what the reference itself is exact to.
     assert errors[3] < 0.2 * errors[0]
     recognised = [p for p in points if p["recognised"] is not None]
-    assert [p["step"] for p in recognised] == [
-        "until all stands still",
-        "0.5",
-        "0.1",
-        "0.01",
-        "0.001",
-        "0.0001",
-    ]
+    steps = ["until all stands still", "0.5", "0.1", "0.01", "0.001", "0.0001"]
+    assert [p["step"] for p in recognised] == steps
     assert {p["recognised"]["n"] for p in recognised} == {30}
     assert all(p["behind"] for p in recognised[1:])
 

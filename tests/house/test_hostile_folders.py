@@ -17,31 +17,11 @@ from graspsense.recording.checkout import checkout_state
 from graspsense.recording.provenance import commit_text
 
 PROGRAM = Path(sys.executable).parent / "graspsense"
-MODULES = [
-    "attr",
-    "attrs",
-    "click",
-    "dask",
-    "distributed",
-    "json",
-    "mcap",
-    "multiprocessing",
-    "numba",
-    "numpy",
-    "pickle",
-    "pluggy",
-    "runpy",
-    "scipy",
-    "selectors",
-    "sitecustomize",
-    "sklearn",
-    "socket",
-    "threading",
-    "usercustomize",
-    "yaml",
-    "zstandard",
-    "graspsense",
-]
+MODULES = (
+    *("attr", "attrs", "click", "dask", "distributed", "json", "mcap", "multiprocessing"),
+    *("numba", "numpy", "pickle", "pluggy", "runpy", "scipy", "selectors", "sitecustomize"),
+    *("sklearn", "socket", "threading", "usercustomize", "yaml", "zstandard", "graspsense"),
+)
 EXPERIMENT = """
 title = "Recognised from a table"
 seeds = 2

@@ -34,18 +34,8 @@ MAY_KNOW = {
     "report": {"core", "recording", "store", "evaluation", "regression", "report"},
     "experiments": {"core", "recording", "sources", "evaluation", "report", "experiments"},
     "cli": {
-        "core",
-        "recording",
-        "store",
-        "sources",
-        "evaluation",
-        "regression",
-        "experiments",
-        "live",
-        "report",
-        "scaffold",
-        "testing",
-        "cli",
+        *("core", "recording", "store", "sources", "evaluation", "regression"),
+        *("experiments", "live", "report", "scaffold", "testing", "cli"),
     },
     "testing": {"core", "plugin_api", "testing_api", "recording", "sources", "testing"},
     "scaffold": {"core", "scaffold"},
@@ -73,18 +63,7 @@ MODULE_AS_TEXT = re.compile(
 )
 """What `import_module` could be given to reach around the rules. `graspsense.plugins` is the group of entry points."""
 
-HEAVY = {
-    "numpy",
-    "scipy",
-    "sklearn",
-    "numba",
-    "pandas",
-    "matplotlib",
-    "hid",
-    "hidraw",
-    "usb",
-    "cattrs",
-}
+HEAVY = {"numpy", "scipy", "sklearn", "numba", "pandas", "matplotlib", "hid", "hidraw", "usb", "cattrs"}
 
 
 def imported(tree, package):

@@ -18,9 +18,9 @@ from graspsense.testing.subject import Subject
 ROLES = tuple(parts.ENTRIES)
 
 
-def subject(role, entry, keys=None):
+def subject(role, entry):
     given = {"unplugged": parts.HAND_LOST, "absent": parts.HAND_ABSENT} if role == "sensor-backend" else {}
-    return Subject(component=Component(entry, "graspsense-test", "0.1", role), keys=keys or {}, **given)
+    return Subject(component=Component(entry, "graspsense-test", "0.1", role), keys={}, **given)
 
 
 @pytest.fixture(autouse=True)
@@ -78,7 +78,7 @@ def test_a_check_catches_its_mutant(broken, monkeypatch):
     monkeypatch.setattr(controller, "LONGEST_S", 5.0)
     (check,) = [check for check in CHECKS[broken.role] if check.id == broken.check]
 
-    result = outcome_of(check, subject(broken.role, broken.entry, broken.keys), {})
+    result = outcome_of(check, subject(broken.role, broken.entry), {})
 
     assert result.state == "failed"
     assert broken.says in result.text

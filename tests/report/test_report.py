@@ -13,7 +13,6 @@ from itertools import pairwise
 
 import kept
 import pytest
-import wayward
 from attrs import evolve
 from cases import every_case
 from commands import graspsense, printed
@@ -428,16 +427,3 @@ def test_the_page_of_a_store_that_cannot_be_judged_has_its_grasp_with_its_warnin
     assert page.answer.startswith("There is 1 grasp, but no recognition rate: ")
     assert "One grasp, from the approach to rest" in Reader(page.html()).text
     assert '<ul class="warning"><li>left fingertip stuck: check its cable</li></ul>' in page.html()
-
-
-@pytest.mark.slow
-def test_the_page_of_an_experiment_once_more(tmp_path):
-    (tmp_path / "trials.csv").write_text(wayward.CSV)
-    (tmp_path / "it.toml").write_text(
-        'title = "x"\n[data]\nsource = "trials.csv"\nlabel = "what"\n[judge]\nfolds = 2\ncontrols = false\n'
-    )
-    results = Results(tmp_path / "out")
-    run_experiment(read_experiment(str(tmp_path / "it.toml")), results, Serial)
-
-    assert "recorded grasps" in printed("report", results.folder)
-    assert "recorded grasps" in Reader((results.folder / "report.html").read_text()).text

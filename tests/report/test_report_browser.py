@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-from pathlib import Path
 
 import browser as browsers
 import pytest
@@ -278,24 +276,6 @@ def test_a_page_is_printed_light_whole_and_without_what_is_only_for_the_screen(b
     rows = "[...document.querySelectorAll('table.rows')].filter((one) => !one.closest('details'))"
     assert browser.run(rows + ".every((one) => one.getBoundingClientRect().right <= innerWidth + 1)")
     assert browser.pdf().startswith(b"%PDF-")
-
-
-@pytest.mark.skipif(
-    "GRASPSENSE_AXE" not in os.environ,
-    reason="GRASPSENSE_AXE does not name axe.min.js (npm install axe-core)",
-)
-@pytest.mark.parametrize("name", ["experiment", "long", "signals"])
-@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
-@pytest.mark.parametrize("width", WIDTHS)
-def test_a_page_passes_an_accessibility_check(browser, pages, name, width, dark):
-    browser.show(pages[name], width, dark=dark)
-    browser.run(Path(os.environ["GRASPSENSE_AXE"]).read_text() + ";0")
-    violations = browser.run(
-        "axe.run(document, {resultTypes: ['violations']}).then((found) => found.violations.map((one) => "
-        "[one.id, one.nodes.map((node) => node.html.slice(0, 120))]))"
-    )
-
-    assert violations == []
 
 
 def test_the_colours_of_a_heat_map_differ_in_light_dark_and_print(browser, pages):
