@@ -124,6 +124,7 @@ def test_json_is_exact_and_says_its_version():
     document = to_document(tree)
     assert (document["format"], document["version"]) == ("graspsense-c45-tree", 1)
     assert from_json(to_json(tree)) == tree
+    assert from_json(to_json(tree)).to_dict() == tree.to_dict()
 
 
 @every_case(

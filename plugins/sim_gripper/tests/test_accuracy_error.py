@@ -11,7 +11,7 @@ from random_scenes import record_of
 from graspsense.plugin_api import STEADY, create
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.error import GraspRecord, deviation
-from graspsense_sim_gripper.run.backend import SimBackend
+from graspsense_sim_gripper.run.batch import run_many
 
 SPEED, TAU, STIFFNESS = 0.01, 0.05, 2000.0
 
@@ -87,8 +87,8 @@ def test_at_rest_from_the_very_contact_on_there_is_no_rate():
 
 @pytest.mark.slow
 def test_they_are_the_feature_sets_own_to_a_tick():
-    backend = SimBackend(SimConfig(sensor="ideal", spread=False, open_gap_m=0.065))
-    (grasp,) = backend.run_many(create("controller", "hybrid"), ["odwalla:full_open"], [0], traces=True)
+    config = SimConfig(sensor="ideal", spread=False, open_gap_m=0.065)
+    (grasp,) = run_many(config, create("controller", "hybrid"), ["odwalla:full_closed"], [0])
     drawn = create("feature-set", "chitta").extract(grasp.trace).as_dict()
     quantities = record_of(grasp, 1e-3).quantities
     # The feature set's rest is told from the way in 50 ms, which begins a little before the speed is as low.
