@@ -243,7 +243,7 @@ def _numb(pad: _Force, other: _Force) -> Iterator[str]:
     loaded &= pad.gap <= pad.gap[begin]
     numb, felt = loaded & (away < max(noise, SLIGHT * span)), np.flatnonzero(away > FREE * span)
     if np.count_nonzero(numb) < max(FEWEST, PART * np.count_nonzero(loaded)):
-        numb[: felt[0] if len(felt) else None] = False
+        numb[: felt[0] + 1 if len(felt) else None] = False
         numb[felt[-1] if len(felt) else 0 :] = False
     if np.count_nonzero(numb) > GLITCH_SAMPLES:
         from_k, until_k = np.flatnonzero(numb)[[0, -1]].tolist()
