@@ -110,8 +110,8 @@ def with_sessions(labelled: Labelled) -> Labelled:
     if stretches > len(classes):
         return labelled
     note = (
-        f"instances of several classes have the same name, as {names[0]!r}, and were recorded together: they are held "
-        "out as sessions, and not as objects"
+        f"instances of several classes have the same name, as {names[0]!r}, and were recorded together: they count "
+        "as sessions, and not as objects"
     )
     return evolve(labelled, instances=tuple(names), notes=(*labelled.notes, note))
 
