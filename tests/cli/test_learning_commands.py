@@ -132,6 +132,12 @@ def test_a_rate_of_predictions_counts_the_objects_of_the_trials(csv, tmp_path):
     assert of_objects["instances"] == 6  # in place of 120 independent trials
     assert of_objects["interval"][0] < alone["interval"][0]
 
+    # The same grasps, of things that are named by the day: all of one day.
+    today = [line.replace(line.split(",")[1], f"{line.split(':')[0]}#today", 1) for line in lines]
+    others.write_text("\n".join([header, *(f"{line}1" for line in today)]) + "\n")
+    rate = json.loads(printed(*arguments, "--instance", "thing"))["rate"]
+    assert (rate["instances"], rate["interval"]) == (1, None)
+
 
 @pytest.mark.slow
 def test_a_certainty_by_trials_is_said_to_be_that_of_the_same_objects(tmp_path):

@@ -167,6 +167,7 @@ def test_instances_that_are_named_by_days_of_several_classes_are_held_out_as_day
     assert set(instances_of(days, order=in_order).instances) == set(days)
     result = evaluate(learner(), instances_of(days, order=in_order))
     assert result.headline.no_interval
+    assert set(instances_of(["today"] * len(numbers), order=in_order).instances) == {"today"}
     # Numbers count the objects of a class; colours that were grasped in turns are no session; without a time, nothing
     # tells which of them it is.
     counted, colours = np.unique(days, return_inverse=True)[1], np.tile(["red", "green"], len(numbers) // 2)

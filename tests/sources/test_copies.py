@@ -10,7 +10,7 @@ from commands import graspsense, printed
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.core.learn.copies import apart_from, without_copies
+from graspsense.core.learn.copies import apart_from, learned_from, row_hashes, without_copies
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import FeatureTable
@@ -100,6 +100,19 @@ def test_trials_that_were_learned_from_are_not_tested_on():
     assert "7 trials" in copies_said(kept)[0]
     with pytest.raises(ConfigError, match="every trial"):
         apart_from(training, training)
+
+
+def test_a_trial_of_which_one_coarse_feature_is_known_is_not_said_to_be_learned_from():
+    values = measured(20)
+    values[:5] = [[0.25, np.nan, np.nan]] * 5
+    table = labelled(values).table
+    known = row_hashes(table)
+    others = measured(20, seed=1)
+    others[:5] = values[:5]
+    assert learned_from(known, labelled(others).table) == ""
+    assert learned_from(known, table).startswith("15 of 20")
+    alone = labelled(values[:, :1]).table
+    assert learned_from(row_hashes(alone), alone).startswith("20 of 20")
 
 
 def test_copies_are_found_among_columns_in_another_order_and_other_units_are_refused():

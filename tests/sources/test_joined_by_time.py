@@ -59,6 +59,20 @@ def test_a_file_beside_with_a_rate_of_its_own_is_joined_by_time(tmp_path, write,
     assert any("left out" in notice for notice in notices) == (begin > 0.15 or times[-1] - times[0] > 3.5)
 
 
+def test_files_of_several_recordings_in_a_folder_are_joined_by_the_fields_of_their_names(tmp_path):
+    times = np.arange(0.0, 3.0, 0.01)
+    for number in (1, 2):
+        written(tmp_path / f"jar_{number}_gap.csv", "t,gap", seconds(T_S), GAP_MM)
+        written(tmp_path / f"jar_{number}_pad.csv", "t,N", seconds(times), number * force(times))
+    (tmp_path / "m.toml").write_text(
+        "files = '{label}_{number:d}_gap.csv'\ntime = 't'\ngap = 'gap [mm]'\n"
+        "beside = '{label}_{number}_pad.csv'\nforce = \"'pad.N'\"\n"
+    )
+    grasps = read_recordings(str(tmp_path / "m.toml"))
+    peaks = [max(r.frame.force_left_n for r in grasp.recording.readings) for grasp in grasps]
+    assert peaks[1] == pytest.approx(2.0 * peaks[0], rel=1e-6)
+
+
 def test_a_hole_and_another_clock_in_a_file_beside_are_told(tmp_path):
     written(tmp_path / "jar.csv", "t,gap", seconds(T_S), GAP_MM)
     times = np.arange(0.0, 3.0, 0.03)

@@ -204,6 +204,7 @@ def trials_of(
     Raises ConfigError, DataDamaged.
     """
     from graspsense.core.learn.copies import without_copies
+    from graspsense.core.learn.groups import with_sessions
     from graspsense.sources.trial_source import TrialSource, groups_of, kind_of, labelled_trials
 
     kind = kind_of(source)
@@ -245,7 +246,7 @@ def trials_of(
             "grasping" if kind == SIMULATED else "extracting features", done, total
         ),
     )
-    return trials if copies else without_copies(trials)
+    return with_sessions(trials) if copies else without_copies(trials)
 
 
 def to_predict(

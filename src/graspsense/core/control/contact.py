@@ -2,7 +2,8 @@
 
 These are equations 1 and 2 of Chitta, Piccoli and Sturm (ICRA 2010) with two corrections. Contact is the first time at
 which *both* pads are at or above tau_1, as the text says; the printed formula has the inequality reversed. Rest is a
-speed that *stays* below tau_2 over a window; the printed formula takes a single sample, which noise would pass.
+gap that *stays*, over a window, within what tau_2 would move it in that window; the printed formula takes the speed
+of a single sample, which noise would pass.
 Controllers and features share these functions, so that they agree on contact and rest.
 """
 

@@ -107,9 +107,13 @@ def row_hashes(table: FeatureTable) -> tuple[str, ...]:
 
 
 def learned_from(known: Iterable[str], table: FeatureTable) -> str:
-    """Return in words how many of these trials are among those that have the hashes `known`; empty if none is."""
+    """Return in words how many of these trials are among those that have the hashes `known`; empty if none is.
+
+    Trials of which a single feature of several is known can have the same value by chance, and do not count.
+    """
     hashes, learned = row_hashes(table), frozenset(known)
-    seen = sum(text in learned for text in hashes)
+    telling = (~np.isnan(table.values)).sum(axis=1) >= min(2, len(table.names))
+    seen = sum(text in learned for text, tells in zip(hashes, telling.tolist(), strict=True) if tells)
     return f"{seen} of {counted(len(hashes), 'trial')} were learned from" if seen else ""
 
 

@@ -92,11 +92,11 @@ def with_sessions(labelled: Labelled) -> Labelled:
     pairs = [tuple(instance.partition("#")[::2]) for instance in labelled.instances]
     own = [class_of(label) for label in labelled.labels]
     names = [name for _, name in pairs]
-    classes = {name: {kind for kind, other in pairs if other == name} for name in names}
-    if (
-        [kind for kind, _ in pairs] != own
-        or len(classes) < 2
-        or any(not name or name.isdecimal() or len(kinds) < 2 for name, kinds in classes.items())
+    classes: dict[str, set[str]] = {}
+    for kind, name in pairs:
+        classes.setdefault(name, set()).add(kind)
+    if [kind for kind, _ in pairs] != own or any(
+        not name or name.isdecimal() or len(kinds) < 2 for name, kinds in classes.items()
     ):
         return labelled
     if labelled.order is None:
@@ -110,8 +110,8 @@ def with_sessions(labelled: Labelled) -> Labelled:
     if stretches > len(classes):
         return labelled
     note = (
-        f"instances of several classes have the same name, as {names[0]!r}, and were recorded together: they are held "
-        "out as sessions, and not as objects"
+        f"instances of several classes have the same name, as {names[0]!r}, and were recorded together: they count "
+        "as sessions, and not as objects"
     )
     return evolve(labelled, instances=tuple(names), notes=(*labelled.notes, note))
 

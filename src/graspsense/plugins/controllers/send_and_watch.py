@@ -72,7 +72,7 @@ class SendAndWatchConfig(OwnLoopConfig):
         unit="m/s",
         above=0.0,
         plausible=(1e-6, 0.05),
-        meaning="Speed below which the fingers are at rest, if throughout the window.",
+        meaning="At rest, the gap changes by less than this times the window, throughout it.",
     )
     rest_window_s: float = setting(
         default=0.15,

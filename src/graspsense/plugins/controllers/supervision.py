@@ -60,7 +60,7 @@ class SupervisionConfig:
         unit="m/s",
         above=0.0,
         plausible=(1e-7, 0.05),
-        meaning="Speed below which the fingers are at rest, if throughout the window.",
+        meaning="At rest, the gap changes by less than this times the window, throughout it.",
     )
     rest_window_s: float = setting(
         default=REST_WINDOW_S,

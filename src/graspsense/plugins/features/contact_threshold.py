@@ -31,8 +31,8 @@ class RestThresholds(ContactThreshold):
         unit="m/s",
         above=0.0,
         plausible=(1e-7, 0.05),
-        meaning="tau_2 of the paper, below which the speed must stay throughout the window; that of the controller "
-        "unless it is given here.",
+        meaning="tau_2 of the paper: at rest, the gap changes by less than this times the window, throughout it; "
+        "that of the controller unless it is given here.",
         follows="controller.rest_speed_m_s",
     )
     rest_window_s: float = setting(
@@ -40,7 +40,7 @@ class RestThresholds(ContactThreshold):
         unit="s",
         above=0.0,
         plausible=(0.001, 5.0),
-        meaning="Time for which the speed must stay below rest_speed_m_s; that of the controller unless it is given "
+        meaning="Time for which the gap must rest, as rest_speed_m_s says; that of the controller unless it is given "
         "here. Longer where the gap is coarse: a step at this speed must fit into it.",
         follows="controller.rest_window_s",
     )

@@ -48,8 +48,8 @@ class WithoutPadsConfig:
         unit="m/s",
         above=0.0,
         plausible=(1e-6, 0.05),
-        meaning="Speed below which the fingers are at rest, if throughout the window. The gap has steps of 0.37 mm, so "
-        "that a slower motion does not show within 0.15 s.",
+        meaning="At rest, the gap changes by less than this times the window, throughout it. The gap has steps "
+        "of 0.37 mm, so that a slower motion does not show within 0.15 s.",
     )
     rest_window_s: float = setting(
         default=0.15,

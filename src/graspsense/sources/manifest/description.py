@@ -72,7 +72,8 @@ class Manifest:
     )
     beside: Text = setting(
         default=(),
-        meaning="Files beside each file, joined by rows or by time; `labels.csv` has the columns `'labels.NAME'`.",
+        meaning="Files beside each file, joined by rows or by time; `labels.csv` and `{number}_labels.csv` have the "
+        "columns `'labels.NAME'`.",
     )
     start: str = setting(
         default="",

@@ -27,7 +27,7 @@ _NOT_IN_LABELS: Final = re.compile(r"[\s#,]+")
 _STAMP: Final = re.compile(r"(\d{4})-?(\d\d)-?(\d\d)[T _-]?(\d\d):?(\d\d):?(\d\d)(?:\.\d+)?")
 
 
-def _filled(manifest: ReadManifest, key: str, template: str, table: ColumnTable) -> str:
+def filled(manifest: ReadManifest, key: str, template: str, table: ColumnTable) -> str:
     """Return a template filled from the facts and columns of a table. Raises ConfigError, DataDamaged."""
 
     def value(match: re.Match[str]) -> str:
@@ -45,7 +45,7 @@ def _filled(manifest: ReadManifest, key: str, template: str, table: ColumnTable)
 def _given(manifest: ReadManifest, key: str, table: ColumnTable) -> str:
     """Return what the manifest says for this key, or the field of that name."""
     template = getattr(manifest.keys, key)
-    return _filled(manifest, key, template, table) if template else table.fields.get(key, "")
+    return filled(manifest, key, template, table) if template else table.fields.get(key, "")
 
 
 def label_of(manifest: ReadManifest, table: ColumnTable) -> str:
@@ -106,7 +106,7 @@ def values_of(manifest: ReadManifest, file: NamedFile, table: ColumnTable) -> di
             )
         values[f"{name} [{expression.unit}]" if expression.unit else name] = float(column[0])
     for name, beside in manifest.value_files.items():
-        number = _number_beside(file.path.parent / _filled(manifest, f"values.{name}", beside, table))
+        number = _number_beside(file.path.parent / filled(manifest, f"values.{name}", beside, table))
         if number is not None:
             values[name] = number
     return values

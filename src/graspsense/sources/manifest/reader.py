@@ -27,6 +27,7 @@ from graspsense.sources.formats.topic_clocks import NOTICED, PERIODS
 from graspsense.sources.manifest.description import ReadManifest, axes_of, read_manifest, texts_of
 from graspsense.sources.manifest.facts import (
     FIELD,
+    filled,
     instance_of,
     label_of,
     order_of,
@@ -81,7 +82,9 @@ def tables_of(manifest: ReadManifest, file: NamedFile) -> list[ColumnTable]:
     read = raw_tables(file.path, _rules(manifest))
     tables = [evolve(table.with_fields(file.fields), blank=file.blank) for table in read]
     for name in texts_of(manifest.keys.beside):
-        tables = _joined(manifest, tables, file.path.parent / name)
+        path = file.path.parent / filled(manifest, "beside", name, tables[0])
+        # `{number}_left.csv` has the columns `'left.NAME'`, of each recording alike.
+        tables = _joined(manifest, tables, path, Path(FIELD.sub("", name)).stem.strip("_- .") or path.stem)
     if file.rows is not None:
         begin, end = file.rows
         if end > len(tables[0]):
@@ -99,8 +102,8 @@ def tables_of(manifest: ReadManifest, file: NamedFile) -> list[ColumnTable]:
     return tables
 
 
-def _joined(manifest: ReadManifest, tables: list[ColumnTable], path: Path) -> list[ColumnTable]:
-    """Return the table of a file with the columns of one beside it. Raises ConfigError, DataDamaged.
+def _joined(manifest: ReadManifest, tables: list[ColumnTable], path: Path, prefix: str) -> list[ColumnTable]:
+    """Return the table of a file with the columns, behind a prefix, of one beside it. Raises ConfigError, DataDamaged.
 
     Files with other numbers of rows are joined by their time, if both have the column that is the time.
     """
@@ -121,7 +124,7 @@ def _joined(manifest: ReadManifest, tables: list[ColumnTable], path: Path) -> li
         table, other = _by_time(table, other, time)
 
     def named(columns: Mapping[str, Any]) -> dict[str, Any]:
-        return {f"{path.stem}.{name}": column for name, column in columns.items()}
+        return {f"{prefix}.{name}": column for name, column in columns.items()}
 
     return [
         evolve(

@@ -68,8 +68,8 @@ class Opening:
             is_told = "is no number" if gap_m != gap_m else f"is {gap_m * 1e3:.1f} mm"
             return Fault(
                 "fingers not open",
-                f"their gap {is_told} after they were told to open: something holds them, or the encoder fails; look "
-                "at the fingers and the encoder",
+                f"their gap {is_told} after they were told to open: something holds them, the encoder fails, or it "
+                "counts the other way; look at the fingers, the encoder and the sign of the gap",
                 ends=True,
             )
         if not abs(gap_m - self._target_m) > max(TARGET_M, TARGET_SHARE * self._target_m):

@@ -105,8 +105,8 @@ class Rush:
         return Fault(
             "fingers rush",
             f"they close at {-frame.velocity_m_s * 1e3:.0f} mm/s, and {self._limit_m_s * 1e3:.0f} mm/s are allowed "
-            "before a contact (run.first_speed_m_s): the gripper does not keep the speed of its commands; send it "
-            "a position or a velocity instead of an effort",
+            "before a contact (run.first_speed_m_s): the gripper does not keep the speed of its commands, or "
+            "its gap is in another unit; send it a position or a velocity instead of an effort, and give metres",
             ends=True,
         )
 
