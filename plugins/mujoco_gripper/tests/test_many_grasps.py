@@ -1,11 +1,7 @@
 """Many grasps at once: each follows from its thing and its seed alone, whoever runs it and in whatever order."""
 
-from itertools import pairwise
-
 import pytest
 from attrs import evolve
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from graspsense.plugin_api import UnknownName, create
 from graspsense.simulator_api import RunConfig, run_uninterrupted
@@ -38,21 +34,15 @@ def alone():
 
 
 @pytest.mark.slow
-def test_processes_grasp_as_one_process_does_and_tell_their_progress(alone):
+def test_processes_grasp_as_one_process_does_in_any_order_and_tell_their_progress(alone):
     told = []
-    many = felt(GRASPS, workers=2, progress=lambda done, total: told.append((done, total)))
-    assert many == [alone[grasp] for grasp in GRASPS]
+    grasps = GRASPS[::-1]
+    many = felt(grasps, workers=2, progress=lambda done, total: told.append((done, total)))
+    assert many == [alone[grasp] for grasp in grasps]
+    assert felt(GRASPS[2:], workers=1) == [alone[grasp] for grasp in GRASPS[2:]]
     assert len(set(map(repr, alone.values()))) == len(GRASPS)
     assert told[-1] == (len(GRASPS), len(GRASPS))
-    assert all(after >= earlier for earlier, after in pairwise(told))
-
-
-@pytest.mark.slow
-@given(order=st.permutations(range(len(GRASPS))), count=st.integers(2, 3), workers=st.integers(1, 2))
-@settings(max_examples=3, deadline=None)
-def test_order_and_number_change_no_grasp(alone, order, count, workers):
-    grasps = [GRASPS[k] for k in order[:count]]
-    assert felt(grasps, workers=workers) == [alone[grasp] for grasp in grasps]
+    assert told == sorted(told)
 
 
 def test_a_batch_grasps_as_the_runner_does():

@@ -98,21 +98,6 @@ def test_grasp_through_the_driver_is_the_direct_one(thing, seed, monkeypatch):
     assert through.report["lost"] == through.report["corrupt"] == through.report["images_lost"] == 0
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("answered")
-def test_paced_grasp_runs_by_the_clock_under_the_limits_of_a_first_use():
-    """Device clock, so the first close is held to 12 N until contact has been seen; 20 N squeeze after it."""
-    ended = grasp(Pr2Config(transport="emulated", pace="device", **NEAR), PATIENT)
-    assert ended.outcome == Outcome.STEADY
-    assert ended.device.clock == "device"
-    assert ended.seconds_simulated is None
-    assert ended.seconds_wall > ended.trace.t_s[-1] - ended.trace.t_s[0]
-    squeezing = ended.trace.phase >= Phase.SQUEEZE
-    onset = int(squeezing.argmax())
-    assert np.max(np.abs(ended.trace.command[:onset])) <= 12.0
-    assert np.max(ended.trace.command) == 20.0
-
-
 class Watched(Wire):
     """A wire with a witness to every command that passes."""
 
