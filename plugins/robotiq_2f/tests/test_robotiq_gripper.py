@@ -1,6 +1,8 @@
 """The driver against the emulated gripper, over every connection."""
 
+import asyncio
 import struct
+import threading
 from contextlib import nullcontext
 
 import numpy as np
@@ -13,6 +15,9 @@ from emulated_grippers import (
     give_own_time,
     plugged_in,
 )
+from pymodbus import FramerType
+from pymodbus.server import ModbusTcpServer
+from pymodbus.simulator import DataType, SimData, SimDevice
 
 from graspsense import WiringError, load_pipeline
 from graspsense.gripper_api import SerialFaults
@@ -313,18 +318,44 @@ def test_doctor_tells_a_gripper_from_a_silent_port_and_from_none(emulated):
     assert not gripper.state()["going"]
 
 
-@pytest.mark.usefixtures("own_time")
-def test_the_registers_are_those_of_the_manual(emulated):
-    """Its activation and its movement: rACT and rGTO, the position, then speed and force."""
-    gripper, model = emulated(), MODELS["2f-85"]
-    driver = opened(gripper)
-    driven(driver, Command(POSITION, 0.04, 100.0, 0.05), 1)
-    driver.read(0.1)
-    speed_and_force = byte_of(0.05, model.speeds_m_s) << 8 | byte_of(100.0, model.forces_n)
-    assert gripper._hand.registers == (0x0900, model.position(0.04), speed_and_force)
+@pytest.fixture
+def pymodbus_server():
+    """The simulator server of pymodbus: unit 9, active, with the position and current of fingers at rest."""
+    registers = ((OUTPUT, [0, 0, 0]), (INPUT, [0x3100, 0, 3 << 8 | 12]))
+    blocks = [SimData(place, values=words, datatype=DataType.REGISTERS) for place, words in registers]
+    loop = asyncio.new_event_loop()
+
+    async def listening():
+        unit = SimDevice(9, simdata=blocks)
+        server = ModbusTcpServer(unit, framer=FramerType.RTU, address=("127.0.0.1", 0))
+        await server.listen()
+        return server
+
+    thread = threading.Thread(target=loop.run_forever)
+    thread.start()
+    server = asyncio.run_coroutine_threadsafe(listening(), loop).result(PATIENT_S)
+    yield f"socket:127.0.0.1:{server.transport.sockets[0].getsockname()[1]}"
+    asyncio.run_coroutine_threadsafe(server.shutdown(), loop).result(PATIENT_S)
+    loop.call_soon_threadsafe(loop.stop)
+    thread.join(PATIENT_S)
+    loop.close()
+
+
+def test_the_simulator_server_of_pymodbus_takes_the_driver(pymodbus_server):
+    driver = create("sensor-backend", "robotiq", port=pymodbus_server, reply_timeout_s=PATIENT_S)
+    assert driver.open(0).name == "Robotiq 2F-85"
+    for _ in range(5):
+        driver.apply(Command(POSITION, 0.04, 100.0, 0.05))
+        frame = driver.read(PATIENT_S).frame
     driver.close()
+    assert (frame.gap_m, frame.effort_n) == pytest.approx((0.085, 0.12 * 150.0))
+    link = ModbusLink(pymodbus_server, 9, PATIENT_S)
+    written = link._client.read_holding_registers(OUTPUT, count=3, device_id=9).registers
+    link.close()
+    model = MODELS["2f-85"]
     # The last word is to stop: the rest of the request is that of the grasp.
-    assert gripper._hand.registers == (0x0100, model.position(0.04), speed_and_force)
+    speed_and_force = byte_of(0.05, model.speeds_m_s) << 8 | byte_of(100.0, model.forces_n)
+    assert written == [0x0100, model.position(0.04), speed_and_force]
 
 
 def test_the_checksum_is_that_of_the_manual():
