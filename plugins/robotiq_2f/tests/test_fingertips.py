@@ -49,9 +49,6 @@ from graspsense_robotiq_2f.tactile_protocol import (
 CELL = st.integers(0, 0xFFFF)
 NOISE_OF_SUM = 6.0 * NOISE_COUNTS * CELLS**0.5
 """Six standard deviations."""
-REST = EmulatedFingertips(lambda: (0.0, 0.0)).rest
-
-
 FINGER = st.integers(0, 1)
 FIELDS = st.tuples(
     st.builds(Field, st.just(TIMESTAMP), FINGER, st.tuples(st.integers(0, 2**64 - 1))),
@@ -126,11 +123,7 @@ def ports():
     made = []
 
     def make(count):
-        boards = (
-            emulated_boards(count, lambda: (2.0, 4.0))
-            if count > 1
-            else [EmulatedFingertips(lambda: (2.0, 4.0))]
-        )
+        boards = emulated_boards(count, lambda: (2.0, 4.0))
         made.extend(EmulatedPort("pty", board.heard, board.unasked, 0.001) for board in boards)
         return [port.where for port in made], boards
 
@@ -175,7 +168,7 @@ def test_the_driver_reads_images_in_a_thread_with_their_age_and_each_board_has_i
     driver = TactileFingertips(opened_boards(places))
     taken = taken_images(driver, 5)
     driver.close()
-    assert_images_of_both(taken, REST if count == 1 else [board.rest[board.fingers[0]] for board in boards])
+    assert_images_of_both(taken, [board.rest[finger] for board in boards for finger in board.fingers])
     report = driver.report()
     told = {key: value for key, value in report.items() if key.endswith("_channels")}
     assert told.keys() == channels.keys()
