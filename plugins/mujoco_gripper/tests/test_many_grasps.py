@@ -5,7 +5,6 @@ from attrs import evolve
 
 from graspsense.plugin_api import UnknownName, create
 from graspsense.simulator_api import RunConfig, run_uninterrupted
-from graspsense_mujoco_gripper import backend
 
 HYBRID = create("controller", "hybrid", sends="velocity", closing_speed_m_s=0.15)
 FEATURES = create("feature-set", "chitta")
@@ -21,9 +20,9 @@ class Values:
         return repr((FEATURES.extract(trace).values, trace.force_left_n.tolist(), trace.gap_m.tolist()))
 
 
-def felt(grasps, **options):
+def felt(grasps, controller=HYBRID, **options):
     things, seeds = zip(*grasps, strict=True)
-    done = GRIPPER.run_many(HYBRID, things, seeds, run=RUN, extract=Values(), **options)
+    done = GRIPPER.run_many(controller, things, seeds, run=RUN, extract=Values(), **options)
     return [(grasped.outcome, grasped.extracted, grasped.report["greatest_force_n"]) for grasped in done]
 
 
@@ -63,15 +62,5 @@ def test_a_controller_that_other_processes_cannot_make_again_grasps_here(alone):
     class Unregistered(type(HYBRID)):
         pass
 
-    things, seeds = zip(*GRASPS[:2], strict=True)
     own = Unregistered(HYBRID.config)
-    done = GRIPPER.run_many(own, things, seeds, run=RUN, extract=Values(), workers=2)
-    assert [grasped.extracted for grasped in done] == [alone[grasp][1] for grasp in GRASPS[:2]]
-
-
-def test_a_batch_prepares_each_thing_once(monkeypatch):
-    prepare, made = backend.prepare, []
-    monkeypatch.setattr(backend, "prepare", lambda *given: made.append(given[0].object) or prepare(*given))
-    short = evolve(RUN, grasp_timeout_s=0.1, opening_timeout_s=0.1)
-    GRIPPER.run_many(HYBRID, ["block", "can", "block"], [1, 2, 3], run=short, workers=1)
-    assert made == ["block", "can"]
+    assert felt(GRASPS[:2], own, workers=2) == [alone[grasp] for grasp in GRASPS[:2]]
