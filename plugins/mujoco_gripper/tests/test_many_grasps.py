@@ -1,15 +1,10 @@
 """Many grasps at once: each follows from its thing and its seed alone, whoever runs it and in whatever order."""
 
-from itertools import pairwise
-
 import pytest
 from attrs import evolve
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from graspsense.plugin_api import UnknownName, create
 from graspsense.simulator_api import RunConfig, run_uninterrupted
-from graspsense_mujoco_gripper import backend
 
 HYBRID = create("controller", "hybrid", sends="velocity", closing_speed_m_s=0.15)
 FEATURES = create("feature-set", "chitta")
@@ -25,9 +20,9 @@ class Values:
         return repr((FEATURES.extract(trace).values, trace.force_left_n.tolist(), trace.gap_m.tolist()))
 
 
-def felt(grasps, **options):
+def felt(grasps, controller=HYBRID, **options):
     things, seeds = zip(*grasps, strict=True)
-    done = GRIPPER.run_many(HYBRID, things, seeds, run=RUN, extract=Values(), **options)
+    done = GRIPPER.run_many(controller, things, seeds, run=RUN, extract=Values(), **options)
     return [(grasped.outcome, grasped.extracted, grasped.report["greatest_force_n"]) for grasped in done]
 
 
@@ -38,21 +33,15 @@ def alone():
 
 
 @pytest.mark.slow
-def test_processes_grasp_as_one_process_does_and_tell_their_progress(alone):
+def test_processes_grasp_as_one_process_does_in_any_order_and_tell_their_progress(alone):
     told = []
-    many = felt(GRASPS, workers=2, progress=lambda done, total: told.append((done, total)))
-    assert many == [alone[grasp] for grasp in GRASPS]
+    grasps = GRASPS[::-1]
+    many = felt(grasps, workers=2, progress=lambda done, total: told.append((done, total)))
+    assert many == [alone[grasp] for grasp in grasps]
+    assert felt(GRASPS[2:], workers=1) == [alone[grasp] for grasp in GRASPS[2:]]
     assert len(set(map(repr, alone.values()))) == len(GRASPS)
     assert told[-1] == (len(GRASPS), len(GRASPS))
-    assert all(after >= earlier for earlier, after in pairwise(told))
-
-
-@pytest.mark.slow
-@given(order=st.permutations(range(len(GRASPS))), count=st.integers(2, 3), workers=st.integers(1, 2))
-@settings(max_examples=3, deadline=None)
-def test_order_and_number_change_no_grasp(alone, order, count, workers):
-    grasps = [GRASPS[k] for k in order[:count]]
-    assert felt(grasps, workers=workers) == [alone[grasp] for grasp in grasps]
+    assert told == sorted(told)
 
 
 def test_a_batch_grasps_as_the_runner_does():
@@ -73,15 +62,5 @@ def test_a_controller_that_other_processes_cannot_make_again_grasps_here(alone):
     class Unregistered(type(HYBRID)):
         pass
 
-    things, seeds = zip(*GRASPS[:2], strict=True)
     own = Unregistered(HYBRID.config)
-    done = GRIPPER.run_many(own, things, seeds, run=RUN, extract=Values(), workers=2)
-    assert [grasped.extracted for grasped in done] == [alone[grasp][1] for grasp in GRASPS[:2]]
-
-
-def test_a_batch_prepares_each_thing_once(monkeypatch):
-    prepare, made = backend.prepare, []
-    monkeypatch.setattr(backend, "prepare", lambda *given: made.append(given[0].object) or prepare(*given))
-    short = evolve(RUN, grasp_timeout_s=0.1, opening_timeout_s=0.1)
-    GRIPPER.run_many(HYBRID, ["block", "can", "block"], [1, 2, 3], run=short, workers=1)
-    assert made == ["block", "can"]
+    assert felt(GRASPS[:2], own, workers=2) == [alone[grasp] for grasp in GRASPS[:2]]

@@ -32,11 +32,11 @@ def test_a_shake_begins_and_ends_at_rest_and_stays_within_its_amplitude(t_s, cyc
         assert shake.place_m(t_s) == 0.0
 
 
-def test_the_gripper_follows_the_shake_and_tells_it(tmp_path):
-    path = tmp_path / "shake.toml"
-    path.write_text('thing = "block"\n[shake]\namplitude_m = 0.01\nfrequency_hz = 4.0\nstart_s = 0.0\n')
-    gripper = backend(object=str(path), spread=False)
+def test_the_gripper_follows_the_shake_and_tells_it(scene_file):
+    shake = ("[shake]", "amplitude_m = 0.01", "frequency_hz = 4.0", "start_s = 0.0")
+    gripper = backend(object=scene_file('thing = "block"', *shake), spread=False)
     assert gripper.channels[-1].name == "shake"
+    assert "shake" not in [channel.name for channel in backend(object="tugged").channels]
     gripper.open(0)
     told, felt = [], []
     for _ in range(1300):
@@ -50,11 +50,7 @@ def test_the_gripper_follows_the_shake_and_tells_it(tmp_path):
     assert max(felt) > 0.01 * (2 * math.pi * 4.0) ** 2
 
 
-def test_without_a_shake_there_is_no_such_channel():
-    assert "shake" not in [channel.name for channel in backend(object="tugged").channels]
-
-
-@pytest.mark.parametrize(("fill", "depth_m"), [(0.5, 0.085), (0.1, 0.017)])
+@every_case(("fill", "depth_m"), [(0.5, 0.085), (0.1, 0.017)])
 def test_a_wave_has_the_figures_of_a_liquid_in_a_cylinder(fill, depth_m):
     contents = Contents(mass_kg=0.45, fill=fill, radius_m=0.029, height_m=0.17)
     tanh = math.tanh(1.8412 * depth_m / 0.029)
@@ -71,33 +67,29 @@ def test_of_a_shallow_liquid_most_moves_and_of_a_full_bottle_nothing():
 
 
 def test_a_liquid_weighs_the_same_with_and_without_a_wave():
-    names = ("flask_full:open", "flask_half:closed", "flask_empty:open")
-    masses = {name: mass_kg(_opened(name)._model) for name in names}
-    assert masses["flask_full:open"] == pytest.approx(0.15 + 0.45)
-    assert masses["flask_half:closed"] == pytest.approx(0.15 + 0.225)
-    assert masses["flask_empty:open"] == pytest.approx(0.15)
-    spring = _opened("flask_half:open")._model
-    wave = spring.joint("thing/flask_half:open_wave_x")
-    moving_kg = spring.body("thing/flask_half:open_wave").mass[0]
+    masses = {"flask_full:open": 0.15 + 0.45, "flask_half:closed": 0.15 + 0.225, "flask_empty:open": 0.15}
+    assert {name: mass_kg(_opened(name)) for name in masses} == pytest.approx(masses)
+    model = _opened("flask_half:open")
+    wave = model.joint("thing/flask_half:open_wave_x")
+    moving_kg = model.body("thing/flask_half:open_wave").mass[0]
     assert np.ravel(wave.stiffness)[0] / moving_kg == pytest.approx(1.8412 * 9.81 / 0.029, rel=1e-3)
 
 
-def _opened(name, **settings):
-    gripper = backend(object=name, scene="shaken", **{"spread": False, **settings})
+def _opened(name, spread=False):
+    """Return the model of a shaken thing."""
+    gripper = backend(object=name, scene="shaken", spread=spread)
     gripper.open(0)
-    return gripper
+    return gripper._model
 
 
 def test_a_bottle_is_the_same_in_each_of_its_states():
     """Closed and open differ in stiffness; the instance decides by which factor, and of mass and size."""
-    masses = [
-        mass_kg(_opened(f"flask_half:{s}#{k}", spread=True)._model)
-        for s in ("closed", "open")
-        for k in (1, 2)
-    ]
-    assert masses[0] == masses[2]
-    assert masses[1] == masses[3]
-    assert masses[0] != masses[1]
+    closed, opened = (
+        [mass_kg(_opened(f"flask_half:{state}#{k}", spread=True)) for k in (1, 2)]
+        for state in ("closed", "open")
+    )
+    assert closed == opened
+    assert closed[0] != closed[1]
     assert {name for kind in backend().objects() for name in kind.full_names} >= set(STATES)
 
 
@@ -107,13 +99,9 @@ def test_a_scene_takes_another_thing():
     assert scene.shake == read_scene("shaken").scene.shake
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("thing", "scene", "said"),
-    [
-        ("tugged", "shaken", "object"),
-        ("block", "shakn", "shaken"),
-        ("block", "missing.toml", "missing.toml"),
-    ],
+    [("tugged", "shaken", "object"), ("block", "shakn", "shaken"), ("block", "missing.toml", "missing.toml")],
 )
 def test_a_scene_that_cannot_be_says_why(thing, scene, said):
     with pytest.raises(ConfigError, match=said):
@@ -121,15 +109,15 @@ def test_a_scene_that_cannot_be_says_why(thing, scene, said):
 
 
 @every_case(
-    "wrong",
+    ("name", "value"),
     [
-        {"amplitude_m": 0.0},
-        {"frequency_hz": -1.0},
-        {"cycles": 1.0},
-        {"direction": (0.0, 0.0, 0.0)},
-        {"start_s": float("nan")},
+        ("amplitude_m", 0.0),
+        ("frequency_hz", -1.0),
+        ("cycles", 1.0),
+        ("direction", (0.0, 0.0, 0.0)),
+        ("start_s", math.nan),
     ],
 )
-def test_a_shake_that_cannot_be_is_refused(wrong):
-    with pytest.raises(ValueError, match=next(iter(wrong))):
-        Shake(**{"amplitude_m": 0.01, "frequency_hz": 3.0, "start_s": 1.0, **wrong})
+def test_a_shake_that_cannot_be_is_refused(name, value):
+    with pytest.raises(ValueError, match=name):
+        Shake(**{"amplitude_m": 0.01, "frequency_hz": 3.0, "start_s": 1.0, name: value})

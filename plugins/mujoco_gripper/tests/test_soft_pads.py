@@ -61,14 +61,6 @@ def test_a_cell_image_is_the_pressure_of_a_bed_of_springs(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_flat_thing_presses_on_all_cells_alike(tmp_path):
-    backend = opened(thing_file(tmp_path, 'type="box" size="0.02 0.02 0.02"'))
-    image = np.array(squeezed(backend, 0.0395, 800).pads.right)
-    assert image.min() > 0.1
-    assert np.ptp(image) < 0.1 * image.mean()
-
-
-@pytest.mark.slow
 def test_the_palm_feels_gravity_and_the_motion_of_the_fingers():
     backend = opened("none")
     still = [backend.read(1.0).signals.acceleration for _ in range(200)]

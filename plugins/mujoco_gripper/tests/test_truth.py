@@ -43,17 +43,10 @@ def extreme(folder, mass_kg, friction, speed_m_s, step_s):
         f'thing = "wide.xml"\ntable = true\nmass_kg = {mass_kg}\nfriction = {friction}\n'
         "arm = [[0.0, 0.0], [0.3, 0.03]]\n"
     )
-    gripper = create(
-        "sensor-backend",
-        "mujoco",
-        object=str(scene),
-        spread=False,
-        timestep_s=step_s,
-        rate_hz=min(1000.0, 1.0 / step_s),
-    )
-    controller = create(
-        "controller", "hybrid", closing_speed_m_s=speed_m_s, sends="velocity", move_timeout_s=2.0
-    )
+    steps = {"timestep_s": step_s, "rate_hz": min(1000.0, 1.0 / step_s)}
+    gripper = create("sensor-backend", "mujoco", object=str(scene), spread=False, **steps)
+    servo = {"sends": "velocity", "move_timeout_s": 2.0}
+    controller = create("controller", "hybrid", closing_speed_m_s=speed_m_s, **servo)
     return run_uninterrupted(gripper, controller, RunConfig(hold_s=0.35))
 
 

@@ -11,10 +11,14 @@ from types import ModuleType
 from typing import Any
 
 import pytest
+from attrs import evolve
 
+from graspsense.core.grasp.runner import run_grasp
 from graspsense.plugin_api import create
-from graspsense_pr2_gripper import device_time, link, opening
-from graspsense_pr2_gripper.config import FaultConfig
+from graspsense.simulator_api import RunConfig
+from graspsense_pr2_gripper import device_time, emulation, link, opening
+from graspsense_pr2_gripper.backend import Pr2Backend
+from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
 from graspsense_pr2_gripper.discovery import LIBRARY
 from graspsense_pr2_gripper.emulator import board as emulated_boards
 from graspsense_pr2_gripper.faults import Wire
@@ -50,6 +54,45 @@ def board():
         return Wire(Firmware(body, identity(**changes)), faults or FaultConfig(), seed)
 
     return make
+
+
+@pytest.fixture(scope="session")
+def near():
+    """Makes an emulated gripper at a can, whose fingers stand near it: a grasp of half the ticks.
+
+    They touch it at 1.3 s, and squeeze it until 1.6 s.
+    """
+
+    def make(faults=None, **settings):
+        can = {"object": "can:empty_open", "body_config": {"open_gap_m": 0.075}}
+        return Pr2Backend(
+            Pr2Config(transport="emulated", faults=FaultConfig(**faults or {}), **can, **settings)
+        )
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def grasped():
+    """Makes a grasp, with the report of the gripper as it stands after closing."""
+
+    def grasp(backend, controller="hybrid", run=None, **more):
+        ended = run_grasp(backend, create("controller", controller), run or RunConfig(seed=1), **more)
+        return evolve(ended, report=dict(backend.report()))
+
+    return grasp
+
+
+@pytest.fixture
+def wires(monkeypatch):
+    """Makes every wire of an emulated board one of this class; returns the list of them, the newest last."""
+
+    def keep(kind):
+        made = []
+        monkeypatch.setattr(emulation, "Wire", lambda *given: made.append(kind(*given)) or made[-1])
+        return made
+
+    return keep
 
 
 @pytest.fixture(autouse=True)

@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from attrs import evolve
+import pytest
 from cases import every_case
 
 from graspsense.plugin_api import Samples
 from graspsense_pr2_gripper.accelerometer import CHANNEL, Accelerometer, word_of
-from graspsense_pr2_gripper.backend import Pr2Backend
-from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
 from graspsense_pr2_gripper.link import LockStepLink
 from graspsense_pr2_gripper.protocol import (
     SAMPLES_MISSED,
@@ -19,10 +17,6 @@ from graspsense_pr2_gripper.protocol import (
     encode_input,
 )
 from graspsense_pr2_gripper.stream import Stream
-
-NEAR = {"object": "can:empty_open", "body_config": {"open_gap_m": 0.075}}
-"""A can, and fingers that stand near it: a grasp of half the ticks."""
-EMULATED = Pr2Config(transport="emulated", calibration="none", **NEAR)
 
 
 def report(sequence, words, status=0):
@@ -72,18 +66,23 @@ def test_samples_of_a_report_that_was_skipped_come_with_the_next_one_but_not_ove
     assert (arrival.words, arrival.sampled) == (words, sampled)
 
 
-def opened_and_read(**settings):
-    """Return what the emulated gripper with these settings says, and half a second of its readings."""
-    backend = Pr2Backend(evolve(EMULATED, **settings))
-    info = backend.open(1)
-    readings = [backend.read(0.1) for _ in range(500)]
-    backend.close()
-    return info, [reading for reading in readings if reading is not None]
+@pytest.fixture
+def opened_and_read(near):
+    """Opens an emulated gripper with these settings: what it says, and half a second of its readings."""
+
+    def read(faults=None, **settings):
+        backend = near(faults, calibration="none", **settings)
+        info = backend.open(1)
+        readings = [backend.read(0.1) for _ in range(500)]
+        backend.close()
+        return info, [reading for reading in readings if reading is not None]
+
+    return read
 
 
 @every_case(("drop", "least", "most"), [(0.0, 0.0, 0.0), (0.05, 0.02, 0.1)])
-def test_reports_that_are_dropped_show_as_lost_samples(drop, least, most):
-    _, readings = opened_and_read(faults=FaultConfig(drop=drop))
+def test_reports_that_are_dropped_show_as_lost_samples(opened_and_read, drop, least, most):
+    _, readings = opened_and_read({"drop": drop})
     samples = [reading.signals.acceleration for reading in readings]
     arrived = sum(block.new for block in samples)
     counted = samples[-1].counter - samples[0].counter + samples[0].new
@@ -92,15 +91,15 @@ def test_reports_that_are_dropped_show_as_lost_samples(drop, least, most):
     assert (np.diff([block.t_s for block in samples]) > 0.0).all()
 
 
-def test_a_board_without_an_accelerometer_reads_as_before_and_says_so():
+def test_a_board_without_an_accelerometer_reads_as_before_and_says_so(opened_and_read):
     _, with_it = opened_and_read()
-    info, without = opened_and_read(faults=FaultConfig(identity={"accelerometer_g": 0}))
+    info, without = opened_and_read({"identity": {"accelerometer_g": 0}})
     assert "the board has no accelerometer" in " ".join(info.notes)
     assert {reading.signals.acceleration.new for reading in without} == {0}
     assert repr([reading.frame for reading in without]) == repr([reading.frame for reading in with_it])
 
 
-def test_the_channel_can_be_left_out_by_the_settings():
-    assert CHANNEL not in Pr2Backend(evolve(EMULATED, accelerometer=False)).channels
+def test_the_channel_can_be_left_out_by_the_settings(near, opened_and_read):
+    assert CHANNEL not in near(accelerometer=False).channels
     _, readings = opened_and_read(accelerometer=False)
     assert {reading.signals for reading in readings} == {()}

@@ -7,17 +7,11 @@ from collections import Counter
 
 import pytest
 
-from graspsense.core.grasp.runner import run_grasp
 from graspsense.gripper_api import Outcome, Phase
-from graspsense.plugin_api import create
-from graspsense.simulator_api import RunConfig
-from graspsense_pr2_gripper.backend import Pr2Backend
-from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
 from graspsense_pr2_gripper.faults import Wire
 
 FAULTS = int(os.environ.get("GRASPSENSE_DEVICE_FAULTS", "120"))
 CONTROLLERS = ("hybrid", "force", "velocity")
-NEAR = {"object": "can:empty_open", "body_config": {"open_gap_m": 0.075}}
 OFF_WITHIN_S = 0.1
 PHASES = (Phase.OPENING, Phase.TARING, Phase.APPROACH, Phase.SQUEEZE, Phase.HOLD, Phase.RELEASE)
 
@@ -37,37 +31,22 @@ class Witness(Wire):
         return arriving
 
 
-@pytest.fixture
-def witnesses(monkeypatch):
-    """The wires of the grasps so far, the newest last."""
-    made = []
-    monkeypatch.setattr(
-        "graspsense_pr2_gripper.emulation.Wire", lambda *given: made.append(Witness(*given)) or made[-1]
-    )
-    return made
-
-
-def grasp(controller, faults):
-    backend = Pr2Backend(Pr2Config(transport="emulated", faults=faults, **NEAR))
-    return run_grasp(backend, create("controller", controller), RunConfig(seed=1))
-
-
 @pytest.mark.slow
-def test_the_motor_is_off_within_a_tenth_of_a_second_of_losing_the_device(witnesses):
+def test_the_motor_is_off_within_a_tenth_of_a_second_of_losing_the_device(near, grasped, wires):
     """Pulled or stalled for good, in every phase, under each controller; as many faults as are asked for."""
-    chance = random.Random(5)
+    chance, witnesses = random.Random(5), wires(Witness)
     lost = Counter()
     driven = 0
     last_s = {}
     for controller in CONTROLLERS:
-        grasp(controller, FaultConfig())
+        grasped(near(), controller)
         last_s[controller] = witnesses[-1].firmware.time_us / 1e6
     for _ in range(2 * FAULTS):
         controller = chance.choice(CONTROLLERS)
         at_s = chance.uniform(0.001, last_s[controller])
         pulled = chance.random() < 0.5
-        faults = FaultConfig(unplug_at_s=at_s) if pulled else FaultConfig(stall_at_s=at_s, stall_s=1e6)
-        ended = grasp(controller, faults)
+        faults = {"unplug_at_s": at_s} if pulled else {"stall_at_s": at_s, "stall_s": 1e6}
+        ended = grasped(near(faults), controller)
         witness = witnesses[-1]
         assert witness.firmware.effort_un == 0
         if math.isnan(witness.lost_s):

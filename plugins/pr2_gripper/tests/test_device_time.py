@@ -2,23 +2,15 @@
 
 import random
 import re
-import time
 from contextlib import closing
-from types import SimpleNamespace
 
 import pytest
-from attrs import evolve
 from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.core.grasp.runner import run_grasp
 from graspsense.gripper_api import Outcome
-from graspsense.plugin_api import EFFORT, Command, DeviceLost, create
-from graspsense.simulator_api import RunConfig
-from graspsense_pr2_gripper import link as links
-from graspsense_pr2_gripper.backend import Pr2Backend
-from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
+from graspsense.plugin_api import EFFORT, Command, DeviceLost
 from graspsense_pr2_gripper.device_time import (
     COUNTED_OFF_S,
     STILL_REPORTS,
@@ -30,24 +22,18 @@ from graspsense_pr2_gripper.device_time import (
 from graspsense_pr2_gripper.link import LockStepLink, ThreadedLink
 from graspsense_pr2_gripper.protocol import InputReport, encode_input
 
-NEAR = {"object": "can:empty_open", "body_config": {"open_gap_m": 0.075}}
-"""A can, and fingers that stand near it: they touch it at 1.3 s, and squeeze it until 1.6 s."""
-
 
 def report(sequence, time_us):
     return encode_input(InputReport(sequence, time_us, 0, 0, 0, 0, 0, (), 0, 0, (0, 0, 0, 0), 0, 0))
 
 
 @pytest.mark.parametrize(("rate", "at_s"), [(0.0, 1.4), pytest.param(0.5, 0.1, marks=pytest.mark.slow)])
-def test_grasp_ends_soon_after_the_clock_of_the_board_goes_wrong(rate, at_s):
+def test_grasp_ends_soon_after_the_clock_of_the_board_goes_wrong(near, grasped, rate, at_s):
     """In lock-step: 50 ms where it stands still, 0.2 s where it loses half.
 
     The effort is switched off by a command, since a watchdog with this clock would never act.
     """
-    faults = FaultConfig(clock_rate=rate, clock_at_s=at_s)
-    backend = Pr2Backend(Pr2Config(transport="emulated", faults=faults, **NEAR))
-    ended = run_grasp(backend, create("controller", "hybrid"), RunConfig(seed=1))
-    ended = evolve(ended, report=dict(backend.report()))
+    ended = grasped(near({"clock_rate": rate, "clock_at_s": at_s}))
     assert ended.outcome == Outcome.DEVICE_LOST
     assert "clock" in ended.reason
     assert "doctor" in ended.reason
@@ -57,12 +43,9 @@ def test_grasp_ends_soon_after_the_clock_of_the_board_goes_wrong(rate, at_s):
     assert ended.report["let_go_after_s"] == 0.0
 
 
-def test_frozen_clock_of_a_board_in_real_time_is_a_lost_device():
+def test_frozen_clock_of_a_board_in_real_time_is_a_lost_device(near):
     """It ends by the number of reports, however fast this machine is."""
-    faults = FaultConfig(clock_rate=0.0, clock_at_s=0.05)
-    with closing(
-        Pr2Backend(Pr2Config(transport="emulated", pace="device", faults=faults, **NEAR))
-    ) as backend:
+    with closing(near({"clock_rate": 0.0, "clock_at_s": 0.05}, pace="device")) as backend:
         backend.open(0)
         with pytest.raises(DeviceLost, match="clock"):
             all(iter(lambda: backend.read(60.0), None))
@@ -87,26 +70,6 @@ def test_time_that_goes_back_is_not_handed_on_and_is_told_if_it_stays_behind(fed
             told = str(lost)
     assert seen == sorted(set(seen))
     assert bool(re.search(r"went back: 50 reports.*10\.049 s", told)) == (jump_us == -300_000), told
-
-
-@pytest.mark.parametrize(("old", "told"), [(64, False), (65, True)])
-def test_clock_that_falls_behind_the_hosts_is_told(monkeypatch, fed, old, told):
-    """64 old reports can come from a buffer; the 65th cannot. The board is slow in all it does, reports too."""
-    host = [100.0]
-    monkeypatch.setattr(links, "time", SimpleNamespace(monotonic=lambda: host[0]))
-    wire = fed(report(0, 0))
-    with closing(ThreadedLink(wire, 0.001)) as link:
-        assert link.next(60.0) is not None
-        host[0] += 0.2
-        for i in range(1, old + 1):
-            wire.reports.put(report(i, 1000 * i))
-        while link.discarded < old:
-            time.sleep(0.001)
-        if told:
-            with pytest.raises(DeviceLost, match=r"clock falls behind.* last 65 reports"):
-                link.next(0.0)
-        else:
-            assert link.next(0.0) is None
 
 
 def right(check, *given):

@@ -26,22 +26,8 @@ BARE = "classifier.type=none"
 EMULATED = ("gripper.type=pr2", "gripper.transport=emulated", BARE)
 
 
-NEAR = {"object": "can:empty_open", "body_config": {"open_gap_m": 0.075}}
-"""A can, and fingers that stand near it: a grasp of half the ticks."""
-
-
 PATIENT = RunConfig(seed=1, frame_timeout_s=60.0)
 """For a board that runs by the clock: how long a frame takes on a busy machine is not what is tested."""
-
-
-def grasp(config, run=None):
-    return driven(Pr2Backend(config), run or RunConfig(seed=1))
-
-
-def driven(backend, run, controller=None, **more):
-    """A grasp with the backend's report as it stands after closing."""
-    ended = run_grasp(backend, controller or create("controller", "hybrid"), run, **more)
-    return evolve(ended, report=dict(backend.report()))
 
 
 @pytest.mark.slow
@@ -96,21 +82,6 @@ def test_grasp_through_the_driver_is_the_direct_one(thing, seed, monkeypatch):
         pads = (getattr(grasp.trace, side)[:approaching] for grasp in (through, direct))
         np.testing.assert_array_equal(*pads)
     assert through.report["lost"] == through.report["corrupt"] == through.report["images_lost"] == 0
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("answered")
-def test_paced_grasp_runs_by_the_clock_under_the_limits_of_a_first_use():
-    """Device clock, so the first close is held to 12 N until contact has been seen; 20 N squeeze after it."""
-    ended = grasp(Pr2Config(transport="emulated", pace="device", **NEAR), PATIENT)
-    assert ended.outcome == Outcome.STEADY
-    assert ended.device.clock == "device"
-    assert ended.seconds_simulated is None
-    assert ended.seconds_wall > ended.trace.t_s[-1] - ended.trace.t_s[0]
-    squeezing = ended.trace.phase >= Phase.SQUEEZE
-    onset = int(squeezing.argmax())
-    assert np.max(np.abs(ended.trace.command[:onset])) <= 12.0
-    assert np.max(ended.trace.command) == 20.0
 
 
 class Watched(Wire):
@@ -178,24 +149,22 @@ OBJECTS = ("odwalla:full_closed", "odwalla:empty_open", "can:empty_open", "naked
         pytest.param(1000, 12, random_faults, "STEADY", id="wire, often", marks=pytest.mark.long),
     ],
 )
-def test_commands_stay_within_limits_whatever_wire_and_board_do(monkeypatch, grasps, seed, faults, twice):
-    chance, wires, outcomes = random.Random(seed), [], Counter()
-    monkeypatch.setattr(
-        "graspsense_pr2_gripper.emulation.Wire", lambda *given: wires.append(Watched(*given)) or wires[-1]
-    )
+def test_commands_stay_within_limits_whatever_wire_and_board_do(wires, grasps, seed, faults, twice):
+    chance, made, outcomes = random.Random(seed), wires(Watched), Counter()
     for i in range(grasps):
         probing_n = chance.choice([17.0, 20.0, 23.0, 90.0, 500.0])
         controller = create("controller", "hybrid", probing_force_n=probing_n, closing_speed_m_s=0.03)
         near = {"object": chance.choice(OBJECTS), "body_config": {"open_gap_m": 0.07}}
         config = Pr2Config(transport="emulated", faults=faults(chance), **near)
-        ended = driven(Pr2Backend(config), RunConfig(seed=i), controller)
+        backend = Pr2Backend(config)
+        ended = run_grasp(backend, controller, RunConfig(seed=i))
         outcomes[ended.outcome.name] += 1
-        witness = wires.pop()
+        witness = made.pop()
         assert all(abs(effort) <= 100_000_000 for effort in witness.commands)
         assert not np.isnan(ended.trace.command).any()
         assert np.max(np.abs(ended.trace.command), initial=0.0) <= 100.0
         assert witness.firmware.effort_un == 0, "whatever happened, it has let go"
-        assert ended.report["let_go_after_s"] <= 0.1
+        assert backend.report()["let_go_after_s"] <= 0.1
         assert ended.reason or ended.outcome != Outcome.DEVICE_LOST
     assert outcomes[twice] >= 2
     assert outcomes["DEVICE_LOST"] >= 1
@@ -204,9 +173,9 @@ def test_commands_stay_within_limits_whatever_wire_and_board_do(monkeypatch, gra
 @every_case(
     ("fault", "word"), [({"unplug_at_s": 1.4}, "cable"), ({"stall_at_s": 1.4, "stall_s": 2.0}, "no frame")]
 )
-def test_device_lost_in_the_squeeze_has_let_go(fault, word):
+def test_device_lost_in_the_squeeze_has_let_go(near, grasped, fault, word):
     """In test_device_lost.py it is lost at any time, under every law."""
-    ended = grasp(Pr2Config(transport="emulated", faults=FaultConfig(**fault), **NEAR))
+    ended = grasped(near(fault))
     assert ended.outcome == Outcome.DEVICE_LOST
     assert word in ended.reason
     assert ended.report["let_go_after_s"] <= 0.1
@@ -222,16 +191,15 @@ def test_device_lost_in_the_squeeze_has_let_go(fault, word):
         for phase in Phase
     ],
 )
-def test_cable_pulled_between_a_frame_and_its_command(phase):
+def test_cable_pulled_between_a_frame_and_its_command(near, grasped, phase):
     """At the instant a phase begins: its frame was read, its command finds nobody."""
-    pace = "device" if phase is Phase.HOLD else "lock-step"
-    backend = Pr2Backend(Pr2Config(transport="emulated", pace=pace, **NEAR))
+    backend = near(pace="device" if phase is Phase.HOLD else "lock-step")
 
     def pull(event):
         if event.phase == phase:
             backend._open().emulation.wire.unplugged = True
 
-    ended = driven(backend, PATIENT, on_event=pull)
+    ended = grasped(backend, run=PATIENT, on_event=pull)
     assert ended.outcome == Outcome.DEVICE_LOST
     assert ended.events[-1].phase == phase
     assert ended.report["let_go_after_s"] <= 0.1
@@ -241,8 +209,8 @@ def test_cable_pulled_between_a_frame_and_its_command(phase):
 
 
 @pytest.mark.slow
-def test_short_stall_is_survived_and_counted_as_late():
-    ended = grasp(Pr2Config(transport="emulated", faults=FaultConfig(stall_at_s=0.6, stall_s=0.05), **NEAR))
+def test_short_stall_is_survived_and_counted_as_late(near, grasped):
+    ended = grasped(near({"stall_at_s": 0.6, "stall_s": 0.05}))
     assert ended.outcome == Outcome.STEADY
     assert ended.report["lost"] == 50
     assert np.max(np.diff(ended.trace.t_s)) == pytest.approx(0.051)
@@ -255,9 +223,8 @@ def test_short_stall_is_survived_and_counted_as_late():
      ("reorder", 0.1, "out_of_order"), ("delay", 0.05, "out_of_order"), ("drop_command", 0.2, ""),
      ("corrupt_command", 0.2, ""), ("freeze_cell", 10, ""), ("drift_counts_s", 1.0, "")],
 )  # fmt: skip
-def test_one_fault_at_a_time_is_survived_and_counted(fault, rate, counter):
-    faults = FaultConfig(**{fault: rate})
-    ended = grasp(Pr2Config(transport="emulated", faults=faults, **NEAR))
+def test_one_fault_at_a_time_is_survived_and_counted(near, grasped, fault, rate, counter):
+    ended = grasped(near({fault: rate}))
     assert ended.outcome == Outcome.STEADY
     report = ended.report
     if counter:

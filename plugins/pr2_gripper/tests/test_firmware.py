@@ -14,7 +14,6 @@ from graspsense_pr2_gripper.protocol import (
     NO_COMMAND,
     OWN_LIMIT,
     REFUSED,
-    RELEASE_KIND,
     OutputReport,
     decode_input,
     encode_output,
@@ -85,11 +84,6 @@ def test_watchdog_lets_go_after_its_time_and_not_before(firmware):
     assert reports[99].status & LET_GO
     again = answer(firmware, effort(2, 20.0))
     assert (again.effort_un, again.status & LET_GO) == (20_000_000, 0)
-
-
-def test_let_go_is_a_command_of_its_own(firmware):
-    firmware.output(effort(1, 20.0))
-    assert answer(firmware, encode_output(OutputReport(2, RELEASE_KIND, 0, 0, 0))).effort_un == 0
 
 
 def test_speed_limit_takes_the_effort_away_while_it_is_exceeded(firmware):

@@ -2,10 +2,11 @@
 
 import threading
 import time
-from contextlib import closing
+from contextlib import closing, nullcontext
 from types import SimpleNamespace
 
 import pytest
+from cases import every_case
 
 from graspsense.plugin_api import DeviceLost
 from graspsense_pr2_gripper import link as links
@@ -18,7 +19,7 @@ def report(sequence, time_us):
     return encode_input(InputReport(sequence, time_us, 0, 0, 0, 0, 0, (), 0, 0, (0, 0, 0, 0), 0, 0))
 
 
-def drained(link, wire, count):
+def drained(link, count):
     """Wait until the reader has taken `count` reports, however long that takes here."""
     while link.stream.counts.reports < count:
         time.sleep(0.001)
@@ -34,34 +35,41 @@ def host(monkeypatch):
 
 def test_reader_counts_what_was_too_old_and_hands_on_the_fresh_one(host, fed):
     """After a stall of 300 ms the buffer holds the 64 reports that came first."""
-    wire = fed()
+    wire = fed(report(1, 10_000_000))
     with closing(ThreadedLink(wire, 0.001)) as link:
-        now_us = 10_000_000
-        wire.reports.put(report(1, now_us))
         assert link.next(60.0) is not None
         host[0] += 0.3
-        for i in range(64):
-            wire.reports.put(report(2 + i, now_us + 1000 * (1 + i)))
-        drained(link, wire, 65)
-        wire.reports.put(report(301, now_us + 300_000))
-        arrival = link.next(60.0)
-        assert arrival is not None
-        assert arrival.report.sequence == 301
+        for i in range(1, 65):
+            wire.reports.put(report(1 + i, 10_000_000 + 1000 * i))
+        drained(link, 65)
+        wire.reports.put(report(301, 10_300_000))
+        assert link.next(60.0).report.sequence == 301
         assert link.discarded == 64
+
+
+@every_case(
+    ("old", "expected"), [(64, nullcontext()), (65, pytest.raises(DeviceLost, match=r"behind.*last 65"))]
+)
+def test_clock_that_falls_behind_the_hosts_is_told(host, fed, old, expected):
+    """64 old reports can come from a buffer; the 65th cannot. The board is slow in all it does, reports too."""
+    wire = fed(report(0, 0))
+    with closing(ThreadedLink(wire, 0.001)) as link:
+        assert link.next(60.0) is not None
+        host[0] += 0.2
+        for i in range(1, old + 1):
+            wire.reports.put(report(i, 1000 * i))
+        while link.discarded < old:
+            time.sleep(0.001)
+        with expected:
+            assert link.next(0.0) is None
 
 
 @pytest.mark.usefixtures("host")
 def test_newest_report_replaces_the_one_nobody_asked_for(fed):
-    wire = fed()
-    with closing(ThreadedLink(wire, 0.001)) as link:
-        for i in range(6):
-            wire.reports.put(report(i, 1000 * i))
-        drained(link, wire, 6)
-        arrival = link.next(60.0)
-        while arrival is not None and arrival.report.sequence < 5:
-            arrival = link.next(60.0)
-        assert arrival is not None
-        assert arrival.report.sequence == 5
+    with closing(ThreadedLink(fed(*(report(i, 1000 * i) for i in range(6))), 0.001)) as link:
+        drained(link, 6)
+        while link.next(60.0).report.sequence < 5:
+            pass
         assert link.skipped >= 4
         assert link.next(0.0) is None
 

@@ -50,7 +50,6 @@ def test_gap_to_revolutions_and_back(name, gap_m):
 
 @given(st.sampled_from(sorted(LINKAGES)), st.floats(5.0, 200.0))
 def test_the_rate_is_the_slope_of_the_gap(name, revolutions):
-    link = LINKAGES[name]
-    h = 1e-3
+    link, h = LINKAGES[name], 1e-3
     slope = (gap_and_rate(link, revolutions + h)[0] - gap_and_rate(link, revolutions - h)[0]) / (2 * h)
     assert gap_and_rate(link, revolutions)[1] == pytest.approx(slope, rel=1e-6)

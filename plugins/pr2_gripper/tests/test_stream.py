@@ -22,13 +22,15 @@ def reports(start, count, image=1):
     return [report(start + i, image=image, slice=i % 11, age_us=1000 * i) for i in range(count)]
 
 
-def test_image_is_whole_after_eleven_reports_and_bears_the_time_it_was_taken():
+def taken(sent):
+    """Return a stream that has taken these reports, and for each whether it was handed on."""
     stream = Stream()
-    for data in reports(100, 10):
-        stream.take(data)
-    assert stream.image is None
-    stream.take(reports(100, 11)[10])
-    assert stream.image == (1, 100_000, IMAGE)
+    return stream, [stream.take(data) is not None for data in sent]
+
+
+def test_image_is_whole_after_eleven_reports_and_bears_the_time_it_was_taken():
+    assert taken(reports(100, 10))[0].image is None
+    assert taken(reports(100, 11))[0].image == (1, 100_000, IMAGE)
 
 
 def test_lost_report_delays_an_image_by_one_round_and_no_more():
@@ -42,41 +44,32 @@ def test_lost_report_delays_an_image_by_one_round_and_no_more():
 
 
 def test_image_that_never_came_whole_is_counted_and_not_made_up():
-    stream = Stream()
-    for data in [*reports(0, 41, image=1), *reports(41, 5, image=2), *reports(46, 41, image=4)]:
-        stream.take(data)
-    assert stream.image is not None
+    stream, _ = taken([*reports(0, 41, image=1), *reports(41, 5, image=2), *reports(46, 41, image=4)])
     assert stream.image.counter == 4, "lost images are counted"
-    assert stream.counts.images == 2
-    assert stream.counts.images_lost == 2, "number 2 was cut short, number 3 never came"
+    # Number 2 was cut short, number 3 never came.
+    assert (stream.counts.images, stream.counts.images_lost) == (2, 2)
 
 
 def test_counters_wrap():
-    stream = Stream()
     start = 2**32 - 20
-    sent = [
-        *(report(start + i, image=65535, slice=i % 11) for i in range(20)),
-        *(report(i, image=1, slice=i % 11) for i in range(11)),
-    ]
-    assert all(stream.take(data) for data in sent)
+    sent = [report(start + i, image=65535, slice=i % 11) for i in range(20)]
+    stream, handed_on = taken([*sent, *reports(0, 11)])
+    assert all(handed_on)
     assert (stream.counts.lost, stream.counts.images, stream.counts.images_lost) == (0, 2, 0)
 
 
 def test_late_report_is_not_handed_on_but_its_cells_count():
-    stream = Stream()
     sent = reports(0, 11)
     sent[4], sent[5] = sent[5], sent[4]
-    handed_on = [stream.take(data) is not None for data in sent]
+    stream, handed_on = taken(sent)
     assert handed_on == [True] * 5 + [False] + [True] * 5
     assert (stream.counts.lost, stream.counts.out_of_order) == (0, 1)
     assert stream.image is not None
 
 
 def test_device_that_begins_anew_is_noticed():
-    stream = Stream()
-    stream.take(report(5000))
-    for i in range(RESTARTED - 1):
-        assert stream.take(report(i)) is None
+    stream, handed_on = taken([report(5000), *(report(i) for i in range(RESTARTED - 1))])
+    assert not any(handed_on[1:])
     with pytest.raises(Restarted, match="5000 to 31"):
         stream.take(report(RESTARTED - 1))
 
@@ -117,8 +110,6 @@ def test_what_is_counted_adds_up(start, fates, chance):
     counts = stream.counts
     sequences = [(passed.sequence - start) & 0xFFFFFFFF for passed in handed_on if passed]
     assert sequences == sorted(set(sequences))
-    assert counts.lost == expected["drop"] + expected["damage"]
-    assert counts.corrupt == expected["damage"]
-    assert counts.repeated == expected["repeat"]
-    assert counts.out_of_order == expected["swap"]
+    counted = {"damage": counts.corrupt, "repeat": counts.repeated, "swap": counts.out_of_order}
+    assert expected == counted | {"drop": counts.lost - counts.corrupt}
     assert counts.reports + counts.out_of_order + counts.lost == len(fates) + 2

@@ -18,6 +18,7 @@ from graspsense import load_pipeline
 from graspsense.gripper_api import EmulatedPort
 from graspsense.plugin_api import POSITION, Command, ConfigError, create
 from graspsense.testing_api import parametrize_checks
+from graspsense_robotiq_2f.config import RobotiqConfig
 from graspsense_robotiq_2f.emulator import fingertips
 from graspsense_robotiq_2f.emulator.device import emulate
 from graspsense_robotiq_2f.emulator.fingertips import (
@@ -49,9 +50,6 @@ from graspsense_robotiq_2f.tactile_protocol import (
 CELL = st.integers(0, 0xFFFF)
 NOISE_OF_SUM = 6.0 * NOISE_COUNTS * CELLS**0.5
 """Six standard deviations."""
-REST = EmulatedFingertips(lambda: (0.0, 0.0)).rest
-
-
 FINGER = st.integers(0, 1)
 FIELDS = st.tuples(
     st.builds(Field, st.just(TIMESTAMP), FINGER, st.tuples(st.integers(0, 2**64 - 1))),
@@ -126,11 +124,7 @@ def ports():
     made = []
 
     def make(count):
-        boards = (
-            emulated_boards(count, lambda: (2.0, 4.0))
-            if count > 1
-            else [EmulatedFingertips(lambda: (2.0, 4.0))]
-        )
+        boards = emulated_boards(count, lambda: (2.0, 4.0))
         made.extend(EmulatedPort("pty", board.heard, board.unasked, 0.001) for board in boards)
         return [port.where for port in made], boards
 
@@ -175,7 +169,7 @@ def test_the_driver_reads_images_in_a_thread_with_their_age_and_each_board_has_i
     driver = TactileFingertips(opened_boards(places))
     taken = taken_images(driver, 5)
     driver.close()
-    assert_images_of_both(taken, REST if count == 1 else [board.rest[board.fingers[0]] for board in boards])
+    assert_images_of_both(taken, [board.rest[finger] for board in boards for finger in board.fingers])
     report = driver.report()
     told = {key: value for key, value in report.items() if key.endswith("_channels")}
     assert told.keys() == channels.keys()
@@ -206,11 +200,9 @@ class FedBoard:
         self.stream, self.silent_s, self.came = TactileStream(1), 0.0, None
 
     def feed(self, host_s, device_s, number, *fields):
-        given = [
-            Field(TIMESTAMP, number, (round(device_s * 1e6),)),
-            *(Field(kind, number, v) for kind, v in fields),
-        ]
-        self.came = self.stream.fed(encoded(given), host_s)
+        stamp = Field(TIMESTAMP, number, (round(device_s * 1e6),))
+        sent = [stamp, *(Field(kind, number, values) for kind, values in fields)]
+        self.came = self.stream.fed(encoded(sent), host_s)
 
     def newest(self, timeout_s):
         came, self.came = self.came, None
@@ -291,26 +283,24 @@ def test_a_gripper_and_two_boards_are_three_ports_and_a_trial_tells_how_far_thei
     assert {"tactile_left_drift", "tactile_right_drift"} <= set(trial.report)
 
 
+TACTILE_PORTS = ("a,b,c", ",", "a,", "emulated,/dev/ttyACM0")
+
+
 @every_case(
-    ("port", "where"),
-    [
-        *(("emulated", where) for where in ("a,b,c", ",", "a,", "emulated,/dev/ttyACM0")),
-        ("/dev/ttyUSB0", "emulated"),
-    ],
+    ("port", "where"), [*(("emulated", where) for where in TACTILE_PORTS), ("/dev/ttyUSB0", "emulated")]
 )
 def test_ports_that_cannot_be_are_refused(port, where):
     with pytest.raises(ConfigError, match="tactile_port"):
         create("sensor-backend", "robotiq", port=port, tactile_port=where)
 
 
-@pytest.mark.parametrize("where", ["emulated", "emulated,emulated"])
-def test_emulated_fingertips_have_a_port_for_each_board(where):
-    config = create("sensor-backend", "robotiq", port="emulated", tactile_port=where).config
-    gripper = emulate(config, "pty", 0)
+@every_case(("where", "count"), [("emulated", 1), ("emulated,emulated", 2)])
+def test_emulated_fingertips_have_a_port_for_each_board(where, count):
+    gripper = emulate(RobotiqConfig(port="emulated", tactile_port=where), "pty", 0)
     gripper.tell("plug")
     boards = opened_boards(gripper.tactile_where.split(","))
     fingertips = TactileFingertips(boards)
-    assert len(boards) == where.count("emulated")
+    assert len(boards) == count
     assert fingertips.take(PATIENT_S)
     fingertips.close()
     gripper.tell("unplug")
@@ -321,16 +311,8 @@ def test_emulated_fingertips_have_a_port_for_each_board(where):
 def test_what_a_host_reads_late_is_not_lost():
     """60 kB, which is more than a terminal takes."""
     chunks = [bytes((k,)) * 1000 for k in range(60)]
-    left = iter(chunks)
-    sent = threading.Event()
-
-    def unasked():
-        chunk = next(left, b"")
-        if not chunk:
-            sent.set()
-        return chunk
-
-    port = EmulatedPort("pty", lambda data: b"", unasked, 0.001)
+    left, sent = iter(chunks), threading.Event()
+    port = EmulatedPort("pty", lambda data: b"", lambda: next(left, None) or sent.set() or b"", 0.001)
     assert sent.wait(PATIENT_S)
     received = b""
     # Opened as a file, since pyserial throws away what waits.

@@ -3,7 +3,7 @@
 import asyncio
 import struct
 import threading
-from contextlib import nullcontext, suppress
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
@@ -321,37 +321,29 @@ def test_doctor_tells_a_gripper_from_a_silent_port_and_from_none(emulated):
 @pytest.fixture
 def pymodbus_server():
     """The simulator server of pymodbus: unit 9, active, with the position and current of fingers at rest."""
-    status = [0x3100, 0, 3 << 8 | 12]
-    blocks = [SimData(OUTPUT, values=[0, 0, 0], datatype=DataType.REGISTERS),
-              SimData(INPUT, values=status, datatype=DataType.REGISTERS)]  # fmt: skip
-    told = {}
-    ready, loop = threading.Event(), asyncio.new_event_loop()
+    registers = ((OUTPUT, [0, 0, 0]), (INPUT, [0x3100, 0, 3 << 8 | 12]))
+    blocks = [SimData(place, values=words, datatype=DataType.REGISTERS) for place, words in registers]
+    loop = asyncio.new_event_loop()
 
-    async def serve():
-        told["server"] = server = ModbusTcpServer(
-            SimDevice(9, simdata=blocks), framer=FramerType.RTU, address=("127.0.0.1", 0)
-        )
+    async def listening():
+        unit = SimDevice(9, simdata=blocks)
+        server = ModbusTcpServer(unit, framer=FramerType.RTU, address=("127.0.0.1", 0))
         await server.listen()
-        told["port"] = server.transport.sockets[0].getsockname()[1]
-        ready.set()
-        await server.serving
+        return server
 
-    def run():
-        with suppress(asyncio.CancelledError):
-            loop.run_until_complete(serve())
-
-    thread = threading.Thread(target=run, daemon=True)
+    thread = threading.Thread(target=loop.run_forever)
     thread.start()
-    assert ready.wait(PATIENT_S)
-    yield f"socket:127.0.0.1:{told['port']}"
-    asyncio.run_coroutine_threadsafe(told["server"].shutdown(), loop).result(PATIENT_S)
+    server = asyncio.run_coroutine_threadsafe(listening(), loop).result(PATIENT_S)
+    yield f"socket:127.0.0.1:{server.transport.sockets[0].getsockname()[1]}"
+    asyncio.run_coroutine_threadsafe(server.shutdown(), loop).result(PATIENT_S)
+    loop.call_soon_threadsafe(loop.stop)
     thread.join(PATIENT_S)
+    loop.close()
 
 
 def test_the_simulator_server_of_pymodbus_takes_the_driver(pymodbus_server):
     driver = create("sensor-backend", "robotiq", port=pymodbus_server, reply_timeout_s=PATIENT_S)
-    info = driver.open(0)
-    assert info.name == "Robotiq 2F-85"
+    assert driver.open(0).name == "Robotiq 2F-85"
     for _ in range(5):
         driver.apply(Command(POSITION, 0.04, 100.0, 0.05))
         frame = driver.read(PATIENT_S).frame

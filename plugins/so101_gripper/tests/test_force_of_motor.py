@@ -45,11 +45,11 @@ def jaw_position(gap_m):
 
 
 def calibrated(tmp_path, rows):
-    readings = tmp_path / "readings.csv"
+    readings, kept = tmp_path / "readings.csv", tmp_path / "kept"
     readings.write_text("direction,motor,load_n\n" + "".join(",".join(map(str, row)) + "\n" for row in rows))
-    (tmp_path / "kept").mkdir()
-    options = ("-o", "gripper.port=emulated", "-o", f"gripper.calibration={tmp_path / 'kept'}")
-    return graspsense("calibrate", "load-cell", readings, "--gripper", "so101", *options, "--json")
+    kept.mkdir()
+    options = ("-o", "gripper.port=emulated", "-o", f"gripper.calibration={kept}", "--json")
+    return graspsense("calibrate", "load-cell", readings, "--gripper", "so101", *options)
 
 
 @pytest.mark.slow

@@ -3,7 +3,6 @@
 import json
 from contextlib import nullcontext
 
-import numpy as np
 import pytest
 from cases import every_case
 from emulated_grippers import (
@@ -132,14 +131,6 @@ def test_it_closes_with_the_torque_limit_of_the_force_and_tells_load_current_and
 @every_case("fault", ["unplug", "silent"])
 def test_a_gripper_lost_in_a_grasp_ends_it_and_is_told(fault, at_s):
     assert_lost_in_a_grasp("so101", fault, at_s)
-
-
-@pytest.mark.slow
-def test_the_emulated_gripper_keeps_its_own_time_so_that_a_grasp_repeats_exactly():
-    trial, again = (load_pipeline("so101", options=["gripper.port=emulated"]).grasp() for _ in range(2))
-    assert trial.features.values == again.features.values
-    assert np.array_equal(trial.trace.t_s, again.trace.t_s)
-    assert trial.trace.t_s[-1] - trial.trace.t_s[0] == pytest.approx((len(trial.trace.t_s) - 1) / 100.0)
 
 
 @pytest.mark.slow
