@@ -115,7 +115,9 @@ PLAIN = """
 
 def test_a_text_file_is_known_by_its_ending(tmp_path):
     for ending in ("CSV", "tsv", "dat"):
-        pandas_csv(tmp_path / f"{ending}.{ending}", {"t": T_S, "gap": squeezing()[0] * 1e3, "F": squeezing()[1]})
+        pandas_csv(
+            tmp_path / f"{ending}.{ending}", {"t": T_S, "gap": squeezing()[0] * 1e3, "F": squeezing()[1]}
+        )
         (recording,) = recordings(tmp_path, PLAIN.replace("*", ending.lower()))
         assert column(recording, "force_right_n") == pytest.approx(squeezing()[1], abs=1e-6)
 
