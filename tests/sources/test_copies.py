@@ -84,6 +84,15 @@ FEW_VALUES[:10, 0] = np.arange(10) % 3
         (WIDTHS, None, tuple("aaaaefgh"), 5, None, None),
         # Where a feature set finds no contact, it gives no features, or one that has few values.
         (FEW_VALUES, None, None, 53, None, "single feature"),
+        # Copies of coarse trials are found where chance cannot make them.
+        (
+            np.tile(np.random.default_rng(2).integers(0, 50, size=(30, 6)), (2, 1)),
+            None,
+            None,
+            30,
+            "copies",
+            None,
+        ),
         # Coarse features that are equal by chance: counts, marks on a scale, a width in whole millimetres, ticks of an
         # encoder, on and off.
         *(
