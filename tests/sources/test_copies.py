@@ -54,42 +54,70 @@ def test_measured_trials_count_once_however_often_they_are_pasted(seed, times, f
     assert copies_said(kept)
 
 
-def test_trials_without_copies_stay_as_they_are_and_one_without_any_feature_is_no_copy():
-    trials = labelled(measured())
-    assert without_copies(trials) is trials
-    values = measured()
-    values[::4] = np.nan
-    assert len(without_copies(labelled(values))) == 40
+def without(values, rows, columns=slice(None)):
+    changed = np.array(values)
+    changed[rows, columns] = np.nan
+    return changed
+
+
+DRAWN = np.random.default_rng(1)
+WIDTHS = [[0.018499999999999999, np.nan]] * 4 + [[0.019000000000000003, np.nan]] * 4
+FEW_VALUES = without(measured(60, 4), slice(20))
+FEW_VALUES[:10, 0] = np.arange(10) % 3
 
 
 @every_case(
-    "values",
+    ("values", "labels", "content", "kept", "said", "not_said"),
     [
-        np.random.default_rng(1).integers(0, 4, size=(60, 1)),  # counts
-        np.random.default_rng(1).integers(0, 3, size=(200, 4)),  # marks on a scale
-        np.random.default_rng(1).integers(40, 60, size=(60, 1)) * 0.001,  # a width in whole millimetres
-        np.random.default_rng(1).integers(300, 360, size=(200, 1)) * 7.3e-5,  # ticks of an encoder
-        np.random.default_rng(1).integers(0, 2, size=(60, 1)) * [[1e-9, 0.0]],  # on and off
+        (without(measured(), slice(None, None, 4)), None, None, 40, None, "copies"),  # no feature is no copy
+        (
+            np.concatenate([measured(10), measured(10)[:1]]),
+            [*"ababababab", "b"],
+            None,
+            10,
+            "another label",
+            None,
+        ),
+        # A feature that hardly varies, such as the gap at the contact of presses that begin alike, makes no copies
+        # of recordings that were compared and differ.
+        (WIDTHS, None, tuple("abcdefgh"), 8, None, None),
+        (WIDTHS, None, tuple("aaaaefgh"), 5, None, None),
+        # Where a feature set finds no contact, it gives no features, or one that has few values.
+        (FEW_VALUES, None, None, 53, None, "single feature"),
+        # Copies of coarse trials are found where chance cannot make them.
+        (
+            np.tile(np.random.default_rng(2).integers(0, 50, size=(30, 6)), (2, 1)),
+            None,
+            None,
+            30,
+            "copies",
+            None,
+        ),
+        # Coarse features that are equal by chance: counts, marks on a scale, a width in whole millimetres, ticks of an
+        # encoder, on and off.
+        *(
+            (values, None, None, len(values), "by chance", None)
+            for values in (
+                DRAWN.integers(0, 4, size=(60, 1)),
+                DRAWN.integers(0, 3, size=(200, 4)),
+                DRAWN.integers(40, 60, size=(60, 1)) * 0.001,
+                DRAWN.integers(300, 360, size=(200, 1)) * 7.3e-5,
+                DRAWN.integers(0, 2, size=(60, 1)) * [[1e-9, 0.0]],
+            )
+        ),
     ],
 )
-def test_coarse_features_that_are_equal_by_chance_count_and_it_is_said(values):
-    kept = without_copies(labelled(values))
-    assert len(kept) == len(values)
-    assert any("by chance" in note for note in kept.notes)
+def test_what_is_a_copy_counts_once_and_is_said(values, labels, content, kept, said, not_said):
+    trials = without_copies(labelled(values, labels, content))
+    assert len(trials) == kept
+    assert said is None or any(said in note for note in trials.notes)
+    assert not any(not_said and not_said in note for note in trials.notes)
 
 
 def test_of_a_grasp_with_a_damaged_copy_the_one_with_more_features_is_kept():
-    values = measured(4)
-    values[1, 1:] = np.nan
+    values = without(measured(4), 1, slice(1, None))
     kept = without_copies(labelled(values, "abab", content=("", "x", "x", "")))
     assert kept.table.values.tolist() == np.delete(values, 1, axis=0).tolist()
-
-
-def test_a_copy_with_another_label_is_said():
-    values = measured(10)
-    kept = without_copies(labelled(np.concatenate([values, values[:1]]), [*"ababababab", "b"]))
-    assert len(kept) == 10
-    assert "another label" in copies_said(kept)[0]
 
 
 def test_trials_that_were_learned_from_are_not_tested_on():
@@ -180,14 +208,6 @@ def test_a_damaged_recording_and_its_recovered_copy_are_one_trial(tmp_path):
     assert copies_said(trials)
 
 
-def test_equal_features_of_recordings_that_were_compared_and_differ_are_no_copies():
-    """A feature that hardly varies, such as the gap at the contact of presses that begin alike, makes no copies."""
-    values = [[0.018499999999999999, np.nan]] * 4 + [[0.019000000000000003, np.nan]] * 4
-    kept = without_copies(labelled(values, content=tuple("abcdefgh")))
-    assert len(kept) == 8
-    assert len(without_copies(labelled(values, content=tuple("aaaaefgh")))) == 5
-
-
 @every_case("column", [0, 1, 2])
 @every_case("change", ["another value", "a missing value"])
 def test_copies_with_one_value_changed_are_told(change, column):
@@ -238,11 +258,3 @@ def test_grasps_of_one_named_object_may_be_close():
     named = evolve(unnamed, instances=tuple(f"bottle {k // 5}" for k in range(60)))
     assert any("4 other trials" in note for note in without_copies(unnamed).notes)
     assert not without_copies(named).notes
-
-
-def test_trials_without_features_are_not_taken_for_edited_copies():
-    """Where a feature set finds no contact, it gives no features, or one that has few values."""
-    values = measured(60, 4)
-    values[:20] = np.nan
-    values[:10, 0] = np.arange(10) % 3
-    assert not any("single feature" in note for note in without_copies(labelled(values)).notes)

@@ -12,7 +12,7 @@ from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.features import FeatureTable
 from graspsense.sources.trial_source import load_trials
-from graspsense.sources.trial_table.features_csv import read_labelled, write_labelled
+from graspsense.sources.trial_table.features_csv import read_labelled, read_table, write_labelled
 
 GOOD = "what,p_first [m],f_steady\n" + "".join(
     f"{'ab'[i % 2]},{0.05 + 0.001 * (i % 3)},{6 + i % 2}\n" for i in range(8)
@@ -112,6 +112,11 @@ def test_what_is_written_reads_back_to_the_bit(tmp_path_factory, rows):
 
     assert again.table.values.tobytes() == np.where(np.isnan(values), np.nan, values).tobytes()
     assert (again.labels, again.instances, again.table.units) == (labels, things, ("m", ""))
+
+
+def test_a_table_without_labels(csv):
+    trials, _ = read_table(csv(GOOD), ["f_steady", "p_first"])
+    assert (trials.names, trials.values[0].tolist()) == (("f_steady", "p_first"), [6.0, 0.05])
 
 
 def test_a_table_with_a_line_for_each_feature_is_refused(csv):

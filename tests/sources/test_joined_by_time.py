@@ -89,7 +89,7 @@ def test_a_hole_and_another_clock_in_a_file_beside_are_told(tmp_path):
 
 def test_as_many_rows_with_other_times_in_words_are_told(tmp_path):
     written(tmp_path / "jar.csv", "t,gap", stamps(T_S), GAP_MM)
-    for late_s, told in ((0.0, False), (0.5, True)):
+    for late_s, told in ((0.0, False), (0.004, False), (0.5, True), (-10.0, True)):
         written(tmp_path / "pad.tsv", "t,N", stamps(T_S + late_s), force(T_S))
         assert any("row by row" in notice for notice in frames(tmp_path, BESIDE)[3]) == told
 

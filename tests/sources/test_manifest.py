@@ -62,7 +62,7 @@ def pandas_csv(path, columns):
     path.write_text("\n".join(lines) + "\n")
 
 
-@pytest.mark.parametrize("ending", ["npz", "mat"])
+@every_case("ending", ["npz", "mat"])
 def test_images_and_blocks_of_samples_become_arrays_with_their_shape_and_fast_channels(tmp_path, ending):
     gap, force = squeezing()
     taxels = np.arange(300.0 * 28).reshape(300, 7, 4)
@@ -111,6 +111,15 @@ PLAIN = """
     gap = "gap [mm]"
     force = "F"
 """
+
+
+def test_a_text_file_is_known_by_its_ending(tmp_path):
+    for ending in ("CSV", "tsv", "dat"):
+        pandas_csv(
+            tmp_path / f"{ending}.{ending}", {"t": T_S, "gap": squeezing()[0] * 1e3, "F": squeezing()[1]}
+        )
+        (recording,) = recordings(tmp_path, PLAIN.replace("*", ending.lower()))
+        assert column(recording, "force_right_n") == pytest.approx(squeezing()[1], abs=1e-6)
 
 
 def test_a_ros_bag_with_topics_of_different_rates(tmp_path):

