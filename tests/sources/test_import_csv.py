@@ -135,3 +135,19 @@ def test_options_of_a_csv_with_another_kind_are_refused(tmp_path):
     assert "--gap is for a CSV" in err
     assert "Traceback" not in err
     assert sys.exc_info() == (None, None, None)
+
+
+@every_case(
+    ("line", "says"),
+    [
+        ("5000;1;1;1;x", "line 4: the time goes from .* it must increase"),
+        ("5002;inf;1;1;x", r"line 4: the gap is missing or infinite"),
+        ("5002;wide;1;1;x", r"opening \(gap\) is not a column of numbers: line 4 has 'wide'"),
+        ("5002;1;1;1", "line 4: 4 values, but there are 5 columns"),
+    ],
+)
+def test_a_line_that_is_no_squeeze_is_told_with_its_number(squeeze, line, says):
+    lines = squeeze.read_text().splitlines()
+    squeeze.write_text("\n".join([*lines[:3], line, *lines[4:]]))
+    with pytest.raises(DataDamaged, match=says):
+        read_squeeze(name_of(squeeze))

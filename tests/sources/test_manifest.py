@@ -648,3 +648,25 @@ def test_features_are_of_the_whole_recording_and_not_of_what_the_controller_saw(
     whole = load_trials(f"manifest:{place}", options=["features.type=curve"]).table
     assert np.isfinite(stored.values[0, stored.names.index("hysteresis")])
     assert stored.values[0] == pytest.approx(whole.values[0], nan_ok=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("resample_hz", [0, 100, 1000])
+def test_rest_is_found_on_a_coarse_gap_at_any_rate(tmp_path, resample_hz):
+    """A squeeze of 2.4 mm in 3 s and a hold of 1.5 s, in steps of 0.1 mm at 45 Hz."""
+    times = np.arange(270) / 45.0
+    gap = np.round(np.interp(times, [0.0, 1.5, 4.5], [76.0, 64.0, 61.6]), 1)
+    for k in range(4):
+        force = np.interp(times, [1.5, 4.5], [0.0, 6.0 + k])
+        pandas_csv(tmp_path / f"jar_{k}.csv", {"t": times, "mm": gap, "F": force})
+    place = manifest(
+        tmp_path,
+        f'files = "{{label}}_{{order:d}}.csv"\ntime = "t"\ngap = "mm [mm]"\nforce = "F"\nresample_hz = {resample_hz}',
+    )
+    code, out, _ = graspsense("import", place, "--save", tmp_path / "trials")
+    assert code == 0
+    assert "rest_window_s" in out
+    assert "steps of 0.1 mm" in out
+    for source in (f"store:{tmp_path / 'trials'}", f"manifest:{place}"):
+        table = load_trials(source).table
+        assert table.values[:, table.names.index("f_steady")] == pytest.approx([6.0, 7.0, 8.0, 9.0], rel=0.05)

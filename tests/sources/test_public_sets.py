@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import scipy
 from cases import every_case
-from commands import graspsense
+from commands import graspsense, printed
 from repository import ROOT
 
 from graspsense.core.values.signals import NO_GAP
@@ -431,3 +431,15 @@ def test_check_says_what_it_understood_and_draws_a_grasp_without_storing(tmp_pat
     assert not (tmp_path / "store").exists()
     code, _, err = graspsense("import", described)
     assert (code, "--save DIR. Or look at the recordings first: --check" in err) == (2, True)
+
+
+@pytest.mark.slow
+def test_one_recording_of_a_set_is_imported_by_its_number(tmp_path):
+    jaco(tmp_path)
+    described = tmp_path / "manifest.toml"
+    described.write_text((MANIFESTS / "jaco.toml").read_text())
+    printed("import", f"manifest:{described}#2", "--save", tmp_path / "second", "-o", "classifier.type=none")
+    with Store.read(tmp_path / "second") as store:
+        assert store.trial(1).record.labels["label"] == "object3"
+    code, _, err = graspsense("replay", f"manifest:{described}#9")
+    assert (code, "fewer than 9 recordings" in err) == (2, True)
