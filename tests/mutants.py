@@ -497,13 +497,13 @@ def padding(check, says, **fields):
     giving(check, says)(lambda reading: reading._replace(pads=changed(reading.pads, fields)))
 
 
-def sampling(check, says, change):
-    """Keep a mutant whose block of samples is what a function makes of the sound one."""
+def sampling(check, says, change, channel="acceleration"):
+    """Keep a mutant whose samples or images of a channel are what a function makes of the sound ones."""
 
     @giving(check, says)
     def _(reading):
-        block = change(reading.signals.acceleration)
-        return reading._replace(signals=reading.signals._replace(acceleration=block))
+        given = change(getattr(reading.signals, channel))
+        return reading._replace(signals=reading.signals._replace(**{channel: given}))
 
 
 def seeing(says, image):
@@ -589,6 +589,11 @@ UNBROKEN = "signals-have-no-gaps-or-repeats"
 sampling(SIGNALS, "give Samples of the declared shape (3, 3)", lambda block: block.values)
 sampling(SIGNALS, "no number of the declared channel", lambda block: block._replace(new=0))
 sampling(UNBROKEN, "every sample", lambda block: block._replace(counter=block.counter // 3))
+sampling(
+    *(UNBROKEN, "an image of 'camera' changes while its counter stays"),
+    lambda image: Image(image.t_s, 1, np.full((2, 2), next(_calls) % 256, np.uint8)),
+    channel="camera",
+)
 sampling(UNBROKEN, "they repeat old ones", lambda block: block._replace(new=2))
 
 seeing("can still be changed", lambda pixels: pixels.copy())

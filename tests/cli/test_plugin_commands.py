@@ -75,6 +75,13 @@ def test_settings_reach_the_part_that_is_checked(monkeypatch):
         assert "-o nonsense: expected KEY=VALUE" in err
 
 
+def test_a_name_that_nobody_has():
+    code, _, err = graspsense("plugins", "check", "chita")
+
+    assert code == 2
+    assert "Did you mean 'chitta'?" in err
+
+
 OLD = """import graspsense.plugin_api as api
 from graspsense.plugin_api import (
     Channel,

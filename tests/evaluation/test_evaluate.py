@@ -264,6 +264,12 @@ def test_one_instance_of_a_label_cannot_be_held_out():
     assert held.reason == "labels with a single instance, which cannot be held out: can:empty, can:full"
 
 
+def test_too_few_instances_for_an_interval_are_a_note_with_their_number():
+    labels, width, force = four_states()
+    notes = judged(labelled(labels, width, force, instances=("can#1",) * 120)).notes
+    assert any(note.startswith("1 instance:") for note in notes), notes
+
+
 def names_in(value):
     """Return every key of JSON values, at any depth."""
     if isinstance(value, list):

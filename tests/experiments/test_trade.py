@@ -164,6 +164,17 @@ def test_a_grasp_lasts_until_the_rest_window_has_shown_the_rest():
     assert mean_seconds(settings, trials) == pytest.approx(2.0 + 0.3 + 0.2)
 
 
+def test_the_joint_trade_varies_speed_force_rest_and_squeezes_on_bottles_held_out():
+    planned = read_experiment("trade_joint")
+    assert planned.experiment.kind == "squeezes"  # whole instances are held out
+    assert set(planned.experiment.sweep) == {
+        "controller.closing_speed_m_s",
+        "controller.probing_force_n",
+        "controller.rest_window_s",
+    }
+    assert planned.cases[0].judge.most > 1
+
+
 @pytest.mark.slow
 def test_controls_stand_beside_the_rates_of_a_trade(tmp_path):
     pytest.importorskip("graspsense_sim_gripper")
