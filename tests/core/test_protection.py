@@ -536,7 +536,7 @@ def test_pads_that_both_feel_more_than_the_motor_was_told():
     # One image that is wrong is no force.
     assert felt(100.0, 100.0, seconds=0.041) is None
     # The default hold lasts 0.25 s: it is told within that, and ends the grasp only if it lasts longer.
-    assert not felt(41.0, 60.0, seconds=0.2).ends
+    assert felt(41.0, 60.0, seconds=0.2) is False
 
 
 def eased(effort, friction=7.0, speed=0.01, kind=EFFORT):
