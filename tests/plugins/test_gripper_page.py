@@ -94,7 +94,8 @@ def test_it_grasps_with_the_default_pipeline_and_asks_again_for_late_answers(plu
     features = trial.features.as_dict()
     assert trial.outcome.words == "steady"
     assert features["p_first"] == pytest.approx(0.05, abs=1e-3)
-    assert features["f_steady"] == pytest.approx(20.0, abs=1.5)
+    # At 10 mm/s on 1500 N/m, the force rises by 15 N/s until the answer is there, and for two frames.
+    assert 20.0 <= features["f_steady"] <= 20.0 + 15.0 * (late_s + 2.0 / 50.0)
     if late_s:
         assert trial.report["repeated"] > 0
         assert trial.counts["lost_frames"] > 0
