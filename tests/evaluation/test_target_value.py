@@ -201,6 +201,13 @@ def test_an_interval_holds_for_large_predictions_too():
     assert np.mean(covered, axis=0) == pytest.approx([0.91, 0.91], abs=0.04)
 
 
+@pytest.fixture
+def path(tmp_path):
+    """The file of a trained model."""
+    write_regression(tmp_path / "m.json", train_regression("ridge", bottles(), name="m"))
+    return tmp_path / "m.json"
+
+
 @pytest.mark.parametrize(
     ("change", "says"),
     [
@@ -209,17 +216,13 @@ def test_an_interval_holds_for_large_predictions_too():
         ({"format": "other"}, "not a model of a number"),
     ],
 )
-def test_a_damaged_model_is_refused(tmp_path, change, says):
-    path = tmp_path / "m.json"
-    write_regression(path, train_regression("ridge", bottles(), name="m"))
+def test_a_damaged_model_is_refused(path, change, says):
     path.write_text(json.dumps({**json.loads(path.read_text()), **change}))
     with pytest.raises(DataDamaged, match=says):
         load_regression(str(path))
 
 
-def test_a_model_of_a_number_is_not_one_of_labels(tmp_path):
-    path = tmp_path / "m.json"
-    write_regression(path, train_regression("ridge", bottles(), name="m"))
+def test_a_model_of_a_number_is_not_one_of_labels(path):
     with pytest.raises(ConfigError, match=r"m\.json.*graspsense predict"):
         load_model(str(path), installed())
 
@@ -231,15 +234,8 @@ def folder(tmp_path):
         for k in range(24):
             fill = 10.0 * (k // 2 * 7 % 12)
             labels = {"fill [ml]": str(fill)} if k < 22 else {"colour": "red"}
-            keep(
-                store,
-                "bottle",
-                f"bottle#{k // 2}",
-                values=(0.06, 1.0 + fill + k % 2),
-                ticks=9,
-                labels=labels,
-                grasp=k,
-            )
+            values = (0.06, 1.0 + fill + k % 2)
+            keep(store, "bottle", f"bottle#{k // 2}", values=values, ticks=9, labels=labels, grasp=k)
     return tmp_path / "trials"
 
 
