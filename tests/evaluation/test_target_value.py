@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 from cases import every_case
-from commands import graspsense
+from commands import graspsense, printed
 from kept import keep
 
 from graspsense.core.components.registry import installed
@@ -241,11 +241,8 @@ def folder(tmp_path):
 
 @pytest.mark.slow
 def test_a_store_is_trained_on_predicted_and_evaluated(folder, tmp_path):
-    code, out, err = graspsense(
-        "evaluate", f"store:{folder}", "--target-value", "fill", "--classifier", "ridge", "--json"
-    )
-    assert code == 0, err
-    answer = json.loads(out)
+    number = ("--target-value", "fill", "--classifier", "ridge")
+    answer = json.loads(printed("evaluate", f"store:{folder}", *number, "--json"))
     assert (answer["unit"], answer["headline"]["n"], answer["headline"]["instances"]) == ("ml", 22, 11)
     assert (
         answer["headline"]["mean_absolute"] < 10.0 < answer["controls"]["mean_only"]["error"]["mean_absolute"]
@@ -253,16 +250,11 @@ def test_a_store_is_trained_on_predicted_and_evaluated(folder, tmp_path):
     assert "2 trials left out: no fill" in answer["notes"]
 
     model = tmp_path / "m.json"
-    number = ("--target-value", "fill", "--classifier", "ridge")
     arguments = ("train", f"store:{folder}", *number, "--out", model)
-    code, out, err = graspsense(*arguments)
-    assert code == 0, err
-    assert "ridge predicts fill [ml], trained on 22 trials" in out
+    assert "ridge predicts fill [ml], trained on 22 trials" in printed(*arguments)
     assert graspsense(*arguments)[0] == 2  # it exists
 
-    code, out, err = graspsense("predict", model, f"store:{folder}", "--target-value", "fill", "--json")
-    assert code == 0, err
-    told = json.loads(out)
+    told = json.loads(printed("predict", model, f"store:{folder}", "--target-value", "fill", "--json"))
     assert told["n"] == 22
     assert told["error"]["mean_absolute"] < 10.0
     assert told["predictions"][4]["truth"] == 20.0
