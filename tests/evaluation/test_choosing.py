@@ -184,6 +184,6 @@ def test_the_same_seed_gives_the_same_choice():
     noise = objects()
     sets = {"noise": noise, "other": objects(seed=3)}
     choices = [choose({"tree": learner("tree")}, sets, seed=4) for _ in range(2)]
-    first, repeated = [(choice.rate, choice.chosen_in, choice.best.name) for choice in choices]
+    choice, repeated = [(made.rate, made.chosen_in, made.best.name) for made in choices]
 
-    assert first == repeated
+    assert choice == repeated
