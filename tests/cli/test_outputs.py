@@ -69,19 +69,15 @@ def test_two_outputs_are_two_files(table, tmp_path, monkeypatch):
     assert json.loads((tmp_path / "m.json").read_text())["format"]
 
 
-@pytest.mark.parametrize("option", ["--keep", "--out"])
-def test_a_pipe_or_a_device_is_not_replaced(table, tmp_path, option):
-    pipe = tmp_path / "pipe.json"
-    os.mkfifo(pipe)
-    for name in (pipe, "/dev/full"):
-        if option == "--out" and name != pipe:
-            continue
-        outputs = {"--out": tmp_path / "m.json", "--keep": tmp_path / "k.csv", option: name}
-        more = [word for pair in outputs.items() for word in pair]
-        done = graspsense("train", table, *TRAIN, *more, "--overwrite")
-        assert done.returncode == 2
-        assert "pipe or a device" in done.stderr
-    assert pipe.is_fifo()
+@every_case(("option", "name"), [("--keep", "pipe.json"), ("--out", "pipe.json"), ("--keep", "/dev/full")])
+def test_a_pipe_or_a_device_is_not_replaced(table, tmp_path, option, name):
+    os.mkfifo(tmp_path / "pipe.json")
+    outputs = {"--out": tmp_path / "m.json", "--keep": tmp_path / "k.csv", option: tmp_path / name}
+    more = [word for pair in outputs.items() for word in pair]
+    done = graspsense("train", table, *TRAIN, *more, "--overwrite")
+    assert done.returncode == 2
+    assert "pipe or a device" in done.stderr
+    assert (tmp_path / "pipe.json").is_fifo()
 
 
 @every_case(

@@ -31,11 +31,8 @@ def test_a_part_that_conforms():
 
 
 def test_a_part_that_does_not():
-    (broken,) = [
-        mutant
-        for mutant in MUTANTS
-        if mutant.check == "requires-what-it-reads" and mutant.role == "feature-set"
-    ]
+    broken_rule = ("feature-set", "requires-what-it-reads")
+    (broken,) = [mutant for mutant in MUTANTS if (mutant.role, mutant.check) == broken_rule]
     with IsolatedPlugins(parts.offering(broken.entry)):
         code, out, _ = graspsense("plugins", "check", "peak", "--json")
 

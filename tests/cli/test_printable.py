@@ -84,17 +84,12 @@ def test_a_text_of_several_lines_looks_like_no_other_text_and_a_row_of_a_table_i
 def made(tmp_path_factory):
     """Return a store whose labels, reasons and gripper an attacker has chosen, as in a store from elsewhere."""
     folder = tmp_path_factory.mktemp("made") / "t"
+    attacker = evolve(BENCH, name=HOSTILE)
     with Store.open(folder) as store:
         for label in (HOSTILE, FORGED):
             for value in (0.06, 0.07, 0.065):
-                keep(
-                    store,
-                    label,
-                    f"{label}#1",
-                    values=(value, 5.5),
-                    grasp=round(1e6 * value),
-                    device=evolve(BENCH, name=HOSTILE),
-                )
+                grasp = round(1e6 * value)
+                keep(store, label, f"{label}#1", values=(value, 5.5), grasp=grasp, device=attacker)
         set_aside(store, [1], HOSTILE)
         relabel(store, [2], {"label": FORGED + "2"}, FORGED)
     return folder
@@ -150,19 +145,7 @@ def test_json_has_the_text_as_it_is(store, command):
         printed("train", f"store:{store}", "--classifier", "knn", "--out", f"{store}.json")
     out = printed(*[word.format(store) for word in command], "--json")
     assert acts(out) == []
-    assert HOSTILE in set(strings(json.loads(out)))
-
-
-def strings(value):
-    if isinstance(value, str):
-        yield value
-    elif isinstance(value, dict):
-        for key, inner in value.items():
-            yield key
-            yield from strings(inner)
-    elif isinstance(value, list):
-        for inner in value:
-            yield from strings(inner)
+    assert repr(HOSTILE) in repr(json.loads(out))
 
 
 def test_all_that_is_printed_passes_through_the_terminal_module():

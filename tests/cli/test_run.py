@@ -64,11 +64,9 @@ def test_nothing_there_is_an_outcome_with_reasons_and_exit_code_0():
 @every_case(
     ("arguments", "code", "says"),
     [
-        (["--gripper", "pr3"], 2, "Did you mean 'pr2'?"),
         (["--gripper", "pr2"], 3, "searched for"),
         (["--object", "odwala:full_open"], 2, "Did you mean 'odwalla'?"),
         (["--gripper", "pr2", "--object", "block"], 2, "object"),
-        (["--pipeline", "defolt"], 2, "Did you mean 'default'?"),
         (["-o", "controller.probing_forse_n=3"], 2, "probing_force_n"),
         (["-o", "controller.probing_force_n"], 2, "="),
         (["--seed", "x"], 2, "seed"),

@@ -139,29 +139,29 @@ def test_the_certainty_of_a_chosen_model_is_not_raised_by_the_choice():
     assert np.mean(procedure) == pytest.approx(0.5, abs=0.07)
 
 
-class Failing(Nearest):
-    def fit(self, table, labels, seed):
-        raise RuntimeError("it broke")
+def raising(error):
+    """Return what makes classifiers whose training ends with this error."""
+
+    class Raising(Nearest):
+        def fit(self, table, labels, seed):
+            raise error
+
+    return Made(Raising)
 
 
 def test_a_classifier_that_fails_is_told_and_left_out():
     noise = objects()
-    choice = choose({"broken": Made(Failing), **NEAREST}, {"informed": informed(noise)})
+    choice = choose({"broken": raising(RuntimeError("it broke")), **NEAREST}, {"informed": informed(noise)})
 
     assert {candidate.classifier for candidate in choice.ranking.candidates} == {"nearest"}
     assert any("broken" in note and "it broke" in note for note in choice.ranking.notes)
     with pytest.raises(ConfigError, match="it broke"):
-        choose({"broken": Made(Failing)}, {"informed": informed(noise)})
-
-
-class Interrupted(Nearest):
-    def fit(self, table, labels, seed):
-        raise KeyboardInterrupt
+        choose({"broken": raising(RuntimeError("it broke"))}, {"informed": informed(noise)})
 
 
 def test_an_end_that_the_user_asks_for_is_no_failure_of_a_classifier():
     with pytest.raises(KeyboardInterrupt):
-        choose({"slow": Made(Interrupted), **NEAREST}, {"noise": objects()})
+        choose({"slow": raising(KeyboardInterrupt()), **NEAREST}, {"noise": objects()})
 
 
 def test_too_little_to_choose_by_is_refused():
@@ -183,10 +183,7 @@ def test_a_label_with_a_single_object_is_cross_validated_by_trials():
 def test_the_same_seed_gives_the_same_choice():
     noise = objects()
     sets = {"noise": noise, "other": objects(seed=3)}
-    choice, repeated = (choose({"tree": learner("tree")}, sets, seed=4) for _ in range(2))
+    choices = [choose({"tree": learner("tree")}, sets, seed=4) for _ in range(2)]
+    choice, repeated = [(made.rate, made.chosen_in, made.best.name) for made in choices]
 
-    assert (choice.rate, choice.chosen_in, choice.best.name) == (
-        repeated.rate,
-        repeated.chosen_in,
-        repeated.best.name,
-    )
+    assert choice == repeated

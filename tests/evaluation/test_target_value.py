@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 from cases import every_case
-from commands import graspsense
+from commands import graspsense, printed
 from kept import keep
 
 from graspsense.core.components.registry import installed
@@ -201,6 +201,13 @@ def test_an_interval_holds_for_large_predictions_too():
     assert np.mean(covered, axis=0) == pytest.approx([0.91, 0.91], abs=0.04)
 
 
+@pytest.fixture
+def path(tmp_path):
+    """The file of a trained model."""
+    write_regression(tmp_path / "m.json", train_regression("ridge", bottles(), name="m"))
+    return tmp_path / "m.json"
+
+
 @pytest.mark.parametrize(
     ("change", "says"),
     [
@@ -209,17 +216,13 @@ def test_an_interval_holds_for_large_predictions_too():
         ({"format": "other"}, "not a model of a number"),
     ],
 )
-def test_a_damaged_model_is_refused(tmp_path, change, says):
-    path = tmp_path / "m.json"
-    write_regression(path, train_regression("ridge", bottles(), name="m"))
+def test_a_damaged_model_is_refused(path, change, says):
     path.write_text(json.dumps({**json.loads(path.read_text()), **change}))
     with pytest.raises(DataDamaged, match=says):
         load_regression(str(path))
 
 
-def test_a_model_of_a_number_is_not_one_of_labels(tmp_path):
-    path = tmp_path / "m.json"
-    write_regression(path, train_regression("ridge", bottles(), name="m"))
+def test_a_model_of_a_number_is_not_one_of_labels(path):
     with pytest.raises(ConfigError, match=r"m\.json.*graspsense predict"):
         load_model(str(path), installed())
 
@@ -231,25 +234,15 @@ def folder(tmp_path):
         for k in range(24):
             fill = 10.0 * (k // 2 * 7 % 12)
             labels = {"fill [ml]": str(fill)} if k < 22 else {"colour": "red"}
-            keep(
-                store,
-                "bottle",
-                f"bottle#{k // 2}",
-                values=(0.06, 1.0 + fill + k % 2),
-                ticks=9,
-                labels=labels,
-                grasp=k,
-            )
+            values = (0.06, 1.0 + fill + k % 2)
+            keep(store, "bottle", f"bottle#{k // 2}", values=values, ticks=9, labels=labels, grasp=k)
     return tmp_path / "trials"
 
 
 @pytest.mark.slow
 def test_a_store_is_trained_on_predicted_and_evaluated(folder, tmp_path):
-    code, out, err = graspsense(
-        "evaluate", f"store:{folder}", "--target-value", "fill", "--classifier", "ridge", "--json"
-    )
-    assert code == 0, err
-    answer = json.loads(out)
+    number = ("--target-value", "fill", "--classifier", "ridge")
+    answer = json.loads(printed("evaluate", f"store:{folder}", *number, "--json"))
     assert (answer["unit"], answer["headline"]["n"], answer["headline"]["instances"]) == ("ml", 22, 11)
     assert (
         answer["headline"]["mean_absolute"] < 10.0 < answer["controls"]["mean_only"]["error"]["mean_absolute"]
@@ -257,16 +250,11 @@ def test_a_store_is_trained_on_predicted_and_evaluated(folder, tmp_path):
     assert "2 trials left out: no fill" in answer["notes"]
 
     model = tmp_path / "m.json"
-    number = ("--target-value", "fill", "--classifier", "ridge")
     arguments = ("train", f"store:{folder}", *number, "--out", model)
-    code, out, err = graspsense(*arguments)
-    assert code == 0, err
-    assert "ridge predicts fill [ml], trained on 22 trials" in out
+    assert "ridge predicts fill [ml], trained on 22 trials" in printed(*arguments)
     assert graspsense(*arguments)[0] == 2  # it exists
 
-    code, out, err = graspsense("predict", model, f"store:{folder}", "--target-value", "fill", "--json")
-    assert code == 0, err
-    told = json.loads(out)
+    told = json.loads(printed("predict", model, f"store:{folder}", "--target-value", "fill", "--json"))
     assert told["n"] == 22
     assert told["error"]["mean_absolute"] < 10.0
     assert told["predictions"][4]["truth"] == 20.0

@@ -1,8 +1,10 @@
 """`graspsense train --choose`, as a user types it, on a store of recordings of another program."""
 
+import json
+
 import numpy as np
 import pytest
-from commands import graspsense
+from commands import graspsense, printed
 
 MANIFEST = """\
 folder = "grasps"
@@ -39,23 +41,19 @@ def store(tmp_path_factory):
                 file = folder / "grasps" / f"{kind}_{instance}_{order}.csv"
                 file.write_text(squeeze(relaxes, rng) + "\n")
     (folder / "m.toml").write_text(MANIFEST)
-    code, _, err = graspsense("import", folder / "m.toml", "--save", folder / "store")
-    assert code == 0, err
+    printed("import", folder / "m.toml", "--save", folder / "store")
     return folder / "store"
 
 
 def choice_of(trials, folder, *given):
     """Train the best candidate on the trials, and return what is said of the choice."""
-    done = graspsense("train", trials, "--choose", *given, "--out", folder / "own.json", "--json")
-    assert done.returncode == 0, done.stderr
-    return done.json["choice"]
+    told = printed("train", trials, "--choose", *given, "--out", folder / "own.json", "--json")
+    return json.loads(told)["choice"]
 
 
 def runs(store, pipeline):
-    code, out, err = graspsense(
-        "run", "--pipeline", pipeline, "--gripper", "replay", "-o", f"gripper.recording=store:{store}#1"
-    )
-    assert code == 0, err
+    recording = ("--gripper", "replay", "-o", f"gripper.recording=store:{store}#1")
+    out = printed("run", "--pipeline", pipeline, *recording)
     assert "prediction  foam" in out
     # Other settings than those of the training would be told.
     assert "warning" not in out
@@ -88,9 +86,8 @@ def test_among_all_candidates_one_that_knows_the_hold_is_chosen(store, tmp_path,
 @pytest.mark.slow
 def test_the_text_names_the_pipeline_and_the_procedure(store, tmp_path):
     fixed = ("--classifier", "extra-trees", "-o", "classifier.trees=10", "-o", "features.type=union")
-    code, out, err = graspsense("train", store, "--choose", *fixed, "--out", tmp_path / "own.json")
+    out = printed("train", store, "--choose", *fixed, "--out", tmp_path / "own.json")
 
-    assert code == 0, err
     assert f"--pipeline {tmp_path / 'own.toml'}" in out
     assert "the whole procedure by instance_held_out" in " ".join(out.split())
     runs(store, tmp_path / "own.toml")

@@ -13,17 +13,19 @@ from graspsense.experiments.summary import ConditionResult
 from graspsense.experiments.task_results import ClassifierResult
 
 
-def condition(name, *rates, n=100, simulated=True):
+def condition(name, *rates, n=100, simulated=True, target="both", cost=None):
     """Return a case with these rates of its seeds."""
 
     def rated(rate):
         predicted = ["can:full"] * round(rate * n) + ["can:empty"] * (n - round(rate * n))
-        return ClassifierResult.from_answers("c45", "both", "stratified_10_fold", ["can:full"] * n, predicted)
+        return ClassifierResult.from_answers(
+            "c45", target, "stratified_10_fold", ["can:full"] * n, predicted, cost=cost
+        )
 
     return ConditionResult(
         case=SimpleNamespace(name=name, part="", learners=(), levels={"force": name}),
         classifier="c45",
-        target="both",
+        target=target,
         by_seed={seed: rated(rate) for seed, rate in enumerate(rates)},
         simulated=simulated,
     )

@@ -1,9 +1,8 @@
 """What recognition costs: the front, and paired tests."""
 
-from types import SimpleNamespace
-
 import pytest
 from cases import every_case
+from test_answer import condition
 
 from graspsense.evaluation.over_seeds import verdict_on
 from graspsense.experiments.executors.serial import Serial
@@ -11,28 +10,15 @@ from graspsense.experiments.experiment_file import read_experiment
 from graspsense.experiments.page import findings_of
 from graspsense.experiments.results import Results
 from graspsense.experiments.run import run_experiment
-from graspsense.experiments.summary import ConditionResult, summarise
-from graspsense.experiments.task_results import ClassifierResult, TrialValues
+from graspsense.experiments.summary import summarise
+from graspsense.experiments.task_results import TrialValues
 from graspsense.experiments.trade.costs import mean_seconds
 from graspsense.experiments.trade.trade_point import advise, trade_points
 
 
-def case(name, cost, *rates, n=100):
-    """Return a case with these rates of its seeds; the rest of a condition is not needed here."""
-
-    def rated(rate):
-        predicted = ["can:full"] * round(rate * n) + ["can:empty"] * (n - round(rate * n))
-        return ClassifierResult.from_answers(
-            "c45", "state", "stratified_10_fold", ["can:full"] * n, predicted, cost=cost
-        )
-
-    return ConditionResult(
-        case=SimpleNamespace(name=name, part="", learners=()),
-        classifier="c45",
-        target="state",
-        by_seed={seed: rated(rate) for seed, rate in enumerate(rates)},
-        simulated=True,
-    )
+def case(name, cost, *rates):
+    """Return a case of this cost with these rates of its seeds."""
+    return condition(name, *rates, target="state", cost=cost)
 
 
 def test_a_cheap_case_is_recommended_only_if_it_is_shown_to_lose_little():
@@ -115,30 +101,31 @@ seeds = 2
 [data]
 objects = ["can:full_closed", "can:empty_open"]
 instances = 3
-trials = {trials}
+trials = 2
 [judge]
 targets = ["state"]
 """
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("kind", "more", "trials"),
-    [
-        ("early", "moments_s = [0.0, 1.0]", 2),
-        ("squeezes", "most = 2", 2),
-        ("physics", "error = 0.1", 2),
-    ],
-)
-def test_each_trade_runs_and_gives_advice(tmp_path, kind, more, trials):
+def summary_of(folder, kind, more):
+    """Run a small experiment of this kind, and return the summary of its results."""
     pytest.importorskip("graspsense_sim_gripper")
     pytest.importorskip("graspsense_c45")
-    (tmp_path / "small.toml").write_text(f'kind = "{kind}"\n{COMMON.format(trials=trials)}{more}\n')
-    planned = read_experiment(str(tmp_path / "small.toml"))
-    results = Results(tmp_path / "out")
+    (folder / "small.toml").write_text(f'kind = "{kind}"\n{COMMON}{more}\n')
+    planned = read_experiment(str(folder / "small.toml"))
+    results = Results(folder / "out")
     account = run_experiment(planned, results, Serial)
     assert account.complete, account.failed
-    summary = summarise(planned, results)
+    return summarise(planned, results)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kind", "more"),
+    [("early", "moments_s = [0.0, 1.0]"), ("squeezes", "most = 2"), ("physics", "error = 0.1")],
+)
+def test_each_trade_runs_and_gives_advice(tmp_path, kind, more):
+    summary = summary_of(tmp_path, kind, more)
     findings = findings_of(summary)
     assert findings.answer
     if "squeeze" in kind:  # the answers are those of too few bottles for an interval
@@ -177,15 +164,9 @@ def test_the_joint_trade_varies_speed_force_rest_and_squeezes_on_bottles_held_ou
 
 @pytest.mark.slow
 def test_controls_stand_beside_the_rates_of_a_trade(tmp_path):
-    pytest.importorskip("graspsense_sim_gripper")
-    pytest.importorskip("graspsense_c45")
-    trade = COMMON.format(trials=2) + "controls = true\ngrasps = 0\nfolds = 2\nprotocol = 'stratified'\n"
-    sweep = '[sweep]\n"controller.closing_speed_m_s" = [0.02, 0.04]\n'
-    (tmp_path / "small.toml").write_text(f'kind = "trade"\n{trade}{sweep}')
-    planned = read_experiment(str(tmp_path / "small.toml"))
-    results = Results(tmp_path / "out")
-    run_experiment(planned, results, Serial)
-    findings = findings_of(summarise(planned, results))
+    judge = "controls = true\ngrasps = 0\nfolds = 2\nprotocol = 'stratified'\n"
+    sweep = '[sweep]\n"controller.closing_speed_m_s" = [0.02, 0.04]'
+    findings = findings_of(summary_of(tmp_path, "trade", judge + sweep))
     (controls,) = (table for table in findings.tables if table.id == "controls")
     assert len(controls.rows) == 2
     assert controls.header[-5:] == (
