@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from math import nan
+from math import inf, nan
 from typing import Any
 
 import numpy as np
 from cases import every_case
+from hypothesis import given
+from hypothesis import strategies as st
 from traces import made_recording
 
 from graspsense.recording.labelled_recording import LabelledRecording
@@ -28,6 +30,15 @@ def noticed(
     gaps = np.full(len(left), 0.05) if gap is None else gap
     recording = made_recording(rate_hz, times, gaps, left, left if right is None else right, units=units)
     return with_notices(LabelledRecording(recording=recording, source="squeeze")).notices
+
+
+SAMPLE = st.tuples(*(st.sampled_from([nan, inf, -1e12, 0.0, 0.05, 3.0]) for _ in range(3)))
+
+
+@given(st.lists(st.tuples(SAMPLE, st.integers(1, 12)), max_size=8))
+def test_every_recording_has_notices_also_one_without_a_sample(runs: Any) -> None:
+    samples = np.array([sample for sample, times in runs for _ in range(times)]).reshape(-1, 3)
+    assert all(noticed(*samples.T, 50.0))
 
 
 def kept(samples: int) -> Any:

@@ -126,7 +126,9 @@ def signal_notices(recording: Recording) -> Iterator[str]:
     or stays while the force changes.
     """
     frames = [reading.frame for reading in recording.readings]
-    t, gap, left, right = np.array([(f.t_s, f.gap_m, f.force_left_n, f.force_right_n) for f in frames]).T
+    signals = [(f.t_s, f.gap_m, f.force_left_n, f.force_right_n) for f in frames]
+    t, gap, left, right = columns = np.array(signals, dtype=np.float64).reshape(-1, 4).T
+    columns[~np.isfinite(columns)] = np.nan
     measured = [np.isfinite(signal) for signal in (gap, left, right)]
     known = np.logical_and.reduce([finite for finite in measured if finite.any()] or measured)
     pads = force_of_pads(left, right)
