@@ -92,6 +92,15 @@ def test_neighbours_that_are_alike_are_held_out_in_blocks_and_in_another_order_n
     ]
 
 
+def test_neighbours_are_alike_or_not_also_where_rounded_features_are_equal_by_chance():
+    rng = np.random.default_rng(1)
+    numbers, values = by_object(rng)
+    assert without_copies(table_of(numbers, values.round())).grouped
+    order = rng.permutation(len(numbers))
+    mixed = without_copies(table_of(numbers[order], values[order].round()))
+    assert (len(mixed), mixed.instances) == (len(numbers), None)
+
+
 def test_named_instances_and_trials_sorted_by_a_feature_have_no_blocks():
     numbers, values = by_object(np.random.default_rng(1))
     named = table_of(numbers, values, instances=tuple(f"trial {k}" for k in range(len(numbers))))

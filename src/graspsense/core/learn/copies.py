@@ -71,7 +71,7 @@ def without_copies(labelled: Labelled) -> Labelled:
         )
     remaining = labelled.rows(kept) if len(left_out) else labelled
     noted = labelled if len(notes) == len(labelled.notes) else evolve(remaining, notes=tuple(notes))
-    return noted if by_chance or edited or labelled.provenance.get("simulated") else grouped(noted)
+    return noted if edited or labelled.provenance.get("simulated") else grouped(noted)
 
 
 def apart_from(tested: Labelled, training: Labelled) -> Labelled:
