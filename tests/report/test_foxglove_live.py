@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import os
 import socket
 import struct
 import threading
@@ -263,6 +264,20 @@ def test_what_is_not_a_subscription_is_an_error_and_the_others_go_on(feed):
         messages_until_the_end(bad)
     shown(feed)
     good.wait_for_all()
+    feed.close()
+    check_complete(good.ended())
+
+
+@pytest.mark.slow
+def test_rubbish_and_a_thousand_connections_disturb_nobody(feed):
+    good = Viewer(feed)
+    crowd = [socket.create_connection(("127.0.0.1", port_of(feed))) for _ in range(1000)]
+    for connection in crowd[::100]:
+        connection.sendall(os.urandom(20_000))
+    shown(feed)
+    good.wait_for_all()
+    for connection in crowd:
+        connection.close()
     feed.close()
     check_complete(good.ended())
 

@@ -9,11 +9,14 @@ import pytest
 from cases import every_case
 
 from graspsense.plugin_api import Samples
+from graspsense_pr2_gripper import emulation
 from graspsense_pr2_gripper.accelerometer import CHANNEL, Accelerometer, word_of
+from graspsense_pr2_gripper.faults import Wire
 from graspsense_pr2_gripper.link import LockStepLink
 from graspsense_pr2_gripper.protocol import (
     SAMPLES_MISSED,
     InputReport,
+    decode_input,
     encode_input,
 )
 from graspsense_pr2_gripper.stream import Stream
@@ -78,6 +81,28 @@ def opened_and_read(near):
         return info, [reading for reading in readings if reading is not None]
 
     return read
+
+
+def test_every_sample_that_the_board_sends_arrives(monkeypatch, opened_and_read):
+    words = []
+
+    class Sent(Wire):
+        """A wire that keeps the samples that the board sent."""
+
+        def step(self):
+            arriving = super().step()
+            words.extend(word for data in arriving for word in decode_input(data).samples)
+            return arriving
+
+    monkeypatch.setattr(emulation, "Wire", Sent)
+    _, readings = opened_and_read()
+    counts = np.array([[word >> shift & 1023 for shift in (0, 10, 20)] for word in words])
+    sent = np.where(counts < 512, counts, counts - 1024) * (8 * 9.81 / 512)
+    blocks = [reading.signals.acceleration for reading in readings]
+    arrived = np.concatenate([block.values[: block.new] for block in blocks])
+    assert len(arrived) == 3 * len(readings)
+    # The first reports are read while the gripper is opened.
+    assert arrived.tolist() in (sent[k : k + len(arrived)].tolist() for k in range(len(sent)))
 
 
 @every_case(("drop", "least", "most"), [(0.0, 0.0, 0.0), (0.05, 0.02, 0.1)])
