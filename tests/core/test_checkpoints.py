@@ -153,10 +153,21 @@ def test_predictions_in_the_loop_are_those_of_the_same_part_afterwards(model, tm
         features = curve().extract(grasp.trace.until(contact + after_s))
         assert made.features.values == pytest.approx(features.values, nan_ok=True, rel=1e-12)
         assert made.prediction.label == part.predict(features).label
+        assert made.t_s == pytest.approx(contact + after_s, abs=0.0011)
     told = told_by_model(grasp)
     assert told == [prediction.words for prediction in anytime.predictions]
     assert told[-1].startswith("0.05 s after the contact: soft")
     assert "0.05 s after the contact" in anytime.predictions[-1].prediction.model
+
+
+def test_a_checkpoint_in_the_hold_is_predicted_then(model):
+    trace = grasp_of(Watched(2000.0)).trace
+    held_s = trace.t_s[trace.phase == Phase.HOLD]
+    after_s = float(np.median(held_s)) - contact_of(trace)
+    anytime = watcher(evolve(model, checkpoints=((after_s, model.checkpoints[0][1]),)))
+    grasp_of(Watched(2000.0), watcher=anytime)
+    (made,) = anytime.predictions
+    assert held_s[0] < made.t_s < held_s[-1]
 
 
 @every_case(

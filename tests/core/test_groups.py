@@ -72,6 +72,12 @@ def test_near_copies_join_the_named_instances_that_they_are_of():
     assert len(set(trials.instances)) == len(set(zip(trials.instances, original, strict=True)))
 
 
+def test_near_copies_of_one_named_instance_are_told_of_by_its_name():
+    numbers, values, original = pasted(np.random.default_rng(0))
+    named = table_of(numbers, values, instances=tuple(f"bottle {k}" for k in original))
+    assert without_copies(named) is named
+
+
 @every_case("make", [by_object, windows])
 def test_neighbours_that_are_alike_are_held_out_in_blocks_and_in_another_order_nothing_is_told(make):
     rng = np.random.default_rng(1)

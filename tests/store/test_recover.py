@@ -6,7 +6,7 @@ import shutil
 import pytest
 from attrs import evolve
 from commands import graspsense
-from kept import begun, ended, keep, write_recording
+from kept import begun, ended, keep, pads, write_recording
 from mcap.reader import make_reader
 
 from graspsense.core.values.errors import ConfigError, DataDamaged
@@ -42,7 +42,8 @@ def test_a_cut_recording_becomes_a_trial_that_does_not_count(store):
     assert "were recovered" in kept.result.reason
     # Extracted with the settings in the recording.
     assert kept.result.features.features[0] == ("p_first", "m")
-    assert len(read_recorded(kept.recording)) == recovered.ticks
+    counters = [reading.pads.counter for reading in read_recorded(kept.recording).readings()]
+    assert counters == [pads(k).counter for k in range(recovered.ticks)], "each image is that of its tick"
     with kept.recording.open("rb") as file:  # complete for other readers: it has a summary again
         assert make_reader(file).get_summary().statistics.channel_message_counts[1] == recovered.ticks
     names = sorted(file.name for file in store.recordings.iterdir())
