@@ -35,6 +35,12 @@ def test_a_cheap_case_is_recommended_only_if_it_is_shown_to_lose_little():
     assert "above those of all cheaper cases; not for a robot." in advice.text
 
 
+def test_of_cases_that_cost_the_same_the_worse_one_is_not_on_the_front():
+    strong, feeble = case("strong", 1.0, 0.90, 0.91, 0.92, 0.91), case("feeble", 1.0, 0.40, 0.42, 0.41, 0.40)
+    points = trade_points([feeble, strong], True)
+    assert {point.name: point.on_front for point in points} == {"strong": "yes", "feeble": "no"}
+
+
 def test_where_no_difference_is_shown_the_cheapest_is_taken_and_that_is_said():
     best = case("strong", 2.0, 0.70, 0.95, 0.80, 0.99)
     other = case("weak", 1.0, 0.95, 0.70, 0.90, 0.77)
