@@ -98,6 +98,10 @@ KNOWN_IN_ANY_ORDER = {
         name: COUNTERS[name]
         for name in ("a trial number", "seconds since 1970", "dates", "times", "times of the day")
     },
+    "times of the day with any pauses": [
+        int(f"{9 + k // 3600}{k // 60 % 60:02}{k % 60:02}")
+        for k in np.random.default_rng(4).integers(40, 600, N).cumsum().tolist()
+    ],
     "a tenth": [0.1 * i for i in range(N)],
     "days of a table": [46_000.0 + i * 37 / 1440 + 1e-4 * (i % 3) for i in range(N)],
     "two lines each, falling": [(N - i) // 2 for i in range(N)],
@@ -112,6 +116,12 @@ def test_a_number_with_a_rule_is_no_feature_in_any_order(counter):
     values = np.array(KNOWN_IN_ANY_ORDER[counter])
     for order in (np.arange(N), *(np.random.default_rng(seed).permutation(N) for seed in range(20))):
         assert identifies("x", "", values[order], [LABELS[i] for i in order])
+
+
+def test_a_large_number_that_was_rounded_to_thousands_is_no_hash_of_an_object():
+    pascals = np.repeat(1e3 * np.random.default_rng(0).integers(50_000, 900_000, size=6), 10)
+    assert not identifies("modulus", "", pascals, LABELS)
+    assert identifies("modulus", "", pascals + 1.0, LABELS)
 
 
 @every_case("unit", ["s", "hours", "Minutes", "days", "nr", "ID"])

@@ -29,6 +29,7 @@ from graspsense.testing.subject import Subject
 
 WIDEST_M: Final = 0.5
 WIDER: Final = ((20.0, "millimetres: divide by 1000"), (2.0, "centimetres: divide by 100"))
+"""Gaps above which one is given in another unit, and which."""
 FORGIVEN: Final = 0.25
 """Relative difference allowed between the measured and the declared rate."""
 

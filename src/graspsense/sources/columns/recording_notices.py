@@ -137,8 +137,8 @@ def signal_notices(recording: Recording) -> Iterator[str]:
         for what, force in pads.items()
         if np.isfinite(force).any()
     ]
-    told = [f"{what} has no number: was the sensor connected?" for what in pads if len(t) > 1]
-    told = [text for text in told if not any(text.startswith(f"{force.what} has") for force in forces)]
+    silent = [what for what, force in pads.items() if len(t) > 1 and not np.isfinite(force).any()]
+    told = [f"{what} has no number: was the sensor connected?" for what in silent]
     told += [text for force in forces for text in _of_sensor(force)]
     if int(known.sum()) < FEWEST or not forces:
         yield from told

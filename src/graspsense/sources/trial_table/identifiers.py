@@ -70,7 +70,7 @@ _ALIKE: Final = 0.35
 _ENDS: Final = 2
 """Objects that may have fewer lines than the others: the first and the last one; or the last one of each label."""
 _HASHED: Final = 1e7
-"""Integers from this one on are hashes, if they number objects."""
+"""Integers from this one on are hashes, if they number objects and are no multiples of 1000."""
 _EPOCH_S: Final = (6.3e8, 4.2e9)
 """The years 1990 to 2100 in seconds since 1970."""
 _PER_SECOND: Final = (1.0, 1e3, 1e6, 1e9)
@@ -91,6 +91,9 @@ _WEEKDAYS: Final = re.compile(
     r"sam(edi)?|dim(anche)?"
 )
 _DATES: Final = ("%Y%m%d", "%y%m%d%H%M", "%Y%m%d%H%M", "%y%m%d%H%M%S", "%Y%m%d%H%M%S")
+_CLOCK_VALUES: Final = (10, 15)
+"""Different hundreds, and different last two digits, from which on 142530 and 91205 are times of the day: that no two
+digits are above 59 is a chance of one in two thousand."""
 _DAYS: Final = ((36_526.0, 55_153.0), (730_486.0, 749_113.0))
 """The years 2000 to 2050 in days, as spreadsheets and as MATLAB count them."""
 _WORKING_DAY: Final = 0.7
@@ -157,7 +160,7 @@ def identifies(
             return "number the trials"
         if len(values_of) == len(column) >= _SPACED and _is_regular(values_of, _ALIKE):
             return "have equal steps, as those of a clock or a counter"
-    hashed = whole and column.max() >= _HASHED
+    hashed = whole and column.max() >= _HASHED and bool((column % 1000.0).any())
     if (hashed or cells <= 2.0 * len(values_of)) and name_objects(column.tolist(), known):
         return NUMBER_OBJECTS
     return ""
@@ -216,6 +219,10 @@ def _is_calendar(column: NDArray[np.float64]) -> bool:
         return True
     if least < 0.0 or (column != np.floor(column)).any():
         return False
+    if least < 19_700_101:
+        hundreds, ends = np.unique(column // 100.0), np.unique(column % 100.0)
+        many = len(hundreds) >= _CLOCK_VALUES[0] and len(ends) >= _CLOCK_VALUES[1]
+        return many and most < 240_000.0 and max(ends.max(), (hundreds % 100.0).max()) < 60.0
     texts = [f"{value:.0f}" for value in np.unique(column).tolist()]
     return any(all(_is_written_date(text, form) for text in texts) for form in _DATES)
 
