@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import scipy
 from attrs import evolve
+from cases import every_case
 from parts import Nearest
 from test_evaluate import learner
 
@@ -95,6 +96,18 @@ def test_each_trial_is_predicted_by_a_model_that_was_chosen_and_trained_without_
         same = {r for r, other in zip(rows, noise.instances, strict=True) if other == instance}
         assert len(apart) == 1 + 4
         assert all(not same & training_rows for training_rows in apart)
+
+
+@every_case(
+    ("known", "least"),
+    [
+        (objects(label_count=2, instances=1, each=2), 5),
+        (evolve(objects(label_count=2, instances=1, each=10), instances=tuple("ab" * 10)), 3),
+    ],
+)
+def test_too_few_trials_or_objects_are_refused_with_the_number_that_is_needed(known, least):
+    with pytest.raises(ConfigError, match=f"too few .* at least {least}$"):
+        choose(NEAREST, {"noise": known})
 
 
 @pytest.mark.slow

@@ -74,6 +74,7 @@ def test_the_delay_that_is_reported_is_the_one_that_is_used(shown_s):
         (0.0, lambda used_s: 0.0004, 0.0),
         (-0.0032, lambda used_s: -0.00111, 0.0),  # the chosen terms show -2.62 to 0.40 ms, and so none
         (0.0032, lambda used_s: 0.0051, 0.0051),  # they show another one, which is used
+        (-0.0032, lambda used_s: -0.0051, -0.0051),
         (0.0102, lambda used_s: 0.0100, 0.0102),  # they show this one
         (0.0100, lambda used_s: used_s + 0.004, 0.0),  # they always show more
     ],

@@ -8,7 +8,7 @@ from attrs import evolve
 from cases import every_case
 from random_scenes import record_of
 
-from graspsense.plugin_api import STEADY, create
+from graspsense.plugin_api import REST_WINDOW_S, STEADY, create
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.error import GraspRecord, deviation
 from graspsense_sim_gripper.run.batch import run_many
@@ -75,6 +75,15 @@ def test_a_rest_before_the_hold_is_not_the_one_that_is_meant():
     # Pressed by 10 mm/s for 0.4 s, of which 0.5 mm without contact: not by the half of it.
     assert quantities["f_steady"] == pytest.approx(STIFFNESS * 0.0035, rel=1e-3)
     assert quantities["p_steady"] == pytest.approx(0.0415, abs=1.5e-5)
+
+
+@every_case(("hold_from", "row"), [(900, 900), (1000, None)])
+def test_the_steady_force_is_that_of_the_hold_or_of_the_rest_if_there_is_no_hold(hold_from, row):
+    creeping = 2.0 + np.arange(1000) * 1e-3
+    record = evolve(squeeze(), left_n=creeping, right_n=creeping, hold_from=hold_from)
+    if row is None:
+        row = 1000 * (0.1 + TAU * math.log(SPEED / 1e-4) + REST_WINDOW_S)
+    assert record.quantities["f_steady"] == pytest.approx(2.0 + row * 1e-3, abs=2e-4)
 
 
 def test_at_rest_from_the_very_contact_on_there_is_no_rate():
