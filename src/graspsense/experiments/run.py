@@ -9,7 +9,7 @@ from attrs import field, frozen
 
 from graspsense.core.components.caller import option
 from graspsense.core.grasp.interrupts import Interrupts
-from graspsense.core.values.errors import ConfigError, listed
+from graspsense.core.values.errors import ConfigError, counted, listed
 from graspsense.experiments.executors.base import Executor, ExecutorLost
 from graspsense.experiments.experiment import Planned
 from graspsense.experiments.results import Results
@@ -57,7 +57,7 @@ class Account:
             parts.append(f"{len(self.failed)} failed")
         if self.missing:
             parts.append(f"{self.missing} not done")
-        return f"{self.total} tasks: {', '.join(parts)}"
+        return f"{counted(self.total, 'task')}: {', '.join(parts)}"
 
 
 def refuse_store(folder: Path) -> None:
