@@ -71,11 +71,9 @@ from graspsense.core.drivers.transmission import revolutions_at as revolutions_a
 from graspsense.core.drivers.transmission import screw_linkage as screw_linkage
 
 # Contact, and rest where the gap is coarse
-from graspsense.core.control.contact import both_touch_samples as both_touch_samples
 from graspsense.core.control.contact import either_touches as either_touches
 from graspsense.core.grasp.gap_resolution import GapResolution as GapResolution
 from graspsense.core.grasp.gap_resolution import gap_resolution as gap_resolution
-from graspsense.core.grasp.gap_resolution import gap_resolution_by_sample as gap_resolution_by_sample
 from graspsense.core.grasp.gap_resolution import window_of_rest as window_of_rest
 from graspsense.core.control.contact import MOVED_M as MOVED_M
 from graspsense.core.control.contact import first_rest as first_rest

@@ -53,6 +53,7 @@ from graspsense.core.control.free_motion import FreeMotion as FreeMotion
 from graspsense.core.components.compiled_features import CompiledExtraction as CompiledExtraction
 from graspsense.core.components.compiled_features import CompiledFeatures as CompiledFeatures
 from graspsense.core.components.compiled_features import TickColumns as TickColumns
+from graspsense.core.components.compiled_features import listed_columns as listed_columns
 from graspsense.core.components.compiled_features import compiled_extraction as compiled_extraction
 
 # The tick of the runner, for a backend that runs it compiled

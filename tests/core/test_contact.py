@@ -2,7 +2,6 @@
 
 from math import nan
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,7 +12,6 @@ from graspsense.core.control.contact import (
     RestState,
     at_rest,
     both_touch,
-    first_rest,
     update_rest,
 )
 
@@ -73,26 +71,3 @@ def test_at_rest_means_the_gap_stayed_within_bounds_over_the_whole_window(steps)
         if at_rest(still, t, REST_WINDOW_S):
             within = [g for when, g in seen if when >= still.since_t_s]
             assert max(abs(g - within[0]) for g in within) <= REST_SPEED_M_S * (t - still.since_t_s) + 1e-15
-
-
-MOVES = st.sampled_from([0.0, 0.0, 0.0, 1e-6, -1e-6, 1e-5, nan])
-
-
-@given(
-    st.lists(st.tuples(st.sampled_from([1e-3, 1e-2, 0.1]), MOVES, st.booleans()), min_size=1, max_size=300),
-    st.sampled_from([0.02, 0.05]),
-)
-def test_rest_over_a_trace_is_rest_sample_by_sample(steps, window):
-    times = np.cumsum([dt for dt, _, _ in steps])
-    gaps = 0.05 + np.array([0.0 if np.isnan(dx) else dx for _, dx, _ in steps]).cumsum()
-    gaps[[np.isnan(dx) for _, dx, _ in steps]] = np.nan
-    shows = np.array([may for _, _, may in steps])
-    expected, still, since = None, RestState(times[0], gaps[0]), 0
-    for i, (t, gap) in enumerate(zip(times, gaps, strict=True)):
-        now = update_rest(still, t, gap, REST_SPEED_M_S, window)
-        if now is not still:
-            still, since = now, i
-        if shows[i] and at_rest(still, t, window):
-            expected = since, i
-            break
-    assert first_rest(times, gaps, shows, REST_SPEED_M_S, window) == expected

@@ -9,7 +9,7 @@ Controllers and features share these functions, so that they agree on contact an
 
 from __future__ import annotations
 
-from bisect import bisect_left
+import math
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 if TYPE_CHECKING:
@@ -24,9 +24,6 @@ REST_WINDOW_S: Final = 0.05
 """Time for which the speed must stay below tau_2. One encoder tick in 1 ms is already 0.33 mm/s on the PR2."""
 MOVED_M: Final = 1e-3
 """Travel after which the fingers have overcome static friction: fingers that stand still later have met something."""
-
-FEW: Final = 8
-"""Number of samples that are examined one by one before all others at once."""
 
 
 class RestState(NamedTuple):
@@ -46,17 +43,6 @@ def both_touch(force_left_n: float, force_right_n: float, contact_force_n: float
     (True, False)
     """
     return force_left_n >= contact_force_n and force_right_n >= contact_force_n
-
-
-def both_touch_samples(
-    force_left_n: NDArray[np.float64], force_right_n: NDArray[np.float64], contact_force_n: float
-) -> NDArray[np.bool_]:
-    """Return a mask of the samples in which both pads touch; arrays of shape (n,). The result is that of `both_touch`.
-
-    >>> both_touch_samples(np.array([0.1, 0.8]), np.array([0.7, 0.7]), CONTACT_FORCE_N).tolist()
-    [False, True]
-    """
-    return (force_left_n >= contact_force_n) & (force_right_n >= contact_force_n)
 
 
 def either_touches(force_left_n: float, force_right_n: float, contact_force_n: float) -> bool:
@@ -118,48 +104,13 @@ def first_rest(
     >>> first_rest(times, gaps, shows, REST_SPEED_M_S, REST_WINDOW_S)
     (2, 7)
     """
-    import numpy as np
-
-    n = len(times_s)
-    if n == 0:
-        return None
-    # A state that the next sample replaces cannot be a rest, unless one sample suffices.
-    lasting = np.ones(n, bool)
-    if not at_rest(RestState(times_s[0], gaps_m[0]), times_s[0], rest_window_s):
-        allowed = rest_speed_m_s * np.maximum(rest_window_s, times_s[1:] - times_s[:-1])
-        np.less_equal(np.abs(gaps_m[1:] - gaps_m[:-1]), allowed, out=lasting[:-1])
-    skipped = int(lasting.argmax())
-    begins = np.flatnonzero(lasting[skipped:]).tolist()
-    times, gaps = times_s[skipped:].tolist(), gaps_m[skipped:].tolist()
-    n -= skipped
-    at_once_m, limits = rest_speed_m_s * rest_window_s, (rest_speed_m_s, rest_window_s)
-    end = following = 0
-    while end < n:
-        while begins[following] < end:
-            following += 1
-        since = begins[following]
-        still = RestState(times[since], gaps[since])
-        # While the gap moves, most states are short: the first samples are examined one by one, as by `update_rest`.
-        few = min(since + FEW, n)
-        end, at_m, since_s = since, still.gap_m, still.since_t_s
-        if times[few - 1] - since_s <= rest_window_s:
-            while end < few and abs(gaps[end] - at_m) <= at_once_m:
-                end += 1
-        else:
-            while end < few and update_rest(still, times[end], gaps[end], *limits) is still:
-                end += 1
-        if end == few:
-            begin = skipped + few
-            allowed = rest_speed_m_s * np.maximum(rest_window_s, times_s[begin:] - still.since_t_s)
-            strayed = ~(np.abs(gaps_m[begin:] - still.gap_m) <= allowed)
-            end = few + int(strayed.argmax()) if strayed.any() else n
-        if end > since and at_rest(still, times[end - 1], rest_window_s):
-            # From just before the end of the window on, because rounding decides the rest.
-            full = bisect_left(times, still.since_t_s + rest_window_s - 1e-9, since, end)
-            while not at_rest(still, times[full], rest_window_s):
-                full += 1
-            showing = shows[skipped + full : skipped + end]
-            if showing.any():
-                return skipped + since, skipped + full + int(showing.argmax())
-        end = max(end, since + 1)
+    still, since = RestState(math.nan, math.nan), 0
+    for i, (t_s, gap_m, showing) in enumerate(
+        zip(times_s.tolist(), gaps_m.tolist(), shows.tolist(), strict=True)
+    ):
+        state = update_rest(still, t_s, gap_m, rest_speed_m_s, rest_window_s)
+        if state is not still:
+            still, since = state, i
+        if showing and at_rest(still, t_s, rest_window_s):
+            return since, i
     return None

@@ -7,11 +7,8 @@ of a step at this speed, and a gap that was measured three times.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+from collections.abc import Sequence
+from typing import Final, NamedTuple
 
 ROUNDING: Final = 1e-9
 """Share of a gap up to which a change is one of rounding."""
@@ -40,36 +37,17 @@ def window_of_rest(resolution: GapResolution, rest_speed_m_s: float, rest_window
     return max(rest_window_s, MARGIN * resolution.step_m / rest_speed_m_s, MEASURED * resolution.period_s)
 
 
-def gap_resolution(times_s: NDArray[np.float64], gaps_m: NDArray[np.float64], contact: int) -> GapResolution:
-    """Return the resolution of the gap of a grasp with its first contact at this sample. Arrays of shape (n,).
+def gap_resolution(times_s: Sequence[float], gaps_m: Sequence[float], contact: int) -> GapResolution:
+    """Return the resolution of the gap of a grasp with its first contact at this sample.
 
-    The gap is coarse if it repeats a number while it closes. Then its least change is its step.
+    `times_s` (s) and `gaps_m` (m) are of one length; in the interpreter, lists take less time than arrays. The gap is
+    coarse if it repeats a number while it closes. Then its least change is its step.
 
-    >>> coarse = np.round(0.06 - 4e-5 * np.arange(100), 4)
-    >>> round(gap_resolution(np.arange(100) * 0.1, coarse, 0).step_m, 9)
+    >>> times, coarse = [0.1 * i for i in range(100)], [round(0.06 - 4e-5 * i, 4) for i in range(100)]
+    >>> round(gap_resolution(times, coarse, 0).step_m, 9)
     0.0001
     """
-    import numpy as np
-
-    with np.errstate(invalid="ignore"):
-        moved = gaps_m[1:] - gaps_m[:-1]
-        changes_at = np.flatnonzero(np.abs(moved) > ROUNDING * np.abs(gaps_m[1:])) + 1
-    step_m, period_s = 0.0, 0.0
-    if len(changes_at) > 1:
-        closing = moved[changes_at - 1] < 0.0
-        if bool(((np.diff(changes_at) > 1) & closing[1:] & closing[:-1]).any()):
-            step_m = float(np.abs(moved[changes_at - 1]).min())
-        free_changes = changes_at[changes_at <= contact]
-        changes = len(free_changes) - 1
-        if len(free_changes) >= LEAST_CHANGES and free_changes[-1] - free_changes[0] > HELD * changes:
-            period_s = float((times_s[free_changes[-1]] - times_s[free_changes[0]]) / changes)
-    return GapResolution(step_m, period_s)
-
-
-def gap_resolution_by_sample(
-    times_s: NDArray[np.float64], gaps_m: NDArray[np.float64], contact: int, end: int
-) -> GapResolution:
-    """Return what `gap_resolution` does for the samples before `end`, one by one, so that it can be compiled."""
+    end = len(gaps_m)
     first_change, last_change = 1, contact
     while first_change < end and not _changes(gaps_m[first_change - 1], gaps_m[first_change]):
         first_change += 1
@@ -94,15 +72,15 @@ def _changes(previous_m: float, gap_m: float) -> bool:
     return abs(gap_m - previous_m) > ROUNDING * abs(gap_m)
 
 
-def _count_changes(previous_m: NDArray[np.float64], gaps_m: NDArray[np.float64]) -> int:
-    """Return how many gaps differ from those before them; the arrays have one shape."""
+def _count_changes(previous_m: Sequence[float], gaps_m: Sequence[float]) -> int:
+    """Return how many gaps differ from those before them."""
     n = 0
     for i in range(len(gaps_m)):
         n += 1 if _changes(previous_m[i], gaps_m[i]) else 0
     return n
 
 
-def _repeats_while_closing(gaps_m: NDArray[np.float64], begin: int, end: int) -> bool:
+def _repeats_while_closing(gaps_m: Sequence[float], begin: int, end: int) -> bool:
     """Return whether a number is repeated between two changes that close the gap."""
     last_change, was_closing = end, False
     for i in range(begin, end):

@@ -18,14 +18,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 from attrs import frozen
 
-from graspsense.gripper_api import (
-    NO_GAP,
-    both_touch_samples,
-    first_rest,
-    gap_resolution,
-    gap_resolution_by_sample,
-    window_of_rest,
-)
+from graspsense.gripper_api import NO_GAP, gap_resolution, window_of_rest
 from graspsense.plugin_api import (
     APPROACH,
     HOLD,
@@ -41,7 +34,7 @@ from graspsense.plugin_api import (
     update_rest,
 )
 from graspsense.plugins.features.contact_threshold import RestThresholds
-from graspsense.simulator_api import CompiledFeatures, TickColumns
+from graspsense.simulator_api import CompiledFeatures, TickColumns, listed_columns
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -95,6 +88,8 @@ class ChittaParams(NamedTuple):
     contact_force_n: float
     rest_speed_m_s: float
     rest_window_s: float
+    in_seconds: int
+    """0 where time is counted in frames: the window of a rest is then that of the settings."""
 
 
 class Measured(NamedTuple):
@@ -199,8 +194,11 @@ def measure(params: ChittaParams, ticks: TickColumns) -> Measured:
         holds = holds or phase[end] == HOLD
         end += 1
     p_first, after_contact = gap[contact], t[end - 1] - t[contact]
-    resolution = gap_resolution_by_sample(t, gap, contact, end)
-    window_s = window_of_rest(resolution, params.rest_speed_m_s, params.rest_window_s)
+    window_s = params.rest_window_s
+    if params.in_seconds == 1:
+        window_s = window_of_rest(
+            gap_resolution(t[:end], gap[:end], contact), params.rest_speed_m_s, window_s
+        )
     still, since, unseen_s = RestState(t[contact], gap[contact]), contact, 0.0
     for i in range(contact, end):
         if i > contact:
@@ -212,7 +210,7 @@ def measure(params: ChittaParams, ticks: TickColumns) -> Measured:
         shows = phase[i] == HOLD or not holds
         let_go = gap[i] > p_first + params.rest_speed_m_s * window_s and left[i] < tau_1 and right[i] < tau_1
         if shows and not let_go and gap[since] == gap[since] and at_rest(still, t[i], window_s):
-            hole_s = hole_within(t, since, i)
+            hole_s = hole_within(t, since, i) if params.in_seconds == 1 else 0.0
             if hole_s > 0.0 and not at_rest(still, t[i] - hole_s, window_s):
                 unseen_s = hole_s
                 continue
@@ -262,7 +260,8 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
         """
         if trace.units.get("gap") == NO_GAP:
             return self.undefined("no gap was recorded")
-        return self._features(self._measured(trace), trace.units)
+        params = self._params(in_seconds=trace.units["t"] == "s")
+        return self._features(measure(params, listed_columns(trace)), trace.units)
 
     def _features(self, measured: Any, units_of: Mapping[str, str]) -> Features:
         """Return the features that follow from what was measured; `units_of` are those of the trace."""
@@ -303,93 +302,17 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
         values = (p_first, p_steady, f_steady, delta_t, *rates)
         return Features(names=NAMES, values=values, units=units, reasons=reasons)
 
-    def _params(self) -> ChittaParams:
+    def _params(self, in_seconds: bool = True) -> ChittaParams:
         config = self.config
         return ChittaParams(
             FORCES.index(config.force),
             float(config.contact_force_n),
             float(config.rest_speed_m_s),
             float(config.rest_window_s),
+            int(in_seconds),
         )
 
     compiled = CompiledFeatures(measure, _params, _features, reads_release=False)
-
-    def _measured(self, trace: Trace) -> Measured:
-        """Return what `measure` does, in less time in the interpreter."""
-        contact = self._first(trace)
-        if contact is None:
-            return Measured(self._no_contact(trace), math.nan, math.nan)
-        p_first = float(trace.gap_m[contact])
-        end = _released(trace, contact)
-        after_contact = float(trace.t_s[end - 1] - trace.t_s[contact])
-        window_s = self._window_s(trace, contact, end)
-        rest_ticks = self._rest(trace, contact, end, window_s)
-        if rest_ticks is None:
-            return Measured(CONTACT, p_first, after_contact, window_s=window_s)
-        steady, shown = rest_ticks
-        if trace.units["t"] == "s" and hole_within(trace.t_s, steady, shown) > 0.0:
-            return measure(
-                self._params(), TickColumns(*(getattr(trace, name) for name in TickColumns._fields))
-            )
-        p_steady, delta_t = float(trace.gap_m[steady]), float(trace.t_s[steady] - trace.t_s[contact])
-        forces = self._force(trace, contact), self._force(trace, shown)
-        blind_s = blind_time(float(trace.t_s[max(contact - 1, 0)]), float(trace.t_s[contact]), *forces)
-        return Measured(
-            reached=REST,
-            p_first=p_first,
-            after_contact=after_contact,
-            p_steady=p_steady,
-            delta_t=delta_t,
-            f_first=forces[0],
-            f_steady=forces[1],
-            window_s=window_s,
-            blind_s=blind_s,
-        )
-
-    def _window_s(self, trace: Trace, contact: int, end: int) -> float:
-        """Return the window in which a rest shows; where time is counted in frames, that of the settings."""
-        if trace.units["t"] != "s":
-            return self.config.rest_window_s
-        resolution = gap_resolution(trace.t_s[:end], trace.gap_m[:end], contact)
-        return window_of_rest(resolution, self.config.rest_speed_m_s, self.config.rest_window_s)
-
-    def _force(self, trace: Trace, tick: int) -> float:
-        left, right = float(trace.force_left_n[tick]), float(trace.force_right_n[tick])
-        return pad_force(FORCES.index(self.config.force), left, right)
-
-    def _first(self, trace: Trace) -> int | None:
-        tau_1 = self.config.contact_force_n
-        touch = both_touch_samples(trace.force_left_n, trace.force_right_n, tau_1)
-        touch &= trace.closing & (trace.gap_m == trace.gap_m)
-        return int(touch.argmax()) if touch.any() else None
-
-    def _rest(self, trace: Trace, contact: int, end: int, window_s: float) -> tuple[int, int] | None:
-        """Return the tick at which rest begins and the one at which its window ends, both before `end`, or None."""
-        # A controller can wait for more than rest, such as a force. The rest in its hold phase is then the one meant.
-        held = trace.phase[contact:end] == HOLD
-        shows = held if held.any() else ~held
-        # A recording can go on after the release, and then rest with open fingers.
-        tau_1, speed, gap = self.config.contact_force_n, self.config.rest_speed_m_s, trace.gap_m[contact:end]
-        free = (trace.force_left_n[contact:end] < tau_1) & (trace.force_right_n[contact:end] < tau_1)
-        shows &= ~(free & (gap > gap[0] + speed * window_s))
-        offsets = first_rest(trace.t_s[contact:end], gap, shows, speed, window_s)
-        return None if offsets is None else (contact + offsets[0], contact + offsets[1])
-
-    def _no_contact(self, trace: Trace) -> float:
-        """Return how far a grasp without contact came."""
-        if len(trace) == 0:
-            return NO_TICKS
-        tau_1 = self.config.contact_force_n
-        left, right = trace.force_left_n >= tau_1, trace.force_right_n >= tau_1
-        closing = trace.closing
-        if bool((left & right & ~closing).any()) and not bool((trace.phase == HOLD).any()):
-            return BOTH_TOO_LATE
-        felt_left, felt_right = bool((left & closing).any()), bool((right & closing).any())
-        if felt_left and felt_right:
-            return NEVER_BOTH
-        if felt_left:
-            return LEFT_ONLY
-        return RIGHT_ONLY if felt_right else NO_PAD
 
     def _why_no_contact(self, reached: float) -> str:
         tau_1 = self.config.contact_force_n
@@ -403,9 +326,3 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
             which = "left" if reached == LEFT_ONLY else "right"
             return f"only the {which} pad felt {tau_1:g} N while the fingers closed"
         return f"no pad felt {tau_1:g} N while the fingers closed"
-
-
-def _released(trace: Trace, contact: int) -> int:
-    """Return the first tick of the release after that of the contact, or the number of ticks."""
-    released = trace.phase[contact:] > HOLD
-    return contact + (int(released.argmax()) if released.any() else len(released))

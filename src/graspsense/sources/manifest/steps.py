@@ -273,7 +273,7 @@ def resampled(columns: GraspColumns, rate_hz: float) -> GraspColumns:
     times = t[0] + np.arange(int(duration_s * rate_hz + 1e-9) + 1) / rate_hz
 
     contact = int((columns.force_n - columns.force_n.min() > LOADED * np.ptp(columns.force_n)).argmax())
-    coarse = gap_resolution(t, columns.gap_m, contact).step_m > 0.0
+    coarse = gap_resolution(t.tolist(), columns.gap_m.tolist(), contact).step_m > 0.0
 
     def along(name: str, values: Numbers) -> Numbers:
         if name in columns.times:

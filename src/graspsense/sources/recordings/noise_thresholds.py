@@ -202,7 +202,7 @@ class _Noise:
     @cached_property
     def steps(self) -> tuple[float, float, float]:
         """The least step of a coarse gap, the time between its measurements if rows repeat it, and between samples."""
-        resolution = gap_resolution(self.times, self.gap, self.loaded)
+        resolution = gap_resolution(self.times.tolist(), self.gap.tolist(), self.loaded)
         return resolution.step_m, resolution.period_s, float(np.median(np.diff(self.times)))
 
     @property
