@@ -17,9 +17,7 @@ from sklearn.utils.validation import _check_sample_weight, check_is_fitted, colu
 
 from graspsense_c45.arrays import AnyArray, Indices, Reals
 from graspsense_c45.dot import to_dot
-from graspsense_c45.drawing import draw
 from graspsense_c45.fitting import fit
-from graspsense_c45.importances import feature_importances
 from graspsense_c45.options import PAPER, Options
 from graspsense_c45.path import Path, explain
 from graspsense_c45.prediction import class_indices, distributions
@@ -144,24 +142,18 @@ class C45Classifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         """Return the class of each row, as J48 classifies; `laplace` changes probabilities only."""
         check_is_fitted(self)
         values = self._encode(X, fitting=False)
-        labels: AnyArray = self.classes_[class_indices(self.tree_, values, self.engine)]  # type: ignore[arg-type]
+        labels: AnyArray = self.classes_[class_indices(self.tree_, values)]
         return labels
 
     def predict_proba(self, X: Any) -> Reals:
         """Return the probability of each class for each row, in the order of ``classes_``."""
         check_is_fitted(self)
-        return distributions(self.tree_, self._encode(X, fitting=False), self.engine)  # type: ignore[arg-type]
+        return distributions(self.tree_, self._encode(X, fitting=False))
 
     def explain(self, X: Any) -> list[Path]:
         """Return the path of each row through the tree, in words and units."""
         check_is_fitted(self)
         return [explain(self.tree_, row) for row in self._encode(X, fitting=False)]
-
-    @property
-    def feature_importances_(self) -> Reals:
-        """The fraction of each column in the information gain; see `importances.feature_importances`."""
-        check_is_fitted(self)
-        return feature_importances(self.tree_)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the tree as nested dictionaries; see `tree.Tree.to_dict`."""
@@ -187,11 +179,6 @@ class C45Classifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         """Return the tree in the DOT language."""
         check_is_fitted(self)
         return to_dot(self.tree_)
-
-    def draw(self, axes: Any = None) -> Any:
-        """Draw the tree with matplotlib; return the axes."""
-        check_is_fitted(self)
-        return draw(self.tree_, axes)
 
     def __sklearn_tags__(self) -> Any:
         """Return the tags: NaN is allowed, and means missing."""

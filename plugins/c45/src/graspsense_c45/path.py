@@ -69,9 +69,9 @@ def explain(tree: Tree, row: Sequence[float]) -> Path:
     Raises ValueError as `prediction.distributions` does.
     """
     values = np.array([row], dtype=np.float64)
-    shares = distributions(tree, values, "plain")[0]
+    shares = distributions(tree, values)[0]
     # Without smoothing, the largest probability is that of the class: the row is routed once.
-    of_class = largest_class(shares[None]) if not tree.laplace else class_indices(tree, values, "plain")
+    of_class = largest_class(shares[None]) if not tree.laplace else class_indices(tree, values)
     chosen = int(of_class[0])
     node, steps, tests, nominal = 0, [], [], []
     while not tree.is_leaf(node):
