@@ -81,10 +81,10 @@ class ExperimentComparison:
         """The first of the differences and the number of settings that differ, in a few sentences."""
         told = [f"{self.names} have no case in common."]
         if self.differences:
-            first = self.differences[0]
+            shown = self.differences[0]
             told = [
-                f"{condition_name(first.other)}, {TARGETS[first.other.recognised]}: {first.other_name} minus "
-                f"{self.experiments[0].name} is {first.difference.words}, {first.verdict}, {first.how}."
+                f"{condition_name(shown.other)}, {TARGETS[shown.other.recognised]}: {shown.other_name} minus "
+                f"{self.experiments[0].name} is {shown.difference.words}, {shown.verdict}, {shown.how}."
             ]
         if len(self.differences) > 1:
             told.append(f"The table has {len(self.differences) - 1} more.")
