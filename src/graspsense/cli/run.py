@@ -67,6 +67,12 @@ MANY_GUARDED: Final = 0.1
     is_flag=True,
     help="Simulated: list what every term contributed, and what each feature would lose without it. (gripper.explain)",
 )
+@click.option(
+    "--beside",
+    metavar="PIPELINE",
+    help="Grasp with a second gripper at the same time: its pipeline, by name or file. --seed, --object and -o are of "
+    "the first.",
+)
 @plot_option
 @click.option(
     "--picture",
@@ -83,6 +89,7 @@ def run(
     label: str | None,
     changed: bool,
     explain_model: bool,
+    beside: str | None,
     plot: str | None,
     picture: str | None,
     video: str | None,
@@ -97,6 +104,11 @@ def run(
     whatever its outcome; 2 wrong settings; 3 device not found; 4 grasp aborted or device lost.
     """
     live = LiveOptions.taken_from(asked)
+    if beside and any((plot, explain_model, dry_run, picture, video, viewer, live != LiveOptions())):
+        raise click.UsageError(
+            "--beside goes without --plot, --explain-model, --dry-run, --picture, --video, --viewer, --live, "
+            "--foxglove and --rerun"
+        )
     if explain_model:
         asked["options"] = (*asked["options"], "gripper.explain=true")
     settings = _labelled_settings(label, asked)
@@ -110,6 +122,9 @@ def run(
         return
     if label is not None and save is None:
         raise click.UsageError("--label goes with a trial that is kept: add --save DIR")
+    if beside is not None:
+        _run_beside(settings, beside, save, label, as_json)
+        return
     film = _film(picture, video, viewer)
     sinks: tuple[Sink, ...] = film if as_json else (LiveRows(), *film)
     with shown_live(live, save) as shown:
@@ -118,7 +133,7 @@ def run(
             talk(f"seed {asked['seed']}, drawn for this trial; --seed {asked['seed']} repeats the grasp")
         shown.finished(trial, save)
         if as_json:
-            echo_json({**trial_as_json(trial), **({} if kept is None else {"kept": kept})})
+            echo_json(_as_json(trial, kept))
         else:
             print_trial(trial)
             _print_better(settings, trial)
@@ -136,6 +151,38 @@ def _performed(
     if save is None:
         return (*grasped(settings, sinks), None)
     return _kept(save, label, settings, sinks, changed)
+
+
+def _run_beside(
+    settings: Settings, pipeline: str, save: str | None, label: str | None, as_json: bool
+) -> None:
+    """Grasp with the grippers of these settings and of another pipeline at once, and print both trials.
+
+    Ends the command with the exit code of the first trial that was not kept or did not end by itself.
+    """
+    from graspsense.cli.run_beside import grasp_beside
+
+    other = _labelled_settings(label, {"pipeline": pipeline})
+    if save is not None and other.origins["run.seed"] == "default":
+        drawn = randbelow(LARGEST_DRAWN_SEED + 1)
+        other = _labelled_settings(label, {"pipeline": pipeline, "seed": drawn})
+    check(other)
+    both = grasp_beside(settings, other, save, label)
+    if as_json:
+        echo_json({"grippers": [_as_json(trial, kept) for trial, _, kept in both]})
+    for trial, _, kept in () if as_json else both:
+        echo()
+        echo_entry("gripper", trial.device.name)
+        print_trial(trial)
+        if kept is not None and kept["trial"] is not None:
+            talk(f"kept as trial {kept['trial']} in {save}")
+    for trial, interrupted, kept in both:
+        finish(trial, interrupted, "" if kept is None else kept["problem"])
+
+
+def _as_json(trial: Trial, kept: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return a trial as JSON values, with what is known of its place in a store."""
+    return {**trial_as_json(trial), **({} if kept is None else {"kept": kept})}
 
 
 def grasped(settings: Settings, sinks: Sequence[Sink]) -> tuple[Trial, bool]:
@@ -187,7 +234,7 @@ def _labelled_settings(label: str | None, asked: Mapping[str, Any]) -> Settings:
     settings = settings_of(**asked)
     if label is None or agrees(settings, label):
         return settings
-    if names_object(asked["object_name"], asked["options"]):
+    if names_object(asked.get("object_name"), asked.get("options", ())):
         raise contradiction(settings, label)
     return settings_of(**{**asked, "object_name": label})
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from attrs import evolve, frozen
@@ -17,6 +18,7 @@ from graspsense.store.store import Store
 
 if TYPE_CHECKING:
     from graspsense.core.components.registry import Plugins
+    from graspsense.core.grasp.pair import Member
     from graspsense.core.grasp.sinks import Sink
     from graspsense.core.settings.resolved import Settings
     from graspsense.core.values.device import DeviceInfo
@@ -38,6 +40,15 @@ class RecordedTrial:
     """Whether the user asked for an end, during the grasp or while it was saved."""
 
 
+@frozen(kw_only=True, eq=False)
+class Beside:
+    """A grasp of a pair: its gripper, the recording that is reserved for it, and the name of the other one's."""
+
+    member: Member
+    recording: Path
+    other: str
+
+
 def record_grasp(
     store: Store,
     settings: Settings,
@@ -47,11 +58,13 @@ def record_grasp(
     origin: Origin,
     sinks: Iterable[Sink] = (),
     on_open: Callable[[DeviceInfo], None] | None = None,
+    beside: Beside | None = None,
 ) -> RecordedTrial:
     """Perform one grasp as `grasp_with` does, record it, and add it to the store.
 
     A disk that fails during the grasp does not stop it: the trial is returned with the problem. An interrupted grasp is
-    stored as well, and nothing interrupts its saving. Raises what else `grasp_with` raises, SaveFailed if the recording
+    stored as well, and nothing interrupts its saving. That of a pair has the recording of the other as its label
+    `beside`. Raises what else `grasp_with` raises, SaveFailed if the recording
     cannot be started, and KeyboardInterrupt if the user asked for an end before the fingers moved.
     """
     # The grasp itself ends at a signal; what comes before and after it does not.
@@ -63,12 +76,19 @@ def record_grasp(
             if on_open is not None:
                 on_open(device)
 
-        record = TrialRecord.begin(settings, labels, origin)
-        recorder = Recorder(store.new_recording(record.made_at))
+        record = TrialRecord.begin(
+            settings, labels if beside is None else {**labels, "beside": beside.other}, origin
+        )
+        recorder = Recorder(store.new_recording(record.made_at) if beside is None else beside.recording)
 
         def grasped(on_open: Callable[[DeviceInfo], None]) -> Trial:
             return grasp_with(
-                settings, plugins, labels=record.labels, sinks=[*sinks, recorder], on_open=on_open
+                settings,
+                plugins,
+                labels=record.labels,
+                sinks=[*sinks, recorder],
+                on_open=on_open,
+                beside=None if beside is None else beside.member,
             )
 
         grasp = _recorded(store, record, recorder, opened, grasped)

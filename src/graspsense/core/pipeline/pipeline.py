@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
 from math import nan
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from attrs import evolve, frozen
@@ -38,6 +38,9 @@ from graspsense.core.values.features import (
 )
 from graspsense.core.values.signals import Outcome
 from graspsense.core.values.trial import RunInfo, Trial
+
+if TYPE_CHECKING:
+    from graspsense.core.grasp.pair import Member
 
 MODELS_KEPT: Final = 4
 """How many models of pipelines stay in memory."""
@@ -185,14 +188,16 @@ def grasp_with(
     sinks: Iterable[Sink] = (),
     on_event: Callable[[GraspEvent], None] | None = None,
     on_open: Callable[[DeviceInfo], None] | None = None,
+    beside: Member | None = None,
 ) -> Trial:
     """Run one grasp with these settings: build the components, grasp, extract features, predict, notify observers.
 
-    Raises GraspInterrupted, which has the trial, if the user asked for an end; the gripper was then released.
+    `beside` makes its gripper the one of a pair (`run_pair`). Raises GraspInterrupted, which has the trial,
+    if the user asked for an end; the gripper was then released.
     """
     # The model is loaded first, because a missing model must be reported before the grasp.
     model = model_for(settings, plugins)
-    backend, controller = settings.gripper.create(), settings.controller.create()
+    backend, controller = _gripper(settings, beside), settings.controller.create()
     feature_set = settings.features.create()
     anytime = anytime_of(model, feature_set, settings)
     run = _run_info(settings, labels)
@@ -258,6 +263,11 @@ def _run_info(settings: Settings, labels: Mapping[str, str] | None) -> RunInfo:
         seed=settings.run.seed,
         labels=dict(labels or {}),
     )
+
+
+def _gripper(settings: Settings, beside: Member | None) -> SensorBackend[Any]:
+    backend: SensorBackend[Any] = settings.gripper.create()
+    return backend if beside is None else beside.gripper(backend)
 
 
 def _grasped(
