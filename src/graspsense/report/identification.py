@@ -1,9 +1,10 @@
-"""The page of an identified object: data and fit, candidates, and the predictive check."""
+"""The page of an identified object: data and fit, candidates, pairs of parameters, and the predictive check."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import combinations
 from typing import Final
 
 import numpy as np
@@ -22,6 +23,8 @@ from graspsense.report.html import Page, Section, bullets, figure, panels, parag
 from graspsense.report.svg import INKS, QUIET, WIDTH, AxisScale, Picture, reaching
 
 MAX_FITS: Final = 12
+MAX_PAIRS: Final = 6
+MAX_SHOWN: Final = 300
 LEFT: Final = 46.0
 RIGHT: Final = WIDTH - 8.0
 BINS: Final = 24
@@ -48,6 +51,7 @@ def identification_page(result: Identification, scene: str) -> Page:
             undetermined.section(),
             Section(id="fits", title="Data and fit", body=_fits(result.fits)),
             candidates.section(),
+            Section(id="pairs", title="Pairs of parameters", body=_pairs(result)),
             Section(id="check", title="Simulated beside recorded squeezes", body=_checks(result.checks)),
         ),
     )
@@ -139,6 +143,27 @@ def _points(
     x: AxisScale, y: AxisScale, xs: NDArray[np.float64], ys: NDArray[np.float64]
 ) -> list[tuple[float, float]]:
     return [(x(float(a)), y(float(b))) for a, b in zip(xs, ys, strict=True)]
+
+
+def _pairs(result: Identification) -> str:
+    names = [parameter.name for parameter in result.parameters if "." in parameter.name]
+    draws = result.draws
+    if draws is None or len(names) < 2 or draws.shape[1] != len(names):
+        return paragraph("There is one free parameter, so there are no pairs.")
+    correlation = np.corrcoef(np.log(draws), rowvar=False)
+    order = sorted(combinations(range(len(names)), 2), key=lambda pair: -abs(correlation[pair]))
+    figures = []
+    for a, b in order[:MAX_PAIRS]:
+        picture = Picture(height=210.0)
+        x = reaching(draws[:, a].tolist(), LEFT, RIGHT)
+        y = reaching(draws[:, b].tolist(), 170.0, 22.0)
+        with picture.plot(x, y, 22.0, 170.0):
+            picture.x_axis(x, 22.0, 170.0, names[a])
+            picture.y_axis(y, LEFT, RIGHT, names[b])
+            picture.dots(_points(x, y, draws[:MAX_SHOWN, a], draws[:MAX_SHOWN, b]), INKS[0], "draw")
+        words = f"{names[a]} and {names[b]}: correlation {correlation[a, b]:+.2f}"
+        figures.append(figure(picture.svg(words), words))
+    return paragraph("Draws of the identified values, the most correlated pairs first.") + panels(figures)
 
 
 def _checks(checks: Sequence[PredictiveCheck]) -> str:

@@ -101,6 +101,7 @@ def identify(
         held_out=held_out,
         refusals=refusals(open_, fits, held_out),
         checks=predictive_checks(fitted, intervals),
+        draws=intervals.draws,
         notes=tuple(notes),
     )
     scene = scene_text(result, fitted, values, _fingertips(config), delay)

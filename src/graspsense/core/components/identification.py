@@ -151,9 +151,9 @@ class PredictiveCheck:
 class Identification:
     """An object identified from recorded squeezes.
 
-    `scene` is the text of a scene file. `held_out` has the rms error over the peak of each squeeze, predicted from
-    other recordings, with only a width of its own; it is empty for a single recording. `refusals` says why the scene
-    is not to be used.
+    `scene` is the text of a scene file. `draws` has a row for each draw of the parameters, in their order. `held_out`
+    has the rms error over the peak of each squeeze, predicted from other recordings, with only a width of its own; it
+    is empty for a single recording. `refusals` says why the scene is not to be used.
     """
 
     label: str
@@ -165,5 +165,6 @@ class Identification:
     held_out: tuple[float, ...] = ()
     refusals: tuple[str, ...] = ()
     checks: tuple[PredictiveCheck, ...] = ()
+    draws: NDArray[Any] | None = None
     notes: tuple[str, ...] = ()
     seconds: float = 0.0
