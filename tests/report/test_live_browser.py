@@ -134,8 +134,8 @@ def test_arrays_are_heat_maps_and_fast_channels_have_a_spectrogram_and_nothing_g
         new = Samples(k / 1000, 4 * k + 4, 4, tone)
         feed.take(Reading(frame, NO_PADS, signals(Image(k / 1000, k + 1, cells), new)), SQUEEZE, COMMAND)
         if k % 4000 == 0:
-            feed.told("outcome", {"outcome": f"tick {k}", "reason": ""})
-            shown(browser, "$('outcome').textContent", f"outcome: tick {k}")
+            feed.told("progress", {"text": f"tick {k}"})
+            shown(browser, "$('done').textContent", f"tick {k}")
     feed.told("outcome", {"outcome": "steady", "reason": ""})
     shown(browser, "$('outcome').textContent", "outcome: steady")
     assert browser.run("[series.get('gap_m').n, series.get('sound value').n]") == [30_000, 30_000]
@@ -164,8 +164,8 @@ def test_fifty_channels_do_not_grow_the_page_or_its_process(browser, feed, ticks
         frame = Frame(k / 1000, 0.001, 0.05, 0.0, nan, nan, nan, nan, nan, 0)
         feed.take(Reading(frame, NO_PADS, signals(*(k + i for i in range(50)))), SQUEEZE, COMMAND)
         if k % 2000 == 1999:
-            feed.told("outcome", {"outcome": f"tick {k}", "reason": ""})
-            shown(browser, "$('outcome').textContent", f"outcome: tick {k}")
+            feed.told("progress", {"text": f"tick {k}"})
+            shown(browser, "$('done').textContent", f"tick {k}")
         if k % 10_000 == 9_999 and k >= 50_000:
             browser.call("HeapProfiler.collectGarbage")
             used = browser.call("Runtime.getHeapUsage")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from graspsense.cli.live import Live, LiveOptions, live_options, shown_live
+from graspsense.cli.live import Live, LiveOptions, live_options, shown_live, viewer_options
 from graspsense.cli.options import (
     GRIPPER_ALONE,
     contradiction,
@@ -59,6 +59,7 @@ _LABEL = 14
 @click.option("--changed", is_flag=True, help="Continue with another gripper or other settings.")
 @pipeline_options
 @live_options
+@viewer_options
 @click.option("--json", "as_json", is_flag=True, help="Print a summary as JSON at the end.")
 def collect(
     labels: str,

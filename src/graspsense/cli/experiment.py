@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from attrs import asdict
 
+from graspsense.cli.live import Live, LiveOptions, live_options, shown_live
 from graspsense.cli.options import force_option, keys_option
 from graspsense.cli.output import echo_found, echo_json
 from graspsense.cli.progress import ProgressLine
@@ -57,6 +58,7 @@ class ExperimentCommand(click.Command):
 @click.option("--workers", type=int, help="Number of processes.  [default: number of cores]")
 @keys_option("Set a key of the file: -o seeds=3, -o data.trials=2.", "KEY=VALUE")
 @force_option
+@live_options
 @click.option("--dry-run", is_flag=True, help="Print what would be done, and do nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def experiment(
@@ -67,6 +69,8 @@ def experiment(
     workers: int | None,
     options: tuple[str, ...],
     force: bool,
+    live: bool,
+    live_address: str | None,
     dry_run: bool,
     as_json: bool,
 ) -> None:
@@ -82,6 +86,7 @@ def experiment(
     if experiment is None:
         _list(shipped(), as_json)
         return
+    from graspsense.experiments.answer import answer
     from graspsense.experiments.executors.choose import chosen
     from graspsense.experiments.page import findings_of
     from graspsense.experiments.results import Results
@@ -95,10 +100,12 @@ def experiment(
     if dry_run:
         _plan(planned, results, as_json)
         return
-    account = _run(planned, results, make, resume)
-    summary = summarise(planned, results)
-    page, problem = _written_page(summary, results)
-    more = findings_of(summary)
+    with shown_live(LiveOptions(live, live_address)) as shown:
+        account = _run(planned, results, make, resume, shown)
+        summary = summarise(planned, results)
+        page, problem = _written_page(summary, results)
+        more = findings_of(summary)
+        shown.told("progress", {"text": answer(summary) if more is None else more.answer})
     if as_json:
         _print_json(summary, more, page, _counts(account, problem))
     else:
@@ -109,11 +116,18 @@ def experiment(
         raise click.exceptions.Exit(ExitCode.CHECK_FAILED)
 
 
-def _run(planned: Planned, results: Results, make: Callable[[], Executor], resume: bool) -> Account:
+def _run(
+    planned: Planned, results: Results, make: Callable[[], Executor], resume: bool, shown: Live
+) -> Account:
     """Run the tasks, and show how many are done."""
     from graspsense.experiments.run import run_experiment
 
-    with ProgressLine() as progress:
+    with ProgressLine() as line:
+
+        def progress(what: str, done: int, total: int) -> None:
+            line(what, done, total)
+            shown.told("progress", {"text": f"{what}: {done} of {total}"})
+
         return run_experiment(
             planned,
             results,

@@ -47,35 +47,34 @@ class LiveOptions(NamedTuple):
 
 
 def live_options(command: _Command) -> _Command:
-    """Add `--live`, `--live-address`, `--foxglove` and `--rerun` to a command that grasps."""
-    for option in reversed(_OPTIONS):
-        command = option(command)
-    return command
-
-
-_OPTIONS: Final = (
-    click.option("--live", is_flag=True, help="Show it on a page in the browser while it goes on."),
-    click.option(
+    """Add `--live` and `--live-address` to a command."""
+    command = click.option(
         "--live-address",
         metavar="HOST[:PORT]",
         help="--live on another address than loopback, or on a port that you choose.",
-    ),
-    click.option(
+    )(command)
+    return click.option("--live", is_flag=True, help="Show it on a page in the browser while it goes on.")(
+        command
+    )
+
+
+def viewer_options(command: _Command) -> _Command:
+    """Add `--foxglove` and `--rerun` to a command with `live_options` that grasps."""
+    command = click.option(
+        "--rerun",
+        is_flag=False,
+        flag_value=RERUN_VIEWER,
+        metavar="[FILE.rrd]",
+        help="Log it to a file of Rerun, or to its viewer, which runs.",
+    )(command)
+    return click.option(
         "--foxglove",
         is_flag=False,
         flag_value=0,
         type=click.IntRange(0, 65535),
         metavar="[PORT]",
         help="Serve it to Foxglove while it goes on.",
-    ),
-    click.option(
-        "--rerun",
-        is_flag=False,
-        flag_value=RERUN_VIEWER,
-        metavar="[FILE.rrd]",
-        help="Log it to a file of Rerun, or to its viewer, which runs.",
-    ),
-)
+    )(command)
 
 
 class Live:
@@ -88,14 +87,13 @@ class Live:
         """Show how a grasp ended, and the last grasps of the store in which it was saved."""
         for sink in self.sinks:
             sink.finished(trial)
-        self.stored(save)
-
-    def stored(self, save: str | None) -> None:
-        """Show the last grasps of a store, if there is one."""
         if save is not None and self.sinks:
-            rows = _last_grasps(save)
-            for sink in self.sinks:
-                sink.told("stored", {"rows": rows})
+            self.told("stored", {"rows": _last_grasps(save)})
+
+    def told(self, name: str, values: Any) -> None:
+        """Pass on JSON values."""
+        for sink in self.sinks:
+            sink.told(name, values)
 
     def close(self) -> None:
         """End what shows the grasps, and print what was wrong with it."""
@@ -118,7 +116,8 @@ def shown_live(asked: LiveOptions, save: str | None = None) -> Iterator[Live]:
     shown = Live(feeds)
     try:
         _start(asked, feeds)
-        shown.stored(save)
+        if save is not None:
+            shown.told("stored", {"rows": _last_grasps(save)})
         yield shown
         if sys.stderr.isatty() and (asked.page or asked.foxglove is not None):
             talk("the grasps can still be seen: Ctrl-C ends it")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from graspsense.cli.live import LiveOptions, live_options, shown_live
+from graspsense.cli.live import LiveOptions, live_options, shown_live, viewer_options
 from graspsense.cli.live_rows import LiveRows
 from graspsense.cli.model_table import print_model, print_not_verified, print_selection, print_without
 from graspsense.cli.options import contradiction, names_object, pipeline_options, plot_option, settings_of
@@ -82,6 +82,7 @@ MANY_GUARDED: Final = 0.1
 @click.option("--video", metavar="FILE", help="Film a gripper that can be seen: .mp4, .webp or .gif.")
 @click.option("--viewer", is_flag=True, help="Show a gripper that can be seen, in a window.")
 @live_options
+@viewer_options
 @click.option("--dry-run", is_flag=True, help="Print what would be done, and open nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print the trial as JSON.")
 def run(

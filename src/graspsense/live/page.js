@@ -124,6 +124,10 @@ const take = {
   outcome(message) {
     $("outcome").textContent = `outcome: ${message.outcome}${message.reason ? `: ${message.reason}` : ""}`;
   },
+  progress(message) {
+    $("progress").hidden = false;
+    $("done").textContent = message.text;
+  },
   stored(message) {
     $("stored").hidden = false;
     $("rows").replaceChildren();

@@ -46,7 +46,7 @@ POLICY: Final = (
     "default-src 'none'; script-src 'self'; style-src 'unsafe-inline'; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-STICKY: Final = ("grasp", "stored", "prediction", "outcome")
+STICKY: Final = ("grasp", "stored", "progress", "prediction", "outcome")
 """Messages of which a viewer who comes later needs the newest."""
 _SHOWN: Final = (
     "t_s",
