@@ -186,14 +186,14 @@ def test_predictions_fit_the_terminal_and_count_their_training_trials(csv, tmp_p
 
 @pytest.mark.slow
 @pytest.mark.parametrize("width", WIDTHS)
-def test_the_list_of_experiments_says_how_large_each_is(width):
+def test_the_list_of_experiments_says_how_long_each_takes(width):
     shown = in_terminal(["experiment"], width)
 
     assert_fits(shown, width)
     rows = printed("experiment").partition("\n\n")[0].splitlines()[1:]
     assert len(rows) > 30
     for row in rows:
-        assert re.match(r"\w+ +\d+ +\d+ +\w", row), row
+        assert re.match(r"\w+ +\d[\d.]* (s|min|h)  ", row), row
 
 
 @pytest.mark.slow
@@ -206,6 +206,7 @@ def test_a_dry_run_of_an_experiment_is_a_summary(tmp_path, width):
     said = " ".join(shown.text.split())
     assert "30000: 3 cases with 10000 seeds" in said
     assert "2880000 simulated grasps" in said
+    assert re.search(r"time about [\d.]+ h with \d+ processes", said)
     assert not (tmp_path / "e").exists()
     assert_fits(shown, width, unbroken=tmp_path)
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from attrs import asdict
 
 from graspsense.cli.live import Live, LiveOptions, live_options, shown_live
 from graspsense.cli.options import force_option, keys_option
@@ -22,6 +22,7 @@ from graspsense.recording.atomic_file import SaveFailed
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
+    from graspsense.experiments.duration import Effort
     from graspsense.experiments.executors.base import Executor
     from graspsense.experiments.experiment import Planned
     from graspsense.experiments.findings import Findings
@@ -98,7 +99,7 @@ def experiment(
     make = chosen(executor, workers)
     refuse_store(results.folder)
     if dry_run:
-        _plan(planned, results, as_json)
+        _plan(planned, results, workers or os.cpu_count() or 1, as_json)
         return
     with shown_live(LiveOptions(live, live_address)) as shown:
         account = _run(planned, results, make, resume, shown)
@@ -160,43 +161,54 @@ def _counts(account: Account, problem: str) -> dict[str, object]:
 
 
 def _list(known: Iterable[str], as_json: bool) -> None:
-    from graspsense.experiments.effort import effort_of
+    from graspsense.experiments.duration import ESTIMATED_FROM, effort_of
     from graspsense.experiments.experiment_file import read_experiment
 
+    cores = os.cpu_count() or 1
     planned = {name: read_experiment(name) for name in known}
     efforts = {name: effort_of(experiment) for name, experiment in planned.items()}
     if as_json:
         echo_json(
             [
-                {"name": name, "title": experiment.experiment.title, **asdict(efforts[name])}
+                {"name": name, "title": experiment.experiment.title, **_effort_as_json(efforts[name])}
                 for name, experiment in planned.items()
             ]
         )
         return
     rows = [
-        (name, str(efforts[name].tasks), str(efforts[name].trials or ""), experiment.experiment.title)
+        (name, efforts[name].time_on(cores), str(efforts[name].tasks), experiment.experiment.title)
         for name, experiment in planned.items()
     ]
-    echo_table(("EXPERIMENT", "TASKS", "TRIALS", "WHAT"), rows)
+    echo_table(("EXPERIMENT", "TIME", "TASKS", "WHAT"), rows)
+    echo(f"\nTIME is for {cores} cores, {ESTIMATED_FROM}.")
     echo(
-        "\nMost take seconds to minutes. The first one after an installation compiles the simulator as well, about a "
-        "minute in each process."
+        "The first experiment after an installation compiles the simulator as well, about a minute in each process."
     )
     echo(
         "`graspsense experiment NAME --dry-run` says what an experiment consists of; -o seeds=2 makes it shorter."
     )
 
 
-def _plan(planned: Planned, results: Results, as_json: bool) -> None:
-    """Print what the experiment consists of, and what is done already."""
-    from graspsense.experiments.effort import effort_of
+def _effort_as_json(effort: Effort) -> dict[str, object]:
+    return {
+        "cases": effort.cases,
+        "seeds": effort.seeds,
+        "tasks": effort.tasks,
+        "trials": effort.trials,
+        "trainings": effort.trainings,
+        "cpu_seconds": effort.seconds,
+    }
+
+
+def _plan(planned: Planned, results: Results, workers: int, as_json: bool) -> None:
+    """Print what the experiment consists of, what is done already, and how long it takes."""
+    from graspsense.experiments.duration import ESTIMATED_FROM, effort_of
 
     effort = effort_of(planned)
     if as_json:
-        echo_json({"dry_run": True, "experiment": planned.name, **asdict(effort)})
+        echo_json({"dry_run": True, "experiment": planned.name, **_effort_as_json(effort)})
         return
-    simulated = any(case.data.source == "simulated" for case in planned.cases)
-    kind = "simulated grasps" if simulated else "trials"
+    kind = "simulated grasps" if effort.simulated else "trials"
     trials = "not known before the data set is read" if effort.trials is None else f"{effort.trials} {kind}"
     echo(planned.experiment.question or planned.experiment.title, Style.HEADING)
     echo_entry(
@@ -206,9 +218,11 @@ def _plan(planned: Planned, results: Results, as_json: bool) -> None:
     if names:
         more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
         echo_entry("cases", "; ".join(names[:_MOST_NAMED]) + more)
-    echo_entry("grasps" if simulated else "trials", trials)
+    echo_entry("grasps" if effort.simulated else "trials", trials)
     if effort.trainings:
         echo_entry("trainings", f"{effort.trainings} models for the rates; controls add to them")
+    estimate = f"about {effort.time_on(workers)} with {workers} processes, {ESTIMATED_FROM}"
+    echo_entry("time", "no estimate for this kind of data" if effort.seconds is None else estimate)
     echo_entry(
         "results", f"in {results.folder}" + (", where there are some already" if results.any() else "")
     )

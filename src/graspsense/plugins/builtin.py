@@ -159,14 +159,15 @@ def graspsense_experiment_kinds() -> Iterable[ExperimentKindEntry]:
         name="recognise",
         run="graspsense.experiments.recognise:recognise",
         keys="graspsense.experiments.recognise:EvaluationSettings",
+        seconds_per_trial=0.00986,
         summary="trains and tests classifiers on the trials",
     )
     trades = "graspsense.experiments.trade"
-    for name, module, keys, summary in (
-        ("trade", "costs", "TradeSettings", "recognition against what a setting costs"),
-        ("early", "early", "EarlySettings", "recognition against the time since contact"),
-        ("squeezes", "squeezes", "RepeatSettings", "recognition against the number of squeezes"),
-        ("physics", "physics", "ModelErrorSettings", "recognition when test trials lack a term"),
+    for name, module, keys, seconds, summary in (
+        ("trade", "costs", "TradeSettings", 0.00394, "recognition against what a setting costs"),
+        ("early", "early", "EarlySettings", 0.0363, "recognition against the time since contact"),
+        ("squeezes", "squeezes", "RepeatSettings", 0.0025, "recognition against the number of squeezes"),
+        ("physics", "physics", "ModelErrorSettings", 0.00578, "recognition when test trials lack a term"),
     ):
         yield ExperimentKindEntry(
             name=name,
@@ -174,6 +175,7 @@ def graspsense_experiment_kinds() -> Iterable[ExperimentKindEntry]:
             keys=f"{trades}.{module}:{keys}",
             findings=f"{trades}.findings:findings",
             simulates=name != "trade",
+            seconds_per_trial=seconds,
             summary=summary,
         )
     yield ExperimentKindEntry(
@@ -185,21 +187,22 @@ def graspsense_experiment_kinds() -> Iterable[ExperimentKindEntry]:
 
 @hookimpl
 def graspsense_experiments() -> Iterable[ExperimentEntry]:
-    """Return the experiments of this package."""
-    for name in (
-        "probing_force",
-        "trade_accuracy",
-        "trade_cells",
-        "trade_force",
-        "trade_frame_rate",
-        "trade_joint",
-        "trade_noise",
-        "trade_physics",
-        "trade_recognition",
-        "trade_sensing",
-        "trade_speed",
-        "trade_squeezes",
-        "trade_time",
-        "which_gripper",
+    """Return the experiments of this package; `benchmarks/experiment_times.py` measures the times."""
+    for name, seconds in (
+        ("probing_force", 0.00986),
+        ("trade_accuracy", 0.00626),
+        ("trade_cells", 0.0033),
+        ("trade_force", 0.009),
+        ("trade_frame_rate", 0.00337),
+        ("trade_joint", None),
+        ("trade_noise", 0.000927),
+        ("trade_physics", 0.00529),
+        ("trade_recognition", None),
+        ("trade_sensing", None),
+        ("trade_speed", 0.0045),
+        ("trade_squeezes", 0.0025),
+        ("trade_time", 0.0363),
+        ("which_gripper", 0.326),
     ):
-        yield ExperimentEntry(name, f"graspsense:experiments/shipped/{name}.toml")
+        resource = f"graspsense:experiments/shipped/{name}.toml"
+        yield ExperimentEntry(name, resource, seconds_per_trial=seconds)

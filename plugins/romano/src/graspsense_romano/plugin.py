@@ -55,6 +55,7 @@ def graspsense_experiment_kinds() -> Iterable[ExperimentKindEntry]:
         keys="graspsense_romano.touch:TouchSettings",
         result="graspsense_romano.touch:TouchRow",
         findings="graspsense_romano.findings:findings",
+        seconds_per_trial=5.0,
         summary="grasps a thing of a MuJoCo scene, lifts it, tugs at it or fills it, puts it down",
     )
 
@@ -64,4 +65,4 @@ def graspsense_experiments() -> Iterable[ExperimentEntry]:
     """Return the experiments on grab, slip, placing, bumps, range, and what is in a thing."""
     names = "romano_grab", "romano_slip", "romano_place", "romano_side", "romano_range", "contents_shake"
     for name in names:
-        yield ExperimentEntry(name, f"graspsense_romano:experiments/{name}.toml")
+        yield ExperimentEntry(name, f"graspsense_romano:experiments/{name}.toml", seconds_per_trial=5.0)

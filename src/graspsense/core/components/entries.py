@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from typing import Any, Final, Literal, NamedTuple
 
 from attrs import Attribute, field, frozen
-from attrs.validators import and_, deep_iterable, instance_of, matches_re, optional
+from attrs.validators import and_, deep_iterable, ge, instance_of, matches_re, optional
 
 from graspsense.core.values.channel import IS_NAME, Channel
 from graspsense.core.values.errors import suggestion
@@ -316,6 +316,8 @@ class ExperimentKindEntry:
     """The import string of a function from a `Summary` to `Findings`; empty if the rates are the whole report."""
     simulates: bool = False
     """Whether tasks simulate all trials: recorded ones are refused."""
+    seconds_per_trial: float | None = field(default=None, validator=optional(ge(0.0)))
+    """Processor time per trial, from which the duration of a user's experiment is estimated; None if not known."""
     needs: str = ""
     """What to install or do if these cannot be imported."""
 
@@ -327,6 +329,9 @@ class ExperimentKindEntry:
 @frozen
 class ExperimentEntry(_FileEntry):
     """An experiment file shipped inside a package, which `graspsense experiment` names."""
+
+    seconds_per_trial: float | None = field(default=None, validator=optional(ge(0.0)))
+    """Processor time per trial, from which the duration is estimated; None for that of its kind."""
 
 
 @frozen
