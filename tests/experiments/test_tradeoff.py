@@ -4,9 +4,12 @@ import json
 import math
 
 import pytest
+from attrs import evolve
 
 from graspsense.cli.main import main
+from graspsense.evaluation.intervals import Difference
 from graspsense.experiments.simulation import PEAK, TRACE, SimulationTrade, VariantPoint, simulation_rows
+from graspsense.experiments.simulation_recognition import conclusion
 
 QUANTITIES = ("p_first", "delta_t", PEAK, TRACE)
 
@@ -68,7 +71,7 @@ def test_a_gripper_with_nothing_to_trade_is_refused(capsys, tmp_path):
 
 @pytest.mark.slow
 def test_the_simulator_gets_better_with_finer_steps(capsys):
-    arguments = ["--scene", "can:empty_open", "--seeds", "1", "--json"]
+    arguments = ["--scene", "can:empty_open", "--seeds", "1", "--instances", "2", "--json"]
     assert ended(["tradeoff", "simulation", *arguments]) == 0
     answer = json.loads(capsys.readouterr().out)
     points = answer["points"]
@@ -82,3 +85,35 @@ def test_the_simulator_gets_better_with_finer_steps(capsys):
     assert 0.01 > errors[0] > 2.0 * errors[1] > 2.0 * errors[2] > 0.0
     # Near what the reference itself is exact to.
     assert errors[3] < 0.2 * errors[0]
+    recognised = [p for p in points if p["recognised"] is not None]
+    steps = ["until all stands still", "0.5", "0.1", "0.01", "0.001", "0.0001"]
+    assert [p["step"] for p in recognised] == steps
+    assert {p["recognised"]["n"] for p in recognised} == {30}
+    assert all(p["behind"] for p in recognised[1:])
+
+
+def with_rates(interval, slowest_s=1.2e-3):
+    behind = Difference(0.05, interval)
+    points = (
+        point("halved", "to the end", 2.0, 0.0, role="reference"),
+        evolve(point("errors", "0.5", 1e-3, 0.0), behind=behind),
+        evolve(point("errors", "0.001", slowest_s, 0.0), behind=behind),
+    )
+    return conclusion(evolve(TRADE, points=points))
+
+
+def test_the_conclusion_says_whether_a_lower_accuracy_saves_time_or_costs_recognition():
+    nothing = with_rates((-0.01, 0.11))
+    assert "1 to 1.2 ms" in nothing
+    assert "hardly a trade-off" in nothing
+    assert "hardly" not in with_rates((-0.01, 0.11), slowest_s=1e-2)
+    assert "shown at 0.5, 0.001" in with_rates((0.01, 0.09))
+    assert "shown at 0.5, 0.001" in with_rates((-0.09, -0.01))
+
+
+@pytest.mark.slow
+def test_without_a_classifier_errors_and_times_are_measured(capsys):
+    arguments = ["--scene", "block", "--seeds", "1", "-o", "classifier.type=none", "--json"]
+    assert ended(["tradeoff", "simulation", *arguments]) == 0
+    points = json.loads(capsys.readouterr().out)["points"]
+    assert all(p["errors"] and p["recognised"] is None for p in points)

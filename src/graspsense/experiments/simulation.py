@@ -14,6 +14,7 @@ from attrs import asdict, evolve, frozen
 
 from graspsense.core.components.roles import BatchBackend, Grasped, SimulationVariant
 from graspsense.core.values.errors import ConfigError
+from graspsense.evaluation.intervals import Difference, RecognitionRate, percent
 from graspsense.experiments.versions import measured_on
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from graspsense.core.values.trace import Trace
 
 HEADER: Final = ("METHOD", "FIDELITY", "STEP OR ACCURACY", "MS A GRASP", "SET-UP, S")
+RECOGNITION: Final = ("RECOGNISED", "REFERENCE LESS THIS")
 PEAK: Final = "peak force"
 TRACE: Final = "force trace, rms"
 SCENES: Final = (
@@ -50,7 +52,8 @@ class VariantPoint:
     `seconds` is the processor time for one grasp, without set-up and compilation. `errors` are the largest errors over
     all grasps, by quantity, and infinite if a feature is missing that the reference has. `setup_s` is the additional
     time of the first grasps, for compiling or for loading compiled code. `failure` is the reason why there are no
-    errors, or why grasps ended otherwise than in the reference.
+    errors, or why grasps ended otherwise than in the reference. `recognised` is the rate with the sensors of the
+    gripper (`simulation_recognition`), `behind` that of the reference less it; None where they are not measured.
     """
 
     method: str
@@ -61,6 +64,8 @@ class VariantPoint:
     setup_s: float
     errors: Mapping[str, float]
     failure: str = ""
+    recognised: RecognitionRate | None = None
+    behind: Difference | None = None
 
     @classmethod
     def measured(cls, variant: SimulationVariant, **figures: Any) -> VariantPoint:
@@ -92,7 +97,7 @@ class SimulationTrade:
 
 def simulation_rows(trade: SimulationTrade) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return the header and the rows of the table: time, set-up and the largest error of each quantity."""
-    header = (*HEADER, *(name.upper() for name in trade.quantities), "")
+    header = (*HEADER, *(name.upper() for name in trade.quantities), *RECOGNITION, "")
     rows = []
     for point in trade.points:
         errors = [_short(point.errors.get(name, math.nan)) for name in trade.quantities]
@@ -100,7 +105,11 @@ def simulation_rows(trade: SimulationTrade) -> tuple[tuple[str, ...], list[tuple
         seconds, setup = (
             f"{v:.3g}" if math.isfinite(v) else "-" for v in (1e3 * point.seconds, point.setup_s)
         )
-        rows.append((point.method, point.fidelity, point.step, seconds, setup, *errors, note))
+        recognised = (
+            percent(point.recognised.rate) if point.recognised else "-",
+            point.behind.points if point.behind else "-",
+        )
+        rows.append((point.method, point.fidelity, point.step, seconds, setup, *errors, *recognised, note))
     return header, rows
 
 

@@ -247,7 +247,8 @@ class SimulationVariant:
     """Settings of a simulated gripper with a certain trade-off between accuracy and time.
 
     `settings` are keys of the gripper's own table. Variants of one `method` and `fidelity` form a curve, on which
-    `step` names the point. The `role` is `reference` for the variant that errors are measured against.
+    `step` names the point. The `role` is `reference` for the variant that errors are measured against. Recognition is
+    measured for the reference and for the variants that are `for_recognition`.
     """
 
     method: str
@@ -255,6 +256,7 @@ class SimulationVariant:
     step: str
     settings: Mapping[str, Any]
     role: Literal["curve", "reference"] = "curve"
+    for_recognition: bool = False
 
 
 class BatchOptions(TypedDict, total=False):

@@ -26,6 +26,7 @@ _FORMS: Final = (
             fidelity="scene",
             step=f"{accuracy:g}",
             settings={"fidelity": "scene", "accuracy": accuracy},
+            for_recognition=True,
         )
         for accuracy in ACCURACIES
     ),
