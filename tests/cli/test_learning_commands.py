@@ -25,10 +25,14 @@ def csv(tmp_path):
 
 
 @pytest.mark.slow
-def test_an_honest_rate_of_ones_own_csv_in_one_command(csv):
-    code, out, _ = graspsense("evaluate", csv, "--label", "what", "--instance", "thing")
+def test_an_honest_rate_and_a_picture_of_ones_own_csv_in_one_command(csv, tmp_path):
+    pytest.importorskip("matplotlib", reason="needs matplotlib, the extra `plot`")
+    picture = tmp_path / "confusion.png"
+    code, out, err = graspsense("evaluate", csv, "--label", "what", "--instance", "thing", "--png", picture)
 
     assert code == 0
+    assert f"drawn in {picture}" in err
+    assert picture.read_bytes().startswith(b"\x89PNG")
     assert "\nrate        9" in out
     assert out.startswith("c45 recognises the object and its state in 9")
     for line in [

@@ -103,6 +103,14 @@ def test_a_picture_that_is_no_file_is_refused_before_the_grasp(tmp_path, monkeyp
     assert "approach" not in done.stderr
 
 
+def test_a_matrix_is_drawn_into_pictures_only(table):
+    original = table.read_text()
+    done = graspsense("evaluate", table, *EVALUATE, "--png", table)
+    assert done.returncode == 2
+    assert ".png" in done.stderr
+    assert table.read_text() == original
+
+
 @pytest.fixture
 def experiment(table, tmp_path):
     """Return the folder of an experiment, one of whose results is damaged and one of which is on a disk that fails."""

@@ -188,11 +188,17 @@ def test_pictures_show_a_dollar_as_it_is(tmp_path):
     pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
     from matplotlib.figure import Figure
 
+    from graspsense.evaluation.results import Confusion
+    from graspsense.report.confusion import confusion_png
     from graspsense.report.grasp_picture import grasp_png
     from graspsense.report.write import show_literally
 
+    labels = tuple(MATHEMATICS)
+    counts = tuple(tuple(3 * (i == k) for k in range(len(labels))) for i in range(len(labels)))
+    confusion_png(Confusion(labels, counts), "$\\frac$", tmp_path / "matrix.png")
     grasp_png(shown_as(" ".join(MATHEMATICS)), tmp_path / "grasp.png")
-    assert (tmp_path / "grasp.png").stat().st_size > 1000
+    for name in ("matrix.png", "grasp.png"):
+        assert (tmp_path / name).stat().st_size > 1000
 
     figure = Figure()
     axes = figure.add_subplot()

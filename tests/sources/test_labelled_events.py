@@ -317,7 +317,7 @@ def test_an_acceleration_of_one_axis_is_told_and_its_threshold_can_be_set(tmp_pa
 @every_case(
     ("arguments", "code", "says"),
     [
-        (("--events", "--checkpoints", "0.1"), 2, "--checkpoints"),
+        (("--events", "--png", "x.png"), 2, "--png"),
         (("--events", "--tolerance", "0"), 2, "tolerance"),
         (("--events", "--tolerance", "nan"), 2, "nan is no time"),
         (("--events", "--instance", "box"), 2, "--instance"),

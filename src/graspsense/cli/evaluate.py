@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from graspsense.cli.events import evaluate_events
 from graspsense.cli.options import Seconds, target_option
-from graspsense.cli.output import check_outputs, echo_json, page_to_write
+from graspsense.cli.output import check_outputs, echo_json, file_to_write_as, page_to_write
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import (
     SOURCES,
@@ -29,12 +30,11 @@ from graspsense.core.components.strict import plain
 from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.intervals import percent, percentages
 from graspsense.evaluation.json_codec import to_json
-from graspsense.report.confusion import confusion_text
+from graspsense.report.confusion import confusion_png, confusion_text
 from graspsense.report.write import write_html
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
     from graspsense.core.learn.checkpoints import CheckpointTrials
     from graspsense.core.learn.labelled import Labelled
@@ -54,6 +54,9 @@ if TYPE_CHECKING:
 @source_argument
 @target_option("What is recognised: whole labels, classes, or the states within each class.")
 @folds_option
+@click.option(
+    "--png", metavar="FILE.png", callback=file_to_write_as(".png"), help="Draw the confusion matrix."
+)
 @click.option("--report", metavar="DIR", help="Write the page DIR/report.html as well.")
 @keep_option
 @click.option("--overwrite", is_flag=True, help="Replace the file of --keep if it exists.")
@@ -78,6 +81,7 @@ def evaluate(
     source: str,
     target: str,
     folds: int,
+    png: str | None,
     report: str | None,
     keep: str | None,
     overwrite: bool,
@@ -107,6 +111,8 @@ def evaluate(
         labelled, parts = _parts(labelled, times, target)
         keep_features(keep, labelled)
         evaluation, early = _measured(learner, labelled, parts, target, folds, given["seed"], progress)
+    if png:
+        _draw(evaluation, Path(png))
     if page is not None:
         _write_page(page, evaluation, learner, labelled)
     if as_json:
@@ -142,10 +148,16 @@ def _measured(
     return evaluation, early_recognition(learner, parts, folds=folds, seed=seed) if parts else None
 
 
+def _draw(evaluation: Evaluation, path: Path) -> None:
+    title = f"{evaluation.source}\n{evaluation.protocol}: {evaluation.headline.words}"
+    confusion_png(evaluation.confusion, title, path)
+    talk(f"drawn in {path}")
+
+
 def _write_page(path: Path, evaluation: Evaluation, learner: SelectedComponent, labelled: Labelled) -> None:
     from graspsense.report.evaluation_page import evaluation_page
 
-    command = command_line(("report", "as_json", "keep", "overwrite"))
+    command = command_line(("report", "as_json", "png", "keep", "overwrite"))
     write_html(path, evaluation_page(evaluation, learner, labelled, command))
     talk(f"page in {path}")
 

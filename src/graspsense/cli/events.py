@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from graspsense.recording.replayable import Recording
 
 _FOR_LABELS: Final = (
-    *("report", "keep", "checkpoints", "classifier", "target", "target_value"),
+    *("png", "report", "keep", "checkpoints", "classifier", "target", "target_value"),
     *("label", "instance", "order", "features", "before", "unreliable"),
     *("objects", "instances", "trials", "states_per_instance", "pipeline", "gripper"),
 )

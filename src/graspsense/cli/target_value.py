@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from graspsense.core.learn.labelled import Labelled
     from graspsense.regression.model import PredictedValue, RegressionModel
 
-_FOR_LABELS: Final = ("target", "checkpoints")
+_FOR_LABELS: Final = ("png", "target", "checkpoints")
 
 
 def refuse_options_for_labels(options: Sequence[str]) -> None:

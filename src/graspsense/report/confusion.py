@@ -1,12 +1,14 @@
-"""The confusion matrix: for the terminal, and as a table of a page."""
+"""The confusion matrix: for the terminal, as a picture, and as a table of a page."""
 
 from __future__ import annotations
 
 import math
 from html import escape
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from graspsense.report.html import wide
+from graspsense.report.write import new_figure, write_picture
 
 if TYPE_CHECKING:
     from graspsense.evaluation.results import Confusion
@@ -22,6 +24,29 @@ def confusion_text(confusion: Confusion) -> list[str]:
         cells = " ".join((str(n) if n else ".").rjust(width) for n in row)
         lines.append(f"{cells}   {letter} = {label}")
     return lines
+
+
+def confusion_png(confusion: Confusion, title: str, path: Path) -> None:
+    """Draw the matrix. Raises PluginUnavailable without matplotlib, ConfigError for a path that cannot be written."""
+    n = len(confusion.labels)
+    side = 2.6 + 0.42 * n
+    figure = new_figure(side, side)
+    axes: Any = figure.add_subplot()
+    totals = [max(sum(row), 1) for row in confusion.counts]
+    shares = [[count / total for count in row] for row, total in zip(confusion.counts, totals, strict=True)]
+    axes.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.0)
+    for i, row in enumerate(confusion.counts):
+        for j, count in enumerate(row):
+            if count:
+                colour = "white" if shares[i][j] > 0.5 else "black"
+                axes.text(j, i, str(count), ha="center", va="center", color=colour, fontsize=8)
+    axes.set_xticks(range(n), confusion.labels, rotation=90, fontsize=8)
+    axes.set_yticks(range(n), confusion.labels, fontsize=8)
+    axes.set_xlabel("answered")
+    axes.set_ylabel("true")
+    axes.set_title(title, fontsize=9)
+    # The title may be wider than a small matrix: "tight" extends the picture to include it.
+    write_picture(path, figure, bbox_inches="tight")
 
 
 def _letter(k: int) -> str:
