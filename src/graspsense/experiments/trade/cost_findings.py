@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import tomllib
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
 from typing import Any
 
 from attrs import frozen
@@ -63,6 +65,24 @@ def cost_report(part: str, title: str, conditions: Sequence[ConditionResult], co
     return Report(
         text=text, table=table, picture=rates_over(series, cost.axis, caption), advice=tuple(advice)
     )
+
+
+def damage_table() -> tuple[FoundTable, list[str]]:
+    """Return the forces that damage each container, and the reason for each."""
+    text = files("graspsense.experiments.trade").joinpath("damage.toml").read_text(encoding="utf-8")
+    known: Mapping[str, Mapping[str, Any]] = tomllib.loads(text)
+    table = FoundTable(
+        id="damage",
+        title="Force from which a container is damaged",
+        header=("container", "force on a pad, N", "probing force, N"),
+        rows=tuple(
+            (name, f"{row['force_n']:g}", f"{1.5 * row['force_n'] + 7:.0f}") for name, row in known.items()
+        ),
+        note="These are assumptions, not measurements. A probing force is an effort: the friction of the default "
+        "gripper takes 7 N of it, plus half of the force on the pads.",
+        numbers=1,
+    )
+    return table, [f"Damage, {name}: {row['reason']}" for name, row in known.items()]
 
 
 def _row(point: TradePoint) -> RateRow:

@@ -8,7 +8,7 @@ from typing import Any, Final
 from graspsense.evaluation.intervals import percent
 from graspsense.experiments.findings import CONTROLS, Findings, control_cells
 from graspsense.experiments.summary import Summary
-from graspsense.experiments.trade.cost_findings import Report, cost_report
+from graspsense.experiments.trade.cost_findings import Report, cost_report, damage_table
 from graspsense.experiments.trade.trade_point import Advice
 from graspsense.report.found_table import FoundTable
 from graspsense.report.wording import TARGETS
@@ -42,6 +42,11 @@ def findings(summary: Summary) -> Findings:
     controls = _controls_table(summary, titles)
     if controls is not None:
         tables.append(controls)
+    notes = [ONE_PROTOCOL]
+    if "trade_force" in reports:
+        table, reasons = damage_table()
+        tables.append(table)
+        notes += reasons
     advice = [piece for report in reports.values() for piece in report.advice]
     if len(reports) > 1:
         tables.insert(0, _advice_table(advice))
@@ -50,7 +55,7 @@ def findings(summary: Summary) -> Findings:
         answer=_answer(reports),
         headline=_headline(advice) if len(reports) == 1 else "",
         tables=tuple(tables),
-        notes=(ONE_PROTOCOL,),
+        notes=tuple(notes),
         drawn={part: report.picture for part, report in reports.items()},
         values=values,
     )
