@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from graspsense_c45.arff import ArffError, parse_arff, read_arff
     from graspsense_c45.classifier import C45Classifier
     from graspsense_c45.dot import to_dot
+    from graspsense_c45.drawing import draw
     from graspsense_c45.fitting import fit
+    from graspsense_c45.importances import feature_importances
     from graspsense_c45.options import J48, PAPER, Options
     from graspsense_c45.path import Path, explain
     from graspsense_c45.prediction import class_indices, distributions
@@ -31,7 +33,9 @@ _HOMES = {
     "arff": ("ArffError", "parse_arff", "read_arff"),
     "classifier": ("C45Classifier",),
     "dot": ("to_dot",),
+    "drawing": ("draw",),
     "fitting": ("fit",),
+    "importances": ("feature_importances",),
     "options": ("J48", "PAPER", "Options"),
     "path": ("Path", "explain"),
     "prediction": ("class_indices", "distributions"),
@@ -62,7 +66,9 @@ __all__ = [
     "Tree",
     "class_indices",
     "distributions",
+    "draw",
     "explain",
+    "feature_importances",
     "fit",
     "from_document",
     "from_json",

@@ -17,7 +17,9 @@ from sklearn.utils.validation import _check_sample_weight, check_is_fitted, colu
 
 from graspsense_c45.arrays import AnyArray, Indices, Reals
 from graspsense_c45.dot import to_dot
+from graspsense_c45.drawing import draw
 from graspsense_c45.fitting import fit
+from graspsense_c45.importances import feature_importances
 from graspsense_c45.options import PAPER, Options
 from graspsense_c45.path import Path, explain
 from graspsense_c45.prediction import class_indices, distributions
@@ -155,6 +157,12 @@ class C45Classifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         check_is_fitted(self)
         return [explain(self.tree_, row) for row in self._encode(X, fitting=False)]
 
+    @property
+    def feature_importances_(self) -> Reals:
+        """The fraction of each column in the information gain; see `importances.feature_importances`."""
+        check_is_fitted(self)
+        return feature_importances(self.tree_)
+
     def to_dict(self) -> dict[str, Any]:
         """Return the tree as nested dictionaries; see `tree.Tree.to_dict`."""
         check_is_fitted(self)
@@ -179,6 +187,11 @@ class C45Classifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         """Return the tree in the DOT language."""
         check_is_fitted(self)
         return to_dot(self.tree_)
+
+    def draw(self, axes: Any = None) -> Any:
+        """Draw the tree with matplotlib; return the axes."""
+        check_is_fitted(self)
+        return draw(self.tree_, axes)
 
     def __sklearn_tags__(self) -> Any:
         """Return the tags: NaN is allowed, and means missing."""
