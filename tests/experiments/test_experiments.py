@@ -582,7 +582,7 @@ def test_experiments_are_compared_on_one_page(compared, tmp_path):
         assert row["interval"][0] <= row["difference"] <= row["interval"][1]
     text = page.read_text()
     for part in (
-        answer["headline"],
+        answer["answer"],
         "probing_force_n",
         "Settings that differ",
         "unpaired: the trials differ",

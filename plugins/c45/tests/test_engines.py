@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from graspsense_c45 import Attribute, Options, Schema, class_indices, engines, fit, fitting, make_table
+from graspsense_c45 import Attribute, Options, Schema, engines, fit, fitting, make_table
 from graspsense_c45.engines import Fits, choose_fast
 
 pytest.importorskip("numba", reason="the extra 'fast' (numba) is not installed: nothing is compiled")
@@ -54,14 +54,11 @@ def grasps(seed, n, decimals, weights):
 @pytest.mark.slow
 @pytest.mark.parametrize("weights", ["one", "whole", "any"])
 @pytest.mark.parametrize("decimals", [None, 0, 2])
-def test_same_tree_and_predictions(weights, decimals):
+def test_same_tree(weights, decimals):
     sizes = []
     for seed, options in enumerate(OPTIONS):
         table = grasps(seed, [40, 300, 1_500][seed % 3], decimals, weights)
-        tree = same_tree(table, options)
-        predicted = [class_indices(tree, table.values, engine).tolist() for engine in ("plain", "fast")]
-        assert predicted[0] == predicted[1]
-        sizes.append(tree.node_count)
+        sizes.append(same_tree(table, options).node_count)
     assert max(sizes) > 50
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from graspsense.cli.output import echo_json, file_to_write_as
+from graspsense.cli.output import echo_found, echo_json, file_to_write_as
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import (
     DEFAULT_CLASSIFIER,
@@ -20,10 +20,9 @@ from graspsense.cli.sources import (
     source_options,
     trials_of,
 )
-from graspsense.cli.terminal import Style, echo, echo_entries, echo_entry, echo_table
+from graspsense.cli.terminal import Style, echo, echo_entries, echo_entry
 from graspsense.core.components.registry import installed
 from graspsense.core.values.errors import UnknownName
-from graspsense.evaluation.intervals import percent
 from graspsense.evaluation.json_codec import to_json
 from graspsense.report.write import write_html
 
@@ -32,7 +31,7 @@ if TYPE_CHECKING:
 
     from graspsense.core.components.entries import Role
     from graspsense.core.learn.labelled import Labelled
-    from graspsense.evaluation.ranking import Candidate, Ranking
+    from graspsense.evaluation.ranking import Ranking
 
 DEFAULT_FEATURES: Final = ("chitta", "columns")
 """The features that are used where none are named: of recordings, and of a table."""
@@ -115,26 +114,12 @@ def compared_trials(
 
 
 def _print(ranking: Ranking) -> None:
+    from graspsense.report.ranking_page import ranking_table
+
     echo(ranking.verdict, Style.HEADING)
     echo_entry("trials", f"{ranking.trials} of {ranking.source}; compared by {ranking.protocol}")
     echo()
-    protocols = list(dict.fromkeys(name for candidate in ranking.candidates for name in candidate.rates))
-    rows = [
-        (
-            candidate.classifier,
-            candidate.features,
-            *(percent(candidate.rates[name].rate) if name in candidate.rates else "" for name in protocols),
-            "" if candidate.loss is None else candidate.loss.points,
-            candidate.standing,
-            _coverage(candidate),
-            f"{candidate.training_s:.2g} s",
-        )
-        for candidate in ranking.candidates
-    ]
-    headings = [name.replace("_", " ").upper() for name in protocols]
-    echo_table(
-        ("CLASSIFIER", "FEATURES", *headings, "LOSS, IN POINTS", "STANDING", "SETS COVER", "TRAINING"), rows
-    )
+    echo_found(ranking_table(ranking))
     echo_entries("note", ranking.notes)
     default = next(
         (
@@ -149,12 +134,6 @@ def _print(ranking: Ranking) -> None:
             "advice",
             f"the default, {default.name}, is worse on these trials: train --choose finds what suits them",
         )
-
-
-def _coverage(candidate: Candidate) -> str:
-    """Return how many of the prediction sets contain the true label; empty if that was not measured."""
-    sets = candidate.sets
-    return "" if sets is None or sets.covered is None else percent(sets.covered.rate)
 
 
 def _names(text: str, option: str, role: Role) -> tuple[str, ...]:

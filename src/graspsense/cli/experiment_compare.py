@@ -38,7 +38,7 @@ def compare(folders: tuple[str, ...], out: str, as_json: bool) -> None:
     if as_json:
         echo_json({**comparison.as_json(), "page": out})
         return
-    echo(comparison.headline, Style.RESULT)
+    echo(comparison.answer, Style.RESULT)
     echo()
     for line in doubts(comparison):
         echo(f"WARNING     {line}", Style.CAUTION, indent=12)

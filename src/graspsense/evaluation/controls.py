@@ -17,7 +17,7 @@ from graspsense.evaluation.intervals import RecognitionRate, percent, rate_among
 from graspsense.evaluation.results import Measurement
 
 PERMUTATIONS: Final = 19
-"""Number of permutations of the labels, or numbers: the smallest with which p can be 0.05."""
+"""Number of permutations of the labels: the smallest with which p can be 0.05."""
 
 
 class ControlMeasurements:

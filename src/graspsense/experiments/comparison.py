@@ -17,7 +17,6 @@ from graspsense.experiments.cases import shown
 from graspsense.experiments.experiment import PIPELINE_TABLES, ExperimentCase
 from graspsense.experiments.results import EXPERIMENT, RESULTS, Results
 from graspsense.experiments.summary import ConditionResult, Summary, summarise
-from graspsense.report.verdict import in_hundred
 from graspsense.report.wording import TARGETS
 
 ABSENT: Final = "not set"
@@ -72,25 +71,6 @@ class ExperimentComparison:
     differences: tuple[ConditionDifference, ...]
 
     @property
-    def headline(self) -> str:
-        """The result as a person would say it, from the first difference."""
-        if not self.differences:
-            return f"{self.names} have no case in common"
-        difference = self.differences[0]
-        reference, recognises = self.experiments[0].name, TARGETS[difference.base.recognised]
-        mine, theirs = in_hundred(difference.base.rate.mean), in_hundred(difference.other.rate.mean)
-        if difference.verdict == "not shown to differ":
-            return (
-                f"{difference.other_name} is not shown to recognise {recognises} better or worse than {reference}: "
-                f"{theirs} grasps against {mine}"
-            )
-        return (
-            f"{difference.other_name} recognises {recognises} "
-            f"{'more' if difference.verdict == 'higher' else 'less'} often than {reference}: "
-            f"{theirs} grasps against {mine}"
-        )
-
-    @property
     def names(self) -> str:
         """The names of the experiments, in words."""
         *others, last = (experiment.name for experiment in self.experiments)
@@ -98,16 +78,16 @@ class ExperimentComparison:
 
     @property
     def answer(self) -> str:
-        """The differences and the number of settings that differ, in a few sentences."""
-        told = [
-            f"{condition_name(difference.other)}, {TARGETS[difference.other.recognised]}: "
-            f"{difference.other_name} minus {self.experiments[0].name} is {difference.difference.words}, "
-            f"{difference.how}."
-            for difference in self.differences[:4]
-        ]
-        more = len(self.differences) - len(told)
-        if more > 0:
-            told.append(f"The table has {more} more.")
+        """The first of the differences and the number of settings that differ, in a few sentences."""
+        told = [f"{self.names} have no case in common."]
+        if self.differences:
+            shown = self.differences[0]
+            told = [
+                f"{condition_name(shown.other)}, {TARGETS[shown.other.recognised]}: {shown.other_name} minus "
+                f"{self.experiments[0].name} is {shown.difference.words}, {shown.verdict}, {shown.how}."
+            ]
+        if len(self.differences) > 1:
+            told.append(f"The table has {len(self.differences) - 1} more.")
         count = len(self.settings)
         differ = counted(count, "setting differs", "settings differ")
         told.append(f"{differ if count else 'No setting differs'}.")
@@ -116,7 +96,6 @@ class ExperimentComparison:
     def as_json(self) -> dict[str, Any]:
         """Return all of it as JSON values."""
         return {
-            "headline": self.headline,
             "answer": self.answer,
             "settings": [
                 {

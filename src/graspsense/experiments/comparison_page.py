@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from html import escape
-
-from graspsense.experiments.answer import answer
+from graspsense.evaluation.intervals import span
 from graspsense.experiments.comparison import ConditionDifference, ExperimentComparison, condition_name
-from graspsense.experiments.page import SIMULATED, failure_lines, rate_row
+from graspsense.experiments.page import SIMULATED, failure_lines
 from graspsense.report.found_table import FoundTable
-from graspsense.report.html import Page, Section, bullets, facts, pair, paragraph
-from graspsense.report.rates import rates_picture
-from graspsense.report.wording import TARGETS, protocol_words
+from graspsense.report.html import Page, bullets, paragraph
+from graspsense.report.wording import TARGETS
 
 
 def comparison_page(comparison: ExperimentComparison) -> Page:
     """Return the page."""
     reference = comparison.experiments[0].name
-    settings, rates, differences = comparison_tables(comparison)
     simulated = any(condition.simulated for e in comparison.experiments for condition in e.summary.conditions)
     text = (
         f"Differences are those from {reference}. Where both experiments simulate the same trials with the same seeds, "
@@ -31,16 +27,10 @@ def comparison_page(comparison: ExperimentComparison) -> Page:
             )
         ).strip(),
         answer=comparison.answer,
-        headline=comparison.headline,
         beside=paragraph(text)
         + bullets(doubts(comparison), "warning")
         + bullets([SIMULATED] if simulated else [], "notes"),
-        sections=(
-            settings.section(),
-            rates.section(_pictures(comparison)),
-            differences.section(),
-            _made_of(comparison),
-        ),
+        sections=tuple(table.section() for table in comparison_tables(comparison)),
     )
 
 
@@ -71,7 +61,7 @@ def comparison_tables(comparison: ExperimentComparison) -> tuple[FoundTable, Fou
                 condition_name(condition),
                 TARGETS[condition.recognised],
                 f"{100 * condition.rate.mean:.1f} %",
-                rate_row(condition).interval_text,
+                span(condition.rate.interval),
                 str(condition.rate.n),
                 str(len(condition.by_seed)),
             )
@@ -107,37 +97,3 @@ def _difference_cells(difference: ConditionDifference) -> tuple[str, ...]:
         difference.verdict,
         difference.how,
     )
-
-
-def _pictures(comparison: ExperimentComparison) -> str:
-    """Return a picture of the rates for each target."""
-    body = []
-    conditions = [(e, condition) for e in comparison.experiments for condition in e.summary.conditions]
-    for target in dict.fromkeys(condition.target for _, condition in conditions):
-        recognising = [(e, condition) for e, condition in conditions if condition.target == target]
-        best = max((condition for _, condition in recognising), key=lambda condition: condition.rate.mean)
-        rows = [
-            rate_row(condition, strong=condition is best, name=f"{e.name}: {condition_name(condition)}")
-            for e, condition in recognising
-        ]
-        title = f"How often {TARGETS[best.recognised]} is recognised"
-        protocols = dict.fromkeys(protocol_words(condition.protocol) for _, condition in recognising)
-        notes = "".join(paragraph(f"Every grasp is classified by {words}.") for words in protocols)
-        picture = rates_picture(rows, f"{title}. Bars are 95 % intervals.")
-        body.append(f"<h3>{escape(title)}</h3>{pair(picture, notes)}")
-    return "".join(body)
-
-
-def _made_of(comparison: ExperimentComparison) -> Section:
-    body = []
-    for experiment in comparison.experiments:
-        made, planned = experiment.results.provenance(), experiment.summary.planned
-        pairs = [
-            ("experiment", f"{planned.experiment.title} ({planned.name})"),
-            ("folder", str(experiment.results.folder)),
-            ("answer", answer(experiment.summary)),
-            ("command", str(made.get("command", ""))),
-            ("begun", str(made.get("begun_at", ""))),
-        ]
-        body.append(f"<h3>{escape(experiment.name)}</h3>{facts(pairs)}")
-    return Section(id="made", title="Provenance", body="".join(body))

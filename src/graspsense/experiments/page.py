@@ -91,10 +91,10 @@ def best_condition(summary: Summary) -> ConditionResult | None:
     return max(conditions, key=lambda condition: condition.rate.mean) if conditions else None
 
 
-def rate_row(condition: ConditionResult, *, strong: bool = False, name: str = "") -> RateRow:
+def rate_row(condition: ConditionResult, *, strong: bool = False) -> RateRow:
     """Return a condition as a row of a picture."""
     return RateRow(
-        name=name or condition.name,
+        name=condition.name,
         rate=condition.rate.mean,
         interval=condition.rate.interval,
         what=f"{TARGETS[condition.recognised]}, {control_words(condition.protocol, '')[0]}",

@@ -16,7 +16,6 @@ from graspsense.core.components.caller import option
 from graspsense.core.learn.conformal import COVERAGE
 from graspsense.core.learn.labelled import ControlFeatures, Labelled
 from graspsense.core.values.errors import ConfigError, counted
-from graspsense.evaluation.controls import PERMUTATIONS
 from graspsense.evaluation.evaluator import Progress
 from graspsense.evaluation.folds import (
     Folds,
@@ -46,7 +45,6 @@ def evaluate_regression(
     *,
     folds: int = 10,
     seed: int = 0,
-    permutations: int = PERMUTATIONS,
     progress: Progress | None = None,
 ) -> RegressionEvaluation:
     """Cross-validate an estimator on trials with a number to predict, `labelled.value`, with controls.
@@ -67,7 +65,7 @@ def evaluate_regression(
     evaluator = _Evaluator(estimator, labelled, np.array(target.values), folds, seed, progress)
     with gathered_warnings(notes):
         evaluator.measure_protocols()
-        evaluator.measure_controls(permutations)
+        evaluator.measure_controls()
     headline = evaluator.headline
     if evaluator.instances is not None and len(set(evaluator.instances)) < MIN_INSTANCES:
         notes.append(
@@ -179,7 +177,7 @@ class _Evaluator:
             what=f"{self.k} folds of shuffled trials", error=self.error(self.plain)
         )
 
-    def measure_controls(self, permutations: int) -> None:
+    def measure_controls(self) -> None:
         """Measure what the number can be predicted from besides the squeeze."""
         trials, folds = self.trials, self.headline.folds
         mean = np.empty(len(self.values))
@@ -201,7 +199,6 @@ class _Evaluator:
         held_out_name = held_out_protocol(self.trials)
         self.controls[held_out_name] = self.protocols[held_out_name]
         self._in_order()
-        self._shuffled(permutations)
 
     def error(self, held: _HeldOut) -> RegressionError:
         """Return the error of these predictions."""
@@ -279,16 +276,14 @@ class _Evaluator:
         folds: Folds,
         features: NDArray[np.float64] | None = None,
         rows: Sequence[int] | None = None,
-        values: NDArray[np.float64] | None = None,
     ) -> _HeldOut:
         """Cross-validate and report progress under this name. `rows`: the trials that take part (default: all)."""
         features = self.trials.table.values if features is None else features
-        values = self.values if values is None else values
-        rows = range(len(values)) if rows is None else rows
+        rows = range(len(self.values)) if rows is None else rows
         tell = None if self.progress is None else partial(self.progress, name)
-        predicted = np.full(len(values), np.nan)
+        predicted = np.full(len(self.values), np.nan)
         predicted[rows] = held_out_predictions(
-            self.estimator, features[rows], values[rows], folds[rows], self.seed, tell
+            self.estimator, features[rows], self.values[rows], folds[rows], self.seed, tell
         )
         held = self.held_out[name] = _HeldOut(name, predicted, folds, rows)
         return held
@@ -335,46 +330,6 @@ class _Evaluator:
         folds = in_order([""] * len(self.values), self.trials.order, self.k)
         held = self._predicted("recording_order", folds)
         self.controls["recording_order"] = self._against(what, held, self.plain)
-
-    def _shuffled(self, permutations: int) -> None:
-        """Measure the error on numbers that are exchanged among instances, and the permutation p of the headline."""
-        rng = np.random.default_rng(self.seed)
-        means = []
-        for k in range(permutations):
-            values = self._permuted(rng)
-            name = f"shuffled_values {k + 1}/{permutations}"
-            held = self._predicted(name, self.headline.folds, values=values)
-            means.append(float(np.abs(held.predicted - values).mean()))
-        reached = self.error(self.headline).mean_absolute
-        p = None
-        if permutations >= PERMUTATIONS:
-            p = (sum(mean <= reached for mean in means) + 1) / (len(means) + 1)
-        mean = float(np.mean(means)) if means else float("nan")
-        what = f"mean of {permutations} permutations of the numbers, in the folds of the headline"
-        error = RegressionError(
-            n=len(self.values),
-            mean_absolute=mean,
-            root_mean_square=float("nan"),
-            interval=None,
-            no_interval="a mean over permutations",
-        )
-        self.controls["shuffled_values"] = RegressionMeasurement(
-            what=what + ("" if p is None else f"; permutation p of the headline: {p:.2g}"),
-            error=error,
-            permutation_p=p,
-        )
-
-    def _permuted(self, rng: np.random.Generator) -> NDArray[np.float64]:
-        """Return the numbers exchanged among whole instances; among the trials if no instances are known."""
-        if self.instances is None:
-            return rng.permutation(self.values)
-        names = np.array(self.instances)
-        blocks = [np.flatnonzero(names == name) for name in np.unique(names)]
-        order = rng.permutation(len(blocks))
-        values = np.empty(len(self.values))
-        given = np.concatenate([self.values[blocks[k]] for k in order])
-        values[np.concatenate([blocks[k] for k in rng.permutation(len(blocks))])] = given
-        return values
 
 
 def _is_worse(control: RegressionMeasurement) -> bool:

@@ -82,7 +82,6 @@ class RegressionMeasurement:
     """An error under one protocol or control, or the reason why it could not be measured.
 
     `difference` is this mean absolute error minus that of the protocol named in `difference_of`, on the same trials.
-    `permutation_p` is the p-value of the headline among shuffled numbers, None for all other controls.
     """
 
     what: str
@@ -90,7 +89,6 @@ class RegressionMeasurement:
     reason: str = ""
     difference: Difference | None = None
     difference_of: str = ""
-    permutation_p: float | None = None
 
 
 @frozen(kw_only=True)

@@ -144,13 +144,13 @@ class C45Classifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         """Return the class of each row, as J48 classifies; `laplace` changes probabilities only."""
         check_is_fitted(self)
         values = self._encode(X, fitting=False)
-        labels: AnyArray = self.classes_[class_indices(self.tree_, values, self.engine)]  # type: ignore[arg-type]
+        labels: AnyArray = self.classes_[class_indices(self.tree_, values)]
         return labels
 
     def predict_proba(self, X: Any) -> Reals:
         """Return the probability of each class for each row, in the order of ``classes_``."""
         check_is_fitted(self)
-        return distributions(self.tree_, self._encode(X, fitting=False), self.engine)  # type: ignore[arg-type]
+        return distributions(self.tree_, self._encode(X, fitting=False))
 
     def explain(self, X: Any) -> list[Path]:
         """Return the path of each row through the tree, in words and units."""

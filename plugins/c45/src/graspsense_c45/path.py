@@ -15,13 +15,16 @@ from graspsense_c45.tree import Tree, largest_class
 
 
 @frozen
-class NumericTest:
-    """A test of a numeric attribute: the value of the row, NaN if it is missing, and whether it is above the threshold.
+class PathTest:
+    """A test on the path of a row.
 
-    share: the part of the training weight that took the same branch.
+    words: such as ``delta_t 0.61 s > 0.542 s``. value: of the row, NaN if it is missing; of a nominal attribute its
+    place. threshold: NaN for a nominal attribute. above: whether the value is above it. share: the part of the training
+    weight that took the same branch.
     """
 
     attribute: Attribute
+    words: str
     value: float
     threshold: float
     above: bool
@@ -29,33 +32,26 @@ class NumericTest:
 
 
 @frozen
-class NominalTest:
-    """A test of a nominal attribute: the place of the value of the row, NaN if it is missing, and the test in words."""
-
-    attribute: Attribute
-    value: float
-    words: str
-
-
-@frozen
 class Path:
     """The path of a row from the root to a leaf.
 
-    steps: one test each, such as ``delta_t 0.61 s > 0.542 s``. label, probability: the prediction for the row.
-    support: the training weight at the leaf, in rows. Where a tested value is missing, the prediction is a mean over
-    all branches; the path follows the heaviest branch, and the step says so. numeric_tests: the tests of numeric
-    attributes among the steps, as numbers. nominal_tests: those of nominal ones. with_label: the training weight at the
-    leaf that has the label. distribution: the probability of each class.
+    label, probability: the prediction for the row. support: the training weight at the leaf, in rows. Where a tested
+    value is missing, the prediction is a mean over all branches; the path follows the heaviest branch, and the words of
+    the test say so. with_label: the training weight at the leaf that has the label. distribution: the probability of
+    each class.
     """
 
-    steps: tuple[str, ...]
+    tests: tuple[PathTest, ...]
     label: str | int | float | bool
     probability: float
     support: float
-    numeric_tests: tuple[NumericTest, ...] = ()
-    nominal_tests: tuple[NominalTest, ...] = ()
-    with_label: float = 0.0
-    distribution: tuple[float, ...] = ()
+    with_label: float
+    distribution: tuple[float, ...]
+
+    @property
+    def steps(self) -> tuple[str, ...]:
+        """The tests in words."""
+        return tuple(test.words for test in self.tests)
 
     def __str__(self) -> str:
         """Return the prediction and the steps in one line."""
@@ -69,40 +65,34 @@ def explain(tree: Tree, row: Sequence[float]) -> Path:
     Raises ValueError as `prediction.distributions` does.
     """
     values = np.array([row], dtype=np.float64)
-    shares = distributions(tree, values, "plain")[0]
+    shares = distributions(tree, values)[0]
     # Without smoothing, the largest probability is that of the class: the row is routed once.
-    of_class = largest_class(shares[None]) if not tree.laplace else class_indices(tree, values, "plain")
+    of_class = largest_class(shares[None]) if not tree.laplace else class_indices(tree, values)
     chosen = int(of_class[0])
-    node, steps, tests, nominal = 0, [], [], []
+    node, tests = 0, []
     while not tree.is_leaf(node):
-        tested = values[0, tree.splits.feature[node]]
+        tested = float(values[0, tree.splits.feature[node]])
         slot = int(tree.splits.slot(np.array([node]), np.array([tested]))[0])
-        if slot < 0:
+        missing = slot < 0
+        if missing:
             slot = int(np.argmax(tree.weighted_n_node_samples[tree.children(node)]))
-            share = _share(tree, node, slot)
-            steps.append(
-                f"{tree.attribute(node).name} missing ({branch(tree, node, slot)} in {100 * share:.0f} % of training)"
+        attribute, share = tree.attribute(node), _share(tree, node, slot)
+        if missing:
+            words = (
+                f"{attribute.name} missing ({branch(tree, node, slot)} in {100 * share:.0f} % of training)"
             )
         else:
-            steps.append(_step(tree, node, slot, float(tested)))
-        attribute = tree.attribute(node)
-        if not attribute.is_nominal:
-            threshold = float(tree.splits.threshold[node])
-            tests.append(
-                NumericTest(attribute, float(tested), threshold, slot == 1, _share(tree, node, slot))
-            )
-        else:
-            nominal.append(NominalTest(attribute, float(tested), steps[-1]))
+            words = _step(tree, node, slot, tested)
+        above = slot == 1 and not attribute.is_nominal
+        tests.append(PathTest(attribute, words, tested, float(tree.splits.threshold[node]), above, share))
         node = tree.children(node)[slot]
     return Path(
-        tuple(steps),
-        tree.schema.classes[chosen],
-        float(shares[chosen]),
-        float(tree.weighted_n_node_samples[node]),
-        tuple(tests),
-        tuple(nominal),
-        float(tree.class_weights[node, chosen]),
-        tuple(shares.tolist()),
+        tests=tuple(tests),
+        label=tree.schema.classes[chosen],
+        probability=float(shares[chosen]),
+        support=float(tree.weighted_n_node_samples[node]),
+        with_label=float(tree.class_weights[node, chosen]),
+        distribution=tuple(shares.tolist()),
     )
 
 

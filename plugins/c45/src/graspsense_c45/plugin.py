@@ -161,7 +161,7 @@ class C45(Classifier[C45Config]):
             for column, value in zip(columns, row, strict=True)
             if math.isnan(value)
         ]
-        tests = [
+        bounds = [
             SplitTest(
                 feature=test.attribute.name,
                 unit=test.attribute.unit,
@@ -170,17 +170,21 @@ class C45(Classifier[C45Config]):
                 above=test.above,
                 share=test.share,
             )
-            for test in path.numeric_tests
+            for test in path.tests
+            if not test.attribute.is_nominal
+        ]
+        # Where a tested feature is missing, the probability is a mean over leaves and not the share in this one.
+        one_leaf = not any(math.isnan(test.value) for test in path.tests)
+        nominal = [
+            Reason(words=test.words)
+            for test in path.tests
+            if test.attribute.is_nominal and not math.isnan(test.value)
         ]
         leaf = leaf_reason(path.with_label, path.support, str(path.label))
-        # Where a tested feature is missing, the probability is a mean over leaves and not the share in this one.
-        tested = [test.value for test in path.numeric_tests] + [test.value for test in path.nominal_tests]
-        one_leaf = not any(map(math.isnan, tested))
-        nominal = [Reason(words=test.words) for test in path.nominal_tests if not math.isnan(test.value)]
         return Prediction(
             label=str(path.label),
             probabilities=dict(zip(self.classes(), path.distribution, strict=True)),
-            because=(*missing, *path_reasons(tests), *nominal, leaf),
+            because=(*missing, *path_reasons(bounds), *nominal, leaf),
             support=(path.with_label, path.support) if one_leaf and path.support > 0 else None,
         )
 

@@ -7,15 +7,17 @@ from numpy.typing import ArrayLike
 
 from graspsense_c45.arithmetic import TOLERANCE
 from graspsense_c45.arrays import Indices, Reals
-from graspsense_c45.engines import choose_fast
-from graspsense_c45.options import Engine
-from graspsense_c45.routing import CHUNK, leaves_of_rows
-from graspsense_c45.splits import LEAF
+from graspsense_c45.splits import LEAF, Splits
 from graspsense_c45.table import check_values
 from graspsense_c45.tree import Tree, largest_class
 
+CHUNK = 16_384
+"""Rows that are routed together: their arrays fit into the processor's caches."""
+NO_LEAF = -1
+"""The leaf of a row that lacks a value which is tested."""
 
-def distributions(tree: Tree, values: ArrayLike, engine: Engine = "auto") -> Reals:
+
+def distributions(tree: Tree, values: ArrayLike) -> Reals:
     """Return the probability of every class for every row (rows x classes).
 
     values: rows x attributes; NaN is missing.
@@ -23,36 +25,15 @@ def distributions(tree: Tree, values: ArrayLike, engine: Engine = "auto") -> Rea
     Raises ValueError for a number of columns that does not fit the tree, for infinite values, and for numbers in
     nominal columns that are not indices of declared values.
     """
-    x = _checked(tree, values)
-    of_nodes = node_distributions(tree, tree.laplace)
-    complete, partial = _by_completeness(x)
-    if partial is None:
-        return of_nodes[_leaves(tree, x, engine)]
-    result = np.empty((len(x), of_nodes.shape[1]))
-    result[complete] = of_nodes[_leaves(tree, x[complete], engine)]
-    for begin in range(0, len(partial), CHUNK):
-        rows = partial[begin : begin + CHUNK]
-        result[rows] = _blended(tree, x[rows], of_nodes)
-    return result
+    return _distributions(tree, _checked(tree, values), tree.laplace)
 
 
-def class_indices(tree: Tree, values: ArrayLike, engine: Engine = "auto") -> Indices:
+def class_indices(tree: Tree, values: ArrayLike) -> Indices:
     """Return the index of the class of every row, as J48 classifies: the first largest unsmoothed probability.
 
     Raises ValueError as `distributions` does.
     """
-    x = _checked(tree, values)
-    of_nodes = node_distributions(tree, laplace=False)
-    complete, partial = _by_completeness(x)
-    labels = largest_class(of_nodes)
-    if partial is None:
-        return labels[_leaves(tree, x, engine)]
-    result = np.empty(len(x), dtype=np.int64)
-    result[complete] = labels[_leaves(tree, x[complete], engine)]
-    for begin in range(0, len(partial), CHUNK):
-        rows = partial[begin : begin + CHUNK]
-        result[rows] = largest_class(_blended(tree, x[rows], of_nodes))
-    return result
+    return largest_class(_distributions(tree, _checked(tree, values), laplace=False))
 
 
 def leaf_weights(tree: Tree, values: ArrayLike) -> Reals:
@@ -60,17 +41,8 @@ def leaf_weights(tree: Tree, values: ArrayLike) -> Reals:
 
     Raises ValueError as `distributions` does.
     """
-    x = _checked(tree, values)
-    splits, result = tree.splits, np.full(len(x), np.nan)
-    rows, nodes = np.arange(len(x)), np.zeros(len(x), dtype=np.int64)
-    while rows.size:
-        ended = splits.feature[nodes] == LEAF
-        result[rows[ended]] = tree.weighted_n_node_samples[nodes[ended]]
-        rows, nodes = rows[~ended], nodes[~ended]
-        slots = splits.slot(nodes, x[rows, splits.feature[nodes]])
-        known = slots >= 0
-        rows, nodes = rows[known], splits.first_child[nodes[known]] + slots[known]
-    return result
+    leaves = _leaves(tree.splits, _checked(tree, values))
+    return np.where(leaves == NO_LEAF, np.nan, tree.weighted_n_node_samples[leaves])
 
 
 def node_distributions(tree: Tree, laplace: bool) -> Reals:
@@ -86,13 +58,41 @@ def node_distributions(tree: Tree, laplace: bool) -> Reals:
     return np.asarray(of_nodes)
 
 
-def _leaves(tree: Tree, x: Reals, engine: Engine) -> Indices:
-    """Return the leaf of each row; no value may be missing."""
-    if choose_fast(engine, x.size) and not any(attribute.is_nominal for attribute in tree.schema.attributes):
-        from graspsense_c45.building import compiled
+def _distributions(tree: Tree, x: Reals, laplace: bool) -> Reals:
+    of_nodes = node_distributions(tree, laplace)
+    leaves = _leaves(tree.splits, x)
+    result = of_nodes[leaves]
+    partial = np.flatnonzero(leaves == NO_LEAF)
+    for begin in range(0, len(partial), CHUNK):
+        rows = partial[begin : begin + CHUNK]
+        result[rows] = _blended(tree, x[rows], of_nodes)
+    return result
 
-        return compiled.leaves_of_rows(tree.splits, x)
-    return leaves_of_rows(tree.splits, x, np.arange(len(x)), np.zeros(len(x), dtype=np.int64))
+
+def _leaves(splits: Splits, x: Reals) -> Indices:
+    """Return the leaf of each row, `NO_LEAF` for a row that lacks a value which is tested."""
+    flat, width = np.ascontiguousarray(x).reshape(-1), x.shape[1]
+    nominal = bool(np.isnan(splits.threshold[splits.feature != LEAF]).any())
+    # The minimum of an array with a NaN is NaN.
+    complete = not np.isnan(x.min(initial=0.0))
+    result = np.zeros(len(x), dtype=np.int64)
+    for begin in range(0, len(x), CHUNK):
+        index = np.arange(begin, min(begin + CHUNK, len(x)))
+        node = result[index]
+        while index.size:
+            feature = splits.feature[node]
+            on_way = feature != LEAF
+            if not on_way.all():
+                result[index] = node
+                index, node, feature = index[on_way], node[on_way], feature[on_way]
+            tested = flat[index * width + feature]
+            if not complete and np.isnan(tested).any():
+                known = ~np.isnan(tested)
+                result[index[~known]] = NO_LEAF
+                index, node, tested = index[known], node[known], tested[known]
+            slots = splits.slot(node, tested) if nominal else tested > splits.threshold[node]
+            node = splits.first_child[node] + slots
+    return result
 
 
 def _blended(tree: Tree, x: Reals, of_nodes: Reals) -> Reals:
@@ -118,15 +118,6 @@ def _blended(tree: Tree, x: Reals, of_nodes: Reals) -> Reals:
             np.concatenate((parts[known], (np.repeat(parts[~known], each) * fraction)[kept])),
         )
     return result
-
-
-def _by_completeness(x: Reals) -> tuple[Indices, Indices | None]:
-    """Return the rows without and with missing values; (an empty array, None) if no value is missing."""
-    # The minimum of an array with a NaN is NaN.
-    if not np.isnan(x.min(initial=0.0)):
-        return np.arange(0), None
-    missing = np.isnan(x).any(axis=1)
-    return np.flatnonzero(~missing), np.flatnonzero(missing)
 
 
 def _checked(tree: Tree, values: ArrayLike) -> Reals:

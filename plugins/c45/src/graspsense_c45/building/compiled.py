@@ -5,15 +5,12 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-import numpy as np
-
 from graspsense.simulator_api import CompileOptions, compile_function, first_call, is_on_disk
 from graspsense_c45 import arithmetic
-from graspsense_c45.arrays import Indices, Integers, IntegerTable, Reals
-from graspsense_c45.building import dealing, descent, growing, leaves
+from graspsense_c45.arrays import Integers, IntegerTable
+from graspsense_c45.building import dealing, descent, growing
 from graspsense_c45.building.dealing import Entries, Place, Split
 from graspsense_c45.building.nodes import Nodes
-from graspsense_c45.splits import Splits
 
 
 def _enter_no_values(
@@ -71,11 +68,3 @@ def call(function: Any, slim: bool, *arguments: Any) -> Any:
 def kept(slim: bool) -> bool:
     """Return whether the machine code that grows such a tree is on disk."""
     return is_on_disk(growing.grow, _options(slim))
-
-
-def leaves_of_rows(splits: Splits, values: Reals) -> Indices:
-    """Return the leaf that each row comes to from the root; see `leaves.find_leaves`."""
-    result = np.empty(len(values), dtype=np.int64)
-    columns = splits.feature, splits.threshold, splits.first_child
-    call(leaves.find_leaves, True, *columns, np.ascontiguousarray(values), result)
-    return result
