@@ -80,7 +80,9 @@ def _of_store(folder: str, number: int | None = None) -> Iterator[RecordedSqueez
         complete = (trial.id for trial in store.page(limit=1_000_000) if trial.complete)
         for k in [number] if number is not None else reversed([*complete]):
             trial = store.trial(k)
-            yield _of_grasp(read_recorded(trial.recording), f"{folder}#{k}", trial.recording_sha256)
+            squeeze = _of_grasp(read_recorded(trial.recording), f"{folder}#{k}", trial.recording_sha256)
+            label, instance = trial.summary.label, trial.summary.instance
+            yield evolve(squeeze, label=label or "", instance=instance or "")  # which may have been corrected
 
 
 def _of_grasp(grasp: RecordedGrasp, name: str, sha256: str) -> RecordedSqueeze:
