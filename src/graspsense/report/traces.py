@@ -15,7 +15,7 @@ from graspsense.core.values.errors import counted
 from graspsense.core.values.units import display_unit, in_words, without_underscores
 from graspsense.report.grasp_curve import GraspCurve
 from graspsense.report.html import figure, folded, panels, table
-from graspsense.report.svg import DASHES, INKS, QUIET, SIZE, TEXT, AxisScale, Picture, number, reaching
+from graspsense.report.svg import DASHES, INKS, QUIET, SIZE, TEXT, AxisScale, Picture, reaching
 
 STATES: Final = 8
 """Largest number of line styles in one picture."""
@@ -71,7 +71,7 @@ def _traces(name: str, grasps: Sequence[GraspCurve], axes: _Axes) -> str:
     force = reaching(axes.forces, 172, 40, zero=True)
     gap = reaching(axes.gaps, 300, 210)
     picture.x_axis(x_scale, 40, 300, f"{grasps[0].time_words} since both pads touched")
-    picture.y_axis(force, 36, picture.width - 10, "force, N")
+    picture.y_axis(force, 36, picture.width - 10, f"{grasps[0].force}, N")
     picture.y_axis(gap, 36, picture.width - 10, "gap, mm")
     for column, unit, scale, top, bottom in (
         ("force_n", "N", force, 40.0, 172.0),
@@ -99,8 +99,10 @@ def _legend(picture: Picture, states: Sequence[str], grasps: Sequence[GraspCurve
         picture.line([(36, y - 4), (66, y - 4)], INKS[k], width=2, dash=DASHES[k])
         state = without_underscores(label.partition(":")[2] or label)
         picture.text(72, y, state)
-        peak = max(grasp.peak_force_n for grasp in grasps if grasp.label == label)
-        peaks.append(f"{state} up to {number(peak)} N")
+        largest = max(
+            (grasp for grasp in grasps if grasp.label == label), key=lambda grasp: grasp.peak_force_n
+        )
+        peaks.append(f"{state} {largest.peak_words}")
     return peaks
 
 
@@ -116,10 +118,10 @@ def one_grasp(grasp: GraspCurve, caption: str) -> str:
     durations = _phases(picture, grasp, t, x_scale)
     picture.x_axis(x_scale, 24, 280, f"{grasp.time_words} since both pads touched")
     picture.y_axis(gap, 36, picture.width - 10, "gap, mm")
-    picture.y_axis(force, 36, picture.width - 10, "force, N")
+    picture.y_axis(force, 36, picture.width - 10, f"{grasp.force}, N")
     for column, scale, ink, named, top, bottom in (
         ("gap_mm", gap, INKS[0], "gap, mm", 44.0, 140.0),
-        ("force_n", force, INKS[1], "force, N", 176.0, 280.0),
+        ("force_n", force, INKS[1], f"{grasp.force}, N", 176.0, 280.0),
     ):
         points = [(x_scale(time), scale(value)) for time, value in grasp.values(column)]
         with picture.plot(x_scale, scale, top, bottom):

@@ -40,7 +40,7 @@ def _over_each_other(curves: Sequence[GraspCurve], labels: Sequence[str], chosen
     force = reaching(_values(curves, "force_n"), 150, 30, zero=True)
     gap = reaching(_values(curves, "gap_mm"), 296, 192)
     picture.x_axis(x, 30, 296, f"{curves[0].time_words} since both pads touched")
-    picture.y_axis(force, 36, picture.width - 10, "force, N")
+    picture.y_axis(force, 36, picture.width - 10, f"{curves[0].force}, N")
     picture.y_axis(gap, 36, picture.width - 10, "gap, mm")
     for column, unit, scale, top, bottom in (
         ("force_n", "N", force, 30.0, 150.0),
@@ -73,10 +73,9 @@ def _small(curve: GraspCurve, k: int, label: int, chosen: bool) -> str:
     picture.line(_points(curve, "force_n", x, y), INKS[k % len(INKS)], dash=DASHES[label % len(DASHES)])
     name = f"{curve.trial} {curve.label}"
     checked = " checked" if chosen else ""
-    peak = f"up to {curve.peak_force_n:.1f} N"
     return (
         f'<label><input type="checkbox" value="{curve.trial}"{checked}> {escape(name)}'
-        f"{picture.svg(f'trial {name}: {peak}')}<span>{peak}</span></label>"
+        f"{picture.svg(f'trial {name}: {curve.peak_words}')}<span>{curve.peak_words}</span></label>"
     )
 
 

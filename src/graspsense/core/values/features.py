@@ -229,7 +229,7 @@ class Prediction:
 
     @property
     def set_in_words(self) -> str:
-        """The set with its coverage, such as `full_open or empty_open (right in 90 % of grasps)`; empty without a set."""
+        """The set, such as `full_open or empty_open (right in 90 % of grasps)`; empty without a set."""
         return self.coverage_in_words(" or ".join(self.prediction_set))
 
     def coverage_in_words(self, labels: str) -> str:
