@@ -80,13 +80,15 @@ class History:
         if began:
             self._texts.clear()
             self._size = 0
-            for kind in ("prediction", "outcome"):
-                self._newest.pop(kind, None)
+            kept = (kind for kind in ("progress", "stored") if kind in self._newest)
+            self._newest = {kind: self._newest[kind] for kind in kept}
         for message in ready[began[-1] if began else 0 :]:
             if message["kind"] in STICKY:
                 self._newest[message["kind"]] = json.dumps(message)
             elif message["kind"] == "image":
-                self._newest[f"image {message['name']}"] = json.dumps(message)
+                text = json.dumps(message)
+                self._newest.setdefault(f"first image {message['name']}", text)
+                self._newest[f"image {message['name']}"] = text
             else:
                 self._keep(json.dumps(message))
         return json.dumps(ready)

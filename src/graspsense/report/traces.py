@@ -70,7 +70,7 @@ def _traces(name: str, grasps: Sequence[GraspCurve], axes: _Axes) -> str:
     picture.text(2, 14, name, bold=True, size=13)
     force = reaching(axes.forces, 172, 40, zero=True)
     gap = reaching(axes.gaps, 300, 210)
-    picture.x_axis(x_scale, 40, 300, f"{grasps[0].time_words} since both pads touched")
+    picture.x_axis(x_scale, 40, 300, f"{grasps[0].time_words} since the squeeze began")
     picture.y_axis(force, 36, picture.width - 10, f"{grasps[0].force}, N")
     picture.y_axis(gap, 36, picture.width - 10, "gap, mm")
     for column, unit, scale, top, bottom in (
@@ -116,7 +116,7 @@ def one_grasp(grasp: GraspCurve, caption: str) -> str:
     gap = reaching([v for v in grasp.gap_mm if v is not None], 140, 44)
     force = reaching([v for v in grasp.force_n if v is not None], 280, 176, zero=True)
     durations = _phases(picture, grasp, t, x_scale)
-    picture.x_axis(x_scale, 24, 280, f"{grasp.time_words} since both pads touched")
+    picture.x_axis(x_scale, 24, 280, f"{grasp.time_words} since the squeeze began")
     picture.y_axis(gap, 36, picture.width - 10, "gap, mm")
     picture.y_axis(force, 36, picture.width - 10, f"{grasp.force}, N")
     for column, scale, ink, named, top, bottom in (

@@ -39,7 +39,7 @@ def _over_each_other(curves: Sequence[GraspCurve], labels: Sequence[str], chosen
     x = _times(curves, 36, picture.width - 10)
     force = reaching(_values(curves, "force_n"), 150, 30, zero=True)
     gap = reaching(_values(curves, "gap_mm"), 296, 192)
-    picture.x_axis(x, 30, 296, f"{curves[0].time_words} since both pads touched")
+    picture.x_axis(x, 30, 296, f"{curves[0].time_words} since the squeeze began")
     picture.y_axis(force, 36, picture.width - 10, f"{curves[0].force}, N")
     picture.y_axis(gap, 36, picture.width - 10, "gap, mm")
     for column, unit, scale, top, bottom in (
