@@ -170,8 +170,8 @@ function heat(message) {
   }
   canvas.getContext("2d").putImageData(picture, 0, 0);
   const shown = (size) => (Number.isFinite(size) ? Number(size.toPrecision(4)).toString() : "-");
-  const change = channel.dtype === "uint8" ? "" : ", change since the first image";
-  text.textContent = `${message.name}${change}: ${shown(least)} to ${shown(most)} ${channel.unit ?? ""}`;
+  const change = channel.dtype === "uint8" ? "" : "change of ";
+  text.textContent = `${message.name}: ${change}${shown(least)} to ${shown(most)} ${channel.unit ?? ""}`;
 }
 
 // From dark blue over red to yellow; lighter is more, in light and dark.
