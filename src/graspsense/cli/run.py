@@ -335,7 +335,10 @@ def print_trial(trial: Trial, *, events: bool = True) -> None:
             channels = {channel.name for channel in trial.device.channels}
             if channels and not channels & {"force_left", "force_right"}:
                 why_limited += ", which has no pads to feel one"
-        echo_entry("note", f"the guard limited {counts['guarded']} of {counts['ticks']} ticks{why_limited}")
+        echo_entry(
+            "note",
+            f"the guard limited the command in {counts['guarded']} of {counts['ticks']} ticks{why_limited}",
+        )
     if counts.get("late"):
         echo_entry("note", f"{counts['late']} of {counts['ticks']} frames came late")
     if trial.seconds_simulated is not None:
