@@ -81,8 +81,7 @@ def print_not_verified(report: Mapping[str, Any]) -> None:
     if names:
         why = "reasons: --explain-model"
         if not selection.get("within", True):
-            reached = report["true_peak_force_n"]
-            why = f"the squeeze reached {reached:.3g} N; verified at {selection['expected_force_n']:.3g} N"
+            why = f"verified at {selection['expected_force_n']:.3g} N, reached {report['true_peak_force_n']:.3g} N"
         echo_entry("simulation", f"accuracy not verified for: {', '.join(names)} ({why})")
 
 

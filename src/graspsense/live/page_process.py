@@ -80,8 +80,7 @@ class History:
         if began:
             self._texts.clear()
             self._size = 0
-            kept = (kind for kind in ("progress", "stored") if kind in self._newest)
-            self._newest = {kind: self._newest[kind] for kind in kept}
+            self._newest = {k: text for k, text in self._newest.items() if k in ("progress", "stored")}
         for message in ready[began[-1] if began else 0 :]:
             if message["kind"] in STICKY:
                 self._newest[message["kind"]] = json.dumps(message)

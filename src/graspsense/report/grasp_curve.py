@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from math import inf
 from typing import TYPE_CHECKING, Any, Final
 
@@ -64,16 +65,6 @@ class GraspCurve:
         """The unit of time, in words."""
         return "seconds" if self.time_unit == "s" else self.time_unit
 
-    @property
-    def peak_words(self) -> str:
-        """The largest force in words."""
-        return f"up to {self.peak_force_n:.1f} N" if self.peak_force_n == self.peak_force_n else "no force"
-
-    @property
-    def peak_force_n(self) -> float:
-        """The largest force; NaN if there is none."""
-        return max((force for force in self.force_n if force is not None), default=float("nan"))
-
 
 def grasp_curve(trace: Trace, label: str, trial: int) -> GraspCurve:
     """Return the curve of a trace."""
@@ -96,6 +87,12 @@ def grasp_curve(trace: Trace, label: str, trial: int) -> GraspCurve:
         time_unit=trace.units.get("t", "s"),
         force="effort" if no_pads else "force",
     )
+
+
+def peak_in_words(curves: Iterable[GraspCurve]) -> str:
+    """Return the largest force of the curves."""
+    peak = max((force for curve in curves for force in curve.force_n if force is not None), default=None)
+    return "no force" if peak is None else f"up to {peak:.1f} N"
 
 
 def _rounded(values: Any, digits: int) -> tuple[float | None, ...]:

@@ -13,7 +13,7 @@ from graspsense.core.components.registry import installed
 from graspsense.core.learn.labelled import class_of
 from graspsense.core.values.errors import counted
 from graspsense.core.values.units import display_unit, in_words, without_underscores
-from graspsense.report.grasp_curve import GraspCurve
+from graspsense.report.grasp_curve import GraspCurve, peak_in_words
 from graspsense.report.html import figure, folded, panels, table
 from graspsense.report.svg import DASHES, INKS, QUIET, SIZE, TEXT, AxisScale, Picture, reaching
 
@@ -99,10 +99,7 @@ def _legend(picture: Picture, states: Sequence[str], grasps: Sequence[GraspCurve
         picture.line([(36, y - 4), (66, y - 4)], INKS[k], width=2, dash=DASHES[k])
         state = without_underscores(label.partition(":")[2] or label)
         picture.text(72, y, state)
-        largest = max(
-            (grasp for grasp in grasps if grasp.label == label), key=lambda grasp: grasp.peak_force_n
-        )
-        peaks.append(f"{state} {largest.peak_words}")
+        peaks.append(f"{state} {peak_in_words(grasp for grasp in grasps if grasp.label == label)}")
     return peaks
 
 

@@ -7,7 +7,7 @@ from html import escape
 from typing import Final
 
 from graspsense.core.values.errors import counted
-from graspsense.report.grasp_curve import GraspCurve
+from graspsense.report.grasp_curve import GraspCurve, peak_in_words
 from graspsense.report.html import Section, figure, paragraph
 from graspsense.report.svg import DASHES, INKS, AxisScale, Picture, reaching
 
@@ -72,10 +72,10 @@ def _small(curve: GraspCurve, k: int, label: int, chosen: bool) -> str:
     x, y = _times([curve], 2, width - 2), reaching(_values([curve], "force_n"), height - 3, 3, zero=True)
     picture.line(_points(curve, "force_n", x, y), INKS[k % len(INKS)], dash=DASHES[label % len(DASHES)])
     name = f"{curve.trial} {curve.label}"
-    checked = " checked" if chosen else ""
+    checked, peak = " checked" if chosen else "", peak_in_words([curve])
     return (
         f'<label><input type="checkbox" value="{curve.trial}"{checked}> {escape(name)}'
-        f"{picture.svg(f'trial {name}: {curve.peak_words}')}<span>{curve.peak_words}</span></label>"
+        f"{picture.svg(f'trial {name}: {peak}')}<span>{peak}</span></label>"
     )
 
 

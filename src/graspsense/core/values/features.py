@@ -122,10 +122,7 @@ def misfit(taker: str, names: Sequence[str], units: Sequence[str], given: Featur
     """
     lacking = [name for name in names if name not in given.names]
     if lacking:
-        return (
-            f"{taker} takes the features {listed(names)}; there is no {listed(lacking)} here (there are: "
-            f"{listed(given.names)})"
-        )
+        return f"{taker} takes the features {listed(names)}; there is no {listed(lacking)} among {listed(given.names)}"
     unit_of = dict(zip(given.names, given.units, strict=True))
     for name, unit in zip(names, units, strict=True):
         if unit and unit_of[name] and unit != unit_of[name]:
