@@ -43,8 +43,7 @@ class GraspCurve:
     def until_release(self) -> GraspCurve:
         """Return the curve up to where the fingers open again."""
         end = self.phase.index("release") if "release" in self.phase else len(self.phase)
-        columns = ("t_s", "gap_mm", "force_n", "phase")
-        return evolve(self, **{column: getattr(self, column)[:end] for column in columns})
+        return evolve(self, **{n: getattr(self, n)[:end] for n in ("t_s", "gap_mm", "force_n", "phase")})
 
     @property
     def shown_times(self) -> list[float]:
