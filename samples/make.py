@@ -17,7 +17,7 @@ from graspsense import Trial, load_pipeline
 
 FOLDER = Path(__file__).parent
 LABELS = ("can:full_open", "can:empty_open", "odwalla:full_closed", "odwalla:empty_open")
-TRIALS = 6
+TRIALS = 10
 """Trials of each label in the feature table."""
 TOUCHING_N = 0.5
 """Force of both fingers from which on the other program says that they touch."""

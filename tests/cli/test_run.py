@@ -243,7 +243,7 @@ def test_the_effort_of_a_dry_run_is_told_as_a_limit_where_velocities_are_command
 
 def test_a_note_says_how_many_ticks_the_guard_limited_and_why_on_a_real_gripper(capsys):
     trial = load_pipeline(options=["gripper.object=block", "classifier.type=none"]).grasp()
-    limited = "note        the guard limited {} of 1000 ticks"
+    limited = "note        the guard limited the command in {} of 1000 ticks"
     why = ": until a contact, run.first_speed_m_s and run.first_effort_n limit this gripper"
     for guarded, clock, notes in (
         (0, "device", []),

@@ -81,6 +81,7 @@ def run(monkeypatch, tmp_path):
         ("predict simulated default", "predict default simulated"),
         ("run -o features.type=grasp-curve", "pip install -e ./examples/grasp_curve"),
         ("evaluate table.csv", "--label COLUMN"),
+        ("evaluate table.csv --label what -o features.type=curve", "only keys of [classifier]"),
         ("evaluate nothere.csv", "no file of this name"),
         ("compare nothere.csv", "no file of this name"),
         ("import nothere.csv --check", "no file of this name"),

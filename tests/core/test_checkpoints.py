@@ -173,8 +173,8 @@ def test_a_checkpoint_in_the_hold_is_predicted_then(model):
 @every_case(
     ("labels", "certainty", "said"),
     [
-        (("soft", "stiff", "hard"), {}, "soft or stiff or hard, 90 % of all sets"),
-        (("soft", "stiff", "hard", "empty"), {}, "soft or one of 3 others, 90 % of all sets"),
+        (("soft", "stiff", "hard"), {}, "soft or stiff or hard (right in 90 % of grasps)"),
+        (("soft", "stiff", "hard", "empty"), {}, "soft or one of 3 others (right in 90 % of grasps)"),
         # Which answers are sure depends on luck, too: of few trials, the interval says how much.
         (("soft",), {"calibrated": True, "certainty_interval": (0.75, 0.98)}, "soft, 92 % (75 to 98 %)"),
     ],

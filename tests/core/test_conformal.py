@@ -253,7 +253,7 @@ def test_every_classifier_has_sets_that_loading_keeps_exactly(name, tmp_path):
         assert (said.probabilities, said.prediction_set) == (again.probabilities, again.prediction_set)
         assert said.label in said.prediction_set
         assert said.coverage == 0.9
-        assert said.set_in_words.endswith(", 90 % of all sets")
+        assert said.set_in_words.endswith(" (right in 90 % of grasps)")
     model.classifier.to_json = lambda: {"means": np.zeros(2)}
     with pytest.raises(ComponentFailed, match=rf"/{name} .*to_json"):
         write_model(tmp_path / "m.json", model)

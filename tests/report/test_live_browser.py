@@ -95,7 +95,7 @@ def test_the_page_shows_what_was_sent(browser, feed, tmp_path, dark, width):
     shown(browser, "$('certainty').textContent", vague.certainty_in_words)
     assert "(21 to 69 %)" in vague.certainty_in_words
     events = browser.run("[...document.querySelectorAll('#events li')].map((one) => one.textContent)")
-    assert events == [f"{event.t_s:.3f} s  {event.what}" for event in trial.events]
+    assert events == [f"{event.t_s:.3f} s: {event.what}" for event in trial.events]
     browser.screenshot(tmp_path / "page.png")
     answer = browser.run(
         "({across: document.documentElement.scrollWidth, ground: getComputedStyle(document.body).backgroundColor})"
@@ -140,7 +140,7 @@ def test_arrays_are_heat_maps_and_fast_channels_have_a_spectrogram_and_nothing_g
     shown(browser, "$('outcome').textContent", "outcome: steady")
     assert browser.run("[series.get('gap_m').n, series.get('sound value').n]") == [30_000, 30_000]
     assert browser.run("series.get('gap_m').last()") == 0.05
-    assert browser.run("arrays.get('skin').text.textContent") == "skin: 0 to 155000 counts"
+    assert browser.run("arrays.get('skin').text.textContent") == "skin: change of 0 to 155000 counts"
     picture = "arrays.get('skin').canvas.getContext('2d').getImageData(0, 0, 3, 2).data"
     assert browser.run(f"[{picture}[0], {picture}[20], {picture}.length]") == [0, 255, 24]
     column = "spectra.get('sound').canvas.getContext('2d').getImageData(0, 0, 1, 128).data"

@@ -126,7 +126,7 @@ def test_it_is_kept_whole_with_its_label_and_its_features_worked_out_by_hand(squ
     approach, squeeze = map(float, re.search(r"approach for ([\d.]+), squeeze for ([\d.]+)", page).groups())
     assert approach == pytest.approx(1.0, abs=0.1)
     assert squeeze == pytest.approx(0.55, abs=0.1)
-    assert "seconds since both pads touched" in page
+    assert "seconds since the squeeze began" in page
 
 
 def test_options_of_a_csv_with_another_kind_are_refused(tmp_path):

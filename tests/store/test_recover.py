@@ -163,6 +163,12 @@ def test_what_needs_no_recovery_or_cannot_be_recovered_is_told(tmp_path):
         recover_file(tmp_path / "nowhere.mcap")
 
 
+def test_a_folder_without_a_store_does_not_become_one(tmp_path):
+    for command in ("recover", "verify"):
+        assert graspsense(command, tmp_path).returncode == 2
+    assert not list(tmp_path.iterdir())
+
+
 def test_the_commands_say_what_they_did(store):
     keep(store)
     part(store)

@@ -17,6 +17,7 @@ from kept import BENCH, keep
 
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.report.store_page import store_page
+from graspsense.sources.squeezes import recorded_squeezes
 from graspsense.store import changes
 from graspsense.store.dataset import labelled_store
 from graspsense.store.export_table import trial_table
@@ -54,6 +55,8 @@ def test_a_relabelled_trial_has_its_new_label_everywhere_and_the_store_is_intact
     assert labels(store)[1] == (2, "can:empty_open", "can#3")
     assert store.trial(2).record.labels == {"label": "can:empty_open", "instance": "can#3"}
     assert labelled_store(str(store.folder)).labels == ("can:full_open", "can:empty_open", "toy")
+    (squeeze,) = recorded_squeezes([f"store:{store.folder}"], "can:empty_open")
+    assert (squeeze.name, squeeze.instance) == (f"{store.folder}#2", "can#3")
     assert any("labels of 1 trial were changed" in note for note in labelled_store(str(store.folder)).notes)
     assert store.counts() == {("can:full_open", "can#2"): 1, ("can:empty_open", "can#3"): 1, ("toy", None): 1}
     assert verify_store(store.folder).problems == ()

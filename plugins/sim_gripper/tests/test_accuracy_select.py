@@ -183,7 +183,7 @@ def test_selecting_that_takes_long_reports_how_far_it_is(monkeypatch, caplog):
     assert caplog.messages == []
     monkeypatch.setattr(verify, "PROGRESS_S", 0.0)
     selected(CONFIG, thing(SHELL, ("loss", {"damping_n_s_m": 1.0})), hybrid())
-    assert "selecting the steps for the object: 1 % of the allowed ticks and steps used" in caplog.messages
+    assert "choosing the steps of the simulation: 1 % of the allowed work done" in caplog.messages
 
 
 class Ragged(NamedTuple):

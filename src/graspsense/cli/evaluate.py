@@ -217,8 +217,8 @@ def _print(evaluation: Evaluation) -> None:
     echo_entry("features", ", ".join(name for name, _ in evaluation.features))
     echo_entry(
         "unknown",
-        f"{evaluation.unknown.words} would be called unknown (false alarms: their labels are known); "
-        "hardly more by a model of all trials",
+        f"{evaluation.unknown.words} would be called unknown (false alarms: their labels are known), "
+        "and hardly more by a model that is trained on all trials",
     )
     _print_doubt(evaluation)
     echo_entries("note", evaluation.notes)
@@ -269,7 +269,7 @@ def _print_doubt(evaluation: Evaluation) -> None:
         )
         if sets.covered_below is not None:
             echo_entry(
-                "", f"{sets.covered_below.words} of the labels that are recognised less often than that"
+                "", f"{sets.covered_below.words} of the trials whose label is recognised less often than that"
             )
         least = min(sets.by_label, key=lambda name: sets.by_label[name].rate)
         echo_entry("", f"{sets.mean_size:.2f} labels on average, {percent(sets.single.rate)} of the sets have one; "

@@ -132,9 +132,9 @@ def _print(evaluation: EventsEvaluation) -> None:
         echo_entry(
             "not told", f"{name} is labelled, and {evaluation.detector} has no such event", Style.CAUTION
         )
-    others = [f"{name} ({count} times)" for name, count in evaluation.not_labelled.items()]
+    others = [f"{name!r} ({count} times)" for name, count in evaluation.not_labelled.items()]
     if others:
-        echo_entry("not judged", f"told as well, without labels to judge by: {', '.join(others)}")
+        echo_entry("not judged", f"detected, but labelled nowhere: {', '.join(others)}")
     for name, kind in evaluation.kinds.items():
         if kind.fitted is None:
             echo_entry("not fitted", f"{name}: {kind.not_fitted}", Style.CAUTION)

@@ -119,7 +119,7 @@ def shown_live(asked: LiveOptions, save: str | None = None) -> Iterator[Live]:
         if save is not None:
             shown.told("stored", {"rows": _last_grasps(save)})
         yield shown
-        if sys.stderr.isatty() and (asked.page or asked.foxglove is not None):
+        if sys.stderr and sys.stderr.isatty() and (asked.page or asked.foxglove is not None):
             talk("the grasps can still be seen: Ctrl-C ends it")
             _wait_for_interrupt()
     finally:

@@ -77,9 +77,12 @@ def print_not_verified(report: Mapping[str, Any]) -> None:
     """Print for which quantities a simulated gripper does not guarantee its accuracy, if any, and an unstable loop."""
     if report.get("unstable_loop"):
         echo_entry("simulation", report["unstable_loop"])
-    names = report.get("not_verified")
+    names, selection = report.get("not_verified"), report.get("selection") or {}
     if names:
-        echo_entry("simulation", f"accuracy not verified for: {', '.join(names)} (reasons: --explain-model)")
+        why = "reasons: --explain-model"
+        if not selection.get("within", True):
+            why = f"verified at {selection['expected_force_n']:.3g} N, reached {report['true_peak_force_n']:.3g} N"
+        echo_entry("simulation", f"accuracy not verified for: {', '.join(names)} ({why})")
 
 
 def print_selection(selection: Mapping[str, Any]) -> None:

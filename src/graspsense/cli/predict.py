@@ -58,9 +58,9 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     _refuse_swapped(model, source)
     if is_regression(model):
         return predict_value(model, source, as_json, given)
+    asked = load_model(model, installed())
     if given["target_value"]:
         raise click.UsageError(f"--target-value: model {model} predicts a label, not a number")
-    asked = load_model(model, installed())
     table, labelled, notes = to_predict(source, asked.names, given)
     labelled = None if labelled is None else labelled.aimed(asked.target)
     predictions = _predictions(asked, table, {} if labelled is None else labelled.provenance)

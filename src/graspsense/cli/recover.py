@@ -22,12 +22,15 @@ def recover(source: str, out: str | None, as_json: bool) -> None:
     Nothing is deleted: the original of an interrupted recording stays as .cut. Exit code 5 means that some data could
     not be recovered.
     """
+    from graspsense.store.opening import RECORDINGS
     from graspsense.store.recover import recover_file, recover_store
     from graspsense.store.store import Store
 
     if Path(source).is_dir():
         if out is not None:
             raise click.UsageError("--out is for a FILE; in a store everything has its place")
+        if not (Path(source) / RECORDINGS).is_dir():
+            Store.read(source).close()
         with Store.open(source) as store:
             rebuilt = not store.recording_names()
             recovered = recover_store(store)

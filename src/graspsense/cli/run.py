@@ -328,14 +328,14 @@ def print_trial(trial: Trial, *, events: bool = True) -> None:
         _print_prediction(trial.prediction)
     echo_entries("note", trial.device.notes)
     counts = trial.counts
-    if counts.get("guarded"):
-        why_limited = ""
-        if trial.device.clock == "device" and counts["guarded"] > MANY_GUARDED * counts["ticks"]:
-            why_limited = ": until a contact, run.first_speed_m_s and run.first_effort_n limit this gripper"
+    if guarded := counts.get("guarded"):
+        why = ""
+        if trial.device.clock == "device" and guarded > MANY_GUARDED * counts["ticks"]:
+            why = ": until a contact, run.first_speed_m_s and run.first_effort_n limit this gripper"
             channels = {channel.name for channel in trial.device.channels}
             if channels and not channels & {"force_left", "force_right"}:
-                why_limited += ", which has no pads to feel one"
-        echo_entry("note", f"the guard limited {counts['guarded']} of {counts['ticks']} ticks{why_limited}")
+                why += ", which has no pads to feel one"
+        echo_entry("note", f"the guard limited the command in {guarded} of {counts['ticks']} ticks{why}")
     if counts.get("late"):
         echo_entry("note", f"{counts['late']} of {counts['ticks']} frames came late")
     if trial.seconds_simulated is not None:

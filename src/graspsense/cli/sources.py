@@ -314,9 +314,8 @@ def _refuse_misplaced(kind: str) -> None:
         for name in names:
             from_user = context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
             if from_user and owner != kind:
-                raise click.UsageError(
-                    f"--{_dashed(name)} is for a {owner} source; this one is a {kind}", context
-                )
+                kinds = f"a source of the kind {owner!r}; this one is of the kind {kind!r}"
+                raise click.UsageError(f"--{_dashed(name)} is for {kinds}", context)
 
 
 def _settings(source: str, given: Mapping[str, Any], classifier: str | None) -> Settings:
@@ -339,9 +338,8 @@ def _alone(table: str, name: str, given: Mapping[str, Any], source: str) -> Sele
 
     layers, complaints = option_layers(given["options"])
     merged = Merged()
-    tables = ("classifier", *(CHANGEABLE if source.startswith(STORE) else ("features",)))
-    if table == "controller":
-        tables = (table,)
+    own = () if is_csv(source) else CHANGEABLE if source.startswith(STORE) else ("features",)
+    tables = (table,) if table == "controller" else ("classifier", *own)
     for layer in layers:
         for key, values in layer.values.items():
             if key not in tables or not isinstance(values, dict):

@@ -248,13 +248,13 @@ def _say_trained(out: str, model: Model) -> None:
             echo_entry(
                 "unknown",
                 f"{100 * unknown / trials:.1f} % ({unknown} of {trials}) of the held-out trials are called unknown "
-                "(false alarms), hardly more of new ones: the model knows more trials than those of the folds",
+                "(false alarms); of new trials it will be hardly more, since this model is trained on all of them",
             )
     if model.certainty is not None and not model.simulated:
         echo_entry(
             "drift",
-            "certainty and sets know the drift of the forces between held-out instances only: where sessions differ, "
-            f"let the instance of a trial be its session ({units_needed()} or more), or they are too sure",
+            "certainty and sets allow only for what differs between instances. If the forces also drift between "
+            f"sessions, name the session as the instance ({units_needed()} sessions or more); else they are too sure",
         )
     for after_s, part in model.checkpoints:
         sets = "" if part.sets is None else f", sets {part.sets.in_words}"

@@ -36,7 +36,7 @@ def message_of(error: click.ClickException) -> str:
         and refused
     ):
         return f"{error.param.opts[0]} {typed}: give {_allowed(kind)}"
-    return error.format_message()
+    return error.format_message().expandtabs(2)
 
 
 def _allowed(kind: click.types.IntParamType | click.types.FloatParamType) -> str:

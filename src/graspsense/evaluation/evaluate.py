@@ -159,8 +159,8 @@ def _on_instances(trials: Labelled) -> Iterator[str]:
     count = len(set(trials.instances))
     if count < MIN_INSTANCES:
         yield (
-            f"{counted(count, 'instance')}: with fewer than {MIN_INSTANCES}, rates and differences have "
-            "no interval, and the controls give no warning"
+            f"{counted(count, 'instance')}: with fewer than {MIN_INSTANCES}, a set of trials gives "
+            "no interval, and its controls give no warning"
         )
     if count == len(trials.labels) and not trials.provenance.get("simulated"):
         yield (

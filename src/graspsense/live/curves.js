@@ -72,7 +72,7 @@ function draw(canvas, curves, from, to, marks, style) {
   const pen = canvas.getContext("2d");
   pen.setTransform(scale, 0, 0, scale, 0, 0);
   pen.clearRect(0, 0, wide, high);
-  const left = 46, bottom = 18, width = wide - left - 6, height = high - bottom - 6;
+  const left = 46, top = 20, bottom = 18, width = wide - left - 6, height = high - bottom - top;
   if (!(to > from) || width < 10) return;
   const shown = curves.map((one) => columns(one.series, from, to, width).map((c) =>
     [c[0], c[1] * one.factor, c[2] * one.factor, c[3] * one.factor, c[4] * one.factor, c[5]]));
@@ -81,7 +81,7 @@ function draw(canvas, curves, from, to, marks, style) {
   if (most === least) most = least + 1;
   const margin = 0.05 * (most - least);
   [least, most] = [least === 0 ? 0 : least - margin, most + margin];
-  const y = (v) => 6 + height - ((v - least) / (most - least)) * height;
+  const y = (v) => top + height - ((v - least) / (most - least)) * height;
   const x = (t) => left + ((t - from) / (to - from)) * width;
   pen.font = "11px system-ui, sans-serif";
   pen.lineWidth = 1;
@@ -96,7 +96,7 @@ function draw(canvas, curves, from, to, marks, style) {
   }
   pen.textAlign = "center";
   for (let t = Math.ceil(from / run) * run; t <= to; t += run) {
-    line(pen, x(t), 6, x(t), 6 + height);
+    line(pen, x(t), top, x(t), top + height);
     pen.fillText(`${t.toFixed(Math.min(digits, 4))} s`, Math.min(x(t), wide - 18), high - 4);
   }
   pen.textAlign = "left";
@@ -104,7 +104,7 @@ function draw(canvas, curves, from, to, marks, style) {
   let free = 0;
   for (const mark of marks) {
     if (mark.t < from || mark.t > to) continue;
-    line(pen, x(mark.t), 6, x(mark.t), 6 + height);
+    line(pen, x(mark.t), 6, x(mark.t), top + height);
     if (x(mark.t) >= free) {
       pen.fillText(mark.text, x(mark.t) + 3, 16);
       free = x(mark.t) + 8 + pen.measureText(mark.text).width;

@@ -11,7 +11,7 @@ const $ = (id) => document.getElementById(id);
 
 const panels = new Map(); // title to {canvas, curves}
 const series = new Map(); // name to Series
-const arrays = new Map(); // name to {canvas, text}
+const arrays = new Map(); // name to {canvas, text, zero, least, most}
 const spectra = new Map(); // name to {canvas, pending, columns}
 let marks = [], declared = {}, rate = 0, newest = NaN, stale = true;
 
@@ -110,7 +110,7 @@ const take = {
       if (marks.length > MOST_EVENTS) marks.shift();
     }
     const events = $("events");
-    made("li", events, `${message.t_s.toFixed(3)} s  ${message.what}`);
+    made("li", events, `${message.t_s.toFixed(3)} s: ${message.what}`);
     if (events.childElementCount > MOST_EVENTS) events.firstElementChild.remove();
     events.scrollTop = events.scrollHeight;
   },
@@ -150,25 +150,25 @@ function heat(message) {
     canvas.height = Math.ceil(cells / columns);
     canvas.setAttribute("role", "img");
     canvas.setAttribute("aria-label", `image of ${message.name}`);
-    arrays.set(message.name, {canvas, text});
+    arrays.set(message.name, {canvas, text, zero: null, least: Infinity, most: -Infinity});
   }
-  const {canvas, text} = arrays.get(message.name), picture = new ImageData(canvas.width, canvas.height);
+  const state = arrays.get(message.name), {canvas, text} = state, picture = new ImageData(canvas.width, canvas.height);
   const colours = parts === 3 && channel.dtype === "uint8";
   const sizes = colours ? message.cells : Array.from({length: cells}, (_, k) =>
     parts === 1 ? message.cells[k] : Math.hypot(...message.cells.slice(k * parts, (k + 1) * parts)));
-  let least = Infinity, most = -Infinity;
-  for (const size of sizes) {
-    if (typeof size !== "number") continue;
-    least = Math.min(least, size);
-    most = Math.max(most, size);
-  }
+  // Unloaded cells differ, so what is shown is the change since the first image, on the scale of all images so far.
+  state.zero ??= channel.dtype === "uint8" ? [] : sizes;
+  const changes = sizes.map((size, k) => (typeof size === "number" ? size - (state.zero[k] ?? 0) : NaN));
+  for (const one of changes) if (!Number.isNaN(one)) [state.least, state.most] = [Math.min(state.least, one), Math.max(state.most, one)];
+  const {least, most} = state;
   for (let k = 0; k < cells; k++) {
     if (colours) picture.data.set([...message.cells.slice(3 * k, 3 * k + 3), 255], 4 * k);
-    else if (typeof sizes[k] === "number") picture.data.set(shade((sizes[k] - least) / (most - least || 1)), 4 * k);
+    else if (!Number.isNaN(changes[k])) picture.data.set(shade((changes[k] - least) / (most - least || 1)), 4 * k);
   }
   canvas.getContext("2d").putImageData(picture, 0, 0);
   const shown = (size) => (Number.isFinite(size) ? Number(size.toPrecision(4)).toString() : "-");
-  text.textContent = `${message.name}: ${shown(least)} to ${shown(most)} ${channel.unit ?? ""}`;
+  const change = channel.dtype === "uint8" ? "" : "change of ";
+  text.textContent = `${message.name}: ${change}${shown(least)} to ${shown(most)} ${channel.unit ?? ""}`;
 }
 
 // From dark blue over red to yellow; lighter is more, in light and dark.

@@ -80,13 +80,14 @@ class History:
         if began:
             self._texts.clear()
             self._size = 0
-            for kind in ("prediction", "outcome"):
-                self._newest.pop(kind, None)
+            self._newest = {k: text for k, text in self._newest.items() if k in ("progress", "stored")}
         for message in ready[began[-1] if began else 0 :]:
             if message["kind"] in STICKY:
                 self._newest[message["kind"]] = json.dumps(message)
             elif message["kind"] == "image":
-                self._newest[f"image {message['name']}"] = json.dumps(message)
+                text = json.dumps(message)
+                self._newest.setdefault(f"first image {message['name']}", text)
+                self._newest[f"image {message['name']}"] = text
             else:
                 self._keep(json.dumps(message))
         return json.dumps(ready)

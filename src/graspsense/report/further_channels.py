@@ -87,7 +87,7 @@ def _figure(
     picture.text(2, 14, title, bold=True, size=13)
     x_scale = AxisScale(float(t[0]), float(t[-1]), 42, picture.width - 10)
     y_scale = reaching([float(every.min()), float(every.max())], 150, 44)
-    when = f"{time} since both pads touched" if touched else time
+    when = f"{time} since the squeeze began" if touched else time
     picture.x_axis(x_scale, 36, 150, when)
     picture.y_axis(y_scale, 42, picture.width - 10, unit)
     with picture.plot(x_scale, y_scale, 44.0, 150.0):

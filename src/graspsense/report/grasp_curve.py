@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from math import inf
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 
 from graspsense.core.values.signals import Phase
 
@@ -36,19 +37,13 @@ class GraspCurve:
     force_n: tuple[float | None, ...]
     phase: tuple[str, ...]
     time_unit: str = "s"
+    force: str = "force"
+    """What `force_n` is: of a gripper whose pads measure no force, the effort."""
 
     def until_release(self) -> GraspCurve:
         """Return the curve up to where the fingers open again."""
         end = self.phase.index("release") if "release" in self.phase else len(self.phase)
-        return GraspCurve(
-            label=self.label,
-            trial=self.trial,
-            t_s=self.t_s[:end],
-            gap_mm=self.gap_mm[:end],
-            force_n=self.force_n[:end],
-            phase=self.phase[:end],
-            time_unit=self.time_unit,
-        )
+        return evolve(self, **{n: getattr(self, n)[:end] for n in ("t_s", "gap_mm", "force_n", "phase")})
 
     @property
     def shown_times(self) -> list[float]:
@@ -69,11 +64,6 @@ class GraspCurve:
         """The unit of time, in words."""
         return "seconds" if self.time_unit == "s" else self.time_unit
 
-    @property
-    def peak_force_n(self) -> float:
-        """The largest force; NaN if there is none."""
-        return max((force for force in self.force_n if force is not None), default=float("nan"))
-
 
 def grasp_curve(trace: Trace, label: str, trial: int) -> GraspCurve:
     """Return the curve of a trace."""
@@ -85,15 +75,23 @@ def grasp_curve(trace: Trace, label: str, trial: int) -> GraspCurve:
     squeezed = np.flatnonzero(trace.phase >= int(Phase.SQUEEZE))
     zero = float(trace.t_s[squeezed[0]]) if len(squeezed) else (float(trace.t_s[0]) if n else 0.0)
     force = (trace.force_left_n[chosen] + trace.force_right_n[chosen]) / 2.0
+    no_pads = bool(np.isnan(force).all())
     return GraspCurve(
         label=label,
         trial=trial,
         t_s=_rounded(trace.t_s[chosen] - zero, 4),
         gap_mm=_rounded(trace.gap_m[chosen] * 1e3, 3),
-        force_n=_rounded(force, 3),
+        force_n=_rounded(trace.effort_n[chosen] if no_pads else force, 3),
         phase=tuple(Phase(int(phase)).name.lower() for phase in trace.phase[chosen]),
         time_unit=trace.units.get("t", "s"),
+        force="effort" if no_pads else "force",
     )
+
+
+def peak_in_words(curves: Iterable[GraspCurve]) -> str:
+    """Return the largest force of the curves."""
+    peak = max((force for curve in curves for force in curve.force_n if force is not None), default=None)
+    return "no force" if peak is None else f"up to {peak:.1f} N"
 
 
 def _rounded(values: Any, digits: int) -> tuple[float | None, ...]:

@@ -88,7 +88,7 @@ def _draw_array(trace: Trace, axes: Any, name: str, images: ImageTrace) -> Any:
 
 
 def draw_trace(trace: Trace, force: Any, gap: Any, fingers: Sequence[FingerForce] = ()) -> None:
-    """Draw the pad forces and the gap into two axes of matplotlib that share the axis of time.
+    """Draw the pad forces (the effort where there are none) and the gap into two axes of matplotlib with one time.
 
     The forces of `fingers`, which the gripper declares, are drawn beside those of the pads.
     """
@@ -96,8 +96,11 @@ def draw_trace(trace: Trace, force: Any, gap: Any, fingers: Sequence[FingerForce
     zero = 0.0 if contact is None else contact
     start = shown_from(trace)
     t = trace.t_s[start:] - zero
-    force.plot(t, trace.force_left_n[start:], color=LEFT, lw=1.6, label="left pad")
-    force.plot(t, trace.force_right_n[start:], color=RIGHT, lw=1.6, ls="--", label="right pad")
+    if np.isnan([trace.force_left_n, trace.force_right_n]).all():
+        force.plot(t, trace.effort_n[start:], color=LEFT, lw=1.6, label="effort (no pad has a force)")
+    else:
+        force.plot(t, trace.force_left_n[start:], color=LEFT, lw=1.6, label="left pad")
+        force.plot(t, trace.force_right_n[start:], color=RIGHT, lw=1.6, ls="--", label="right pad")
     for k, finger in enumerate(fingers):
         label = without_underscores(finger.finger)
         force.plot(t, trace.signals[finger.name][start:], color=f"C{k + 2}", lw=0.8, label=label)

@@ -13,9 +13,9 @@ from graspsense.core.components.registry import installed
 from graspsense.core.learn.labelled import class_of
 from graspsense.core.values.errors import counted
 from graspsense.core.values.units import display_unit, in_words, without_underscores
-from graspsense.report.grasp_curve import GraspCurve
+from graspsense.report.grasp_curve import GraspCurve, peak_in_words
 from graspsense.report.html import figure, folded, panels, table
-from graspsense.report.svg import DASHES, INKS, QUIET, SIZE, TEXT, AxisScale, Picture, number, reaching
+from graspsense.report.svg import DASHES, INKS, QUIET, SIZE, TEXT, AxisScale, Picture, reaching
 
 STATES: Final = 8
 """Largest number of line styles in one picture."""
@@ -70,8 +70,8 @@ def _traces(name: str, grasps: Sequence[GraspCurve], axes: _Axes) -> str:
     picture.text(2, 14, name, bold=True, size=13)
     force = reaching(axes.forces, 172, 40, zero=True)
     gap = reaching(axes.gaps, 300, 210)
-    picture.x_axis(x_scale, 40, 300, f"{grasps[0].time_words} since both pads touched")
-    picture.y_axis(force, 36, picture.width - 10, "force, N")
+    picture.x_axis(x_scale, 40, 300, f"{grasps[0].time_words} since the squeeze began")
+    picture.y_axis(force, 36, picture.width - 10, f"{grasps[0].force}, N")
     picture.y_axis(gap, 36, picture.width - 10, "gap, mm")
     for column, unit, scale, top, bottom in (
         ("force_n", "N", force, 40.0, 172.0),
@@ -99,8 +99,7 @@ def _legend(picture: Picture, states: Sequence[str], grasps: Sequence[GraspCurve
         picture.line([(36, y - 4), (66, y - 4)], INKS[k], width=2, dash=DASHES[k])
         state = without_underscores(label.partition(":")[2] or label)
         picture.text(72, y, state)
-        peak = max(grasp.peak_force_n for grasp in grasps if grasp.label == label)
-        peaks.append(f"{state} up to {number(peak)} N")
+        peaks.append(f"{state} {peak_in_words(grasp for grasp in grasps if grasp.label == label)}")
     return peaks
 
 
@@ -114,12 +113,12 @@ def one_grasp(grasp: GraspCurve, caption: str) -> str:
     gap = reaching([v for v in grasp.gap_mm if v is not None], 140, 44)
     force = reaching([v for v in grasp.force_n if v is not None], 280, 176, zero=True)
     durations = _phases(picture, grasp, t, x_scale)
-    picture.x_axis(x_scale, 24, 280, f"{grasp.time_words} since both pads touched")
+    picture.x_axis(x_scale, 24, 280, f"{grasp.time_words} since the squeeze began")
     picture.y_axis(gap, 36, picture.width - 10, "gap, mm")
-    picture.y_axis(force, 36, picture.width - 10, "force, N")
+    picture.y_axis(force, 36, picture.width - 10, f"{grasp.force}, N")
     for column, scale, ink, named, top, bottom in (
         ("gap_mm", gap, INKS[0], "gap, mm", 44.0, 140.0),
-        ("force_n", force, INKS[1], "force, N", 176.0, 280.0),
+        ("force_n", force, INKS[1], f"{grasp.force}, N", 176.0, 280.0),
     ):
         points = [(x_scale(time), scale(value)) for time, value in grasp.values(column)]
         with picture.plot(x_scale, scale, top, bottom):

@@ -7,7 +7,7 @@ from html import escape
 from typing import Final
 
 from graspsense.core.values.errors import counted
-from graspsense.report.grasp_curve import GraspCurve
+from graspsense.report.grasp_curve import GraspCurve, peak_in_words
 from graspsense.report.html import Section, figure, paragraph
 from graspsense.report.svg import DASHES, INKS, AxisScale, Picture, reaching
 
@@ -39,8 +39,8 @@ def _over_each_other(curves: Sequence[GraspCurve], labels: Sequence[str], chosen
     x = _times(curves, 36, picture.width - 10)
     force = reaching(_values(curves, "force_n"), 150, 30, zero=True)
     gap = reaching(_values(curves, "gap_mm"), 296, 192)
-    picture.x_axis(x, 30, 296, f"{curves[0].time_words} since both pads touched")
-    picture.y_axis(force, 36, picture.width - 10, "force, N")
+    picture.x_axis(x, 30, 296, f"{curves[0].time_words} since the squeeze began")
+    picture.y_axis(force, 36, picture.width - 10, f"{curves[0].force}, N")
     picture.y_axis(gap, 36, picture.width - 10, "gap, mm")
     for column, unit, scale, top, bottom in (
         ("force_n", "N", force, 30.0, 150.0),
@@ -72,8 +72,7 @@ def _small(curve: GraspCurve, k: int, label: int, chosen: bool) -> str:
     x, y = _times([curve], 2, width - 2), reaching(_values([curve], "force_n"), height - 3, 3, zero=True)
     picture.line(_points(curve, "force_n", x, y), INKS[k % len(INKS)], dash=DASHES[label % len(DASHES)])
     name = f"{curve.trial} {curve.label}"
-    checked = " checked" if chosen else ""
-    peak = f"up to {curve.peak_force_n:.1f} N"
+    checked, peak = " checked" if chosen else "", peak_in_words([curve])
     return (
         f'<label><input type="checkbox" value="{curve.trial}"{checked}> {escape(name)}'
         f"{picture.svg(f'trial {name}: {peak}')}<span>{peak}</span></label>"

@@ -13,6 +13,7 @@ from graspsense.core.components.identification import RecordedSqueeze
 from graspsense.core.learn.labelled import class_of
 from graspsense.core.values.errors import ConfigError, suggestion
 from graspsense.recording.recorded_grasp import RecordedGrasp
+from graspsense.recording.trial_record import TrialRecord
 from graspsense.store.naming import STORE, as_source
 from graspsense.store.stored_grasps import parse_trial_ref
 
@@ -66,7 +67,7 @@ def _of_source(source: str) -> Iterator[RecordedSqueeze]:
 
         path = Path(source).expanduser()
         grasp = read_recorded(path)
-        yield _of_grasp(grasp, path.name, hashlib.sha256(path.read_bytes()).hexdigest())
+        yield _of_grasp(grasp, grasp.record(), path.name, hashlib.sha256(path.read_bytes()).hexdigest())
     else:
         yield from _of_import(source)
 
@@ -80,11 +81,11 @@ def _of_store(folder: str, number: int | None = None) -> Iterator[RecordedSqueez
         complete = (trial.id for trial in store.page(limit=1_000_000) if trial.complete)
         for k in [number] if number is not None else reversed([*complete]):
             trial = store.trial(k)
-            yield _of_grasp(read_recorded(trial.recording), f"{folder}#{k}", trial.recording_sha256)
+            grasp = read_recorded(trial.recording)
+            yield _of_grasp(grasp, trial.record, f"{folder}#{k}", trial.recording_sha256)
 
 
-def _of_grasp(grasp: RecordedGrasp, name: str, sha256: str) -> RecordedSqueeze:
-    record = grasp.record()
+def _of_grasp(grasp: RecordedGrasp, record: TrialRecord, name: str, sha256: str) -> RecordedSqueeze:
     labels = record.labels
     gripper = dict(record.settings.get("gripper", {})) if record.simulated else {}
     warnings = () if record.result is None else record.result.details.get("warnings", ())

@@ -194,7 +194,7 @@ def described(path: Path, where: str, most: int, what: str, cls: type[DescribedT
     try:
         return structured(toml_values(text_of(path, most, what)), cls, f"a {what}")
     except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{where} cannot be read: {error}") from error
+        raise ConfigError(f"{where} cannot be read: {getattr(error, 'strerror', error)}") from error
     except TomlError as error:
         raise ConfigError(f"{where}, line {error.line}: {error}") from error
     except ValidationFailed as misfit:

@@ -161,7 +161,7 @@ def _check_includes(path: Path, folder: Path, seen: set[Path]) -> None:
     try:
         content = first_bytes(path, LARGEST_BYTES)
     except OSError as error:
-        raise ConfigError(f"the model {path} cannot be read: {error}") from error
+        raise ConfigError(f"the model {path} cannot be read: {error.strerror}") from error
     if len(content) > LARGEST_BYTES:
         raise ConfigError(f"the model {path} has more than {LARGEST_BYTES} bytes")
     text = content.decode("utf-8", errors="replace")

@@ -162,7 +162,7 @@ class SensorBackend(ABC, Generic[ConfigT]):
         """
         del viewer
         raise ConfigError(
-            f"{type(self).__name__} has no picture of its grasps. --plot draws the measured forces of any gripper"
+            "this gripper has no picture of its grasps. --plot draws the measured forces of any gripper"
         )
 
     @abstractmethod

@@ -235,7 +235,7 @@ def sets_of(
         thresholds[classes[k]] = LabelThreshold(score=score, units=of_label)
     if all(threshold.score is None for threshold in thresholds.values()):
         most = max((threshold.units for threshold in thresholds.values()), default=0)
-        reason = f"{most} calibration {unit} at most of a label, {100 * coverage:.0f} % needs {needed}"
+        reason = f"a label has at most {most} calibration {unit}, and {100 * coverage:.0f} % needs {needed}"
         return PredictionSets(coverage=coverage, unit=unit, thresholds={}, reason=reason)
     numbers = range(int(answers.support_class.max()) + 1)
     of_support = [

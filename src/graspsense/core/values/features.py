@@ -122,10 +122,7 @@ def misfit(taker: str, names: Sequence[str], units: Sequence[str], given: Featur
     """
     lacking = [name for name in names if name not in given.names]
     if lacking:
-        return (
-            f"{taker} takes the features {', '.join(names)}; there is no {', '.join(lacking)} here (there are: "
-            f"{', '.join(given.names)})"
-        )
+        return f"{taker} takes the features {listed(names)}; there is no {listed(lacking)} among {listed(given.names)}"
     unit_of = dict(zip(given.names, given.units, strict=True))
     for name, unit in zip(names, units, strict=True):
         if unit and unit_of[name] and unit != unit_of[name]:
@@ -229,7 +226,7 @@ class Prediction:
 
     @property
     def set_in_words(self) -> str:
-        """The set with its coverage, such as `full_open or empty_open, 90 % of all sets`; empty without a set."""
+        """The set, such as `full_open or empty_open (right in 90 % of grasps)`; empty without a set."""
         return self.coverage_in_words(" or ".join(self.prediction_set))
 
     def coverage_in_words(self, labels: str) -> str:
@@ -239,7 +236,7 @@ class Prediction:
         """
         if self.coverage is None:
             return ""
-        return f"{labels}, {certainty_words(self.coverage)} of all sets{self._for_which}"
+        return f"{labels} (right in {certainty_words(self.coverage)} of grasps{self._for_which})"
 
     @property
     def _for_which(self) -> str:
@@ -337,7 +334,7 @@ class CheckpointPrediction:
 
     @property
     def words(self) -> str:
-        """The checkpoint with the prediction: `0.2 s after the contact: can:full or can:empty, 90 % of all sets`.
+        """The checkpoint with the prediction: `0.2 s after the contact: soft or hard (right in 90 % of grasps)`.
 
         A set with one label has the certainty of the answer in place of that of the sets. Of a set with more than three
         labels, only the first is named, so that it stays one line in a terminal.

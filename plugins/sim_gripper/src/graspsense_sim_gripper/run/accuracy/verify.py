@@ -215,9 +215,7 @@ class TrialGrasps:
         percent = 100 * self.work // MOST_WORK
         # Compiling takes seconds too, but no work.
         if percent > 0 and time.monotonic() - self._reported_s > PROGRESS_S:
-            _LOG.warning(
-                "selecting the steps for the object: %d %% of the allowed ticks and steps used", percent
-            )
+            _LOG.warning("choosing the steps of the simulation: %d %% of the allowed work done", percent)
             self._reported_s = time.monotonic()
 
 
