@@ -159,7 +159,7 @@ function heat(message) {
   // Unloaded cells differ, so what is shown is the change since the first image, on the scale of all images so far.
   state.zero ??= channel.dtype === "uint8" ? [] : sizes;
   const changes = sizes.map((size, k) => (typeof size === "number" ? size - (state.zero[k] ?? 0) : NaN));
-  for (const one of changes) if (!Number.isNaN(one)) [state.least, state.most] = [Math.min(state.least, one), Math.max(state.most, one)];
+  for (const change of changes) if (!Number.isNaN(change)) [state.least, state.most] = [Math.min(state.least, change), Math.max(state.most, change)];
   const {least, most} = state;
   for (let k = 0; k < cells; k++) {
     if (colours) picture.data.set([...message.cells.slice(3 * k, 3 * k + 3), 255], 4 * k);
