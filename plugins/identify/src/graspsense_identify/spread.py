@@ -75,14 +75,11 @@ class Uncertainty:
     width_m: Components
 
 
-def uncertainty(
-    fitted: Fitted, force_scale: float = 0.0, lag_error_s: float = 0.0, of_each: Fitted | None = None
-) -> Uncertainty:
+def uncertainty(fitted: Fitted, force_scale: float = 0.0, lag_error_s: float = 0.0) -> Uncertainty:
     """Return the uncertainty of a fit.
 
     `force_scale`: standard deviation of the logarithm of the force's scale. `lag_error_s`: that of the lag of the force
-    (s), beyond what the squeezes show by their scatter; 0 if the lag was not identified. `of_each`: a fit with other
-    widths and factors, of which the spreads are.
+    (s), beyond what the squeezes show by their scatter; 0 if the lag was not identified.
     """
     rng = np.random.default_rng(0)
     names = [squeeze.instance for squeeze in fitted.squeezes]
@@ -110,8 +107,8 @@ def uncertainty(
         high=tuple(high.tolist()),
         basis=basis,
         draws=best * _changed(factor / normal() * drawn),
-        stiffness=_components(np.log((of_each or fitted).factors), names),
-        width_m=_components(np.array((of_each or fitted).widths_m), names),
+        stiffness=_components(np.log(fitted.factors), names),
+        width_m=_components(np.array(fitted.widths_m), names),
     )
 
 
