@@ -27,7 +27,7 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.sensing import with_listed_cells
 from graspsense_sim_gripper.run.batch.buffers import as_lists, begin_images, longer, new_buffers
 from graspsense_sim_gripper.run.build import device_info
-from graspsense_sim_gripper.run.compiled.compose import grasp_loop, guarded_loop
+from graspsense_sim_gripper.run.compiled.compose import grasp_loop
 from graspsense_sim_gripper.run.compiled.padding import PaddedLayout, composition_of, unpadded
 from graspsense_sim_gripper.run.loop import (
     NOT_STARTED,
@@ -49,15 +49,12 @@ from graspsense_sim_gripper.run.model_report import (
 from graspsense_sim_gripper.run.nested import Stored
 from graspsense_sim_gripper.run.problem import GraspController, GraspSetup
 from graspsense_sim_gripper.run.recorded_trace import recorded_trace
-from graspsense_sim_gripper.run.term_failure import not_finite_in_tick, raised_in_term
+from graspsense_sim_gripper.run.term_failure import not_finite_in_tick
 from graspsense_sim_gripper.scene.random_numbers import key_of
-from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
 from graspsense_sim_gripper.solve.state import PlantState
 
 Extracted = Any
 """What `Job.extract` returns, such as features."""
-GraspLoop = Callable[[GraspParams, SimulationState, Buffers], SimulationState]
-"""The loop of a grasp, compiled or in the interpreter."""
 Measure = Callable[[Any, Any, Any, int], Any]
 """`compiled.extraction.measure_buffers` of a job, compiled."""
 
@@ -159,17 +156,7 @@ class Job:
 
 def grasp_plain(job: Job, setup: GraspSetup, model: GraspModel = NO_MODEL) -> FinishedGrasp:
     """Simulate a grasp in the interpreter; `model`: that of its object, for the report."""
-    composition, step = composition_of(setup, pad=False), type(job.controller).step
-    try:
-        return _interpreted(job, setup, grasp_loop(composition, step), model)
-    except LAW_ERRORS as error:
-        if not raised_in_term(error, setup.kinds):
-            raise
-    return _interpreted(job, setup, guarded_loop(composition, step), model)
-
-
-def _interpreted(job: Job, setup: GraspSetup, loop: GraspLoop, model: GraspModel) -> FinishedGrasp:
-    """Simulate a grasp in the interpreter with this loop."""
+    loop = grasp_loop(composition_of(setup, pad=False), type(job.controller).step)
     params, state = started(job, setup)
     params = params._replace(sensor=with_listed_cells(setup.sensor))
     key, arrays = None, new_buffers()
