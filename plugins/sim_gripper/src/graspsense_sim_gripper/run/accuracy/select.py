@@ -20,7 +20,7 @@ from attrs import evolve
 
 from graspsense.plugin_api import ConfigError
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.run.accuracy.cache import ChosenStepsCache
+from graspsense_sim_gripper.run.accuracy.cache import find, keep, key_of
 from graspsense_sim_gripper.run.accuracy.chosen_steps import (
     QUANTITIES,
     ChosenSteps,
@@ -59,7 +59,6 @@ MOST_FOR_FEATURES: Final = 2
 """Further models that are tried where features of the pipeline are less accurate than those of the paper. A feature
 that shorter steps do not give is one that depends on ticks."""
 
-_SELECTED: Final = ChosenStepsCache()
 
 
 def select(
@@ -83,12 +82,12 @@ def select(
     """
     if problem.config.fidelity == "fixed":
         return propose(problem, None)
-    key = _SELECTED.key(problem, controller)
-    chosen = _SELECTED.get(key)
+    key = key_of(problem, controller)
+    chosen = find(key)
     if chosen is None:
         trial = trial_grasps(problem, controller, compiled=compiled, padding=padding)
         chosen = _select_within_limit(problem, trial)
-        _SELECTED.put(key, chosen)
+        keep(key, chosen)
     return chosen
 
 
