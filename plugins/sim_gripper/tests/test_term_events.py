@@ -18,8 +18,7 @@ from graspsense.cli.main import cli
 from graspsense.plugin_api import create
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.batch import run_many
-from graspsense_sim_gripper.run.compiled.compose import composed_move, contact_solver, grasp_loop
-from graspsense_sim_gripper.run.compiled.padding import composition_of
+from graspsense_sim_gripper.run.compiled.compose import composed_move, composition, contact_solver, grasp_loop
 from graspsense_sim_gripper.scene.spec import ObjectSpec
 from graspsense_sim_gripper.scene.terms import Term
 from graspsense_sim_gripper.scene.terms.registry import TERMS
@@ -63,7 +62,7 @@ def pressed(terms, config=None, seconds=0.1, effort_n=60.0, held=False, **steps)
     spec = ObjectSpec(name="object", width_m=0.05, terms=tuple(terms.items()), held=held)
     setup = unverified_setup(config, spec, 0)
     plant, state = setup.plant._replace(steps=setup.plant.steps._replace(**steps)), setup.state
-    move, forces = composed_move(composition_of(setup, pad=False)), []
+    move, forces = composed_move(composition(setup.kinds, setup.plant)), []
     for _ in range(round(seconds / 1e-3)):
         state = move(plant, state, effort_n, 1e-3)
         forces.append(state.contact.left_n)
@@ -128,7 +127,7 @@ def test_steps_of_a_tick_keep_their_order_through_an_event(event):
     }[event]
     spec = ObjectSpec(name="object", width_m=0.05, terms=tuple(terms.items()))
     setup = unverified_setup(config, spec, 0)
-    move = composed_move(composition_of(setup, pad=False))
+    move = composed_move(composition(setup.kinds, setup.plant))
 
     def end(n):
         state = setup.state
@@ -272,7 +271,7 @@ def test_an_object_that_is_too_heavy_to_push_stops_the_finger_and_does_not_throw
     terms = (("elastic", {"k1_n_m": 2e3}),)
     spec = ObjectSpec(name="anvil", width_m=0.05, offset_m=0.005, mass_kg=300.0, terms=terms)
     setup = unverified_setup(config, spec, 0)
-    move, state, gaps = composed_move(composition_of(setup, pad=False)), setup.state, []
+    move, state, gaps = composed_move(composition(setup.kinds, setup.plant)), setup.state, []
     for _ in range(300):
         state = move(setup.plant, state, 23.0, 1e-3)
         gaps.append(state.motion.gap_m)

@@ -60,7 +60,6 @@ MOST_FOR_FEATURES: Final = 2
 that shorter steps do not give is one that depends on ticks."""
 
 
-
 def select(
     problem: Problem,
     controller: GraspController,

@@ -27,7 +27,7 @@ from graspsense_sim_gripper.run.compiled.loop_code import (
     CompiledLoops,
     LoopStart,
 )
-from graspsense_sim_gripper.run.compiled.padding import PaddedLayout, padded
+from graspsense_sim_gripper.run.compiled.padding import padded
 from graspsense_sim_gripper.run.loop import Buffers, LoopEnd, before_failure
 from graspsense_sim_gripper.run.model_report import GraspModel
 from graspsense_sim_gripper.run.problem import GraspSetup
@@ -44,7 +44,8 @@ class CompiledStart(NamedTuple):
     """Returns the same grasp as named tuples, which is needed if a term fails in it."""
     key: Word | None
     """That of its seed; None: its sensors are ideal."""
-    layout: PaddedLayout
+    terms: tuple[int, ...]
+    """The places of the object's own terms."""
     model: GraspModel
 
 
@@ -80,7 +81,7 @@ class CompiledGrasps:
             start=start,
             setup=partial(scene.setup, seed, number),
             key=key if drawn.has_cells else None,
-            layout=drawn.layout,
+            terms=drawn.terms,
             model=scene.model,
         )
         return grasp_compiled(self.scenes.job, loop, prepared, self.storage, self.measure)
@@ -100,7 +101,7 @@ def grasp_compiled(
         return grasp_plain(job, prepared.setup(), prepared.model)
     outcome, reason = ended_as(job, end)
     if end.failed == 1:
-        setup = padded(prepared.setup(), prepared.layout.kinds)
+        setup = padded(prepared.setup())
         begin_images(buffers)
         last_plant = before_failure(loop, *started(job, setup), buffers, end.ticks)
         effort_n, plant = state().loop.tick.effort_n, lambda: last_plant
@@ -114,7 +115,7 @@ def grasp_compiled(
         extracted=extracted,
         kept=kept,
         model=prepared.model,
-        layout=prepared.layout,
+        terms=prepared.terms,
     )
 
 

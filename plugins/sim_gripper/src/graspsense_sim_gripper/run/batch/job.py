@@ -27,8 +27,8 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.sensing import with_listed_cells
 from graspsense_sim_gripper.run.batch.buffers import as_lists, begin_images, longer, new_buffers
 from graspsense_sim_gripper.run.build import device_info
-from graspsense_sim_gripper.run.compiled.compose import grasp_loop
-from graspsense_sim_gripper.run.compiled.padding import PaddedLayout, composition_of, unpadded
+from graspsense_sim_gripper.run.compiled.compose import composition, grasp_loop
+from graspsense_sim_gripper.run.compiled.padding import unpadded
 from graspsense_sim_gripper.run.loop import (
     NOT_STARTED,
     Buffers,
@@ -73,20 +73,20 @@ class FinishedGrasp:
     """The trace; None if traces are not kept."""
     model: GraspModel = NO_MODEL
     """The model in which it was simulated."""
-    layout: PaddedLayout | None = None
-    """The layout of the terms in `end`; None: they are those of the object."""
+    terms: tuple[int, ...] | None = None
+    """The places of the object's own terms in `end`; None: it has no others."""
 
     @property
     def state(self) -> PlantState:
         """The plant at the end of the grasp, with the true peak force."""
         end = self.end()
-        return end if self.layout is None else unpadded(end, self.layout)
+        return end if self.terms is None else unpadded(end, self.terms)
 
     def report(self) -> dict[str, Any]:
         """Return the `model_report` of the grasp, with what its model does not verify."""
         kinds, chosen, unstable_loop = self.model
-        if isinstance(self.end, Stored) and self.layout is not None:
-            report = stored_report(self.end.type, self.layout, kinds).report(self.end.numbers)
+        if isinstance(self.end, Stored) and self.terms is not None:
+            report = stored_report(self.end.type, self.terms, kinds).report(self.end.numbers)
         else:
             report = model_report(self.state, kinds)
         if chosen is not None:
@@ -156,7 +156,7 @@ class Job:
 
 def grasp_plain(job: Job, setup: GraspSetup, model: GraspModel = NO_MODEL) -> FinishedGrasp:
     """Simulate a grasp in the interpreter; `model`: that of its object, for the report."""
-    loop = grasp_loop(composition_of(setup, pad=False), type(job.controller).step)
+    loop = grasp_loop(composition(setup.kinds, setup.plant), type(job.controller).step)
     params, state = started(job, setup)
     params = params._replace(sensor=with_listed_cells(setup.sensor))
     key, arrays = None, new_buffers()
