@@ -23,7 +23,6 @@ from graspsense_identify.fracture import fracture_of, not_broken
 from graspsense_identify.held_out import held_out_errors
 from graspsense_identify.interval import identified, identified_mean
 from graspsense_identify.laws import scale_of
-from graspsense_identify.path_error import without_path_error
 from graspsense_identify.prepare import NoSqueeze, Squeeze, prepared
 from graspsense_identify.refuse import refusals, shows_memory, undetermined
 from graspsense_identify.share import WHOLE, Shares, measured_shares
@@ -80,13 +79,13 @@ def identify(
     used, delay = with_delay(timed, lag_of, shown)
     progress("computing intervals", 0, 1)
     chosen, shares = used.choice, used.shares
-    fitted, intervals = _with_uncertainty(used, delay)
-    fracture = fracture_of(chosen.fitted, shares.scatter)
+    fitted, intervals = chosen.fitted, _uncertainty(used, delay)
+    fracture = fracture_of(fitted, shares.scatter)
     values, parameters = _values(fitted, intervals, shares)
     parameters += delay.parameters
     parameters += fracture.parameters
     open_ = [*delay.undetermined, *undetermined(fitted, intervals, shares), *fracture.undetermined]
-    fits, held_out = _fits(fitted), held_out_errors(chosen.fitted)
+    fits, held_out = _fits(fitted), held_out_errors(fitted)
     result = Identification(
         label=next((squeeze.label for squeeze in recorded if squeeze.label), ""),
         scene="",
@@ -130,12 +129,11 @@ def _looks_wrong(squeezes: Sequence[RecordedSqueeze]) -> list[str]:
     return wrong
 
 
-def _with_uncertainty(used: Timed, delay: Delay) -> tuple[Fitted, Uncertainty]:
-    """Return the chosen fit and its uncertainty, both without the error of the path."""
+def _uncertainty(used: Timed, delay: Delay) -> Uncertainty:
+    """Return the uncertainty of the chosen fit."""
     fitted = used.choice.fitted
     scale = used.shares.error / math.sqrt(len(fitted.squeezes))
-    lag_error_s = math.hypot(used.lag.error_s, delay.error_s)
-    return without_path_error(fitted, uncertainty(fitted, scale, lag_error_s))
+    return uncertainty(fitted, scale, math.hypot(used.lag.error_s, delay.error_s))
 
 
 def _ready(

@@ -34,12 +34,11 @@ BLOCKS: Final = 12
 DRAWS: Final = 200
 LARGEST: Final = math.log(30.0)
 """A logarithm changes by at most this in proportion to the force. A larger change is one of a value near zero."""
-PATH_ERROR: Final = 3e-4
+PATH_ERROR: Final = 1e-3
 """Standard deviation of the logarithm of a value that the finite number of nodes of a path causes, at least."""
-PATH_FORCE_ERROR: Final = 3e-5
+PATH_FORCE_ERROR: Final = 1e-4
 """The same of the force, over the peak. With both, the intervals from one squeeze with an ideal sensor cover more than
-nine of ten (`benchmarks/identify.py --sensors ideal --recordings 1`): `path_error` takes most of the error away, and
-what is left is mostly that of the simulated recordings. No recording of a real sensor is as exact."""
+nine of ten (`benchmarks/identify.py --sensors ideal --recordings 1`). No recording of a real sensor is as exact."""
 
 
 class Components(NamedTuple):
