@@ -21,9 +21,9 @@ from graspsense_sim_gripper.run.accuracy.chosen_steps import ChosenSteps
 from graspsense_sim_gripper.run.accuracy.error import GraspRecord, deviation
 from graspsense_sim_gripper.run.accuracy.propose import NOT_VERIFIED
 from graspsense_sim_gripper.run.accuracy.select import select
-from graspsense_sim_gripper.run.batch.buffers import Storage
 from graspsense_sim_gripper.run.batch.compiled_grasps import CompiledStart, grasp_compiled
 from graspsense_sim_gripper.run.batch.job import FinishedGrasp, Job, grasp_plain, started
+from graspsense_sim_gripper.run.buffers import Storage
 from graspsense_sim_gripper.run.build import Problem, instantiate
 from graspsense_sim_gripper.run.compiled.compose import Composition, composition
 from graspsense_sim_gripper.run.compiled.loop_code import CompiledLoops, loop_start

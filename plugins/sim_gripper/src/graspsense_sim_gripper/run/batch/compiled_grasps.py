@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 from attrs import field, frozen
 
-from graspsense_sim_gripper.run.batch.buffers import Storage, begin_images, first_images, longer
 from graspsense_sim_gripper.run.batch.drawn import Drawing, DrawMemory, draw_numbers
 from graspsense_sim_gripper.run.batch.job import (
     FinishedGrasp,
@@ -20,6 +19,7 @@ from graspsense_sim_gripper.run.batch.job import (
     started,
 )
 from graspsense_sim_gripper.run.batch.scenes import Scenes, SelectedScene, number_in
+from graspsense_sim_gripper.run.buffers import Storage, begin_images, first_images, longer
 from graspsense_sim_gripper.run.compiled.loop_code import (
     NO_NOISE,
     CellNoise,

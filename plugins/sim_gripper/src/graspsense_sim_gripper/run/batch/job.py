@@ -25,19 +25,17 @@ from graspsense.simulator_api import (
 )
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.sensing import with_listed_cells
-from graspsense_sim_gripper.run.batch.buffers import as_lists, begin_images, longer, new_buffers
+from graspsense_sim_gripper.run.buffers import as_lists, begin_images, longer, new_buffers
 from graspsense_sim_gripper.run.build import device_info
 from graspsense_sim_gripper.run.compiled.compose import composition, grasp_loop
 from graspsense_sim_gripper.run.compiled.padding import unpadded
 from graspsense_sim_gripper.run.loop import (
-    NOT_STARTED,
     Buffers,
     Ending,
     GraspParams,
     SimulationState,
     before_failure,
     ending,
-    uses_macro_steps,
 )
 from graspsense_sim_gripper.run.model_report import (
     NO_MODEL,
@@ -189,15 +187,7 @@ def grasp_plain(job: Job, setup: GraspSetup, model: GraspModel = NO_MODEL) -> Fi
 
 def started(job: Job, setup: GraspSetup) -> tuple[GraspParams, SimulationState]:
     """Return the parameters of the loop for a grasp, and the state in which it begins."""
-    params = GraspParams(
-        plant=setup.plant,
-        sensor=setup.sensor,
-        controller=job.params,
-        dt_s=setup.dt_s,
-        max_ticks=job.max_ticks,
-        macro_steps=uses_macro_steps(setup.plant.steps),
-    )
-    return params, SimulationState(NOT_STARTED, setup.state, setup.sensor_state, job.initial)
+    return setup.begun(job.params, job.initial, job.max_ticks)
 
 
 def ended_as(job: Job, end: Ending) -> tuple[Outcome, str]:
