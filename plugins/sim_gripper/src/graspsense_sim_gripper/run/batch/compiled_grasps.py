@@ -55,8 +55,6 @@ class CompiledGrasps:
 
     scenes: Scenes
     loops: CompiledLoops
-    is_compiled: Callable[[tuple[str, ...]], bool]
-    """Whether loops with these kinds of terms are compiled."""
     drawing: Drawing = draw_numbers
     """What draws a grasp, compiled or not."""
     measure: Measure | None = None
@@ -64,14 +62,9 @@ class CompiledGrasps:
     storage: Storage = field(factory=Storage, init=False)
     _memory: dict[SelectedScene, DrawMemory] = field(factory=dict, init=False)
 
-    def grasp(self, name: str, seed: int) -> FinishedGrasp | None:
-        """Simulate a grasp of a scene; None if its loop is not compiled.
-
-        Raises NotCompilable if it cannot be compiled, and otherwise as `Scenes.setup` does.
-        """
+    def grasp(self, name: str, seed: int) -> FinishedGrasp:
+        """Simulate a grasp of a scene. Raises NotCompilable, and otherwise as `Scenes.setup` does."""
         scene, number = self.scenes.find(name), number_in(name)
-        if not self.is_compiled(scene.composition.kinds):
-            return None
         loop, drawn = self.loops.loop_of(scene.composition), scene.drawn
         if scene not in self._memory:
             self._memory[scene] = drawn.memory()
