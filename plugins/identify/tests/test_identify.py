@@ -344,7 +344,9 @@ def test_fingertips_that_harden_are_part_of_the_forward_model():
 
 
 def test_a_misspelt_key_of_the_table_identified_is_told():
-    good = 'width_m = 0.05\n[identified]\nlabel = "cup"\n[identified.intervals]\n"elastic.k1_n_m" = [1.0, 2.0]\n'
+    good = (
+        'width_m = 0.05\n[identified]\nlabel = "cup"\n[identified.intervals]\n"elastic.k1_n_m" = [1.0, 2.0]\n'
+    )
     assert parse_scene(good, "cup", "cup.toml").width_m == 0.05
     with pytest.raises(ConfigError, match=r"identified\.labl: no such key"):
         parse_scene(good.replace("label", "labl"), "cup", "cup.toml")
