@@ -30,7 +30,7 @@ from graspsense.report.found_table import markdown_table
 from graspsense.simulator_api import NotCompilable, RunConfig, bind
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.chosen_steps import ChosenSteps
-from graspsense_sim_gripper.run.accuracy.probe import grip_of
+from graspsense_sim_gripper.run.accuracy.probe import FORCE_N, grip_of
 from graspsense_sim_gripper.run.accuracy.propose import propose
 from graspsense_sim_gripper.run.accuracy.select import select
 from graspsense_sim_gripper.run.batch.job import FinishedGrasp, Job, grasp_plain
@@ -81,10 +81,10 @@ class Ready:
     move: Callable[[PlantParams, PlantState, float, float], PlantState]
 
 
-def ready(config: SimConfig, spec: ObjectSpec) -> Ready:
-    """Return the plant of this scene, as the backend has it."""
+def ready(config: SimConfig, spec: ObjectSpec, force_n: float = FORCE_N) -> Ready:
+    """Return the plant of this scene, as the backend has it where a trial grasp has this peak force (N)."""
     problem = Problem(config, spec)
-    chosen = propose(problem, grip_of(problem))
+    chosen = propose(problem, grip_of(problem, force_n))
     setup = instantiate(problem, chosen, 0)
     move = plant_move(laws_of(setup.kinds))
     return Ready(setup=setup, chosen=chosen, params=setup.plant, move=move)
@@ -114,10 +114,8 @@ def press(
         config,
         # The contact lies inside a tick of any length used here; at the very end of a tick it would depend on rounding.
         open_gap_m=min(spec.width_m + 2.0 * abs(spec.offset_m) + 0.0537 * speed_m_s, 0.09),
-        expected_speed_m_s=max(speed_m_s, 1e-6),
-        expected_force_n=max(effort_n, 1.0),
     )
-    plant = ready(config, spec)
+    plant = ready(config, spec, max(effort_n, 1.0))
     drive, state, dt = plant.setup.plant.drive, plant.setup.state, plant.setup.dt_s
     # The fingers start at their speed, so that the result does not depend on the tick of a slow controller.
     motion = state.motion
@@ -336,7 +334,7 @@ def hertz_energy(short: bool) -> Iterator[Row]:
     """With the drive off, a contact of Hertz returns the kinetic energy: 2/5 k d^2.5 is stored meanwhile."""
     mass, speed = BASE.moving_mass_kg, 0.05
     for hertz in (1e5, 1e7) if short else (1e4, 1e5, 1e6, 1e7, 1e8):
-        config = evolve(SMOOTH, damping_n_s_m=0.0, open_gap_m=0.0505, expected_speed_m_s=speed)
+        config = evolve(SMOOTH, damping_n_s_m=0.0, open_gap_m=0.0505)
         plant = ready(config, object_of(("rigid", {"hertz_n_m15": hertz})))
         state = plant.setup.state
         motion = state.motion

@@ -81,7 +81,7 @@ def _our_engine(config: SimConfig, setting: str) -> Engine:
     job = Job(config=config, controller=Law(None), run=RunConfig(hold_s=0.0), extract=None, traces=True)
     scenes = Scenes(job)
     scenes.add(config.object, compiled=True)
-    grasps = CompiledGrasps(scenes, CompiledLoops(Law.step), lambda kinds: True)
+    grasps = CompiledGrasps(scenes, CompiledLoops(Law.step))
     grasps.grasp(config.object, 0)
 
     def grasp() -> Trace:

@@ -21,13 +21,13 @@ from graspsense_sim_gripper.run.accuracy.chosen_steps import ChosenSteps
 from graspsense_sim_gripper.run.accuracy.error import GraspRecord, deviation
 from graspsense_sim_gripper.run.accuracy.propose import NOT_VERIFIED
 from graspsense_sim_gripper.run.accuracy.select import select
-from graspsense_sim_gripper.run.batch.buffers import Storage
 from graspsense_sim_gripper.run.batch.compiled_grasps import CompiledStart, grasp_compiled
 from graspsense_sim_gripper.run.batch.job import FinishedGrasp, Job, grasp_plain, started
+from graspsense_sim_gripper.run.buffers import Storage
 from graspsense_sim_gripper.run.build import Problem, instantiate
-from graspsense_sim_gripper.run.compiled.compose import Composition
+from graspsense_sim_gripper.run.compiled.compose import Composition, composition
 from graspsense_sim_gripper.run.compiled.loop_code import CompiledLoops, loop_start
-from graspsense_sim_gripper.run.compiled.padding import composition_of, layout_of, padded
+from graspsense_sim_gripper.run.compiled.padding import padded, places_of
 from graspsense_sim_gripper.run.model_report import NO_MODEL
 from graspsense_sim_gripper.run.problem import GraspController, GraspSetup
 from graspsense_sim_gripper.run.sampled_loop import instability
@@ -188,11 +188,12 @@ class Bench:
         if not self.compiled:
             return grasp_plain(job, setup)
         full = padded(setup, KINDS)
-        composition = composition_of(full, pad=False)
-        if composition not in self._loops:
-            self._loops[composition] = CompiledLoops(type(job.controller).step).loop_of(composition)
+        composed = composition(full.kinds, full.plant)
+        if composed not in self._loops:
+            self._loops[composed] = CompiledLoops(type(job.controller).step).loop_of(composed)
         # Of a seed, but with ideal sensors, which draw nothing.
         key = None if full.sensor.ideal == 1 else key_of(full.seed)
-        layout = layout_of(full, full.kinds)
-        start = CompiledStart(loop_start(*started(job, full)), lambda: full, key, layout, NO_MODEL)
-        return grasp_compiled(job, self._loops[composition], start, self._storage)
+        start = CompiledStart(
+            loop_start(*started(job, full)), lambda: full, key, places_of(full.kinds), NO_MODEL
+        )
+        return grasp_compiled(job, self._loops[composed], start, self._storage)

@@ -123,7 +123,7 @@ DEFAULTS = {table: resolve().values[table] for table in ("gripper", "controller"
     [
         ("", None, ""),
         ("gripper.object=can:empty_open run.seed=4", None, ""),
-        ("gripper.explain=true gripper.compile=never gripper.expected_force_n=20", None, ""),
+        ("gripper.explain=true gripper.compile=never", None, ""),
         ("controller.probing_force_n=17", None, "probing force 20 N, this one was with 17 N"),
         ("controller.closing_speed_m_s=0.05", None, "closing speed 10 mm/s, this one was with 50 mm/s"),
         ("gripper.transmission=pr2_paper", None, "transmission pr2, this one was with pr2_paper"),

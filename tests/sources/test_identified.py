@@ -106,6 +106,9 @@ def test_scenes_that_cannot_be_trained_on_together_are_refused(tmp_path):
         identified_scenes(f"identified:{cup},{other}")
     with pytest.raises(ConfigError, match="no table"):
         identified_scenes(f"identified:{own}")
+    own.write_text(CUP.replace("8000.0", "'8000'"))
+    with pytest.raises(ConfigError, match="pad_stiffness_n_m: '8000' is not a number"):
+        identified_scenes(f"identified:{own}")
     with pytest.raises(ConfigError, match=r"no\.toml"):
         identified_scenes(f"identified:{tmp_path / 'no.toml'}")
 

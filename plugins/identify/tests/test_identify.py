@@ -343,16 +343,13 @@ def test_fingertips_that_harden_are_part_of_the_forward_model():
     assert fitted.values == pytest.approx((1500.0,), rel=1e-3)
 
 
-def test_the_table_identified_of_a_scene_is_checked():
-    good = '[identified]\nlabel = "cup"\n[identified.intervals]\n"elastic.k1_n_m" = [1.0, 2.0]\n'
-    assert parse_scene("width_m = 0.05\n" + good, "cup", "cup.toml").width_m == 0.05
-    for bad, message in (
-        ("[identified]\nlabl = 1\n", "identified.labl: no such key"),
-        ("[identified.intervals]\nk = [1.0]\n", "identified.intervals.k: .* is not two numbers"),
-        ("[identified.recordings]\na = 3\n", "is not the hash of a recording"),
-    ):
-        with pytest.raises(ConfigError, match=message):
-            parse_scene("width_m = 0.05\n" + bad, "cup", "cup.toml")
+def test_a_misspelt_key_of_the_table_identified_is_told():
+    good = (
+        'width_m = 0.05\n[identified]\nlabel = "cup"\n[identified.intervals]\n"elastic.k1_n_m" = [1.0, 2.0]\n'
+    )
+    assert parse_scene(good, "cup", "cup.toml").width_m == 0.05
+    with pytest.raises(ConfigError, match=r"identified\.labl: no such key"):
+        parse_scene(good.replace("label", "labl"), "cup", "cup.toml")
 
 
 def test_what_looks_wrong_in_a_recording_is_told_and_a_force_in_another_unit_as_well():

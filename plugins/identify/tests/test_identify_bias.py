@@ -1,4 +1,4 @@
-"""Errors that all squeezes have in common, which no scatter shows: of the nodes of a path, and of the share."""
+"""Errors that all squeezes have in common, which no scatter shows, and how wide intervals are."""
 
 import numpy as np
 import pytest
@@ -11,8 +11,7 @@ from squeezes import ready
 from graspsense_identify.fit import fit
 from graspsense_identify.forward import RIGID_PADS, ForwardModel
 from graspsense_identify.interval import interval_of_mean, normal, student
-from graspsense_identify.laws import memories, scale_of, static_candidates
-from graspsense_identify.path_error import NODES_PER_TICK, on_fine_path, path_bias
+from graspsense_identify.laws import scale_of, static_candidates
 from graspsense_identify.prepare import prepared
 from graspsense_identify.share import measured_share
 from graspsense_identify.spread import _scale_errors, at_least, uncertainty
@@ -26,42 +25,6 @@ def squeeze_of(name, seed=7, **gripper):
     text = scene_text(SCENES[name], 0.0).replace("share_spread = 0.01", "share_spread = 0.0")
     (squeeze,) = squeezes_of(text, name, gripper, ["1"], [seed])
     return squeeze
-
-
-def errors_of(name):
-    """Return the errors of the fitted logarithms, with an ideal sensor, before and after that of the path is taken."""
-    squeeze = prepared(squeeze_of(name, sensor="ideal", accuracy=1e-3), 0.0)
-    model = ForwardModel(pads=drive_and_pads(SimConfig())[1])
-    scale = scale_of([squeeze])
-    true = [value for term in SCENES[name] for key, value in term.items() if key != "type"]
-    keys = [key for term in SCENES[name] for key in term if key != "type"]
-    spring = static_candidates(scale)[0]
-    joined = (spring.joined(memory) for memory in memories(scale))
-    (candidate,) = (candidate for candidate in joined if [free.name for free in candidate.free] == keys)
-    fitted = fit(model, candidate, [squeeze])
-    biased = np.log(np.array(fitted.values) / true)
-    return biased, biased - path_bias(fitted)
-
-
-@pytest.mark.slow
-def test_the_force_of_a_damper_right_after_the_contact_needs_nodes_between_the_ticks():
-    biased, after = errors_of("creeping and damped")
-    assert np.abs(biased).max() > 1e-3
-    assert np.abs(after).max() < 3e-4
-
-
-@pytest.mark.slow
-def test_a_recording_with_fewer_ticks_than_nodes_has_no_finer_path():
-    squeeze = prepared(squeeze_of("spring", sensor="ideal"), 0.0)
-    times, gaps = squeeze.course
-    twice = evolve(squeeze, course=(np.repeat(times, 2), np.repeat(gaps, 2)))
-    for fine in (on_fine_path(squeeze), on_fine_path(twice)):
-        assert len(fine.t_s) > NODES_PER_TICK * len(squeeze.t_s)
-        assert np.min(np.diff(fine.t_s)) > 1e-9
-    coarse = evolve(squeeze, course=(times[::100], gaps[::100]))
-    model = ForwardModel(pads=drive_and_pads(SimConfig())[1])
-    fitted = fit(model, static_candidates(scale_of([squeeze]))[0], [squeeze])
-    assert not path_bias(evolve(fitted, squeezes=[coarse])).any()
 
 
 @pytest.mark.parametrize("name", ["spring", pytest.param("stiffening", marks=pytest.mark.slow)])

@@ -46,7 +46,7 @@ def shell(k1=2000.0):
 
 def select(config=CONFIG, spec=None, **settings):
     """Return the model that a process selects which begins now."""
-    selection._SELECTED.clear()
+    cache.forget()
     return again(config, spec, **settings)
 
 
@@ -72,7 +72,7 @@ def test_memory_is_bounded(monkeypatch):
     select()
     for k in range(3):
         again(spec=shell(1000.0 + k))
-    assert len(selection._SELECTED) == 2
+    assert len(cache._IN_MEMORY) == 2
 
 
 def test_the_next_process_finds_what_was_selected(trials, folder):

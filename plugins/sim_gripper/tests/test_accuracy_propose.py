@@ -56,9 +56,8 @@ def test_run_reports_each_decision_with_its_number():
     assert (selection["accuracy"], selection["fidelity"], report["resolved"]) == (0.01, "scene", True)
     assert selection["level"] == PLAIN[0].level(0.01)._asdict()
     assert selection["verified"]["error"] <= 0.005
-    # The probing force less friction, and what the controller is set to.
+    # The probing force less friction.
     assert 10.0 < selection["expected_force_n"] < 25.0
-    assert selection["expected_speed_m_s"] == 0.01
     rows = {row["subject"]: row for row in selection["decisions"]}
     assert rows.keys() == {"steps", "contact"}
     assert all(row.keys() == {"subject", "decision", "what", "number"} for row in rows.values())

@@ -38,8 +38,9 @@ from graspsense.plugin_api import (
 )
 from graspsense.simulator_api import CompiledExtraction, NotHandedOver
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.run import buffers
 from graspsense_sim_gripper.run.backend import SimBackend
-from graspsense_sim_gripper.run.batch import buffers, threads
+from graspsense_sim_gripper.run.batch import threads
 from graspsense_sim_gripper.run.batch.drawn import draw_numbers
 from graspsense_sim_gripper.run.batch.job import Job, grasp_plain
 from graspsense_sim_gripper.run.batch.scenes import Scenes

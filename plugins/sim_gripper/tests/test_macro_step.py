@@ -15,8 +15,7 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.state import Contact, Motion
 from graspsense_sim_gripper.run.batch import run_many
 from graspsense_sim_gripper.run.binding import bind_reachable
-from graspsense_sim_gripper.run.compiled.compose import plant_move, step_parts, uncompressed
-from graspsense_sim_gripper.run.compiled.padding import composition_of
+from graspsense_sim_gripper.run.compiled.compose import composition, plant_move, step_parts, uncompressed
 from graspsense_sim_gripper.scene.terms.registry import laws_of
 from graspsense_sim_gripper.solve.macro_step import macro_step, next_ticks
 from graspsense_sim_gripper.solve.scheme import Steps
@@ -36,7 +35,7 @@ class Plant:
 
     def __init__(self, scene):
         setup = unverified_setup(CONFIG, scene, 0)
-        composed = composition_of(setup, pad=False)
+        composed = composition(setup.kinds, setup.plant)
         self.params = setup.plant._replace(steps=MACRO)
         self._macro_step = bind_reachable(macro_step, step_parts(composed))
         self._move = plant_move(laws_of(setup.kinds), converges=False, lags=False)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from functools import partial
 from typing import NamedTuple
 
@@ -14,11 +15,10 @@ from click.testing import CliRunner
 from unverified import unverified_setup
 
 from graspsense.cli.main import cli
-from graspsense.plugin_api import ConfigError, create
+from graspsense.plugin_api import create
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.batch import run_many
-from graspsense_sim_gripper.run.compiled.compose import composed_move, contact_solver, grasp_loop
-from graspsense_sim_gripper.run.compiled.padding import composition_of
+from graspsense_sim_gripper.run.compiled.compose import composed_move, composition, contact_solver, grasp_loop
 from graspsense_sim_gripper.scene.spec import ObjectSpec
 from graspsense_sim_gripper.scene.terms import Term
 from graspsense_sim_gripper.scene.terms.registry import TERMS
@@ -62,7 +62,7 @@ def pressed(terms, config=None, seconds=0.1, effort_n=60.0, held=False, **steps)
     spec = ObjectSpec(name="object", width_m=0.05, terms=tuple(terms.items()), held=held)
     setup = unverified_setup(config, spec, 0)
     plant, state = setup.plant._replace(steps=setup.plant.steps._replace(**steps)), setup.state
-    move, forces = composed_move(composition_of(setup, pad=False)), []
+    move, forces = composed_move(composition(setup.kinds, setup.plant)), []
     for _ in range(round(seconds / 1e-3)):
         state = move(plant, state, effort_n, 1e-3)
         forces.append(state.contact.left_n)
@@ -127,7 +127,7 @@ def test_steps_of_a_tick_keep_their_order_through_an_event(event):
     }[event]
     spec = ObjectSpec(name="object", width_m=0.05, terms=tuple(terms.items()))
     setup = unverified_setup(config, spec, 0)
-    move = composed_move(composition_of(setup, pad=False))
+    move = composed_move(composition(setup.kinds, setup.plant))
 
     def end(n):
         state = setup.state
@@ -175,7 +175,7 @@ class Stuff(NamedTuple):
 LAWS = {
     "nan": lambda p, state, d0, d1, h, v1: (p.k_n_m * d1 * (1.0 if d1 < p.limit else math.nan), state),
     "inf": lambda p, state, d0, d1, h, v1: ((p.k_n_m * d1 if d1 < p.limit else math.inf), state),
-    "raises": lambda p, state, d0, d1, h, v1: (p.k_n_m * math.sqrt(p.limit - d1), state),
+    "raises": lambda p, state, d0, d1, h, v1: (p.k_n_m * d1 + 0.0 * math.sqrt(p.limit - d1), state),
 }
 
 STUFF = scene_of(("elastic", {"k1_n_m": 500.0}), ("stuff", {"k_n_m": 2000.0, "limit": 0.002}))
@@ -217,10 +217,13 @@ def test_a_single_grasp_names_the_term_too(stuff):
     assert "term 'stuff' gave the force nan" in trial["reason"]
 
 
-def test_a_law_that_raises_is_refused_by_name(stuff):
-    says = r"stuff.toml: term 'stuff' raised ValueError: .* at a compression of"
-    with pytest.raises(ConfigError, match=says):
-        run_many(SimConfig(spread=False), create("controller", "hybrid"), [stuff("raises")], [0])
+@every_case("compiled", [False, True])
+def test_a_law_that_raises_ends_the_grasp_with_the_name_of_the_term(stuff, compiled):
+    config = SimConfig(spread=False, sensor="ideal", open_gap_m=0.052)
+    done = run_many(config, create("controller", "hybrid"), [stuff("raises")], [0], compiled=compiled)[0]
+    assert done.outcome.words == "aborted"
+    assert re.search(r"term 'stuff' raised ValueError: .* at a compression of 2", done.reason)
+    assert len(done.trace.t_s) > 100
 
 
 def sloshing(frequency_hz):
@@ -268,7 +271,7 @@ def test_an_object_that_is_too_heavy_to_push_stops_the_finger_and_does_not_throw
     terms = (("elastic", {"k1_n_m": 2e3}),)
     spec = ObjectSpec(name="anvil", width_m=0.05, offset_m=0.005, mass_kg=300.0, terms=terms)
     setup = unverified_setup(config, spec, 0)
-    move, state, gaps = composed_move(composition_of(setup, pad=False)), setup.state, []
+    move, state, gaps = composed_move(composition(setup.kinds, setup.plant)), setup.state, []
     for _ in range(300):
         state = move(setup.plant, state, 23.0, 1e-3)
         gaps.append(state.motion.gap_m)

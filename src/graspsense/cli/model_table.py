@@ -98,7 +98,7 @@ def print_selection(selection: Mapping[str, Any]) -> None:
         "not by a trial grasp"
         if verified is None
         else f"{verified['error']:.2g} in {verified['quantity']}, by {verified['grasps']} trial grasps, at "
-        f"{selection['expected_force_n']:.3g} N and {selection['expected_speed_m_s'] * 1e3:.3g} mm/s",
+        f"{selection['expected_force_n']:.3g} N",
     )
     rows = [
         (row["subject"], row["decision"], f"{row['what']} = {row['number']:.3g}")

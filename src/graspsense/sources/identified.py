@@ -71,5 +71,8 @@ def _scene(name: str) -> IdentifiedScene:
             f"{name} has no table [identified]: `graspsense identify` writes it. Scenes of your own are simulated by "
             f"the source `simulated` with {option('objects', name)}"
         )
-    numbers = {str(key): float(value) for key, value in gripper.items() if isinstance(value, int | float)}
+    for key, value in gripper.items():
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise ConfigError(f"{name}: identified.gripper.{key}: {value!r} is not a number")
+    numbers = {str(key): float(value) for key, value in gripper.items()}
     return IdentifiedScene(path=str(path), label=str(identified.get("label") or path.stem), gripper=numbers)

@@ -50,10 +50,6 @@ class Choice:
     refined: tuple[Fitted, ...]
     """The candidates whose residual is near the least one, chosen or not."""
     scores: tuple[CandidateScore, ...]
-    alone: Sequence[Fitted] = ()
-    """The fits of the chosen candidate to each squeeze by itself; none with fewer than three objects with names."""
-    varies: bool = False
-    """Whether common values fit worse than noise would make them."""
 
 
 @frozen(kw_only=True, eq=False)

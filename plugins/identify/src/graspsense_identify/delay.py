@@ -16,12 +16,12 @@ import numpy as np
 from attrs import frozen
 
 from graspsense.simulator_api import IdentifiedParameter, Undetermined
-from graspsense_identify.choose import LEAST_GAIN
-from graspsense_identify.fit import Fitted
+from graspsense_identify.choose import LEAST_GAIN, Choice
+from graspsense_identify.fit import Fitted, information
 from graspsense_identify.interval import identified, normal
 from graspsense_identify.prepare import MAX_LAG_S
 from graspsense_identify.refuse import shows_memory
-from graspsense_identify.spread import refits
+from graspsense_identify.spread import has_objects, refits
 from graspsense_identify.threads import in_threads
 
 EVIDENCE: Final = 5.0
@@ -97,6 +97,26 @@ class Lag:
     """0 where the recordings show no lag."""
     error_s: float = 0.0
     """Its standard deviation from the choice of the terms, and from the finite number of nodes."""
+
+
+def lag_of(choice: Choice) -> Lag:
+    """Return the lag of the force beyond the settings.
+
+    Common values that do not hold for all objects fit badly, and a lag may mimic that: no lag is taken from these.
+    """
+    return Lag() if _values_vary(choice.fitted) else lag_beyond_settings(choice.refined)
+
+
+def _values_vary(fitted: Fitted) -> bool:
+    """Return whether common values fit worse than noise would make them, by fits to each squeeze by itself."""
+    if not has_objects(fitted.squeezes):
+        return False
+    alone = in_threads(lambda i: fitted.part([i]).refitted(), range(len(fitted.squeezes)))
+    rms = float(np.sqrt(np.mean(np.concatenate([own.residuals for own in alone]) ** 2)))
+    n, values = len(fitted.residuals), len(fitted.values)
+    # Beside common values, each squeeze but one has a factor on the stiffness.
+    common = information(fitted.rms, values + len(alone) - 1, n)
+    return information(rms, values * len(alone), n) <= common - EVIDENCE
 
 
 def lag_beyond_settings(refined: Sequence[Fitted]) -> Lag:

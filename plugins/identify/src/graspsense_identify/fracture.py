@@ -19,15 +19,16 @@ from numpy.typing import NDArray
 
 from graspsense.simulator_api import IdentifiedParameter, Undetermined
 from graspsense_identify.fit import Fitted
-from graspsense_identify.interval import NO_INTERVAL, identified, student
+from graspsense_identify.interval import LEVEL, NO_INTERVAL, identified, student
 from graspsense_identify.prepare import BREAK_SHARE, Squeeze
-from graspsense_identify.random_effects import FALSE_CLAIMS, Scatter, between
 
 Floats = NDArray[np.float64]
 
 LEAST_BROKEN: Final = 3
 """Objects that have to break before their spread is identified."""
 SMALLEST_SPREAD: Final = 1e-4
+FALSE_CLAIMS: Final = 0.05
+"""The probability with which a spread is claimed that is not there."""
 MOST_LEFT: Final = 1.0
 SAME_DEPTH: Final = 0.9
 """A squeeze as deep as this share of another one is compared with it."""
@@ -82,8 +83,8 @@ def fracture_of(fitted: Fitted, force_scatter: float = 0.0) -> IdentifiedFractur
         identified("fracture.left", median, NO_INTERVAL, "median"),
     ]
     variances = np.array(errors[name]) ** 2 + (force_scatter**2 if name == "force_n" else 0.0)
-    if broken >= LEAST_BROKEN and (scatter := _spread(np.log(breaks[name]), variances, spread)):
-        parameters.append(identified(f"fracture.{name}.spread", scatter.value, scatter[1:], basis))
+    if broken >= LEAST_BROKEN and _differ(np.log(breaks[name]), variances + SMALLEST_SPREAD**2):
+        parameters.append(identified(f"fracture.{name}.spread", spread, _interval(spread, broken), basis))
     return IdentifiedFracture(parameters, list(_undetermined(fitted.squeezes, broken)))
 
 
@@ -133,16 +134,21 @@ def bears_again(squeezes: Sequence[Squeeze], i: int) -> bool | None:
     return None
 
 
-def _spread(logs: Floats, variances: Floats, likeliest: float) -> Scatter | None:
-    """Return the spread between objects; None if the errors of the breaks make their scatter.
+def _differ(logs: Floats, variances: Floats) -> bool:
+    """Return whether these values differ by more than errors of these variances make them (Cochran's Q)."""
+    from scipy.stats import chi2
 
-    `likeliest`: with the objects that did not break. Its interval is as wide as that of the broken ones alone.
-    """
-    scatter = between(logs, variances + SMALLEST_SPREAD**2, FALSE_CLAIMS)
-    if scatter is None:
-        return None
-    ratio = likeliest / scatter.value
-    return Scatter(likeliest, ratio * scatter.low, ratio * scatter.high)
+    mean = np.average(logs, weights=1.0 / variances)
+    return bool(np.sum((logs - mean) ** 2 / variances) > chi2.ppf(1.0 - FALSE_CLAIMS, len(logs) - 1))
+
+
+def _interval(spread: float, n: int) -> tuple[float, float]:
+    """Return the interval of a standard deviation that was estimated from `n` values of a normal distribution."""
+    from scipy.stats import chi2
+
+    tail = 0.5 * (1.0 - LEVEL)
+    low, high = (spread * math.sqrt((n - 1) / chi2.ppf(share, n - 1)) for share in (1.0 - tail, tail))
+    return low, high
 
 
 def _whole(fitted: Fitted, i: int) -> dict[str, Floats]:

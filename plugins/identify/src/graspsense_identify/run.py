@@ -15,19 +15,15 @@ from attrs import evolve, fields_dict
 from graspsense.plugin_api import ConfigError
 from graspsense.simulator_api import Identification, IdentifiedParameter, RecordedSqueeze, SqueezeFit
 from graspsense_identify.block import lag_of_block, with_fingertips_of_block
-from graspsense_identify.check import predictive_checks
 from graspsense_identify.choose import choose
-from graspsense_identify.delay import Delay, Lag, delay_of
+from graspsense_identify.delay import Delay, Lag, delay_of, lag_of
 from graspsense_identify.fit import Fitted
 from graspsense_identify.forward import ForwardModel, path_forces
 from graspsense_identify.fracture import fracture_of, not_broken
 from graspsense_identify.held_out import held_out_errors
-from graspsense_identify.individual import lag_of, of_each, with_own_values
 from graspsense_identify.interval import identified, identified_mean
 from graspsense_identify.laws import scale_of
-from graspsense_identify.path_error import without_path_error
 from graspsense_identify.prepare import NoSqueeze, Squeeze, prepared
-from graspsense_identify.random_effects import own_spreads
 from graspsense_identify.refuse import refusals, shows_memory, undetermined
 from graspsense_identify.share import WHOLE, Shares, measured_shares
 from graspsense_identify.spread import Uncertainty, uncertainty
@@ -75,7 +71,7 @@ def identify(
         choice = choose(
             model, ready, scale_of(ready), shows_memory(ready), partial(progress, "fitting candidates")
         )
-        return Timed(shares, with_own_values(choice), lag)
+        return Timed(shares, choice, lag)
 
     def shown(used: Timed) -> Delay:
         return delay_of(used.choice.fitted, config.force_delay_s, used.lag)
@@ -83,14 +79,13 @@ def identify(
     used, delay = with_delay(timed, lag_of, shown)
     progress("computing intervals", 0, 1)
     chosen, shares = used.choice, used.shares
-    fitted, intervals = _with_uncertainty(used, delay)
-    fracture = fracture_of(chosen.fitted, shares.scatter)
+    fitted, intervals = chosen.fitted, _uncertainty(used, delay)
+    fracture = fracture_of(fitted, shares.scatter)
     values, parameters = _values(fitted, intervals, shares)
     parameters += delay.parameters
-    parameters += own_spreads(chosen.fitted, chosen.alone, shares.scatter)
     parameters += fracture.parameters
     open_ = [*delay.undetermined, *undetermined(fitted, intervals, shares), *fracture.undetermined]
-    fits, held_out = _fits(fitted), held_out_errors(chosen.fitted)
+    fits, held_out = _fits(fitted), held_out_errors(fitted)
     result = Identification(
         label=next((squeeze.label for squeeze in recorded if squeeze.label), ""),
         scene="",
@@ -100,7 +95,6 @@ def identify(
         fits=tuple(fits),
         held_out=held_out,
         refusals=refusals(open_, fits, held_out),
-        checks=predictive_checks(fitted, intervals),
         draws=intervals.draws,
         notes=tuple(notes),
     )
@@ -135,12 +129,11 @@ def _looks_wrong(squeezes: Sequence[RecordedSqueeze]) -> list[str]:
     return wrong
 
 
-def _with_uncertainty(used: Timed, delay: Delay) -> tuple[Fitted, Uncertainty]:
-    """Return the chosen fit and its uncertainty, both without the error of the path."""
+def _uncertainty(used: Timed, delay: Delay) -> Uncertainty:
+    """Return the uncertainty of the chosen fit."""
     fitted = used.choice.fitted
     scale = used.shares.error / math.sqrt(len(fitted.squeezes))
-    lag_error_s = math.hypot(used.lag.error_s, delay.error_s)
-    return without_path_error(fitted, uncertainty(fitted, scale, lag_error_s, of_each(used.choice)))
+    return uncertainty(fitted, scale, math.hypot(used.lag.error_s, delay.error_s))
 
 
 def _ready(

@@ -34,12 +34,11 @@ BLOCKS: Final = 12
 DRAWS: Final = 200
 LARGEST: Final = math.log(30.0)
 """A logarithm changes by at most this in proportion to the force. A larger change is one of a value near zero."""
-PATH_ERROR: Final = 3e-4
+PATH_ERROR: Final = 1e-3
 """Standard deviation of the logarithm of a value that the finite number of nodes of a path causes, at least."""
-PATH_FORCE_ERROR: Final = 3e-5
+PATH_FORCE_ERROR: Final = 1e-4
 """The same of the force, over the peak. With both, the intervals from one squeeze with an ideal sensor cover more than
-nine of ten (`benchmarks/identify.py --sensors ideal --recordings 1`): `path_error` takes most of the error away, and
-what is left is mostly that of the simulated recordings. No recording of a real sensor is as exact."""
+nine of ten (`benchmarks/identify.py --sensors ideal --recordings 1`). No recording of a real sensor is as exact."""
 
 
 class Components(NamedTuple):
@@ -54,11 +53,6 @@ class Components(NamedTuple):
     def of_scene(self) -> float:
         """That of a scene: without numbers of the objects, that between squeezes, whatever it comes from."""
         return self.squeezes if math.isnan(self.objects) else self.objects
-
-    @property
-    def whole(self) -> float:
-        """That of a squeeze of another object."""
-        return float(np.sqrt(np.nansum(np.square(self))))
 
 
 @frozen(kw_only=True, eq=False)
@@ -75,14 +69,11 @@ class Uncertainty:
     width_m: Components
 
 
-def uncertainty(
-    fitted: Fitted, force_scale: float = 0.0, lag_error_s: float = 0.0, of_each: Fitted | None = None
-) -> Uncertainty:
+def uncertainty(fitted: Fitted, force_scale: float = 0.0, lag_error_s: float = 0.0) -> Uncertainty:
     """Return the uncertainty of a fit.
 
     `force_scale`: standard deviation of the logarithm of the force's scale. `lag_error_s`: that of the lag of the force
-    (s), beyond what the squeezes show by their scatter; 0 if the lag was not identified. `of_each`: a fit with other
-    widths and factors, of which the spreads are.
+    (s), beyond what the squeezes show by their scatter; 0 if the lag was not identified.
     """
     rng = np.random.default_rng(0)
     names = [squeeze.instance for squeeze in fitted.squeezes]
@@ -110,8 +101,8 @@ def uncertainty(
         high=tuple(high.tolist()),
         basis=basis,
         draws=best * _changed(factor / normal() * drawn),
-        stiffness=_components(np.log((of_each or fitted).factors), names),
-        width_m=_components(np.array((of_each or fitted).widths_m), names),
+        stiffness=_components(np.log(fitted.factors), names),
+        width_m=_components(np.array(fitted.widths_m), names),
     )
 
 

@@ -41,22 +41,6 @@ class SimConfig:
         meaning="scene: steps for the accuracy, verified by trial grasps. reference: steps that are halved until the "
         "result no longer changes. fixed: steps for the accuracy, which no trial grasp verifies.",
     )
-    expected_force_n: float | None = setting(
-        default=None,
-        unit="N",
-        above=0.0,
-        plausible=(0.1, 1000.0),
-        effect=CHANGES_NO_RESULT,
-        meaning="Gripping force for which the steps are selected; not set: that of a trial grasp under the controller.",
-    )
-    expected_speed_m_s: float | None = setting(
-        default=None,
-        unit="m/s",
-        above=0.0,
-        plausible=(1e-4, 1.0),
-        effect=CHANGES_NO_RESULT,
-        meaning="Speed of the fingers at the contact for which the steps are selected; not set: that of a trial grasp.",
-    )
     step_s: float | None = setting(
         default=None,
         unit="s",

@@ -41,13 +41,13 @@ from graspsense_sim_gripper.plant.state import PlantReadings, right_of
 from graspsense_sim_gripper.run.accuracy.probe import FORCE_N, SPEED_M_S
 from graspsense_sim_gripper.run.accuracy.select import select
 from graspsense_sim_gripper.run.binding import bind_reachable
-from graspsense_sim_gripper.run.build import EFFORT_LIMIT_N, build, device_info, instantiate
+from graspsense_sim_gripper.run.build import build, device_info, instantiate
 from graspsense_sim_gripper.run.compiled.compose import INTERPRETED, composed_move, composition
 from graspsense_sim_gripper.run.explain import explain
 from graspsense_sim_gripper.run.model_report import accuracy_report, model_report
 from graspsense_sim_gripper.run.problem import IMAGES_PER_BLOCK, GraspController
 from graspsense_sim_gripper.run.sampled_loop import instability
-from graspsense_sim_gripper.run.term_failure import TermFailed, not_finite_in_tick, raised_in_term
+from graspsense_sim_gripper.run.term_failure import TermFailed, not_finite_in_tick
 from graspsense_sim_gripper.scene.library import kinds_in, object_kinds
 from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
 from graspsense_sim_gripper.solve.state import PlantState, is_finite
@@ -60,14 +60,9 @@ _reading = maker(Reading)
 _COMPILED: Final[Mapping[str, bool | None]] = {"worth": None, "always": True, "never": False}
 
 
-def default_controller(config: SimConfig) -> GraspController:
-    """Return the controller for which a model is selected if none is given: that of the paper.
-
-    Its probing force and closing speed are those that the config expects, or those of the paper.
-    """
-    force = min(config.expected_force_n or FORCE_N, EFFORT_LIMIT_N)
-    speed = config.expected_speed_m_s or SPEED_M_S
-    controller = create("controller", "hybrid", probing_force_n=force, closing_speed_m_s=speed)
+def default_controller() -> GraspController:
+    """Return the controller for which a model is selected if none is given: that of the paper."""
+    controller = create("controller", "hybrid", probing_force_n=FORCE_N, closing_speed_m_s=SPEED_M_S)
     return GraspController(controller, RunConfig())
 
 
@@ -127,7 +122,7 @@ class SimBackend(BatchBackend[SimConfig]):
         problem = build(self.config, self.config.object)
         self._chosen = None
         if problem.spec is not None:
-            self._chosen = select(problem, self._controller or default_controller(self.config))
+            self._chosen = select(problem, self._controller or default_controller())
         setup = instantiate(problem, self._chosen, seed)
         self._setup = setup = evolve(setup, sensor=with_listed_cells(setup.sensor))
         self._move = composed_move(composition(setup.kinds, setup.plant))
@@ -181,7 +176,7 @@ class SimBackend(BatchBackend[SimConfig]):
         try:
             after = self._move(setup.plant, plant, effort_n, setup.dt_s)
         except LAW_ERRORS as error:
-            raise TermFailed(raised_in_term(error, setup.kinds) or str(error)) from error
+            raise TermFailed(str(error)) from error
         if not is_finite(after):
             raise TermFailed(not_finite_in_tick(setup.kinds, setup.plant, plant, effort_n, setup.dt_s))
         return after
@@ -216,7 +211,7 @@ class SimBackend(BatchBackend[SimConfig]):
                 "steps": self._state.step.n_steps,
                 "within": chosen.valid_for(self._state.peak_n),
             }
-            controller = self._controller or default_controller(self.config)
+            controller = self._controller or default_controller()
             report |= accuracy_report(report, chosen, instability(setup, controller, chosen))
         if self.config.explain:
             report["model"] = explain(setup, self._compressions) | {"without": self._without()}
@@ -229,7 +224,7 @@ class SimBackend(BatchBackend[SimConfig]):
 
         if self._chosen is None:
             return []
-        controller = self._controller or default_controller(self.config)
+        controller = self._controller or default_controller()
         return without_each_term(build(self.config, self.config.object), controller, self._chosen)
 
     def _draw_noise(self) -> None:

@@ -22,7 +22,6 @@ from graspsense_sim_gripper.run.compiled.compose import (
     uncompressed,
 )
 from graspsense_sim_gripper.run.compiled.jit import compile_part
-from graspsense_sim_gripper.scene.spec import MOST_SPREAD
 from graspsense_sim_gripper.scene.terms.registry import active_laws, find_term, laws_of
 from graspsense_sim_gripper.scene.terms.switchable import Switchable
 from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
@@ -31,7 +30,6 @@ __all__ = [
     "BALANCE_RTOL",
     "CELLS",
     "LAW_ERRORS",
-    "MOST_SPREAD",
     "ContactState",
     "Drive",
     "ObjectModel",

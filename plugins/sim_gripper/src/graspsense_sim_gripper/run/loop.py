@@ -27,7 +27,7 @@ from graspsense_sim_gripper.solve.macro_step import (
     values_at,
     with_peak,
 )
-from graspsense_sim_gripper.solve.scheme import PlantParams, Steps
+from graspsense_sim_gripper.solve.scheme import PlantParams
 from graspsense_sim_gripper.solve.state import PlantState, is_finite
 from graspsense_sim_gripper.solve.trend import UNKNOWN, Trend
 
@@ -83,11 +83,6 @@ class Ahead(NamedTuple):
     after: PlantState
     control: MacroControl
     """That of the next one, if this one is taken to its end."""
-
-
-def uses_macro_steps(steps: Steps) -> int:
-    """Return `GraspParams.macro_steps` for a plant with these steps."""
-    return 1 if steps.macro_tolerance > 0.0 else 0
 
 
 class LastTick(NamedTuple):

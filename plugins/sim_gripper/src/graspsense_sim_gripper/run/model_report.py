@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graspsense_sim_gripper.run.accuracy.chosen_steps import QUANTITIES, ChosenSteps
-from graspsense_sim_gripper.run.compiled.padding import PaddedLayout
 from graspsense_sim_gripper.run.nested import TupleType, first_place, with_places
 from graspsense_sim_gripper.scene.terms.registry import find_term
 from graspsense_sim_gripper.scene.terms.term import TermState, never_beyond
@@ -76,10 +75,10 @@ class StoredReport(NamedTuple):
 
 
 @lru_cache(maxsize=256)
-def stored_report(plant: TupleType, layout: PaddedLayout, kinds: tuple[str, ...]) -> StoredReport:
-    """Return what makes the reports of states of the plant of this type, padded in this layout.
+def stored_report(plant: TupleType, terms: tuple[int, ...], kinds: tuple[str, ...]) -> StoredReport:
+    """Return what makes the reports of padded states of the plant of this type.
 
-    `kinds`: those of the object's own terms.
+    `terms`: the places of the object's own terms in them; `kinds`: their kinds.
     """
     padded = plant.filled([0.0] * plant.count)
     places_of = with_places(padded)
@@ -88,7 +87,7 @@ def stored_report(plant: TupleType, layout: PaddedLayout, kinds: tuple[str, ...]
         (places_of.contact.left, *places_of.contact.right),
         strict=True,
     )
-    of_kinds = [(kind, check, layout.places[i]) for i, kind, check in _checked(kinds)]
+    of_kinds = [(kind, check, terms[i]) for i, kind, check in _checked(kinds)]
     checked = tuple(
         _CheckedTerm(kind, check, TupleType.made_of(half.states[place]), first_place(places.states[place]))
         for half, places in states

@@ -11,9 +11,10 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from graspsense.plugin_api import Controller, FeatureSet
-from graspsense.simulator_api import RunConfig
+from graspsense.simulator_api import RunConfig, TickParams, TickState
 from graspsense_sim_gripper.plant.sensing import SensorParams, SensorState
 from graspsense_sim_gripper.run.drawing import image_noise
+from graspsense_sim_gripper.run.loop import NOT_STARTED, GraspParams, SimulationState
 from graspsense_sim_gripper.scene.random_numbers import key_of
 from graspsense_sim_gripper.scene.spec import TermParams
 from graspsense_sim_gripper.solve.scheme import PlantParams
@@ -65,6 +66,20 @@ class GraspSetup:
     sensor_state: SensorState
     dt_s: float
     seed: int
+
+    def begun(
+        self, controller: TickParams, initial: TickState, max_ticks: int
+    ) -> tuple[GraspParams, SimulationState]:
+        """Return the parameters of the loop for this grasp, and the state in which it begins."""
+        params = GraspParams(
+            plant=self.plant,
+            sensor=self.sensor,
+            controller=controller,
+            dt_s=self.dt_s,
+            max_ticks=max_ticks,
+            macro_steps=1 if self.plant.steps.macro_tolerance > 0.0 else 0,
+        )
+        return params, SimulationState(NOT_STARTED, self.state, self.sensor_state, initial)
 
     def noise(self, begin: int, count: int) -> NDArray[np.float64]:
         """Return the noise of the cell images from image `begin` on: normal numbers (count, 2 CELLS)."""

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from traceback import walk_tb
-from types import CodeType
+from collections.abc import Callable, Iterator, Sequence
 
 from graspsense.gripper_api import GraspsenseError
 from graspsense_sim_gripper.run.compiled.compose import hardens, plant_move
@@ -20,28 +18,10 @@ class TermFailed(GraspsenseError):
     """A term of the object gave no finite force, or raised an exception."""
 
 
-def raised_in_term(error: BaseException, kinds: Sequence[str]) -> str:
-    """Return in words which term raised this exception in the interpreter; empty if none of these did."""
-    laws = zip(kinds, active_laws(kinds), strict=True)
-    names: dict[CodeType, str] = {
-        (law.law if isinstance(law, OnSum) else law).__code__: kind for kind, law in laws
-    }
-    for frame, _ in walk_tb(error.__traceback__):
-        if frame.f_code in names:
-            compression_m = frame.f_locals.get("d1")
-            where = (
-                f" at a compression of {compression_m * 1e3:.3g} mm"
-                if isinstance(compression_m, float)
-                else ""
-            )
-            return f"term {names[frame.f_code]!r} raised {type(error).__name__}: {error}{where}"
-    return ""
-
-
 def not_finite_in_tick(
     kinds: Sequence[str], plant: PlantParams, state: PlantState, effort_n: float, dt_s: float
 ) -> str:
-    """Return in words which term gives no finite force in the tick that begins with `state`."""
+    """Return in words which term raises, or gives no finite force, in the tick that begins with `state`."""
     laws = [
         OnSum(_checked_on_sum(kind, law.law)) if isinstance(law, OnSum) else _checked(kind, law)
         for kind, law in zip(kinds, active_laws(kinds), strict=True)
@@ -49,22 +29,20 @@ def not_finite_in_tick(
     move = plant_move(laws, phases_of(kinds), hardens=hardens(plant.object))
     try:
         move(plant, state, effort_n, dt_s)
-    except TermFailed as error:
+    except (TermFailed, *LAW_ERRORS) as error:
         return str(error)
-    except LAW_ERRORS as error:
-        return raised_in_term(error, kinds) or str(error)
     return "the simulation gave a force that is not a finite number"
 
 
 def _checked(kind: str, law: Law) -> Law:
-    """Return the switchable law, which raises TermFailed where its force or its state is not finite."""
+    """Return the switchable law, which raises TermFailed where it raises, or its force or its state is not finite."""
 
     def checked(
         term: Switchable, state: TermState, d0: float, d1: float, h: float, v1: float
     ) -> tuple[float, TermState]:
         if term.active == 0:
             return 0.0, state
-        return _finite(kind, law(term.params, state, d0, d1, h, v1), d1)
+        return _finite(kind, lambda: law(term.params, state, d0, d1, h, v1), d1)
 
     return checked
 
@@ -75,21 +53,24 @@ def _checked_on_sum(kind: str, law: SumLaw) -> SumLaw:
     def checked(term: Switchable, state: TermState, force_n: float, d1: float) -> tuple[float, TermState]:
         if term.active == 0:
             return force_n, state
-        return _finite(kind, law(term.params, state, force_n, d1), d1)
+        return _finite(kind, lambda: law(term.params, state, force_n, d1), d1)
 
     return checked
 
 
-def _finite(kind: str, result: tuple[float, TermState], d1: float) -> tuple[float, TermState]:
-    """Return force and state. Raises TermFailed if one of their numbers is not finite."""
-    force, state = result
+def _finite(kind: str, call: Callable[[], tuple[float, TermState]], d1: float) -> tuple[float, TermState]:
+    """Return force and state. Raises TermFailed if the law raises, or one of their numbers is not finite."""
+    where = f"at a compression of {d1 * 1e3:.3g} mm"
+    try:
+        force, state = call()
+    except LAW_ERRORS as error:
+        raise TermFailed(f"term {kind!r} raised {type(error).__name__}: {error} {where}") from error
     for name, value in (("the force", force), *_numbers(state)):
         if not math.isfinite(value):
             raise TermFailed(
-                f"term {kind!r} gave {name} {value} at a compression of {d1 * 1e3:.3g} mm; a law has to give "
-                "finite numbers at every compression"
+                f"term {kind!r} gave {name} {value} {where}; a law has to give finite numbers at every compression"
             )
-    return result
+    return force, state
 
 
 def _numbers(state: TermState) -> Iterator[tuple[str, float]]:

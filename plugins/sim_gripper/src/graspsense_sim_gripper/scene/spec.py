@@ -15,7 +15,6 @@ from attrs.validators import ge, gt, in_, le
 
 from graspsense.plugin_api import ConfigError, UnknownName
 from graspsense.simulator_api import TomlError, gives, refuse_other_kind, suggestion, toml_values
-from graspsense_sim_gripper.scene.identified import check_identified
 from graspsense_sim_gripper.scene.terms.liquid import GRAVITY_M_S2
 from graspsense_sim_gripper.scene.terms.registry import find_term, in_order
 from graspsense_sim_gripper.scene.terms.term import not_dented
@@ -27,6 +26,8 @@ SMALLEST: Final = 1e-30
 """The largest and the smallest magnitude of a number of a scene; products of a few of them stay finite."""
 MOST_TERMS: Final = 40
 """The largest number of terms of an object, whose code is compiled together."""
+IDENTIFIED: Final = ("label", "gripper", "sensor", "intervals", "recordings", "candidates", "undetermined")
+"""The keys of the table `[identified]`."""
 MOST_SPREAD: Final = 3.0
 """The largest standard deviation of the logarithm of a parameter: instances then differ by a factor of 20 and more."""
 
@@ -238,7 +239,7 @@ def _scene_values(table: TomlTable, problems: list[str]) -> dict[str, TomlValue]
     values: dict[str, TomlValue] = {}
     for key, entry in table.items():
         if key == "identified":
-            check_identified(entry, problems)
+            _check_identified(entry, problems)
         elif key not in known:
             problems.append(f"{key}: no such key. Known: {', '.join(sorted(known))}.{suggestion(key, known)}")
         elif key in ("summary", "patch", "held"):
@@ -251,6 +252,21 @@ def _scene_values(table: TomlTable, problems: list[str]) -> dict[str, TomlValue]
     if "width_m" not in table:
         problems.append("width_m: is missing, and every object has a width")
     return values
+
+
+def _check_identified(entry: TomlValue, problems: list[str]) -> None:
+    """Add what is wrong with the table that `graspsense identify` writes, and which the simulator does not use.
+
+    Trials of identified scenes read its label and settings of the gripper, which a misspelt name would hide.
+    """
+    if not isinstance(entry, Mapping):
+        problems.append(f"identified: {entry!r} is not a table")
+        return
+    problems += [
+        f"identified.{key}: no such key. Known: {', '.join(IDENTIFIED)}.{suggestion(key, IDENTIFIED)}"
+        for key in entry
+        if key not in IDENTIFIED
+    ]
 
 
 def _scene_terms(tables: TomlValue, problems: list[str]) -> list[ParsedTerm]:

@@ -10,8 +10,6 @@ from __future__ import annotations
 import hashlib
 import json
 import sys
-import threading
-from collections import OrderedDict
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -39,18 +37,17 @@ from graspsense_sim_gripper.scene.terms.term import OnSum
 from graspsense_sim_gripper.solve.scheme import Steps
 
 MAX_IN_MEMORY: Final = 512
-"""Models in memory, of some 5 kB each; the least recently used is dropped first."""
-_CONTENT: Final = "files with choices of models"
+"""Choices in memory, of some 5 kB each; at that number all are dropped."""
 MAX_FILES: Final = 4000
 """Files on disk, of some 2 kB each; at that number the older half is deleted."""
-
+_CONTENT: Final = "files with choices of models"
 
 Json = Any
 """A value that JSON can represent."""
 
 
 class Key(NamedTuple):
-    """Everything that a model depends on, except the code."""
+    """Everything that a choice depends on, except the code."""
 
     config: SimConfig
     kinds: tuple[str, ...]
@@ -64,81 +61,77 @@ class Key(NamedTuple):
     """The feature set with its settings and its files; empty if there is none."""
 
 
-class ChosenStepsCache:
-    """Reduced models by `Key`. Threads may share a cache."""
-
-    def __init__(self) -> None:
-        self._models: OrderedDict[Key, ChosenSteps] = OrderedDict()
-        self._lock = threading.Lock()
-
-    def key(self, problem: Problem, controller: GraspController) -> Key:
-        """Return the key of the model for a problem under a controller. Raises TypeError if there is no object."""
-        if problem.spec is None:
-            raise TypeError("where there is no object there is no model to reduce")
-        spec = problem.spec
-        features = _features_content(controller.features)
-        return Key(
-            config=problem.model_config,
-            kinds=spec.kinds,
-            spec=spec.content,
-            step=controller.step,
-            controller=controller.content,
-            features=features,
-        )
-
-    def get(self, key: Key) -> ChosenSteps | None:
-        """Return the model of this key, from memory or else from disk; None if there is none."""
-        with self._lock:
-            if key in self._models:
-                self._models.move_to_end(key)
-                return self._models[key]
-        name = _file_name(key)
-        model = None if name is None else _read(name)
-        if model is not None:
-            self._remember(key, model)
-        return model
-
-    def put(self, key: Key, model: ChosenSteps) -> None:
-        """Cache a model: in memory, and on disk if it was verified by trial grasps."""
-        self._remember(key, model)
-        if model.verification is not None:
-            name = _file_name(key)
-            if name is not None:
-                _write(name, model)
-
-    def clear(self) -> None:
-        """Remove the models in memory; those on disk remain."""
-        with self._lock:
-            self._models.clear()
-
-    def __len__(self) -> int:
-        return len(self._models)
-
-    def _remember(self, key: Key, model: ChosenSteps) -> None:
-        with self._lock:
-            self._models[key] = model
-            self._models.move_to_end(key)
-            while len(self._models) > MAX_IN_MEMORY:
-                self._models.popitem(last=False)
+_IN_MEMORY: Final[dict[Key, ChosenSteps]] = {}
 
 
-def _file_name(key: Key) -> str | None:
-    """Return the name of a model's file: a digest of its key and of all code that it depends on.
+def key_of(problem: Problem, controller: GraspController) -> Key:
+    """Return the key of the choice for a problem under a controller. Raises TypeError if there is no object."""
+    spec = problem.spec
+    if spec is None:
+        raise TypeError("where there is no object there are no steps to choose")
+    return Key(
+        config=problem.model_config,
+        kinds=spec.kinds,
+        spec=spec.content,
+        step=controller.step,
+        controller=controller.content,
+        features=_features_content(controller.features),
+    )
 
-    None if the code of a term or of the controller cannot be identified.
+
+def find(key: Key) -> ChosenSteps | None:
+    """Return the choice of this key, from memory or else from disk; None if there is none."""
+    chosen = _IN_MEMORY.get(key)
+    if chosen is None and (path := _file_of(key)) is not None and (chosen := _read(path)) is not None:
+        _remember(key, chosen)
+    return chosen
+
+
+def keep(key: Key, chosen: ChosenSteps) -> None:
+    """Keep a choice: in memory, and on disk if it was verified by trial grasps and a file can be written."""
+    _remember(key, chosen)
+    path = None if chosen.verification is None else _file_of(key)
+    if path is None:
+        return
+    with suppress(OSError):
+        _delete_old_files(path.parent)
+        values = json.loads(json.dumps(stored(chosen)))
+        content = json.dumps({"model": values, "sha256": _digest(values)})
+        write_whole(path, content.encode(), mode=0o600)
+
+
+def forget() -> None:
+    """Remove the choices in memory; those on disk remain."""
+    _IN_MEMORY.clear()
+
+
+def _remember(key: Key, chosen: ChosenSteps) -> None:
+    if len(_IN_MEMORY) >= MAX_IN_MEMORY:
+        forget()
+    _IN_MEMORY[key] = chosen
+
+
+def _file_of(key: Key) -> Path | None:
+    """Return the file of a choice, named by a digest of its key and of all code that it depends on.
+
+    None if the code of a term or of the controller cannot be identified, or without a folder that is closed to other
+    users.
     """
-    digest = hashlib.sha256(_own_code())
+    parent = cache_folder()
+    if parent is None:
+        return None
     functions = (key.step, *(law.law if isinstance(law, OnSum) else law for law in active_laws(key.kinds)))
     try:
+        make_closed(parent / "chosen_steps")
         marks = [fingerprint(function) for function in functions]
         # The rates and limits of a term are in the same file as its law: the file is identified as well.
         stamps = [_stamp(Path(str(sys.modules[function.__module__].__file__))) for function in functions]
     except (NotCompilable, KeyError, AttributeError, OSError):
         return None
-    for item in (key.spec, repr(key.config), key.controller, key.features, *marks, *stamps):
-        digest.update(item.encode())
-        digest.update(b"\0")
-    return f"{digest.hexdigest()[:32]}.json"
+    items = (key.spec, repr(key.config), key.controller, key.features, *marks, *stamps)
+    name = hashlib.sha256(_own_code() + "\0".join(items).encode()).hexdigest()[:32]
+    folder = parent / "chosen_steps"
+    return folder / f"{name}.json" if is_closed(folder, _CONTENT) else None
 
 
 @cache
@@ -171,45 +164,19 @@ def _stamp(source: Path) -> str:
     return f"{source} {status.st_size} {status.st_mtime_ns}\n"
 
 
-def _read(name: str) -> ChosenSteps | None:
-    folder = _folder()
-    if folder is None or not (folder / name).is_file() or not is_closed(folder / name, _CONTENT):
+def _read(path: Path) -> ChosenSteps | None:
+    if not path.is_file() or not is_closed(path, _CONTENT):
         return None
     with suppress(OSError, ValueError, TypeError, KeyError):
-        kept = json.loads((folder / name).read_text(encoding="utf-8"))
+        kept = json.loads(path.read_text(encoding="utf-8"))
         # A choice that was edited would change what is simulated, and nothing else would tell.
         if kept["sha256"] == _digest(kept["model"]):
             return restored(kept["model"])
     return None
 
 
-def _write(name: str, model: ChosenSteps) -> None:
-    """Write a model to disk. If that is not possible, nothing happens."""
-    folder = _folder()
-    if folder is None:
-        return
-    with suppress(OSError):
-        _delete_old_files(folder)
-        values = json.loads(json.dumps(stored(model)))
-        content = json.dumps({"model": values, "sha256": _digest(values)})
-        write_whole(folder / name, content.encode(), mode=0o600)
-
-
 def _digest(values: Json) -> str:
     return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
-
-
-def _folder() -> Path | None:
-    """Return the folder for models, or None where there is none that is closed to other users."""
-    parent = cache_folder()
-    if parent is None:
-        return None
-    folder = parent / "chosen_steps"
-    try:
-        make_closed(folder)
-    except OSError:
-        return None
-    return folder if is_closed(folder, _CONTENT) else None
 
 
 def _delete_old_files(folder: Path) -> None:

@@ -49,8 +49,6 @@ class ChosenSteps:
     """The accuracy that was asked for (`gripper.accuracy`)."""
     force_n: float
     """The peak force that is expected, or the largest of the trial grasps."""
-    speed_m_s: float
-    """The speed of the gap at the contact that is expected."""
     steps: Steps
     decisions: tuple[StepDecision, ...]
     """How the steps are controlled, and what they may not resolve."""
@@ -106,7 +104,6 @@ class ChosenSteps:
             "accuracy": self.accuracy,
             "level": self.level._asdict(),
             "expected_force_n": self.force_n,
-            "expected_speed_m_s": self.speed_m_s,
             "verified": None if self.verification is None else asdict(self.verification),
             "decisions": [asdict(decision) for decision in self.decisions],
         }

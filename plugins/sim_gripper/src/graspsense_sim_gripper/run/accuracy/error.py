@@ -95,11 +95,6 @@ class GraspRecord:
         """The mean force of both pads."""
         return 0.5 * (self.left_n + self.right_n)
 
-    def contact_speed_m_s(self) -> float:
-        """Return the closing speed (m/s) at the tick before the first force on a pad; 0 if there is none."""
-        felt = np.flatnonzero(np.maximum(self.left_n, self.right_n) > 0.0)
-        return float(-self.speed_m_s[max(int(felt[0]) - 1, 0)]) if len(felt) else 0.0
-
     def _shown_from(self) -> int:
         """Return the first row that can show a rest: that of the hold, or any if there is no hold."""
         return self.hold_from if self.hold_from < self.n_rows else 0

@@ -29,8 +29,6 @@ class Grip(NamedTuple):
     """What a grasp of the nominal object is expected to meet."""
 
     force_n: float
-    speed_m_s: float
-    """That of the gap at the first contact."""
     mass_kg: float
     """The mass that moves with the gap: the inertia of the rotor through the linkage."""
     stiffness_n_m: float
@@ -40,20 +38,15 @@ class Grip(NamedTuple):
     """The stiffness at the first touch, where rigid pads meet the surface of the object alone."""
 
 
-def grip_of(problem: Problem, force_n: float | None = None, speed_m_s: float | None = None) -> Grip:
-    """Return what a grasp with this peak force (N) and this speed at the contact (m/s) meets.
-
-    `expected_force_n` and `expected_speed_m_s` of the settings take precedence over the arguments. Without either, the
-    values of the paper are used. Raises TypeError if there is no object.
-    """
-    config, setup = problem.model_config, problem.nominal
+def grip_of(problem: Problem, force_n: float = FORCE_N) -> Grip:
+    """Return what a grasp with this peak force (N) meets. Raises TypeError if there is no object."""
+    setup = problem.nominal
     drive, model = setup.plant.drive, setup.plant.object
     # Only orders of magnitude follow from the forces, so their balance need not be that of a reference.
     model = model._replace(balance_rtol=MAX_BALANCE_RTOL)
     press, untouched = contact_solver(setup.kinds, hardens(model)), uncompressed(setup.kinds)
-    force = config.expected_force_n or force_n or FORCE_N
     contact, last_closure, closure, largest = untouched, 0.0, FIRST_M, 0.0
-    while closure < MAX_DEPTH * model.width_m and contact.force_n < force:
+    while closure < MAX_DEPTH * model.width_m and contact.force_n < force_n:
         contact, _ = press(model, contact, closure, (closure - last_closure) / POINT_S, POINT_S)
         rests, further = (
             press(model, contact, closure * share, 0.0, setup.dt_s)[0].force_n
@@ -65,11 +58,10 @@ def grip_of(problem: Problem, force_n: float | None = None, speed_m_s: float | N
         last_closure, closure = closure, GROWTH * closure
     touch, _ = press(model, untouched, FIRST_M, 0.0, 0.0)
     _, jacobian = gap_and_rate(
-        drive.link, revolutions_at(drive.link, min(max(model.width_m, 0.0), config.open_gap_m))
+        drive.link, revolutions_at(drive.link, min(max(model.width_m, 0.0), problem.config.open_gap_m))
     )
     return Grip(
-        force_n=force,
-        speed_m_s=config.expected_speed_m_s or speed_m_s or SPEED_M_S,
+        force_n=force_n,
         mass_kg=drive.inertia / (jacobian * jacobian),
         stiffness_n_m=largest,
         touch_n_m=touch.force_n / FIRST_M,

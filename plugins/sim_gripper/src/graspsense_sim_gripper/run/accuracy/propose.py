@@ -90,7 +90,6 @@ def propose(problem: Problem, grip: Grip | None, scale: LevelScale = CONTROLLED[
     return ChosenSteps(
         accuracy=config.accuracy,
         force_n=FORCE_N if grip is None else grip.force_n,
-        speed_m_s=SPEED_M_S if grip is None else grip.speed_m_s,
         steps=steps,
         decisions=tuple(StepDecision(*decision) for decision in decisions),
         frequency=frequency,

@@ -1,6 +1,6 @@
 """Selecting the steps of the grasps of an object: the first level whose trial grasp is accurate enough.
 
-A trial grasp in finer steps gives the peak force and the speed at the contact. Then the steps of one level after
+A trial grasp in finer steps gives the peak force. Then the steps of one level after
 another are compared with finer ones: first a step per tick, since it costs least, then steps whose error is controlled,
 for the accuracy, a tenth and a hundredth of it.
 
@@ -20,7 +20,7 @@ from attrs import evolve
 
 from graspsense.plugin_api import ConfigError
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.run.accuracy.cache import ChosenStepsCache
+from graspsense_sim_gripper.run.accuracy.cache import find, keep, key_of
 from graspsense_sim_gripper.run.accuracy.chosen_steps import (
     QUANTITIES,
     ChosenSteps,
@@ -30,7 +30,7 @@ from graspsense_sim_gripper.run.accuracy.chosen_steps import (
 from graspsense_sim_gripper.run.accuracy.error import GraspRecord, deviation
 from graspsense_sim_gripper.run.accuracy.levels import CONTROLLED, PLAIN, REFERENCE_SCALES, LevelScale
 from graspsense_sim_gripper.run.accuracy.own_features import NOT_READ
-from graspsense_sim_gripper.run.accuracy.probe import Grip, grip_of
+from graspsense_sim_gripper.run.accuracy.probe import FORCE_N, Grip, grip_of
 from graspsense_sim_gripper.run.accuracy.propose import propose
 from graspsense_sim_gripper.run.accuracy.verify import (
     MOST_WORK,
@@ -41,7 +41,7 @@ from graspsense_sim_gripper.run.accuracy.verify import (
 )
 from graspsense_sim_gripper.run.build import Problem
 from graspsense_sim_gripper.run.problem import GraspController
-from graspsense_sim_gripper.run.term_failure import TermFailed, raised_in_term
+from graspsense_sim_gripper.run.term_failure import TermFailed
 from graspsense_sim_gripper.scene.spec import ObjectSpec
 from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
 
@@ -59,10 +59,6 @@ MOST_FOR_FEATURES: Final = 2
 """Further models that are tried where features of the pipeline are less accurate than those of the paper. A feature
 that shorter steps do not give is one that depends on ticks."""
 
-_SELECTED: Final = ChosenStepsCache()
-_UNKNOWN: Final = (None, None)
-"""What `_felt` returns for a trial grasp that fails; `grip_of` then has the values of the paper."""
-
 
 def select(
     problem: Problem,
@@ -74,30 +70,23 @@ def select(
     """Return the steps for a problem's object, verified by trial grasps under the controller.
 
     They are cached in memory and on disk, by everything that they depend on. They are not verified, and their
-    `verification` is None, if the settings prescribe the steps or ask for the reference, if the controller raises in
-    the first trial grasp, if something cannot be resolved (`ChosenSteps.unresolved`), or if the trial grasps would take
-    too much work (`MOST_WORK`).
+    `verification` is None, if the settings prescribe the steps or ask for the reference, if the controller or a term
+    fails in the first trial grasp, if something cannot be resolved (`ChosenSteps.unresolved`), or if the trial grasps
+    would take too much work (`MOST_WORK`).
 
     `compiled`: run the trial grasps compiled, if the controller can be compiled. `padding`: the kinds of terms in the
     compiled code, by default those of a batch. Both change the run time only.
 
-    Raises ConfigError if no steps reach the requested accuracy or a term raises an exception, TypeError if there is no
-    object.
+    Raises ConfigError if no steps reach the requested accuracy, TypeError if there is no object.
     """
     if problem.config.fidelity == "fixed":
         return propose(problem, None)
-    key = _SELECTED.key(problem, controller)
-    chosen = _SELECTED.get(key)
+    key = key_of(problem, controller)
+    chosen = find(key)
     if chosen is None:
         trial = trial_grasps(problem, controller, compiled=compiled, padding=padding)
-        try:
-            chosen = _select_within_limit(problem, trial)
-        except LAW_ERRORS as error:
-            reason = raised_in_term(error, trial.setup.kinds)
-            if not reason:
-                raise
-            raise ConfigError(f"{_scene_in_words(problem)}: {reason}") from error
-        _SELECTED.put(key, chosen)
+        chosen = _select_within_limit(problem, trial)
+        keep(key, chosen)
     return chosen
 
 
@@ -125,30 +114,27 @@ def _select(problem: Problem, trial: TrialGrasps) -> ChosenSteps:
     if prescribed or unverified.unresolved:
         return unverified
     finer = propose(problem, usual, _reference_scale(config, CONTROLLED[0]))
-    felt = _felt(trial, finer)
-    if felt == _UNKNOWN:
+    force_n = _felt(trial, finer)
+    if not math.isfinite(force_n):
         return unverified
-    grip = grip_of(problem, *felt)
+    grip = grip_of(problem, force_n or FORCE_N)
     unverified = propose(problem, grip)
     return unverified if unverified.unresolved else _best(problem, grip, trial)
 
 
-def _felt(trial: TrialGrasps, chosen: ChosenSteps) -> tuple[float | None, float | None]:
-    """Return the peak force and the speed at the contact of a trial grasp in these steps, to two digits.
+def _felt(trial: TrialGrasps, chosen: ChosenSteps) -> float:
+    """Return the peak force of a trial grasp in these steps, to two digits, so that similar grasps share a proposal.
 
-    They suffice: similar grasps then get the same proposals. `_UNKNOWN` if the grasp fails; a controller that raises
-    does so in the grasp of the run as well, and is reported there. Raises TooMuchWork, and what a term raises.
+    NaN if the grasp fails; what failed does so in the grasp of the run as well, and is reported there. Raises
+    TooMuchWork.
     """
     try:
         grasp = trial.record(chosen)
     except TooMuchWork:
         raise
-    except Exception as error:
-        if isinstance(error, LAW_ERRORS) and raised_in_term(error, trial.setup.kinds):
-            raise
-        return _UNKNOWN
-    force_n, speed_m_s = (float(f"{value:.1e}") for value in (grasp.peak_n, grasp.contact_speed_m_s()))
-    return (force_n, speed_m_s) if math.isfinite(force_n + speed_m_s) else _UNKNOWN
+    except Exception:
+        return math.nan
+    return float(f"{grasp.peak_n:.1e}")
 
 
 def _best(problem: Problem, grip: Grip, trial: TrialGrasps) -> ChosenSteps:

@@ -24,12 +24,11 @@ from graspsense.simulator_api import (
     tick_params,
 )
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.plant.fingertip import CELLS
-from graspsense_sim_gripper.plant.sensing import PadBuffers
 from graspsense_sim_gripper.plant.state import Motion
 from graspsense_sim_gripper.run.accuracy.chosen_steps import ChosenSteps
 from graspsense_sim_gripper.run.accuracy.error import SCALES, UNIT_SCALES, GraspRecord
 from graspsense_sim_gripper.run.accuracy.own_features import OwnFeatures, beyond, own_features
+from graspsense_sim_gripper.run.buffers import as_lists, new_buffers
 from graspsense_sim_gripper.run.build import Problem
 from graspsense_sim_gripper.run.compiled.compose import composition, grasp_loop
 from graspsense_sim_gripper.run.compiled.loop_code import CompiledLoops
@@ -37,14 +36,10 @@ from graspsense_sim_gripper.run.compiled.padding import padded
 from graspsense_sim_gripper.run.loop import (
     COLUMNS,
     EVENT_SHIFT,
-    NOT_STARTED,
     ROWS_AT_ONCE,
-    Buffers,
-    GraspParams,
     SimulationState,
     before_failure,
     has_ended,
-    uses_macro_steps,
 )
 from graspsense_sim_gripper.run.problem import GraspController, GraspSetup
 from graspsense_sim_gripper.run.term_failure import TermFailed, not_finite_in_tick
@@ -173,26 +168,16 @@ class TrialGrasps:
         made = padded(setup, self.padding) if self.compiled else setup
         composed = composition(made.kinds, made.plant)
         loop = self._loops.loop_of(composed) if self.compiled else grasp_loop(composed, self.controller.step)
-        params = GraspParams(
-            plant=made.plant,
-            sensor=made.sensor,
-            controller=self.params_near if self.near else self.params,
-            dt_s=setup.dt_s,
-            max_ticks=most,
-            macro_steps=uses_macro_steps(made.plant.steps),
-        )
-        plant = _near(made) if self.near else made.state
         controller = first_state(self.controller.controller.init())
-        progress = SimulationState(NOT_STARTED, plant, made.sensor_state, controller)
-        pads, rows = _ideal_buffers(self.compiled), []
+        params, progress = made.begun(self.params_near if self.near else self.params, controller, most)
+        if self.near:
+            progress = progress._replace(plant=_near(made))
+        rows = []
         while not has_ended(progress.controller) and progress.loop.tick.ticks < most:
-            table: Any = np.zeros((len(COLUMNS), CAPACITY + ROWS_AT_ONCE))
-            phases: Any = np.zeros(CAPACITY + ROWS_AT_ONCE, np.int64)
-            if not self.compiled:
-                table, phases = table.tolist(), phases.tolist()
+            arrays = new_buffers(CAPACITY + ROWS_AT_ONCE, images=1)
+            written = arrays if self.compiled else as_lists(arrays)
             last = progress.loop.tick._replace(recorded=0)
             start = progress._replace(loop=progress.loop._replace(tick=last))
-            written = Buffers(*pads, table, phases)
             progress = loop(params, start, written)
             if progress.loop.failed == 1:
                 last_plant = before_failure(loop, params, start, written, progress.loop.tick.ticks)
@@ -202,7 +187,7 @@ class TrialGrasps:
                     )
                 )
             n = progress.loop.tick.recorded
-            rows.append(np.vstack((np.asarray(table)[:, :n], np.asarray(phases)[:n])))
+            rows.append(np.vstack((np.asarray(written.columns)[:, :n], np.asarray(written.phases)[:n])))
             self._count(start, progress)
         return progress, np.concatenate(rows, axis=1)
 
@@ -244,15 +229,6 @@ def _near(setup: GraspSetup) -> PlantState:
     reach_m = setup.plant.object.width_m + 2.0 * abs(state.contact.offset_m)
     near = revolutions_at(link, min(state.motion.gap_m, reach_m + NEAR_M))
     return state._replace(motion=Motion(near, 0.0, *gap_and_rate(link, near)))
-
-
-def _ideal_buffers(on_arrays: bool) -> tuple[PadBuffers, Any]:
-    """Return minimal buffers for cell images and their times, which an ideal sensor does not use."""
-    zero, noise, images = np.zeros((2, CELLS)), np.zeros((1, 2 * CELLS)), np.full((1, 2, CELLS), math.nan)
-    if on_arrays:
-        return PadBuffers(zero[0], zero[1], noise, images), np.zeros(1)
-    left, right = zero.tolist()
-    return PadBuffers(left, right, noise.tolist(), images.tolist()), [0.0]
 
 
 def _record(end: SimulationState, rows: NDArray[np.float64], dt_s: float) -> GraspRecord:

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 from attrs import field, frozen
 
-from graspsense_sim_gripper.run.batch.buffers import Storage, begin_images, first_images, longer
 from graspsense_sim_gripper.run.batch.drawn import Drawing, DrawMemory, draw_numbers
 from graspsense_sim_gripper.run.batch.job import (
     FinishedGrasp,
@@ -20,6 +19,7 @@ from graspsense_sim_gripper.run.batch.job import (
     started,
 )
 from graspsense_sim_gripper.run.batch.scenes import Scenes, SelectedScene, number_in
+from graspsense_sim_gripper.run.buffers import Storage, begin_images, first_images, longer
 from graspsense_sim_gripper.run.compiled.loop_code import (
     NO_NOISE,
     CellNoise,
@@ -27,7 +27,7 @@ from graspsense_sim_gripper.run.compiled.loop_code import (
     CompiledLoops,
     LoopStart,
 )
-from graspsense_sim_gripper.run.compiled.padding import PaddedLayout, padded
+from graspsense_sim_gripper.run.compiled.padding import padded
 from graspsense_sim_gripper.run.loop import Buffers, LoopEnd, before_failure
 from graspsense_sim_gripper.run.model_report import GraspModel
 from graspsense_sim_gripper.run.problem import GraspSetup
@@ -44,7 +44,8 @@ class CompiledStart(NamedTuple):
     """Returns the same grasp as named tuples, which is needed if a term fails in it."""
     key: Word | None
     """That of its seed; None: its sensors are ideal."""
-    layout: PaddedLayout
+    terms: tuple[int, ...]
+    """The places of the object's own terms."""
     model: GraspModel
 
 
@@ -54,8 +55,6 @@ class CompiledGrasps:
 
     scenes: Scenes
     loops: CompiledLoops
-    is_compiled: Callable[[tuple[str, ...]], bool]
-    """Whether loops with these kinds of terms are compiled."""
     drawing: Drawing = draw_numbers
     """What draws a grasp, compiled or not."""
     measure: Measure | None = None
@@ -63,14 +62,9 @@ class CompiledGrasps:
     storage: Storage = field(factory=Storage, init=False)
     _memory: dict[SelectedScene, DrawMemory] = field(factory=dict, init=False)
 
-    def grasp(self, name: str, seed: int) -> FinishedGrasp | None:
-        """Simulate a grasp of a scene; None if its loop is not compiled.
-
-        Raises NotCompilable if it cannot be compiled, and otherwise as `Scenes.setup` does.
-        """
+    def grasp(self, name: str, seed: int) -> FinishedGrasp:
+        """Simulate a grasp of a scene. Raises NotCompilable, and otherwise as `Scenes.setup` does."""
         scene, number = self.scenes.find(name), number_in(name)
-        if not self.is_compiled(scene.composition.kinds):
-            return None
         loop, drawn = self.loops.loop_of(scene.composition), scene.drawn
         if scene not in self._memory:
             self._memory[scene] = drawn.memory()
@@ -80,7 +74,7 @@ class CompiledGrasps:
             start=start,
             setup=partial(scene.setup, seed, number),
             key=key if drawn.has_cells else None,
-            layout=drawn.layout,
+            terms=drawn.terms,
             model=scene.model,
         )
         return grasp_compiled(self.scenes.job, loop, prepared, self.storage, self.measure)
@@ -100,7 +94,7 @@ def grasp_compiled(
         return grasp_plain(job, prepared.setup(), prepared.model)
     outcome, reason = ended_as(job, end)
     if end.failed == 1:
-        setup = padded(prepared.setup(), prepared.layout.kinds)
+        setup = padded(prepared.setup())
         begin_images(buffers)
         last_plant = before_failure(loop, *started(job, setup), buffers, end.ticks)
         effort_n, plant = state().loop.tick.effort_n, lambda: last_plant
@@ -114,7 +108,7 @@ def grasp_compiled(
         extracted=extracted,
         kept=kept,
         model=prepared.model,
-        layout=prepared.layout,
+        terms=prepared.terms,
     )
 
 

@@ -6,7 +6,7 @@ bit as by `build.instantiate` (`test_a_drawn_grasp_is_that_of_the_seed`), drawn 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache, lru_cache
 from typing import Any, Final, NamedTuple
 
@@ -27,7 +27,7 @@ from graspsense_sim_gripper.run.compiled.loop_code import (
     Numbers,
     loop_start,
 )
-from graspsense_sim_gripper.run.compiled.padding import PaddedLayout, layout_of
+from graspsense_sim_gripper.run.compiled.padding import places_of
 from graspsense_sim_gripper.run.drawing import (
     NO_NUMBER,
     DrawBuffers,
@@ -164,7 +164,8 @@ class DrawnScene:
 
     config: SimConfig
     spec: ObjectSpec | None
-    layout: PaddedLayout
+    terms: tuple[int, ...]
+    """The places of the object's own terms."""
     start: StartLayout
     numbers: Numbers
     """Those of the parameters and of the first state of a grasp; which a seed decides is arbitrary."""
@@ -211,27 +212,30 @@ def drawn_scene(
 
     `example`: one of them; `begun`: its parameters and its first state, padded.
     """
-    layout, start = layout_of(example), _start_layout(LoopTypes.made_of(*begun))
+    terms, start = places_of(example.kinds), _start_layout(LoopTypes.made_of(*begun))
     numbers = loop_start(*begun, start.types)
     return DrawnScene(
         config=problem.config,
         spec=problem.spec,
-        layout=layout,
+        terms=terms,
         start=start,
         numbers=numbers.numbers,
         arrays=numbers.arrays,
         scene=_with_arrays(scene_numbers(problem.config, problem.spec)),
-        places=_places(start.places, layout),
+        places=_places(start.places, terms),
     )
 
 
-def _places(known: Any, layout: PaddedLayout) -> Places:
-    """Return where the numbers are that a seed decides; `known`: parameters and state with the place of each number."""
+def _places(known: Any, terms: Sequence[int]) -> Places:
+    """Return where the numbers are that a seed decides.
+
+    `known`: parameters and state with the place of each number; `terms`: the places of the object's own terms.
+    """
     params, state = known
     friction, model = params.plant.drive.friction, params.plant.object
     of_params: list[int] = []
-    for position in layout.places:
-        of_params += model.terms[position].params
+    for place in terms:
+        of_params += model.terms[place].params
     return Places(
         coulomb_n=friction.coulomb_n,
         breakaway_n=friction.breakaway_n,

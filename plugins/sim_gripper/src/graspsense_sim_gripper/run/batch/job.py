@@ -25,19 +25,17 @@ from graspsense.simulator_api import (
 )
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.sensing import with_listed_cells
-from graspsense_sim_gripper.run.batch.buffers import as_lists, begin_images, longer, new_buffers
+from graspsense_sim_gripper.run.buffers import as_lists, begin_images, longer, new_buffers
 from graspsense_sim_gripper.run.build import device_info
-from graspsense_sim_gripper.run.compiled.compose import grasp_loop, guarded_loop
-from graspsense_sim_gripper.run.compiled.padding import PaddedLayout, composition_of, unpadded
+from graspsense_sim_gripper.run.compiled.compose import composition, grasp_loop
+from graspsense_sim_gripper.run.compiled.padding import unpadded
 from graspsense_sim_gripper.run.loop import (
-    NOT_STARTED,
     Buffers,
     Ending,
     GraspParams,
     SimulationState,
     before_failure,
     ending,
-    uses_macro_steps,
 )
 from graspsense_sim_gripper.run.model_report import (
     NO_MODEL,
@@ -49,15 +47,12 @@ from graspsense_sim_gripper.run.model_report import (
 from graspsense_sim_gripper.run.nested import Stored
 from graspsense_sim_gripper.run.problem import GraspController, GraspSetup
 from graspsense_sim_gripper.run.recorded_trace import recorded_trace
-from graspsense_sim_gripper.run.term_failure import not_finite_in_tick, raised_in_term
+from graspsense_sim_gripper.run.term_failure import not_finite_in_tick
 from graspsense_sim_gripper.scene.random_numbers import key_of
-from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
 from graspsense_sim_gripper.solve.state import PlantState
 
 Extracted = Any
 """What `Job.extract` returns, such as features."""
-GraspLoop = Callable[[GraspParams, SimulationState, Buffers], SimulationState]
-"""The loop of a grasp, compiled or in the interpreter."""
 Measure = Callable[[Any, Any, Any, int], Any]
 """`compiled.extraction.measure_buffers` of a job, compiled."""
 
@@ -76,20 +71,20 @@ class FinishedGrasp:
     """The trace; None if traces are not kept."""
     model: GraspModel = NO_MODEL
     """The model in which it was simulated."""
-    layout: PaddedLayout | None = None
-    """The layout of the terms in `end`; None: they are those of the object."""
+    terms: tuple[int, ...] | None = None
+    """The places of the object's own terms in `end`; None: it has no others."""
 
     @property
     def state(self) -> PlantState:
         """The plant at the end of the grasp, with the true peak force."""
         end = self.end()
-        return end if self.layout is None else unpadded(end, self.layout)
+        return end if self.terms is None else unpadded(end, self.terms)
 
     def report(self) -> dict[str, Any]:
         """Return the `model_report` of the grasp, with what its model does not verify."""
         kinds, chosen, unstable_loop = self.model
-        if isinstance(self.end, Stored) and self.layout is not None:
-            report = stored_report(self.end.type, self.layout, kinds).report(self.end.numbers)
+        if isinstance(self.end, Stored) and self.terms is not None:
+            report = stored_report(self.end.type, self.terms, kinds).report(self.end.numbers)
         else:
             report = model_report(self.state, kinds)
         if chosen is not None:
@@ -159,17 +154,7 @@ class Job:
 
 def grasp_plain(job: Job, setup: GraspSetup, model: GraspModel = NO_MODEL) -> FinishedGrasp:
     """Simulate a grasp in the interpreter; `model`: that of its object, for the report."""
-    composition, step = composition_of(setup, pad=False), type(job.controller).step
-    try:
-        return _interpreted(job, setup, grasp_loop(composition, step), model)
-    except LAW_ERRORS as error:
-        if not raised_in_term(error, setup.kinds):
-            raise
-    return _interpreted(job, setup, guarded_loop(composition, step), model)
-
-
-def _interpreted(job: Job, setup: GraspSetup, loop: GraspLoop, model: GraspModel) -> FinishedGrasp:
-    """Simulate a grasp in the interpreter with this loop."""
+    loop = grasp_loop(composition(setup.kinds, setup.plant), type(job.controller).step)
     params, state = started(job, setup)
     params = params._replace(sensor=with_listed_cells(setup.sensor))
     key, arrays = None, new_buffers()
@@ -202,15 +187,7 @@ def _interpreted(job: Job, setup: GraspSetup, loop: GraspLoop, model: GraspModel
 
 def started(job: Job, setup: GraspSetup) -> tuple[GraspParams, SimulationState]:
     """Return the parameters of the loop for a grasp, and the state in which it begins."""
-    params = GraspParams(
-        plant=setup.plant,
-        sensor=setup.sensor,
-        controller=job.params,
-        dt_s=setup.dt_s,
-        max_ticks=job.max_ticks,
-        macro_steps=uses_macro_steps(setup.plant.steps),
-    )
-    return params, SimulationState(NOT_STARTED, setup.state, setup.sensor_state, job.initial)
+    return setup.begun(job.params, job.initial, job.max_ticks)
 
 
 def ended_as(job: Job, end: Ending) -> tuple[Outcome, str]:

@@ -258,17 +258,16 @@ class _Batch:
 
     def _compiled(self, scene: str, seed: int) -> FinishedGrasp | None:
         """Return the result of a compiled grasp; None if it has to run in the interpreter."""
-        if not any(self.is_compiled.values()):
+        kinds = self.models.find(scene).composition.kinds
+        if not self.is_compiled[kinds]:
             return None
         try:
             if not hasattr(self.local, "grasps"):
-                self.local.grasps = CompiledGrasps(
-                    self.models, self.loops, self.is_compiled.__getitem__, self.drawing, self.measure
-                )
+                self.local.grasps = CompiledGrasps(self.models, self.loops, self.drawing, self.measure)
             grasps: CompiledGrasps = self.local.grasps
             return grasps.grasp(scene, seed)
         except NotCompilable as error:
-            self.is_compiled[self.models.find(scene).composition.kinds] = False
+            self.is_compiled[kinds] = False
             how = f"on {self.workers} cores" if self._worth_processes() else "on one core"
             self.notes[f"these grasps run in plain Python {how}, about a hundred times slower: {error}"] = (
                 None

@@ -115,7 +115,8 @@ def _summed(laws: Sequence[Any]) -> Law:
 def sum_of_active(laws: Sequence[Law | OnSum]) -> Law:
     """Return what `sum_of` computes with `laws_of`, bit for bit, in a form that suits the interpreter.
 
-    It takes the `active_laws`, calls those of the active terms only, and cannot be compiled.
+    It takes the `active_laws`, calls those of the active terms only, and cannot be compiled. The force is NaN where a
+    law raises an exception.
     """
     from_last = tuple([(i, law) for i, law in reversed(list(enumerate(laws))) if not isinstance(law, OnSum)])
 
@@ -132,7 +133,10 @@ def sum_of_active(laws: Sequence[Law | OnSum]) -> Law:
             active_of = params, active
         total, after = 0.0, list(states)
         for i, law, term in active:
-            force, after[i] = law(term, after[i], d0, d1, h, v1)
+            try:
+                force, after[i] = law(term, after[i], d0, d1, h, v1)
+            except LAW_ERRORS:
+                force = math.nan
             total = force + total
         return total, tuple(after)
 
@@ -148,7 +152,10 @@ def sum_of_active(laws: Sequence[Law | OnSum]) -> Law:
         active, term = params[-1]
         if active == 0:
             return total, after
-        force, state = on_sum(term, after[-1], total, d1)
+        try:
+            force, state = on_sum(term, after[-1], total, d1)
+        except LAW_ERRORS:
+            return math.nan, after
         return force, (*after[:-1], state)
 
     return acted_on
@@ -309,47 +316,25 @@ def step_parts(composition: Composition) -> dict[str, Any]:
     return _object_parts(laws_of(kinds), phases_of(kinds), moving_of(kinds), composition.hardens)
 
 
-@lru_cache(maxsize=64)
-def grasp_loop(
-    composition: Composition, step: ControllerStep, *, interpreted: bool = True
-) -> Callable[..., SimulationState]:
-    """Return the loop of a grasp for a controller with this step; `interpreted` False: in the form that is compiled."""
-    force = sum_of_active(active_laws(composition.kinds)) if interpreted else None
-    return _loop_of(composed_move(composition, interpreted=False), step, force, composition)
-
-
-@lru_cache(maxsize=64)
-def guarded_loop(composition: Composition, step: ControllerStep) -> Callable[..., SimulationState]:
-    """Return the loop of a grasp in the interpreter, in which a law that raises an exception gives NaN."""
-    laws = [law if isinstance(law, OnSum) else _guarded(law) for law in active_laws(composition.kinds)]
-    force = sum_of_active(laws)
-    return _loop_of(composed_move(composition, interpreted=False), step, force, composition)
-
-
 def _may_last_several_ticks(composition: Composition) -> bool:
     """Return whether a step of this plant may last several ticks."""
     return not (composition.converges or composition.lags)
 
 
-def _loop_of(
-    move: PlantMove, step: ControllerStep, force: Law | None, composition: Composition
+@lru_cache(maxsize=64)
+def grasp_loop(
+    composition: Composition, step: ControllerStep, *, interpreted: bool = True
 ) -> Callable[..., SimulationState]:
-    """Return the loop with this plant; `force`: of the object, in the form that suits the interpreter."""
+    """Return the loop of a grasp for a controller with this step; `interpreted` False: in the form that is compiled."""
     control = bind_reachable(tick, {"step": step, "events_told": events_of(step)})
-    parts: dict[str, Any] = {"move": move, "control": control}
+    parts: dict[str, Any] = {"move": composed_move(composition, interpreted=False), "control": control}
     if _may_last_several_ticks(composition):
         parts["begin_macro_step"] = bind_reachable(begin_macro_step, step_parts(composition))
         if law := free_parts(step):
-            parts["run_approach_ticks"] = bind_reachable(approach_ticks, law, INTERPRETED if force else None)
+            constructors = INTERPRETED if interpreted else None
+            parts["run_approach_ticks"] = bind_reachable(approach_ticks, law, constructors)
     loop = bind_reachable(grasp, parts)
-    return bind_reachable(loop, {"object_force": force}, INTERPRETED) if force else loop
-
-
-def _guarded(law: Law) -> Law:
-    def guarded(params: Any, state: Any, d0: float, d1: float, h: float, v1: float) -> tuple[float, Any]:
-        try:
-            return law(params, state, d0, d1, h, v1)
-        except LAW_ERRORS:
-            return math.nan, state
-
-    return guarded
+    if not interpreted:
+        return loop
+    force = sum_of_active(active_laws(composition.kinds))
+    return bind_reachable(loop, {"object_force": force}, INTERPRETED)

@@ -22,18 +22,18 @@ IMAGES: Final = 160
 """Cell images that the buffers hold at first, which suffice for nearly all grasps of the catalogue."""
 
 
-def new_buffers() -> Buffers:
+def new_buffers(ticks: int = TICKS, images: int = IMAGES) -> Buffers:
     """Return buffers for the first grasp of a thread."""
     return Buffers(
         pads=PadBuffers(
             left_zero=np.zeros(CELLS),
             right_zero=np.zeros(CELLS),
-            noise=np.zeros((IMAGES, 2 * CELLS)),
-            images=np.full((IMAGES, 2, CELLS), np.nan),
+            noise=np.zeros((images, 2 * CELLS)),
+            images=np.full((images, 2, CELLS), np.nan),
         ),
-        image_times=np.zeros(IMAGES),
-        columns=np.zeros((len(COLUMNS), TICKS)),
-        phases=np.zeros(TICKS, np.int64),
+        image_times=np.zeros(images),
+        columns=np.zeros((len(COLUMNS), ticks)),
+        phases=np.zeros(ticks, np.int64),
     )
 
 
