@@ -38,6 +38,7 @@ from graspsense.core.components.entries import IdentifierEntry as IdentifierEntr
 from graspsense.core.components.identification import CandidateScore as CandidateScore
 from graspsense.core.components.identification import Identification as Identification
 from graspsense.core.components.identification import IdentifiedParameter as IdentifiedParameter
+from graspsense.core.components.identification import PredictiveCheck as PredictiveCheck
 from graspsense.core.components.identification import RecordedSqueeze as RecordedSqueeze
 from graspsense.core.components.identification import SqueezeFit as SqueezeFit
 from graspsense.core.components.identification import Undetermined as Undetermined

@@ -168,5 +168,6 @@ def _as_values(out: str | None, result: Identification) -> dict[str, Any]:
         "held_out": list(result.held_out),
         "refusals": list(result.refusals),
         "repeatability": None if len(result.fits) < 2 else repeatability(result.fits),
+        "checks": [{"statistic": check.statistic, "p": check.p} for check in result.checks],
         "notes": list(result.notes),
     }

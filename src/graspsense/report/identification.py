@@ -1,4 +1,4 @@
-"""The page of an identified object: data and fit, candidates, and pairs of parameters."""
+"""The page of an identified object: data and fit, candidates, pairs of parameters, and the predictive check."""
 
 from __future__ import annotations
 
@@ -13,19 +13,21 @@ from numpy.typing import NDArray
 from graspsense.core.components.identification import (
     Identification,
     IdentifiedParameter,
+    PredictiveCheck,
     SqueezeFit,
     held_out_in_words,
     repeatability,
 )
 from graspsense.report.found_table import FoundTable
-from graspsense.report.html import Page, Section, bullets, figure, panels, paragraph
-from graspsense.report.svg import INKS, WIDTH, AxisScale, Picture, reaching
+from graspsense.report.html import Page, Section, bullets, figure, panels, paragraph, table
+from graspsense.report.svg import INKS, QUIET, WIDTH, AxisScale, Picture, reaching
 
 MAX_FITS: Final = 12
 MAX_PAIRS: Final = 6
 MAX_SHOWN: Final = 300
 LEFT: Final = 46.0
 RIGHT: Final = WIDTH - 8.0
+BINS: Final = 24
 
 
 def identification_page(result: Identification, scene: str) -> Page:
@@ -50,6 +52,7 @@ def identification_page(result: Identification, scene: str) -> Page:
             Section(id="fits", title="Data and fit", body=_fits(result.fits)),
             candidates.section(),
             Section(id="pairs", title="Pairs of parameters", body=_pairs(result)),
+            Section(id="check", title="Simulated beside recorded squeezes", body=_checks(result.checks)),
         ),
     )
 
@@ -161,6 +164,45 @@ def _pairs(result: Identification) -> str:
         words = f"{names[a]} and {names[b]}: correlation {correlation[a, b]:+.2f}"
         figures.append(figure(picture.svg(words), words))
     return paragraph("Draws of the identified values, the most correlated pairs first.") + panels(figures)
+
+
+def _checks(checks: Sequence[PredictiveCheck]) -> str:
+    if not checks:
+        return paragraph("No squeezes were simulated.")
+    rows = [
+        (
+            f"{check.statistic}{f', {check.unit}' if check.unit else ''}",
+            f"{np.mean(check.recorded):.4g}",
+            f"{np.quantile(check.simulated, 0.05):.4g} to {np.quantile(check.simulated, 0.95):.4g}",
+            f"{check.p:.2f}",
+        )
+        for check in checks
+    ]
+    note = paragraph(
+        "New squeezes were simulated on the recorded paths of the gap, of objects drawn from the identified values and "
+        "spreads. p is the share of simulated sets whose mean is at least the recorded one: near 0 or 1, the scene "
+        "does not describe the recordings."
+    )
+    header = ("statistic", "recorded, mean", "simulated, 90 %", "p")
+    return note + table("Predictive check", header, rows, 1) + panels([_histogram(check) for check in checks])
+
+
+def _histogram(check: PredictiveCheck) -> str:
+    values = np.array(check.simulated)
+    counts, edges = np.histogram(values[np.isfinite(values)], BINS)
+    picture = Picture(height=170.0)
+    x = reaching([*edges.tolist(), *check.recorded], LEFT, RIGHT)
+    y = reaching([0.0, *counts.tolist()], 128.0, 22.0, zero=True)
+    with picture.plot(x, y, 22.0, 128.0):
+        picture.x_axis(x, 22.0, 128.0, f"{check.statistic}{f', {check.unit}' if check.unit else ''}")
+        picture.y_axis(y, LEFT, RIGHT, "simulated squeezes")
+        for k, count in enumerate(counts.tolist()):
+            left, right = x(float(edges[k])), x(float(edges[k + 1]))
+            picture.box(left, y(count), right - left, y(0.0) - y(count), INKS[0], QUIET)
+        for value in check.recorded:
+            picture.mark(x(value), y(0.0) - 4.0, INKS[1], 2, words=f"recorded {value:.4g}")
+    words = f"{check.statistic}: bars are simulated squeezes, marks recorded ones; p = {check.p:.2f}"
+    return figure(picture.svg(words), words)
 
 
 def _interval(parameter: IdentifiedParameter) -> str:

@@ -15,6 +15,7 @@ from attrs import evolve, fields_dict
 from graspsense.plugin_api import ConfigError
 from graspsense.simulator_api import Identification, IdentifiedParameter, RecordedSqueeze, SqueezeFit
 from graspsense_identify.block import lag_of_block, with_fingertips_of_block
+from graspsense_identify.check import predictive_checks
 from graspsense_identify.choose import choose
 from graspsense_identify.delay import Delay, Lag, delay_of, lag_of
 from graspsense_identify.fit import Fitted
@@ -95,6 +96,7 @@ def identify(
         fits=tuple(fits),
         held_out=held_out,
         refusals=refusals(open_, fits, held_out),
+        checks=predictive_checks(fitted, intervals),
         draws=intervals.draws,
         notes=tuple(notes),
     )

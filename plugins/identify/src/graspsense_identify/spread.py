@@ -54,6 +54,11 @@ class Components(NamedTuple):
         """That of a scene: without numbers of the objects, that between squeezes, whatever it comes from."""
         return self.squeezes if math.isnan(self.objects) else self.objects
 
+    @property
+    def whole(self) -> float:
+        """That of a squeeze of another object."""
+        return float(np.sqrt(np.nansum(np.square(self))))
+
 
 @frozen(kw_only=True, eq=False)
 class Uncertainty:

@@ -133,6 +133,20 @@ def held_out_in_words(errors: Sequence[float]) -> str:
     )
 
 
+@frozen(kw_only=True)
+class PredictiveCheck:
+    """A statistic of the recorded squeezes beside that of simulated ones.
+
+    `p` is the posterior predictive p-value: the share of simulated squeezes whose statistic is at least as large.
+    """
+
+    statistic: str
+    unit: str
+    recorded: tuple[float, ...]
+    simulated: tuple[float, ...]
+    p: float
+
+
 @frozen(kw_only=True, eq=False)
 class Identification:
     """An object identified from recorded squeezes.
@@ -150,6 +164,7 @@ class Identification:
     fits: tuple[SqueezeFit, ...]
     held_out: tuple[float, ...] = ()
     refusals: tuple[str, ...] = ()
+    checks: tuple[PredictiveCheck, ...] = ()
     draws: NDArray[Any] | None = None
     notes: tuple[str, ...] = ()
     seconds: float = 0.0
