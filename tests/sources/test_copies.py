@@ -83,7 +83,7 @@ FEW_VALUES[:10, 0] = np.arange(10) % 3
         (WIDTHS, None, tuple("abcdefgh"), 8, None, None),
         (WIDTHS, None, tuple("aaaaefgh"), 5, None, None),
         # Where a feature set finds no contact, it gives no features, or one that has few values.
-        (FEW_VALUES, None, None, 53, None, "single feature"),
+        (FEW_VALUES, None, None, 53, None, "half of the features"),
         # Copies of coarse trials are found where chance cannot make them.
         (
             np.tile(np.random.default_rng(2).integers(0, 50, size=(30, 6)), (2, 1)),
@@ -216,8 +216,27 @@ def test_copies_with_one_value_changed_are_told(change, column):
     edited[:, column] = np.nan if change == "a missing value" else edited[:, column] + 0.5
     labels = ["a"] * 20 + ["b"] * 20
     kept = without_copies(labelled(np.concatenate([values, edited]), labels * 2))
-    assert any("single feature: 40 (trial 41 from trial 1)" in note for note in kept.notes)
+    assert any(
+        "half of the features of another one, or more: 40 (trial 41, of trial 1)" in n for n in kept.notes
+    )
+    assert kept.instances[:40] == kept.instances[40:]
     assert without_copies(labelled(values, labels)).notes == ()
+
+
+def test_a_single_copy_with_one_value_changed_hides_no_windows_of_a_recording():
+    rng = np.random.default_rng(3)
+    windows = rng.normal(size=(20, 5)).repeat(12, axis=0) + 0.3 * rng.normal(size=(240, 5))
+    values = np.concatenate([windows, windows[5:6]]).round(4)
+    values[240, 2] += 0.5
+    kept = without_copies(labelled(values, [f"{k // 12 % 2}" for k in range(240)] + ["0"]))
+    assert any("windows of one recording" in note for note in kept.notes)
+    assert kept.instances[240] == kept.instances[5]
+
+
+def test_features_that_follow_each_other_make_no_copies():
+    width = np.random.default_rng(4).normal(60.0, 4.0, 60).round(2)
+    values = np.column_stack([width, (width / 25.4).round(4), 0.001 * width, measured(60, 2)])
+    assert without_copies(labelled(values)).notes == ()
 
 
 NEAR = {

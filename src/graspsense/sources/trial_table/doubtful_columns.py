@@ -285,7 +285,7 @@ def values_have_one_label(values: Sequence[str], labels: Sequence[str]) -> bool:
     """Return whether several lines have each value, all with one label, and there are more values than labels."""
     given = [(value, label) for value, label in zip(values, labels, strict=True) if value]
     different = len({value for value, _ in given})
-    return len(set(labels)) < different == len(set(given)) and 2 * different <= len(given)
+    return len(set(labels)) < different == len(set(given)) and _OFTEN * different <= len(given)
 
 
 def in_one_block_each(values: Sequence[str], labels: Sequence[str]) -> bool:

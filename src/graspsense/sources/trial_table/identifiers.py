@@ -156,6 +156,9 @@ def identifies(
     cells = cells_in_range(values_of) + 1.0
     if cells < len(values_of):  # a value far from the others hides their grid
         cells = math.inf
+    hashed = whole and column.max() >= _HASHED and bool((column % 1000.0).any())
+    if (hashed or cells <= 2.0 * len(values_of)) and name_objects(column.tolist(), known):
+        return NUMBER_OBJECTS
     named = bool(_NAMES & set(words_in(name)))
     orders = (given, None if order is None else np.array(order)[given])
     if (whole or named) and any(lines is not None and _begins_anew(column, lines) for lines in orders):
@@ -173,9 +176,6 @@ def identifies(
             return "number the trials"
         if len(values_of) == len(column) >= _SPACED and _is_regular(values_of, _ALIKE):
             return "have equal steps, as those of a clock or a counter"
-    hashed = whole and column.max() >= _HASHED and bool((column % 1000.0).any())
-    if (hashed or cells <= 2.0 * len(values_of)) and name_objects(column.tolist(), known):
-        return NUMBER_OBJECTS
     return ""
 
 
