@@ -354,12 +354,13 @@ def test_a_number_too_large_to_learn_from_is_refused_by_its_name(tmp_path):
 def test_the_number_to_predict_in_another_unit_is_told(tmp_path):
     forces = np.random.default_rng(8).normal(12.0, 3.0, N).round(3)
     widths = np.random.default_rng(9).normal(60.0, 3.0, N).round(3)
-    lines = [f"{force},{1000 * force:.0f},{width}" for force, width in zip(forces, widths, strict=True)]
     path = tmp_path / "t.csv"
-    path.write_text("\n".join(["break_n,break_mn,width", *lines]) + "\n")
-    notes = read_labelled(path, None, value="break_n").notes
-    assert any("break_mn" in note and "another unit" in note for note in notes)
-    assert not any("width" in note for note in notes)
+    for other in (1000.0 * forces, forces.round(), -(forces**2)):
+        lines = [f"{force},{x},{width}" for force, x, width in zip(forces, other, widths, strict=True)]
+        path.write_text("\n".join(["break_n,other,width", *lines]) + "\n")
+        notes = read_labelled(path, None, value="break_n").notes
+        assert any("other" in note and "another unit" in note for note in notes)
+        assert not any("width" in note for note in notes)
 
 
 def test_sessions_that_are_not_held_out_are_told(tmp_path):

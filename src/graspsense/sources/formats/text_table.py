@@ -36,6 +36,7 @@ UNITS: Final = frozenset((
     "1", "pa", "kpa", "mpa", "bar", "psi", "nm", "n\u00b7m", "n*m", "m/s", "cm/s", "mm/s", "m/s2", "m/s^2",
     "millisecond", "milliseconds", "millimeter", "millimeters", "millimetre", "millimetres", "inches", "newton",
     "newtons", "m/s\u00b2", "rad/s", "deg/s", "counts", "count", "raw", "adc", "a.u.", "au", "step", "steps",
+    "ml", "cl", "dl", "mj", "mw", "n/s", "n/cm", "mm/n", "n*mm", "nmm", "cm2", "mm2", "mm^2", "mm\u00b2", "rpm", "ohm",
 ))  # fmt: skip
 """What stands in a line of units, in small letters."""
 _SINGLE_UNITS: Final = frozenset("smgNVACK%\u00b0")

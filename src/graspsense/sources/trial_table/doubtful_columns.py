@@ -126,7 +126,7 @@ _DOUBTS: Final[Mapping[str, tuple[str, str]]] = {
         "If it is a time or a counter, ",
     ),
     "target": (
-        "it is the number to predict in another unit",
+        "the number to predict determines it, as in another unit or for a known object",
         "If it is not measured apart from it, ",
     ),
 }
@@ -207,7 +207,7 @@ def _of_target(values: Numbers, target: Numbers) -> Iterator[str]:
     """Yield why the numbers of a column may be the number to predict itself, or when it was measured."""
     if keeps_rising(values):
         yield "rising"
-    if is_proportional(values, target):
+    if follows_from(values, target):
         yield "target"
 
 
@@ -323,14 +323,22 @@ def differs_by_label(values: Numbers, labels: Sequence[str]) -> bool:
     return bool(np.var(values[known] - means[codes]) < 0.5 * np.var(values[known]))
 
 
-def is_proportional(values: Numbers, target: Numbers) -> bool:
-    """Return whether these are the numbers of the target with another factor and zero, as rounding allows."""
+def follows_from(values: Numbers, target: Numbers) -> bool:
+    """Return whether these are the numbers of the target with another factor and zero, as rounding allows.
+
+    Or whether each number of the target has one of them, of which there are not few: they rise or fall with it, or most
+    numbers have several lines.
+    """
     known = ~np.isnan(values)
-    if known.sum() < 2 * LEAST_LINES:
+    if known.sum() < 2 * LEAST_LINES or np.ptp(values[known]) == 0.0 or np.ptp(target[known]) == 0.0:
         return False
-    away, of_target = values[known] - values[known].mean(), target[known] - target[known].mean()
-    scale = float(np.sqrt((away @ away) * (of_target @ of_target)))
-    return scale > 0.0 and abs(float(away @ of_target)) >= _PROPORTIONAL * scale
+    values, target = (numbers[known] / np.ptp(numbers[known]) for numbers in (values, target))
+    if abs(np.corrcoef(values, target)[0, 1]) >= _PROPORTIONAL:
+        return True
+    of_target, pairs = len(set(target.tolist())), len(set(zip(values.tolist(), target.tolist(), strict=True)))
+    steps = np.diff(values[np.argsort(target, kind="stable")])
+    rises = (steps >= 0.0).all() or (steps <= 0.0).all() or 2 * of_target <= len(target)
+    return pairs == of_target and bool(rises) and len(set(values.tolist())) >= LEAST_LINES
 
 
 def _numbers(columns: CsvColumns, names: Sequence[str]) -> dict[str, Numbers]:

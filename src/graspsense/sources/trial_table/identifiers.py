@@ -39,7 +39,7 @@ _NAMES: Final = frozenset({
 _OF_RECORDINGS: Final = frozenset({
     "session", "operator", "experimenter", "person", "participant", "subject", "user", "robot", "host", "lab", "site",
     "seed", "batch", "lot", "weekday", "day", "doy", "week", "month", "year", "date", "datetime", "trial", "fold",
-    "split", "file", "filename", "uid", "uuid", "prediction", "predicted", "proba", "probability", "confidence",
+    "split", "file", "filename", "uid", "uuid", "pred", "prediction", "predicted", "proba", "probability", "confidence",
     "sitzung", "bediener", "proband", "datum", "wochentag", "tag", "versuch", "datei", "fichier", "jour", "fecha",
 })  # fmt: skip
 """What a recording is known by, and what a model said of it; no gripper measures it."""
