@@ -248,7 +248,7 @@ def _labels(columns: CsvColumns, label: str | None, notes: list[str], *, require
         notes.append(f"taken as labels, not as missing ones: {listed(words)}")
     if len(set(written)) > len(set(labels)):
         notes.append("labels that differ in invisible characters, or as 1 and 1.0 do, count as one")
-    if len(set(labels)) > max(2, len(labels) // 2):
+    if len(set(labels)) > max(LEAST_LINES, len(labels) // 2):
         raise ConfigError(
             f"column {label!r} of {columns.path} has {len(set(labels))} different values in {len(labels)} trials, so "
             "it cannot be the label. Name the column that says what was grasped"
