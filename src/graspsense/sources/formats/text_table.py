@@ -49,8 +49,8 @@ _RULE: Final = re.compile(r"(?=.*[-_=]{3})[-_=+|:\s]+")
 _REMARKS: Final = frozenset({"comment", "comments", "remark", "remarks", "note", "notes"})
 """Names of a last column whose cells a program leaves out, with the separator, where it has nothing to say."""
 _SEPARATOR_LINE: Final = re.compile(r'"?sep=([;,\t|])"?\s*')
-SPREADSHEETS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
-"""The first bytes of a ZIP file, as which spreadsheets are saved, and of those of old programs."""
+SPREADSHEETS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"PAR1", b"ARROW1")
+"""The first bytes of a ZIP file, as which spreadsheets are saved, of those of old programs, and of Apache's tables."""
 _CODE_PAGES: Final = ("cp1252", "cp1250", "iso8859-1", "iso8859-15")
 """They agree on degrees, micro and the letters of several languages."""
 _WITH_UNIT: Final = re.compile(r"(.*[0-9.])\s*([^\s0-9]+)")
@@ -566,7 +566,7 @@ def text_of(path: Path) -> str:
             data = Unpacked(path).unpack("gzip", data)
             size = max(size, len(data))
     if data.startswith(SPREADSHEETS):
-        raise DataDamaged(f"{path} is a spreadsheet or an archive, not text: save its table as CSV in UTF-8")
+        raise DataDamaged(f"{path} is a spreadsheet, an archive or a binary table: save it as CSV in UTF-8")
     if too_large := TEXT_BYTES.exceeded(size):
         raise DataDamaged(f"{path}: {too_large}")
     text = _decoded(path, data).replace("\ufeff", "")  # also of files that were joined
