@@ -176,19 +176,16 @@ def _edited_copies(values: NDArray[np.float64]) -> NDArray[np.int64]:
     from scipy.special import gammainc
 
     n, none = len(values), np.empty(0, dtype=np.int64)
-    ranks = np.array([np.unique(column, return_inverse=True)[1] for column in values.T])
-    alike_in: list[NDArray[np.int64]] = []
-    fine: list[int] = []
-    for k in np.flatnonzero(ranks.max(axis=1, initial=0) >= _FEW - 1).tolist():
-        order = np.argsort(values[:, k], kind="stable")
-        ranked, alike, lag = values[order, k], none, 1
+    fine: list[NDArray[np.int64]] = []
+    for column in _independent(values).T:
+        order = np.argsort(column, kind="stable")
+        ranked, alike, lag = column[order], none, 1
         while len(alike) <= n and (same := ranked[lag:] == ranked[:-lag]).any():
             alike, lag = np.append(alike, order[:-lag][same] * n + order[lag:][same]), lag + 1
-        if len(alike) <= n and all(abs(np.corrcoef(ranks[[k, i]])[0, 1]) < _SAME for i in fine):
-            fine.append(k)
-            alike_in.append(alike)
+        if len(alike) <= n:
+            fine.append(alike)
     least = max(2, (len(fine) + 1) // 2)
-    pairs, times = np.unique(np.concatenate([none, *alike_in]), return_counts=True)
+    pairs, times = np.unique(np.concatenate([none, *fine]), return_counts=True)
     share = (times[times < least].sum() + 1.0) / max(len(fine), 1) / (0.5 * n * n)
     by_chance = 0.5 * n * n * tail(least, len(fine), min(share, 1.0)) if least <= len(fine) else math.inf
     copies = pairs[times >= least]
@@ -252,9 +249,8 @@ def _can_be_chance(distinct: NDArray[np.float64], repeated: int) -> bool:
 
     They may if the values of all features have few combinations, and where trials often agree in all features but one.
     """
-    finest = np.argsort([-len(np.unique(column)) for column in distinct.T], kind="stable")[:_COMPARED]
-    distinct = _independent(distinct[:, finest])
-    if distinct.shape[1] == 1:
+    distinct = _independent(distinct)
+    if distinct.shape[1] <= 1:
         return True
     different = [np.unique(column[~np.isnan(column)]) for column in distinct.T]
     combinations = math.prod(
@@ -270,17 +266,12 @@ def _can_be_chance(distinct: NDArray[np.float64], repeated: int) -> bool:
     return agreeing >= repeated
 
 
-def _independent(distinct: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return these columns without those that say the same as one before, such as a length in another unit."""
-    kept: list[NDArray[np.int64]] = []
-    columns = []
-    for column in distinct.T:
-        numbers = np.unique(column, return_inverse=True)[1]
-        n = len(set(numbers.tolist()))
-        if all(
-            not n == len(set(other.tolist())) == len(set(zip(numbers.tolist(), other.tolist(), strict=True)))
-            for other in kept
-        ):
-            kept.append(numbers)
-            columns.append(column)
-    return np.column_stack(columns)
+def _independent(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the finest of these columns without those that follow a finer one, such as a length in another unit."""
+    ranks = np.array([np.unique(column, return_inverse=True)[1] for column in values.T], dtype=np.float64)
+    highest = ranks.max(axis=1, initial=0.0)
+    kept: list[int] = []
+    for k in np.argsort(-highest, kind="stable")[:_COMPARED].tolist():
+        if highest[k] and all(abs(np.corrcoef(ranks[[k, i]])[0, 1]) < _SAME for i in kept):
+            kept.append(k)
+    return values[:, kept]
