@@ -101,7 +101,7 @@ class FeatureTable:
         """Return the table of these trials, by number or by a mask."""
         numbers = (which.nonzero()[0] if which.dtype == bool else which).tolist() if self.reasons else ()
         reasons = {k: self.reasons[i] for k, i in enumerate(numbers) if i in self.reasons}
-        return FeatureTable(names=self.names, units=self.units, values=self.values[which], reasons=reasons)
+        return evolve(self, values=self.values[which], reasons=reasons)
 
     def columns(self, names: Sequence[str]) -> FeatureTable:
         """Return the table of these features, in this order. KeyError names the known ones."""
@@ -110,12 +110,8 @@ class FeatureTable:
             if name not in places:
                 raise KeyError(f"no feature {name!r}; there are {listed(self.names)}")
         which = [places[name] for name in names]
-        return FeatureTable(
-            names=tuple(names),
-            units=tuple(self.units[i] for i in which),
-            values=self.values[:, which],
-            reasons=self.reasons,
-        )
+        units = tuple(self.units[i] for i in which)
+        return evolve(self, names=tuple(names), units=units, values=self.values[:, which])
 
     def row(self, i: int, reason: str = "missing in the table") -> Features:
         """Return the features of one trial; each missing one of which no reason is known has this."""

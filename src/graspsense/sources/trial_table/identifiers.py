@@ -44,7 +44,8 @@ _OF_RECORDINGS: Final = frozenset({
 })  # fmt: skip
 """What a recording is known by, and what a model said of it; no gripper measures it."""
 _DIVISIONS: Final = frozenset({
-    "seed", "trial", "fold", "split", "uid", "uuid", "prediction", "predicted", "proba", "probability", "confidence"
+    "seed", "trial", "fold", "split", "uid", "uuid", "pred", "prediction", "predicted", "proba", "probability",
+    "confidence",
 })  # fmt: skip
 """Those that tell nothing of what was the same for several recordings."""
 _NUMBERED: Final = frozenset(
@@ -101,9 +102,8 @@ _WORDED_DATE: Final = re.compile(
     rf"(?=.*\d)(?=.*({_LONG_WORDS}|[ap]\.?m))({_LONG_WORDS}|\d+(st|nd|rd|th)?|[ap]\.?m\.?|utc|gmt|[-\s.,:/_+])+"
 )
 """A date or a time with such words, as 26 Nov 2026 or 2:03 pm."""
-_DATES: Final = (
-    *("%Y%m%d", "%d%m%Y", "%m%d%Y", "%y%m%d", "%y%m%d%H%M", "%Y%m%d%H%M", "%y%m%d%H%M%S", "%Y%m%d%H%M%S"),
-)
+_DAY_FORMS: Final = ("%Y%m%d", "%d%m%Y", "%m%d%Y", "%y%m%d")
+_DATES: Final = (*_DAY_FORMS, "%y%m%d%H%M", "%Y%m%d%H%M", "%y%m%d%H%M%S", "%Y%m%d%H%M%S")
 _CLOCK_VALUES: Final = (10, 15)
 """Different hundreds, and different last two digits, from which on 142530 and 91205 are times of the day: that no two
 digits are above 59 is a chance of one in two thousand."""
