@@ -269,9 +269,10 @@ def _can_be_chance(distinct: NDArray[np.float64], repeated: int) -> bool:
 def _independent(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the finest of these columns without those that follow a finer one, such as a length in another unit."""
     ranks = np.array([np.unique(column, return_inverse=True)[1] for column in values.T], dtype=np.float64)
+    ranks = ranks.reshape(values.T.shape)
     highest = ranks.max(axis=1, initial=0.0)
-    kept: list[int] = []
-    for k in np.argsort(-highest, kind="stable")[:_COMPARED].tolist():
-        if highest[k] and all(abs(np.corrcoef(ranks[[k, i]])[0, 1]) < _SAME for i in kept):
-            kept.append(k)
-    return values[:, kept]
+    finest = [k for k in np.argsort(-highest, kind="stable")[:_COMPARED].tolist() if highest[k] > 0.0]
+    away = ranks[finest] - ranks[finest].mean(axis=1, keepdims=True)
+    away /= np.sqrt((away**2).sum(axis=1, keepdims=True))
+    follows = np.triu(np.abs(away @ away.T) >= _SAME, 1).any(axis=0)
+    return values[:, [k for k, other in zip(finest, follows.tolist(), strict=True) if not other]]

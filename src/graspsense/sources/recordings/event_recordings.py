@@ -85,7 +85,7 @@ def event_recordings(source: str, only: str | None = None) -> EventRecordings:
             f"the forces are in {', '.join(units)}, for which thresholds in N have no meaning: see the fitted ones"
         )
     instances = instances_of(labelled)
-    known = with_sessions(
+    noted = with_sessions(
         Labelled(
             source=source,
             table=FeatureTable(names=(), units=(), values=np.empty((len(labelled), 0))),
@@ -97,9 +97,9 @@ def event_recordings(source: str, only: str | None = None) -> EventRecordings:
     )
     return EventRecordings(
         recordings=tuple(labelled),
-        groups=known.instances or known.labels,
+        groups=noted.instances or noted.labels,
         held_out="label" if instances is None else "instance",
-        notes=known.notes,
+        notes=noted.notes,
     )
 
 

@@ -357,7 +357,7 @@ def name_objects(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
     fewer = sum(count < most for count in counts.values())
     in_blocks = sum(1 for _ in groupby(values)) == objects
     uneven = sum((count - mean) ** 2 for count in counts.values()) / mean
-    even = mean >= 2.0 and gammainc(0.5 * (objects - 1), 0.5 * uneven) < _EVEN
+    even = mean >= 2.0 and bool(gammainc(0.5 * (objects - 1), 0.5 * uneven) < _EVEN)
     return most > 1 and (fewer <= max(_ENDS, among) or (in_blocks and min(counts.values()) > 1) or even)
 
 
