@@ -344,6 +344,8 @@ def test_measured_columns_are_not_doubted(tmp_path_factory, seed):
         rng.choice([0.05, 0.1, 0.15, 0.2, 0.25], N, p=[0.5, 0.2, 0.1, 0.1, 0.1]),  # a time in samples
     ):
         assert not notes_on(path, "width [mm]", values.tolist())
+    coarse = rng.normal([5.0] * 30 + [40.0] * 30, 2.0).round()
+    assert not notes_on(path, "width", coarse.tolist())
 
 
 def test_a_number_too_large_to_learn_from_is_refused_by_its_name(tmp_path):

@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from decimal import Decimal
 from itertools import groupby
+from operator import itemgetter
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -20,6 +21,7 @@ from graspsense.core.values.features import LARGEST_VALUE
 from graspsense.sources.trial_table.identifiers import (
     LEAST_LINES,
     TIMES,
+    are_even,
     can_be_days,
     follow_lines,
     groups_trials,
@@ -182,7 +184,8 @@ def _of_recording(columns: CsvColumns, name: str, labels: Sequence[str]) -> Iter
         return
     if mostly_says_the_label(cells, labels):
         yield "mostly"
-    if name_objects(cells, labels) or (is_number and values_have_one_label(cells, labels)):
+    values = cells if columns.is_nominal(name) else columns.numbers(name)
+    if name_objects(cells, labels) or (is_number and values_have_one_label(values, labels)):
         yield "one label"
     if (columns.is_nominal(name) or is_number) and in_one_block_each(cells, labels):
         yield "blocks"
@@ -281,11 +284,17 @@ def digits_tell_labels(values: Numbers, labels: Sequence[str]) -> bool:
     )
 
 
-def values_have_one_label(values: Sequence[str], labels: Sequence[str]) -> bool:
-    """Return whether several lines have each value, all with one label, and there are more values than labels."""
-    given = [(value, label) for value, label in zip(values, labels, strict=True) if value]
-    different = len({value for value, _ in given})
-    return len(set(labels)) < different == len(set(given)) and _OFTEN * different <= len(given)
+def values_have_one_label(values: Sequence[str] | Sequence[float], labels: Sequence[str]) -> bool:
+    """Return whether several lines have each value, all with one label, and there are more values than labels.
+
+    Numbers of a label that have a range of their own are measured, unless each has about as many lines.
+    """
+    given = [pair for pair in zip(values, labels, strict=True) if pair[0] != "" and pair[0] == pair[0]]
+    different, among = Counter(value for value, _ in given), len(set(labels))
+    if not among < len(different) == len(set(given)) or _OFTEN * len(different) > len(given):
+        return False
+    ranges = sum(1 for _ in groupby(sorted(given), key=itemgetter(1)))
+    return isinstance(given[0][0], str) or ranges > among or are_even([*different.values()])
 
 
 def in_one_block_each(values: Sequence[str], labels: Sequence[str]) -> bool:

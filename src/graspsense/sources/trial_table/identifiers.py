@@ -343,22 +343,28 @@ def _hardly_repeats(n: int, distinct: int, cells: float) -> bool:
 def name_objects(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
     """Return whether values name objects: each belongs to one label, and all have as many lines, or one block.
 
-    Where two labels meet, an object may have lines of both. Objects at the ends may have fewer lines; others may,
-    where the numbers of lines are so even that drawn values (as in a chi-squared test) hardly ever are.
+    Where two labels meet, an object may have lines of both. Objects at the ends may have fewer lines, and others may if
+    all have nearly as many.
     """
-    from scipy.special import gammainc
-
     counts = Counter(values)
     objects = len(counts)
     among = len(set(labels))
     if not _enough_objects(objects, labels) or len(set(zip(values, labels, strict=True))) >= objects + among:
         return False
-    most, mean = max(counts.values()), len(values) / objects
+    most = max(counts.values())
     fewer = sum(count < most for count in counts.values())
     in_blocks = sum(1 for _ in groupby(values)) == objects
-    uneven = sum((count - mean) ** 2 for count in counts.values()) / mean
-    even = mean >= 2.0 and bool(gammainc(0.5 * (objects - 1), 0.5 * uneven) < _EVEN)
-    return most > 1 and (fewer <= max(_ENDS, among) or (in_blocks and min(counts.values()) > 1) or even)
+    alike = fewer <= max(_ENDS, among) or are_even([*counts.values()])
+    return most > 1 and (alike or (in_blocks and min(counts.values()) > 1))
+
+
+def are_even(counts: Sequence[int]) -> bool:
+    """Return whether values have numbers of lines as even as those of objects, by a chi-squared test."""
+    from scipy.special import gammainc
+
+    mean = sum(counts) / len(counts)
+    uneven = sum((count - mean) ** 2 for count in counts) / mean
+    return mean >= 2.0 and bool(gammainc(0.5 * (len(counts) - 1), 0.5 * uneven) < _EVEN)
 
 
 def _enough_objects(objects: int, labels: Sequence[str]) -> bool:
