@@ -271,9 +271,10 @@ def test_measured_trials_are_not_taken_for_near_copies(seed, features):
         assert not any("closer to" in note for note in without_copies(labelled(values)).notes)
 
 
-def test_grasps_of_one_named_object_may_be_close():
-    grasps = np.repeat(measured(12), 5, axis=0) + 0.01 * measured(60, seed=1)
-    unnamed = labelled(grasps, [f"{k // 5 % 2}" for k in range(60)])
-    named = evolve(unnamed, instances=tuple(f"bottle {k // 5}" for k in range(60)))
-    assert any("4 other trials" in note for note in without_copies(unnamed).notes)
+@every_case("each", [5, 10])
+def test_grasps_of_one_named_object_may_be_close(each):
+    grasps = np.repeat(measured(12), each, axis=0) + 0.01 * measured(12 * each, seed=1)
+    unnamed = labelled(grasps, [f"{k // each % 2}" for k in range(12 * each)])
+    named = evolve(unnamed, instances=tuple(f"bottle {k // each}" for k in range(12 * each)))
+    assert any(f"{each - 1} other trials" in note for note in without_copies(unnamed).notes)
     assert not without_copies(named).notes

@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 _CLOSER: Final = 0.2
 """Ratio of two distances below which a trial is much closer to some trials than to the next one."""
 _BY_CHANCE: Final = 1e-6
-_MOST_OTHERS: Final = 4
-"""Largest number of trials that each trial may be close to."""
+_MOST_OTHERS: Final = 9
+"""Largest number of trials that each trial may be close to: ten grasps of an object are usual."""
 _FEWEST_OF_LABEL: Final = 3
 """A label with fewer trials than this times those that are close is a group of its own."""
 _MOST_TRIALS: Final = 2000
