@@ -213,7 +213,6 @@ class _Tables:
 
     features: FeatureTable
     before_contact: FeatureTable | None
-    before_missing: str
 
 
 def _controls(store: Store, rows: _Rows, tables: _Tables) -> Controls:
@@ -221,7 +220,6 @@ def _controls(store: Store, rows: _Rows, tables: _Tables) -> Controls:
         tables.features,
         tables.before_contact,
         no_before="the trials do not have the same features from before contact",
-        before_missing=tables.before_missing,
         first_line=first_lines(store, rows.recording, rows.origin),
     )
     return without_constant_gap(known_controls, imported_gaps(store, rows.recording, rows.origin))
@@ -285,13 +283,14 @@ def _with_value(store: Store, rows: _Rows, name: str, notes: list[str]) -> tuple
 def _stored_tables(store: Store, folder: str, rows: _Rows, feature_set: int) -> _Tables:
     sets = dict(store.query("SELECT id, features FROM feature_set"))
     same_before = len(set(rows.before_set)) == 1
-    reasons = {i: decoded(folder, text) for i, text in enumerate(rows.missing) if text != "{}"}
+    reasons, before_reasons = (
+        {i: decoded(folder, text) for i, text in enumerate(missing) if text != "{}"}
+        for missing in (rows.missing, rows.missing_before)
+    )
+    early = _unpacked_table(folder, sets[rows.before_set[0]], rows.before_contact) if same_before else None
     return _Tables(
         features=evolve(_unpacked_table(folder, sets[feature_set], rows.values), reasons=reasons),
-        before_contact=_unpacked_table(folder, sets[rows.before_set[0]], rows.before_contact)
-        if same_before
-        else None,
-        before_missing=_most_frequent_reason([decoded(folder, text) for text in rows.missing_before]),
+        before_contact=None if early is None else evolve(early, reasons=before_reasons),
     )
 
 
@@ -322,7 +321,6 @@ def _tables_again(
     return rows.picked(same), _Tables(
         features=_table([trial.features for trial in kept]),
         before_contact=_table([trial.before_contact for trial in kept]) if same_before else None,
-        before_missing=_most_frequent_reason([trial.before_contact.reasons for trial in kept]),
     )
 
 
@@ -331,14 +329,6 @@ def _table(trials: Sequence[FeatureValues]) -> FeatureTable:
     values = np.array([[np.nan if v is None else v for v in trial.values] for trial in trials], np.float64)
     reasons = {i: trial.reasons for i, trial in enumerate(trials) if trial.reasons}
     return FeatureTable(names=names, units=units, values=values, reasons=reasons)
-
-
-def _most_frequent_reason(missing: Sequence[Mapping[str, str]]) -> str:
-    """Return the most frequent of the reasons why features of these trials are missing; empty without any."""
-    reasons: Counter[str] = Counter()
-    for row in missing:
-        reasons.update(set(row.values()))
-    return reasons.most_common(1)[0][0] if reasons else ""
 
 
 def _unused(store: Store) -> tuple[str, ...]:

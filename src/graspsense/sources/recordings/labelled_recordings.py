@@ -156,7 +156,6 @@ def _controls(table: FeatureTable, early: Sequence[Features], facts: Sequence[La
     known_controls = controls(
         table,
         table_of(early),
-        before_missing=next((reason for features in early for reason in features.reasons.values()), ""),
         first_line=FeatureTable(names=NAMES, units=UNITS, values=opening),
     )
     gaps = ([reading.frame.gap_m for reading in fact.recording.readings] for fact in facts)
