@@ -237,6 +237,9 @@ def test_features_that_follow_each_other_make_no_copies():
     width = np.random.default_rng(4).normal(60.0, 4.0, 60).round(2)
     values = np.column_stack([width, (width / 25.4).round(4), 0.001 * width, measured(60, 2)])
     assert without_copies(labelled(values)).notes == ()
+    values = np.maximum(measured(300, 4), [-9.0, -9.0, -1.8, -1.8]).round(4)
+    values[:12, 2:] = -1.8  # of a sensor and what is computed from it
+    assert without_copies(labelled(values)).notes == ()
 
 
 NEAR = {

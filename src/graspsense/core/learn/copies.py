@@ -42,6 +42,8 @@ _HASH_DIGITS: Final = 12
 """Two of a million different trials have the same hash with a probability below 1 in 500."""
 _BY_CHANCE: Final = 1e-3
 """Probability that trials which agree in half of their features are no copies."""
+_OFTEN: Final = 3
+"""Most lines of a zero, or of the end of a range, that are no sign of a limit."""
 _SAME: Final = 0.99
 """Correlation of the ranks of two features from which on they are the same one in other units or digits."""
 _FEW: Final = 5
@@ -171,13 +173,16 @@ def _edited_copies(values: NDArray[np.float64]) -> NDArray[np.int64]:
     """Return pairs of trials, shape (2, pairs), that agree in half of the fine features, which chance hardly makes.
 
     A feature is fine if no more pairs than there are trials agree in it. It does not follow another one, and at least
-    two of them agree.
+    two of them agree. Zeros, and the ends of a range, can be measured often.
     """
     from scipy.special import gammainc
 
     n, none = len(values), np.empty(0, dtype=np.int64)
     fine: list[NDArray[np.int64]] = []
     for column in _independent(values).T:
+        level, lines = np.unique(column[~np.isnan(column)], return_counts=True)
+        usual = level[(lines > _OFTEN) & ((level == level[0]) | (level == level[-1]) | (level == 0.0))]
+        column = np.where(np.isin(column, usual), np.nan, column)
         order = np.argsort(column, kind="stable")
         ranked, alike, lag = column[order], none, 1
         while len(alike) <= n and (same := ranked[lag:] == ranked[:-lag]).any():
