@@ -194,7 +194,7 @@ def _edited_copies(values: NDArray[np.float64]) -> NDArray[np.int64]:
     share = (times[times < least].sum() + 1.0) / max(len(fine), 1) / (0.5 * n * n)
     by_chance = 0.5 * n * n * tail(least, len(fine), min(share, 1.0)) if least <= len(fine) else math.inf
     copies = pairs[times >= least]
-    if gammainc(len(copies), by_chance) > _BY_CHANCE:
+    if gammainc(len(copies), _SURE_OF_ALL * by_chance) > _BY_CHANCE:
         copies = pairs[:0]
     return np.stack([copies // n, copies % n])
 
