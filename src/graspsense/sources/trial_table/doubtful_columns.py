@@ -139,9 +139,15 @@ def doubts(
     columns: CsvColumns,
     labels: Sequence[str],
     table: FeatureTable,
-    target: Sequence[float] | None = None,
+    target: Sequence[float] | None,
+    lines: Sequence[int],
 ) -> list[str]:
-    """Return notes on those columns that are features and may reveal the labels, or the number to predict."""
+    """Return notes on those columns that are features and may reveal the labels, or the number to predict.
+
+    `lines` are those to be looked at, in the order of recording.
+    """
+    columns, table, labels = columns.rows(lines), table.rows(np.array(lines)), [labels[i] for i in lines]
+    target = None if target is None else [target[i] for i in lines]
     used = [name for name in columns.names if set(columns.columns_of(name)) <= set(table.names)]
     numbers = _numbers(columns, [name for name in used if not columns.is_nominal(name)])
     doubted: dict[str, list[str]] = {}

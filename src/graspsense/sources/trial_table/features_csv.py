@@ -97,9 +97,8 @@ def read_labelled(
     table = _feature_table(columns, features, reserved, identified, notes)
     if export is None:
         recorded = lines if ranks is None else sorted(lines, key=ranks.__getitem__)
-        values = None if target is None else [target.values[i] for i in recorded]
-        known = [labels[i] for i in recorded]
-        notes += doubts(columns.rows(recorded), known, table.rows(np.array(recorded)), values)
+        values = None if target is None else target.values
+        notes += doubts(columns, labels, table, values, recorded)
         others = [name for name in columns.names if name not in {*reserved, *table.names}]
         notes += not_held_out(columns, others, instances)
     return Labelled(
