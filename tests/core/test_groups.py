@@ -15,6 +15,7 @@ from graspsense.core.learn.model_file import load_model, write_model
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.report.verdict import verdict
 
+NO_COPIES = np.empty((2, 0), dtype=np.int64)
 MEANS = 1.3 * np.random.default_rng(5).normal(size=(3, 4))
 
 
@@ -82,7 +83,7 @@ def test_near_copies_of_one_named_instance_are_told_of_by_its_name():
 def test_neighbours_that_are_alike_are_held_out_in_blocks_and_in_another_order_nothing_is_told(make):
     rng = np.random.default_rng(1)
     numbers, values = make(rng)
-    trials = grouped(table_of(numbers, values))
+    trials = grouped(table_of(numbers, values), NO_COPIES)
     assert trials.grouped
     assert 6 <= len(set(trials.instances)) < len(numbers) / 3
     assert all(
@@ -91,8 +92,8 @@ def test_neighbours_that_are_alike_are_held_out_in_blocks_and_in_another_order_n
     )
     order = rng.permutation(len(numbers))
     mixed = table_of(numbers[order], values[order])
-    assert grouped(mixed) is mixed
-    in_time = grouped(evolve(mixed, order=tuple(order.tolist())))
+    assert grouped(mixed, NO_COPIES) is mixed
+    in_time = grouped(evolve(mixed, order=tuple(order.tolist())), NO_COPIES)
     assert [in_time.instances[i] == in_time.instances[k] for i, k in np.ndindex(30, 30)] == [
         trials.instances[order[i]] == trials.instances[order[k]] for i, k in np.ndindex(30, 30)
     ]
@@ -110,10 +111,10 @@ def test_neighbours_are_alike_or_not_also_where_rounded_features_are_equal_by_ch
 def test_named_instances_and_trials_sorted_by_a_feature_have_no_blocks():
     numbers, values = by_object(np.random.default_rng(1))
     named = table_of(numbers, values, instances=tuple(f"trial {k}" for k in range(len(numbers))))
-    assert grouped(named) is named
+    assert grouped(named, NO_COPIES) is named
     by_force = np.lexsort((values[:, 0], numbers))
     table = table_of(numbers[by_force], values[by_force])
-    assert grouped(table) is table
+    assert grouped(table, NO_COPIES) is table
 
 
 @every_case("each", [5, 20, 60])
@@ -124,7 +125,7 @@ def test_grasps_that_do_not_resemble_their_neighbours_are_no_groups(each):
         values = things(numbers, rng).round(1)
         values[rng.random(values.shape) < 0.1] = np.nan
         trials = table_of(numbers, values)
-        assert grouped(trials) is trials, f"seed {seed}"
+        assert grouped(trials, NO_COPIES) is trials, f"seed {seed}"
 
 
 @every_case("make", [by_object, windows, pasted])
@@ -149,7 +150,7 @@ def test_a_certainty_says_that_it_is_of_the_same_objects_unless_others_were_held
     trials = table_of(numbers, values)
     named = evolve(trials, instances=tuple(f"bottle {k // 5}" for k in range(len(numbers))))
     order = np.random.default_rng(2).permutation(len(numbers))
-    for known, of_same in ((named, False), (grouped(trials), True), (trials.rows(order), True)):
+    for known, of_same in ((named, False), (grouped(trials, NO_COPIES), True), (trials.rows(order), True)):
         write_model(tmp_path / "m.json", model_of(known, "tree"))
         made = load_model(str(tmp_path / "m.json"), installed()).predictions(known.table)
         (certain, *_) = [prediction for prediction in made if prediction.certainty is not None]

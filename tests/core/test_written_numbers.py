@@ -56,6 +56,7 @@ def test_a_column_has_one_notation(cells, values):
         (["1,2,3"], 0),
         (["1,0,000"], 0),
         (["12.5", "1,5", "1,234.5"], 1),
+        (["8.19", "9,802", "1,043", "7.4", "8,125"], 1),
     ],
 )
 def test_what_fits_no_common_notation_is_refused_with_its_row(cells, row):

@@ -196,8 +196,10 @@ def test_what_is_known_before_the_contact_is_a_warning_only_where_it_tells(name,
     assert ("The first line of the recording alone" in verdict(evaluation)) is (leak and name == "first_line")
 
 
-def control_of(values, **more):
-    return ControlFeatures(table=table(values, names=("gap_at_start",)), what="the gap at the start", **more)
+def control_of(values, missing=""):
+    known = table(values, names=("gap_at_start",))
+    reasons = {k: {"gap_at_start": missing} for k in np.flatnonzero(np.isnan(values)).tolist() if missing}
+    return ControlFeatures(table=evolve(known, reasons=reasons), what="the gap at the start")
 
 
 @every_case(

@@ -83,7 +83,7 @@ FEW_VALUES[:10, 0] = np.arange(10) % 3
         (WIDTHS, None, tuple("abcdefgh"), 8, None, None),
         (WIDTHS, None, tuple("aaaaefgh"), 5, None, None),
         # Where a feature set finds no contact, it gives no features, or one that has few values.
-        (FEW_VALUES, None, None, 53, None, "single feature"),
+        (FEW_VALUES, None, None, 53, None, "half of the features"),
         # Copies of coarse trials are found where chance cannot make them.
         (
             np.tile(np.random.default_rng(2).integers(0, 50, size=(30, 6)), (2, 1)),
@@ -216,8 +216,30 @@ def test_copies_with_one_value_changed_are_told(change, column):
     edited[:, column] = np.nan if change == "a missing value" else edited[:, column] + 0.5
     labels = ["a"] * 20 + ["b"] * 20
     kept = without_copies(labelled(np.concatenate([values, edited]), labels * 2))
-    assert any("single feature: 40 (trial 41 from trial 1)" in note for note in kept.notes)
+    assert any(
+        "half of the features of another one, or more: 40 (trial 41, of trial 1)" in n for n in kept.notes
+    )
+    assert kept.instances[:40] == kept.instances[40:]
     assert without_copies(labelled(values, labels)).notes == ()
+
+
+def test_a_single_copy_with_one_value_changed_hides_no_windows_of_a_recording():
+    rng = np.random.default_rng(3)
+    windows = rng.normal(size=(20, 5)).repeat(12, axis=0) + 0.3 * rng.normal(size=(240, 5))
+    values = np.concatenate([windows, windows[5:6]]).round(4)
+    values[240, 2] += 0.5
+    kept = without_copies(labelled(values, [f"{k // 12 % 2}" for k in range(240)] + ["0"]))
+    assert any("windows of one recording" in note for note in kept.notes)
+    assert kept.instances[240] == kept.instances[5]
+
+
+def test_features_that_follow_each_other_make_no_copies():
+    width = np.random.default_rng(4).normal(60.0, 4.0, 60).round(2)
+    values = np.column_stack([width, (width / 25.4).round(4), 0.001 * width, measured(60, 2)])
+    assert without_copies(labelled(values)).notes == ()
+    values = np.maximum(measured(300, 4), [-9.0, -9.0, -1.8, -1.8]).round(4)
+    values[:12, 2:] = -1.8  # of a sensor and what is computed from it
+    assert without_copies(labelled(values)).notes == ()
 
 
 NEAR = {
@@ -252,9 +274,10 @@ def test_measured_trials_are_not_taken_for_near_copies(seed, features):
         assert not any("closer to" in note for note in without_copies(labelled(values)).notes)
 
 
-def test_grasps_of_one_named_object_may_be_close():
-    grasps = np.repeat(measured(12), 5, axis=0) + 0.01 * measured(60, seed=1)
-    unnamed = labelled(grasps, [f"{k // 5 % 2}" for k in range(60)])
-    named = evolve(unnamed, instances=tuple(f"bottle {k // 5}" for k in range(60)))
-    assert any("4 other trials" in note for note in without_copies(unnamed).notes)
+@every_case("each", [5, 10])
+def test_grasps_of_one_named_object_may_be_close(each):
+    grasps = np.repeat(measured(12), each, axis=0) + 0.01 * measured(12 * each, seed=1)
+    unnamed = labelled(grasps, [f"{k // each % 2}" for k in range(12 * each)])
+    named = evolve(unnamed, instances=tuple(f"bottle {k // each}" for k in range(12 * each)))
+    assert any(f"{each - 1} other trials" in note for note in without_copies(unnamed).notes)
     assert not without_copies(named).notes

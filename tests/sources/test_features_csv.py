@@ -49,7 +49,8 @@ def csv(tmp_path):
         (GOOD.encode("utf-16")[:-1], DataDamaged, "begins as UTF-16, and is none"),
         (GOOD.replace("b,", "бутылка,").encode("cp1251"), DataDamaged, "line 3: byte 0xe1 is not UTF-8"),
         (b"what,p\n\x00\x00,1\n", DataDamaged, "contains zero bytes: it is not a text file"),
-        (b"PK\x03\x04\x00\x00what,p", DataDamaged, "is a spreadsheet or an archive, not text"),
+        (b"PAR1\x15\x04", DataDamaged, "a binary table"),
+        (b"PK\x03\x04\x00\x00what,p", DataDamaged, "is a spreadsheet, an archive or a binary table"),
         ("what,p\na,\nb,\n" * 1, DataDamaged, "no feature has any value: p"),
         ("what,name\na,x\na,y\nb,z\n", ConfigError, "has no column to learn from besides what"),
         ("what,p\n" + "".join(f"{i * 1.1},{i % 2}\n" for i in range(9)), ConfigError, "cannot be the label"),
@@ -178,6 +179,9 @@ OBJECTS = [f"{k},{what},{k * 0.31 % 1:.3f}" for what in ("can", "jar") for k in 
         *(([HEAD, *TRIALS[:k], "Summary,,", "mean,0.05,6", "N,8,8", *TRIALS[k:]], "abababab") for k in (0, 8)),
         # A trial without values, or with the remark `max`, is one.
         ([f"{HEAD},x", *ANNOTATED[:3], f"{TRIALS[3]},max", "a,,,", "c,,,", "c,,,", *ANNOTATED[4:]], "ababaccabab"),
+        # Levels of filling are no quartiles.
+        *(([HEAD, *(line.replace("a,", "50%,").replace("b,", f"{full},") for line in TRIALS)], ("50%", full) * 4)
+          for full in ("100%", "75%")),
         # An object may have the name of a statistic.
         ([HEAD, *(line.replace("b,", "total,") for line in TRIALS)], ("a", "total") * 4),
         # A mean of each object is known by the column of trial numbers.
@@ -198,6 +202,7 @@ def test_the_trials_are_read_whatever_is_between_them(csv, lines, labels):
         # Counters and texts are no features unless they are asked for.
         ("trial,time,p,comment", [f"{i},{100.5 + i * i},{i % 3},x{i}" for i in range(8)], ("p",),
          ["trial, time (use columns to include them)", "hardly repeat"]),
+        ("p,,q", [f"{i % 3},,{i % 4}" for i in range(8)], ("p", "q"), []),
         ("p,same,empty,void", [f"{i % 3},7,," for i in range(8)], ("p", "same"),
          ["constant, and so without information: same", "no values: empty, void (use columns to include them)"]),
         # Units that differ within a column are no numbers.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from datetime import datetime
+
 import numpy as np
 import pytest
 from cases import every_case
@@ -34,6 +36,7 @@ COUNTERS = {
     "seconds since 1970": [1.7e9 + 31.7 * i for i in range(N)],
     "milliseconds since 1970": [1_700_000_000_123 + 31_700 * i for i in range(N)],
     "dates": [20260101 + i % 28 + 100 * (i // 28) for i in range(N)],
+    "dates with the day in front": [7112024 + 1_000_000 * (i // 20) for i in range(N)],
     "dates of sessions": [20260101 + i // 15 for i in range(N)],
     "times": [20261126093000 + i % 30 + 100 * (i // 30) for i in range(N)],
     "times of the day": [int(f"{9 + k // 3600}{k // 60 % 60:02}{k % 60:02}") for k in range(0, 97 * N, 97)],
@@ -82,6 +85,13 @@ def table(path, column, values, measured=True):
 SESSIONS = {
     "letters": ["ABCDEF"[i // 10] for i in range(N)],
     "weekdays of others": [("Mo", "Di", "Fr")[i // 20] for i in range(N)],
+    "months": [("January", "March", "May")[i % 3] for i in range(N)],
+    **{
+        f"dates as {form}": [
+            datetime(2024, 3 + i % 2, 5 + i // 20, 9 + i % 2).strftime(form) for i in range(N)
+        ]
+        for form in ("%d-%b-%Y", "%b %d, %Y", "%A, %d %B %Y", "%a %-d %b, %-I %p")
+    },
     "predictions": ["can" if i % 40 < 30 else "jar" for i in range(N)],
     "names": [("cola", "tonic", "water", "beans", "honey", "jam")[i // 10] for i in range(N)],
     "numbered, with a group in both labels": [f"group{(i + 1) // 10}" for i in range(N)],
@@ -107,6 +117,7 @@ KNOWN_IN_ANY_ORDER = {
     "two lines each, falling": [(N - i) // 2 for i in range(N)],
     "three lines each": [(i + 1) // 3 for i in range(N)],
     "days in seconds since 1970": [1_793_404_800 + 86_400 * (i // 10) for i in range(N)],
+    "the last lines of objects left out": np.repeat(np.arange(12), [5, 6, 4, 5, 6, 4] * 2),
     "hashed days": [int(x) for x in np.repeat(np.random.default_rng(0).integers(1 << 32, size=6), 10)],
 }
 
@@ -246,12 +257,6 @@ DOUBTFUL = {
     "a very noisy counter": ("kind [V]", np.arange(N) + RNG.normal(0.0, 2.0, N), LABELS, range(N)),
     "a zero": ("kind [V]", ZERO, LABELS, range(N)),
     "kelvin": ("kind [V]", 300.0 + 0.05 * np.arange(N) + RNG.normal(0.0, 0.1, N), LABELS, range(N)),
-    "months": (
-        "kind",
-        [("January", "February", "March")[(i > 14) + (i > 39)] for i in range(N)],
-        LABELS,
-        range(N),
-    ),
     "a version": ("kind", [1.2 if i < 27 else 1.3 for i in range(N)], LABELS, range(N)),
     "a value far from all others": ("kind [V]", [*NOISE[:-1], 1e9], LABELS, range(N)),
     "a single code for a missing value": ("kind [V]", [*NOISE[:-1], -9999.0], LABELS, range(N)),
@@ -339,6 +344,8 @@ def test_measured_columns_are_not_doubted(tmp_path_factory, seed):
         rng.choice([0.05, 0.1, 0.15, 0.2, 0.25], N, p=[0.5, 0.2, 0.1, 0.1, 0.1]),  # a time in samples
     ):
         assert not notes_on(path, "width [mm]", values.tolist())
+    coarse = rng.normal([5.0] * 30 + [40.0] * 30, 2.0).round()
+    assert not notes_on(path, "width", coarse.tolist())
 
 
 def test_a_number_too_large_to_learn_from_is_refused_by_its_name(tmp_path):
@@ -349,12 +356,13 @@ def test_a_number_too_large_to_learn_from_is_refused_by_its_name(tmp_path):
 def test_the_number_to_predict_in_another_unit_is_told(tmp_path):
     forces = np.random.default_rng(8).normal(12.0, 3.0, N).round(3)
     widths = np.random.default_rng(9).normal(60.0, 3.0, N).round(3)
-    lines = [f"{force},{1000 * force:.0f},{width}" for force, width in zip(forces, widths, strict=True)]
     path = tmp_path / "t.csv"
-    path.write_text("\n".join(["break_n,break_mn,width", *lines]) + "\n")
-    notes = read_labelled(path, None, value="break_n").notes
-    assert any("break_mn" in note and "another unit" in note for note in notes)
-    assert not any("width" in note for note in notes)
+    for other in (1000.0 * forces, forces.round(), -(forces**2)):
+        lines = [f"{force},{x},{width}" for force, x, width in zip(forces, other, widths, strict=True)]
+        path.write_text("\n".join(["break_n,other,width", *lines]) + "\n")
+        notes = read_labelled(path, None, value="break_n").notes
+        assert any("other" in note and "another unit" in note for note in notes)
+        assert not any("width" in note for note in notes)
 
 
 def test_sessions_that_are_not_held_out_are_told(tmp_path):

@@ -19,6 +19,7 @@ from graspsense.core.values.signals import Phase
 from graspsense.evaluation.events import LabelledEvents, evaluate_kind, outcomes
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.sources.recordings.dataset_recordings import readable_or_not
+from graspsense.sources.recordings.event_recordings import event_recordings
 from graspsense.store.store import Store
 
 RATE_HZ = 200.0
@@ -289,6 +290,19 @@ def test_slips_of_a_force_are_found_and_what_cannot_be_told_is_said(tmp_path):
     assert scores["held_out"] == "label"
     assert scores["not_told"] == ["jump"]
     assert scores["not_labelled"]["no acceleration is measured: placing is told by force alone"] == 4
+
+
+def test_sessions_of_several_objects_are_held_out_as_a_whole(tmp_path):
+    for order in range(8):
+        name = f"{('box', 'can')[order % 2]}_{('mo', 'tu')[order // 4]}_{order}"
+        write(tmp_path, name, force(level=5.0 + order), flags())
+    path = tmp_path / "m.toml"
+    path.write_text(
+        'files = "{label}_{instance}_{order:d}.csv"\ntime = "t"\nforce = "F"\nevents = { slip = "slip" }\n'
+    )
+    read = event_recordings(f"manifest:{path}")
+    assert sorted(read.groups) == ["mo"] * 4 + ["tu"] * 4
+    assert any("count as sessions" in note for note in read.notes)
 
 
 @pytest.mark.slow

@@ -20,10 +20,15 @@ def test_dense_rows_with_quotes_missing_values_weights_and_comments():
 
 
 def test_sparse_rows_fill_in_zeros_and_first_values():
-    table = parse_arff(HEAD + "{0 2.5, 2 yes}\n{1 'y z'}, {3}\n{}\n")
-    assert table.values.tolist() == [[2.5, 0.0], [0.0, 1.0], [0.0, 0.0]]
-    assert table.labels.tolist() == [1, 0, 0]
-    assert table.weights.tolist() == [1.0, 3.0, 1.0]
+    table = parse_arff(HEAD + "{0 2.5, 2 yes}\n{1 'y z'}, {3}\n{}\n{0\t1, 1 'w,\\'v'}\n")
+    assert table.values.tolist() == [[2.5, 0.0], [0.0, 1.0], [0.0, 0.0], [1.0, 2.0]]
+    assert table.labels.tolist() == [1, 0, 0, 0]
+    assert table.weights.tolist() == [1.0, 3.0, 1.0, 1.0]
+
+
+def test_a_question_mark_in_quotes_is_a_value():
+    table = parse_arff("@relation r\n@attribute a {'?', b}\n@attribute c {x, y}\n@data\n'?',x\n?,y\nb,x\n")
+    np.testing.assert_array_equal(table.values[:, 0], [0.0, np.nan, 1.0])
 
 
 def test_the_class_may_be_any_nominal_attribute():
@@ -58,7 +63,8 @@ def test_rows_without_a_class_are_not_learned_from_but_seen():
         (HEAD + "1,x,yes,{heavy}\n", "the weight is 'heavy'"),
         (HEAD + "1,x,yes,{-1}\n", "not negative"),
         (HEAD + "{7 1}\n", "sparse index '7'"),
-        (HEAD + "1,,yes\n", "cannot read"),
+        (HEAD + "1,,yes\n", "2 values; there are 3"),
+        (HEAD + "1,'x,yes\n", "cannot read"),
     ],
 )
 def test_what_cannot_be_read_is_named(text, words):

@@ -21,8 +21,9 @@ from graspsense.cli.terminal import (
 )
 from graspsense.core.components.entries import ModelEntry
 from graspsense.core.components.registry import installed
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.errors import ConfigError, listed
 from graspsense.core.values.features import UNKNOWN, FeatureTable, Prediction, assumed_units
+from graspsense.core.values.label_text import alike_words, spelled_alike
 from graspsense.evaluation.intervals import RecognitionRate, rate_of
 from graspsense.evaluation.json_codec import to_json
 
@@ -65,6 +66,11 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     labelled = None if labelled is None else labelled.aimed(asked.target)
     predictions = _predictions(asked, table, {} if labelled is None else labelled.provenance)
     notes = (*notes, *assumed_units(asked.names, asked.units, table))
+    strange = set() if labelled is None else {*labelled.labels} - {*asked.classifier.classes()}
+    if strange:
+        alike = alike_words(spelled_alike([*strange, *asked.classifier.classes()]))
+        told = f"labels that the model does not know, so that no answer to them is right: {listed(sorted(strange))}"
+        notes = (*notes, told + (f" (differing in spelling only: {alike})" if alike else ""))
     if len(table) > MOST_WITH_REASONS:
         notes = (*notes, f"more than {MOST_WITH_REASONS} trials: the predictions have no reasons")
     learned = learned_from(asked.learned_from, table.columns(asked.names))

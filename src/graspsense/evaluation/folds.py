@@ -30,7 +30,7 @@ def held_out_words(trials: Labelled, k: int) -> str:
     """Return what `k` folds of the instances of these trials are."""
     if trials.grouped:
         return f"at most {k} folds of trials that belong together, by their values: the objects are not named"
-    return f"at most {k} folds of whole instances: no model was trained on the object that it is tested on"
+    return f"at most {k} folds of whole instances: no model was trained on the instance that it is tested on"
 
 
 def stratified(labels: Sequence[str], k: int, seed: int) -> Folds:

@@ -35,16 +35,15 @@ def controls(
     *,
     before_what: str = BEFORE_CONTACT,
     no_before: str = "",
-    before_missing: str = "",
     first_line: FeatureTable | None = None,
     width_meaning: str = "",
 ) -> Controls:
     """Return the controls of a table of features.
 
     `before_contact` holds features of the same trials from before contact, None with the reason in `no_before`.
-    `before_what` says what these are, and `before_missing` why a trial has none of them. `first_line` holds the numbers
-    of the first frame of trials that were imported. `width_meaning` says what the width means in these data. The width
-    is the feature that an installed feature set declares as such, unless the gap does not change.
+    `before_what` says what these are. `first_line` holds the numbers of the first frame of trials that were imported.
+    `width_meaning` says what the width means in these data. The width is the feature that an installed feature set
+    declares as such, unless the gap does not change.
     """
     name = width_feature(table.names)
     width, no_width = None, "none of the features is declared to be the width"
@@ -62,7 +61,7 @@ def controls(
     return Controls(
         before_contact=None
         if before_contact is None
-        else ControlFeatures(table=before_contact, what=before_what, missing=before_missing),
+        else ControlFeatures(table=before_contact, what=before_what),
         no_before_contact=no_before if before_contact is None else "",
         first_line=None if first_line is None else ControlFeatures(table=first_line, what=FIRST_LINE),
         width=width,

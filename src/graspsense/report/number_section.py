@@ -59,7 +59,7 @@ def number_verdict(evaluation: RegressionEvaluation) -> str:
     trials = counted(evaluation.headline.n, "trial")
     return (
         f"{evaluation.estimator} predicts {evaluation.target_value} of {trials} of {evaluation.source} with a mean "
-        f"absolute error of {evaluation.headline.words(evaluation.unit)}, on objects of which {grasps} for training."
+        f"absolute error of {evaluation.headline.words(evaluation.unit)}, on instances of which {grasps} for training."
     )
 
 

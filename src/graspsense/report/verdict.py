@@ -53,7 +53,7 @@ def _rate(evaluation: Evaluation) -> str:
         f"{rate.n} {source}" if source == "simulated grasps" else f"{counted(rate.n, 'trial')} of {source}"
     )
     if evaluation.protocol == "instance_held_out":
-        protocol = "objects of which no grasp was used for training"
+        protocol = "instances of which no grasp was used for training"
     else:
         protocol = "objects of which other grasps may have been used for training"
     interval = f"95 %: {percentages(rate.interval)}" if rate.interval else f"no interval: {rate.no_interval}"

@@ -73,6 +73,7 @@ class _Rows:
     recording: tuple[str, ...]
     outcome: tuple[str, ...]
     labels: tuple[str, ...]
+    missing: tuple[str, ...]
     missing_before: tuple[str, ...]
 
     def __len__(self) -> int:
@@ -212,7 +213,6 @@ class _Tables:
 
     features: FeatureTable
     before_contact: FeatureTable | None
-    before_missing: str
 
 
 def _controls(store: Store, rows: _Rows, tables: _Tables) -> Controls:
@@ -220,7 +220,6 @@ def _controls(store: Store, rows: _Rows, tables: _Tables) -> Controls:
         tables.features,
         tables.before_contact,
         no_before="the trials do not have the same features from before contact",
-        before_missing=tables.before_missing,
         first_line=first_lines(store, rows.recording, rows.origin),
     )
     return without_constant_gap(known_controls, imported_gaps(store, rows.recording, rows.origin))
@@ -229,7 +228,8 @@ def _controls(store: Store, rows: _Rows, tables: _Tables) -> Controls:
 def _read_rows(store: Store, wanted: str, feature_set: int | None) -> _Rows:
     """Return the rows of the wanted trials, with `feature_set` only those that have it."""
     columns = ", ".join(
-        f"detail.{name}" if name in ("labels", "missing_before") else f'trial."{name}"' for name in _COLUMNS
+        f"detail.{name}" if name in ("labels", "missing", "missing_before") else f'trial."{name}"'
+        for name in _COLUMNS
     )
     of_set = "" if feature_set is None else " AND feature_set = ?"
     rows = store.query(
@@ -249,7 +249,7 @@ def _intact(store: Store, rows: _Rows, notes: list[str]) -> _Rows:
             with readable(f"trial {number} of {store.folder}"):
                 _unpacked_table(str(store.folder), sets[rows.feature_set[i]], rows.values[i : i + 1])
                 _unpacked_table(str(store.folder), sets[rows.before_set[i]], rows.before_contact[i : i + 1])
-                for text in (rows.labels[i], rows.missing_before[i]):
+                for text in (rows.labels[i], rows.missing[i], rows.missing_before[i]):
                     decoded(store.folder, text)
                 datetime.fromisoformat(rows.made_at[i])
             intact.append(i)
@@ -283,12 +283,14 @@ def _with_value(store: Store, rows: _Rows, name: str, notes: list[str]) -> tuple
 def _stored_tables(store: Store, folder: str, rows: _Rows, feature_set: int) -> _Tables:
     sets = dict(store.query("SELECT id, features FROM feature_set"))
     same_before = len(set(rows.before_set)) == 1
+    reasons, before_reasons = (
+        {i: decoded(folder, text) for i, text in enumerate(missing) if text != "{}"}
+        for missing in (rows.missing, rows.missing_before)
+    )
+    early = _unpacked_table(folder, sets[rows.before_set[0]], rows.before_contact) if same_before else None
     return _Tables(
-        features=_unpacked_table(folder, sets[feature_set], rows.values),
-        before_contact=_unpacked_table(folder, sets[rows.before_set[0]], rows.before_contact)
-        if same_before
-        else None,
-        before_missing=_most_frequent_reason([decoded(folder, text) for text in rows.missing_before]),
+        features=evolve(_unpacked_table(folder, sets[feature_set], rows.values), reasons=reasons),
+        before_contact=None if early is None else evolve(early, reasons=before_reasons),
     )
 
 
@@ -319,22 +321,14 @@ def _tables_again(
     return rows.picked(same), _Tables(
         features=_table([trial.features for trial in kept]),
         before_contact=_table([trial.before_contact for trial in kept]) if same_before else None,
-        before_missing=_most_frequent_reason([trial.before_contact.reasons for trial in kept]),
     )
 
 
 def _table(trials: Sequence[FeatureValues]) -> FeatureTable:
     names, units = zip(*trials[0].features, strict=True)
     values = np.array([[np.nan if v is None else v for v in trial.values] for trial in trials], np.float64)
-    return FeatureTable(names=names, units=units, values=values)
-
-
-def _most_frequent_reason(missing: Sequence[Mapping[str, str]]) -> str:
-    """Return the most frequent of the reasons why features of these trials are missing; empty without any."""
-    reasons: Counter[str] = Counter()
-    for row in missing:
-        reasons.update(set(row.values()))
-    return reasons.most_common(1)[0][0] if reasons else ""
+    reasons = {i: trial.reasons for i, trial in enumerate(trials) if trial.reasons}
+    return FeatureTable(names=names, units=units, values=values, reasons=reasons)
 
 
 def _unused(store: Store) -> tuple[str, ...]:

@@ -15,12 +15,11 @@ import numpy as np
 from graspsense_c45.schema import Attribute, Schema
 from graspsense_c45.table import MISSING_CLASS, Table, make_table
 
-_TOKEN = re.compile(r"""\s*(?:'((?:[^'\\]|\\.)*)'|"((?:[^"\\]|\\.)*)"|([^\s,{}'"%][^\s,{}]*))""")
-_SPACE = re.compile(r"\s*")
+_TOKEN = re.compile(r"""[\s,]*(?:'((?:\\.|[^'\\])*)'|"((?:\\.|[^"\\])*)"|([{}])|([^\s,{}'"][^\s,{}]*))""")
 _ESCAPE = re.compile(r"\\(.)")
 _ESCAPED = {"n": "\n", "t": "\t", "r": "\r"}
+_OPEN, _CLOSE, _MISSING = ("{", False), ("}", False), ("?", False)
 _NUMERIC = ("numeric", "real", "integer")
-_MISSING = "?"
 MOST_BYTES = 2**28
 """Limit on the size of a file."""
 MOST_ATTRIBUTES = 10_000
@@ -31,6 +30,10 @@ LONGEST_INDEX = 9
 """Limit on the digits of the index in a sparse row."""
 LONGEST_SHOWN = 60
 """Limit on the characters of a text that an error repeats."""
+
+
+Token = tuple[str, bool]
+"""A word, and whether it is quoted."""
 
 
 class ArffError(ValueError):
@@ -84,7 +87,7 @@ class _Reader:
         if self._in_data:
             self._row(line)
             return
-        keyword, _, declaration = line.partition(" ") if " " in line else line.partition("\t")
+        keyword, _, declaration = re.sub(r"\s", " ", line).partition(" ")
         if keyword.lower() == "@attribute":
             self._attribute(declaration)
         elif keyword.lower() == "@data":
@@ -121,20 +124,18 @@ class _Reader:
             raise ArffError(f"{self._source}: {error}") from None
 
     def _attribute(self, declaration: str) -> None:
-        match = _TOKEN.match(declaration)
-        if match is None:
-            raise self._error(
-                "@attribute without a name; write @attribute NAME numeric or @attribute NAME {a, b}"
-            )
-        name, kind = _text(match), declaration[match.end() :].strip()
+        tokens = list(islice(self._tokens(declaration), MOST_ATTRIBUTES + 3))
+        if len(tokens) < 2:
+            raise self._error("write @attribute NAME numeric or @attribute NAME {a, b}")
+        name, kind = tokens[0][0], tokens[1][0]
         if len(self._attributes) >= MOST_ATTRIBUTES:
             raise self._error(f"a table has at most {MOST_ATTRIBUTES} attributes, and this has more")
-        if kind.startswith("{"):
-            if not kind.endswith("}"):
-                raise self._error(f"the values of {name!r} do not end with }}")
-            values = tuple(islice(self._tokens(kind[1:-1]), MOST_ATTRIBUTES + 1))
-            if len(values) > MOST_ATTRIBUTES:
-                raise self._error(f"{name!r} has more than {MOST_ATTRIBUTES} values")
+        if tokens[1] == _OPEN:
+            if tokens[-1] != _CLOSE:
+                raise self._error(
+                    f"the values of {name!r} do not end with }}, or are more than {MOST_ATTRIBUTES}"
+                )
+            values = tuple(value for value, _ in tokens[2:-1])
             if len(set(values)) != len(values) or not values:
                 raise self._error(
                     f"the values of {name!r} are {_listed(values)}; there must be some, each once"
@@ -146,50 +147,42 @@ class _Reader:
             self._codes.append({})
         else:
             raise self._error(
-                f"attribute {name!r} is {kind!r}; allowed: {', '.join(_NUMERIC)}, or {{value, value}}"
+                f"attribute {name!r} is {kind[:LONGEST_SHOWN]!r}; allowed: {', '.join(_NUMERIC)}, or {{value, value}}"
             )
 
     def _row(self, line: str) -> None:
-        weight = 1.0
-        if line.startswith("{"):
-            end = line.find("}")
-            cells, ending = (
-                self._sparse(line[1:end] if end > 0 else line[1:]),
-                line[end + 1 :] if end > 0 else "",
-            )
-        else:
-            brace = re.search(r",\s*\{([^{}'\"]*)\}\s*$", line)
-            ending = line[brace.start() :] if brace else ""
-            cells = list(self._tokens(line[: brace.start()] if brace else line))
-        if ending.strip(" \t,"):
-            weight = self._number(ending.strip(" \t,{}"), "the weight")
+        tokens = list(self._tokens(line))
+        sparse = tokens[:1] == [_OPEN]
+        end = (
+            tokens.index(_CLOSE if sparse else _OPEN)
+            if (_CLOSE if sparse else _OPEN) in tokens
+            else len(tokens)
+        )
+        cells = self._sparse(tokens[1:end]) if sparse else tokens[:end]
+        weights = [token for token, _ in tokens[end + 1 :] if token not in "{}"]
         if len(cells) != len(self._attributes):
             raise self._error(f"{len(cells)} values; there are {len(self._attributes)} attributes")
         self._rows.append([self._cell(i, cell) for i, cell in enumerate(cells)])
-        self._weights.append(weight)
+        self._weights.append(self._number(weights[0], "the weight") if weights else 1.0)
 
-    def _sparse(self, inside: str) -> list[str]:
-        cells = ["0" if a.values is None else a.values[0] for a in self._attributes]
-        for pair in inside.split(","):
-            if not pair.strip():
-                continue
-            index, _, value = pair.strip().partition(" ")
+    def _sparse(self, tokens: Sequence[Token]) -> list[Token]:
+        cells = [("0" if a.values is None else a.values[0], False) for a in self._attributes]
+        for (index, _), cell in zip(tokens[::2], tokens[1::2], strict=False):
             if not (index.isdecimal() and len(index) <= LONGEST_INDEX) or int(index) >= len(cells):
                 raise self._error(f"sparse index {index[:LONGEST_SHOWN]!r}; allowed: 0..{len(cells) - 1}")
-            match = _TOKEN.match(value)
-            cells[int(index)] = _text(match) if match else ""
+            cells[int(index)] = cell
         return cells
 
-    def _cell(self, column: int, cell: str) -> float:
+    def _cell(self, column: int, cell: Token) -> float:
         if cell == _MISSING:
             return float("nan")
         attribute = self._attributes[column]
         if attribute.values is None:
-            return self._number(cell, attribute.name)
-        code = self._codes[column].get(cell)
+            return self._number(cell[0], attribute.name)
+        code = self._codes[column].get(cell[0])
         if code is None:
             raise self._error(
-                f"{attribute.name} is {cell[:LONGEST_SHOWN]!r}; declared: {_listed(attribute.values)}"
+                f"{attribute.name} is {cell[0][:LONGEST_SHOWN]!r}; declared: {_listed(attribute.values)}"
             )
         return float(code)
 
@@ -201,21 +194,23 @@ class _Reader:
                 f"{name} is {cell[:LONGEST_SHOWN]!r}; it must be a number, or ? where missing"
             ) from None
 
-    def _tokens(self, text: str) -> Iterator[str]:
-        position = 0
-        while True:
+    def _tokens(self, text: str) -> Iterator[Token]:
+        """Yield the words of a line, and whether each is quoted, up to a comment."""
+        position, text = 0, text.rstrip(" \t,")
+        while position < len(text):
             match = _TOKEN.match(text, position)
             if match is None:
                 wrong = text[position : position + LONGEST_SHOWN].strip()
                 raise self._error(f"cannot read {wrong!r} as a value; quote it, or write ? where missing")
-            yield _text(match)
-            position = _after_space(text, match.end())
-            if text.startswith(",", position):
-                position = _after_space(text, position + 1)
-            elif text.startswith("%", position):
+            single, double, brace, word = match.groups()
+            if word is not None and word.startswith("%"):
                 return
-            if position >= len(text):
-                return
+            quoted = double if single is None else single
+            if quoted is None:
+                yield brace or word, False
+            else:
+                yield _ESCAPE.sub(lambda escape: _ESCAPED.get(escape[1], escape[1]), quoted), True
+            position = match.end()
 
     def _error(self, message: str) -> ArffError:
         return ArffError(f"{self._source}:{self._line}: {message}")
@@ -224,15 +219,3 @@ class _Reader:
 def _listed(names: Sequence[str]) -> str:
     more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
     return ", ".join(name[:LONGEST_SHOWN] for name in names[:MOST_NAMED]) + more
-
-
-def _after_space(text: str, position: int) -> int:
-    match = _SPACE.match(text, position)
-    return position if match is None else match.end()
-
-
-def _text(match: re.Match[str]) -> str:
-    quoted = match.group(1) if match.group(1) is not None else match.group(2)
-    if quoted is None:
-        return match.group(3)
-    return _ESCAPE.sub(lambda escape: _ESCAPED.get(escape.group(1), escape.group(1)), quoted)

@@ -2,8 +2,8 @@
 
 A copy in training and test data at once makes every rate too high, and every interval too narrow. Trials are copies
 of each other if their recordings are equal, or if all of their features are. Features that are counted, or rounded
-coarsely, can be equal by chance; such trials are kept, and a note says so. A note also tells of trials that differ from
-another one in a single feature, as an edited copy does.
+coarsely, can be equal by chance; such trials are kept, and a note says so. Trials that agree in half of their finely
+measured features, as edited copies do, are held out together.
 
 Rounded, shifted or noisy copies have no equal features: `learn.groups` finds them.
 """
@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import evolve
 
-from graspsense.core.learn.groups import grouped, with_sessions
+from graspsense.core.learn.groups import grouped, tail, with_sessions
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import ConfigError, counted
 from graspsense.core.values.features import misfit
@@ -40,6 +40,12 @@ _COMPARED: Final = 32
 """Features that are compared with each other, those with the most values."""
 _HASH_DIGITS: Final = 12
 """Two of a million different trials have the same hash with a probability below 1 in 500."""
+_BY_CHANCE: Final = 1e-3
+"""Probability that trials which agree in half of their features are no copies."""
+_OFTEN: Final = 3
+"""Most lines of a zero, or of the end of a range, that are no sign of a limit."""
+_SAME: Final = 0.99
+"""Correlation of the ranks of two features from which on they are the same one in other units or digits."""
 _FEW: Final = 5
 """With fewer different values than this, their differences do not show the resolution of a column."""
 
@@ -62,16 +68,17 @@ def without_copies(labelled: Labelled) -> Labelled:
     kept = np.flatnonzero(original == np.arange(len(labelled)))
     if len(left_out):
         notes.append(_left_out(labelled, left_out, original))
-    edited = [] if by_chance else _edited_copies(with_codes(labelled.table)[1][kept])
-    if edited:
-        row, copy = (int(kept[k]) + 1 for k in edited[0])
+    edited = _edited_copies(with_codes(labelled.table)[1][kept])
+    if edited.size:
+        row, copy = (int(kept[k]) + 1 for k in edited[:, 0])
         notes.append(
-            f"trials that differ from another one in a single feature: {len(edited)} (trial {copy} from trial {row})"
-            ". They count: make sure that they are no copies with a value that was changed"
+            f"trials that have half of the features of another one, or more: {len(set(edited[1].tolist()))} (trial "
+            f"{copy}, of trial {row}). They are held out together: make sure that they are no copies with values that "
+            "were changed"
         )
     remaining = labelled.rows(kept) if len(left_out) else labelled
     noted = labelled if len(notes) == len(labelled.notes) else evolve(remaining, notes=tuple(notes))
-    return noted if edited or labelled.provenance.get("simulated") else grouped(noted)
+    return noted if labelled.provenance.get("simulated") else grouped(noted, edited)
 
 
 def apart_from(tested: Labelled, training: Labelled) -> Labelled:
@@ -162,40 +169,34 @@ def _originals(table: FeatureTable, content: Sequence[str] | None) -> tuple[NDAr
     return _best_of(families, known.sum(axis=1).tolist()), len(repeated) - len(sure)
 
 
-def _edited_copies(values: NDArray[np.float64]) -> list[tuple[int, int]]:
-    """Return the trials that differ in a single feature from one before, each behind that one, if chance makes none."""
-    candidates = _alike_in_a_half(values)
-    if not candidates:
-        return []
-    columns = [np.unique(column[~np.isnan(column)]) for column in values.T]
-    cells = np.array([1.0 if len(column) < _FEW else cells_in_range(column) for column in columns])
-    copies: dict[int, int] = {}
-    for left_out in range(values.shape[1]):
-        others, cells_of = np.delete(values, left_out, axis=1), np.delete(cells, left_out)
-        known = ~np.isnan(others)
-        judged = (known & (cells_of > 1.0)).sum(axis=1) >= 2
-        with np.errstate(over="ignore"):
-            combinations = np.where(known, cells_of, 1.0).prod(axis=1)
-        by_chance = float((len(values) / (2.0 * combinations[judged])).sum())
-        seen: dict[bytes, int] = {}
-        pairs = {}
-        for i in candidates:
-            earlier = seen.setdefault(others[i].tobytes(), i) if judged[i] else i
-            if earlier != i:
-                pairs[i] = earlier
-        if len(pairs) > _SURE_OF_ALL * by_chance:
-            copies |= pairs
-    return [(earlier, i) for i, earlier in sorted(copies.items())]
+def _edited_copies(values: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return pairs of trials, shape (2, pairs), that agree in half of the fine features, which chance hardly makes.
 
+    A feature is fine if no more pairs than there are trials agree in it. It does not follow another one, and at least
+    two of them agree. Zeros, and the ends of a range, can be measured often.
+    """
+    from scipy.special import gammainc
 
-def _alike_in_a_half(values: NDArray[np.float64]) -> list[int]:
-    """Return the trials with the first or the second half of the features of another one, as an edited copy has."""
-    alike = set()
-    for half in np.array_split(values, 2, axis=1):
-        rows = [row.tobytes() for row in half]
-        often = Counter(rows)
-        alike |= {i for i, row in enumerate(rows) if often[row] > 1}
-    return sorted(alike)
+    n, none = len(values), np.empty(0, dtype=np.int64)
+    fine: list[NDArray[np.int64]] = []
+    for column in _independent(values).T:
+        level, lines = np.unique(column[~np.isnan(column)], return_counts=True)
+        usual = level[(lines > _OFTEN) & ((level == level[0]) | (level == level[-1]) | (level == 0.0))]
+        column = np.where(np.isin(column, usual), np.nan, column)
+        order = np.argsort(column, kind="stable")
+        ranked, alike, lag = column[order], none, 1
+        while len(alike) <= n and (same := ranked[lag:] == ranked[:-lag]).any():
+            alike, lag = np.append(alike, order[:-lag][same] * n + order[lag:][same]), lag + 1
+        if len(alike) <= n:
+            fine.append(alike)
+    least = max(2, (len(fine) + 1) // 2)
+    pairs, times = np.unique(np.concatenate([none, *fine]), return_counts=True)
+    share = (times[times < least].sum() + 1.0) / max(len(fine), 1) / (0.5 * n * n)
+    by_chance = 0.5 * n * n * tail(least, len(fine), min(share, 1.0)) if least <= len(fine) else math.inf
+    copies = pairs[times >= least]
+    if gammainc(len(copies), _SURE_OF_ALL * by_chance) > _BY_CHANCE:
+        copies = pairs[:0]
+    return np.stack([copies // n, copies % n])
 
 
 def _known_to_differ(content: Sequence[str] | None, i: int, k: int) -> bool:
@@ -253,9 +254,8 @@ def _can_be_chance(distinct: NDArray[np.float64], repeated: int) -> bool:
 
     They may if the values of all features have few combinations, and where trials often agree in all features but one.
     """
-    finest = np.argsort([-len(np.unique(column)) for column in distinct.T], kind="stable")[:_COMPARED]
-    distinct = _independent(distinct[:, finest])
-    if distinct.shape[1] == 1:
+    distinct = _independent(distinct)
+    if distinct.shape[1] <= 1:
         return True
     different = [np.unique(column[~np.isnan(column)]) for column in distinct.T]
     combinations = math.prod(
@@ -271,17 +271,13 @@ def _can_be_chance(distinct: NDArray[np.float64], repeated: int) -> bool:
     return agreeing >= repeated
 
 
-def _independent(distinct: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return these columns without those that say the same as one before, such as a length in another unit."""
-    kept: list[NDArray[np.int64]] = []
-    columns = []
-    for column in distinct.T:
-        numbers = np.unique(column, return_inverse=True)[1]
-        n = len(set(numbers.tolist()))
-        if all(
-            not n == len(set(other.tolist())) == len(set(zip(numbers.tolist(), other.tolist(), strict=True)))
-            for other in kept
-        ):
-            kept.append(numbers)
-            columns.append(column)
-    return np.column_stack(columns)
+def _independent(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the finest of these columns without those that follow a finer one, such as a length in another unit."""
+    ranks = np.array([np.unique(column, return_inverse=True)[1] for column in values.T], dtype=np.float64)
+    ranks = ranks.reshape(values.T.shape)
+    highest = ranks.max(axis=1, initial=0.0)
+    finest = [k for k in np.argsort(-highest, kind="stable")[:_COMPARED].tolist() if highest[k] > 0.0]
+    away = ranks[finest] - ranks[finest].mean(axis=1, keepdims=True)
+    away /= np.sqrt((away**2).sum(axis=1, keepdims=True))
+    follows = np.triu(np.abs(away @ away.T) >= _SAME, 1).any(axis=0)
+    return values[:, [k for k, other in zip(finest, follows.tolist(), strict=True) if not other]]

@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 _CLOSER: Final = 0.2
 """Ratio of two distances below which a trial is much closer to some trials than to the next one."""
 _BY_CHANCE: Final = 1e-6
-_MOST_OTHERS: Final = 4
-"""Largest number of trials that each trial may be close to."""
+_MOST_OTHERS: Final = 9
+"""Largest number of trials that each trial may be close to: ten grasps of an object are usual."""
 _FEWEST_OF_LABEL: Final = 3
 """A label with fewer trials than this times those that are close is a group of its own."""
 _MOST_TRIALS: Final = 2000
@@ -52,13 +52,14 @@ _FEWEST_BLOCKS: Final = 4
 """Blocks of a label from which on it can be told whether neighbouring ones are alike."""
 
 
-def grouped(labelled: Labelled) -> Labelled:
+def grouped(labelled: Labelled, copies: Numbers) -> Labelled:
     """Return the trials with groups as their instances, and notes on them, if some of them belong together.
 
-    Named instances are joined where their trials are near copies. Numbers to predict have no blocks.
+    `copies` are pairs of trials, shape (2, pairs), that do. Named instances are joined where their trials are copies or
+    near copies. Numbers to predict have no blocks.
     """
     pairs, notes = _near_copies(labelled)
-    links = [pairs]
+    links = [pairs, copies]
     if labelled.instances is not None:
         links.append(_to_the_first(np.unique(np.array(labelled.instances), return_inverse=True)[1]))
     elif labelled.value is None:
@@ -70,7 +71,7 @@ def grouped(labelled: Labelled) -> Labelled:
                 f"of one recording, and drift make them. Blocks of {length} are held out as if of one object: name the "
                 f"objects or sessions ({option('instance', 'COLUMN')})"
             )
-    if not notes:
+    if not notes and not copies.size:
         return labelled
     named = labelled.instances or [f"group of trial {k + 1}" for k in range(len(labelled))]
     return evolve(
@@ -159,7 +160,7 @@ def _near_copies(labelled: Labelled) -> tuple[Numbers, list[str]]:
         judged = (near > _NEAREST) & np.isfinite(next_one)
         judged &= trials_of_label > _FEWEST_OF_LABEL * (others + 1)
         close = np.flatnonzero(judged & (near < _CLOSER * next_one))
-        if len(close) and _tail(len(close), int(judged.sum()), _CLOSER) < _BY_CHANCE:
+        if len(close) and tail(len(close), int(judged.sum()), _CLOSER) < _BY_CHANCE:
             most, copies = others, copies | set(close.tolist())
             pairs.append(np.stack([np.repeat(close, others), closest[close, :others].ravel()]))
     if not copies:
@@ -184,7 +185,7 @@ def _scaled(values: Values) -> Values:
     return scaled
 
 
-def _tail(successes: int, n: int, share: float) -> float:
+def tail(successes: int, n: int, share: float) -> float:
     """Return the probability of at least so many successes of `n`, each with the probability `share`."""
     from scipy.special import bdtrc
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, Literal
 
@@ -26,14 +27,10 @@ TARGETS: Final[tuple[Target, ...]] = ("both", "class", "state")
 
 @frozen(kw_only=True, eq=False)
 class ControlFeatures:
-    """Other features of the same trials, evaluated as a baseline; `what` describes them in words.
-
-    `missing` is the most frequent reason why a trial has none of them, if any has none.
-    """
+    """Other features of the same trials, evaluated as a baseline; `what` describes them in words."""
 
     table: FeatureTable
     what: str
-    missing: str = ""
 
     @property
     def having(self) -> NDArray[np.bool_]:
@@ -46,7 +43,8 @@ class ControlFeatures:
     def having_words(self) -> str:
         """How many trials have any of the features, in words, with the most frequent reason why others have none."""
         having = self.having
-        why = f": {self.missing}" if self.missing else ""
+        reasons = Counter(reason for row in self.table.reasons.values() for reason in {*row.values()})
+        why = f": {reasons.most_common(1)[0][0]}" if reasons else ""
         return f"{int(having.sum())} of {counted(len(having), 'trial')} have such features{why}"
 
 

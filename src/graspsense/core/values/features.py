@@ -83,11 +83,15 @@ class Features:
 
 @frozen(kw_only=True, eq=False)
 class FeatureTable:
-    """Features of many trials: `values` has shape (trials, features), NaN is missing."""
+    """Features of many trials: `values` has shape (trials, features), NaN is missing.
+
+    `reasons` says, by the number of a trial, why its features are missing, where that is known.
+    """
 
     names: tuple[str, ...]
     units: tuple[str, ...]
     values: NDArray[np.float64]
+    reasons: Mapping[int, Mapping[str, str]] = field(factory=dict)
 
     def __len__(self) -> int:
         """Return the number of trials."""
@@ -95,7 +99,9 @@ class FeatureTable:
 
     def rows(self, which: NDArray[np.int64] | NDArray[np.bool_]) -> FeatureTable:
         """Return the table of these trials, by number or by a mask."""
-        return FeatureTable(names=self.names, units=self.units, values=self.values[which])
+        numbers = (which.nonzero()[0] if which.dtype == bool else which).tolist() if self.reasons else ()
+        reasons = {k: self.reasons[i] for k, i in enumerate(numbers) if i in self.reasons}
+        return evolve(self, values=self.values[which], reasons=reasons)
 
     def columns(self, names: Sequence[str]) -> FeatureTable:
         """Return the table of these features, in this order. KeyError names the known ones."""
@@ -104,14 +110,13 @@ class FeatureTable:
             if name not in places:
                 raise KeyError(f"no feature {name!r}; there are {listed(self.names)}")
         which = [places[name] for name in names]
-        return FeatureTable(
-            names=tuple(names), units=tuple(self.units[i] for i in which), values=self.values[:, which]
-        )
+        units = tuple(self.units[i] for i in which)
+        return evolve(self, names=tuple(names), units=units, values=self.values[:, which])
 
     def row(self, i: int, reason: str = "missing in the table") -> Features:
-        """Return the features of one trial; a table keeps no reasons, so each missing one has this."""
-        values = tuple(float(v) for v in self.values[i])
-        absent = missing((n for n, v in zip(self.names, values, strict=True) if math.isnan(v)), reason)
+        """Return the features of one trial; each missing one of which no reason is known has this."""
+        values, known = tuple(float(v) for v in self.values[i]), self.reasons.get(i, {})
+        absent = {n: known.get(n, reason) for n, v in zip(self.names, values, strict=True) if math.isnan(v)}
         return Features(names=self.names, values=values, units=self.units, reasons=absent)
 
 
@@ -142,11 +147,12 @@ def assumed_units(names: Sequence[str], units: Sequence[str], given: FeatureTabl
 
 
 class FeatureRows:
-    """Collects the features of trials for a table, and keeps their numbers only."""
+    """Collects the features of trials for a table, and keeps their numbers and reasons only."""
 
     def __init__(self) -> None:
         self._first: Features | None = None
         self._values = array("d")
+        self._reasons: dict[int, Mapping[str, str]] = {}
         self._n = 0
 
     def add(self, features: Features) -> None:
@@ -157,6 +163,8 @@ class FeatureRows:
                 f"trials disagree: {features.names} in {features.units} beside {model.names} in {model.units}"
             )
         self._values.extend(features.values)
+        if features.reasons:
+            self._reasons[self._n] = features.reasons
         self._n += 1
 
     def table(self) -> FeatureTable:
@@ -166,7 +174,9 @@ class FeatureRows:
         if self._first is None:
             raise ValueError("a table needs at least one trial")
         values = np.array(self._values, dtype=np.float64).reshape(self._n, len(self._first.names))
-        return FeatureTable(names=self._first.names, units=self._first.units, values=values)
+        return FeatureTable(
+            names=self._first.names, units=self._first.units, values=values, reasons=self._reasons
+        )
 
 
 def table_of(rows: Iterable[Features]) -> FeatureTable:

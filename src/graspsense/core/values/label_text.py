@@ -14,20 +14,20 @@ MISSING_LABELS: Final = frozenset({"", "nan", "?"})
 _WHOLE: Final = re.compile(r"(?<![^:#])([-+]?[0-9]+)[.,]0+(?![^:#])")
 
 _JOINTS: Final = re.compile(
-    r"(?<=[^\W\d])[\s_\-\u2010-\u2015]+(?=\w)|(?<=\w)[\s_\-\u2010-\u2015]+(?=[^\W\d])|(?<=\s)\s+"
+    r"(?<=[^\W\d])[\s_\-\u2010-\u2015:/.]+(?=\w)|(?<=\w)[\s_\-\u2010-\u2015:/.]+(?=[^\W\d])|(?<=\s)\s+"
 )
-"""Spaces, underscores and hyphens beside a letter."""
-_LEADING: Final = re.compile(r"(?<![\d.,])0+(?=\d)")
+"""Spaces, underscores, hyphens and signs between words, beside a letter."""
+_LEADING: Final = re.compile(r"(?<![\d.])0+(?=\d)")
 _FILLERS: Final = re.compile(
     "[\u034f\u115f\u1160\u17b4\u17b5\u180b-\u180f\u3164\ufe00-\ufe0f\uffa0\U000e0100-\U000e01ef]"
 )
 """Letters and marks that nothing shows."""
 _LOOK_ALIKE: Final = str.maketrans(
-    "АВЕКМНОРСТУХІЈЅаеорсухіјѕһԁԛԝ" + "ΑΒΕΖΗΙΚΜΝΟΡΤΥΧαονρυικτχ" + "ıɡℓ",
-    "ABEKMHOPCTYXIJSaeopcyxijshdqw" + "ABEZHIKMNOPTYXaovpuiktx" + "igl",
+    "АВЕКМНОРСТУХІЈЅаеорсухіјѕһԁԛԝ" + "ΑΒΕΖΗΙΚΜΝΟΡΤΥΧαονρυικτχ" + "ıɡℓ,",
+    "ABEKMHOPCTYXIJSaeopcyxijshdqw" + "ABEZHIKMNOPTYXaovpuiktx" + "igl.",
 )
-"""Cyrillic, Greek and other letters, and the Latin ones that they look like."""
-_LAST_ZEROS: Final = re.compile(r"(?<!\d)(\d+[.,]\d*[1-9])0+(?![\d.,])")
+"""Cyrillic, Greek and other letters, the Latin ones that they look like, and the decimal comma."""
+_LAST_ZEROS: Final = re.compile(r"(?<!\d)(\d+\.\d*[1-9])0+(?![\d.])")
 
 
 def label_text(text: str) -> str:
@@ -48,19 +48,19 @@ def label_text(text: str) -> str:
 
 
 def spelled_alike(texts: Iterable[str]) -> list[tuple[str, str]]:
-    """Return pairs of different labels or names that differ in case, spaces, hyphens, width or leading zeros only,
-    in zeros at the end of a decimal number, or in letters of two alphabets that look the same.
+    """Return pairs of different labels or names that differ in case, spaces, hyphens, quotes, width or leading zeros
+    only, in the last zeros or the comma of a decimal number, or in letters of two alphabets that look the same.
 
     >>> spelled_alike(["tin-can", "tin\u2010can"])
     [('tin-can', 'tin‐can')]
-    >>> spelled_alike(["can1", "Can 01", "can2", "-2", "2", "1-2", "12", "0.5", "0.50", "1.20.30"])
-    [('0.5', '0.50'), ('Can 01', 'can1')]
+    >>> spelled_alike(["can1", "Can 01", "can2", "-2", "2", "1-2", "12", "0.5", "0,50", "1.20.30", "'full'", "full."])
+    [('0,50', '0.5'), ('Can 01', 'can1'), ("'full'", 'full.')]
     """
     by_form: dict[str, str] = {}
     pairs = []
     for text in sorted(set(texts)):
         form = unicodedata.normalize("NFKC", text.translate(_LOOK_ALIKE)).translate(_LOOK_ALIKE).casefold()
-        form = _LEADING.sub("", _JOINTS.sub("", form))
+        form = _LEADING.sub("", _JOINTS.sub("", form.strip(" .'\"")))
         form = _LAST_ZEROS.sub(r"\1", form)
         other = by_form.setdefault(form, text)
         if other != text:

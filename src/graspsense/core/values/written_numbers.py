@@ -26,6 +26,7 @@ THOUSANDS: Final = 2
 COMMA: Final = 4
 HEXADECIMAL: Final = 8
 """`0x7D0`, beside `0` at most: any other number can be a hexadecimal one without its sign."""
+_FEW: Final = 3
 _EVERY: Final = POINT | THOUSANDS | COMMA
 _NOTATIONS: Final = (POINT, THOUSANDS, COMMA)
 
@@ -203,7 +204,7 @@ def _read(cells: Sequence[str], fit: _Fit, of_file: int) -> Numbers | NotNumbers
             return _values(cells, POINT) if fit.values is None else fit.values
         if not of_file & THOUSANDS:
             return _values(cells, COMMA)
-    elif (common == THOUSANDS and of_file & COMMA) or _three_digits_behind_both_marks(cells):
+    elif (common == THOUSANDS and of_file & COMMA) or _one_mark_of_two(cells):
         pass
     elif common == THOUSANDS | COMMA:
         if of_file == COMMA:
@@ -234,11 +235,15 @@ def _signs_of_thousands(cells: Sequence[str], mark: str) -> int:
     )
 
 
-def _three_digits_behind_both_marks(cells: Sequence[str]) -> bool:
-    """Return whether these are `1,250` and `1.310`: three decimals, behind the mark of one place and of another."""
-    parts = [re.split("([,.])", cell) for cell in cells if "," in cell or "." in cell]
-    both = {part[1] for part in parts} == {",", "."}
-    return both and all(len(part) == 3 and len(part[2]) == 3 for part in parts)
+def _one_mark_of_two(cells: Sequence[str]) -> bool:
+    """Return whether these are `1,250` and `1.31`: decimals behind the mark of one place and of another.
+
+    Of thousands with decimals, some have both marks.
+    """
+    marks = [re.sub("[^,.]", "", cell) for cell in cells]
+    return {*marks} - {""} == {",", "."} and (
+        marks.count(",") >= _FEW or all(len(cell) - cell.find(".") == 4 for cell in cells if "." in cell)
+    )
 
 
 def _values(cells: Sequence[str], notation: int) -> Numbers:

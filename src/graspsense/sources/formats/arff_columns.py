@@ -139,8 +139,8 @@ class ArffColumns(CsvColumns):
 
     def _tokens(self, text: str) -> Iterator[tuple[str, bool]]:
         """Yield the words of a line, and whether each is quoted, up to a comment."""
-        place = 0
-        while text[place:].strip(" \t,"):
+        place, text = 0, text.rstrip(" \t,")
+        while place < len(text):
             match = _TOKEN.match(text, place)
             if match is None:
                 raise self._damaged(f"cannot read {text[place : place + _SHOWN]!r}: is a quote missing?")

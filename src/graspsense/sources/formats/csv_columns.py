@@ -52,24 +52,24 @@ class CsvColumns:
         self.names: list[str] = []
         self.index = ""
         """The name of the index that pandas wrote, empty if there is none."""
-        for heading, unit_of_line in zip(table.names, table.units, strict=True):
+        self.cells: dict[str, list[str]] = {}
+        for number, (heading, unit_of_line, column) in enumerate(
+            zip(table.names, table.units, table.columns, strict=True), 1
+        ):
             name, unit = name_and_unit(text_of_cell(heading))
+            if not name and not any(column):
+                continue
             if not name and not self.names:
                 name = INDEX
             if not name:
-                raise DataDamaged(f"{path}: column {len(self.names) + 1} has no name in the header")
+                raise DataDamaged(f"{path}: column {number} has no name in the header")
             if name in self.units:
                 raise DataDamaged(f"{path}: two columns are named {name!r}: rename one")
             if not self.names and (not heading or name in _INDEXES[1:]):
                 self.index = name
             self.names.append(name)
-            self.units[name] = unit or unit_of_line
-        self.cells = {
-            name: [text_of_cell(cell) for cell in cells]
-            for name, cells in zip(self.names, table.columns, strict=True)
-        }
-        for name, cells in self.cells.items():
-            self.units[name] = self.units[name] or numbers_with_unit(cells)[1]
+            self.cells[name] = [text_of_cell(cell) for cell in column]
+            self.units[name] = unit or unit_of_line or numbers_with_unit(self.cells[name])[1]
         self._numbers: dict[str, Numbers | NotNumbers] | None = None
         self.levels: dict[str, tuple[str, ...]] = {}
 

@@ -36,6 +36,7 @@ UNITS: Final = frozenset((
     "1", "pa", "kpa", "mpa", "bar", "psi", "nm", "n\u00b7m", "n*m", "m/s", "cm/s", "mm/s", "m/s2", "m/s^2",
     "millisecond", "milliseconds", "millimeter", "millimeters", "millimetre", "millimetres", "inches", "newton",
     "newtons", "m/s\u00b2", "rad/s", "deg/s", "counts", "count", "raw", "adc", "a.u.", "au", "step", "steps",
+    "ml", "cl", "dl", "mj", "mw", "n/s", "n/cm", "mm/n", "n*mm", "nmm", "cm2", "mm2", "mm^2", "mm\u00b2", "rpm", "ohm",
 ))  # fmt: skip
 """What stands in a line of units, in small letters."""
 _SINGLE_UNITS: Final = frozenset("smgNVACK%\u00b0")
@@ -48,8 +49,8 @@ _RULE: Final = re.compile(r"(?=.*[-_=]{3})[-_=+|:\s]+")
 _REMARKS: Final = frozenset({"comment", "comments", "remark", "remarks", "note", "notes"})
 """Names of a last column whose cells a program leaves out, with the separator, where it has nothing to say."""
 _SEPARATOR_LINE: Final = re.compile(r'"?sep=([;,\t|])"?\s*')
-SPREADSHEETS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
-"""The first bytes of a ZIP file, as which spreadsheets are saved, and of those of old programs."""
+SPREADSHEETS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"PAR1", b"ARROW1")
+"""The first bytes of a ZIP file, as which spreadsheets are saved, of those of old programs, and of Apache's tables."""
 _CODE_PAGES: Final = ("cp1252", "cp1250", "iso8859-1", "iso8859-15")
 """They agree on degrees, micro and the letters of several languages."""
 _WITH_UNIT: Final = re.compile(r"(.*[0-9.])\s*([^\s0-9]+)")
@@ -565,7 +566,7 @@ def text_of(path: Path) -> str:
             data = Unpacked(path).unpack("gzip", data)
             size = max(size, len(data))
     if data.startswith(SPREADSHEETS):
-        raise DataDamaged(f"{path} is a spreadsheet or an archive, not text: save its table as CSV in UTF-8")
+        raise DataDamaged(f"{path} is a spreadsheet, an archive or a binary table: save it as CSV in UTF-8")
     if too_large := TEXT_BYTES.exceeded(size):
         raise DataDamaged(f"{path}: {too_large}")
     text = _decoded(path, data).replace("\ufeff", "")  # also of files that were joined

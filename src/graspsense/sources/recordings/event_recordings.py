@@ -6,16 +6,20 @@ import math
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
 from attrs import field, frozen
 
-from graspsense.core.learn.labelled import class_of
+from graspsense.core.learn.groups import with_sessions
+from graspsense.core.learn.labelled import Labelled, class_of
 from graspsense.core.values.errors import ConfigError, counted, listed
+from graspsense.core.values.features import FeatureTable
 from graspsense.core.values.signals import CHANNELS, NO_GAP, Reading, Samples
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import each_readable, error_of_all, note_on
 from graspsense.recording.reader import read_recorded
 from graspsense.recording.replayable import content_sha256
 from graspsense.sources.recordings.dataset_recordings import datasets_with_recordings, readable_or_not
+from graspsense.sources.recordings.labelled_recordings import instances_of, order_of
 from graspsense.store.naming import STORE
 from graspsense.store.stored_grasps import StoredGrasp, stored_grasps
 
@@ -80,15 +84,22 @@ def event_recordings(source: str, only: str | None = None) -> EventRecordings:
         notes.append(
             f"the forces are in {', '.join(units)}, for which thresholds in N have no meaning: see the fitted ones"
         )
-    objects = all(recording.instance for recording in labelled)
+    instances = instances_of(labelled)
+    noted = with_sessions(
+        Labelled(
+            source=source,
+            table=FeatureTable(names=(), units=(), values=np.empty((len(labelled), 0))),
+            labels=tuple(recording.label for recording in labelled),
+            instances=instances,
+            order=order_of(labelled),
+            notes=tuple(notes),
+        )
+    )
     return EventRecordings(
         recordings=tuple(labelled),
-        groups=tuple(
-            f"{class_of(recording.label)}#{recording.instance}" if objects else recording.label
-            for recording in labelled
-        ),
-        held_out="instance" if objects else "label",
-        notes=tuple(notes),
+        groups=noted.instances or noted.labels,
+        held_out="label" if instances is None else "instance",
+        notes=noted.notes,
     )
 
 

@@ -71,14 +71,12 @@ def labelled_recordings(
     units = {unit for fact in facts for unit in fact.recording.units.values()}
     if units:
         notes.append(f"units that are not SI units: {', '.join(sorted(units))}")
-    order = _order(facts)
+    order = order_of(facts)
     return Labelled(
         source=f"{kind}:{place}",
         table=table,
         labels=tuple(fact.label for fact in facts),
-        instances=tuple(f"{class_of(fact.label)}#{fact.instance}" for fact in facts)
-        if all(fact.instance for fact in facts)
-        else None,
+        instances=instances_of(facts),
         no_instances="the data set does not say which trials are of the same object",
         order=order,
         no_order="" if order is not None else "the data set does not say when each trial was recorded",
@@ -132,7 +130,13 @@ def trace_of_recording(recording: Recording) -> Trace:
     )
 
 
-def _order(facts: Sequence[LabelledRecording]) -> tuple[int, ...] | None:
+def instances_of(facts: Sequence[LabelledRecording]) -> tuple[str, ...] | None:
+    """Return the instance of each trial with its class in front; None if that of a trial is not known."""
+    named = all(fact.instance for fact in facts)
+    return tuple(f"{class_of(fact.label)}#{fact.instance}" for fact in facts) if named else None
+
+
+def order_of(facts: Sequence[LabelledRecording]) -> tuple[int, ...] | None:
     """Return the rank of each trial by its time of recording, or else by its number; None if neither is known."""
     keys: list[Any]
     if all(fact.recorded_at for fact in facts):
@@ -152,7 +156,6 @@ def _controls(table: FeatureTable, early: Sequence[Features], facts: Sequence[La
     known_controls = controls(
         table,
         table_of(early),
-        before_missing=next((reason for features in early for reason in features.reasons.values()), ""),
         first_line=FeatureTable(names=NAMES, units=UNITS, values=opening),
     )
     gaps = ([reading.frame.gap_m for reading in fact.recording.readings] for fact in facts)

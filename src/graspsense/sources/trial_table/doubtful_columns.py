@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from decimal import Decimal
 from itertools import groupby
+from operator import itemgetter
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -20,6 +21,7 @@ from graspsense.core.values.features import LARGEST_VALUE
 from graspsense.sources.trial_table.identifiers import (
     LEAST_LINES,
     TIMES,
+    are_even,
     can_be_days,
     follow_lines,
     groups_trials,
@@ -126,7 +128,7 @@ _DOUBTS: Final[Mapping[str, tuple[str, str]]] = {
         "If it is a time or a counter, ",
     ),
     "target": (
-        "it is the number to predict in another unit",
+        "the number to predict determines it, as in another unit or for a known object",
         "If it is not measured apart from it, ",
     ),
 }
@@ -137,9 +139,15 @@ def doubts(
     columns: CsvColumns,
     labels: Sequence[str],
     table: FeatureTable,
-    target: Sequence[float] | None = None,
+    target: Sequence[float] | None,
+    lines: Sequence[int],
 ) -> list[str]:
-    """Return notes on those columns that are features and may reveal the labels, or the number to predict."""
+    """Return notes on those columns that are features and may reveal the labels, or the number to predict.
+
+    `lines` are those to be looked at, in the order of recording.
+    """
+    columns, table, labels = columns.rows(lines), table.rows(np.array(lines)), [labels[i] for i in lines]
+    target = None if target is None else [target[i] for i in lines]
     used = [name for name in columns.names if set(columns.columns_of(name)) <= set(table.names)]
     numbers = _numbers(columns, [name for name in used if not columns.is_nominal(name)])
     doubted: dict[str, list[str]] = {}
@@ -182,7 +190,8 @@ def _of_recording(columns: CsvColumns, name: str, labels: Sequence[str]) -> Iter
         return
     if mostly_says_the_label(cells, labels):
         yield "mostly"
-    if name_objects(cells, labels) or (is_number and values_have_one_label(cells, labels)):
+    values = cells if columns.is_nominal(name) else columns.numbers(name)
+    if name_objects(cells, labels) or (is_number and values_have_one_label(values, labels)):
         yield "one label"
     if (columns.is_nominal(name) or is_number) and in_one_block_each(cells, labels):
         yield "blocks"
@@ -207,7 +216,7 @@ def _of_target(values: Numbers, target: Numbers) -> Iterator[str]:
     """Yield why the numbers of a column may be the number to predict itself, or when it was measured."""
     if keeps_rising(values):
         yield "rising"
-    if is_proportional(values, target):
+    if follows_from(values, target):
         yield "target"
 
 
@@ -281,11 +290,17 @@ def digits_tell_labels(values: Numbers, labels: Sequence[str]) -> bool:
     )
 
 
-def values_have_one_label(values: Sequence[str], labels: Sequence[str]) -> bool:
-    """Return whether several lines have each value, all with one label, and there are more values than labels."""
-    given = [(value, label) for value, label in zip(values, labels, strict=True) if value]
-    different = len({value for value, _ in given})
-    return len(set(labels)) < different == len(set(given)) and _OFTEN * different <= len(given)
+def values_have_one_label(values: Sequence[str] | Sequence[float], labels: Sequence[str]) -> bool:
+    """Return whether several lines have each value, all with one label, and there are more values than labels.
+
+    Numbers of a label that have a range of their own are measured, unless each has about as many lines.
+    """
+    given = [pair for pair in zip(values, labels, strict=True) if pair[0] != "" and pair[0] == pair[0]]
+    different, among = Counter(value for value, _ in given), len(set(labels))
+    if not among < len(different) == len(set(given)) or _OFTEN * len(different) > len(given):
+        return False
+    ranges = sum(1 for _ in groupby(sorted(given), key=itemgetter(1)))
+    return isinstance(given[0][0], str) or ranges > among or are_even([*different.values()])
 
 
 def in_one_block_each(values: Sequence[str], labels: Sequence[str]) -> bool:
@@ -323,14 +338,22 @@ def differs_by_label(values: Numbers, labels: Sequence[str]) -> bool:
     return bool(np.var(values[known] - means[codes]) < 0.5 * np.var(values[known]))
 
 
-def is_proportional(values: Numbers, target: Numbers) -> bool:
-    """Return whether these are the numbers of the target with another factor and zero, as rounding allows."""
+def follows_from(values: Numbers, target: Numbers) -> bool:
+    """Return whether these are the numbers of the target with another factor and zero, as rounding allows.
+
+    Or whether each number of the target has one of them, of which there are not few: they rise or fall with it, or most
+    numbers have several lines.
+    """
     known = ~np.isnan(values)
-    if known.sum() < 2 * LEAST_LINES:
+    if known.sum() < 2 * LEAST_LINES or np.ptp(values[known]) == 0.0 or np.ptp(target[known]) == 0.0:
         return False
-    away, of_target = values[known] - values[known].mean(), target[known] - target[known].mean()
-    scale = float(np.sqrt((away @ away) * (of_target @ of_target)))
-    return scale > 0.0 and abs(float(away @ of_target)) >= _PROPORTIONAL * scale
+    values, target = (numbers[known] / np.ptp(numbers[known]) for numbers in (values, target))
+    if abs(np.corrcoef(values, target)[0, 1]) >= _PROPORTIONAL:
+        return True
+    of_target, pairs = len(set(target.tolist())), len(set(zip(values.tolist(), target.tolist(), strict=True)))
+    steps = np.diff(values[np.argsort(target, kind="stable")])
+    rises = (steps >= 0.0).all() or (steps <= 0.0).all() or 2 * of_target <= len(target)
+    return pairs == of_target and bool(rises) and len(set(values.tolist())) >= LEAST_LINES
 
 
 def _numbers(columns: CsvColumns, names: Sequence[str]) -> dict[str, Numbers]:

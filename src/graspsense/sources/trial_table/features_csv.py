@@ -97,7 +97,8 @@ def read_labelled(
     table = _feature_table(columns, features, reserved, identified, notes)
     if export is None:
         recorded = lines if ranks is None else sorted(lines, key=ranks.__getitem__)
-        notes += _doubts(columns, recorded, labels, table, target)
+        values = None if target is None else target.values
+        notes += doubts(columns, labels, table, values, recorded)
         others = [name for name in columns.names if name not in {*reserved, *table.names}]
         notes += not_held_out(columns, others, instances)
     return Labelled(
@@ -165,18 +166,6 @@ def _lines_once(columns: CsvColumns, counted_by: set[str | None], labels: Sequen
     originals = {line: i for i, line in reversed(list(enumerate(lines)))}
     repeated = len(originals) >= LEAST_LINES * len(set(labels)) and len(set(Counter(lines).values())) == 1
     return sorted(originals.values()) if repeated else list(range(len(lines)))
-
-
-def _doubts(
-    columns: CsvColumns,
-    lines: Sequence[int],
-    labels: Sequence[str],
-    table: FeatureTable,
-    target: TargetValue | None,
-) -> list[str]:
-    """Return notes on the features of these lines, which are in the order of recording."""
-    values = None if target is None else [target.values[i] for i in lines]
-    return doubts(columns.rows(lines), [labels[i] for i in lines], table.rows(np.array(lines)), values)
 
 
 def _controls(
@@ -248,7 +237,7 @@ def _labels(columns: CsvColumns, label: str | None, notes: list[str], *, require
         notes.append(f"taken as labels, not as missing ones: {listed(words)}")
     if len(set(written)) > len(set(labels)):
         notes.append("labels that differ in invisible characters, or as 1 and 1.0 do, count as one")
-    if len(set(labels)) > max(2, len(labels) // 2):
+    if len(set(labels)) > max(LEAST_LINES, len(labels) // 2):
         raise ConfigError(
             f"column {label!r} of {columns.path} has {len(set(labels))} different values in {len(labels)} trials, so "
             "it cannot be the label. Name the column that says what was grasped"
@@ -353,8 +342,8 @@ def _note_uninformative_columns(path: Path, table: FeatureTable, notes: list[str
     named = list(zip(table.names, table.values.T, strict=True))
     blank = [name for name, values in named if np.isnan(values).all()]
     having = [(name, values[~np.isnan(values)]) for name, values in named]
-    constant = [name for name, values in having if len(values) and values.min() == values.max() != 0.0]
-    constant += [name for name, values in having if len(values) and not values.any() and not splits_of(name)]
+    same = [(name, values.any()) for name, values in having if len(values) and _span(values) == 0.0]
+    constant = [name for name, nonzero in same if nonzero or not splits_of(name)]
     if blank:
         notes.append(f"without any value: {listed(blank)}")
     if constant:

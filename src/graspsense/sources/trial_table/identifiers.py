@@ -37,12 +37,16 @@ _NAMES: Final = frozenset({
     "fichier", "heure", "numero", "prueba", "archivo", "fecha", "hora"
 })  # fmt: skip
 _OF_RECORDINGS: Final = frozenset({
-    "session", "operator", "experimenter", "person", "user", "robot", "host", "seed", "batch", "weekday", "day", "date",
-    "datetime", "trial", "fold", "split", "file", "filename", "uid", "uuid", "prediction", "predicted",
+    "session", "operator", "experimenter", "person", "participant", "subject", "user", "robot", "host", "lab", "site",
+    "seed", "batch", "lot", "weekday", "day", "doy", "week", "month", "year", "date", "datetime", "trial", "fold",
+    "split", "file", "filename", "uid", "uuid", "pred", "prediction", "predicted", "proba", "probability", "confidence",
     "sitzung", "bediener", "proband", "datum", "wochentag", "tag", "versuch", "datei", "fichier", "jour", "fecha",
 })  # fmt: skip
 """What a recording is known by, and what a model said of it; no gripper measures it."""
-_DIVISIONS: Final = frozenset({"seed", "trial", "fold", "split", "uid", "uuid", "prediction", "predicted"})
+_DIVISIONS: Final = frozenset({
+    "seed", "trial", "fold", "split", "uid", "uuid", "pred", "prediction", "predicted", "proba", "probability",
+    "confidence",
+})  # fmt: skip
 """Those that tell nothing of what was the same for several recordings."""
 _NUMBERED: Final = frozenset(
     {"id", "no", "nr", "num", "number", "index", "idx", "name", "code", "of", "the", "random"}
@@ -69,6 +73,8 @@ _ALIKE: Final = 0.35
 """The same ratio of a clock whose lines are in any order: of 30 measurements it is less once in a million."""
 _ENDS: Final = 2
 """Objects that may have fewer lines than the others: the first and the last one; or the last one of each label."""
+_EVEN: Final = 1e-3
+"""Probability that drawn values have numbers of lines as even as those of objects."""
 _HASHED: Final = 1e7
 """Integers from this one on are hashes, if they number objects and are no multiples of 1000."""
 _EPOCH_S: Final = (6.3e8, 4.2e9)
@@ -85,17 +91,24 @@ _DATE_TEXT: Final = re.compile(
     r"(?=.*\d)(\d{1,4}([-./])\d{1,2}\2\d{1,4})?[T ]?(\d{1,2}(:\d{2}){1,2}(\.\d+)?)?( ?Z| ?[+-]\d\d:?\d\d)?"
 )
 """A date or a time of day, as 2026-11-26, 26.11.2026 14:03 or 14:03:22."""
-_WEEKDAYS: Final = re.compile(
-    r"mon(day)?|tue(sday)?|wed(nesday)?|thu(rsday)?|fri(day)?|sat(urday)?|sun(day)?|mo(ntag)?|di(enstag)?|"
-    r"mi(ttwoch)?|do(nnerstag)?|fr(eitag)?|sa(mstag)?|so(nntag)?|lun(di)?|mar(di)?|mer(credi)?|jeu(di)?|ven(dredi)?|"
-    r"sam(edi)?|dim(anche)?"
+_LONG_WORDS: Final = (
+    "(mon|tues?|wed(nes)?|thu(rs)?|fri|sat(ur)?|sun)(day)?|(lun|mar|mer(cre)?|jeu|ven(dre)?)(di)?|sam(edi)?|dim(anche)?|"
+    "(mon|diens|donners|frei|sams|sonn)tag|mittwoch|jan(uary?)?|jänner|feb(ruary?)?|mar(ch)?|mär(z)?|apr(il)?|may|mai|"
+    "ju[nl][eiy]?|aug(ust)?|sept?(ember)?|o[ck]t(ober)?|nov(ember)?|de[cz](ember)?"
 )
-_DATES: Final = ("%Y%m%d", "%y%m%d%H%M", "%Y%m%d%H%M", "%y%m%d%H%M%S", "%Y%m%d%H%M%S")
+_WORDS_OF_DATES: Final = re.compile(f"{_LONG_WORDS}|mo|di|mi|do|fr|sa|so")
+"""Days of the week and months, alone."""
+_WORDED_DATE: Final = re.compile(
+    rf"(?=.*\d)(?=.*({_LONG_WORDS}|[ap]\.?m))({_LONG_WORDS}|\d+(st|nd|rd|th)?|[ap]\.?m\.?|utc|gmt|[-\s.,:/_+])+"
+)
+"""A date or a time with such words, as 26 Nov 2026 or 2:03 pm."""
+_DAY_FORMS: Final = ("%Y%m%d", "%d%m%Y", "%m%d%Y", "%y%m%d")
+_DATES: Final = (*_DAY_FORMS, "%y%m%d%H%M", "%Y%m%d%H%M", "%y%m%d%H%M%S", "%Y%m%d%H%M%S")
 _CLOCK_VALUES: Final = (10, 15)
 """Different hundreds, and different last two digits, from which on 142530 and 91205 are times of the day: that no two
 digits are above 59 is a chance of one in two thousand."""
-_DAYS: Final = ((36_526.0, 55_153.0), (730_486.0, 749_113.0))
-"""The years 2000 to 2050 in days, as spreadsheets and as MATLAB count them."""
+_DAYS: Final = ((36_526.0, 69_807.0), (730_486.0, 749_113.0))
+"""The years 2000 to 2050 in days, as spreadsheets or the modified Julian date, and as MATLAB count them."""
 _WORKING_DAY: Final = 0.7
 """Part of the day in which all recordings were made."""
 
@@ -143,6 +156,9 @@ def identifies(
     cells = cells_in_range(values_of) + 1.0
     if cells < len(values_of):  # a value far from the others hides their grid
         cells = math.inf
+    hashed = whole and column.max() >= _HASHED and bool((column % 1000.0).any())
+    if (hashed or cells <= 2.0 * len(values_of)) and name_objects(column.tolist(), known):
+        return NUMBER_OBJECTS
     named = bool(_NAMES & set(words_in(name)))
     orders = (given, None if order is None else np.array(order)[given])
     if (whole or named) and any(lines is not None and _begins_anew(column, lines) for lines in orders):
@@ -160,9 +176,6 @@ def identifies(
             return "number the trials"
         if len(values_of) == len(column) >= _SPACED and _is_regular(values_of, _ALIKE):
             return "have equal steps, as those of a clock or a counter"
-    hashed = whole and column.max() >= _HASHED and bool((column % 1000.0).any())
-    if (hashed or cells <= 2.0 * len(values_of)) and name_objects(column.tolist(), known):
-        return NUMBER_OBJECTS
     return ""
 
 
@@ -177,8 +190,11 @@ def text_identifies(texts: Sequence[str], labels: Sequence[str]) -> str:
         return ""
     if counts.keys() <= set(labels):
         return "are the labels, as those of a prediction are"
-    if all(map(_DATE_TEXT.fullmatch, counts)) or (
-        len(counts) > 2 and all(_WEEKDAYS.fullmatch(text.lower()) for text in counts)
+    lower = [text.lower() for text in counts]
+    if (
+        all(map(_DATE_TEXT.fullmatch, counts))
+        or all(map(_WORDED_DATE.fullmatch, lower))
+        or (len(counts) > 2 and all(map(_WORDS_OF_DATES.fullmatch, lower)))
     ):
         return "are dates or times"
     values, known = [text for text, _ in given], [label for _, label in given]
@@ -219,20 +235,19 @@ def _is_calendar(column: NDArray[np.float64]) -> bool:
         return True
     if least < 0.0 or (column != np.floor(column)).any():
         return False
-    if least < 19_700_101:
-        hundreds, ends = np.unique(column // 100.0), np.unique(column % 100.0)
-        many = len(hundreds) >= _CLOCK_VALUES[0] and len(ends) >= _CLOCK_VALUES[1]
-        return many and most < 240_000.0 and max(ends.max(), (hundreds % 100.0).max()) < 60.0
     texts = [f"{value:.0f}" for value in np.unique(column).tolist()]
-    return any(all(_is_written_date(text, form) for text in texts) for form in _DATES)
+    if any(all(_is_written_date(text, form) for text in texts) for form in _DATES):
+        return True
+    hundreds, ends = np.unique(column // 100.0), np.unique(column % 100.0)
+    many = len(hundreds) >= _CLOCK_VALUES[0] and len(ends) >= _CLOCK_VALUES[1]
+    return many and most < 240_000.0 and max(ends.max(), (hundreds % 100.0).max()) < 60.0
 
 
 def _is_written_date(text: str, form: str) -> bool:
-    try:
-        return (
-            len(text) == len(datetime(2000, 1, 1).strftime(form))
-            and 1970 <= datetime.strptime(text, form).year <= 2100
-        )
+    digits = len(datetime(2000, 1, 1).strftime(form))
+    try:  # A number has lost the zero of the first nine days or months.
+        text = text.zfill(digits) if form.endswith("%Y") and len(text) == digits - 1 else text
+        return len(text) == digits and 1970 <= datetime.strptime(text, form).year <= 2100
     except ValueError:
         return False
 
@@ -328,7 +343,8 @@ def _hardly_repeats(n: int, distinct: int, cells: float) -> bool:
 def name_objects(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
     """Return whether values name objects: each belongs to one label, and all have as many lines, or one block.
 
-    Where two labels meet, an object may have lines of both. Objects at the ends may have fewer lines.
+    Where two labels meet, an object may have lines of both. Objects at the ends may have fewer lines, and others may if
+    all have nearly as many.
     """
     counts = Counter(values)
     objects = len(counts)
@@ -338,7 +354,17 @@ def name_objects(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
     most = max(counts.values())
     fewer = sum(count < most for count in counts.values())
     in_blocks = sum(1 for _ in groupby(values)) == objects
-    return most > 1 and (fewer <= max(_ENDS, among) or (in_blocks and min(counts.values()) > 1))
+    alike = fewer <= max(_ENDS, among) or are_even([*counts.values()])
+    return most > 1 and (alike or (in_blocks and min(counts.values()) > 1))
+
+
+def are_even(counts: Sequence[int]) -> bool:
+    """Return whether values have numbers of lines as even as those of objects, by a chi-squared test."""
+    from scipy.special import gammainc
+
+    mean = sum(counts) / len(counts)
+    uneven = sum((count - mean) ** 2 for count in counts) / mean
+    return mean >= 2.0 and bool(gammainc(0.5 * (len(counts) - 1), 0.5 * uneven) < _EVEN)
 
 
 def _enough_objects(objects: int, labels: Sequence[str]) -> bool:

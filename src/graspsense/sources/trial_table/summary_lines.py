@@ -9,6 +9,7 @@ from itertools import takewhile
 from typing import TYPE_CHECKING, Final
 
 from graspsense.core.values.errors import listed
+from graspsense.sources.formats.text_table import numbers_with_unit
 
 if TYPE_CHECKING:
     from graspsense.sources.formats.csv_columns import CsvColumns
@@ -28,7 +29,8 @@ def without_summaries(columns: CsvColumns) -> None:
 
     In the first and the last lines, each has the name of a statistic that its column has nowhere else; an object of
     that name has several trials. Anywhere, the name stands beside that of other lines, as in `mean (can)`, or in a
-    column of numbers, as that of a trial. A heading is a text that its column has nowhere else, alone in its line.
+    column of numbers, as that of a trial; a column of percentages has 50%. A heading is a text that its column has
+    nowhere else, alone in its line.
     """
     summaries: dict[int, str] = {}
     alone = [sum(map(bool, row)) == 1 < len(row) - 1 for row in zip(*columns.cells.values(), strict=True)]
@@ -47,7 +49,7 @@ def without_summaries(columns: CsvColumns) -> None:
         summaries |= {
             i: cells[i] for i in rows if telling[i] and (i in ends or alone[i] or words[i] not in _STATISTICS)
         }
-        if not _STATISTICS.isdisjoint(times) and columns.has_numbers(name):
+        if not (_STATISTICS.isdisjoint(times) or numbers_with_unit(cells)[1]) and columns.has_numbers(name):
             summaries |= {i: cells[i] for i, word in enumerate(words) if word in _STATISTICS}
     if 0 < len(summaries) < len(columns):
         columns.notes = (
