@@ -18,7 +18,7 @@ from graspsense.testing import component
 from graspsense.testing.checks import CheckFailed, checks_of, demand, raises_nothing
 from graspsense.testing.damage import damaged_at, paths
 from graspsense.testing.samples import sample_table
-from graspsense.testing.subject import Subject
+from graspsense.testing.subject import Subject, elsewhere
 
 SEED: Final = 11
 LEAST_RIGHT: Final = 0.9
@@ -101,20 +101,50 @@ def separates_separable_trials(subject: Subject) -> None:
 
 
 def same_seed_same_model(subject: Subject) -> None:
-    """The same trials and seed give the same model, bit for bit."""
-    fitted, table, _ = _learned(subject)
-    again, _, _ = _learned(subject)
+    """The same trials and seed give the same model, bit for bit, whatever it was fitted to before."""
+    fitted, table, labels = _learned(subject)
+    again = _fitted(subject, *sample_table(30, missing=True))
+    again.fit(table, labels, SEED)
     demand(
         _json(fitted) == _json(again)
         and bool((fitted.probabilities(table) == again.probabilities(table)).all()),
-        "two models of one seed differ: draw everything from the seed that fit is given",
+        "two models of one seed differ: draw everything from the seed that fit is given, and keep nothing of what it "
+        "was fitted to before",
+    )
+
+
+def same_model_elsewhere(subject: Subject) -> None:
+    """Another interpreter learns the same, at another time of the day and with its sets in another order."""
+    fitted, table, _ = _learned(subject)
+    there = json.loads(elsewhere(subject, _learned_after_others))
+    demand(
+        there["classes"] == list(fitted.classes())
+        and bool(np.allclose(there["probabilities"], fitted.probabilities(table), rtol=1e-6, atol=1e-9)),
+        "in another interpreter, with another time zone and order of sets, it learns another model (classes "
+        f"{', '.join(there['classes'])} instead of {', '.join(fitted.classes())}): read no clock, sort what comes out "
+        "of a set, and keep no state in the class or the module",
+    )
+
+
+def _learned_after_others(subject: Subject) -> str:
+    _fitted(subject, *sample_table(30, missing=True))
+    fitted, table, _ = _learned(subject)
+    return json.dumps(
+        {"classes": list(fitted.classes()), "probabilities": fitted.probabilities(table).tolist()}
     )
 
 
 def survives_json(subject: Subject) -> None:
-    """A model written as JSON and read again gives the same probabilities, bit for bit, and the same reasons."""
+    """A model read from its JSON gives the same probabilities, bit for bit, and reasons, and runs nothing in it."""
     fitted, table, _ = _learned(subject)
-    again = _again(subject, fitted)
+    _again(subject, fitted)  # which may import what it needs
+    with component.Watched(component.RUNS_CODE) as seen:
+        again = _again(subject, fitted)
+    demand(
+        not seen,
+        f"from_json makes the interpreter {', '.join(dict.fromkeys(seen))}, and a model file comes from anywhere: "
+        "store numbers and text, and read them by graspsense.plugin_api.StoredValues",
+    )
     demand(
         again.classes() == fitted.classes()
         and bool((again.probabilities(table) == fitted.probabilities(table)).all()),
@@ -286,6 +316,7 @@ CHECKS: Final = (
         probabilities_are_valid,
         separates_separable_trials,
         same_seed_same_model,
+        same_model_elsewhere,
         survives_json,
         single_trials_agree,
         handles_missing_values,

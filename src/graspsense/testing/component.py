@@ -159,7 +159,7 @@ def making_one_does_nothing(subject: Subject) -> None:
     """The constructor opens no file, device or connection, and does not prompt the user."""
     subject.component.component_class()
     config = subject.config()
-    with _Watched() as seen:
+    with Watched(_DEEDS) as seen:
         subject.component.create(config)
     demand(
         not seen,
@@ -177,33 +177,36 @@ def summary_is_one_line(subject: Subject) -> None:
     )
 
 
-class _Watched:
-    """Collects what the process opens within the context, by an audit hook. Audit hooks cannot be removed."""
+class Watched:
+    """Collects which of these deeds the process does within the context, by an audit hook, which cannot be removed."""
 
-    _seen: list[str] | None = None
+    _current: Watched | None = None
     _hooked = False
 
+    def __init__(self, deeds: Mapping[str, str]) -> None:
+        self._deeds = deeds
+        self._seen: list[str] = []
+
     def __enter__(self) -> list[str]:
-        if not _Watched._hooked:
-            sys.addaudithook(_Watched._heard)
-            _Watched._hooked = True
-        touched: list[str] = []
-        _Watched._seen = touched
-        return touched
+        if not Watched._hooked:
+            sys.addaudithook(Watched._heard)
+            Watched._hooked = True
+        Watched._current = self
+        return self._seen
 
     def __exit__(self, *_: object) -> None:
-        _Watched._seen = None
+        Watched._current = None
 
     @staticmethod
     def _heard(event: str, arguments: tuple[Any, ...]) -> None:
-        seen = _Watched._seen
-        if seen is None or event not in _DEEDS:
+        current = Watched._current
+        if current is None or event not in current._deeds:
             return
         path = str(arguments[0]) if arguments else ""
         # The import of a module reads files, which the constructor is not responsible for.
         if event == "open" and path.endswith((".py", ".pyc", ".so", ".pyd", ".pth", ".zip")):
             return
-        seen.append(_DEEDS[event] + (f" ({path})" if event == "open" else ""))
+        current._seen.append(current._deeds[event] + (f" ({path})" if event == "open" else ""))
 
 
 _DEEDS: Final = {
@@ -215,6 +218,7 @@ _DEEDS: Final = {
     "os.mkdir": "make a folder",
     "os.remove": "remove a file",
 }
+RUNS_CODE: Final = {"pickle.find_class": "unpickle", "marshal.loads": "load code", "exec": "run code"}
 
 CHECKS: Final = checks_of(
     classes_can_be_imported,

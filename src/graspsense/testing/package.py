@@ -33,6 +33,7 @@ from graspsense.testing.subject import Package
 
 OBSERVERS: Final = ("graspsense_run_starting", "graspsense_grasp_event", "graspsense_run_finished")
 PROBE_S: Final = 1.0
+OBSERVER_S: Final = 2.0
 _ADVICE_ON_OBSERVERS: Final = ": an observer that raises is passed over from then on; catch what may go wrong"
 
 
@@ -151,8 +152,14 @@ def observers_change_nothing(package: Package) -> None:
         for hook in OBSERVERS:
             if hook not in status.hooks:
                 continue
+            began = time.perf_counter()
             with raises_nothing(f"{hook} of {status.entry_point}", _ADVICE_ON_OBSERVERS):
                 results = package.plugins.called(status, hook, **arguments[hook])
+            took = time.perf_counter() - began
+            demand(
+                took <= OBSERVER_S,
+                f"{hook} took {took:.1f} s, and the grasp waits for it: hand the work to a thread",
+            )
             demand(not results, f"{hook} returned {results}: an observer returns nothing")
     demand(
         (run.settings, run.components, run.labels) == given and trial.trace.gap_m.tobytes() == column,

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+import pickle
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -10,6 +14,7 @@ from attrs import define, field
 
 from graspsense.core.components.registry import Component, Plugins, PluginStatus, Resource, canonical
 from graspsense.core.settings.selected import build
+from graspsense.testing.checks import CheckFailed
 from graspsense.testing.session import Session, readings_of
 
 
@@ -79,6 +84,25 @@ class Package:
         return self.distribution
 
     role = "distribution"
+
+
+def elsewhere(subject: Subject, what: Callable[[Subject], str]) -> str:
+    """Return what a module function gives in a fresh interpreter, at another time of the day and of other hashes."""
+    code = (
+        "import pickle, sys; pipe = sys.stdin.buffer; sys.path[:] = pickle.load(pipe)"
+        "; what, subject = pickle.load(pipe); text = what(subject); sys.stdout.buffer.write(b'\\n' + text.encode())"
+    )
+    fresh = Subject(component=subject.component, keys=subject.keys)
+    ran = subprocess.run(
+        [sys.executable, "-c", code],
+        input=pickle.dumps(sys.path) + pickle.dumps((what, fresh)),
+        env={**os.environ, "PYTHONHASHSEED": "77", "TZ": "ELSEWHERE-13"},
+        capture_output=True,
+        check=False,
+    )
+    if ran.returncode:
+        raise CheckFailed(f"it fails in a fresh interpreter: {ran.stderr.decode().strip()[-300:]}")
+    return ran.stdout.decode().rpartition("\n")[2]
 
 
 def package_of(

@@ -124,6 +124,10 @@ def setting(
         raise TypeError("a setting needs a meaning: say in a sentence what its value does")
     if factory is not None and default is not attrs.NOTHING:
         raise TypeError("a setting has one default: give `default` or `factory`")
+    if isinstance(default, list | dict | set):
+        raise TypeError(
+            f"the default {default!r} would be one for all: give it as factory=lambda: {default!r}"
+        )
     limits = _Limits(minimum, above, maximum, below)
     _check_limits(limits, default)
     _check_origin(origin)
