@@ -26,7 +26,7 @@ from graspsense.core.values.signals import (
     Outcome,
     Pads,
 )
-from graspsense.testing import commands, component, fingers, protection, readings, recorded
+from graspsense.testing import commands, component, protection, readings, recorded
 from graspsense.testing.checks import (
     CheckFailed,
     CheckNotTried,
@@ -378,7 +378,7 @@ CHECKS: Final = (
         readings.signals_are_those_declared,
         readings.images_stay_as_they_were_delivered,
         readings.signals_have_no_gaps_or_repeats,
-        fingers.fingers_are_those_declared,
+        readings.fingers_are_those_declared,
         readings.time_runs_forward,
         readings.rate_is_as_declared,
         readings.images_count_up,

@@ -124,7 +124,6 @@ def _leaving_nothing() -> Iterator[None]:
 def _process_state() -> dict[str, Any]:
     return {
         "the working folder": os.getcwd(),
-        "os.environ": dict(os.environ),
         "np.seterr": np.geterr(),
         "the random numbers of numpy": repr(np.random.get_state()),  # noqa: NPY002 (that others draw)
         "the random numbers of Python": random.getstate(),

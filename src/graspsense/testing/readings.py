@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import closing
 from itertools import pairwise
-from math import inf, isfinite, isnan, nan
+from math import inf, isclose, isfinite, isnan, nan
 from statistics import median
 from typing import Any, Final
 
@@ -14,6 +14,7 @@ import numpy as np
 from graspsense.core.components.channels import declared_dtype, dtype_of, further, no_signals, shape_of
 from graspsense.core.components.delivered import Delivered
 from graspsense.core.values.channel import FLOATS, Channel, FastChannel, TactileArray
+from graspsense.core.values.fingers import fingers_of, opposed_forces
 from graspsense.core.values.signals import (
     CHANNELS,
     Frame,
@@ -169,6 +170,32 @@ def _demand_images(name: str, images: Sequence[Any]) -> None:
         not any(np.isinf(cells).any() for cells in images),
         f"{name!r} has an infinite number: give finite ones, or NaN",
     )
+
+
+def fingers_are_those_declared(subject: Subject) -> None:
+    """The two forces of each frame follow from the forces of the declared fingers by the declared rule."""
+    fingers = fingers_of(subject.entry.channels)
+    if not fingers:
+        return
+    try:
+        forces_of = opposed_forces(fingers)
+    except ValueError as error:
+        raise CheckFailed(f"its fingers: {error}") from error
+    for reading in subject.session.readings:
+        each = [getattr(reading.signals, finger.name) for finger in fingers]
+        frame = reading.frame
+        for side, given, follows in zip(
+            ("left", "right"), (frame.force_left_n, frame.force_right_n), forces_of(each), strict=True
+        ):
+            same = isclose(given, follows, rel_tol=1e-9, abs_tol=1e-9) or (
+                given != given and follows != follows
+            )
+            demand(
+                same,
+                f"force_{side}_n is {given:g} where the fingers bear {', '.join(f'{force:g}' for force in each)} N, "
+                f"which are {follows:g} N by touch={fingers[0].touch!r}: fill the frame with "
+                "opposed_forces(self.channels)(forces)",
+            )
 
 
 def images_stay_as_they_were_delivered(subject: Subject) -> None:
