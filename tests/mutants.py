@@ -606,7 +606,7 @@ padding("what-it-delivers-is-kept", "'pad_t_s' is not in an export", t_s=0.0)
 
 SIGNALS = "signals-are-those-declared"
 UNBROKEN = "signals-have-no-gaps-or-repeats"
-sampling(SIGNALS, "give Samples of the declared shape (3, 3)", lambda block: block.values)
+sampling(SIGNALS, "instead of 3 samples of 3 axes", lambda block: block.values)
 sampling(SIGNALS, "no number of the declared channel", lambda block: block._replace(new=0))
 sampling(UNBROKEN, "every sample", lambda block: block._replace(counter=block.counter // 3))
 sampling(
@@ -951,7 +951,7 @@ nearest(
 nearest("single-trials-agree", "predict each trial independently", probabilities=of_all_trials)
 nearest("handles-missing-values", "fill or skip them", probabilities=without_missing)
 fitting(
-    "one-label-is-refused-or-certain", "raise ValueError, or learn it", lambda labels: len(set(labels)) < 2
+    "one-label-is-refused-or-certain", "raise ValueError, or learn from", lambda labels: len(set(labels)) < 2
 )
 fitting(
     "few-trials-are-refused-or-learned",

@@ -138,7 +138,7 @@ def survives_json(subject: Subject) -> None:
     """A model read from its JSON gives the same probabilities, bit for bit, and reasons, and runs nothing in it."""
     fitted, table, _ = _learned(subject)
     _again(subject, fitted)  # which may import what it needs
-    with component.Watched(component.RUNS_CODE) as seen:
+    with component.watched(component.RUNS_CODE) as seen:
         again = _again(subject, fitted)
     demand(
         not seen,
@@ -185,18 +185,26 @@ def handles_missing_values(subject: Subject) -> None:
         fitted.explain(nothing.row(0))
 
 
+def _fitted_or_refused(subject: Subject, what: str, table: FeatureTable, labels: Sequence[str]) -> Any:
+    """Return a classifier that was fitted to these trials; None if it refuses them by a ValueError that says why."""
+    classifier = subject.create()
+    with raises_nothing(f"fit on {what}", ": raise ValueError, or learn from them"):
+        try:
+            classifier.fit(table, labels, SEED)
+        except ValueError as error:
+            demand(
+                bool(str(error)), f"fit on {what} raised ValueError without a message: say what is lacking"
+            )
+            return None
+    return classifier
+
+
 def one_label_is_refused_or_certain(subject: Subject) -> None:
     """With one training label, `fit` raises ValueError, or that label has probability 1."""
     table, labels = sample_table()
-    classifier = subject.create()
-    with raises_nothing("fit on one label", ": raise ValueError, or learn it"):
-        try:
-            classifier.fit(table, ["can:full"] * len(labels), SEED)
-        except ValueError as error:
-            demand(
-                bool(str(error)), "fit on one label raised ValueError without a message: say what is lacking"
-            )
-            return
+    classifier = _fitted_or_refused(subject, "one label", table, ["can:full"] * len(labels))
+    if classifier is None:
+        return
     given = classifier.probabilities(table)
     demand(
         classifier.classes() == ("can:full",) and bool((given == 1.0).all()),
@@ -214,16 +222,9 @@ def few_trials_are_refused_or_learned(subject: Subject) -> None:
         ("two trials of each label", [0, 1, 2, 3, 4, 5]),
     ):
         few = table.rows(np.array(rows))
-        classifier = subject.create()
-        with raises_nothing(f"fit on {what}", ": raise ValueError, or learn from them"):
-            try:
-                classifier.fit(few, [labels[i] for i in rows], SEED)
-            except ValueError as error:
-                demand(
-                    bool(str(error)),
-                    f"fit on {what} raised ValueError without a message: say what is lacking",
-                )
-                continue
+        classifier = _fitted_or_refused(subject, what, few, [labels[i] for i in rows])
+        if classifier is None:
+            continue
         with raises_nothing(f"trained on {what}, probabilities", ": raise ValueError in fit, or answer"):
             probabilities = classifier.probabilities(table)
         demand(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import copy
 import importlib.util
 import json
@@ -20,6 +21,7 @@ from typing import Any, Final
 from urllib.parse import unquote, urlparse
 
 from graspsense.core.components.entries import ConformanceCheckEntry, PipelineEntry
+from graspsense.core.components.moved_names import new_form
 from graspsense.core.components.registry import SLOW_IMPORT_S, Resource
 from graspsense.core.pipeline.wiring import check as check_wiring
 from graspsense.core.settings.resolved import resolve
@@ -27,19 +29,19 @@ from graspsense.core.values.errors import GraspsenseError
 from graspsense.testing import reader
 from graspsense.testing.checks import Check, CheckFailed, CheckSkipped, checks_of, demand, raises_nothing
 from graspsense.testing.component import ADVICE_ON_IMPORTS
-from graspsense.testing.old_imports import old_imports
 from graspsense.testing.samples import a_trial, an_event
 from graspsense.testing.subject import Package
 
 OBSERVERS: Final = ("graspsense_run_starting", "graspsense_grasp_event", "graspsense_run_finished")
 PROBE_S: Final = 1.0
+_MODULE: Final = "graspsense.plugin_api"
 OBSERVER_S: Final = 2.0
 _ADVICE_ON_OBSERVERS: Final = ": an observer that raises is passed over from then on; catch what may go wrong"
 
 
 def plugins_load(package: Package) -> None:
     """Every plugin of the distribution can be imported, is written for this API, and violates no rule."""
-    old = [line for path in _sources(package) for line in old_imports(path)]
+    old = [line for path in _sources(package) for line in _old_imports(path)]
     names = f"\n    {len(old)} names moved:\n    " + "\n    ".join(old) if old else ""
     for status in package.statuses:
         demand(
@@ -256,6 +258,33 @@ def _sources(package: Package) -> Iterator[Path]:
                 yield path
 
 
+def _old_imports(path: Path) -> Iterator[str]:
+    """Yield each use of a moved name in a source file: its place, the old form, and the new form beside it."""
+    try:
+        tree = ast.parse(path.read_bytes())
+    except SyntaxError:
+        return
+    for line, name, old in sorted(_uses(tree)):
+        if replacement := new_form(name):
+            yield f"{path}:{line}: {old} -> {replacement}"
+
+
+def _uses(tree: ast.Module) -> Iterator[tuple[int, str, str]]:
+    """Yield line, name and text of everything that is taken from the module."""
+    called = {_MODULE}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module == _MODULE:
+            for alias in node.names:
+                yield alias.lineno, alias.name, f"from {_MODULE} import {alias.name}"
+        elif isinstance(node, ast.ImportFrom) and node.module == "graspsense":
+            called |= {alias.asname or alias.name for alias in node.names if alias.name == "plugin_api"}
+        elif isinstance(node, ast.Import):
+            called |= {alias.asname for alias in node.names if alias.name == _MODULE and alias.asname}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and ast.unparse(node.value) in called:
+            yield node.lineno, node.attr, ast.unparse(node)
+
+
 def _files_of(top: str) -> list[str]:
     """Return the files of a package as a wheel names them; a module alone is one file."""
     spec = importlib.util.find_spec(top)
@@ -289,13 +318,7 @@ def _built(folder: Path, scratch: Path) -> Path:
     here = bool(backend) and importlib.util.find_spec(backend) is not None
     command = [
         sys.executable,
-        "-P",
-        "-m",
-        "pip",
-        "wheel",
-        "--quiet",
-        "--no-deps",
-        "--disable-pip-version-check",
+        *["-P", "-m", "pip", "wheel", "--quiet", "--no-deps", "--disable-pip-version-check"],
     ]
     command += ["--wheel-dir", str(scratch), *(["--no-build-isolation"] if here else []), str(folder)]
     ran = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from graspsense.core.components.channels import declared_dtype, dtype_of, further, no_signals, shape_of
+from graspsense.core.components.channels import declared_dtype, dtype_of, further, no_signals
 from graspsense.core.components.delivered import Delivered
 from graspsense.core.values.channel import FLOATS, Channel, FastChannel, TactileArray
 from graspsense.core.values.fingers import fingers_of, opposed_forces
@@ -119,7 +119,7 @@ def channels_are_those_declared(subject: Subject) -> None:
 def signals_are_those_declared(subject: Subject) -> None:
     """Each further channel is delivered in `Reading.signals`, in the declared shape, and has numbers."""
     channels, session = further(subject.entry.channels), subject.session
-    nothing = no_signals(channels)
+    nothing, problem = no_signals(channels), Delivered(subject.entry.channels).problem
     names = ", ".join(getattr(nothing, "_fields", ())) or "none"
     for reading in session.readings:
         fields = getattr(reading.signals, "_fields", ())
@@ -128,16 +128,8 @@ def signals_are_those_declared(subject: Subject) -> None:
             f"the further channels declared are {names}, and read delivers {', '.join(fields) or 'none'}: fill "
             "signal_type(self.channels) with a value for each, in this order",
         )
-        for channel, empty, value in zip(channels, nothing, reading.signals, strict=True):
-            if type(value) is not type(empty) or (shape_of(value), dtype_of(value)) != (
-                shape_of(empty),
-                dtype_of(empty),
-            ):
-                raise CheckFailed(
-                    f"{channel.name!r} is {value!r:.80}: give {type(empty).__name__}"
-                    + (f" of the declared shape {shape_of(empty)}" if shape_of(empty) else "")
-                    + (f" and the declared dtype {dtype_of(empty)}" if dtype_of(empty) != FLOATS else "")
-                )
+        fault = problem(reading)
+        demand(not fault, f"a reading is not as declared: {fault}")
     for channel in channels:
         values = [getattr(reading.signals, channel.name) for reading in session.readings]
         if isinstance(channel, TactileArray) and channel.dtype != FLOATS:

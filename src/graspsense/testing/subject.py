@@ -68,7 +68,6 @@ class Package:
     """A distribution under check: its plugins, and everything that these declare."""
 
     distribution: str
-    version: str
     statuses: tuple[PluginStatus, ...]
     components: tuple[Component, ...]
     resources: tuple[Resource[Any], ...]
@@ -115,7 +114,6 @@ def package_of(
         return None
     return Package(
         distribution=name,
-        version=statuses[0].version,
         statuses=statuses,
         components=tuple(component for component in plugins.components() if component.distribution == name),
         resources=tuple(resource for resource in plugins.all_resources() if resource.distribution == name),
