@@ -139,7 +139,9 @@ def _exit_code(arguments: list[str]) -> int:
         with cli.make_context(PROGRAM, arguments) as ctx:
             if not has_colour(sys.stdout):
                 ctx.color = False  # for the commands of plugins, which print through click
-            with results_alone_on_stdout() if _is_own(arguments) else nullcontext(), exits_raise():
+            # click prints a help itself, as do the commands of plugins.
+            ours = _is_own(arguments) and not {"-h", "--help"} & set(arguments)
+            with results_alone_on_stdout() if ours else nullcontext(), exits_raise():
                 cli.invoke(ctx)
         if sys.stdout is None:
             echo_as_it_is(

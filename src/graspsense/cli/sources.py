@@ -314,8 +314,9 @@ def _refuse_misplaced(kind: str) -> None:
         for name in names:
             from_user = context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
             if from_user and owner != kind:
+                other = ": a feature set is selected by -o features.type=NAME" if name == "features" else ""
                 raise click.UsageError(
-                    f"--{_dashed(name)} is for a {owner} source; this one is a {kind}", context
+                    f"--{_dashed(name)} is for a {owner} source; this one is a {kind}{other}", context
                 )
 
 

@@ -199,20 +199,10 @@ def wheel_is_complete(package: Package) -> None:
         wheel = _built(folder, Path(scratch))
         with zipfile.ZipFile(wheel) as archive:
             inside = set(archive.namelist())
-    for module in sorted(set(_modules_of(package))):
-        path = module.replace(".", "/")
-        if _lies_within(module, folder):
-            demand(
-                bool({f"{path}.py", f"{path}/__init__.py"} & inside),
-                f"the wheel of {folder.name} has no module {module}: {_ADVICE}",
-            )
-    for resource in package.resources:
-        if resource.is_file:
-            top, _, path = resource.entry.resource.partition(":")
-            name = f"{top.replace('.', '/')}/{path}"
-            demand(name in inside, f"the wheel of {folder.name} has no file {name}: {_ADVICE}")
-    tops = {module.partition(".")[0] for module in _modules_of(package) if _lies_within(module, folder)}
-    for top in sorted(tops):
+    named = {*_modules_of(package), *(part.entry.resource for part in package.resources if part.is_file)}
+    for top in sorted({re.split("[.:]", name)[0] for name in named}):
+        if not _lies_within(top, folder):
+            continue
         lacking = [name for name in _files_of(top) if name not in inside]
         demand(
             not lacking,
@@ -236,9 +226,10 @@ def _modules_of(package: Package) -> Iterator[str]:
         yield from (getattr(resource.entry, part).partition(":")[0] for part in resource.targets)
 
 
-def _lies_within(module: str, folder: Path) -> bool:
-    origin = getattr(importlib.util.find_spec(module), "origin", None)
-    return origin is not None and Path(origin).resolve().is_relative_to(folder)
+def _lies_within(top: str, folder: Path) -> bool:
+    spec = importlib.util.find_spec(top)
+    places = [] if spec is None else [*(spec.submodule_search_locations or ()), spec.origin]
+    return any(place and Path(place).resolve().is_relative_to(folder) for place in places)
 
 
 def _sources(package: Package) -> Iterator[Path]:

@@ -16,6 +16,7 @@ from graspsense.core.components.caller import set_option
 from graspsense.core.components.registry import Component, Plugins, installed
 from graspsense.core.components.roles import Controller, FeatureSet, SensorBackend
 from graspsense.core.control.garbage_collection import no_collection
+from graspsense.core.files.toml_text import toml_value
 from graspsense.core.grasp.runner import Grasp, run_grasp
 from graspsense.core.grasp.sinks import Sink
 from graspsense.core.learn.model import Model
@@ -106,8 +107,10 @@ def _how_to_train(settings: Settings, out: str) -> str:
     selection = f"--gripper {settings.gripper.component.name}"
     if settings.pipeline.endswith(".toml"):
         selection = f"--pipeline {shlex.quote(settings.pipeline)}"
-    if settings.origins.get("features.type", "").startswith("-o"):
-        selection += f" -o features.type={settings.features.component.name}"
+    for path, origin in settings.origins.items():
+        table, _, key = path.partition(".")
+        if table in ("controller", "features") and origin.startswith("-o") and key in settings.values[table]:
+            selection += f" -o {path}={toml_value(settings.values[table][key])}".replace('"', "")
     if settings.gripper.create().objects():
         return f"  train one: graspsense train simulated {selection} --classifier {name} --out {out}"
     return (
