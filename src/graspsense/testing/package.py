@@ -307,11 +307,9 @@ def _built(folder: Path, scratch: Path) -> Path:
         str(project.get("build-system", {}).get("build-backend", "")).partition(":")[0].partition(".")[0]
     )
     here = bool(backend) and importlib.util.find_spec(backend) is not None
-    command = [
-        sys.executable,
-        *["-P", "-m", "pip", "wheel", "--quiet", "--no-deps", "--disable-pip-version-check"],
-    ]
-    command += ["--wheel-dir", str(scratch), *(["--no-build-isolation"] if here else []), str(folder)]
+    command = [sys.executable, "-P", "-m", "pip", "wheel", "--quiet", "--no-deps"]
+    command += ["--disable-pip-version-check", "--wheel-dir", str(scratch)]
+    command += [*(["--no-build-isolation"] if here else []), str(folder)]
     ran = subprocess.run(command, capture_output=True, text=True, check=False)
     if "No module named pip" in ran.stderr:
         raise CheckSkipped(

@@ -119,7 +119,7 @@ def hostile_laws_stay_below_the_ceiling(subject: Subject) -> None:
     """Under laws that command NaN, huge, oscillating and never ending values, the effort stays below its ceiling."""
     kind = kind_of(subject.entry.accepts)
     for name in HOSTILE:
-        controller = HostileController((name, kind))
+        controller: Controller[Any] = HostileController((name, kind))
         gripper, grasp = _grasped(subject, controller, RUN)
         demand(
             grasp.outcome not in (Outcome.STEADY, Outcome.RUNNING),

@@ -124,10 +124,6 @@ def setting(
         raise TypeError("a setting needs a meaning: say in a sentence what its value does")
     if factory is not None and default is not attrs.NOTHING:
         raise TypeError("a setting has one default: give `default` or `factory`")
-    if isinstance(default, list | dict | set):
-        raise TypeError(
-            f"the default {default!r} would be one for all: give it as factory=lambda: {default!r}"
-        )
     limits = _Limits(minimum, above, maximum, below)
     _check_limits(limits, default)
     _check_origin(origin)
@@ -195,7 +191,11 @@ def _is_number(value: Any) -> bool:
 
 
 def _check_limits(limits: _Limits, default: Any) -> None:
-    """Raise TypeError for two lower or two upper limits, and for a default outside of them."""
+    """Raise TypeError for two lower or two upper limits, and for a default outside of them or that can be changed."""
+    if isinstance(default, list | dict | set):
+        raise TypeError(
+            f"the default {default!r} would be one for all: give it as factory=lambda: {default!r}"
+        )
     minimum, above, maximum, below = limits
     if (minimum is not None and above is not None) or (maximum is not None and below is not None):
         raise TypeError(

@@ -107,10 +107,12 @@ def _how_to_train(settings: Settings, out: str) -> str:
     selection = f"--gripper {settings.gripper.component.name}"
     if settings.pipeline.endswith(".toml"):
         selection = f"--pipeline {shlex.quote(settings.pipeline)}"
-    for path, origin in settings.origins.items():
-        table, _, key = path.partition(".")
-        if table in ("controller", "features") and origin.startswith("-o") and key in settings.values[table]:
-            selection += f" -o {path}={toml_value(settings.values[table][key])}".replace('"', "")
+    for part in (settings.controller, settings.features):
+        table = part.component.table
+        for key, value in settings.values[table].items():
+            if settings.origins.get(f"{table}.{key}", "").startswith("-o"):
+                text = part.component.name if key == "type" else toml_value(value)
+                selection += f" -o {table}.{key}={text}"
     if settings.gripper.create().objects():
         return f"  train one: graspsense train simulated {selection} --classifier {name} --out {out}"
     return (
