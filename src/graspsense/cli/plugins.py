@@ -359,16 +359,9 @@ def _status_text(status: PluginStatus) -> str:
 
 def _described(component: Component) -> dict[str, Any]:
     keys, reason = _keys(component)
-    return {
-        "role": component.role,
-        "name": component.name,
-        "qualified": component.qualified,
-        "distribution": component.distribution,
-        "version": component.version,
-        "entry": attrs.asdict(_declared(component)),
-        "keys": keys,
-        "reason": reason,
-    }
+    names = ("role", "name", "qualified", "distribution", "version")
+    described = {name: getattr(component, name) for name in names}
+    return {**described, "entry": attrs.asdict(_declared(component)), "keys": keys, "reason": reason}
 
 
 def _component_text(component: Component) -> str:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import random
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout
 from io import StringIO
 from typing import Any, Literal
@@ -178,11 +179,10 @@ class ConformanceReport:
 
     def counts(self) -> str:
         """Return a line for each component: the numbers of checks that passed, failed, were skipped."""
-        lines = []
-        for subject, role in dict.fromkeys((result.subject, result.role) for result in self.results):
-            states: Sequence[str] = [
-                result.state for result in self.results if (result.subject, result.role) == (subject, role)
-            ]
-            kinds = [f"{states.count(kind)} {kind}" for kind in dict.fromkeys(states)]
-            lines.append(f"{role} {subject}: {len(states)} checks: {', '.join(kinds)}")
-        return "\n".join(lines)
+        counts: dict[str, Counter[str]] = {}
+        for result in self.results:
+            counts.setdefault(f"{result.role} {result.subject}", Counter())[result.state] += 1
+        return "\n".join(
+            f"{component}: {states.total()} checks: {', '.join(f'{n} {state}' for state, n in states.items())}"
+            for component, states in counts.items()
+        )

@@ -311,8 +311,8 @@ def a_damaged_model_raises_a_documented_error(subject: Subject) -> None:
 
 CHECKS: Final = (
     *component.CHECKS,
-    *component.CLASSIFIER_CHECKS,
     *checks_of(
+        component.a_classifier_has_a_model_key,
         classes_are_the_labels,
         probabilities_are_valid,
         separates_separable_trials,

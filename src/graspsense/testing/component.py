@@ -214,4 +214,3 @@ CHECKS: Final = checks_of(
     making_one_does_nothing,
     summary_is_one_line,
 )
-CLASSIFIER_CHECKS: Final = checks_of(a_classifier_has_a_model_key)
