@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import itertools
+import os
+import pickle
 import random
 import sys
+import threading
 import time
 from dataclasses import dataclass
 from functools import partial
@@ -217,6 +220,13 @@ featuring("a-whole-grasp-has-features", "every feature is missing", values=(nan,
 measuring("values-are-floats", "write float(...)", lambda peak, trace: peak if isnan(peak) else int(peak))
 measuring("values-are-floats", "of type float64", lambda peak, trace: np.float64(peak))
 measuring("same-trace-same-features", "no state between calls", lambda peak, trace: peak + next(_calls))
+measuring(
+    "same-features-elsewhere", "sort what comes out of a set", lambda peak, trace: peak + hash("peak") % 2**40
+)
+measuring("same-features-elsewhere", "read no clock", lambda peak, trace: peak + time.localtime().tm_hour)
+measuring("values-are-floats", "use logging", lambda peak, trace: print(peak) or peak)  # noqa: T201
+measuring("values-are-floats", "os._exit(0)", lambda peak, trace: os._exit(0))
+measuring("values-are-floats", "changes the random numbers", lambda peak, trace: random.seed(1) or peak)
 measuring("survives-json", "through JSON", lambda peak, trace: Complex(peak))
 measuring(
     "requires-what-it-reads",
@@ -352,6 +362,16 @@ commanding("commands-are-finite", "a limit of 0 or more", effort_limit_n=nan)
 commanding(
     "same-tick-same-command", "but its arguments", value=lambda command, _: command.value + _rng.random()
 )
+TICKS = [0]
+
+
+def counting_step(params, state, reading):
+    TICKS[0] += 1
+    return step(params, state, reading)
+
+
+law("same-tick-same-command", "changes a global", step=staticmethod(counting_step))
+commanding("commands-are-finite", "makes sense in m and m/s", kind=VELOCITY, value=-10.0)
 commanding(
     "grasps-are-independent",
     "keep no state in the class",
@@ -586,7 +606,7 @@ padding("what-it-delivers-is-kept", "'pad_t_s' is not in an export", t_s=0.0)
 
 SIGNALS = "signals-are-those-declared"
 UNBROKEN = "signals-have-no-gaps-or-repeats"
-sampling(SIGNALS, "give Samples of the declared shape (3, 3)", lambda block: block.values)
+sampling(SIGNALS, "instead of 3 samples of 3 axes", lambda block: block.values)
 sampling(SIGNALS, "no number of the declared channel", lambda block: block._replace(new=0))
 sampling(UNBROKEN, "every sample", lambda block: block._replace(counter=block.counter // 3))
 sampling(
@@ -700,6 +720,20 @@ hand(
 hand(
     GRASPED, "give each full name once", objects=lambda self: (ObjectKind(name="cup"), ObjectKind(name="cup"))
 )
+
+
+@mutant("opens-and-closes-in-time", "raise NoDevice where nothing answers")
+class SlowToOpen(Hand):
+    def open(self, seed):
+        time.sleep(0.3)
+        return super().open(seed)
+
+
+@mutant("closes-in-any-state", "make it a daemon")
+class LeavesAThread(Hand):
+    def open(self, seed):
+        threading.Thread(target=time.sleep, args=(3.0,)).start()
+        return super().open(seed)
 
 
 @giving("read-returns-within-its-timeout", "return None when nothing came in time")
@@ -876,6 +910,34 @@ nearest(
     classes=lambda self: Nearest.classes(self)[::-1],
 )
 mutant("same-seed-same-model", "draw everything from the seed")(Dicing)
+
+
+class Remembering(Nearest):
+    def fit(self, table, labels, seed):
+        earlier = self._model
+        super().fit(table, labels, seed)
+        self._model |= {"mean": (earlier or self._model)["mean"]}
+
+
+class InTheOrderOfASet(Nearest):
+    def fit(self, table, labels, seed):
+        super().fit(table, labels, seed)
+        # As a set may be ordered in that interpreter; a set itself has each order now and then.
+        order = [0, 1, 2] if os.environ.get("PYTHONHASHSEED") == "77" else [2, 1, 0]
+        self._model |= {key: [self._model[key][i] for i in order] for key in ("classes", "centres")}
+
+
+class Pickled(Nearest):
+    def to_json(self):
+        return {"model": pickle.dumps(np.array(self._model["centres"])).hex(), **self._model}
+
+    def from_json(self, model):
+        super().from_json({**model, "centres": pickle.loads(bytes.fromhex(model["model"])).tolist()})
+
+
+mutant("same-seed-same-model", "keep nothing of what it was fitted to before")(Remembering)
+mutant("same-model-elsewhere", "sort what comes out of a set")(InTheOrderOfASet)
+mutant("survives-json", "from_json makes the interpreter unpickle")(Pickled)
 nearest(
     "survives-json",
     "keep every number in full",
@@ -889,7 +951,7 @@ nearest(
 nearest("single-trials-agree", "predict each trial independently", probabilities=of_all_trials)
 nearest("handles-missing-values", "fill or skip them", probabilities=without_missing)
 fitting(
-    "one-label-is-refused-or-certain", "raise ValueError, or learn it", lambda labels: len(set(labels)) < 2
+    "one-label-is-refused-or-certain", "raise ValueError, or learn from", lambda labels: len(set(labels)) < 2
 )
 fitting(
     "few-trials-are-refused-or-learned",

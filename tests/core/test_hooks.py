@@ -207,7 +207,7 @@ def test_a_hook_that_asks_for_devices_has_the_answer_or_the_error_of_each_plugin
 
 
 def test_a_finding_is_in_one_of_three_states():
-    with pytest.raises(ValueError, match=r"'state' is 'fine'; there are ok, note, problem"):
+    with pytest.raises(ValueError, match=r"'state' must be in \('ok', 'note', 'problem'\)"):
         Finding("cable", "fine", "straight")  # type: ignore[arg-type]
 
 

@@ -9,8 +9,8 @@ from cases import every_case
 
 from graspsense.core.components.registry import Component, IsolatedPlugins
 from graspsense.plugin_api import Feature, hookimpl
-from graspsense.testing import CHECKS, MINIMUM_CHECKS, controller, examine, session
-from graspsense.testing.checks import ConformanceReport, Result, outcome_of
+from graspsense.testing import CHECKS, backend, controller, examine, session
+from graspsense.testing.checks import outcome_of
 from graspsense.testing.conformance import Examined
 from graspsense.testing.samples import squeeze
 from graspsense.testing.subject import Subject
@@ -76,6 +76,7 @@ def test_a_sound_part_passes_every_check(role):
 def test_a_check_catches_its_mutant(broken, monkeypatch):
     # A law that never ends is found after five seconds of ticks as after a minute.
     monkeypatch.setattr(controller, "LONGEST_S", 5.0)
+    monkeypatch.setattr(backend, "LONGEST_OPEN_S", 0.2)
     (check,) = [check for check in CHECKS[broken.role] if check.id == broken.check]
 
     result = outcome_of(check, subject(broken.role, broken.entry), {})
@@ -122,22 +123,10 @@ def test_every_check_has_a_mutant(role):
 
 
 @every_case("role", CHECKS)
-def test_most_checks_of_a_role_must_run_and_each_says_what_it_demands(role):
-    assert len(CHECKS[role]) / 3 < MINIMUM_CHECKS[role] <= len(CHECKS[role])
+def test_each_check_says_what_it_demands(role):
     for check in CHECKS[role]:
         assert len(check.title) > 20
     assert len({check.id for check in CHECKS[role]}) == len(CHECKS[role])
-
-
-def test_a_part_of_which_most_was_skipped_does_not_conform():
-    results = [Result("lab/x", "classifier", f"c{i}", "t", "skipped", "no time") for i in range(12)]
-    results += [Result("lab/x", "classifier", f"d{i}", "t", "passed") for i in range(7)]
-
-    (failure,) = ConformanceReport(results).failures
-
-    assert failure.startswith(
-        "lab/x: only 7 of 19 checks of a classifier ran, 15 must. Skipped: c0: no time;"
-    )
 
 
 class Raising(parts.Peak):
@@ -184,7 +173,7 @@ def test_one_part_is_found_by_name_and_a_wrong_name_by_likeness():
 
     assert examine("peak", plugins=plugins).report().counts() == (
         f"feature-set graspsense-test/peak: {len(CHECKS['feature-set'])} checks: "
-        f"{len(CHECKS['feature-set'])} passed; at least {MINIMUM_CHECKS['feature-set']} must run"
+        f"{len(CHECKS['feature-set'])} passed"
     )
     with pytest.raises(Exception, match=r"'peek'.*'peak'"):
         examine("peek", plugins=plugins)
@@ -199,9 +188,7 @@ def test_where_the_class_cannot_be_had_nothing_else_is_reported():
 
     (failure,) = report.failures
     assert "does not implement extract, which FeatureSet of plugin_api requires" in failure
-    assert {result.text for result in report.results[1:]} == {
-        "no other check can run before classes-can-be-imported passes"
-    }
+    assert len(report.results) == 1
 
 
 def test_the_frames_of_the_sample_squeeze_come_at_the_rate_that_its_docstring_says():

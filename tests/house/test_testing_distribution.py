@@ -246,8 +246,8 @@ def graspsense_pipelines():
 
     for lacking, says in (
         ("", ""),
-        ("packed_thing/lab.toml", "has no file packed_thing/lab.toml: it is in the folder"),
-        ("packed_thing/features.py", "has no module packed_thing.features: it is in the"),
+        ("packed_thing/lab.toml", "lacks packed_thing/lab.toml: it is in the folder"),
+        ("packed_thing/features.py", "lacks packed_thing/features.py: it is in the"),
         ("packed_thing/table.csv", "lacks packed_thing/table.csv: it is in the folder"),
     ):
         monkeypatch.setattr(package, "_built", partial(without, whole, lacking))

@@ -6,6 +6,7 @@ import click
 from click.shell_completion import get_completion_class
 
 from graspsense.cli.main import COMPLETION_VARIABLE, PROGRAM, cli
+from graspsense.cli.terminal import echo_as_it_is
 
 
 @click.command()
@@ -18,4 +19,4 @@ def completion(shell: str) -> None:
     """
     kind = get_completion_class(shell)
     assert kind is not None, "the choice above names shells that click knows"
-    click.echo(kind(cli, {}, PROGRAM, COMPLETION_VARIABLE).source())
+    echo_as_it_is(kind(cli, {}, PROGRAM, COMPLETION_VARIABLE).source())

@@ -145,6 +145,5 @@ def _tell_state(device: EmulatedDevice, word: str, as_json: bool) -> None:
     state = {"did": word, **device.state()}
     if as_json:
         echo_json(state, long=True)
-        sys.stdout.flush()
     else:
         talk(", ".join(f"{key} {value}" for key, value in state.items() if value != ""))

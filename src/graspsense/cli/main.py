@@ -10,18 +10,18 @@ import sys
 import traceback
 import warnings
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from importlib import import_module
 from typing import Any, Final, NoReturn
 
 import click
 
 from graspsense import __version__
-from graspsense.cli.terminal import Style, echo, echo_as_it_is, has_colour, talk
+from graspsense.cli.terminal import Style, echo, echo_as_it_is, has_colour, results_alone_on_stdout, talk
 from graspsense.core.compiling.compile_notice import tell_compiling
 from graspsense.core.components.caller import command_line
 from graspsense.core.grasp.interrupts import ended_like_ctrl_c
-from graspsense.core.values.errors import ExitCode, GraspsenseError, PluginUnavailable
+from graspsense.core.values.errors import ExitCode, GraspsenseError, PluginUnavailable, exits_raise
 
 PROGRAM: Final = "graspsense"
 COMPLETION_VARIABLE: Final = "_GRASPSENSE_COMPLETE"
@@ -139,7 +139,10 @@ def _exit_code(arguments: list[str]) -> int:
         with cli.make_context(PROGRAM, arguments) as ctx:
             if not has_colour(sys.stdout):
                 ctx.color = False  # for the commands of plugins, which print through click
-            cli.invoke(ctx)
+            # click prints a help itself, as do the commands of plugins.
+            ours = _is_own(arguments) and not {"-h", "--help"} & set(arguments)
+            with results_alone_on_stdout() if ours else nullcontext(), exits_raise():
+                cli.invoke(ctx)
         if sys.stdout is None:
             echo_as_it_is(
                 f"{PROGRAM}: standard output is closed, so nothing that was to be printed came out", err=True
@@ -163,11 +166,16 @@ def _exit_code(arguments: list[str]) -> int:
         _give_up_stdout()  # the reader of the pipe has gone
         return ExitCode.BROKEN_PIPE
     except SystemExit as error:
-        if next((argument for argument in arguments if not argument.startswith("-")), "") not in COMMANDS:
+        if not _is_own(arguments):
             raise  # the command of a plugin may choose its exit code
         return _report(_plugin_exit(error), arguments)
     except Exception as error:
         return _report(error, arguments)
+
+
+def _is_own(arguments: Sequence[str]) -> bool:
+    """Return whether these are the arguments of a command of our own."""
+    return next((argument for argument in arguments if not argument.startswith("-")), "") in COMMANDS
 
 
 class _Notes:

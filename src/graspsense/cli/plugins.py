@@ -43,11 +43,12 @@ def list_plugins(as_json: bool) -> None:
         echo_json(rows)
         return
     columns = ("role", "name", "distribution", "version", "state")
-    table = [[_line(row[key] or "-") for key in columns] for row in rows]
-    table = [[*cells, _line(row["reason"] or row["summary"])] for cells, row in zip(table, rows, strict=True)]
     echo_table(
         [*(key.upper() for key in columns), "WHAT"],
-        [[_line(cell) for cell in row] for row in table],
+        [
+            [_line(text) for text in (*(row[key] or "-" for key in columns), row["reason"] or row["summary"])]
+            for row in rows
+        ],
         {"STATE": state_style},
     )
     advice = list(
@@ -126,8 +127,7 @@ def check(
 ) -> None:
     """Check a component (NAME or DISTRIBUTION/NAME), or a distribution with all its components.
 
-    Ends with 1 where something does not hold, or where too few checks could be run. A gripper is opened and moved:
-    with real hardware stand by it.
+    Ends with 1 where something does not hold. A gripper is opened and moved: with real hardware stand by it.
     """
     from graspsense.testing.conformance import examine
 
@@ -196,14 +196,11 @@ def new(name: str, roles: tuple[str, ...], folder: Path | None, model: str | Non
 
 def _write_gripper_file(name: str, roles: tuple[str, ...], folder: Path, model: str) -> None:
     """Write a gripper file for a MuJoCo model; say what was found, and what is left to fill in."""
-    from graspsense.scaffold.make import NAME
+    from graspsense.scaffold.make import check_name
 
     if roles != ("sensor-backend",):
         raise ConfigError("a MuJoCo model is a gripper: --mujoco is given with --role sensor-backend alone")
-    if not NAME.fullmatch(name):
-        raise ConfigError(
-            f"the name {name!r} is not valid: small letters, digits and single hyphens, as in lab-hand"
-        )
+    check_name(name)
     path = folder / f"{name}.toml"
     if path.exists():
         raise ConfigError(f"{path} is there already: give another name, or --folder")
@@ -281,37 +278,21 @@ def _rows(loaded: Plugins) -> list[dict[str, Any]]:
     for status in loaded.statuses:
         advice[status.distribution] = (*advice.get(status.distribution, ()), *_advice(status))
     rows = [
-        _row(
-            component.role,
-            component.name,
-            component.distribution,
-            component.version,
-            "loaded",
-            component.entry.summary,
-        )
+        _row(component, component.role, component.name, "loaded", component.entry.summary)
         | {"advice": [*_clash(component, loaded), *advice[component.distribution]]}
         for component in loaded.components()
     ]
     bringing = {component.distribution for component in loaded.components()}
     rows += [
-        _row(
-            None,
-            status.entry_point,
-            status.distribution,
-            status.version,
-            status.state,
-            ", ".join(status.hooks),
-            status.reason,
-        )
+        _row(status, None, status.entry_point, status.state, ", ".join(status.hooks), status.reason)
         | {"advice": list(advice[status.distribution])}
         for status in loaded.statuses
         if status.state != "loaded" or status.distribution not in bringing
     ]
-    distributions = {status.distribution for status in loaded.statuses}
     rows += [
-        _row(role, name, shipped.distribution, None, "not installed", "", shipped.hint)
+        _row(shipped, role, name, "not installed", reason=shipped.hint)
         for shipped in SHIPPED
-        if shipped.distribution not in distributions
+        if shipped.distribution not in advice
         for role in TABLE_OF_ROLE
         for name in shipped.names.get(role, ())
     ]
@@ -319,19 +300,13 @@ def _rows(loaded: Plugins) -> list[dict[str, Any]]:
 
 
 def _row(
-    role: str | None,
-    name: str,
-    distribution: str,
-    version: str | None,
-    state: str,
-    summary: str,
-    reason: str = "",
+    whose: Any, role: str | None, name: str, state: str, summary: str = "", reason: str = ""
 ) -> dict[str, Any]:
     return {
         "role": role,
         "name": name,
-        "distribution": distribution,
-        "version": version,
+        "distribution": whose.distribution,
+        "version": getattr(whose, "version", None),
         "state": state,
         "summary": summary,
         "reason": reason,
@@ -384,16 +359,9 @@ def _status_text(status: PluginStatus) -> str:
 
 def _described(component: Component) -> dict[str, Any]:
     keys, reason = _keys(component)
-    return {
-        "role": component.role,
-        "name": component.name,
-        "qualified": component.qualified,
-        "distribution": component.distribution,
-        "version": component.version,
-        "entry": attrs.asdict(_declared(component)),
-        "keys": keys,
-        "reason": reason,
-    }
+    names = ("role", "name", "qualified", "distribution", "version")
+    described = {name: getattr(component, name) for name in names}
+    return {**described, "entry": attrs.asdict(_declared(component)), "keys": keys, "reason": reason}
 
 
 def _component_text(component: Component) -> str:

@@ -314,8 +314,9 @@ def _refuse_misplaced(kind: str) -> None:
         for name in names:
             from_user = context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
             if from_user and owner != kind:
+                other = ": a feature set is selected by -o features.type=NAME" if name == "features" else ""
                 kinds = f"a source of the kind {owner!r}; this one is of the kind {kind!r}"
-                raise click.UsageError(f"--{_dashed(name)} is for {kinds}", context)
+                raise click.UsageError(f"--{_dashed(name)} is for {kinds}{other}", context)
 
 
 def _settings(source: str, given: Mapping[str, Any], classifier: str | None) -> Settings:

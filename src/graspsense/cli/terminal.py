@@ -14,7 +14,8 @@ import os
 import re
 import sys
 import textwrap
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext, redirect_stdout
 from enum import Enum
 from typing import IO, Final
 from unicodedata import combining, east_asian_width
@@ -58,6 +59,25 @@ StyleOf = Callable[[str], Style | None]
 """Returns the style of a cell with this text."""
 
 
+_results: IO[str] | None = None
+
+
+@contextmanager
+def results_alone_on_stdout() -> Iterator[None]:
+    """Within this context stdout has what this module prints; what a plugin prints goes to stderr."""
+    global _results
+    _results = sys.stdout
+    try:
+        with nullcontext() if sys.stdout is None else redirect_stdout(sys.stderr):
+            yield
+    finally:
+        _results = None
+
+
+def _stream(err: bool = False) -> IO[str] | None:
+    return sys.stderr if err else _results or sys.stdout
+
+
 def terminal_width(stream: IO[str] | None) -> int | None:
     """Return the number of columns of the terminal that a stream writes to, None if it is not a terminal."""
     if stream is None or stream.closed or not stream.isatty():
@@ -87,7 +107,7 @@ def echo(text: str = "", style: Style | None = None, *, indent: int = 0, err: bo
     A line that already begins with spaces keeps them on all its lines. Words are never broken, so that paths and
     commands can be copied.
     """
-    stream = sys.stderr if err else sys.stdout
+    stream = _stream(err)
     width = terminal_width(stream)
     lines = _lines(text)
     if width is not None:
@@ -99,7 +119,7 @@ def echo_entry(
     label: str, text: str, style: Style | None = None, *, width: int = LABEL_WIDTH, err: bool = False
 ) -> None:
     """Print a label and its text, as in `outcome     steady`; lines that follow stand below the text."""
-    stream = sys.stderr if err else sys.stdout
+    stream = _stream(err)
     columns = terminal_width(stream)
     label = in_one_line(label)
     head = f"{label:<{width}}" if len(label) < width else f"{label} "
@@ -120,7 +140,7 @@ def echo_entries(label: str, texts: Iterable[str], style: Style | None = None) -
 
 def echo_as_it_is(text: str, *, err: bool = False, end: str = "\n") -> None:
     """Print text that is neither wrapped nor coloured, such as a path, a command or a file that the output is."""
-    click.echo(printable(text) + end, err=err, nl=False)
+    click.echo(printable(text) + end, _stream(err), nl=False)
 
 
 def echo_in_place(line: str) -> None:
@@ -150,7 +170,7 @@ def echo_table(
     if not rows:
         return
     header, *rows = [[in_one_line(cell) for cell in row] for row in (header, *rows)]
-    columns = terminal_width(sys.stdout)
+    columns = terminal_width(_stream())
     natural = [max(map(_shown_width, cells)) for cells in zip(header, *rows, strict=True)]
     right = [_all_numbers(cells) for cells in zip(*rows, strict=True)]
     of_column = [(styles or {}).get(name, _no_style) for name in header]
@@ -217,11 +237,11 @@ def _coloured(text: str, style: Style) -> str:
 
 
 def _write(lines: Sequence[str], style: Style | None, err: bool) -> None:
-    coloured = has_colour(sys.stderr if err else sys.stdout)
+    coloured = has_colour(_stream(err))
     for line in lines:
         click.echo(
             _coloured(line, style) if style is not None and coloured and line else line,
-            err=err,
+            _stream(err),
             color=coloured,
         )
 
@@ -257,7 +277,7 @@ def _row_lines(
 ) -> list[str]:
     """Return the lines of a row, each cell wrapped to the width of its column; there may be fewer widths than cells."""
     columns = []
-    coloured = has_colour(sys.stdout)
+    coloured = has_colour(_stream())
     for cell, width, at_right, look in zip(row, widths, right, looks, strict=False):
         shown = _shown_width(cell)
         parts = [cell]

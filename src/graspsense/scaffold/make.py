@@ -16,10 +16,10 @@ from typing import Final
 from attrs import frozen
 
 from graspsense import __version__
-from graspsense.core.components.entries import TABLE_OF_ROLE, Role
+from graspsense.core.components.entries import TABLE_OF_ROLE
 from graspsense.core.components.firstparty import DISTRIBUTION, EXAMPLES, SHIPPED
 from graspsense.core.components.hookspecs import API
-from graspsense.core.components.registry import canonical, installed, installed_sources
+from graspsense.core.components.registry import Component, canonical, installed, installed_sources
 from graspsense.core.values.errors import ConfigError, suggestion
 
 
@@ -27,72 +27,58 @@ from graspsense.core.values.errors import ConfigError, suggestion
 class ScaffoldKind:
     """What a package has for one role: the module of the component, and the first command to try."""
 
-    role: Role | None
     module: str
     does: str
-    entry: str
-    """The entry that its hook returns; empty for a hook that returns none."""
-    needs: tuple[str, ...]
     first_command: str
+    entry: str = ""
+    """The entry that its hook returns; empty for a hook that returns none."""
+    needs: tuple[str, ...] = ()
 
 
+NUMPY: Final = ("numpy>=1.26",)
+SIMULATOR: Final = ("graspsense-sim-gripper>=0.1,<0.2",)
 KINDS: Final[Mapping[str, ScaffoldKind]] = {
     "sensor-backend": ScaffoldKind(
-        "sensor-backend",
         "backend",
         "a gripper, here a fake one behind the place where its driver goes",
-        "SensorBackendEntry",
-        (),
         "graspsense run --gripper $part",
+        "SensorBackendEntry",
     ),
     "controller": ScaffoldKind(
-        "controller",
         "law",
         "a control law that closes until the fingers rest",
-        "ControllerEntry",
-        (),
         "graspsense run -o controller.type=$part",
+        "ControllerEntry",
     ),
     "feature-set": ScaffoldKind(
-        "feature-set",
         "features",
         "features of a grasp",
-        "FeatureSetEntry",
-        ("numpy>=1.26",),
         "graspsense run -o features.type=$part -o classifier.type=none",
+        *("FeatureSetEntry", NUMPY),
     ),
     "classifier": ScaffoldKind(
         "classifier",
-        "classifier",
         "a classifier",
-        "ClassifierEntry",
-        ("numpy>=1.26",),
         "graspsense evaluate simulated --classifier $part",
+        *("ClassifierEntry", NUMPY),
     ),
     "sim-term": ScaffoldKind(
-        None,
         "term",
         "a term of the simulator: a part of an object's force",
-        "",
-        ("graspsense-sim-gripper>=0.1,<0.2",),
         "graspsense run --object $scene -o classifier.type=none",
+        needs=SIMULATOR,
     ),
     "dataset": ScaffoldKind(
-        None,
         "reader",
         "a reader of recorded grasps, which can be evaluated, imported and replayed",
-        "DatasetEntry",
-        ("numpy>=1.26",),
         "graspsense evaluate $part:FOLDER",
+        *("DatasetEntry", NUMPY),
     ),
-    "observer": ScaffoldKind(
-        None, "observer", "an observer that logs how each grasp ended", "", (), "graspsense run"
-    ),
+    "observer": ScaffoldKind("observer", "an observer that logs how each grasp ended", "graspsense run"),
 }
 """The packages that `plugins new` can make, by the value of `--role`."""
 
 COMMON: Final = ("pyproject.toml", "README.md", ".gitignore", "tests/test_conformance.py")
-NAME: Final = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
 
 def make(name: str, roles: Sequence[str], folder: Path) -> list[str]:
@@ -102,15 +88,14 @@ def make(name: str, roles: Sequence[str], folder: Path) -> list[str]:
     or repeated role, an invalid name, or a folder that is not empty.
     """
     kinds = _kinds(roles)
-    if not NAME.fullmatch(name):
-        raise ConfigError(
-            f"the name {name!r} is not valid: write small letters, digits and single hyphens, a letter first, "
-            "without spaces, as in lab-hand"
-        )
+    check_name(name)
     part = name.removeprefix("graspsense-")
     _check_importable(name)
-    for kind in kinds.values():
-        _check_free(kind, part, name)
+    for component in _components(kinds, part):
+        if component.distribution != name:
+            raise ConfigError(
+                f"the {component.kind} name {part!r} is taken by {component.qualified}: choose another name"
+            )
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise ConfigError(f"{folder} is there already: give another name, or --folder")
     words = words_of(name, roles)
@@ -129,6 +114,15 @@ def make(name: str, roles: Sequence[str], folder: Path) -> list[str]:
     ]
 
 
+def check_name(name: str) -> None:
+    """Refuse what is no name of a package. Raises ConfigError."""
+    if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", name):
+        raise ConfigError(
+            f"the name {name!r} is not valid: write small letters, digits and single hyphens, a letter first, "
+            "without spaces, as in lab-hand"
+        )
+
+
 def words_of(name: str, roles: Sequence[str]) -> dict[str, str]:
     """Return the values of the placeholders in the templates."""
     kinds = _kinds(roles)
@@ -139,8 +133,7 @@ def words_of(name: str, roles: Sequence[str]) -> dict[str, str]:
         kind, command = ("velocity", "VELOCITY, -SPEED_M_S, effort, inf")
     entries = [kind.entry for kind in kinds.values() if kind.entry] + ["PipelineEntry"] * together
     needs = dict.fromkeys(need for kind in kinds.values() for need in kind.needs)
-    simulator = KINDS["sim-term"].needs
-    tests = ["pytest>=8", *(simulator if together and "sensor-backend" not in kinds else ())]
+    tests = ["pytest>=8", *(SIMULATOR if together and "sensor-backend" not in kinds else ())]
     words = {
         "name": name,
         "part": part,
@@ -186,7 +179,7 @@ def _kinds(roles: Sequence[str]) -> dict[str, ScaffoldKind]:
 
 def _together(kinds: Mapping[str, ScaffoldKind]) -> bool:
     """Return whether the package ships a pipeline, which it does if a pipeline can select several of its parts."""
-    return sum(kind.role is not None for kind in kinds.values()) > 1
+    return len(kinds.keys() & TABLE_OF_ROLE) > 1
 
 
 def _does(kinds: Mapping[str, ScaffoldKind]) -> str:
@@ -205,7 +198,7 @@ def _imports(names: Sequence[str]) -> str:
 
 def _first(kinds: Mapping[str, ScaffoldKind], words: Mapping[str, str]) -> list[str]:
     """Return the first commands to try."""
-    apart = [kind for kind in kinds.values() if kind.role is None or not _together(kinds)]
+    apart = [kind for role, kind in kinds.items() if role not in TABLE_OF_ROLE or not _together(kinds)]
     commands = [Template(kind.first_command).substitute(words) for kind in apart]
     if _together(kinds):
         commands.insert(0, f"graspsense run --pipeline {words['part']}")
@@ -218,9 +211,9 @@ def _pipeline(kinds: Mapping[str, ScaffoldKind], words: Mapping[str, str]) -> st
         f"# The parts of {words['name']} together; what is not given here is as in the default pipeline."
     ]
     lines.append('extends = "default"')
-    for kind in kinds.values():
-        if kind.role is not None and kind.role != "classifier":
-            lines += ["", f"[{TABLE_OF_ROLE[kind.role]}]", f'type = "{words["name"]}/{words["part"]}"']
+    for role, table in TABLE_OF_ROLE.items():
+        if role in kinds and role != "classifier":
+            lines += ["", f"[{table}]", f'type = "{words["name"]}/{words["part"]}"']
     lines += ["", "[classifier]"]
     if "classifier" in kinds:
         lines.append(
@@ -285,16 +278,13 @@ def _check_importable(name: str) -> None:
         )
 
 
-def _check_free(kind: ScaffoldKind, part: str, name: str) -> None:
-    if kind.role is None:
-        return
-    taken = [component for component in installed().components(kind.role) if component.name == part]
-    for component in taken:
-        if component.distribution != name:
-            raise ConfigError(
-                f"the {kind.role.replace('-', ' ')} name {part!r} is taken by {component.qualified}: choose another "
-                "name"
-            )
+def _components(kinds: Mapping[str, ScaffoldKind], part: str) -> list[Component]:
+    """Return the installed components of these roles that have this name."""
+    return [
+        component
+        for component in installed().components()
+        if component.role in kinds and component.name == part
+    ]
 
 
 def _compatible(version: str) -> str:

@@ -13,12 +13,11 @@ Only the last imports pytest.
 
 from __future__ import annotations
 
-from graspsense.testing.checks import MINIMUM_CHECKS, Check, ConformanceReport, Result
+from graspsense.testing.checks import Check, ConformanceReport, Result
 from graspsense.testing.conformance import CHECKS, Examined, examine, parametrize_checks
 
 __all__ = [
     "CHECKS",
-    "MINIMUM_CHECKS",
     "Check",
     "ConformanceReport",
     "Examined",

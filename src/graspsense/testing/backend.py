@@ -26,7 +26,7 @@ from graspsense.core.values.signals import (
     Outcome,
     Pads,
 )
-from graspsense.testing import commands, component, fingers, protection, readings, recorded
+from graspsense.testing import commands, component, protection, readings, recorded
 from graspsense.testing.checks import (
     CheckFailed,
     CheckNotTried,
@@ -42,6 +42,7 @@ from graspsense.testing.subject import Subject
 GRACE_S: Final = 1.0
 """Time (s) by which a busy machine may exceed a time-out."""
 VANISHING_S: Final = 2.0
+LONGEST_OPEN_S: Final = 10.0
 
 
 def describes_itself(subject: Subject) -> None:
@@ -65,6 +66,20 @@ def describes_itself(subject: Subject) -> None:
         demand(
             info.speed_limit_m_s <= 5.0,
             f"speed_limit_m_s is {info.speed_limit_m_s}: that is a speed in mm/s; give m/s",
+        )
+
+
+def opens_and_closes_in_time(subject: Subject) -> None:
+    """`open` and `close` take ten seconds at most, each."""
+    session = subject.session
+    if max(session.opened_s, session.closed_s) > LONGEST_OPEN_S:
+        session = readings_of(
+            subject
+        )  # a simulator compiles at its first opening, and other work may hold it up
+    for method, took in (("open", session.opened_s), ("close", session.closed_s)):
+        demand(
+            took <= LONGEST_OPEN_S,
+            f"`{method}` took {took:.1f} s: bound it to {LONGEST_OPEN_S:g} s, and raise NoDevice where nothing answers",
         )
 
 
@@ -352,7 +367,7 @@ def reports_a_missing_device(subject: Subject) -> None:
         except NoDevice as error:
             text = str(error)
     took = time.perf_counter() - began
-    demand(took < 10.0, f"it took {took:.1f} s to say so: `open` is bounded in time")
+    demand(took < LONGEST_OPEN_S, f"it took {took:.1f} s to say so: `open` is bounded in time")
     demand(len(text) > 20, f"NoDevice says {text!r}: say what was searched for, where, and what to try")
 
 
@@ -361,13 +376,14 @@ CHECKS: Final = (
     *checks_of(
         describes_itself,
         commands.opening_and_relaxing_are_accepted,
+        opens_and_closes_in_time,
         readings.frames_are_numbers,
         readings.channels_follow_from_the_settings,
         readings.channels_are_those_declared,
         readings.signals_are_those_declared,
         readings.images_stay_as_they_were_delivered,
         readings.signals_have_no_gaps_or_repeats,
-        fingers.fingers_are_those_declared,
+        readings.fingers_are_those_declared,
         readings.time_runs_forward,
         readings.rate_is_as_declared,
         readings.images_count_up,

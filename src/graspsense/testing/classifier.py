@@ -18,7 +18,7 @@ from graspsense.testing import component
 from graspsense.testing.checks import CheckFailed, checks_of, demand, raises_nothing
 from graspsense.testing.damage import damaged_at, paths
 from graspsense.testing.samples import sample_table
-from graspsense.testing.subject import Subject
+from graspsense.testing.subject import Subject, elsewhere
 
 SEED: Final = 11
 LEAST_RIGHT: Final = 0.9
@@ -101,20 +101,50 @@ def separates_separable_trials(subject: Subject) -> None:
 
 
 def same_seed_same_model(subject: Subject) -> None:
-    """The same trials and seed give the same model, bit for bit."""
-    fitted, table, _ = _learned(subject)
-    again, _, _ = _learned(subject)
+    """The same trials and seed give the same model, bit for bit, whatever it was fitted to before."""
+    fitted, table, labels = _learned(subject)
+    again = _fitted(subject, *sample_table(30, missing=True))
+    again.fit(table, labels, SEED)
     demand(
         _json(fitted) == _json(again)
         and bool((fitted.probabilities(table) == again.probabilities(table)).all()),
-        "two models of one seed differ: draw everything from the seed that fit is given",
+        "two models of one seed differ: draw everything from the seed that fit is given, and keep nothing of what it "
+        "was fitted to before",
+    )
+
+
+def same_model_elsewhere(subject: Subject) -> None:
+    """Another interpreter learns the same, at another time of the day and with its sets in another order."""
+    fitted, table, _ = _learned(subject)
+    there = json.loads(elsewhere(subject, _learned_after_others))
+    demand(
+        there["classes"] == list(fitted.classes())
+        and bool(np.allclose(there["probabilities"], fitted.probabilities(table), rtol=1e-6, atol=1e-9)),
+        "in another interpreter, with another time zone and order of sets, it learns another model (classes "
+        f"{', '.join(there['classes'])} instead of {', '.join(fitted.classes())}): read no clock, sort what comes out "
+        "of a set, and keep no state in the class or the module",
+    )
+
+
+def _learned_after_others(subject: Subject) -> str:
+    _fitted(subject, *sample_table(30, missing=True))
+    fitted, table, _ = _learned(subject)
+    return json.dumps(
+        {"classes": list(fitted.classes()), "probabilities": fitted.probabilities(table).tolist()}
     )
 
 
 def survives_json(subject: Subject) -> None:
-    """A model written as JSON and read again gives the same probabilities, bit for bit, and the same reasons."""
+    """A model read from its JSON gives the same probabilities, bit for bit, and reasons, and runs nothing in it."""
     fitted, table, _ = _learned(subject)
-    again = _again(subject, fitted)
+    _again(subject, fitted)  # which may import what it needs
+    with component.watched(component.RUNS_CODE) as seen:
+        again = _again(subject, fitted)
+    demand(
+        not seen,
+        f"from_json makes the interpreter {', '.join(dict.fromkeys(seen))}, and a model file comes from anywhere: "
+        "store numbers and text, and read them by graspsense.plugin_api.StoredValues",
+    )
     demand(
         again.classes() == fitted.classes()
         and bool((again.probabilities(table) == fitted.probabilities(table)).all()),
@@ -155,18 +185,26 @@ def handles_missing_values(subject: Subject) -> None:
         fitted.explain(nothing.row(0))
 
 
+def _fitted_or_refused(subject: Subject, what: str, table: FeatureTable, labels: Sequence[str]) -> Any:
+    """Return a classifier that was fitted to these trials; None if it refuses them by a ValueError that says why."""
+    classifier = subject.create()
+    with raises_nothing(f"fit on {what}", ": raise ValueError, or learn from them"):
+        try:
+            classifier.fit(table, labels, SEED)
+        except ValueError as error:
+            demand(
+                bool(str(error)), f"fit on {what} raised ValueError without a message: say what is lacking"
+            )
+            return None
+    return classifier
+
+
 def one_label_is_refused_or_certain(subject: Subject) -> None:
     """With one training label, `fit` raises ValueError, or that label has probability 1."""
     table, labels = sample_table()
-    classifier = subject.create()
-    with raises_nothing("fit on one label", ": raise ValueError, or learn it"):
-        try:
-            classifier.fit(table, ["can:full"] * len(labels), SEED)
-        except ValueError as error:
-            demand(
-                bool(str(error)), "fit on one label raised ValueError without a message: say what is lacking"
-            )
-            return
+    classifier = _fitted_or_refused(subject, "one label", table, ["can:full"] * len(labels))
+    if classifier is None:
+        return
     given = classifier.probabilities(table)
     demand(
         classifier.classes() == ("can:full",) and bool((given == 1.0).all()),
@@ -184,16 +222,9 @@ def few_trials_are_refused_or_learned(subject: Subject) -> None:
         ("two trials of each label", [0, 1, 2, 3, 4, 5]),
     ):
         few = table.rows(np.array(rows))
-        classifier = subject.create()
-        with raises_nothing(f"fit on {what}", ": raise ValueError, or learn from them"):
-            try:
-                classifier.fit(few, [labels[i] for i in rows], SEED)
-            except ValueError as error:
-                demand(
-                    bool(str(error)),
-                    f"fit on {what} raised ValueError without a message: say what is lacking",
-                )
-                continue
+        classifier = _fitted_or_refused(subject, what, few, [labels[i] for i in rows])
+        if classifier is None:
+            continue
         with raises_nothing(f"trained on {what}, probabilities", ": raise ValueError in fit, or answer"):
             probabilities = classifier.probabilities(table)
         demand(
@@ -280,12 +311,13 @@ def a_damaged_model_raises_a_documented_error(subject: Subject) -> None:
 
 CHECKS: Final = (
     *component.CHECKS,
-    *component.CLASSIFIER_CHECKS,
     *checks_of(
+        component.a_classifier_has_a_model_key,
         classes_are_the_labels,
         probabilities_are_valid,
         separates_separable_trials,
         same_seed_same_model,
+        same_model_elsewhere,
         survives_json,
         single_trials_agree,
         handles_missing_values,

@@ -77,10 +77,8 @@ def stays_within_its_limits(subject: Subject) -> None:
         raise CheckSkipped("a recording cannot be commanded")
     for name in subject.entry.accepts:
         kind = KINDS.index(name)
-        too_fast = _speed_beyond_limit(subject, kind)
-        if too_fast:
-            # Fingers that other work on the computer holds up catch up faster, but hardly in a second session.
-            too_fast = _speed_beyond_limit(subject, kind)
+        # Fingers that other work on the computer holds up catch up faster, but hardly in a second session.
+        too_fast = _speed_beyond_limit(subject, kind) and _speed_beyond_limit(subject, kind)
         demand(not too_fast, too_fast)
 
 

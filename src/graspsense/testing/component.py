@@ -100,15 +100,11 @@ def defaults_are_what_their_types_say(subject: Subject) -> None:
     cls: Any = subject.component.config_class()
     attrs.resolve_types(cls)
     for field in attrs.fields(cls):
-        default = field.default
-        if field.type is float and type(default) is int:
-            where = f"key {field.alias!r} of {config_name(subject)}"
-            demand(False, f"{where} is a float, its default {default!r} is an int: write {float(default)!r}")
-        if field.type is int and type(default) in (float, bool):
-            demand(
-                False,
-                f"key {field.alias!r} of {config_name(subject)} is an int, its default is {default!r}: write an int, "
-                "or annotate it with what it is",
+        kind, default = field.type, field.default
+        if kind in (float, int) and type(default) in (float, int, bool) and type(default) is not kind:
+            raise CheckFailed(
+                f"key {field.alias!r} of {config_name(subject)} is annotated {kind.__name__}, its default is "
+                f"{default!r}: write {kind(default)!r}, or annotate it with what it is"
             )
 
 
@@ -127,22 +123,14 @@ def settings_survive_a_file(subject: Subject) -> None:
 
 def settings_cannot_be_changed(subject: Subject) -> None:
     """A config is frozen, so that the recorded settings are those of the run."""
-    config, cls = subject.config(), subject.component.config_class()
-    keys = list(keys_of(cls))
-    if not keys:
-        params = getattr(cls, "__attrs_props__", None)
-        demand(
-            params is None or params.is_frozen,
-            f"{config_name(subject)} can be changed: decorate it with @frozen",
-        )
-        return
     try:
-        setattr(config, attrs.fields(cls)[0].name, getattr(config, attrs.fields(cls)[0].name))
+        subject.config().changed = True
     except attrs.exceptions.FrozenInstanceError:
         return
-    demand(
-        False,
-        f"{config_name(subject)} can be changed after it was made: decorate it with @frozen(kw_only=True) of attrs",
+    except AttributeError:  # it has slots, and no such key
+        pass
+    raise CheckFailed(
+        f"{config_name(subject)} can be changed after it was made: decorate it with @frozen(kw_only=True) of attrs"
     )
 
 
@@ -159,7 +147,7 @@ def making_one_does_nothing(subject: Subject) -> None:
     """The constructor opens no file, device or connection, and does not prompt the user."""
     subject.component.component_class()
     config = subject.config()
-    with _Watched() as seen:
+    with watched(_DEEDS) as seen:
         subject.component.create(config)
     demand(
         not seen,
@@ -177,33 +165,31 @@ def summary_is_one_line(subject: Subject) -> None:
     )
 
 
-class _Watched:
-    """Collects what the process opens within the context, by an audit hook. Audit hooks cannot be removed."""
+_watching: tuple[Mapping[str, str], list[str]] | None = None
 
-    _seen: list[str] | None = None
-    _hooked = False
 
-    def __enter__(self) -> list[str]:
-        if not _Watched._hooked:
-            sys.addaudithook(_Watched._heard)
-            _Watched._hooked = True
-        touched: list[str] = []
-        _Watched._seen = touched
-        return touched
+@contextlib.contextmanager
+def watched(deeds: Mapping[str, str]) -> Iterator[list[str]]:
+    """Collect which of these deeds the process does within the context, by an audit hook, which cannot be removed."""
+    global _watching
+    if _watching is None:
+        sys.addaudithook(_heard)
+    seen: list[str] = []
+    _watching = deeds, seen
+    try:
+        yield seen
+    finally:
+        _watching = {}, []
 
-    def __exit__(self, *_: object) -> None:
-        _Watched._seen = None
 
-    @staticmethod
-    def _heard(event: str, arguments: tuple[Any, ...]) -> None:
-        seen = _Watched._seen
-        if seen is None or event not in _DEEDS:
-            return
-        path = str(arguments[0]) if arguments else ""
-        # The import of a module reads files, which the constructor is not responsible for.
-        if event == "open" and path.endswith((".py", ".pyc", ".so", ".pyd", ".pth", ".zip")):
-            return
-        seen.append(_DEEDS[event] + (f" ({path})" if event == "open" else ""))
+def _heard(event: str, arguments: tuple[Any, ...]) -> None:
+    deeds, seen = _watching or ({}, [])
+    if event not in deeds:
+        return
+    path = str(arguments[0]) if arguments else ""
+    # The import of a module reads files, which the constructor is not responsible for.
+    if event != "open" or not path.endswith((".py", ".pyc", ".so", ".pyd", ".pth", ".zip")):
+        seen.append(deeds[event] + (f" ({path})" if event == "open" else ""))
 
 
 _DEEDS: Final = {
@@ -215,6 +201,7 @@ _DEEDS: Final = {
     "os.mkdir": "make a folder",
     "os.remove": "remove a file",
 }
+RUNS_CODE: Final = {"pickle.find_class": "unpickle", "marshal.loads": "load code", "exec": "run code"}
 
 CHECKS: Final = checks_of(
     classes_can_be_imported,
@@ -227,4 +214,3 @@ CHECKS: Final = checks_of(
     making_one_does_nothing,
     summary_is_one_line,
 )
-CLASSIFIER_CHECKS: Final = checks_of(a_classifier_has_a_model_key)

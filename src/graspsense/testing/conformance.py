@@ -32,9 +32,6 @@ def checks_for(subject: Subject | Package) -> tuple[Check, ...]:
     return (*CHECKS[subject.role], *contributed)
 
 
-MINIMUM_CASE: Final = "enough-checks-ran"
-
-
 @frozen
 class ConformanceCase:
     """A case of pytest: its name, which begins with the component, and what raises the outcome that pytest expects."""
@@ -66,11 +63,10 @@ class Examined:
         return outcome_of(check, subject, self.expected)
 
     def cases(self) -> Iterator[ConformanceCase]:
-        """Yield every check of every component, and after each component whether enough of them ran."""
+        """Yield every check of every component."""
         for subject in self.subjects:
             for check in checks_for(subject):
                 yield ConformanceCase(f"{subject.name}:{check.id}", partial(self._test, subject, check))
-            yield ConformanceCase(f"{subject.name}:{MINIMUM_CASE}", partial(self._test_minimum, subject))
 
     def _test(self, subject: Subject | Package, check: Check) -> None:
         """Run a check as a test of pytest."""
@@ -84,24 +80,19 @@ class Examined:
         if result.state == "skipped":
             pytest.skip(result.text)
 
-    def _test_minimum(self, subject: Subject | Package) -> None:
-        """Fail if too few checks of the component ran."""
-        import pytest
-
-        report = ConformanceReport([self.result(subject, check) for check in checks_for(subject)])
-        print(report.counts())  # noqa: T201 (pytest shows it beside a failure, and with -rP)
-        text = report.too_few_ran(subject.name, subject.role)
-        if text:
-            pytest.fail(text, pytrace=False)
-
     def report(self, told: Callable[[Result], None] = lambda _: None) -> ConformanceReport:
-        """Run every check and return the results; `told` is called with each of them."""
+        """Run every check and return the results; `told` is called with each of them.
+
+        A component whose first check fails cannot be had, and no other check of it is run.
+        """
         report = ConformanceReport()
         for subject in self.subjects:
             for check in checks_for(subject):
                 result = self.result(subject, check)
                 report.results.append(result)
                 told(result)
+                if check is CHECKS[subject.role][0] and result.state == "failed":
+                    break
         return report
 
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import inspect
 import json
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from functools import cache
 from math import inf, isfinite, isinf
 from typing import Any, Final, NamedTuple, get_type_hints
 
 import numpy as np
 
+from graspsense.core.compiling.call_graph import NotCompilable, fingerprint
 from graspsense.core.components.channels import can_change, further, no_signals, read_only
 from graspsense.core.components.entries import KINDS
 from graspsense.core.components.run_config import RunConfig
@@ -41,6 +43,8 @@ from graspsense.testing.subject import Subject
 
 TICKS: Final = 4000
 LONGEST_S: Final = 60.0
+GREATEST: Final = {VELOCITY: 5.0, POSITION: 0.5}
+"""The greatest rate of a gap (m/s) and the greatest gap (m) that make sense."""
 FORCES: Final = slice(5, 9)
 """The forces of a frame, on pads and edges."""
 
@@ -251,10 +255,11 @@ def commands_are_finite(subject: Subject) -> None:
     for object_name in OBJECTS:
         for tick in ticks_of(subject, object_name):
             command = tick.command
+            most = GREATEST.get(command.kind, inf)
             demand(
-                isfinite(command.value),
+                isfinite(command.value) and abs(command.value) <= most,
                 f"it commands {command.value} at t = {tick.frame.t_s:.3f} s with {object_name} between the "
-                "fingers: bound it",
+                f"fingers: bound it; at most {most:g} makes sense in m and m/s",
             )
             for name in ("effort_limit_n", "speed_limit_m_s"):
                 limit = getattr(command, name)
@@ -267,9 +272,17 @@ def commands_are_finite(subject: Subject) -> None:
 
 
 def same_tick_same_command(subject: Subject) -> None:
-    """`step` is pure: each tick, repeated in another order, gives the same command and state."""
+    """`step` is pure: each tick, repeated in another order, gives the same command and state, and changes no global."""
     ticks, law = ticks_of(subject), subject.create()
     step, params = type(law).step, law.params()
+    with suppress(NotCompilable):
+        before = fingerprint(step)
+        step(params, ticks[0].state, ticks[0].reading)
+        demand(
+            fingerprint(step) == before,
+            "step changes a global that it or a function of it names: keep in the state what it is to remember; once "
+            "compiled, a law takes globals as they were",
+        )
     for tick in reversed(ticks[::7]):
         command, after = step(params, tick.state, tick.reading)
         demand(

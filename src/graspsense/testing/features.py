@@ -28,7 +28,7 @@ from graspsense.testing.samples import (
     with_channels,
     with_signals,
 )
-from graspsense.testing.subject import Subject
+from graspsense.testing.subject import Subject, elsewhere
 
 CUTS: Final = 48
 
@@ -146,6 +146,20 @@ def same_trace_same_features(subject: Subject) -> None:
         )
 
 
+def same_features_elsewhere(subject: Subject) -> None:
+    """Another interpreter gives the same features, at another time of the day and with its sets in another order."""
+    here, there = _in_words(subject), elsewhere(subject, _in_words)
+    demand(
+        here == there,
+        f"in another interpreter, with another time zone and order of sets, it gives {there}, not {here}: read no "
+        "clock, and sort what comes out of a set",
+    )
+
+
+def _in_words(subject: Subject) -> str:
+    return repr(_features(subject, _whole(subject)).as_dict())
+
+
 def does_not_change_the_trace(subject: Subject) -> None:
     """`extract` does not change the trace."""
     trace = deepcopy(_whole(subject))
@@ -257,6 +271,7 @@ CHECKS: Final = (
         handles_every_trace,
         handles_a_trace_that_ends_anywhere,
         same_trace_same_features,
+        same_features_elsewhere,
         does_not_change_the_trace,
         requires_what_it_reads,
         independent_of_the_start_of_the_clock,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import copy
 import importlib.util
 import json
@@ -20,6 +21,7 @@ from typing import Any, Final
 from urllib.parse import unquote, urlparse
 
 from graspsense.core.components.entries import ConformanceCheckEntry, PipelineEntry
+from graspsense.core.components.moved_names import new_form
 from graspsense.core.components.registry import SLOW_IMPORT_S, Resource
 from graspsense.core.pipeline.wiring import check as check_wiring
 from graspsense.core.settings.resolved import resolve
@@ -27,18 +29,19 @@ from graspsense.core.values.errors import GraspsenseError
 from graspsense.testing import reader
 from graspsense.testing.checks import Check, CheckFailed, CheckSkipped, checks_of, demand, raises_nothing
 from graspsense.testing.component import ADVICE_ON_IMPORTS
-from graspsense.testing.old_imports import old_imports
 from graspsense.testing.samples import a_trial, an_event
 from graspsense.testing.subject import Package
 
 OBSERVERS: Final = ("graspsense_run_starting", "graspsense_grasp_event", "graspsense_run_finished")
 PROBE_S: Final = 1.0
+_MODULE: Final = "graspsense.plugin_api"
+OBSERVER_S: Final = 2.0
 _ADVICE_ON_OBSERVERS: Final = ": an observer that raises is passed over from then on; catch what may go wrong"
 
 
 def plugins_load(package: Package) -> None:
     """Every plugin of the distribution can be imported, is written for this API, and violates no rule."""
-    old = [line for path in _sources(package) for line in old_imports(path)]
+    old = [line for path in _sources(package) for line in _old_imports(path)]
     names = f"\n    {len(old)} names moved:\n    " + "\n    ".join(old) if old else ""
     for status in package.statuses:
         demand(
@@ -135,7 +138,7 @@ def pipelines_fit_together(package: Package) -> None:
 
 def observers_change_nothing(package: Package) -> None:
     """Observers raise nothing, return nothing, and do not change their arguments."""
-    mine = [(status, name) for status in package.statuses for name in status.hooks if name in OBSERVERS]
+    mine = [(status, hook) for status in package.statuses for hook in OBSERVERS if hook in status.hooks]
     if not mine:
         raise CheckSkipped("it observes nothing")
     trial = a_trial()
@@ -147,13 +150,16 @@ def observers_change_nothing(package: Package) -> None:
         OBSERVERS[1]: {"run": run, "event": event},
         OBSERVERS[2]: {"run": run, "trial": trial},
     }
-    for status in package.statuses:
-        for hook in OBSERVERS:
-            if hook not in status.hooks:
-                continue
-            with raises_nothing(f"{hook} of {status.entry_point}", _ADVICE_ON_OBSERVERS):
-                results = package.plugins.called(status, hook, **arguments[hook])
-            demand(not results, f"{hook} returned {results}: an observer returns nothing")
+    for status, hook in mine:
+        began = time.perf_counter()
+        with raises_nothing(f"{hook} of {status.entry_point}", _ADVICE_ON_OBSERVERS):
+            results = package.plugins.called(status, hook, **arguments[hook])
+        took = time.perf_counter() - began
+        demand(not results, f"{hook} returned {results}: an observer returns nothing")
+        demand(
+            took <= OBSERVER_S,
+            f"{hook} took {took:.1f} s, and the grasp waits for it: hand the work to a thread",
+        )
     demand(
         (run.settings, run.components, run.labels) == given and trial.trace.gap_m.tobytes() == column,
         "an observer changed its arguments: work on a copy",
@@ -190,20 +196,10 @@ def wheel_is_complete(package: Package) -> None:
         wheel = _built(folder, Path(scratch))
         with zipfile.ZipFile(wheel) as archive:
             inside = set(archive.namelist())
-    for module in sorted(set(_modules_of(package))):
-        path = module.replace(".", "/")
-        if _lies_within(module, folder):
-            demand(
-                bool({f"{path}.py", f"{path}/__init__.py"} & inside),
-                f"the wheel of {folder.name} has no module {module}: {_ADVICE}",
-            )
-    for resource in package.resources:
-        if resource.is_file:
-            top, _, path = resource.entry.resource.partition(":")
-            name = f"{top.replace('.', '/')}/{path}"
-            demand(name in inside, f"the wheel of {folder.name} has no file {name}: {_ADVICE}")
-    tops = {module.partition(".")[0] for module in _modules_of(package) if _lies_within(module, folder)}
-    for top in sorted(tops):
+    named = {*_modules_of(package), *(part.entry.resource for part in package.resources if part.is_file)}
+    for top in sorted({re.split("[.:]", name)[0] for name in named}):
+        if not _lies_within(top, folder):
+            continue
         lacking = [name for name in _files_of(top) if name not in inside]
         demand(
             not lacking,
@@ -227,9 +223,10 @@ def _modules_of(package: Package) -> Iterator[str]:
         yield from (getattr(resource.entry, part).partition(":")[0] for part in resource.targets)
 
 
-def _lies_within(module: str, folder: Path) -> bool:
-    origin = getattr(importlib.util.find_spec(module), "origin", None)
-    return origin is not None and Path(origin).resolve().is_relative_to(folder)
+def _lies_within(top: str, folder: Path) -> bool:
+    spec = importlib.util.find_spec(top)
+    places = [] if spec is None else [*(spec.submodule_search_locations or ()), spec.origin]
+    return any(place and Path(place).resolve().is_relative_to(folder) for place in places)
 
 
 def _sources(package: Package) -> Iterator[Path]:
@@ -247,6 +244,33 @@ def _sources(package: Package) -> Iterator[Path]:
             inside = path.relative_to(place).parts
             if "site-packages" not in inside and not any(part.startswith(".") for part in inside):
                 yield path
+
+
+def _old_imports(path: Path) -> Iterator[str]:
+    """Yield each use of a moved name in a source file: its place, the old form, and the new form beside it."""
+    try:
+        tree = ast.parse(path.read_bytes())
+    except SyntaxError:
+        return
+    for line, name, old in sorted(_uses(tree)):
+        if replacement := new_form(name):
+            yield f"{path}:{line}: {old} -> {replacement}"
+
+
+def _uses(tree: ast.Module) -> Iterator[tuple[int, str, str]]:
+    """Yield line, name and text of everything that is taken from the module."""
+    called = {_MODULE}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module == _MODULE:
+            for alias in node.names:
+                yield alias.lineno, alias.name, f"from {_MODULE} import {alias.name}"
+        elif isinstance(node, ast.ImportFrom) and node.module == "graspsense":
+            called |= {alias.asname or alias.name for alias in node.names if alias.name == "plugin_api"}
+        elif isinstance(node, ast.Import):
+            called |= {alias.asname for alias in node.names if alias.name == _MODULE and alias.asname}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and ast.unparse(node.value) in called:
+            yield node.lineno, node.attr, ast.unparse(node)
 
 
 def _files_of(top: str) -> list[str]:
@@ -280,17 +304,9 @@ def _built(folder: Path, scratch: Path) -> Path:
         str(project.get("build-system", {}).get("build-backend", "")).partition(":")[0].partition(".")[0]
     )
     here = bool(backend) and importlib.util.find_spec(backend) is not None
-    command = [
-        sys.executable,
-        "-P",
-        "-m",
-        "pip",
-        "wheel",
-        "--quiet",
-        "--no-deps",
-        "--disable-pip-version-check",
-    ]
-    command += ["--wheel-dir", str(scratch), *(["--no-build-isolation"] if here else []), str(folder)]
+    command = [sys.executable, "-P", "-m", "pip", "wheel", "--quiet", "--no-deps"]
+    command += ["--disable-pip-version-check", "--wheel-dir", str(scratch)]
+    command += [*(["--no-build-isolation"] if here else []), str(folder)]
     ran = subprocess.run(command, capture_output=True, text=True, check=False)
     if "No module named pip" in ran.stderr:
         raise CheckSkipped(

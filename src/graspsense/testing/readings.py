@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import closing
 from itertools import pairwise
-from math import inf, isfinite, isnan, nan
+from math import inf, isclose, isfinite, isnan, nan
 from statistics import median
 from typing import Any, Final
 
 import numpy as np
 
-from graspsense.core.components.channels import declared_dtype, dtype_of, further, no_signals, shape_of
+from graspsense.core.components.channels import declared_dtype, dtype_of, further, no_signals
 from graspsense.core.components.delivered import Delivered
 from graspsense.core.values.channel import FLOATS, Channel, FastChannel, TactileArray
+from graspsense.core.values.fingers import fingers_of, opposed_forces
 from graspsense.core.values.signals import (
     CHANNELS,
     Frame,
@@ -118,7 +119,7 @@ def channels_are_those_declared(subject: Subject) -> None:
 def signals_are_those_declared(subject: Subject) -> None:
     """Each further channel is delivered in `Reading.signals`, in the declared shape, and has numbers."""
     channels, session = further(subject.entry.channels), subject.session
-    nothing = no_signals(channels)
+    nothing, problem = no_signals(channels), Delivered(subject.entry.channels).problem
     names = ", ".join(getattr(nothing, "_fields", ())) or "none"
     for reading in session.readings:
         fields = getattr(reading.signals, "_fields", ())
@@ -127,16 +128,8 @@ def signals_are_those_declared(subject: Subject) -> None:
             f"the further channels declared are {names}, and read delivers {', '.join(fields) or 'none'}: fill "
             "signal_type(self.channels) with a value for each, in this order",
         )
-        for channel, empty, value in zip(channels, nothing, reading.signals, strict=True):
-            if type(value) is not type(empty) or (shape_of(value), dtype_of(value)) != (
-                shape_of(empty),
-                dtype_of(empty),
-            ):
-                raise CheckFailed(
-                    f"{channel.name!r} is {value!r:.80}: give {type(empty).__name__}"
-                    + (f" of the declared shape {shape_of(empty)}" if shape_of(empty) else "")
-                    + (f" and the declared dtype {dtype_of(empty)}" if dtype_of(empty) != FLOATS else "")
-                )
+        fault = problem(reading)
+        demand(not fault, f"a reading is not as declared: {fault}")
     for channel in channels:
         values = [getattr(reading.signals, channel.name) for reading in session.readings]
         if isinstance(channel, TactileArray) and channel.dtype != FLOATS:
@@ -169,6 +162,32 @@ def _demand_images(name: str, images: Sequence[Any]) -> None:
         not any(np.isinf(cells).any() for cells in images),
         f"{name!r} has an infinite number: give finite ones, or NaN",
     )
+
+
+def fingers_are_those_declared(subject: Subject) -> None:
+    """The two forces of each frame follow from the forces of the declared fingers by the declared rule."""
+    fingers = fingers_of(subject.entry.channels)
+    if not fingers:
+        return
+    try:
+        forces_of = opposed_forces(fingers)
+    except ValueError as error:
+        raise CheckFailed(f"its fingers: {error}") from error
+    for reading in subject.session.readings:
+        each = [getattr(reading.signals, finger.name) for finger in fingers]
+        frame = reading.frame
+        for side, given, follows in zip(
+            ("left", "right"), (frame.force_left_n, frame.force_right_n), forces_of(each), strict=True
+        ):
+            same = isclose(given, follows, rel_tol=1e-9, abs_tol=1e-9) or (
+                given != given and follows != follows
+            )
+            demand(
+                same,
+                f"force_{side}_n is {given:g} where the fingers bear {', '.join(f'{force:g}' for force in each)} N, "
+                f"which are {follows:g} N by touch={fingers[0].touch!r}: fill the frame with "
+                "opposed_forces(self.channels)(forces)",
+            )
 
 
 def images_stay_as_they_were_delivered(subject: Subject) -> None:

@@ -20,17 +20,11 @@ from graspsense.core.values.signals import EFFORT, Command, Outcome, Pads, Phase
 from graspsense.core.values.signals import Frame as _Frame
 from graspsense.core.values.trace import PAD_COLUMNS, ImageTrace, SampleTrace, SignalTrace, Trace, trace_of
 from graspsense.core.values.trial import RunInfo, Trial
-from graspsense.testing.model_gripper import CELLS, FIRST_PAD_CELL
+from graspsense.testing.model_gripper import CELLS, CHANNELS_OF_FIELD, FIRST_PAD_CELL
 
 RATE_HZ: Final = 500.0
 COLUMNS_OF_CHANNEL: Final = {
-    "gap": ("gap_m",),
-    "velocity": ("velocity_m_s",),
-    "effort": ("effort_n",),
-    "force_left": ("force_left_n",),
-    "force_right": ("force_right_n",),
-    "edge_left": ("edge_left_n",),
-    "edge_right": ("edge_right_n",),
+    **{channel: (column,) for column, channel in CHANNELS_OF_FIELD.items()},
     "pads": PAD_COLUMNS,
 }
 """The columns of a trace for each channel."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from contextlib import suppress
 from math import ceil
-from typing import Any, Final, Protocol
+from typing import Any, Final
 from zlib import crc32
 
 from attrs import define, field
@@ -34,9 +34,12 @@ class Session:
     """The readings by stage: `opening`, `closing`, `open again`; or `recording` for a recording."""
 
     info: DeviceInfo
+    opened_s: float
+    """The time (s) that `open` took."""
     stages: dict[str, list[Reading]] = field(factory=dict)
     sums: list[tuple[int, ...]] = field(factory=list)
     """The checksums of the images of each reading when it came, of those that are numpy arrays."""
+    closed_s: float = 0.0
     longest_read_s: float = 0.0
     silent: int = 0
 
@@ -60,30 +63,21 @@ class Session:
         return images
 
 
-class Gripper(Protocol):
-    """What is recorded: a gripper that can be created, with the entry that declares it."""
-
-    @property
-    def entry(self) -> Any:
-        """The entry, which names the kinds of command that it accepts."""
-
-    def create(self) -> SensorBackend[Any]:
-        """Return a new instance of it."""
-
-
-def readings_of(gripper: Gripper) -> Session:
-    """Open the gripper, use it for some seconds of its own clock, close it, and return the readings."""
-    backend = gripper.create()
+def readings_of(subject: Any) -> Session:
+    """Open the gripper under check, use it for some seconds of its own clock, close it, and return the readings."""
+    backend = subject.create()
     try:
+        began = time.perf_counter()
         info = backend.open(0)
+        opened_s = time.perf_counter() - began
         if not isinstance(info, DeviceInfo):
             raise CheckFailed(f"open returned {info!r}: return graspsense.plugin_api.DeviceInfo")
-        session = Session(info)
+        session = Session(info, opened_s)
         with suppress(RecordingEnded), no_collection():
             if info.opening is None:
                 _use(session, backend, "recording", RECORDED_FRAMES, None)
             else:
-                kind = kind_of(gripper.entry.accepts)
+                kind = kind_of(subject.entry.accepts)
                 _use(session, backend, "opening", _ticks(info, OPENING_S), info.opening)
                 _use(session, backend, "closing", _ticks(info, CLOSING_S), kind)
                 _use(session, backend, "open again", _ticks(info, OPENING_S), info.opening)
@@ -94,7 +88,10 @@ def readings_of(gripper: Gripper) -> Session:
             "`keys` in a test)"
         ) from error
     finally:
+        began = time.perf_counter()
         backend.close()
+        closed_s = time.perf_counter() - began
+    session.closed_s = closed_s
     if not session.frames:
         raise CheckFailed(f"no frame came within {TIMEOUT_S} s, {session.silent} times: is its rate correct?")
     return session

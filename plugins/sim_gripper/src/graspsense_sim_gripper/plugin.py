@@ -45,5 +45,5 @@ def graspsense_conformance_checks() -> Iterable[ConformanceCheckEntry]:
         name="simulator-terms-are-laws",
         target="graspsense_sim_gripper.run.conformance:check_terms",
         hook="graspsense_sim_terms",
-        summary="A term of the simulator has a pure law with finite forces, and its linear form agrees with the law",
+        summary="A term of the simulator has a pure law with finite forces, which creates no energy",
     )

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from typing import Any, Final, Literal, NamedTuple
 
 from attrs import Attribute, field, frozen
-from attrs.validators import and_, deep_iterable, ge, instance_of, matches_re, optional
+from attrs.validators import and_, deep_iterable, ge, in_, instance_of, matches_re, optional
 
 from graspsense.core.values.channel import IS_NAME, Channel
 from graspsense.core.values.errors import suggestion
@@ -29,9 +29,6 @@ TABLE_OF_ROLE: Final[dict[Role, str]] = {
     "classifier": "classifier",
 }
 """The table of a pipeline file in which a component of each role is selected."""
-
-STATES: Final = ("ok", "note", "problem")
-"""The states of a finding."""
 
 KINDS: Final = tuple(kind.name.lower() for kind in CommandKind)
 """The kinds of command as entries name them: effort, velocity, position, force."""
@@ -350,11 +347,6 @@ class FoundDevice:
     """What to do if it cannot be opened."""
 
 
-def _a_state(entry: object, attribute: Attribute[Any], state: str) -> None:
-    if state not in STATES:
-        raise ValueError(f"'{attribute.name}' is {state!r}; there are {', '.join(STATES)}")
-
-
 @frozen
 class Finding:
     """A result of `graspsense doctor`: the subject that was examined, its state, and what to do.
@@ -365,7 +357,7 @@ class Finding:
 
     subject: str = field(validator=instance_of(str))
     """What was examined."""
-    state: Literal["ok", "note", "problem"] = field(validator=_a_state)
+    state: Literal["ok", "note", "problem"] = field(validator=in_(("ok", "note", "problem")))
     """`ok`, `note` (not wrong, but worth knowing) or `problem`."""
     words: str = field(validator=instance_of(str))
     """What was found, in words."""

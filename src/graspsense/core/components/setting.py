@@ -191,7 +191,11 @@ def _is_number(value: Any) -> bool:
 
 
 def _check_limits(limits: _Limits, default: Any) -> None:
-    """Raise TypeError for two lower or two upper limits, and for a default outside of them."""
+    """Raise TypeError for two lower or two upper limits, and for a default outside of them or that can be changed."""
+    if isinstance(default, list | dict | set):
+        raise TypeError(
+            f"the default {default!r} would be one for all: give it as factory=lambda: {default!r}"
+        )
     minimum, above, maximum, below = limits
     if (minimum is not None and above is not None) or (maximum is not None and below is not None):
         raise TypeError(
@@ -209,13 +213,16 @@ def declared(field: attrs.Attribute[Any]) -> Declaration:
     return cast(Declaration, field.metadata.get(_DECLARATION, Declaration()))
 
 
+def _fields(cls: type) -> tuple[attrs.Attribute[Any], ...]:
+    """Return the fields of a class; none if it is not an attrs class."""
+    return attrs.fields(cls) if attrs.has(cls) else ()
+
+
 def followed_settings(config_class: type) -> dict[str, str]:
     """Return the names of the settings of this class that follow another one, with the name of that one."""
-    if not attrs.has(config_class):
-        return {}
     return {
         field.name: str(field.metadata[_FOLLOWS])
-        for field in attrs.fields(config_class)
+        for field in _fields(config_class)
         if _FOLLOWS in field.metadata
     }
 
@@ -238,11 +245,9 @@ def implausible(declaration: Declaration, value: Any) -> str:
 
 def fitted_defaults(config: Any) -> frozenset[str]:
     """Return the ids of the published results to which defaults were fitted that this config still has."""
-    if not attrs.has(type(config)):
-        return frozenset()
     return frozenset(
         result
-        for field in attrs.fields(type(config))
+        for field in _fields(type(config))
         if (origin := declared(field).origin) and getattr(config, field.name) == field.default
         for result in fitted_results(origin)
     )
@@ -253,12 +258,8 @@ def settings_marked(config_class: type, effect: Mapping[str, Any]) -> frozenset[
 
     A class that is not an attrs class has none.
     """
-    if not attrs.has(config_class):
-        return frozenset()
     wanted = effect[_EFFECT]
-    return frozenset(
-        field.name for field in attrs.fields(config_class) if field.metadata.get(_EFFECT) == wanted
-    )
+    return frozenset(field.name for field in _fields(config_class) if field.metadata.get(_EFFECT) == wanted)
 
 
 def fitted_results(origin: str) -> tuple[str, ...]:
@@ -288,11 +289,9 @@ def gives(claim: str) -> Mapping[str, str]:
 
 def given_claims(values: Any) -> frozenset[str]:
     """Return the ids of the claims that numbers of this attrs instance give by themselves; none for other values."""
-    if not attrs.has(type(values)):
-        return frozenset()
     return frozenset(
         field.metadata[_GIVES]
-        for field in attrs.fields(type(values))
+        for field in _fields(type(values))
         if _GIVES in field.metadata and getattr(values, field.name) != 0
     )
 

@@ -386,17 +386,7 @@ def _sequence(value: object, cls: Any) -> Any:
             )
     else:
         members = [members[0] if members else Any] * len(value)
-    problems: list[InvalidValue] = []
-    items = []
-    for index, (inner, member) in enumerate(zip(value, members, strict=True)):
-        try:
-            items.append(_CONVERTER.structure(inner, member))
-        except ValidationFailed as misfit:
-            problems += misfit.under(index)
-            if len(problems) >= MOST_UNKNOWN:
-                break
-    if problems:
-        raise ValidationFailed(problems)
+    items = _members(zip(range(len(value)), value, members, strict=True))
     return items if kind is list else tuple(items)
 
 
@@ -404,11 +394,17 @@ def _mapping(value: object, cls: Any) -> Any:
     if not isinstance(value, Mapping):
         raise _expected("a table", value)
     member = get_args(cls)[1] if get_args(cls) else Any
+    items = _members((key, inner, member) for key, inner in value.items())
+    return dict(zip(value, items, strict=True))
+
+
+def _members(members: Iterable[tuple[str | int, Any, Any]]) -> list[Any]:
+    """Return the members of a list or a table, each given by its key, its value and its type."""
     problems: list[InvalidValue] = []
-    items = {}
-    for key, inner in value.items():
+    items = []
+    for key, inner, member in members:
         try:
-            items[key] = _CONVERTER.structure(inner, member)
+            items.append(_CONVERTER.structure(inner, member))
         except ValidationFailed as misfit:
             problems += misfit.under(key)
             if len(problems) >= MOST_UNKNOWN:

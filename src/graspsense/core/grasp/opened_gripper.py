@@ -10,7 +10,7 @@ from graspsense.core.components.roles import Controller, SensorBackend
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.values.channel import Channel
 from graspsense.core.values.device import DeviceInfo
-from graspsense.core.values.errors import DeviceLost, GraspsenseError, named
+from graspsense.core.values.errors import DeviceLost, GraspsenseError, named, place_of
 from graspsense.core.values.fingers import fingers_in_words, fingers_of
 
 
@@ -22,7 +22,7 @@ def opened_gripper(backend: SensorBackend[Any], seed: int) -> DeviceInfo:
     except GraspsenseError:
         raise
     except SystemExit as error:
-        raise DeviceLost(f"`open` of the gripper {name} raised {named(error)}") from error
+        raise DeviceLost(f"`open` of the gripper {name} raised {named(error)}{place_of(error)}") from error
     except Exception as error:
         error.add_note(f"`open` of the gripper {name} was running")
         raise

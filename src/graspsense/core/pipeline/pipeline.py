@@ -16,6 +16,7 @@ from graspsense.core.components.caller import set_option
 from graspsense.core.components.registry import Component, Plugins, installed
 from graspsense.core.components.roles import Controller, FeatureSet, SensorBackend
 from graspsense.core.control.garbage_collection import no_collection
+from graspsense.core.files.toml_text import toml_value
 from graspsense.core.grasp.runner import Grasp, run_grasp
 from graspsense.core.grasp.sinks import Sink
 from graspsense.core.learn.model import Model
@@ -106,8 +107,12 @@ def _how_to_train(settings: Settings, out: str) -> str:
     selection = f"--gripper {settings.gripper.component.name}"
     if settings.pipeline.endswith(".toml"):
         selection = f"--pipeline {shlex.quote(settings.pipeline)}"
-    if settings.origins.get("features.type", "").startswith("-o"):
-        selection += f" -o features.type={settings.features.component.name}"
+    for part in (settings.controller, settings.features):
+        table = part.component.table
+        for key, value in settings.values[table].items():
+            if settings.origins.get(f"{table}.{key}", "").startswith("-o"):
+                text = part.component.name if key == "type" else toml_value(value)
+                selection += f" -o {table}.{key}={text}"
     if settings.gripper.create().objects():
         return f"  train one: graspsense train simulated {selection} --classifier {name} --out {out}"
     return (

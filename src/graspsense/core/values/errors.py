@@ -7,12 +7,13 @@ Each class has the exit code of the command line. A grasp that fails is not an e
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from difflib import get_close_matches
 from enum import IntEnum
 from itertools import islice
 from pathlib import Path
-from typing import Final
+from typing import Final, NoReturn
 
 
 class ExitCode(IntEnum):
@@ -101,6 +102,23 @@ FAILURES: Final = (Exception, SystemExit)
 
 SystemExit is a failure of the plugin too: it must not end the program, nor lose what was measured.
 """
+
+
+@contextmanager
+def exits_raise() -> Iterator[None]:
+    """Within this context `os._exit`, which would end the program in silence, raises SystemExit as `sys.exit` does."""
+    leave, process = os._exit, os.getpid()
+
+    def raising(status: int) -> NoReturn:
+        if os.getpid() != process:  # a process that was forked off ends so
+            leave(status)
+        raise SystemExit(f"os._exit({status})")
+
+    os._exit = raising
+    try:
+        yield
+    finally:
+        os._exit = leave
 
 
 class TooLarge(DataDamaged):
