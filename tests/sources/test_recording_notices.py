@@ -89,6 +89,7 @@ HELD = slice(0, 260)
 """A recording that ends in the hold."""
 # One that reads a fifth less is sound by itself, so only the step tells that the pads are exchanged.
 LOW_N = 0.8 * (RELEASED_N - NOISE_N[0]) + NOISE_N[1]
+LINE_N = np.interp(T_S, [0.8, 1.5], [0.0, 3.0])
 # As where samples without a time of their own are missing.
 CUT = (T_S < 1.5) | (T_S >= 1.7)
 
@@ -119,6 +120,24 @@ TOLD = {
         )
         for s in (1.6, 2)
     },
+    # As a program fills in what was lost, from before the contact until half of the force is there.
+    "missing samples that were filled in": (
+        "straight line from 0.81 to 1.49 s", np.where((T_S > 0.8) & (T_S < 1.5), LINE_N, RELEASED_N), None, OPEN_AGAIN_M
+    ),
+    "the same in the gap": (
+        "gap is a straight line", RELEASED_N, None,
+        np.where((T_S > 0.4) & (T_S < 1.1), np.interp(T_S, [0.4, 1.1], [0.068, 0.05]), OPEN_AGAIN_M + NOISE_N[1] / 5e3),
+    ),
+    "a force at 2.5 Hz between whose values a program draws lines": (
+        "every 0.4 s only", np.interp(T_S, T_S[::40], RELEASED_N[::40]), None, OPEN_AGAIN_M
+    ),
+    "zeros for a gap that was not read": (
+        "the gap leaves its course", RELEASED_N, None,
+        np.where(np.isin(np.arange(300), [30, 90, 150, 220]), 0.0, OPEN_AGAIN_M),
+    ),
+    "the friction of a drive in the current of its motor": (
+        "stays low until 1.21 s", RELEASED_N + np.where((T_S > 0.1) & (T_S < 2.7), 0.8, 0.0), None, OPEN_AGAIN_M
+    ),
     # 6 N/s for 0.2 s.
     "a force that rises at once": ("rises by 1.2", RELEASED_N[CUT], None, OPEN_AGAIN_M[CUT]),
 }  # fmt: skip

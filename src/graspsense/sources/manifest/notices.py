@@ -33,6 +33,8 @@ OFFSET: Final = 0.05
 """Share of the range of a pad that its force may have without contact."""
 STRONG_N: Final = 300.0
 """A force whose range is beyond that of the usual grippers is in another unit."""
+WEAK_N: Final = 0.02
+"""A force whose range is below that of the usual sensors is in another unit."""
 WIDEST_M: Final = 5e-4
 """No gripper opens less (m)."""
 NO_GLITCH: Final = 0.05
@@ -128,6 +130,11 @@ def _of_unit(columns: GraspColumns) -> Iterator[str]:
         yield (
             f"the force reaches {high:.4g} N, which few grippers have: if it is in another unit, write that behind "
             "it, as [gf] for the grams of a scale, [mN] or [counts]"
+        )
+    elif high - low < WEAK_N and _is_felt(columns.force_n):
+        yield (
+            f"the force reaches {high:.2g} N only, which few sensors feel: if it is in another unit, write that behind "
+            "it, as [kN]"
         )
 
 
