@@ -385,7 +385,7 @@ GAP_M, FORCE_N = squeezing()
         ({"force": 10.0 + 2.0 * np.cos(T_S)}, "the recording begins in contact: there is no approach"),
         ({"gap": np.full(300, 0.05)}, "the gap does not change"),
         ({"gap": 1e-3 * GAP_M}, r"the gap reaches 0\.\d+ mm only"),
-        ({"force": 5e-4 * FORCE_N}, r"reaches 0.01 N only.*\[kN\]"),
+        ({"force": 5e-4 * FORCE_N}, r"reaches 0.01 N, which few.*\[kN\]"),
         # From 1 N of 20 N on: the contact force is 0.625 N.
         ({"force": FORCE_N[105::2], "gap": GAP_M[105::2], "time": T_S[105::2]}, "begins in contact"),
         # Three seconds in ms that are called us, in hours, and as the number of the row; a sample a second is none.

@@ -252,7 +252,10 @@ def _held(force: Numbers) -> tuple[int, int] | None:
             return begin, end
         noise = steps[others & changed]
         turns = noise[1:] * noise[:-1] < 0.0  # noise goes up and down, and a force that is built up does not
-        if len(turns) == 0 or repeated * changed[others].mean() < CHANGES or turns.mean() < TURNS:
+        unloaded = (
+            force[begin] == force.min() > force[0] - SLIGHT * np.ptp(force)
+        )  # as of one that says 0 then
+        if unloaded or not len(turns) or repeated * changed[others].mean() < CHANGES or turns.mean() < TURNS:
             continue
         large = np.abs(noise) > 1.5 * np.abs(steps[changed]).min()
         fine = (large[1:] & large[:-1] & turns).mean() > PART

@@ -42,8 +42,6 @@ _NORMAL: Final = 1.4826
 _FORCE_SIGMAS: Final = 5.0
 """A contact threshold is at least so many standard deviations above the mean force without contact."""
 _GAP_SIGMAS: Final = 6.0
-_STEPS_OF_NOISE: Final = 2.0
-"""Steps of a gap from which on its noise is not that of its steps."""
 _EARLY_SHARE: Final = 0.2
 """Share of the peak force up to which a force counts as without contact."""
 _FEW: Final = 5
@@ -305,9 +303,7 @@ def _rest(
         candidates.append(candidates[-1] * _FASTER)
     if "rest_window_s" in given:
         del candidates[1:]
-    # Steps of a coarse gap pass for noise while it moves, so the step alone is tried first. Noise repeats a value too.
-    travels = sorted({MARGIN * step, travel}) if noise < _STEPS_OF_NOISE * step else [travel]
-    pairs = [(v, _window(x / v, least, scale)) for x in travels for v in map(_rounded, candidates)]
+    pairs = [(v, _window(travel / v, least, scale)) for v in map(_rounded, candidates)]
     resting = [sum(recording.rests(contact, *pair) for recording in tried) for pair in pairs]
     enough = _REACHING * sum(bool((recording.both >= contact).any()) for recording in tried)
     chosen = next((k for k, count in enumerate(resting) if count >= enough), int(np.argmax(resting)))
