@@ -151,6 +151,9 @@ def test_what_looks_wrong_is_noticed_once(case: str) -> None:
 
 
 RELEASED_SOON_N = np.where(T_S < 2.5, LOAD_N, 0.0)
+STAIRS_M = np.interp(
+    T_S, [0, 1, 1.4, 1.5, 1.9, 2.0, 2.4, 2.5], 0.08 - 0.01 * np.array([0, 3, 3, 4, 4, 5, 5, 6])
+)
 SOUND = {
     "noise": (LEFT, RIGHT),
     "no noise, so that the force repeats itself at rest": (LOAD_N,),
@@ -182,6 +185,8 @@ SOUND = {
     "a pad that reads a fifth less": (LOW_N, RELEASED_N, OPEN_AGAIN_M),
     "steep steps at a low rate": (RELEASED_N[::5], None, OPEN_AGAIN_M[::5], 20.0),
     "stairs": (STAIRS * (T_S < 2.7) + NOISE_N[0], None, OPEN_AGAIN_M),
+    "a sensor that says 0 without a load": (np.where(RELEASED_N < 0.3, 0.0, RELEASED_N), None, OPEN_AGAIN_M),
+    "a gap as it was commanded, in steps": (LEFT, RIGHT, STAIRS_M),
     "fast fingers": (
         RELEASED_N, None,
         np.interp(T_S, [0.0, 0.3, 0.34, 1.0, 2.68, 2.7, 3.0], [0.08, 0.08, 0.072, 0.05, 0.05, 0.054, 0.08]),

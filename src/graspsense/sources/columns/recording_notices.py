@@ -252,9 +252,8 @@ def _held(force: Numbers) -> tuple[int, int] | None:
             return begin, end
         noise = steps[others & changed]
         turns = noise[1:] * noise[:-1] < 0.0  # noise goes up and down, and a force that is built up does not
-        unloaded = (
-            force[begin] == force.min() > force[0] - SLIGHT * np.ptp(force)
-        )  # as of one that says 0 then
+        # Many sensors say 0 without a load.
+        unloaded = force[begin] == force.min() > force[0] - SLIGHT * np.ptp(force)
         if unloaded or not len(turns) or repeated * changed[others].mean() < CHANGES or turns.mean() < TURNS:
             continue
         large = np.abs(noise) > 1.5 * np.abs(steps[changed]).min()
@@ -396,11 +395,10 @@ def _seldom(what: str, t_s: Numbers, values: Numbers, large: float) -> Iterator[
     """Yield that values are new so rarely (s) that they change by a `large` share of their range at once."""
     changes, bends = np.flatnonzero(np.diff(values)) + 1, _bends(values) + 1
     knots = bends[np.diff(bends, prepend=-2) > 1]
-    apart = np.diff(knots)
-    if len(knots) >= KNOTS and len(knots) >= 0.5 * len(bends):
-        # Lines between values at a steady rate are no measurement.
-        off = np.abs(apart - apart.min() * np.round(apart / apart.min()))
-        changes = knots if np.mean(off <= 1) > 1.0 - PART else changes
+    apart = np.diff([0, *knots.tolist(), len(values)])
+    # Lines between values at a steady rate are no measurement.
+    if len(knots) >= max(KNOTS, 0.5 * len(bends)) and apart.max() <= LEAP * np.median(apart):
+        changes = knots
     if len(changes) < 2:
         return
     every_s = float(np.quantile(np.diff(t_s[changes]), PART))

@@ -57,10 +57,8 @@ class AvailableColumns(dict[str, Any]):
         """
         stated = expression.unit or self.stated(expression)
         other = expression.unit or (quantity in ("force", "gap") and stated.lower() not in GRAM_FORCE)
-        known = known_unit(stated, quantity)
-        return known or (
-            stated if other and stated not in WITHOUT_UNIT else self.since_1970(expression, quantity)
-        )
+        kept = stated if other and stated not in WITHOUT_UNIT else ""
+        return known_unit(stated, quantity) or kept or self.since_1970(expression, quantity)
 
     def since_1970(self, expression: Expression, quantity: str = "time") -> str:
         """Return the unit of numbers that are times since 1970, empty if that is s, or if they are no such times."""

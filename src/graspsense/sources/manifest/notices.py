@@ -18,6 +18,7 @@ from graspsense.sources.manifest.steps import NOISE, squeezes
 
 if TYPE_CHECKING:
     from graspsense.sources.formats.table import Numbers
+    from graspsense.sources.manifest.description import Manifest
 
 BEGINS_LOADED: Final = 0.25
 """Share of its range above which the force of the first sample is that of a contact, or of a wrong zero."""
@@ -46,11 +47,8 @@ _OFFSET: Final = ' If the fingers were free, the sensor has an offset: zero = "1
 _FOUND: Final = 'split = "force" finds them, '
 
 
-def notices_of(columns: GraspColumns, *, zeroed: bool, divided: bool) -> Iterator[str]:
-    """Yield a sentence for each thing that looks wrong.
-
-    `zeroed`: the zero of the forces is from the first samples. `divided`: the squeezes of a file were told apart.
-    """
+def notices_of(columns: GraspColumns, keys: Manifest) -> Iterator[str]:
+    """Yield a sentence for each thing that looks wrong in the columns of a manifest with these keys."""
     yield from columns.warnings
     if len(columns) < 2:
         return
@@ -62,8 +60,8 @@ def notices_of(columns: GraspColumns, *, zeroed: bool, divided: bool) -> Iterato
         yield from _of_unit(columns)
     if not pulls:
         yield from _of_gap(columns)
-        yield from _of_zero(columns, zeroed=zeroed)
-    yield from _of_time(columns, divided=divided)
+        yield from _of_zero(columns, zeroed=bool(keys.zero))
+    yield from _of_time(columns, divided=keys.split == "force")
     if _is_felt(columns.force_n):
         yield from _of_holes(columns)
 
