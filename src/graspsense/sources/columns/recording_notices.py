@@ -67,7 +67,8 @@ SELDOM_S: Final = 0.05
 SELDOM_ROWS: Final = 5
 """A force or gap that keeps each value for so long, and so many samples, is measured more rarely than the rows."""
 KNOTS: Final = 6
-"""Fewest values at a steady rate with straight lines between them."""
+FINE_SHARE: Final = 2e-4
+"""Fewest values at a steady rate with straight lines between them, in smaller steps than this share of their range."""
 LINE: Final = 10
 """Fewest samples of a straight line that is no chance in noise,"""
 FINE: Final = 5.0
@@ -169,8 +170,8 @@ def signal_notices(recording: Recording) -> Iterator[str]:
     if not {"gap", "t"} & recording.units.keys():
         yield from _bump(mean)
         yield from next(filter(None, map(list, map(_late, forces))), ())
-        gap = evolve(mean, what="the gap", n=1e3 * mean.gap, units={"force_left": "mm"})
-        yield from [*_glitches(gap), *_filled(gap)] or _gap_leaps(mean.t, mean.gap)
+        gap_mm = evolve(mean, what="the gap", n=1e3 * mean.gap, units={"force_left": "mm"})
+        yield from [*_glitches(gap_mm), *_filled(gap_mm)] or _gap_leaps(mean.t, mean.gap)
         yield from _stopped_gap(mean)
 
 
@@ -396,8 +397,9 @@ def _seldom(what: str, t_s: Numbers, values: Numbers, large: float) -> Iterator[
     changes, bends = np.flatnonzero(np.diff(values)) + 1, _bends(values) + 1
     knots = bends[np.diff(bends, prepend=-2) > 1]
     apart = np.diff([0, *knots.tolist(), len(values)])
+    fine = (resolution(values) or 0.0) < FINE_SHARE * np.ptp(values)
     # Lines between values at a steady rate are no measurement.
-    if len(knots) >= max(KNOTS, 0.5 * len(bends)) and apart.max() <= LEAP * np.median(apart):
+    if fine and len(knots) >= max(KNOTS, 0.5 * len(bends)) and apart.max() <= LEAP * np.median(apart):
         changes = knots
     if len(changes) < 2:
         return

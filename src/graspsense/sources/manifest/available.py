@@ -62,8 +62,9 @@ class AvailableColumns(dict[str, Any]):
 
     def since_1970(self, expression: Expression, quantity: str = "time") -> str:
         """Return the unit of numbers that are times since 1970, empty if that is s, or if they are no such times."""
-        numbers = expression.numbers(self, len(self.table)) if quantity == "time" else ()
-        return unit_since_1970(float(numbers[0])) if len(numbers) else ""
+        if quantity != "time" or not len(self.table):
+            return ""
+        return unit_since_1970(float(expression.numbers(self, len(self.table))[0]))
 
     def stated(self, expression: Expression) -> str:
         """Return the unit that the file states for an expression that is a column, empty if there is none."""
