@@ -385,12 +385,14 @@ GAP_M, FORCE_N = squeezing()
         ({"force": 10.0 + 2.0 * np.cos(T_S)}, "the recording begins in contact: there is no approach"),
         ({"gap": np.full(300, 0.05)}, "the gap does not change"),
         ({"gap": 1e-3 * GAP_M}, r"the gap reaches 0\.\d+ mm only"),
+        ({"force": 5e-4 * FORCE_N}, r"reaches 0.01 N, which few.*\[kN\]"),
         # From 1 N of 20 N on: the contact force is 0.625 N.
         ({"force": FORCE_N[105::2], "gap": GAP_M[105::2], "time": T_S[105::2]}, "begins in contact"),
         # Three seconds in ms that are called us, in hours, and as the number of the row; a sample a second is none.
         ({"time": np.round(T_S * 1e-3, 9)}, "lasts 3 ms only"),
         ({"time": np.round(T_S / 3600, 9)}, "lasts 0.83 ms only"),
         ({"time": np.round(T_S * RATE_HZ, 9)}, 'rises by 1 in each sample.*"t \\[s\\]"'),
+        ({"time": 1_700_000_000_000 + np.arange(300)}, None),  # milliseconds since 1970, at 1 kHz
     ],
 )
 def test_what_looks_wrong_is_noticed_with_its_remedy(columns, says, tmp_path):
@@ -421,6 +423,15 @@ def test_a_sample_a_second_is_no_number_of_the_row(tmp_path):
     pandas_csv(tmp_path / "jar.csv", {"t": T_S * RATE_HZ, "gap": GAP_M * 1e3, "F": FORCE_N})
     (recording,) = recordings(tmp_path, PLAIN.replace('"t"', '"t [s]"'))
     assert recording.notices == ()
+
+
+def test_squeezes_that_no_key_divides_are_told(tmp_path):
+    twice = {"t": np.arange(600) / RATE_HZ, "gap": np.tile(GAP_M, 2) * 1e3, "F": np.tile(FORCE_N, 2)}
+    pandas_csv(tmp_path / "jar.csv", twice)
+    (undivided,) = recordings(tmp_path, PLAIN)
+    assert any("several squeezes" in notice for notice in undivided.notices)
+    divided = recordings(tmp_path, PLAIN + 'split = "force"')
+    assert [any("several" in notice for notice in squeeze.notices) for squeeze in divided] == [False, False]
 
 
 def test_a_replay_tells_what_looks_wrong_in_its_recording(tmp_path):

@@ -89,6 +89,7 @@ HELD = slice(0, 260)
 """A recording that ends in the hold."""
 # One that reads a fifth less is sound by itself, so only the step tells that the pads are exchanged.
 LOW_N = 0.8 * (RELEASED_N - NOISE_N[0]) + NOISE_N[1]
+LINE_N = np.interp(T_S, [0.8, 1.5], [0.0, 3.0])
 # As where samples without a time of their own are missing.
 CUT = (T_S < 1.5) | (T_S >= 1.7)
 
@@ -119,6 +120,24 @@ TOLD = {
         )
         for s in (1.6, 2)
     },
+    # As a program fills in what was lost, from before the contact until half of the force is there.
+    "missing samples that were filled in": (
+        "straight line from 0.81 to 1.49 s", np.where((T_S > 0.8) & (T_S < 1.5), LINE_N, RELEASED_N), None, OPEN_AGAIN_M
+    ),
+    "the same in the gap": (
+        "gap is a straight line", RELEASED_N, None,
+        np.where((T_S > 0.4) & (T_S < 1.1), np.interp(T_S, [0.4, 1.1], [0.068, 0.05]), OPEN_AGAIN_M + NOISE_N[1] / 5e3),
+    ),
+    "a force at 2.5 Hz between whose values a program draws lines": (
+        "every 0.4 s only", np.interp(T_S, T_S[::40], RELEASED_N[::40]), None, OPEN_AGAIN_M
+    ),
+    "zeros for a gap that was not read": (
+        "the gap leaves its course", RELEASED_N, None,
+        np.where(np.isin(np.arange(300), [30, 90, 150, 220]), 0.0, OPEN_AGAIN_M),
+    ),
+    "the friction of a drive in the current of its motor": (
+        "stays low until 1.21 s", RELEASED_N + np.where((T_S > 0.1) & (T_S < 2.7), 0.8, 0.0), None, OPEN_AGAIN_M
+    ),
     # 6 N/s for 0.2 s.
     "a force that rises at once": ("rises by 1.2", RELEASED_N[CUT], None, OPEN_AGAIN_M[CUT]),
 }  # fmt: skip
@@ -132,6 +151,9 @@ def test_what_looks_wrong_is_noticed_once(case: str) -> None:
 
 
 RELEASED_SOON_N = np.where(T_S < 2.5, LOAD_N, 0.0)
+STAIRS_M = np.interp(
+    T_S, [0, 1, 1.4, 1.5, 1.9, 2.0, 2.4, 2.5], 0.08 - 0.01 * np.array([0, 3, 3, 4, 4, 5, 5, 6])
+)
 SOUND = {
     "noise": (LEFT, RIGHT),
     "no noise, so that the force repeats itself at rest": (LOAD_N,),
@@ -163,6 +185,8 @@ SOUND = {
     "a pad that reads a fifth less": (LOW_N, RELEASED_N, OPEN_AGAIN_M),
     "steep steps at a low rate": (RELEASED_N[::5], None, OPEN_AGAIN_M[::5], 20.0),
     "stairs": (STAIRS * (T_S < 2.7) + NOISE_N[0], None, OPEN_AGAIN_M),
+    "a sensor that says 0 without a load": (np.where(RELEASED_N < 0.3, 0.0, RELEASED_N), None, OPEN_AGAIN_M),
+    "a gap as it was commanded, in steps": (LEFT, RIGHT, STAIRS_M),
     "fast fingers": (
         RELEASED_N, None,
         np.interp(T_S, [0.0, 0.3, 0.34, 1.0, 2.68, 2.7, 3.0], [0.08, 0.08, 0.072, 0.05, 0.05, 0.054, 0.08]),

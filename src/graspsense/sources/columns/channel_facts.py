@@ -48,7 +48,7 @@ def channel_facts(
         missing=int(len(values) - np.isfinite(values.reshape(len(values), -1)).all(axis=1).sum()),
         low=float(known.min()) if len(known) else None,
         high=float(known.max()) if len(known) else None,
-        resolution=_resolution(known),
+        resolution=resolution(known),
         rate_hz=None if gaps is None or not np.median(gaps) > 0.0 else 1.0 / float(np.median(gaps)),
         longest_gap_s=None if gaps is None else float(gaps.max()),
         age_s=None if gaps is None else _age_s(values, t_s, end_s),
@@ -74,7 +74,8 @@ def together(parts: Sequence[ChannelFacts]) -> ChannelFacts:
     )
 
 
-def _resolution(known: Numbers) -> float | None:
+def resolution(known: Numbers) -> float | None:
+    """Return the least step between two of these values that is none of rounding, None if there is a single value."""
     steps = np.diff(np.unique(known))
     steps = steps[steps > _ROUNDING * max(float(np.ptp(known)), 1e-300)] if len(steps) else steps
     return float(steps.min()) if len(steps) else None

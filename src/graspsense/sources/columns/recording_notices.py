@@ -19,6 +19,7 @@ from graspsense.core.control.contact import CONTACT_FORCE_N
 from graspsense.core.values.fingers import FingerForce
 from graspsense.recording.labelled_recording import LabelledRecording
 from graspsense.recording.replayable import Recording
+from graspsense.sources.columns.channel_facts import resolution
 from graspsense.sources.columns.usual_range import usual_range
 from graspsense.sources.formats.table import Numbers
 
@@ -30,6 +31,8 @@ PART: Final = 0.1
 """from which on it is another one, and share of the samples from which on something is told of them,"""
 FREE: Final = 0.2
 """and up to which a force is that of free fingers,"""
+LOW: Final = 0.3
+"""and up to which it grows within half of the travel on no object,"""
 LOADED: Final = 0.5
 """and from which on they press."""
 NOISE: Final = 10.0
@@ -63,6 +66,14 @@ LATE_S: Final = 0.04
 SELDOM_S: Final = 0.05
 SELDOM_ROWS: Final = 5
 """A force or gap that keeps each value for so long, and so many samples, is measured more rarely than the rows."""
+KNOTS: Final = 6
+FINE_SHARE: Final = 2e-4
+"""Fewest values at a steady rate with straight lines between them, in smaller steps than this share of their range."""
+LINE: Final = 10
+"""Fewest samples of a straight line that is no chance in noise,"""
+FINE: Final = 5.0
+BEND: Final = 2.5
+"""whose second difference is so many steps of a signal at least, and so many at most in a line that was rounded."""
 CHANGES: Final = 20.0
 """Number of changes that a force would have had in the time in which its sensor has stopped."""
 TURNS: Final = 0.3
@@ -159,7 +170,8 @@ def signal_notices(recording: Recording) -> Iterator[str]:
     if not {"gap", "t"} & recording.units.keys():
         yield from _bump(mean)
         yield from next(filter(None, map(list, map(_late, forces))), ())
-        yield from _gap_leaps(mean.t, mean.gap)
+        gap_mm = evolve(mean, what="the gap", n=1e3 * mean.gap, units={"force_left": "mm"})
+        yield from [*_glitches(gap_mm), *_filled(gap_mm)] or _gap_leaps(mean.t, mean.gap)
         yield from _stopped_gap(mean)
 
 
@@ -201,6 +213,27 @@ def _of_sensor(force: _Force) -> Iterator[str]:
             f"{force.what} repeats {repeats}, although it varied before: did its sensor stop, or is it "
             "at the end of its range?"
         )
+    elif len(force) >= FEWEST:
+        yield from _filled(force)
+
+
+def _filled(signal: _Force) -> Iterator[str]:
+    """Yield that a signal with noise is a straight line while it changes, as between samples that were missing."""
+    bends = _bends(signal.n)
+    if not signal.noise > NOISE * FINE * (resolution(signal.n) or np.inf):
+        return
+    for begin, end in pairwise([0, *(bends + 1).tolist(), len(signal) - 1]):
+        if end - begin >= LINE and abs(signal.n[end] - signal.n[begin]) > PART * signal.span:
+            yield (
+                f"{signal.what} is a straight line from {signal.t[begin]:.4g} to {signal.when(end)}, although it has "
+                "noise: were missing samples filled in? A contact or a rest in this time is not known"
+            )
+            return
+
+
+def _bends(values: Numbers) -> NDArray[np.int64]:
+    """Return the samples behind which values leave a straight line by more than their rounding."""
+    return np.flatnonzero(np.abs(np.diff(values, 2)) > BEND * (resolution(values) or 0.0))
 
 
 def _held(force: Numbers) -> tuple[int, int] | None:
@@ -220,7 +253,9 @@ def _held(force: Numbers) -> tuple[int, int] | None:
             return begin, end
         noise = steps[others & changed]
         turns = noise[1:] * noise[:-1] < 0.0  # noise goes up and down, and a force that is built up does not
-        if len(turns) == 0 or repeated * changed[others].mean() < CHANGES or turns.mean() < TURNS:
+        # Many sensors say 0 without a load.
+        unloaded = force[begin] == force.min() > force[0] - SLIGHT * np.ptp(force)
+        if unloaded or not len(turns) or repeated * changed[others].mean() < CHANGES or turns.mean() < TURNS:
             continue
         large = np.abs(noise) > 1.5 * np.abs(steps[changed]).min()
         fine = (large[1:] & large[:-1] & turns).mean() > PART
@@ -353,18 +388,25 @@ def _glitches(force: _Force) -> Iterator[str]:
         others = f", and {count - 1} more" if count > 1 else ""
         yield (
             f"{force.what} leaves its course for a moment ({force.amount(sampled[k], '.4g')} at {t[k]:.4g} s{others}): "
-            "if that is a glitch, take it out, since it can pass for a contact"
+            "if that is a glitch, take it out, since it can pass for a contact or a rest"
         )
 
 
 def _seldom(what: str, t_s: Numbers, values: Numbers, large: float) -> Iterator[str]:
     """Yield that values are new so rarely (s) that they change by a `large` share of their range at once."""
-    changes = np.flatnonzero(np.diff(values)) + 1
+    changes, bends = np.flatnonzero(np.diff(values)) + 1, _bends(values) + 1
+    knots = bends[np.diff(bends, prepend=-2) > 1]
+    apart = np.diff([0, *knots.tolist(), len(values)])
+    fine = (resolution(values) or 0.0) < FINE_SHARE * np.ptp(values)
+    # Lines between values at a steady rate are no measurement.
+    if fine and len(knots) >= max(KNOTS, 0.5 * len(bends)) and apart.max() <= LEAP * np.median(apart):
+        changes = knots
     if len(changes) < 2:
         return
     every_s = float(np.quantile(np.diff(t_s[changes]), PART))
     rows = float(np.quantile(np.diff(changes), PART))
-    if every_s >= SELDOM_S and rows >= SELDOM_ROWS and np.abs(np.diff(values)).max() > large * np.ptp(values):
+    most = np.abs(np.diff(values[changes], prepend=values[0])).max()
+    if every_s >= SELDOM_S and rows >= SELDOM_ROWS and most > large * np.ptp(values):
         yield (
             f"{what} has a new value every {every_s:.2g} s only, more rarely than the rows: a contact is seen up to so "
             "much too late, and a rest with an older value"
@@ -395,12 +437,10 @@ def _bump(force: _Force) -> Iterator[str]:
     course = course - usual_range(course)[0]
     least = PART * float(np.ptp(course))
     contact = max(least if "force_left" in force.units else min(least, CONTACT_FORCE_N), force.noise)
-    felt, free = np.flatnonzero(course > contact), np.flatnonzero(course < 0.5 * contact)
-    free = free[free > felt[0]] if len(felt) else free[:0]
-    felt = felt[felt > free[0]] if len(free) else felt[:0]
-    if not len(felt):
-        return
-    begin, end, again = int((course > contact).argmax()), int(free[0]), int(felt[0])
+    begin, pressed = int((course > contact).argmax()), int((course > LOW * np.ptp(course)).argmax())
+    gone = course[begin:] < 0.5 * contact
+    end = begin + int(gone.argmax()) if gone.any() else len(course) - 1
+    again = end + int((course[end:] > contact).argmax())
     closes = float(gap[end] - gap[again])
     glitch = end - begin <= GLITCH_SAMPLES and force.t[end] - force.t[begin] <= GLITCH_S
     if closes > 0.5 * PART * np.ptp(gap) and gap[end:again].max() <= gap[begin] and not glitch:
@@ -408,6 +448,12 @@ def _bump(force: _Force) -> Iterator[str]:
             f"a force comes at {force.when(begin)} and is gone at {force.when(end)}, the fingers close by "
             f"{closes * 1e3:.3g} mm more, and it comes back at {force.when(again)}: the contact is the first of these. "
             "If the fingers touched something on their way, cut that out; or the object broke"
+        )
+    elif not glitch and gap[begin] - gap[pressed] > LOADED * np.ptp(gap):
+        yield (
+            f"a force comes at {force.when(begin)} and stays low until {force.when(pressed)}, while the fingers close "
+            f"by {(gap[begin] - gap[pressed]) * 1e3:.3g} mm: is it friction of the drive, as in a motor current, or "
+            "a zero that drifts? Then subtract it, since it passes for the contact"
         )
 
 

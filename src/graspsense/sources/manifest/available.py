@@ -13,7 +13,7 @@ from graspsense.core.values.written_numbers import number_in
 from graspsense.sources.formats.table import MOST_NAMES, ColumnTable, Numbers
 from graspsense.sources.manifest.description import ReadManifest, quantity_of
 from graspsense.sources.manifest.expression import Expression, ExpressionError
-from graspsense.sources.units import GRAM_FORCE, TO_SI, WITHOUT_UNIT, known_unit
+from graspsense.sources.units import GRAM_FORCE, TO_SI, WITHOUT_UNIT, known_unit, unit_since_1970
 
 
 class AvailableColumns(dict[str, Any]):
@@ -53,12 +53,18 @@ class AvailableColumns(dict[str, Any]):
     def unit(self, expression: Expression, quantity: str) -> str:
         """Return the unit behind an expression, or the one that the file states for a column on its own.
 
-        A mass stands for no unit: it is doubtful which force is meant.
+        A mass stands for no unit: it is doubtful which force is meant. Times since 1970 tell their unit themselves.
         """
         stated = expression.unit or self.stated(expression)
         other = expression.unit or (quantity in ("force", "gap") and stated.lower() not in GRAM_FORCE)
-        known = known_unit(stated, quantity)
-        return known or (stated if other and stated not in WITHOUT_UNIT else "")
+        kept = stated if other and stated not in WITHOUT_UNIT else ""
+        return known_unit(stated, quantity) or kept or self.since_1970(expression, quantity)
+
+    def since_1970(self, expression: Expression, quantity: str = "time") -> str:
+        """Return the unit of numbers that are times since 1970, empty if that is s, or if they are no such times."""
+        if quantity != "time" or not len(self.table):
+            return ""
+        return unit_since_1970(float(expression.numbers(self, len(self.table))[0]))
 
     def stated(self, expression: Expression) -> str:
         """Return the unit that the file states for an expression that is a column, empty if there is none."""

@@ -18,6 +18,7 @@ from graspsense.sources.manifest.steps import NOISE, squeezes
 
 if TYPE_CHECKING:
     from graspsense.sources.formats.table import Numbers
+    from graspsense.sources.manifest.description import Manifest
 
 BEGINS_LOADED: Final = 0.25
 """Share of its range above which the force of the first sample is that of a contact, or of a wrong zero."""
@@ -31,8 +32,9 @@ SHORTEST_S: Final = 0.1
 """No grasp is shorter (s)."""
 OFFSET: Final = 0.05
 """Share of the range of a pad that its force may have without contact."""
+WEAK_N: Final = 0.02
 STRONG_N: Final = 300.0
-"""A force whose range is beyond that of the usual grippers is in another unit."""
+"""A force whose range is not between those of the usual grippers is in another unit."""
 WIDEST_M: Final = 5e-4
 """No gripper opens less (m)."""
 NO_GLITCH: Final = 0.05
@@ -45,8 +47,8 @@ _OFFSET: Final = ' If the fingers were free, the sensor has an offset: zero = "1
 _FOUND: Final = 'split = "force" finds them, '
 
 
-def notices_of(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
-    """Yield a sentence for each thing that looks wrong; `zeroed`: the zero of the forces is from the first samples."""
+def notices_of(columns: GraspColumns, keys: Manifest) -> Iterator[str]:
+    """Yield a sentence for each thing that looks wrong in the columns of a manifest with these keys."""
     yield from columns.warnings
     if len(columns) < 2:
         return
@@ -58,8 +60,8 @@ def notices_of(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
         yield from _of_unit(columns)
     if not pulls:
         yield from _of_gap(columns)
-        yield from _of_zero(columns, zeroed=zeroed)
-    yield from _of_time(columns)
+        yield from _of_zero(columns, zeroed=bool(keys.zero))
+    yield from _of_time(columns, divided=keys.split == "force")
     if _is_felt(columns.force_n):
         yield from _of_holes(columns)
 
@@ -124,10 +126,10 @@ def _of_unit(columns: GraspColumns) -> Iterator[str]:
             "the forces are whole numbers, as counts of a sensor are: give a factor to newtons, or write "
             'force = "COLUMN [counts]", or [gf] for the grams of a scale'
         )
-    elif high - low > STRONG_N:
+    elif not WEAK_N < high - low < STRONG_N and _is_felt(columns.force_n):
         yield (
             f"the force reaches {high:.4g} N, which few grippers have: if it is in another unit, write that behind "
-            "it, as [gf] for the grams of a scale, [mN] or [counts]"
+            "it, as [gf] for the grams of a scale, [mN], [kN] or [counts]"
         )
 
 
@@ -167,7 +169,7 @@ def _of_zero(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
                 yield f'{name} does not begin at zero: if the fingers were free then, write zero = "10 samples"'
 
 
-def _of_time(columns: GraspColumns) -> Iterator[str]:
+def _of_time(columns: GraspColumns, *, divided: bool) -> Iterator[str]:
     steps = np.diff(columns.t_s)
     usual = float(np.median(steps))
     lasts_s = float(columns.t_s[-1] - columns.t_s[0])
@@ -176,12 +178,15 @@ def _of_time(columns: GraspColumns) -> Iterator[str]:
             f"the recording lasts {lasts_s * 1e3:.2g} ms only: if the time is not in s, write its unit behind it, or a "
             "factor that makes it seconds"
         )
+    several = not divided and _is_felt(columns.force_n) and _has_several_squeezes(columns)
     if float(steps.max()) > JUMP * usual > 0.0:
         yield (
             f"the time jumps by more than {JUMP:g} usual steps: was the clock set, or are there several grasps? "
-            + _FOUND * _has_several_squeezes(columns)
+            + _FOUND * several
             + 'split = "COLUMN" splits it by a column'
         )
+    elif several:
+        yield f"there are several squeezes, and the features are of the first: {_FOUND}one grasp each"
 
 
 def _of_holes(columns: GraspColumns) -> Iterator[str]:

@@ -229,7 +229,7 @@ def _grasps(
     cut = cut_at(columns, keys.cut) if keys.cut else columns
     kept = resampled(cut, keys.resample_hz) if keys.resample_hz else cut
     with np.errstate(all="ignore"):  # what is infinite is refused by `checked_recording`
-        notices = tuple(notices_of(cut, zeroed=bool(keys.zero)))
+        notices = tuple(notices_of(cut, keys))
     yield LabelledRecording(
         recording=_checked(kept, table, keys.rate_hz or 1.0),
         source=cut.source,

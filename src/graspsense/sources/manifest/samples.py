@@ -24,7 +24,7 @@ from graspsense.sources.manifest.description import ReadManifest, hand_of, quant
 from graspsense.sources.manifest.events import labelled_events
 from graspsense.sources.manifest.expression import Expression
 from graspsense.sources.manifest.steps import without_duplicates
-from graspsense.sources.units import GRAM_FORCE, TO_SI, WITHOUT_UNIT, known_unit, unit_since_1970
+from graspsense.sources.units import GRAM_FORCE, TO_SI, WITHOUT_UNIT, known_unit
 
 EARLIEST_STAMP_S: Final = 1e6
 """A first time beyond this is a stamp of a clock, and times are counted from it."""
@@ -243,10 +243,9 @@ def _times(columns: AvailableColumns) -> tuple[Numbers, float, tuple[str, ...]]:
     missing = chosen is None or not columns.has(chosen)
     given = None if missing and manifest.keys.rate_hz else columns.value("time")
     if given is not None and chosen is not None:
-        unit = "" if columns.unit(chosen, "time") else unit_since_1970(float(given[0][0]))
-        notes = (f"the time is in {unit} since 1970",) if unit else ()
-        factor, origin = TO_SI["time"].get(unit, 1.0), _origin(given[0])
-        return (given[0] - origin) * factor, origin * factor, notes
+        unit, origin = columns.since_1970(chosen), _origin(given[0])
+        told = unit and unit == columns.unit(chosen, "time")
+        return given[0] - origin, origin, (f"the time is in {unit} since 1970",) if told else ()
     if table.t_s is not None:
         origin = _origin(table.t_s)
         return table.t_s - origin, origin, ()

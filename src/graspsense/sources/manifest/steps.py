@@ -174,7 +174,8 @@ def _held_runs(force: Numbers, steps_s: Numbers, weakest: float = WEAKEST) -> li
     loaded = force[force > low + max(noise, UNLOADED * (high - low))]
     usual = float(np.median(loaded)) - float(low) if len(loaded) else float(high - low)
     rise = max(noise, weakest * usual)
-    shortest = SHORTEST_RELEASE_S / float(np.median(steps_s)) if len(steps_s) else 0.0
+    usual_s = float(np.median(steps_s)) if len(steps_s) else 0.0
+    shortest = SHORTEST_RELEASE_S / usual_s if usual_s else 0.0  # stamps with few digits are alike
     joined: list[tuple[int, int]] = []
     for begin, end in _rises(force, rise, max(rise, 0.5 * usual)):
         if end - begin < FEWEST:

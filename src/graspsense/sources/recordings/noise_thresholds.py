@@ -303,9 +303,7 @@ def _rest(
         candidates.append(candidates[-1] * _FASTER)
     if "rest_window_s" in given:
         del candidates[1:]
-    # Steps of a coarse gap pass for noise while it moves, so the step alone is tried first.
-    travels = sorted({MARGIN * step, travel}) if step else [travel]
-    pairs = [(v, _window(x / v, least, scale)) for x in travels for v in map(_rounded, candidates)]
+    pairs = [(v, _window(travel / v, least, scale)) for v in map(_rounded, candidates)]
     resting = [sum(recording.rests(contact, *pair) for recording in tried) for pair in pairs]
     enough = _REACHING * sum(bool((recording.both >= contact).any()) for recording in tried)
     chosen = next((k for k, count in enumerate(resting) if count >= enough), int(np.argmax(resting)))
