@@ -17,6 +17,7 @@ import numpy as np
 
 from graspsense.core.components.caller import option
 from graspsense.core.files.csv_text import csv_text
+from graspsense.core.learn.confounding import LEAST_LINES
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.target_value import TargetValue
 from graspsense.core.values.errors import ConfigError, DataDamaged, counted, listed
@@ -31,8 +32,8 @@ from graspsense.sources.formats.csv_columns import CsvColumns
 from graspsense.sources.trial_table.doubtful_columns import doubts, not_held_out
 from graspsense.sources.trial_table.exported_table import ExportedTable, exported
 from graspsense.sources.trial_table.identifiers import (
-    LEAST_LINES,
     OF_OBJECTS,
+    groups_trials,
     identifies,
     names_a_recording,
     text_identifies,
@@ -95,10 +96,10 @@ def read_labelled(
     instances = None if instance is None else tuple(columns.complete_column(instance, "the instance"))
     reserved = {name for name in (label, instance, order, value) if name}
     table = _feature_table(columns, features, reserved, identified, notes)
+    others = [name for name in columns.names if name not in {*reserved, *table.names}]
     if export is None:
         recorded = lines if ranks is None else sorted(lines, key=ranks.__getitem__)
         notes += _doubts(columns, recorded, labels, table, target)
-        others = [name for name in columns.names if name not in {*reserved, *table.names}]
         notes += not_held_out(columns, others, instances)
     return Labelled(
         source=str(path),
@@ -106,6 +107,10 @@ def read_labelled(
         labels=tuple(labels),
         instances=instances,
         no_instances=f"no column names the instance ({option('instance', 'COLUMN')})",
+        sessions=instance is not None and groups_trials(instance, columns.texts(instance)),
+        recorded_with={
+            name: tuple(columns.texts(name)) for name in others if groups_trials(name, columns.texts(name))
+        },
         order=ranks,
         no_order=no_order,
         **_controls(table, columns, known_before, export),

@@ -1,0 +1,87 @@
+"""What differs between the trials of one label and of another besides the object, so that nothing tells which is told.
+
+A label that was always recorded with its own setting, or in its own session, is recognised by that too. So is one that
+was recorded in one stretch while the sensors drifted. How often the object is recognised without it, no held-out trials
+of the same recordings tell.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Hashable, Iterator, Sequence
+from itertools import groupby
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from graspsense.core.components.caller import option
+from graspsense.core.learn.groups import beyond_chance, means_of
+
+if TYPE_CHECKING:
+    from graspsense.core.learn.labelled import Labelled
+
+LEAST_LINES: Final = 5
+"""Trials from which on their values can show more than chance."""
+_DRIFT: Final = 5.0
+"""Standard deviations by which features follow the time within all labels more than in random order, if they drift."""
+
+
+def confounded(labelled: Labelled) -> str:
+    """Return what the label cannot be told from in these trials; empty if nothing shows it, and for simulated ones."""
+    if labelled.provenance.get("simulated"):
+        return ""
+    for name, values in _conditions(labelled):
+        if says_the_label(values, labelled.labels):
+            return (
+                f"all trials of a label have the same {name}, and whether it or the object is recognised cannot be "
+                f"told: leave it out ({option('features', python='columns')}) if it is a feature, or record each label "
+                "with each of its values"
+            )
+    if _drifts(labelled):
+        return (
+            "each label was recorded in one stretch while the features drifted, and which of both is recognised "
+            f"cannot be told: record the labels in turns, or state the order ({option('order', 'COLUMN')})"
+        )
+    return ""
+
+
+def says_the_label(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
+    """Return whether all lines of a label have the same value, which differs, as the label in other words does.
+
+    Where labels share a value, the lines of each must not be few, since values with few choices can agree by chance.
+    """
+    pairs = set(zip(values, labels, strict=True))
+    different, among = len(set(values)), len(set(labels))
+    few = different < among and min(Counter(labels).values()) < LEAST_LINES
+    return 1 < different <= len(pairs) == among < len(labels) and not few
+
+
+def _conditions(labelled: Labelled) -> Iterator[tuple[str, Sequence[Hashable]]]:
+    """Yield the names and values of what may be a condition of the recording: all features, and what is no feature."""
+    for name, column in zip(labelled.table.names, labelled.table.values.T, strict=True):
+        if not np.isnan(column).any():
+            yield name, column.tolist()
+    yield from labelled.recorded_with.items()
+
+
+def _drifts(labelled: Labelled) -> bool:
+    """Return whether each label was recorded in one stretch, within which the features of all follow the time alike.
+
+    Trials of one instance are as one.
+    """
+    if labelled.order is None or labelled.value is not None:
+        return False
+    in_time = np.argsort(np.array(labelled.order), kind="stable")
+    labels = np.array(labelled.labels)[in_time]
+    if sum(1 for _ in groupby(labels)) > len(labelled.classes):
+        return False
+    units = np.arange(len(labels)) if labelled.instances is None else np.array(labelled.instances)[in_time]
+    named = [f"{label} {unit}" for label, unit in zip(labels, units, strict=True)]
+    _, begins, unit_of = np.unique(named, return_index=True, return_inverse=True)
+    place_of = np.argsort(np.argsort(begins))[unit_of]
+    rows = np.argsort(place_of, kind="stable")
+    means = means_of(labelled.table.values[in_time][rows], place_of[rows])
+    sizes = [len(list(run)) for _, run in groupby(labels[np.sort(begins)])]
+    codes = np.repeat(np.arange(len(sizes)), sizes)
+    time = np.concatenate([np.linspace(-0.5, 0.5, size) for size in sizes])
+    return beyond_chance(means, codes, lambda ranks: float(((time @ ranks) ** 2).sum())) > _DRIFT
