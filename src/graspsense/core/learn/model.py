@@ -302,9 +302,10 @@ class Model:
     def _kind_warnings(self, differences: Sequence[str]) -> Iterator[str]:
         """Yield what holds for all predictions of this model, unless a difference says more."""
         if self.holds_for and not differences:
+            drift = ", and less once the forces have drifted" if self.holds_for.endswith("sessions") else ""
             yield (
                 f"certainty and sets are for the trained labels and {self.holds_for}, since the training held out no "
-                "others: of these it knows less, and less once the forces have drifted"
+                f"others: of these it knows less{drift}"
             )
         if self.sets is not None and self.sets.uncalibrated and not differences:
             names = ", ".join(self.sets.uncalibrated)

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -107,10 +107,7 @@ def read_labelled(
         labels=tuple(labels),
         instances=instances,
         no_instances=f"no column names the instance ({option('instance', 'COLUMN')})",
-        sessions=instance is not None and groups_trials(instance, columns.texts(instance)),
-        recorded_with={
-            name: tuple(columns.texts(name)) for name in others if groups_trials(name, columns.texts(name))
-        },
+        **_recording(columns, instance, others),
         order=ranks,
         no_order=no_order,
         **_controls(table, columns, known_before, export),
@@ -118,6 +115,15 @@ def read_labelled(
         notes=tuple(notes),
         provenance={"simulated": export is not None and "1" in columns.cells["simulated"]},
     )
+
+
+def _recording(columns: CsvColumns, instance: str | None, others: Sequence[str]) -> dict[str, Any]:
+    """Return whether the instances are sessions, and what else of the recording is in the columns `others`."""
+    grouping = [name for name in others if groups_trials(name, columns.texts(name))]
+    return {
+        "sessions": instance is not None and groups_trials(instance, columns.texts(instance)),
+        "recorded_with": {name: tuple(columns.texts(name)) for name in grouping},
+    }
 
 
 def _object_column(
