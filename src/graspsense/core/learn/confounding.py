@@ -8,7 +8,7 @@ of the same recordings tell.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Hashable, Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING, Final
 
@@ -30,17 +30,19 @@ def confounded(labelled: Labelled) -> str:
     """Return what the label cannot be told from in these trials; empty if nothing shows it, and for simulated ones."""
     if labelled.provenance.get("simulated"):
         return ""
-    for name, values in _conditions(labelled):
+    whole = ~np.isnan(labelled.table.values).any(axis=0)
+    columns = zip(labelled.table.names, labelled.table.values.T, whole.tolist(), strict=True)
+    features = [(name, column.tolist()) for name, column, known in columns if known]
+    for name, values in (*features, *labelled.recorded_with.items()):
         if says_the_label(values, labelled.labels):
             return (
-                f"all trials of a label have the same {name}, and whether it or the object is recognised cannot be "
-                f"told: leave it out ({option('features', python='columns')}) if it is a feature, or record each label "
-                "with each of its values"
+                f"all trials of a label have the same {name}: which of both is recognised cannot be told. Record each "
+                f"label with several; a feature can be left out ({option('features', python='columns')})"
             )
-    if _drifts(labelled):
+    if in_stretches(labelled) and _drifts(labelled):
         return (
-            "each label was recorded in one stretch while the features drifted, and which of both is recognised "
-            f"cannot be told: record the labels in turns, or state the order ({option('order', 'COLUMN')})"
+            "each label was recorded in one stretch while the features drifted: which of both is recognised cannot be "
+            f"told. Record the labels in turns, or state the order ({option('order', 'COLUMN')})"
         )
     return ""
 
@@ -56,32 +58,24 @@ def says_the_label(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
     return 1 < different <= len(pairs) == among < len(labels) and not few
 
 
-def _conditions(labelled: Labelled) -> Iterator[tuple[str, Sequence[Hashable]]]:
-    """Yield the names and values of what may be a condition of the recording: all features, and what is no feature."""
-    for name, column in zip(labelled.table.names, labelled.table.values.T, strict=True):
-        if not np.isnan(column).any():
-            yield name, column.tolist()
-    yield from labelled.recorded_with.items()
+def in_stretches(labelled: Labelled) -> bool:
+    """Return whether the trials of each label are one block in the order of recording, as far as that is known."""
+    if labelled.order is None or labelled.provenance.get("simulated"):
+        return False
+    in_time = [labelled.labels[row] for row in np.argsort(labelled.order, kind="stable").tolist()]
+    return sum(1 for _ in groupby(in_time)) == len(labelled.classes) < len(in_time)
 
 
 def _drifts(labelled: Labelled) -> bool:
-    """Return whether each label was recorded in one stretch, within which the features of all follow the time alike.
-
-    Trials of one instance are as one.
-    """
-    if labelled.order is None or labelled.value is not None:
-        return False
-    in_time = np.argsort(np.array(labelled.order), kind="stable")
-    labels = np.array(labelled.labels)[in_time]
-    if sum(1 for _ in groupby(labels)) > len(labelled.classes):
-        return False
-    units = np.arange(len(labels)) if labelled.instances is None else np.array(labelled.instances)[in_time]
-    named = [f"{label} {unit}" for label, unit in zip(labels, units, strict=True)]
+    """Return whether the features follow the time within all labels alike. Trials of one instance are as one."""
+    in_time = labelled.rows(np.argsort(np.array(labelled.order), kind="stable"))
+    units = in_time.instances or range(len(in_time))
+    named = [f"{label} {unit}" for label, unit in zip(in_time.labels, units, strict=True)]
     _, begins, unit_of = np.unique(named, return_index=True, return_inverse=True)
     place_of = np.argsort(np.argsort(begins))[unit_of]
     rows = np.argsort(place_of, kind="stable")
-    means = means_of(labelled.table.values[in_time][rows], place_of[rows])
-    sizes = [len(list(run)) for _, run in groupby(labels[np.sort(begins)])]
+    means = means_of(in_time.table.values[rows], place_of[rows])
+    sizes = [len(list(run)) for _, run in groupby(np.array(in_time.labels)[np.sort(begins)])]
     codes = np.repeat(np.arange(len(sizes)), sizes)
     time = np.concatenate([np.linspace(-0.5, 0.5, size) for size in sizes])
     return beyond_chance(means, codes, lambda ranks: float(((time @ ranks) ** 2).sum())) > _DRIFT
