@@ -30,9 +30,8 @@ def confounded(labelled: Labelled) -> str:
     """Return what the label cannot be told from in these trials; empty if nothing shows it, and for simulated ones."""
     if labelled.provenance.get("simulated"):
         return ""
-    whole = ~np.isnan(labelled.table.values).any(axis=0)
-    columns = zip(labelled.table.names, labelled.table.values.T, whole.tolist(), strict=True)
-    features = [(name, column.tolist()) for name, column, known in columns if known]
+    columns = zip(labelled.table.names, labelled.table.values.T, strict=True)
+    features = [(name, column.tolist()) for name, column in columns if not np.isnan(column).any()]
     for name, values in (*features, *labelled.recorded_with.items()):
         if says_the_label(values, labelled.labels):
             return (
