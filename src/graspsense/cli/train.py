@@ -250,11 +250,10 @@ def _say_trained(out: str, model: Model) -> None:
                 f"{100 * unknown / trials:.1f} % ({unknown} of {trials}) of the held-out trials are called unknown "
                 "(false alarms), hardly more of new ones: the model knows more trials than those of the folds",
             )
-    if model.certainty is not None and not model.simulated:
+    if model.holds_for.endswith("sessions"):
+        of_sessions = f"let the instance of a trial be its session ({units_needed()} or more)"
         echo_entry(
-            "drift",
-            "certainty and sets know the drift of the forces between held-out instances only: where sessions differ, "
-            f"let the instance of a trial be its session ({units_needed()} or more), or they are too sure",
+            "drift", f"certainty and sets are for {model.holds_for}: where these differ, {of_sessions}"
         )
     for after_s, part in model.checkpoints:
         sets = "" if part.sets is None else f", sets {part.sets.in_words}"
