@@ -498,7 +498,8 @@ def test_rare_labels_whose_few_answers_were_all_right_are_hardly_surer_than_othe
 
 
 def test_answers_of_a_cross_validation_count_for_less():
-    for effect, rate in ((1.0, 20.5 / 22), (2.0, 10.5 / 12)):
+    # All n right answers with two labels: (n + 1) / (n + 2), and of that what is not drawn towards guessing.
+    for effect, rate in ((1.0, 21 / 22 * (1 - 2 / 22**2)), (2.0, 11 / 12 * (1 - 2 / 12**2))):
         certainty = certainty_from([1.0] * 20, [True] * 20, effect=effect)
         assert certainty.rate(*asked([1.0])) == pytest.approx([rate])
 

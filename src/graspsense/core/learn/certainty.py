@@ -375,7 +375,8 @@ def _drawn_together(
     probability 1 - 1/bins.
     """
     mean = float(right.sum() / units.sum())
-    above = units.sum() * (mean - guessing) ** 2 / (guessing * (1.0 - guessing))
+    likely = (float(right.sum()) + 1.0) / (float(units.sum()) + 2.0)
+    above = units.sum() * (mean - guessing) ** 2 / (likely * (1.0 - likely))
     drawn = guessing + _beyond(above, 1.0) * (mean - guessing) if mean > guessing else mean
     rates = right / units
     if len(rates) == 1:
