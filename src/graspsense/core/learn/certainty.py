@@ -367,12 +367,12 @@ def _steps(
 def _drawn_together(
     right: NDArray[np.float64], units: NDArray[np.float64], bins: int, guessing: float
 ) -> NDArray[np.float64]:
-    """Return the rates of rising levels, drawn towards their mean, and this towards guessing, by what chance spreads them.
+    """Return the rates of rising levels, drawn towards their mean, and it towards guessing, by what chance spreads.
 
     Levels of `bins` equal rates have a sum of squares that is distributed as chi-bar-square: of their mean number
     1 + 1/2 + ... + 1/bins, one is the mean (Barlow et al., 1972, chapter 3). That it shrinks the rates as the share of
     the spread is empirical Bayes (C. N. Morris, J. Am. Stat. Assoc. 78 (1983) 47). Chance makes several levels with the
-    probability 1 - 1/bins. That the mean is the rate of guessing is as likely as its distance from it allows.
+    probability 1 - 1/bins.
     """
     mean = float(right.sum() / units.sum())
     likely = (float(right.sum()) + 1.0) / (float(units.sum()) + 2.0)

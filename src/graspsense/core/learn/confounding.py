@@ -68,10 +68,9 @@ def in_stretches(labelled: Labelled) -> bool:
 def _drifts(labelled: Labelled) -> bool:
     """Return whether the features follow the time within all labels alike. Trials of one instance are as one."""
     in_time = labelled.rows(np.argsort(np.array(labelled.order), kind="stable"))
-    units = in_time.instances or range(len(in_time))
-    named = [f"{label} {unit}" for label, unit in zip(in_time.labels, units, strict=True)]
-    _, begins, unit_of = np.unique(named, return_index=True, return_inverse=True)
-    place_of = np.argsort(np.argsort(begins))[unit_of]
+    units = [*zip(in_time.labels, in_time.instances or map(str, range(len(in_time))), strict=True)]
+    _, begins, unit_of = np.unique(units, axis=0, return_index=True, return_inverse=True)
+    place_of = np.argsort(np.argsort(begins))[unit_of.ravel()]
     rows = np.argsort(place_of, kind="stable")
     means = means_of(in_time.table.values[rows], place_of[rows])
     sizes = [len(list(run)) for _, run in groupby(np.array(in_time.labels)[np.sort(begins)])]

@@ -80,10 +80,9 @@ class Model:
         """For which grasps alone its certainty holds, as far as is known; empty if it holds for all of its labels."""
         if self.certainty is None or self.sets is None:
             return ""
-        of_objects = "" if self.sets.unit == "instances" else "objects"
-        of_sessions = "" if self.sets.unit == "sessions" or self.simulated else "sessions"
-        both = " and ".join(filter(None, (of_objects, of_sessions)))
-        return both and f"the same {both}"
+        lacking = ["objects"] * (self.sets.unit != "instances")
+        lacking += ["sessions"] * (self.sets.unit != "sessions" and not self.simulated)
+        return f"the same {' and '.join(lacking)}" if lacking else ""
 
     @property
     def in_a_line(self) -> str:
