@@ -162,7 +162,7 @@ def test_a_certainty_by_trials_is_said_to_be_that_of_the_same_objects(tmp_path):
     assert by_trials["rate"]["rate"] < 0.75
     for predicted, of_same_objects in ((by_trials, True), (by_objects, False)):
         assert any("same objects" in warning for warning in predicted["warnings"]) is of_same_objects
-        assert {row["of_same_objects"] for row in predicted["predictions"]} == {of_same_objects}
+        assert {"objects" in row["holds_for"] for row in predicted["predictions"]} == {of_same_objects}
 
 
 def test_a_model_of_states_or_classes(csv, tmp_path):

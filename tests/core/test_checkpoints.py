@@ -93,7 +93,7 @@ def traces():
     drawn = []
     for label, stiffness_n_m in (("soft", 2000.0), ("stiff", 9000.0)):
         grasped = [grasp_of(Watched(stiffness_n_m * factor)).trace for factor in (0.95, 1.05)]
-        for k in range(15):
+        for k in range(25):
             trace, factor = grasped[k % 2], rng.uniform(0.95, 1.05)
             forces = {side: factor * getattr(trace, side) for side in ("force_left_n", "force_right_n")}
             drawn.append((label, evolve(trace, **forces)))
@@ -290,7 +290,7 @@ def test_trials_without_traces_or_of_short_grasps_have_no_checkpoints(traces, tr
     plain = split_checkpoints(trials, CHECKPOINTS)[-1].labelled
     with pytest.raises(ConfigError, match=r"model gripper .*checkpoints_s"):
         split_checkpoints(plain, CHECKPOINTS)
-    with pytest.raises(ConfigError, match=r"0 of 30 .* 60 s"):
+    with pytest.raises(ConfigError, match=r"0 of 50 .* 60 s"):
         split_checkpoints(trials_of(traces, (60.0,)), (60.0,))
 
 
@@ -313,7 +313,7 @@ def test_recognition_against_seconds_and_newtons(trials):
 
 
 def test_trials_without_enough_instances_have_rates_but_no_sets(trials):
-    few = trials.rows(np.array([0, 1, 2, 15, 16, 17]))
+    few = trials.rows(np.array([0, 1, 2, 25, 26, 27]))
     recognition = early_recognition(C45, split_checkpoints(few, CHECKPOINTS), folds=3)
     assert [row.name for row in recognition.rows] == ["0.02 s", "0.05 s", WHOLE]
     assert "90 % needs 9" in recognition.reason

@@ -253,7 +253,7 @@ def test_every_classifier_has_sets_that_loading_keeps_exactly(name, tmp_path):
         assert (said.probabilities, said.prediction_set) == (again.probabilities, again.prediction_set)
         assert said.label in said.prediction_set
         assert said.coverage == 0.9
-        assert said.set_in_words.endswith(" (right in 90 % of grasps)")
+        assert said.set_in_words.endswith(" (right in 90 % of grasps for the same sessions)")
     model.classifier.to_json = lambda: {"means": np.zeros(2)}
     with pytest.raises(ComponentFailed, match=rf"/{name} .*to_json"):
         write_model(tmp_path / "m.json", model)
@@ -434,7 +434,8 @@ def test_a_certainty_knows_the_drift_between_the_sessions_of_its_trials_and_no_o
         rng = np.random.default_rng(seed)
         means = 5.0 * np.exp(0.13 * rng.normal(size=(3, 3)))
         labels, forces, names = squeezed_in(sessions, each, rng, means)
-        model = model_of(labelled(labels, *forces, instances=names if held_out else None), "svm")
+        trials = labelled(labels, *forces, instances=names if held_out else None)
+        model = model_of(evolve(trials, sessions=held_out), "svm")
         labels, forces, _ = squeezed_in(30, 3, rng, means)
         made = model.predictions(labelled(labels, *forces).table)
         said = [prediction for prediction in made if prediction.certainty is not None]
@@ -497,7 +498,8 @@ def test_rare_labels_whose_few_answers_were_all_right_are_hardly_surer_than_othe
 
 
 def test_answers_of_a_cross_validation_count_for_less():
-    for effect, rate in ((1.0, 21 / 22), (2.0, 11 / 12)):
+    # All n right answers with two labels: (n + 1) / (n + 2), and of that what is not drawn towards guessing.
+    for effect, rate in ((1.0, 21 / 22 * (1 - 2 / 22**2)), (2.0, 11 / 12 * (1 - 2 / 12**2))):
         certainty = certainty_from([1.0] * 20, [True] * 20, effect=effect)
         assert certainty.rate(*asked([1.0])) == pytest.approx([rate])
 

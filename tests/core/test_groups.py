@@ -145,19 +145,27 @@ def test_what_is_said_of_new_objects_is_not_too_sure(make):
     assert np.mean(too_sure) < 0.03
 
 
-def test_a_certainty_says_that_it_is_of_the_same_objects_unless_others_were_held_out(tmp_path):
+def test_a_certainty_says_for_which_objects_and_sessions_it_holds_unless_others_were_held_out(tmp_path):
     numbers, values = by_object(np.random.default_rng(1), objects=20)
     trials = table_of(numbers, values)
     named = evolve(trials, instances=tuple(f"bottle {k // 5}" for k in range(len(numbers))))
     order = np.random.default_rng(2).permutation(len(numbers))
-    for known, of_same in ((named, False), (grouped(trials, NO_COPIES), True), (trials.rows(order), True)):
+    for known, held_for in (
+        (named, "the same sessions"),
+        (evolve(named, sessions=True), "the same objects"),
+        (evolve(named, provenance={"simulated": True}), ""),
+        (grouped(trials, NO_COPIES), "the same objects and sessions"),
+        (trials.rows(order), "the same objects and sessions"),
+    ):
         write_model(tmp_path / "m.json", model_of(known, "tree"))
         made = load_model(str(tmp_path / "m.json"), installed()).predictions(known.table)
         (certain, *_) = [prediction for prediction in made if prediction.certainty is not None]
-        assert certain.of_same_objects == certain.as_json()["of_same_objects"] == of_same
+        assert certain.holds_for == certain.as_json()["holds_for"] == held_for
         for words in filter(None, (certain.certainty_in_words, certain.set_in_words)):
-            assert ("for the same objects" in words) == of_same
-        assert any("drifted" in warning for warning in certain.warnings) == of_same
+            assert "".join(words.partition(" for the")[1:]).partition(":")[0] == (
+                held_for and f" for {held_for}"
+            )
+        assert any("drifted" in warning for warning in certain.warnings) == held_for.endswith("sessions")
 
 
 def test_a_rate_with_groups_held_out_is_not_said_to_be_that_of_new_objects():

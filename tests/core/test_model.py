@@ -107,7 +107,7 @@ def test_simulated_training_is_said_and_louder_on_a_real_gripper():
     simulated = model(simulated=True)
 
     assert simulated.predict(CAN).warnings == (
-        "trained on simulated grasps: valid for the simulator, untested on real objects",
+        "trained on simulated grasps: valid for its labels in the simulator, untested on real objects",
     )
     assert simulated.predict(CAN, None, device("virtual")).warnings == simulated.predict(CAN).warnings
     (warning,) = simulated.predict(CAN, None, device("device")).warnings

@@ -148,7 +148,7 @@ def test_the_certainty_of_a_chosen_model_is_not_raised_by_the_choice():
             certainties += [prediction.certainty for prediction in made.predictions(fresh)]
 
     # Every answer to a fresh trial is right in one half of cases.
-    assert np.mean(own) > 0.6
+    assert np.mean(own) > np.mean(procedure) + 0.03
     assert np.mean(procedure) == pytest.approx(0.5, abs=0.07)
 
 

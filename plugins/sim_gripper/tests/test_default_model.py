@@ -39,7 +39,7 @@ def test_object_and_state_are_named_at_once_with_the_reason(pipeline, name):
     assert any(step.words.startswith(told) for step in said.because)
     assert "simulated grasps at 20 N, 10 mm/s" in said.model
     assert said.warnings == (
-        "trained on simulated grasps: valid for the simulator, untested on real objects",
+        "trained on simulated grasps: valid for its labels in the simulator, untested on real objects",
     )
 
 

@@ -250,11 +250,11 @@ def _say_trained(out: str, model: Model) -> None:
                 f"{100 * unknown / trials:.1f} % ({unknown} of {trials}) of the held-out trials are called unknown "
                 "(false alarms); of new trials it will be hardly more, since this model is trained on all of them",
             )
-    if model.certainty is not None and not model.simulated:
+    if model.holds_for.endswith("sessions"):
         echo_entry(
             "drift",
-            "certainty and sets allow only for what differs between instances. If the forces also drift between "
-            f"sessions, name the session as the instance ({units_needed()} sessions or more); else they are too sure",
+            f"certainty and sets are for {model.holds_for}. If forces drift between sessions, name the session as the "
+            f"instance ({units_needed()} sessions or more); else they are too sure",
         )
     for after_s, part in model.checkpoints:
         sets = "" if part.sets is None else f", sets {part.sets.in_words}"

@@ -24,6 +24,7 @@ from graspsense.core.learn.conformal import (
     sets_of,
     units_needed,
 )
+from graspsense.core.learn.confounding import confounded
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.model import Model
 from graspsense.core.values.errors import ConfigError
@@ -152,9 +153,12 @@ def calibrated_by(model: Model, labelled: Labelled) -> Model:
 
 
 def calibrated_with(model: Model, answers: Pooled, labelled: Labelled) -> Model:
-    """Return a model with certainty and prediction sets from answers for its trials, made without their instances."""
+    """Return a model with certainty and prediction sets from answers for its trials, made without their instances.
+
+    It has neither where these trials show that labels cannot be told from how they were recorded.
+    """
     instances, trials = exchangeable_instances(labelled), len(labelled)
-    calibration = _calibration(answers, labelled.labels, instances, np.arange(trials))
+    calibration = confounded(labelled) or _calibration(answers, labelled.labels, instances, np.arange(trials))
     if isinstance(calibration, str):
         return evolve(model, sets=_no_sets(labelled, calibration))
     return evolve(
@@ -163,7 +167,7 @@ def calibrated_with(model: Model, answers: Pooled, labelled: Labelled) -> Model:
         temperature=calibration.temperature,
         sets=evolve(
             calibration.sets,
-            unit=_unit(instances, labelled.grouped),
+            unit=_unit(instances, labelled.grouped, labelled.sessions),
             unknown=int(answers.unlike.sum()),
             trials=trials,
         ),
@@ -171,13 +175,14 @@ def calibrated_with(model: Model, answers: Pooled, labelled: Labelled) -> Model:
 
 
 def _no_sets(labelled: Labelled, why: str) -> PredictionSets:
-    unit = _unit(exchangeable_instances(labelled), labelled.grouped)
+    unit = _unit(exchangeable_instances(labelled), labelled.grouped, labelled.sessions)
     return PredictionSets(coverage=COVERAGE, unit=unit, thresholds={}, reason=why)
 
 
-def _unit(instances: Sequence[str] | None, grouped: bool = False) -> str:
+def _unit(instances: Sequence[str] | None, grouped: bool = False, sessions: bool = False) -> str:
     """Return what is held out, one of `conformal.UNITS`."""
-    return "trials" if instances is None else "groups" if grouped else "instances"
+    named = "sessions" if sessions else "groups" if grouped else "instances"
+    return "trials" if instances is None else named
 
 
 def _calibration(

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from itertools import groupby
 from typing import Any
 
 import numpy as np
 
+from graspsense.core.learn.confounding import in_stretches
 from graspsense.core.learn.labelled import TARGETS, Labelled, Target, class_of
 from graspsense.core.settings.selected import select_component
 from graspsense.core.values.errors import ConfigError, counted
@@ -176,12 +176,7 @@ def _on_instances(trials: Labelled) -> Iterator[str]:
 
 def _on_blocks(trials: Labelled) -> Iterator[str]:
     """Note that drift can tell recorded labels, and that no control shows it, where each label is one block."""
-    order = trials.order
-    if order is None or trials.provenance.get("simulated"):
-        return
-    in_time = [trials.labels[i] for i in np.argsort(order, kind="stable").tolist()]
-    blocks = sum(1 for _ in groupby(in_time))
-    if blocks == len(set(in_time)) < len(in_time):
+    if in_stretches(trials):
         yield (
             "in the order of recording, the trials of each label are one block: what changes with time, such as a "
             "temperature or the zero of a sensor, may tell the labels, and recording_order cannot show it. Grasp "

@@ -4,10 +4,10 @@ An answer rests on a probability, and in a tree on the number of training trials
 was chosen for its trials, so that 4 of 4 means less than 57 of 57, by how much only held-out trials tell. They are
 divided into classes of support, each with enough of them. Within a class the rate of right answers rises with the
 probability (isotonic regression, R. E. Barlow et al., Statistical Inference under Order Restrictions, 1972). Each step
-of it has enough units. The rates are drawn together by what chance spreads them, and each is (right + 1) / (all + 2),
-so that no answer is certain. Its 95 % interval is that of a beta distribution with this mean: from few units a rate is
-known as badly as that, whatever the luck of these trials. Answers of a cross-validation count for less than others:
-its models share training trials, so that the answers of all of them are lucky together.
+of it has enough units. The rates are drawn together, and towards guessing, by what chance spreads them, and each is
+(right + 1) / (all + 2), so that no answer is certain. Its 95 % interval is that of a beta distribution with this mean:
+from few units a rate is known as badly as that, whatever the luck of these trials. Answers of a cross-validation count
+for less than others: its models share training trials, so that the answers of all of them are lucky together.
 
 Where labels are not equally frequent, answers with a rare one are right less often than others that are as probable. So
 a rate is multiplied by how often the answers with its label were right, as a share of what their rates promise. Of few
@@ -234,12 +234,13 @@ def certainty_of(
     known = np.nan_to_num(support, nan=0.0)
     answers = np.array(right, dtype=np.float64)
     least_units = max(STEP_UNITS, STEP_SHARE * float(weights.sum())) - _ROUNDING
+    guessing = 1.0 / max(len(set(labels)), 2)
     edges = [0.0, *_bounds(known, weights), np.inf]
     classes = []
     for least, end in pairwise(edges):
         rows = (known >= least) & (known < end)
         begins, rates, intervals = _steps(
-            probability[rows], answers[rows], weights[rows], least_units, effect
+            probability[rows], answers[rows], weights[rows], least_units, effect, guessing
         )
         classes.append(
             SupportClass(
@@ -333,6 +334,7 @@ def _steps(
     weights: NDArray[np.float64],
     least_units: float,
     effect: float,
+    guessing: float,
 ) -> tuple[tuple[float, ...], tuple[float, ...], tuple[tuple[float, float], ...]]:
     """Return where the steps of the isotonic regression begin, their rates, and the intervals of these."""
     from scipy.optimize import isotonic_regression
@@ -355,29 +357,38 @@ def _steps(
     right_in, units = (
         np.asarray(np.bincount(level_of, counts), dtype=np.float64) / effect for counts in (right_of, all_of)
     )
-    rates = (units * _drawn_together(right_in, units, len(all_of)) + 1.0) / (units + 2.0)
+    rates = (units * _drawn_together(right_in, units, len(all_of), guessing) + 1.0) / (units + 2.0)
     rates = np.maximum.accumulate(rates)
     ends = (betaincinv(rates * (units + 2.0), (1.0 - rates) * (units + 2.0), end) for end in (0.025, 0.975))
     begins = [float(values[np.flatnonzero(level_of[bins] == level)[0]]) for level in range(len(rates))]
     return tuple(begins), tuple(rates.tolist()), tuple(zip(*(end.tolist() for end in ends), strict=True))
 
 
-def _drawn_together(right: NDArray[np.float64], units: NDArray[np.float64], bins: int) -> NDArray[np.float64]:
-    """Return the rates of rising levels, drawn towards their mean by what chance alone spreads them.
+def _drawn_together(
+    right: NDArray[np.float64], units: NDArray[np.float64], bins: int, guessing: float
+) -> NDArray[np.float64]:
+    """Return the rates of rising levels, drawn towards their mean, and it towards guessing, by what chance spreads.
 
     Levels of `bins` equal rates have a sum of squares that is distributed as chi-bar-square: of their mean number
     1 + 1/2 + ... + 1/bins, one is the mean (Barlow et al., 1972, chapter 3). That it shrinks the rates as the share of
     the spread is empirical Bayes (C. N. Morris, J. Am. Stat. Assoc. 78 (1983) 47). Chance makes several levels with the
     probability 1 - 1/bins.
     """
-    mean = right.sum() / units.sum()
+    mean = float(right.sum() / units.sum())
+    likely = (float(right.sum()) + 1.0) / (float(units.sum()) + 2.0)
+    above = units.sum() * (mean - guessing) ** 2 / (likely * (1.0 - likely))
+    drawn = guessing + _beyond(above, 1.0) * (mean - guessing) if mean > guessing else mean
     rates = right / units
     if len(rates) == 1:
-        return np.asarray(rates)
+        return np.array([drawn])
     spread = float((units * (rates - mean) ** 2).sum()) / (mean * (1.0 - mean))
     by_chance = sum(1.0 / k for k in range(2, bins + 1)) / (1.0 - 1.0 / bins)
-    kept = 1.0 - by_chance / spread if spread > by_chance else 0.0
-    return np.asarray(mean + kept * (rates - mean))
+    return np.asarray(drawn + _beyond(spread, by_chance) * (rates - mean))
+
+
+def _beyond(spread: float, by_chance: float) -> float:
+    """Return the share of a sum of squares that chance does not explain."""
+    return 1.0 - by_chance / spread if spread > by_chance else 0.0
 
 
 LEAST_PROBABILITY: Final = 1e-4

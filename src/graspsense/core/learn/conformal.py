@@ -35,8 +35,8 @@ COVERAGE: Final = 0.9
 """Share of the trials whose set shall contain the true label."""
 COVERAGES: Final = (0.01, 0.999)
 """The coverages that a stored model may have; each needs a number of units that can be counted."""
-UNITS: Final = ("instances", "groups", "trials")
-"""What is held out: named objects or sessions, trials that belong together (`learn.groups`), or single trials."""
+UNITS: Final = ("instances", "sessions", "groups", "trials")
+"""What is held out: named objects, sessions, trials that belong together (`learn.groups`), or single trials."""
 _ROUNDING: Final = 1e-9
 _CLOSENESS: Final = 1e-3
 """Weight of the closeness in a score: it only matters among probabilities that are equal, or almost."""

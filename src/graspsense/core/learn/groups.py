@@ -14,6 +14,7 @@ Sessions: instances of several classes that are called by the same day or sessio
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
@@ -114,7 +115,7 @@ def with_sessions(labelled: Labelled) -> Labelled:
         f"instances of several classes have the same name, as {names[0]!r}, and were recorded together: they count "
         "as sessions, and not as objects"
     )
-    return evolve(labelled, instances=tuple(names), notes=(*labelled.notes, note))
+    return evolve(labelled, instances=tuple(names), sessions=True, notes=(*labelled.notes, note))
 
 
 def _to_the_first(group_of: Numbers) -> Numbers:
@@ -205,7 +206,7 @@ def _blocks(labelled: Labelled) -> tuple[int, Numbers]:
     place = np.arange(len(codes)) - (np.cumsum(sizes) - sizes)[codes]
     length, block_of = 1, np.arange(len(codes))
     limit = np.inf if _is_sorted(values, codes) else _ALIKE
-    while _likeness(_means(values, block_of), codes[np.unique(block_of, return_index=True)[1]]) > limit:
+    while _likeness(means_of(values, block_of), codes[np.unique(block_of, return_index=True)[1]]) > limit:
         length, limit = 2 * length, _STILL_ALIKE
         block_of = codes * len(codes) + place // np.minimum(length, (sizes + 1) // 2)[codes]
     result = np.empty_like(block_of)
@@ -220,7 +221,7 @@ def _is_sorted(values: Values, codes: Numbers) -> bool:
     return bool(((steps > 0.0).all(axis=0) | (steps < 0.0).all(axis=0)).any()) and len(steps) > _FEWEST_BLOCKS
 
 
-def _means(values: Values, block_of: Numbers) -> Values:
+def means_of(values: Values, block_of: Numbers) -> Values:
     """Return the mean of each feature in each block of consecutive trials; NaN where all are missing."""
     begins = np.unique(block_of, return_index=True)[1]
     known = np.add.reduceat(~np.isnan(values), begins, axis=0, dtype=np.float64)
@@ -233,7 +234,16 @@ def _likeness(means: Values, codes: Numbers) -> float:
     """Return by how many standard deviations blocks of a label are more like the next one than in random order.
 
     It is the sum of the products of their ranks in each feature (A. Wald and J. Wolfowitz, Ann. Math. Stat. 14 (1943)
-    378), against its mean over permutations. `codes` number the labels, which come one after the other.
+    378). `codes` number the labels, which come one after the other.
+    """
+    within = codes[1:] == codes[:-1]
+    return beyond_chance(means, codes, lambda ranks: float((ranks[1:] * ranks[:-1])[within].sum()))
+
+
+def beyond_chance(means: Values, codes: Numbers, statistic: Callable[[Values], float]) -> float:
+    """Return by how many standard deviations a statistic is above its mean over permutations within the labels.
+
+    It is computed from the ranks of each feature within a label, as shares about zero. `codes` are as in `_likeness`.
     """
     from scipy.stats import rankdata
 
@@ -244,11 +254,7 @@ def _likeness(means: Values, codes: Numbers) -> float:
             placed = rankdata(means[rows], axis=0, nan_policy="omit") / rows.sum()
             known = np.maximum((~np.isnan(placed)).sum(axis=0), 1)
             ranks[rows] = np.nan_to_num(placed - np.nansum(placed, axis=0) / known)
-    rng, within = np.random.default_rng(0), codes[1:] == codes[:-1]
-
-    def products(ordered: Values) -> float:
-        return float((ordered[1:] * ordered[:-1])[within].sum())
-
-    by_chance = [products(ranks[np.lexsort((rng.random(len(codes)), codes))]) for _ in range(_PERMUTATIONS)]
+    rng = np.random.default_rng(0)
+    by_chance = [statistic(ranks[np.lexsort((rng.random(len(codes)), codes))]) for _ in range(_PERMUTATIONS)]
     spread = float(np.std(by_chance))
-    return (products(ranks) - float(np.mean(by_chance))) / spread if spread > 0.0 else 0.0
+    return (statistic(ranks) - float(np.mean(by_chance))) / spread if spread > 0.0 else 0.0

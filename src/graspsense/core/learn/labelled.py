@@ -80,6 +80,10 @@ class Labelled:
     instances: tuple[str, ...] | None = field(default=None, converter=optional(_label_texts))
     no_instances: str = ""
     grouped: bool = False
+    sessions: bool = False
+    """Whether the instances are sessions, in each of which several objects may have been grasped."""
+    recorded_with: Mapping[str, tuple[str, ...]] = field(factory=dict)
+    """What is known of how each trial was recorded and is no feature, by its name: settings, a session, an operator."""
     no_interval: str = ""
     order: tuple[int, ...] | None = None
     no_order: str = ""
@@ -139,6 +143,7 @@ class Labelled:
             if self.value is None
             else evolve(self.value, values=_picked(self.value.values, numbers)),
             width=_control_rows(self.width, which),
+            recorded_with={name: _picked(texts, numbers) for name, texts in self.recorded_with.items()},
             variants={
                 name: evolve(variant, table=variant.table.rows(which))
                 for name, variant in self.variants.items()

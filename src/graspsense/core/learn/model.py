@@ -76,9 +76,13 @@ class Model:
         return bool(self.provenance.get("simulated", False))
 
     @property
-    def of_same_objects(self) -> bool:
-        """Whether its certainty holds for grasps of the trained objects only, as far as is known."""
-        return self.certainty is not None and self.sets is not None and self.sets.unit != "instances"
+    def holds_for(self) -> str:
+        """For which grasps alone its certainty holds, as far as is known; empty if it holds for all of its labels."""
+        if self.certainty is None or self.sets is None:
+            return ""
+        lacking = ["objects"] * (self.sets.unit != "instances")
+        lacking += ["sessions"] * (self.sets.unit != "sessions" and not self.simulated)
+        return f"the same {' and '.join(lacking)}" if lacking else ""
 
     @property
     def in_a_line(self) -> str:
@@ -144,7 +148,7 @@ class Model:
                     support=explained.support,
                     warnings=warnings,
                     model=self.in_a_line,
-                    of_same_objects=self.of_same_objects,
+                    holds_for=self.holds_for,
                 )
             probabilities = prediction.probabilities
             because = (strange,)
@@ -167,7 +171,7 @@ class Model:
         labels, shares = self.answers(table)
         made = self._calibrated(table.columns(self.names), labels, shares, bool(differences))
         return [
-            evolve(prediction, warnings=warnings, model=self.in_a_line, of_same_objects=self.of_same_objects)
+            evolve(prediction, warnings=warnings, model=self.in_a_line, holds_for=self.holds_for)
             for prediction in made
         ]
 
@@ -296,10 +300,11 @@ class Model:
 
     def _kind_warnings(self, differences: Sequence[str]) -> Iterator[str]:
         """Yield what holds for all predictions of this model, unless a difference says more."""
-        if self.of_same_objects and not differences:
+        if self.holds_for and not differences:
+            drift = ", and less once the forces have drifted" if self.holds_for.endswith("sessions") else ""
             yield (
-                "certainty and sets are for the same objects and sessions, since the training held out no named ones: "
-                "of others it knows less, and less once the forces have drifted"
+                f"certainty and sets are for the trained labels and {self.holds_for}, since the training held out no "
+                f"others: of these it knows less{drift}"
             )
         if self.sets is not None and self.sets.uncalibrated and not differences:
             names = ", ".join(self.sets.uncalibrated)
@@ -307,7 +312,7 @@ class Model:
         if self.simulated and not any(
             difference.startswith("trained on simulated grasps, but") for difference in differences
         ):
-            yield "trained on simulated grasps: valid for the simulator, untested on real objects"
+            yield "trained on simulated grasps: valid for its labels in the simulator, untested on real objects"
 
 
 def differences_from(

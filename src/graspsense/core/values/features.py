@@ -217,8 +217,8 @@ class Prediction:
     the most probable first: it contains the true label of a new object with the probability `coverage`. It is empty,
     and `coverage` None, if the model is not calibrated or the trial is unknown. `calibrated` says whether the
     probabilities agree with rates in held-out trials (`graspsense.core.learn.certainty`); `no_certainty` says why not.
-    `certainty_interval` is the 95 % interval of the certainty, None if it was not measured. `of_same_objects` says that
-    both hold for grasps of the trained objects, since it is not known that others were held out.
+    `certainty_interval` is the 95 % interval of the certainty, None if it was not measured. `holds_for` says for
+    which grasps both hold, such as those of `the same objects and sessions`: it is not known that others were held out.
     """
 
     label: str
@@ -232,7 +232,7 @@ class Prediction:
     calibrated: bool = False
     no_certainty: str = ""
     certainty_interval: tuple[float, float] | None = None
-    of_same_objects: bool = False
+    holds_for: str = ""
 
     @property
     def set_in_words(self) -> str:
@@ -250,7 +250,7 @@ class Prediction:
 
     @property
     def _for_which(self) -> str:
-        return " for the same objects" if self.of_same_objects else ""
+        return f" for {self.holds_for}" if self.holds_for else ""
 
     @property
     def certainty(self) -> float | None:
@@ -272,7 +272,7 @@ class Prediction:
     def certainty_figure(self) -> str:
         """The certainty in per cent, with its interval if that is wide: `92 % (72 to 98 %)`; empty without one.
 
-        It says so where it holds `for the same objects` only.
+        It says so where it holds `for the same objects and sessions` only.
         """
         if self.certainty is None:
             return ""
@@ -312,7 +312,7 @@ class Prediction:
             "certainty": self.certainty,
             "certainty_interval": None if self.certainty_interval is None else list(self.certainty_interval),
             "calibrated": self.calibrated,
-            "of_same_objects": self.of_same_objects,
+            "holds_for": self.holds_for,
             "no_certainty": self.no_certainty,
             "because": [reason.as_json() for reason in self.because],
         }

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from graspsense.core.components.caller import option
+from graspsense.core.learn.confounding import LEAST_LINES, says_the_label
 from graspsense.core.values.errors import counted, listed
 from graspsense.core.values.features import LARGEST_VALUE
 from graspsense.sources.trial_table.identifiers import (
-    LEAST_LINES,
     TIMES,
     are_even,
     can_be_days,
@@ -224,17 +224,6 @@ def keeps_rising(values: Sequence[float] | Numbers) -> bool:
     """Return whether each value is larger than the one before, or each is smaller, in lines that are not few."""
     steps = np.diff(np.array(values, dtype=np.float64))
     return len(steps) >= 2 * LEAST_LINES and bool((steps > 0.0).all() or (steps < 0.0).all())
-
-
-def says_the_label(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
-    """Return whether all lines of a label have the same value, which differs, as the label in other words does.
-
-    Where labels share a value, the lines of each must not be few, since values with few choices can agree by chance.
-    """
-    pairs = set(zip(values, labels, strict=True))
-    different, among = len(set(values)), len(set(labels))
-    few = different < among and min(Counter(labels).values()) < LEAST_LINES
-    return 1 < different <= len(pairs) == among < len(labels) and not few
 
 
 def mostly_says_the_label(values: Sequence[Hashable], labels: Sequence[str]) -> bool:

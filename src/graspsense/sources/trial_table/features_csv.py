@@ -11,12 +11,13 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from graspsense.core.components.caller import option
 from graspsense.core.files.csv_text import csv_text
+from graspsense.core.learn.confounding import LEAST_LINES
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.target_value import TargetValue
 from graspsense.core.values.errors import ConfigError, DataDamaged, counted, listed
@@ -31,8 +32,8 @@ from graspsense.sources.formats.csv_columns import CsvColumns
 from graspsense.sources.trial_table.doubtful_columns import doubts, not_held_out
 from graspsense.sources.trial_table.exported_table import ExportedTable, exported
 from graspsense.sources.trial_table.identifiers import (
-    LEAST_LINES,
     OF_OBJECTS,
+    groups_trials,
     identifies,
     names_a_recording,
     text_identifies,
@@ -95,11 +96,11 @@ def read_labelled(
     instances = None if instance is None else tuple(columns.complete_column(instance, "the instance"))
     reserved = {name for name in (label, instance, order, value) if name}
     table = _feature_table(columns, features, reserved, identified, notes)
+    others = [name for name in columns.names if name not in {*reserved, *table.names}]
     if export is None:
         recorded = lines if ranks is None else sorted(lines, key=ranks.__getitem__)
         values = None if target is None else target.values
         notes += doubts(columns, labels, table, values, recorded)
-        others = [name for name in columns.names if name not in {*reserved, *table.names}]
         notes += not_held_out(columns, others, instances)
     return Labelled(
         source=str(path),
@@ -107,6 +108,7 @@ def read_labelled(
         labels=tuple(labels),
         instances=instances,
         no_instances=f"no column names the instance ({option('instance', 'COLUMN')})",
+        **_recording(columns, instance, others),
         order=ranks,
         no_order=no_order,
         **_controls(table, columns, known_before, export),
@@ -114,6 +116,15 @@ def read_labelled(
         notes=tuple(notes),
         provenance={"simulated": export is not None and "1" in columns.cells["simulated"]},
     )
+
+
+def _recording(columns: CsvColumns, instance: str | None, others: Sequence[str]) -> dict[str, Any]:
+    """Return whether the instances are sessions, and what else of the recording is in the columns `others`."""
+    grouping = [name for name in others if groups_trials(name, columns.texts(name))]
+    return {
+        "sessions": instance is not None and groups_trials(instance, columns.texts(instance)),
+        "recorded_with": {name: tuple(columns.texts(name)) for name in grouping},
+    }
 
 
 def _object_column(

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from graspsense.core.learn.confounding import LEAST_LINES
 from graspsense.core.learn.copies import cells_in_range
 from graspsense.core.values.features import LARGEST_VALUE
 
@@ -51,8 +52,6 @@ _DIVISIONS: Final = frozenset({
 _NUMBERED: Final = frozenset(
     {"id", "no", "nr", "num", "number", "index", "idx", "name", "code", "of", "the", "random"}
 )
-LEAST_LINES: Final = 5
-"""Lines from which on the values of a column can show that it is an identifier."""
 _FOLLOWS: Final = 0.95
 """Rank correlation with the lines, within each label, of a counter or a clock."""
 _DRIFTS: Final = 0.7
@@ -123,7 +122,7 @@ def names_a_recording(name: str) -> bool:
     return bool(words & _OF_RECORDINGS) and words <= _OF_RECORDINGS | _NUMBERED
 
 
-def groups_trials(name: str, values: Sequence[str], instances: Sequence[str] | None) -> bool:
+def groups_trials(name: str, values: Sequence[str], instances: Sequence[str] | None = None) -> bool:
     """Return whether a column names sessions, operators or devices that whole instances do not hold out.
 
     Each of them has several trials, also with several instances. Missing values are empty.

@@ -1,0 +1,79 @@
+"""What differs between the trials of one label and of another besides the object, so that nothing tells which is told.
+
+A label that was always recorded with its own setting, or in its own session, is recognised by that too. So is one that
+was recorded in one stretch while the sensors drifted. How often the object is recognised without it, no held-out trials
+of the same recordings tell.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Hashable, Sequence
+from itertools import groupby
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from graspsense.core.components.caller import option
+from graspsense.core.learn.groups import beyond_chance, means_of
+
+if TYPE_CHECKING:
+    from graspsense.core.learn.labelled import Labelled
+
+LEAST_LINES: Final = 5
+"""Trials from which on their values can show more than chance."""
+_DRIFT: Final = 5.0
+"""Standard deviations by which features follow the time within all labels more than in random order, if they drift."""
+
+
+def confounded(labelled: Labelled) -> str:
+    """Return what the label cannot be told from in these trials; empty if nothing shows it, and for simulated ones."""
+    if labelled.provenance.get("simulated"):
+        return ""
+    columns = zip(labelled.table.names, labelled.table.values.T, strict=True)
+    features = [(name, column.tolist()) for name, column in columns if not np.isnan(column).any()]
+    for name, values in (*features, *labelled.recorded_with.items()):
+        if says_the_label(values, labelled.labels):
+            return (
+                f"all trials of a label have the same {name}: which of both is recognised cannot be told. Record each "
+                f"label with several; a feature can be left out ({option('features', python='columns')})"
+            )
+    if in_stretches(labelled) and _drifts(labelled):
+        return (
+            "each label was recorded in one stretch while the features drifted: which of both is recognised cannot be "
+            f"told. Record the labels in turns, or state the order ({option('order', 'COLUMN')})"
+        )
+    return ""
+
+
+def says_the_label(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
+    """Return whether all lines of a label have the same value, which differs, as the label in other words does.
+
+    Where labels share a value, the lines of each must not be few, since values with few choices can agree by chance.
+    """
+    pairs = set(zip(values, labels, strict=True))
+    different, among = len(set(values)), len(set(labels))
+    few = different < among and min(Counter(labels).values()) < LEAST_LINES
+    return 1 < different <= len(pairs) == among < len(labels) and not few
+
+
+def in_stretches(labelled: Labelled) -> bool:
+    """Return whether the trials of each label are one block in the order of recording, as far as that is known."""
+    if labelled.order is None or labelled.provenance.get("simulated"):
+        return False
+    in_time = [labelled.labels[row] for row in np.argsort(labelled.order, kind="stable").tolist()]
+    return sum(1 for _ in groupby(in_time)) == len(labelled.classes) < len(in_time)
+
+
+def _drifts(labelled: Labelled) -> bool:
+    """Return whether the features follow the time within all labels alike. Trials of one instance are as one."""
+    in_time = labelled.rows(np.argsort(np.array(labelled.order), kind="stable"))
+    units = [*zip(in_time.labels, in_time.instances or map(str, range(len(in_time))), strict=True)]
+    _, begins, unit_of = np.unique(units, axis=0, return_index=True, return_inverse=True)
+    place_of = np.argsort(np.argsort(begins))[unit_of.ravel()]
+    rows = np.argsort(place_of, kind="stable")
+    means = means_of(in_time.table.values[rows], place_of[rows])
+    sizes = [len(list(run)) for _, run in groupby(np.array(in_time.labels)[np.sort(begins)])]
+    codes = np.repeat(np.arange(len(sizes)), sizes)
+    time = np.concatenate([np.linspace(-0.5, 0.5, size) for size in sizes])
+    return beyond_chance(means, codes, lambda ranks: float(((time @ ranks) ** 2).sum())) > _DRIFT
