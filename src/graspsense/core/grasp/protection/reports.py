@@ -62,6 +62,7 @@ class Reports:
         self._expected = self._block_s = 0.0
         self._block = max(FEWEST, SURPLUS_S * rate_hz)
         self._singly_lost = 0
+        self._closing = False
         self._counter = -1
         self._image_t_s = nan
 
@@ -80,7 +81,9 @@ class Reports:
                     "are not valid; restart the gripper",
                     ends=True,
                 )
-        if closing and self._frames and not -self._period_s < frame.dt_s < self._jump_s:
+        # The frame that ends the hold ends it because of the jump.
+        closed, self._closing = self._closing, closing
+        if (closing or closed) and self._frames and not -self._period_s < frame.dt_s < self._jump_s:
             return self._jumped(frame.dt_s)
         if pads.counter != self._counter or self._image_t_s != self._image_t_s:
             self._counter, self._image_t_s = pads.counter, frame.t_s
