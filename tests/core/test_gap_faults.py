@@ -130,7 +130,7 @@ def opened(gap_of, start_m=0.08, delay_s=0.02):
     [
         (lambda t: 0.05 + 0.05 * t, 0.08, []),
         (lambda t: 0.05 + 0.05 * max(t - 0.15, 0.0), 0.08, []),
-        (lambda t: 0.05 + 0.05 * max(t - 0.3, 0.0), 0.08, ["gap late"]),
+        (lambda t: 0.05 + 0.05 * max(t - 0.2, 0.0), 0.08, ["gap late"]),
         (lambda t: 0.05, 0.08, ["fingers did not open"]),
         (lambda t: nan, 0.08, ["fingers did not open"]),
         # Frames that come late tell the end of the squeeze first, which is no opening.

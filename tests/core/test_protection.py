@@ -217,6 +217,16 @@ def test_a_motor_within_a_quarter_of_its_command_or_that_a_spring_pushes_open_in
 
 
 @every_case(
+    ("answer", "tells", "ends"),
+    [(30.0, False, False), (50.0, True, False), (200.0, True, True)],
+)
+def test_a_gripper_that_closes_by_itself_keeps_the_limit_of_its_effort(answer, tells, ends):
+    closes = Command(POSITION, 0.0, 20.0, 0.05)
+    seen = motor_faults(course(1.0, gap=0.05, effort=answer), closes, SQUEEZE)
+    assert ({fault.name for _, fault in seen} == {"motor too strong"}, any(fault.ends for _, fault in seen)) == (tells, ends)
+
+
+@every_case(
     ("asked", "answer", "name", "ends_first", "relaxes"),
     [
         (20.0, 100.0, "motor too strong", True, False),  # five times the command: at once

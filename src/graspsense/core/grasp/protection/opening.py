@@ -17,7 +17,7 @@ LEAST_TRAVEL_M: Final = 0.0015
 """Travel of the closing from which on the opening must show."""
 OPENED_M: Final = 0.001
 """Change of the gap that shows it."""
-LATE_S: Final = 0.2
+LATE_S: Final = 0.16
 """Time beyond the delay of a command after which the gap is late; at least four frames."""
 STANDS_S: Final = 0.5
 """Time beyond it after which the fingers count as not opened; at least six frames."""
