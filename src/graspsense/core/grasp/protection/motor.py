@@ -275,7 +275,7 @@ class FeltForce:
 
     The largest one, since fingers whose drive holds by itself press on with it. `pads_hz` is the rate of the forces, 0
     if it is not known. The friction of the drive (N; 0: it is not known) keeps what an impact has pressed; without it,
-    no force ends a grasp.
+    only three times the effort ends a grasp.
     """
 
     def __init__(self, rate_hz: float, pads_hz: float, friction_n: float = 0.0) -> None:
@@ -294,22 +294,23 @@ class FeltForce:
     def see(self, frame: Frame) -> Fault | None:
         """Take the frame of a tick while the fingers close or hold, and return a force that no command explains.
 
-        Only fingers that rest are judged, so a gripper without a velocity is not.
+        What the mass of fingers that are braked adds for longer is little.
         """
         felt_n, allowed_n = min(frame.force_left_n, frame.force_right_n), self._allowed_n
         rests = abs(frame.velocity_m_s) < RESTS_M_S
         held_n = felt_n - self._friction_n
         more = rests and held_n > (1.0 + ALLOWED_SHARE) * allowed_n + ALLOWED_N
-        strong = rests and self._friction_n > 0.0 and held_n > (1.0 + STRONG_SHARE) * allowed_n + STRONG_N
+        strong = held_n > (1.0 + STRONG_SHARE) * allowed_n + STRONG_N
         self._more_s = lasting(self._more_s, more, frame.dt_s)
         self._strong_s = lasting(self._strong_s, strong, frame.dt_s)
-        if self._more_s <= self._told_s:
+        if self._more_s <= self._told_s and self._strong_s <= self._ends_s:
             return None
+        ends = self._friction_n > 0.0 or held_n > (1.0 + UNLIMITED_SHARE) * allowed_n + STRONG_N
         return Fault(
             "stronger than commanded",
             f"both pads feel {felt_n:.1f} N, and the motor was told {allowed_n:.1f} N at most: check the scale of the "
             "motor, and the calibration of the pads",
-            ends=self._strong_s > self._ends_s,
+            ends=ends and self._strong_s > self._ends_s,
         )
 
 
