@@ -139,9 +139,9 @@ class Motor:
         """Take the command that is applied after this frame."""
         effort_n = command.value if command.kind == EFFORT else nan
         asked = Asked(frame.t_s, effort_n, direction_of(command, frame.gap_m))
-        if asked.direction == 1 and command.kind in (POSITION, VELOCITY):
-            if not command.effort_limit_n <= self._allowed_n:
-                self._allowed_n = command.effort_limit_n
+        chooses = asked.direction == 1 and command.kind in (POSITION, VELOCITY)
+        if chooses and not command.effort_limit_n <= self._allowed_n:
+            self._allowed_n = command.effort_limit_n
         # Where the clock of the gripper stands still, the commands would gather.
         commands = self._commands
         if not commands or asked.direction != commands[-1].direction:
