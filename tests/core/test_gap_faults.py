@@ -137,6 +137,8 @@ def opened(gap_of, start_m=0.08, delay_s=0.02):
         (lambda t: 0.05 - 0.01 * min(t, 0.2) + 0.05 * max(t - 0.3, 0.0), 0.08, ["gap late"]),
         # An encoder that stopped after the first 1.7 mm of the closing.
         (lambda t: 0.05, 0.0517, ["fingers did not open"]),
+        # A gap that never changed, while the fingers closed for a second.
+        (lambda t: 0.05, 0.05, ["fingers stand still"]),
         # Fingers that never closed need not open.
         (lambda t: 0.05, 0.051, []),
     ],

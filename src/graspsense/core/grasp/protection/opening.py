@@ -15,9 +15,8 @@ from graspsense.core.values.signals import APPROACH, EFFORT, POSITION, Command, 
 
 LEAST_TRAVEL_M: Final = 0.0015
 """Travel of the closing from which on the opening must show."""
-STOOD_M: Final = 0.0001
 STOOD_S: Final = 0.4
-"""Travel of the gap in a closing below which it has stood still, and the time from which on that is told."""
+"""Time of a closing from which on a gap that never changed is told."""
 OPENED_M: Final = 0.001
 """Change of the gap that shows it."""
 LATE_S: Final = 0.16
@@ -101,7 +100,7 @@ class Opening:
         self._start_m = min(self._start_m, frame.gap_m)
         self._opened = frame.gap_m - self._start_m >= OPENED_M
         if not closed_m >= LEAST_TRAVEL_M:
-            return self._stood(self._start_s - self._began_s) if closed_m < STOOD_M else None
+            return self._stood(self._start_s - self._began_s) if closed_m == 0.0 else None
         if self._opened:
             rested = self._start_s - self._rest_s >= RESTED_S
             return self._late(elapsed_s) if rested and elapsed_s > self._late_s else None
