@@ -130,13 +130,15 @@ def opened(gap_of, start_m=0.08, delay_s=0.02):
     [
         (lambda t: 0.05 + 0.05 * t, 0.08, []),
         (lambda t: 0.05 + 0.05 * max(t - 0.15, 0.0), 0.08, []),
-        (lambda t: 0.05 + 0.05 * max(t - 0.3, 0.0), 0.08, ["gap late"]),
+        (lambda t: 0.05 + 0.05 * max(t - 0.2, 0.0), 0.08, ["gap late"]),
         (lambda t: 0.05, 0.08, ["fingers did not open"]),
         (lambda t: nan, 0.08, ["fingers did not open"]),
         # Frames that come late tell the end of the squeeze first, which is no opening.
         (lambda t: 0.05 - 0.01 * min(t, 0.2) + 0.05 * max(t - 0.3, 0.0), 0.08, ["gap late"]),
         # An encoder that stopped after the first 1.7 mm of the closing.
         (lambda t: 0.05, 0.0517, ["fingers did not open"]),
+        # A gap that never changed, while the fingers closed for a second.
+        (lambda t: 0.05, 0.05, ["fingers stand still"]),
         # Fingers that never closed need not open.
         (lambda t: 0.05, 0.051, []),
     ],

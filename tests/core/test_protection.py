@@ -217,6 +217,19 @@ def test_a_motor_within_a_quarter_of_its_command_or_that_a_spring_pushes_open_in
 
 
 @every_case(
+    ("answer", "tells", "ends"),
+    [(30.0, False, False), (50.0, True, False), (200.0, True, True)],
+)
+def test_a_gripper_that_closes_by_itself_keeps_the_limit_of_its_effort(answer, tells, ends):
+    closes = Command(POSITION, 0.0, 20.0, 0.05)
+    seen = motor_faults(course(1.0, gap=0.05, effort=answer), closes, SQUEEZE)
+    assert (
+        {fault.name for _, fault in seen} == {"motor too strong"},
+        any(fault.ends for _, fault in seen),
+    ) == (tells, ends)
+
+
+@every_case(
     ("asked", "answer", "name", "ends_first", "relaxes"),
     [
         (20.0, 100.0, "motor too strong", True, False),  # five times the command: at once
@@ -532,7 +545,8 @@ def test_pads_that_both_feel_more_than_the_motor_was_told():
     # A quarter and 1.5 N more are told, a half and 3 N more end the grasp.
     assert (felt(33.0, 60.0), felt(35.0, 35.0), felt(41.0, 60.0)) == (None, False, True)
     # Fingers that are being braked press with their mass; those that hold by themselves, with the largest command.
-    assert felt(100.0, 100.0, velocity=-0.01) is felt(25.0, 25.0, commands=(30.0, 0.0)) is None
+    assert felt(100.0, 100.0, seconds=0.25, velocity=-0.01) is felt(25.0, 25.0, commands=(30.0, 0.0)) is None
+    assert felt(100.0, 100.0, velocity=-0.01) is True
     # One image that is wrong is no force.
     assert felt(100.0, 100.0, seconds=0.041) is None
     # The default hold lasts 0.25 s: it is told within that, and ends the grasp only if it lasts longer.

@@ -16,7 +16,7 @@ from graspsense.core.values.signals import HOLD, Command, Reading
 
 PIPELINE: Final = "hold"
 LONGEST_S: Final = 3500.0
-LETTING_GO: Final = ("release", "opened", "let go", "not opened")
+LETTING_GO: Final = ("release", "opened", "let go")
 """How the events of the runner begin that tell what becomes of the fingers at the end."""
 TO_GRASP_S: Final = 60.0
 """Time that is allowed for the grasp itself."""

@@ -48,7 +48,7 @@ RATE_HZ: Final = 100.0
 ACTIVATION_S: Final = 5.0
 COMMAND_DELAY_S: Final = 0.02
 """A command waits for the next exchange (10 ms), which takes 5 ms on the line, and the gripper's next period (5 ms)."""
-STOP: Final = "graspsense_robotiq_2f.stopping:stop"
+LET_GO: Final = "graspsense_robotiq_2f.stopping:let_go"
 """What is called if the program is killed."""
 AHEAD_M: Final = 0.004
 """How far a target that moves can be ahead of the fingers."""
@@ -116,7 +116,7 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
             self._emulated = LockStepGripper(config, seed) if config.emulated else None
             self._link = self._emulated or self._opened_link()
             if self._emulated is None:
-                self._switch = DeadManSwitch(STOP, config.port, config.address, config.reply_timeout_s)
+                self._switch = DeadManSwitch(LET_GO, config.port, config.address, config.reply_timeout_s)
             self._polling = Polling(RATE_HZ, self._emulated or time)
             status = self._activated()
             self._open_fingertips()

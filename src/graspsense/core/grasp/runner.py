@@ -2,8 +2,8 @@
 
 A grasp opens the fingers, tares, closes under the controller, holds, and opens again. In each tick the runner reads a
 frame, computes the command and limits it, applies it, and passes the tick to the sinks. On every way out (end of the
-grasp, error, Ctrl-C) the gripper is commanded to open and then to relax, a lost gripper only to relax. It is then
-closed.
+grasp, error, Ctrl-C) the gripper is commanded to open and then to relax, also if it no longer answers: it may hear. It
+is then closed.
 """
 
 from __future__ import annotations
@@ -228,6 +228,8 @@ def _announce(
 
 MOSTLY: Final = 0.1
 """Share of the commands of a squeeze from which on it is not the one that the controller commanded."""
+UNHEARD_S: Final = 1.0
+"""Time for which a gripper that does not answer is told to open."""
 _PHASES: Final = frozenset(Phase)
 
 
@@ -295,13 +297,11 @@ class _Grasp:
 
     def drive(self) -> tuple[Outcome, str]:
         """Run the loop and return the outcome. The gripper was then commanded to open or relax."""
-        lost = False
         self._show_device()
         try:
             self._loop()
             ending: tuple[Outcome, str] | None = None
         except DeviceLost as error:
-            lost = True
             ending = Outcome.DEVICE_LOST, str(error)
         except RecordingEnded:
             ending = self._recording_ended()
@@ -315,9 +315,8 @@ class _Grasp:
             ending = Outcome.ABORTED, f"{named(error)}{place_of(error)}"
         finally:
             self.interrupts.deferred = True
-            # A lost gripper may still receive commands, so it is commanded to relax.
             fault = self._fault()
-            self._let_go(lost, opens=not (self.state.done or (fault is not None and fault.relaxes)))
+            self._let_go(opens=not (self.state.done or (fault is not None and fault.relaxes)))
         if ending is None and fault is not None and self.protection is not None:
             ending = fault.outcome, self.protection.cause_of(fault).told
         if ending is None:
@@ -566,13 +565,13 @@ class _Grasp:
         """Log a prediction that was made while the grasp goes on."""
         self._event(t_s, Phase(phase), what, "model", prediction)
 
-    def _let_go(self, lost: bool, *, opens: bool) -> None:
+    def _let_go(self, *, opens: bool) -> None:
         """Open the fingers, then relax, and tell how they were left. A failure of one step must not prevent the next.
 
-        With `opens` false, because the fingers are open, or if frames no longer come, it only relaxes.
+        With `opens` false, because the fingers are open, it only relaxes.
         """
-        left = "not opened: the gripper does not answer" if lost else "let go, not opened"
-        opens = opens and not lost and self.state.phase >= APPROACH
+        left = "let go, not opened"
+        opens = opens and self.state.phase >= APPROACH
         try:
             if opens and self.info.opening is not None and self.last is not None:
                 left = self._opened(self.info.opening, self.last)
@@ -587,17 +586,23 @@ class _Grasp:
         """Open the fingers, and return in words whether they came to rest."""
         info, run = self.info, self.run
         still, began_s = RestState(last.t_s + self.backend.command_delay_s, last.gap_m), last.t_s
-        give_up = time.perf_counter() + run.opening_timeout_s
+        heard = time.perf_counter()
+        give_up, answers = heard + run.opening_timeout_s, False
         fresh = GuardState(1, 0, 0)
         if self.protection is not None:
             opening = self.protection.opens_with(opening)
         # After a second Ctrl-C, only relax.
-        while time.perf_counter() < give_up and self.interrupts.count < 2:
+        while time.perf_counter() < min(give_up, heard + UNHEARD_S) and self.interrupts.count < 2:
             command, fresh = guard(self.params.guard, fresh, last, opening)
-            self.backend.apply(command)
-            reading = self.backend.read(frame_timeout_s(run, info))
-            if reading is None:
-                break
+            reading = None
+            with suppress(*FAILURES):
+                self.backend.apply(command)
+                reading = self.backend.read(frame_timeout_s(run, info))
+            if answers := reading is not None:
+                heard = time.perf_counter()
+            else:
+                time.sleep(1.0 / info.rate_hz)
+                continue
             if self.protection is not None and self.protection.opens_wrongly(reading, command):
                 break
             self.last = last = reading.frame
@@ -607,7 +612,8 @@ class _Grasp:
                 return f"opened to {last.gap_m * 1e3:.1f} mm"
             if last.t_s - began_s > run.opening_timeout_s:
                 break
-        return f"let go at {last.gap_m * 1e3:.1f} mm, not known to be open"
+        why = "" if answers else ": the gripper does not answer"
+        return f"let go at {last.gap_m * 1e3:.1f} mm, not known to be open{why}"
 
     def _recording_ended(self) -> tuple[Outcome, str]:
         if self.state.law.outcome != RUNNING:

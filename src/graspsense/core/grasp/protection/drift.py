@@ -28,6 +28,9 @@ LOW: Final = 0.15
 """Share of the contact force below which a pad counts as free."""
 TRAVEL_M: Final = 0.003
 """Travel from free to a share of the contact force that is too long for a contact."""
+STEP_SHARE: Final = 0.6
+"""Share of a force from which on a single step has made it: the pad pushes an object, or its zero has jumped, which the
+end of the release shows."""
 SIGMAS: Final = 6.0
 """The drift must exceed this many standard deviations of the averaged force."""
 NOISY: Final = 0.2
@@ -91,6 +94,7 @@ class PadDrift:
         self._start: NDArray[np.float64] | None = None
         self._noise = Noise()
         self._low_gap_m = nan
+        self._step_n = 0.0
 
     def see(self, force_n: float, gap_m: float, cells: tuple[float, ...]) -> Fault | None:
         """Take a sample of the approach, with a new image (empty: no cells), and return drift that it shows."""
@@ -109,12 +113,15 @@ class PadDrift:
         if self._start is None and len(self._images) == SAMPLES:
             self._start = np.mean(self._images, axis=0)
         mean_n = sum(self._forces) / SAMPLES
+        earlier_n, *later_n = self._forces
+        self._step_n = max(self._step_n, min(later_n) - earlier_n)
         if self._low_gap_m != self._low_gap_m or mean_n < LOW * self._contact_n:
             self._low_gap_m = gap_m
         noise_n = SIGMAS * self._noise.deviation_n() / sqrt(SAMPLES)
         if abs(mean_n) < max(WARNS * self._contact_n, noise_n):
             return self._noise.fault(f"{self._side} pad", NOISY * self._contact_n)
-        if mean_n > 0.0 and not (self._low_gap_m - gap_m >= TRAVEL_M and self.on_all_cells()):
+        slow = self._low_gap_m - gap_m >= TRAVEL_M and self._step_n < STEP_SHARE * mean_n
+        if mean_n > 0.0 and not (slow and self.on_all_cells()):
             return None
         return Fault(
             f"{self._side} pad drifts",

@@ -12,7 +12,17 @@ from typing import Final, NamedTuple
 
 from graspsense.core.grasp.protection.effort_ceiling import asked_effort_n
 from graspsense.core.values.faults import Fault
-from graspsense.core.values.signals import APPROACH, EFFORT, FORCE, HOLD, POSITION, Command, Frame
+from graspsense.core.values.signals import (
+    APPROACH,
+    EFFORT,
+    FORCE,
+    HOLD,
+    POSITION,
+    SQUEEZE,
+    VELOCITY,
+    Command,
+    Frame,
+)
 
 
 class RecentMean:
@@ -42,6 +52,8 @@ ALLOWED_N: Final = 1.5
 STRONG_SHARE: Final = 0.5
 STRONG_N: Final = 3.0
 """By how much an effort above the command ends the grasp."""
+UNLIMITED_SHARE: Final = 2.0
+"""Share by which an effort that the gripper chooses itself may be above its limit: the scale of a current is unsure."""
 LASTS_S: Final = 0.03
 """Time for which a difference must last to be a fault of the motor."""
 STRONG_S: Final = 0.3
@@ -103,7 +115,8 @@ def lasting(seconds: float, present: bool, dt_s: float) -> float:
 class Motor:
     """Compares the effort that the gripper reports with the commands, and the motion with their direction.
 
-    Only commands of an effort are compared with the answer. `reports_effort` says whether the frames have an effort at
+    Commands of an effort are compared with the answer, and others by the largest effort that they have allowed so far,
+    since a drive that locks itself holds on with it. `reports_effort` says whether the frames have an effort at
     all, and `rate_hz` is their rate.
     """
 
@@ -112,6 +125,7 @@ class Motor:
         self._delay_s = max(DELAY_S, PERIODS / rate_hz)
         self._lasts_s = max(LASTS_S, PERIODS / rate_hz)
         self._commands: deque[Asked] = deque()
+        self._allowed_n = nan
         self._direction_t_s = nan
         """The time since when all commands have the direction of the last one."""
         self._strong_s = self._weak_s = self._reversed_s = 0.0
@@ -125,6 +139,9 @@ class Motor:
         """Take the command that is applied after this frame."""
         effort_n = command.value if command.kind == EFFORT else nan
         asked = Asked(frame.t_s, effort_n, direction_of(command, frame.gap_m))
+        chooses = asked.direction == 1 and command.kind in (POSITION, VELOCITY)
+        if chooses and not command.effort_limit_n <= self._allowed_n:
+            self._allowed_n = command.effort_limit_n
         # Where the clock of the gripper stands still, the commands would gather.
         commands = self._commands
         if not commands or asked.direction != commands[-1].direction:
@@ -151,7 +168,7 @@ class Motor:
         least, most = min(efforts), max(efforts)
         # One command of another kind makes the sum no number.
         if sum(efforts) != sum(efforts):
-            return None
+            return self._beyond_limit(frame) if phase in (APPROACH, SQUEEZE, HOLD) else None
         return self._answer(frame, least, most) or (
             self._off(frame, 0.5 * (least + most)) if phase == HOLD else None
         )
@@ -168,6 +185,20 @@ class Motor:
             "motor off",
             f"it answers {answered_n:.1f} N in the hold to a command of {asked_n:.1f} N, and {100 * OFF_SHARE:.0f} % "
             "are allowed: forces at rest are off by as much; check its supply and its scale",
+        )
+
+    def _beyond_limit(self, frame: Frame) -> Fault | None:
+        above_n = frame.effort_n - self._allowed_n
+        strong = above_n > STRONG_N + STRONG_SHARE * self._allowed_n
+        self._strong_s = lasting(self._strong_s, strong, frame.dt_s)
+        # A motor that starts takes more for a moment.
+        if self._strong_s <= max(OFF_S, self._lasts_s):
+            return None
+        return Fault(
+            "motor too strong",
+            f"it answers {frame.effort_n:.1f} N, and its commands allow {self._allowed_n:.1f} N: it ignores the limit, "
+            "or the effort has another scale; check both",
+            ends=self._strong_s > STRONG_S and above_n > STRONG_N + UNLIMITED_SHARE * self._allowed_n,
         )
 
     def _answer(self, frame: Frame, least: float, most: float) -> Fault | None:
@@ -244,7 +275,7 @@ class FeltForce:
 
     The largest one, since fingers whose drive holds by itself press on with it. `pads_hz` is the rate of the forces, 0
     if it is not known. The friction of the drive (N; 0: it is not known) keeps what an impact has pressed; without it,
-    no force ends a grasp.
+    only three times the effort ends a grasp.
     """
 
     def __init__(self, rate_hz: float, pads_hz: float, friction_n: float = 0.0) -> None:
@@ -263,22 +294,23 @@ class FeltForce:
     def see(self, frame: Frame) -> Fault | None:
         """Take the frame of a tick while the fingers close or hold, and return a force that no command explains.
 
-        Only fingers that rest are judged, so a gripper without a velocity is not.
+        What the mass of fingers that are braked adds for longer is little.
         """
         felt_n, allowed_n = min(frame.force_left_n, frame.force_right_n), self._allowed_n
         rests = abs(frame.velocity_m_s) < RESTS_M_S
         held_n = felt_n - self._friction_n
         more = rests and held_n > (1.0 + ALLOWED_SHARE) * allowed_n + ALLOWED_N
-        strong = rests and self._friction_n > 0.0 and held_n > (1.0 + STRONG_SHARE) * allowed_n + STRONG_N
+        strong = held_n > (1.0 + STRONG_SHARE) * allowed_n + STRONG_N
         self._more_s = lasting(self._more_s, more, frame.dt_s)
         self._strong_s = lasting(self._strong_s, strong, frame.dt_s)
-        if self._more_s <= self._told_s:
+        if self._more_s <= self._told_s and self._strong_s <= self._ends_s:
             return None
+        ends = self._friction_n > 0.0 or held_n > (1.0 + UNLIMITED_SHARE) * allowed_n + STRONG_N
         return Fault(
             "stronger than commanded",
             f"both pads feel {felt_n:.1f} N, and the motor was told {allowed_n:.1f} N at most: check the scale of the "
             "motor, and the calibration of the pads",
-            ends=self._strong_s > self._ends_s,
+            ends=ends and self._strong_s > self._ends_s,
         )
 
 

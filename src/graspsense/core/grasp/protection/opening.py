@@ -15,9 +15,11 @@ from graspsense.core.values.signals import APPROACH, EFFORT, POSITION, Command, 
 
 LEAST_TRAVEL_M: Final = 0.0015
 """Travel of the closing from which on the opening must show."""
+STOOD_S: Final = 0.4
+"""Time of a closing from which on a gap that never changed is told."""
 OPENED_M: Final = 0.001
 """Change of the gap that shows it."""
-LATE_S: Final = 0.2
+LATE_S: Final = 0.16
 """Time beyond the delay of a command after which the gap is late; at least four frames."""
 STANDS_S: Final = 0.5
 """Time beyond it after which the fingers count as not opened; at least six frames."""
@@ -57,7 +59,7 @@ class Opening:
             opening is not None and opening.kind == EFFORT and -opening.value >= STOP * friction_n > 0.0
         )
         self._first_m = nan
-        self._widest_m = -inf
+        self._widest_m, self._began_s = -inf, nan
         self._start_m = self._start_s = self._rest_m = self._rest_s = nan
         self._opened = False
 
@@ -84,6 +86,8 @@ class Opening:
         """Take the frame of a tick; return what is wrong with the opening after the grasp."""
         if phase != Phase.RELEASE:
             if phase >= APPROACH:
+                if self._began_s != self._began_s:
+                    self._began_s = frame.t_s
                 self._widest_m = max(self._widest_m, frame.gap_m)
                 self._start_m, self._start_s = frame.gap_m, frame.t_s
                 if not abs(frame.gap_m - self._rest_m) < OPENED_M:
@@ -96,7 +100,7 @@ class Opening:
         self._start_m = min(self._start_m, frame.gap_m)
         self._opened = frame.gap_m - self._start_m >= OPENED_M
         if not closed_m >= LEAST_TRAVEL_M:
-            return None
+            return self._stood(self._start_s - self._began_s) if closed_m == 0.0 else None
         if self._opened:
             rested = self._start_s - self._rest_s >= RESTED_S
             return self._late(elapsed_s) if rested and elapsed_s > self._late_s else None
@@ -141,6 +145,15 @@ class Opening:
 
     def _is_as_before(self, gap_m: float) -> bool:
         return abs(gap_m - self._first_m) <= max(AGAIN_M, AGAIN_SHARE * self._first_m)
+
+    def _stood(self, closing_s: float) -> Fault | None:
+        if not closing_s > STOOD_S:
+            return None
+        return Fault(
+            "fingers stand still",
+            f"the gap has not changed in {closing_s:.1f} s of closing: if the fingers moved, it is wrong, and the "
+            "object is not too wide; look at the fingers and the encoder",
+        )
 
     def _late(self, elapsed_s: float) -> Fault:
         return Fault(

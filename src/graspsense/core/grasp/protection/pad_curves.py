@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from graspsense.core.grasp.protection.cells import DOUBT, FEWEST_IMAGES, MOST_NOISY, frozen
-from graspsense.core.grasp.protection.pad_forces import HELD_S
+from graspsense.core.grasp.protection.pad_forces import FREE_SHARE, HELD_S
 from graspsense.core.values.faults import Fault
 from graspsense.core.values.signals import APPROACH, HOLD, SQUEEZE, Phase, Reading
 
@@ -51,8 +51,6 @@ FEWEST_APART: Final = 3
 """Share of the greatest force by which the pads may differ besides, in so many samples in a row."""
 RETURNS: Final = 0.3
 """Share of a jump by which the next sample goes back if it is noise; beyond a step, the force stays."""
-FREE_SHARE: Final = 0.3
-"""Share of the contact force below which a pad is free."""
 FEWEST_SPIKES: Final = 2
 """Samples of the approach, with a free pad around each, that are no knock at the object."""
 
@@ -260,7 +258,7 @@ class PadCurves:
     def _apart(self, forces: tuple[float, float], phase: int) -> Fault | None:
         """Return the fault of pads that differ by more than friction holds while the force rises or falls."""
         difference_n = forces[0] - forces[1]
-        if phase == APPROACH:
+        if phase == APPROACH and min(forces) < FREE_SHARE * self._contact_n:
             self._pushed_n = difference_n
         self._pressed_n = max(self._pressed_n, *forces)
         apart = abs(difference_n - self._pushed_n) > max(FRICTION_N, APART_SHARE * self._pressed_n)

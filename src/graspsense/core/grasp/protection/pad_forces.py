@@ -17,6 +17,8 @@ ALLOWED_N: Final = 2.0
 """Difference that friction can hold: 1.5 N for half a kilogram on a table."""
 ALLOWED_SHARE: Final = 1.0 / 3.0
 """Difference that is allowed, as a share of the larger force: calibrations differ."""
+FREE_SHARE: Final = 0.3
+"""Share of the contact force below which a pad is free."""
 SCALED_CONTACTS: Final = 0.5
 SCALED_SHARE: Final = 0.2
 """Difference that is allowed if it has grown from the contact on, over the contact force, or as a share of the larger
@@ -46,13 +48,13 @@ class PadBalance:
     def __init__(self, contact_n: float) -> None:
         self._left, self._right = RecentMean(MEAN_S), RecentMean(MEAN_S)
         self._seen_s = 0.0
-        self._scaled_n = SCALED_CONTACTS * contact_n
+        self._scaled_n, self._free_n = SCALED_CONTACTS * contact_n, FREE_SHARE * contact_n
         self._pushed_n = 0.0
         """What the left pad felt more than the right one before both touched (N)."""
 
     def see(self, frame: Frame, phase: int) -> Fault | None:
         """Take the frame of a tick while the fingers close or hold; return what no friction or calibration explains."""
-        if phase == Phase.APPROACH:
+        if phase == Phase.APPROACH and min(frame.force_left_n, frame.force_right_n) < self._free_n:
             more_n = frame.force_left_n - frame.force_right_n
             self._pushed_n = more_n if more_n == more_n else self._pushed_n
         if phase != Phase.HOLD:

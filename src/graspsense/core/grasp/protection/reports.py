@@ -42,8 +42,10 @@ ALIKE: Final = 0.9
 """Step of the gap from which on it is coarse, and share of it that the others have."""
 SURPLUS_SHARE: Final = 0.05
 SURPLUS_S: Final = 0.4
-"""Share of frames beyond the declared rate, and the time over which it is taken (at least `FEWEST` frames), from which
-on the clock of the gripper counts as slow."""
+SURPLUS_FRAMES: Final = 40
+SURPLUS: Final = 4.0
+"""Share of frames beyond the declared rate from which on the clock of the gripper counts as slow, the time and the
+number of frames over which it is taken at least (at most `FEWEST`, if they take longer), and the least surplus."""
 IMAGES_LATE: Final = 5.0
 """Periods of the cell images without a new one after which the forces are out of date."""
 IMAGES_LATE_S: Final = 0.1
@@ -62,6 +64,7 @@ class Reports:
         self._expected = self._block_s = 0.0
         self._block = max(FEWEST, SURPLUS_S * rate_hz)
         self._singly_lost = 0
+        self._closing = False
         self._counter = -1
         self._image_t_s = nan
 
@@ -80,7 +83,9 @@ class Reports:
                     "are not valid; restart the gripper",
                     ends=True,
                 )
-        if closing and self._frames and not -self._period_s < frame.dt_s < self._jump_s:
+        # The frame that ends the hold ends it because of the jump.
+        closed, self._closing = self._closing, closing
+        if (closing or closed) and self._frames and not -self._period_s < frame.dt_s < self._jump_s:
             return self._jumped(frame.dt_s)
         if pads.counter != self._counter or self._image_t_s != self._image_t_s:
             self._counter, self._image_t_s = pads.counter, frame.t_s
@@ -129,10 +134,11 @@ class Reports:
         self._block_frames += 1
         self._block_s += dt_s
         frames, block_s = self._block_frames, self._block_s
-        if frames < self._block:
+        if frames < max(SURPLUS_FRAMES, SURPLUS_S / self._period_s):
             return None
-        self._block_frames, self._block_s = 0, 0.0
-        if frames * self._period_s - block_s <= SURPLUS_SHARE * block_s:
+        if frames >= self._block:
+            self._block_frames, self._block_s = 0, 0.0
+        if frames * self._period_s - block_s <= max(SURPLUS_SHARE * block_s, SURPLUS * self._period_s):
             return None
         return Fault(
             "clock slow",

@@ -17,6 +17,7 @@ from typing import Final
 
 from graspsense.core.control.contact import MOVED_M
 from graspsense.core.grasp.protection.motor import RecentMean
+from graspsense.core.grasp.protection.pad_forces import FREE_SHARE
 from graspsense.core.values.faults import Fault
 from graspsense.core.values.signals import (
     APPROACH,
@@ -57,8 +58,6 @@ STALL_SHARE: Final = 0.2
 """Share of the approach speed below which the motor counts as stalled."""
 SHARP_M: Final = 0.0015
 """Travel, and the time of the approach for it, in which the force of a pad rises when it touches an object."""
-FREE_SHARE: Final = 0.3
-"""Share of the contact force below which a pad is free."""
 SLOWED_SHARE: Final = 0.7
 """Share of the approach speed below which the fingers have met a resistance."""
 SMOOTHING_S: Final = 0.2
