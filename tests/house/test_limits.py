@@ -41,6 +41,7 @@ MANY_PARAMETERS = {
     "graspsense/core/drivers/transmission.py:screw_linkage": "the ten constants of a linkage, by keyword only",
     "graspsense/evaluation/crossval.py:cross_validate": "public; three optional ones are by keyword only",
     "graspsense/evaluation/evaluate.py:evaluate": "public; all settings of an evaluation, by keyword only",
+    "graspsense/store/record_grasp.py:record_grasp": "what, where, and who watches; all but three by keyword only",
     "graspsense/testing/conformance.py:examine": "public; all that a check can be told, by keyword only",
     "graspsense_c45/classifier.py:__init__": "scikit-learn requires an explicit parameter for each setting",
 }
