@@ -83,7 +83,7 @@ def test_a_thing_unlike_anything_is_unknown_and_says_why():
     ("names", "values", "units", "why"),
     [
         (NAMES, (math.nan,) * 3, UNITS, "no feature is defined: no contact"),
-        (("p_first",), (0.06,), ("m",), "there is no f_steady, noise here"),
+        (("p_first",), (0.06,), ("m",), "there is no f_steady, noise among p_first"),
         (NAMES, (0.06, 8.0, 0.0), ("m", "counts", ""), "takes f_steady in N; here it is in"),
     ],
 )

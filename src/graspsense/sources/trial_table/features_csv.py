@@ -99,8 +99,7 @@ def read_labelled(
     others = [name for name in columns.names if name not in {*reserved, *table.names}]
     if export is None:
         recorded = lines if ranks is None else sorted(lines, key=ranks.__getitem__)
-        values = None if target is None else target.values
-        notes += doubts(columns, labels, table, values, recorded)
+        notes += doubts(columns, labels, table, target and target.values, recorded)
         notes += not_held_out(columns, others, instances)
     return Labelled(
         source=str(path),

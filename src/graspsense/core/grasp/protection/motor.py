@@ -197,7 +197,7 @@ class Motor:
         return Fault(
             "motor too strong",
             f"it answers {frame.effort_n:.1f} N, and its commands allow {self._allowed_n:.1f} N: it ignores the limit, "
-            "or the effort has another scale; check both",
+            "or the effort is wrong; check both",
             ends=self._strong_s > STRONG_S and above_n > STRONG_N + UNLIMITED_SHARE * self._allowed_n,
         )
 
