@@ -96,7 +96,7 @@ def raises_nothing(what: str, advice: str) -> Iterator[None]:
 @contextmanager
 def _leaving_nothing() -> Iterator[None]:
     """Raise CheckFailed for what the code in this context prints, changes in the process, or leaves running."""
-    printed, threads, before = StringIO(), set(threading.enumerate()), _process_state()
+    printed, threads, earlier = StringIO(), set(threading.enumerate()), _process_state()
     with redirect_stdout(printed), exits_raise():
         yield
     text = printed.getvalue().partition("\n")[0]
@@ -105,8 +105,8 @@ def _leaving_nothing() -> Iterator[None]:
             f"it prints {text!r:.60}, where the results of a command go: use logging, or print to sys.stderr",
             "it prints",
         )
-    changed = [name for name, value in _process_state().items() if value != before[name]]
-    os.chdir(before["the working folder"])
+    changed = [name for name, value in _process_state().items() if value != earlier[name]]
+    os.chdir(earlier["the working folder"])
     demand(
         not changed,
         f"it changes {', '.join(changed)} for the whole process: give it back, or work without it (a context as "

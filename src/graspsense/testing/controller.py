@@ -276,10 +276,10 @@ def same_tick_same_command(subject: Subject) -> None:
     ticks, law = ticks_of(subject), subject.create()
     step, params = type(law).step, law.params()
     with suppress(NotCompilable):
-        before = fingerprint(step)
+        unchanged = fingerprint(step)
         step(params, ticks[0].state, ticks[0].reading)
         demand(
-            fingerprint(step) == before,
+            fingerprint(step) == unchanged,
             "step changes a global that it or a function of it names: keep in the state what it is to remember; once "
             "compiled, a law takes globals as they were",
         )

@@ -45,7 +45,7 @@ def check_terms(results: Sequence[Any]) -> Iterator[str]:
 def _law_defect(term: Any, params: TermParams, steps: int) -> str:
     """Return the first defect of the law of a term; empty if there is none."""
     state, called = term.at_rest, f"the law of term {term.name!r}"
-    before, work_j, most_j, force_before = _known_as(term.law), 0.0, 0.0, 0.0
+    unchanged, work_j, most_j, force_before = _known_as(term.law), 0.0, 0.0, 0.0
     tick_s = COMPRESSION_M / steps / SPEED_M_S
     way_m = (COMPRESSION_M / steps * (steps - abs(steps - k)) for k in range(2 * steps + 1))
     for d0, d1 in pairwise((0.0, *way_m)):
@@ -79,7 +79,7 @@ def _law_defect(term: Any, params: TermParams, steps: int) -> str:
                 f"{d1 * 1e3:.2g} mm with {params}: a passive object bears less force while it is released, and none "
                 "without compression"
             )
-    if _known_as(term.law) != before:
+    if _known_as(term.law) != unchanged:
         return f"{called} changes a global: keep in its state what it is to remember"
     return ""
 
