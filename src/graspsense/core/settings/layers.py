@@ -242,7 +242,11 @@ def read_toml(source: Traversable, label: str, what: str) -> Layer:
 
     Raises ConfigError, also for a file of another kind.
     """
-    text = _settings_text(source, label, what)
+    return toml_layer(_settings_text(source, label, what), label, what)
+
+
+def toml_layer(text: str, label: str, what: str) -> Layer:
+    """Return the values of a TOML text, with `label` and `what` as in `read_toml`. Raises ConfigError."""
     try:
         values = toml_values(text)
     except TomlError as error:
