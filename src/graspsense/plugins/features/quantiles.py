@@ -10,13 +10,12 @@ functions of time that are linear between samples, at 128 evenly spaced times.
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, missing
-from graspsense.plugins.features.contact_curve import contact_curve, samples_of, units_in, without_gap
+from graspsense.plugins.features.contact_curve import contact_curve, samples_of, without_gap
 from graspsense.plugins.features.contact_threshold import ContactThreshold
 
 if TYPE_CHECKING:
@@ -91,14 +90,8 @@ class QuantileFeatures(FeatureSet[ContactThreshold]):
                 reasons = missing([feature.name for feature in _QUANTILES], why)
             else:
                 values += _quantiles(samples, start_s, end_s).tolist()
-        absent = [math.nan] * (len(self.features) - len(values))
-        features = Features(
-            names=tuple(feature.name for feature in self.features),
-            values=(*values, *absent),
-            units=units_in(trace, self.features),
-            reasons=reasons,
-        )
-        return without_gap(trace, features, _OF_GAP)
+        named = {feature.name: value for feature, value in zip(self.features, values, strict=False)}
+        return without_gap(trace, self.result(named, reasons, trace.units), _OF_GAP)
 
 
 def _contact(samples: CurveSamples, contact_force_n: float) -> tuple[float, float] | str:
