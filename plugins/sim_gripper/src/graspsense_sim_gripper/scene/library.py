@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Final
 
 from graspsense.plugin_api import ObjectKind, UnknownName
-from graspsense.simulator_api import fitted_results, given_claims, read_toml, suggestion
+from graspsense.simulator_api import fitted_results, given_claims, settings_text, suggestion
 from graspsense_sim_gripper.scene.spec import (
     ObjectSpec,
     TomlTable,
@@ -114,8 +114,7 @@ def find(name: str) -> ObjectSpec:
     if is_scene_text(name):
         return parse_scene(name, SCENE_IN_MEMORY, SCENE_IN_MEMORY)
     if name.endswith(".toml"):
-        table = read_toml(Path(name), name, "scene").values
-        return spec_of(table, name, {"name": Path(name).stem, "file": name})
+        return parse_scene(settings_text(Path(name), name, "scene"), Path(name).stem, name)
     known = catalogue()
     if name in known:
         return known[name]
