@@ -295,11 +295,11 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
     def _params(self, in_seconds: bool = True) -> ChittaParams:
         config = self.config
         return ChittaParams(
-            FORCES.index(config.force),
-            float(config.contact_force_n),
-            float(config.rest_speed_m_s),
-            float(config.rest_window_s),
-            int(in_seconds),
+            force=FORCES.index(config.force),
+            contact_force_n=float(config.contact_force_n),
+            rest_speed_m_s=float(config.rest_speed_m_s),
+            rest_window_s=float(config.rest_window_s),
+            in_seconds=int(in_seconds),
         )
 
     compiled = CompiledFeatures(measure, _params, _features, reads_release=False)
