@@ -24,6 +24,7 @@ from graspsense.core.drivers.emulated_body import opened_body as opened_body
 from graspsense.core.drivers.emulated_body import own_keys_first as own_keys_first
 from graspsense.core.drivers.emulated_body import EmulatedFingers as EmulatedFingers
 from graspsense.core.drivers.emulated_body import FingerTarget as FingerTarget
+from graspsense.core.drivers.emulated_body import finger_target as finger_target
 from graspsense.core.components.entries import EmulatorEntry as EmulatorEntry
 
 # Polling, reading threads and clocks of devices

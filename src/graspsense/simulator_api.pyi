@@ -17,8 +17,9 @@ from graspsense.core.components.entries import ModelEntry as ModelEntry
 from graspsense.core.components.setting import CHANGES_NO_RESULT as CHANGES_NO_RESULT
 from graspsense.core.components.strict import ValidationFailed as ValidationFailed
 from graspsense.core.components.strict import structured as structured
-from graspsense.core.settings.layers import refuse_other_kind as refuse_other_kind
-from graspsense.core.files.toml_text import TomlError as TomlError
+from graspsense.core.settings.layers import read_toml as read_toml
+from graspsense.core.settings.layers import settings_text as settings_text
+from graspsense.core.settings.layers import toml_layer as toml_layer
 from graspsense.core.files.toml_text import toml_values as toml_values
 from graspsense.core.values.errors import suggestion as suggestion
 from graspsense.core.settings.selected import recipe_of as recipe_of

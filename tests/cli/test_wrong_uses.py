@@ -154,6 +154,9 @@ def test_a_store_may_be_named_in_every_way(store):
         assert store_folder(named) == str(store)
         assert as_source(named) == f"store:{store}"
         assert len(load_trials(named)) == 12
+    store = store.rename(f"{store}#2")
+    for number in ("", "#3"):
+        assert as_source(f"{store}{number}") == f"store:{store}{number}"
 
 
 def test_folds_are_refused_before_the_first_grasp(run, monkeypatch):

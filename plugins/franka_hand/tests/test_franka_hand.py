@@ -4,6 +4,7 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
+from attrs import evolve
 from cases import every_case
 from commands import graspsense
 from hypothesis import example, given
@@ -91,6 +92,7 @@ def _features(*gaps):
     gaps = [*(0.06 - 0.02 * k / 15.0 for k in range(15)), *gaps]
     times = np.arange(len(gaps)) / 15.0
     trace = made_trace([(gap, np.nan, np.nan) for gap in gaps], phase=APPROACH, t_s=times)
+    trace = evolve(trace, units={**trace.units, "t": "frame"})
     return create("feature-set", "width-and-time").extract(trace)
 
 
@@ -99,6 +101,8 @@ def test_the_features_are_those_of_the_widths():
     features = _features(*[0.04] * 6, 0.039, *[0.038] * 8)
     expected = {"p_first": 0.04, "p_steady": 0.038, "squeezed": 0.002, "approach_t": 1.0, "delta_t": 7 / 15.0}
     assert {name: features[name] for name in expected} == pytest.approx(expected)
+    # A recording that counts time in frames has no seconds.
+    assert features.units == ("m", "m", "m", "frame", "frame")
 
 
 def test_fingers_that_still_move_have_no_last_rest():

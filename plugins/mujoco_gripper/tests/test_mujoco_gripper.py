@@ -178,7 +178,7 @@ def test_a_gripper_file_that_is_wrong_says_what_is(tmp_path, changed, said):
 
 
 def test_a_gripper_file_that_is_missing_is_told_as_such():
-    with pytest.raises(ConfigError, match="cannot be read") as error:
+    with pytest.raises(ConfigError, match="no gripper file") as error:
         load_pipeline("default", options=["gripper.type=mujoco", "gripper.file=nosuch.toml"])
     assert "pip install" not in str(error.value)
 

@@ -85,7 +85,7 @@ def test_a_sponge_yields_more_than_a_block_and_is_lifted(in_scene):
         # The gripper has no sensor at its edge.
         (("table = true", "[bump]", "t_s = 0.2"), "edge"),
         (("mas = 1.0",), "mas.*mass_kg"),
-        (("table = [",), "line"),
+        (("table = [",), "scene.toml:3"),
     ],
 )
 def test_a_scene_file_that_is_wrong_says_what_is(scene_file, lines, said):

@@ -42,7 +42,7 @@ def scene(tmp_path):
 
 
 def test_a_file_needs_no_more_than_a_width_and_its_terms(scene):
-    spec = find(scene(BOTTLE))
+    spec = find(scene(f"\ufeff{BOTTLE}"))  # as some editors of Windows begin a text
     assert (spec.name, spec.width_m, spec.held) == ("bottle", 0.06, False)
     # In the canonical order, whatever the file's.
     assert [kind for kind, _ in spec.terms] == ["elastic", "maxwell"]
@@ -158,11 +158,11 @@ def test_every_shipped_scene_is_grasped_and_stays_steady(name):
         (f"{FIRST_TERM}='maxwell'\nk_n_m=1", r"\[\[terms\]\] 1 \(maxwell\): missing tau_s"),
         (f"{FIRST_TERM}='maxwell'\nk_n_m=1\ntau_s=0", r"\(maxwell\) tau_s: must be greater than 0"),
         (f"{FIRST_TERM}='loss'\ndamping_n_s_m=-1", r"\(loss\) damping_n_s_m: -1 is negative"),
-        ("width_m = ", "is not valid TOML"),
+        ("width_m = ", "not TOML"),
     ],
 )
 def test_a_file_that_makes_no_sense_is_refused_by_file_table_and_field(scene, text, says):
-    with pytest.raises(ConfigError, match=f"bottle.toml: .*{says}"):
+    with pytest.raises(ConfigError, match=f"bottle.toml(:1)?: .*{says}"):
         unverified_setup(SimConfig(), scene(text), 0)
 
 

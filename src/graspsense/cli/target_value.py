@@ -14,6 +14,7 @@ from graspsense.cli.sources import command_line, keep_features, to_predict, tria
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entries, echo_entry, echo_table, talk
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import assumed_units
+from graspsense.core.values.units import with_unit
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.evaluation.json_codec import to_json
 from graspsense.regression.results import RegressionEvaluation, error_of
@@ -93,7 +94,7 @@ def train_value(
     echo(f"{out}: {model.in_a_line}", indent=2)
     unit = model.target.unit
     widths = model.intervals.half_widths
-    least, most = (_with_unit(end(widths), unit) if widths else "" for end in (min, max))
+    least, most = (with_unit(f"{end(widths):.4g}", unit) if widths else "" for end in (min, max))
     echo_entry(
         "interval",
         f"none: {model.intervals.reason}"
@@ -193,7 +194,7 @@ def _print_evaluation(evaluation: RegressionEvaluation) -> None:
     echo_entry("error", f"{evaluation.headline.words(evaluation.unit)}, by {evaluation.protocol}")
     echo_entry(
         "",
-        f"root of the mean squared error {_with_unit(evaluation.headline.root_mean_square, evaluation.unit)}",
+        f"root of the mean squared error {with_unit(f'{evaluation.headline.root_mean_square:.4g}', evaluation.unit)}",
     )
     if evaluation.explained is not None:
         echo_entry("R2", f"{evaluation.explained:.2f} (1 is perfect, 0 is no better than the mean)")
@@ -201,10 +202,11 @@ def _print_evaluation(evaluation: RegressionEvaluation) -> None:
     if intervals.covered is None or intervals.mean_half_width is None:
         echo_entry("intervals", f"not measured ({intervals.reason})")
     else:
+        half_width = with_unit(f"{intervals.mean_half_width:.4g}", evaluation.unit)
         echo_entry(
             "intervals",
             f"{intervals.covered.words} contain the true number; {100 * intervals.asked:.0f} % asked for, by "
-            f"{intervals.unit}; plus or minus {_with_unit(intervals.mean_half_width, evaluation.unit)} on average",
+            f"{intervals.unit}; plus or minus {half_width} on average",
         )
     echo_entry("features", ", ".join(name for name, _ in evaluation.features))
     echo_entries("note", evaluation.notes)
@@ -212,7 +214,3 @@ def _print_evaluation(evaluation: RegressionEvaluation) -> None:
     echo_found(number_table(evaluation))
     for sentence in not_measured(evaluation):
         echo(sentence, indent=2)
-
-
-def _with_unit(value: float, unit: str) -> str:
-    return f"{value:.4g} {unit}".rstrip()

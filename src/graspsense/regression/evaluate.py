@@ -16,6 +16,7 @@ from graspsense.core.components.caller import option
 from graspsense.core.learn.conformal import COVERAGE
 from graspsense.core.learn.labelled import ControlFeatures, Labelled
 from graspsense.core.values.errors import ConfigError, counted
+from graspsense.core.values.units import with_unit
 from graspsense.evaluation.evaluator import Progress
 from graspsense.evaluation.folds import (
     Folds,
@@ -264,7 +265,7 @@ class _Evaluator:
             if _is_worse(self.controls[name]):
                 by = self.controls[name].difference
                 assert by is not None
-                texts.append(f"the error of {name} is larger by {by.value:.4g} {unit}".rstrip() + f": {why}")
+                texts.append(f"the error of {name} is larger by {with_unit(f'{by.value:.4g}', unit)}: {why}")
         return texts
 
     def _instances_of(self, rows: Sequence[int]) -> list[str] | None:

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from attrs import frozen
 
 from graspsense.core.values.errors import counted
+from graspsense.core.values.units import with_unit
 from graspsense.evaluation.intervals import Difference, Interval, RecognitionRate, mean_interval
 
 
@@ -35,12 +36,11 @@ class RegressionError:
         counts = counted(self.n, "trial") + (
             "" if self.instances is None else f" of {counted(self.instances, 'instance')}"
         )
+        error = with_unit(f"{self.mean_absolute:.4g}", unit)
         if self.interval is None:
-            return (
-                f"{self.mean_absolute:.4g} {unit}".rstrip() + f" ({counts}; no interval: {self.no_interval})"
-            )
+            return f"{error} ({counts}; no interval: {self.no_interval})"
         low, high = self.interval
-        return f"{self.mean_absolute:.4g} {unit}".rstrip() + f" (95 %: {low:.4g} to {high:.4g}; {counts})"
+        return f"{error} (95 %: {low:.4g} to {high:.4g}; {counts})"
 
 
 def error_of(errors: Sequence[float], instances: Sequence[str] | None, folds: int = 0) -> RegressionError:

@@ -9,6 +9,7 @@ from attrs import evolve
 
 from graspsense.core.learn.copies import without_copies
 from graspsense.core.values.errors import counted
+from graspsense.core.values.units import with_unit
 from graspsense.regression.estimators import DEFAULT_ESTIMATOR
 from graspsense.regression.evaluate import evaluate_regression
 from graspsense.regression.results import RegressionError, RegressionEvaluation, RegressionMeasurement
@@ -71,7 +72,7 @@ def number_table(evaluation: RegressionEvaluation) -> FoundTable:
         title=f"Errors of {evaluation.target_value}: other protocols, and controls",
         header=(
             "protocol or control",
-            _with_unit("error", evaluation.unit and f"[{evaluation.unit}]"),
+            with_unit("error", evaluation.unit and f"[{evaluation.unit}]"),
             "95 %",
             "trials",
             "larger by",
@@ -127,7 +128,7 @@ def number_section(evaluation: RegressionEvaluation) -> Section:
         text += (
             f" Prediction intervals of {100 * intervals.asked:.0f} % contain the true number in "
             f"{intervals.covered.words}; they are plus or minus "
-            f"{_with_unit(number(intervals.mean_half_width), unit)} on average."
+            f"{with_unit(number(intervals.mean_half_width), unit)} on average."
         )
     errors = number_table(evaluation)
     rows = [(name.replace("_", " "), *cells) for name, *cells in errors.rows]
@@ -148,10 +149,10 @@ def _scatter(evaluation: RegressionEvaluation) -> str:
     picture = Picture(330)
     x, y = reaching(values, 50.0, picture.width - 16), reaching(values, 280.0, 24.0)
     picture.x_axis(
-        x, 24, 280, _with_unit(f"true {evaluation.target_value}", evaluation.unit and f"in {evaluation.unit}")
+        x, 24, 280, with_unit(f"true {evaluation.target_value}", evaluation.unit and f"in {evaluation.unit}")
     )
     picture.y_axis(
-        y, 50.0, picture.width - 16, _with_unit("predicted", evaluation.unit and f"in {evaluation.unit}")
+        y, 50.0, picture.width - 16, with_unit("predicted", evaluation.unit and f"in {evaluation.unit}")
     )
     with picture.plot(x, y, 24, 280):
         picture.line([(x(end), y(end)) for end in (x.low, x.high)], QUIET)
@@ -160,10 +161,6 @@ def _scatter(evaluation: RegressionEvaluation) -> str:
             picture.mark(x(truth), y(predicted), INKS[0], words=words)
     caption = "Each mark is a grasp that was held out from training. The line is where both are equal."
     return figure(picture.svg(f"Predicted and true {evaluation.target_value}. {caption}"), caption)
-
-
-def _with_unit(text: str, unit: str) -> str:
-    return f"{text} {unit}".rstrip()
 
 
 def _identifier(name: str) -> str:

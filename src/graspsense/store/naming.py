@@ -26,8 +26,9 @@ def store_folder(text: str | os.PathLike[str]) -> str:
 
 def as_source(text: str) -> str:
     """Return a source of trials or recordings with `store:` before the folder of a store; others as they are."""
-    folder, mark, number = text.partition("#")
-    if text.startswith(STORE):
-        return text
-    folder = store_folder(folder)
-    return f"{STORE}{folder}{mark}{number}" if os.path.isfile(Path(folder).expanduser() / FILE) else text
+    if not text.startswith(STORE):
+        for name, mark, number in ((text, "", ""), text.rpartition("#")):
+            folder = store_folder(name)
+            if name and os.path.isfile(Path(folder).expanduser() / FILE):
+                return f"{STORE}{folder}{mark}{number}"
+    return text

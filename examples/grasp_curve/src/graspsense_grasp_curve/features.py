@@ -101,7 +101,7 @@ class GraspCurveFeatures(FeatureSet[GraspCurveConfig]):
 
     def extract(self, trace: Trace) -> Features:
         """Return the features; an undefined one is NaN with its reason."""
-        return self.result(*_curve(trace, self.config.contact_force_n))
+        return self.result(*_curve(trace, self.config.contact_force_n), trace.units)
 
 
 class ChittaAndCurve(FeatureSet[GraspCurveConfig]):

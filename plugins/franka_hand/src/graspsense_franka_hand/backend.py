@@ -14,10 +14,10 @@ from graspsense.gripper_api import (
     LoadTable,
     asked_force,
     calibrations_of,
+    finger_target,
     stored_delivered_force,
 )
 from graspsense.plugin_api import (
-    FORCE,
     NO_PADS,
     POSITION,
     VELOCITY,
@@ -175,19 +175,10 @@ class FrankaBackend(BackendWithEmulator[FrankaConfig]):
 
     def _order(self, command: Command) -> Order | None:
         """Return what a command becomes; None where the fingers are already there."""
-        kind, value, effort_limit, speed_limit = command
-        width_m, speed = self._state.width_m, speed_limit
-        force = min(value, effort_limit) if kind == FORCE else effort_limit
-        if kind == VELOCITY:
-            if value == 0.0:
-                return Order(STOP)
-            speed, goal_m = min(abs(value), speed_limit), 0.0 if value < 0.0 else WIDEST_M
-        elif kind == POSITION:
-            goal_m = min(max(value, 0.0), WIDEST_M)
-            if goal_m not in (0.0, WIDEST_M) and abs(goal_m - width_m) < THERE_M:
-                return Order(STOP) if abs(self._velocity_m_s) > RESTS_M_S else None
-        else:
-            goal_m = 0.0
+        width_m = self._state.width_m
+        goal_m, speed, force = finger_target(command, width_m, WIDEST_M)
+        if goal_m not in (0.0, WIDEST_M) and abs(goal_m - width_m) < THERE_M:
+            return Order(STOP) if abs(self._velocity_m_s) > RESTS_M_S else None
         speed = min(speed, FASTEST_M_S)
         if speed <= 0.0:
             return Order(STOP)

@@ -56,12 +56,12 @@ class WidthAndTime(FeatureSet[WidthAndTimeConfig]):
         known = ~np.isnan(gaps)
         times, gaps = times[known], gaps[known]
         if len(gaps) == 0:
-            return self.undefined("the grasp has no tick in which the fingers close")
+            return self.undefined("the grasp has no tick in which the fingers close", trace.units)
         rest_ticks = first_rest(
             times, gaps, gaps < gaps[0] - MOVED_M, config.rest_speed_m_s, config.rest_window_s
         )
         if rest_ticks is None:
-            return self.undefined("the fingers did not come to rest on anything")
+            return self.undefined("the fingers did not come to rest on anything", trace.units)
         contact = rest_ticks[0]
         values = {"p_first": gaps[contact], "approach_t": times[contact] - times[0]}
         still = np.abs(gaps - gaps[-1]) <= config.rest_speed_m_s * config.rest_window_s
@@ -69,10 +69,12 @@ class WidthAndTime(FeatureSet[WidthAndTimeConfig]):
         last = max(last, contact)
         if times[-1] - times[last] < config.rest_window_s * (1.0 - 1e-9):
             reason = "the fingers were not at rest when the squeeze ended"
-            return self.result(values, dict.fromkeys(("p_steady", "squeezed", "delta_t"), reason))
+            return self.result(
+                values, dict.fromkeys(("p_steady", "squeezed", "delta_t"), reason), trace.units
+            )
         values |= {
             "p_steady": gaps[-1],
             "squeezed": gaps[contact] - gaps[-1],
             "delta_t": times[last] - times[contact],
         }
-        return self.result(values)
+        return self.result(values, None, trace.units)

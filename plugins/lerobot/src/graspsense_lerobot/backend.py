@@ -13,9 +13,8 @@ from math import inf, nan
 from types import MappingProxyType
 from typing import Final, final
 
-from graspsense.gripper_api import Polling
+from graspsense.gripper_api import Polling, finger_target
 from graspsense.plugin_api import (
-    FORCE,
     NO_PADS,
     POSITION,
     VELOCITY,
@@ -123,15 +122,9 @@ class LeRobotBackend(SensorBackend[LeRobotConfig]):
 
     def _next_target(self, command: Command) -> float:
         config = self.config
-        kind, value, force_n, speed_m_s = command
-        goal_m = self._gap_m
-        if kind == VELOCITY:
-            goal_m = config.open_gap_m if value > 0.0 else config.closed_gap_m
-            speed_m_s = min(abs(value), speed_m_s)
-        elif kind == POSITION:
-            goal_m = min(max(value, config.closed_gap_m), config.open_gap_m)
-        elif kind == FORCE:
-            goal_m, force_n = config.closed_gap_m, min(value, force_n)
+        goal_m, speed_m_s, force_n = finger_target(
+            command, self._gap_m, config.open_gap_m, closed_m=config.closed_gap_m
+        )
         if speed_m_s == 0.0:
             return self._gap_m
         step_m = min(speed_m_s, config.most_speed_m_s) / config.rate_hz

@@ -28,23 +28,13 @@ from attrs import field, frozen
 from attrs.validators import ge, gt, lt, min_len
 
 from graspsense.plugin_api import ConfigError
-from graspsense.simulator_api import TomlError, ValidationFailed, first_bytes, structured, toml_values
+from graspsense.simulator_api import ValidationFailed, read_toml, structured
 
 SHIPPED: Final = ("parallel", "soft_pads")
 """The gripper files of this package."""
-LARGEST_BYTES: Final = 512 * 1024
-"""Limit on the size of a gripper file."""
 
 FROM_ZERO: Final = (ge(0.0), lt(inf))
 DescribedT = TypeVar("DescribedT")
-
-
-def text_of(path: Path, most: int, what: str) -> str:
-    """Return the text of a regular file. Raises OSError, UnicodeDecodeError; ConfigError if it has more bytes."""
-    content = first_bytes(path, most)
-    if len(content) > most:
-        raise ConfigError(f"{path} is no {what}: it has more than {most} bytes")
-    return content.decode("utf-8")
 
 
 @frozen(kw_only=True)
@@ -185,23 +175,21 @@ def read_gripper(name: str) -> tuple[GripperFile, Path]:
     path = Path(name).expanduser()
     if not name or name in SHIPPED:
         path = Path(str(files("graspsense_mujoco_gripper") / f"{name or 'parallel'}.toml"))
-    gripper = described(path, f"gripper.file: {path}", LARGEST_BYTES, "gripper file", GripperFile)
+    gripper = described(path, "gripper", GripperFile)
     return gripper, model_path(gripper.model, path)
 
 
-def described(path: Path, where: str, most: int, what: str, cls: type[DescribedT]) -> DescribedT:
-    """Return what a TOML file describes. Raises ConfigError, whose text begins with `where`."""
+def described(path: Path, what: str, cls: type[DescribedT]) -> DescribedT:
+    """Return what a TOML file describes. Raises ConfigError."""
+    layer = read_toml(path, str(path), what)
     try:
-        return structured(toml_values(text_of(path, most, what)), cls, f"a {what}")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{where} cannot be read: {getattr(error, 'strerror', error)}") from error
-    except TomlError as error:
-        raise ConfigError(f"{where}, line {error.line}: {error}") from error
+        return structured(dict(layer.values), cls, f"a {what} file")
     except ValidationFailed as misfit:
         said = [
-            f"{'.'.join(map(str, problem.path)) or 'the file'}: {problem.text}" for problem in misfit.problems
+            f"{layer.where(problem.path)}: {'.'.join(map(str, problem.path)) or 'the file'}: {problem.text}"
+            for problem in misfit.problems
         ]
-        raise ConfigError(f"{where}\n  " + "\n  ".join(said)) from None
+        raise ConfigError("\n".join(said)) from None
 
 
 def model_path(name: str, beside: Path) -> Path:

@@ -38,7 +38,6 @@ Floats = NDArray[np.float64]
 SCENES: Final = Path(str(files("graspsense_mujoco_gripper") / "scenes"))
 SHIPPED_SCENES: Final = ("tugged", "filled", "placed", "shaken")
 """The scene files of this package."""
-LARGEST_BYTES: Final = 64 * 1024
 Schedule = tuple[tuple[float, ...], ...]
 
 
@@ -144,11 +143,7 @@ def scene_named(name: str, around: str = "") -> Scene:
     path = SCENES / f"{name}.toml" if name in SHIPPED_SCENES else Path(name).expanduser()
     is_scene = path.suffix == ".toml"
     if not around:
-        return (
-            described(path, f"the scene {path}", LARGEST_BYTES, "scene file", Scene)
-            if is_scene
-            else Scene(thing=name)
-        )
+        return described(path, "MuJoCo scene", Scene) if is_scene else Scene(thing=name)
     if is_scene:
         raise ConfigError(
             f"gripper.object names the scene {name}, and gripper.scene the scene {around}: name a thing as the object"

@@ -11,9 +11,16 @@ from typing import Any, Final, final
 
 from attrs import evolve
 
-from graspsense.gripper_api import BackendWithEmulator, DeadManSwitch, Polling, no_pads, pad_force, tare
+from graspsense.gripper_api import (
+    BackendWithEmulator,
+    DeadManSwitch,
+    Polling,
+    finger_target,
+    no_pads,
+    pad_force,
+    tare,
+)
 from graspsense.plugin_api import (
-    FORCE,
     NO_PADS,
     POSITION,
     VELOCITY,
@@ -145,17 +152,8 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
 
     def apply(self, command: Command) -> None:
         """Store a command for the next exchange."""
-        kind, value, effort_limit, speed_limit = command
         slowest = self._model.speeds_m_s[0]
-        force = effort_limit
-        if kind == VELOCITY:
-            speed, goal = min(abs(value), speed_limit), self._model.stroke_m if value > 0.0 else 0.0
-        elif kind == POSITION:
-            speed, goal = speed_limit, value
-        elif kind == FORCE:
-            speed, goal, force = min(slowest, speed_limit), 0.0, min(value, effort_limit)
-        else:
-            speed, goal = 0.0, self._gap_m
+        goal, speed, force = finger_target(command, self._gap_m, self._model.stroke_m, slowest)
         if speed <= slowest:
             self._move_target(goal, speed)
         else:

@@ -5,16 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from math import inf, isnan
+from math import inf
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, TypeVar, final
 
 from attrs import evolve
 
-from graspsense.gripper_api import BackendWithEmulator, DeadManSwitch, Polling, calibrations_of
+from graspsense.gripper_api import BackendWithEmulator, DeadManSwitch, Polling, calibrations_of, finger_target
 from graspsense.plugin_api import (
-    FORCE,
     NO_PADS,
     POSITION,
     VELOCITY,
@@ -152,18 +151,11 @@ class So101Backend(BackendWithEmulator[So101Config]):
 
     def apply(self, command: Command) -> None:
         """Write the goal of this command, unless it is the present one. Raises DeviceLost."""
-        kind, value, effort_limit, speed_limit = command
-        jaw, force = self._jaw, effort_limit
-        if kind == VELOCITY:
-            speed, goal = min(abs(value), speed_limit), jaw.opened if value > 0.0 else jaw.closed
-        elif kind == POSITION:
-            speed, goal = speed_limit, jaw.position(value)
-        elif kind == FORCE:
-            speed, goal, force = min(FORCE_SPEED_M_S, speed_limit), jaw.closed, min(value, effort_limit)
-        else:
-            speed, goal = 0.0, self._position
+        jaw = self._jaw
+        gap_m, speed, force = finger_target(command, jaw.gap_m(self._position), jaw.stroke_m, FORCE_SPEED_M_S)
+        goal = jaw.position(gap_m)
         assert self._asked is not None
-        if speed <= 0.0 or isnan(value):
+        if speed <= 0.0:
             # It stops once, where it is: a goal that followed the jaw would let it creep.
             goal, speed = (self._asked.goal_position if self._stopped else self._position), 0.0
         self._stopped = speed <= 0.0

@@ -469,20 +469,26 @@ class FeatureSet(ABC, Generic[ConfigT]):
     def extract(self, trace: Trace) -> Features:
         """Return the features of this trace. Any trace is allowed: an undefined feature is NaN with a reason."""
 
-    def result(self, values: Mapping[str, float], reasons: Mapping[str, str] | None = None) -> Features:
+    def result(
+        self,
+        values: Mapping[str, float],
+        reasons: Mapping[str, str] | None = None,
+        units_of: Mapping[str, str] | None = None,
+    ) -> Features:
         """Return the declared features with these values, for `extract` to return.
 
-        A feature without a value is NaN, and `reasons` says why. Raises ValueError for a name that the class does not
+        A feature without a value is NaN, and `reasons` says why. `units_of` are the units of the trace, which can count
+        time in frames; not given, the declared units hold. Raises ValueError for a name that the class does not
         declare, for what is no number or infinite, and for a NaN without a reason.
         """
-        from graspsense.core.values.features import Features
+        from graspsense.core.values.features import Features, units_in
 
         names = tuple(feature.name for feature in self.features)
-        for name in values:
-            if name not in names:
-                raise ValueError(
-                    f"{type(self).__name__} declares no feature {name!r}; it has {', '.join(names)}"
-                )
+        for name in values.keys() - set(names):
+            raise ValueError(f"{type(self).__name__} declares no feature {name!r}; it has {', '.join(names)}")
+        units = tuple(feature.unit for feature in self.features)
+        if units_of is not None:
+            units = units_in(units_of["t"], units_of["gap"], units_of["force_left"], units)
         numbers = []
         for name in names:
             try:
@@ -490,16 +496,11 @@ class FeatureSet(ABC, Generic[ConfigT]):
             except (TypeError, ValueError) as error:
                 kind = type(values[name]).__name__
                 raise ValueError(f"feature {name!r} is of type {kind}: give one number") from error
-        return Features(
-            names=names,
-            values=tuple(numbers),
-            units=tuple(feature.unit for feature in self.features),
-            reasons=dict(reasons or {}),
-        )
+        return Features(names=names, values=tuple(numbers), units=units, reasons=dict(reasons or {}))
 
-    def undefined(self, reason: str) -> Features:
-        """Return the declared features, all of them NaN for this reason."""
-        return self.result({}, {feature.name: reason for feature in self.features})
+    def undefined(self, reason: str, units_of: Mapping[str, str] | None = None) -> Features:
+        """Return the declared features, all of them NaN for this reason; `units_of` is as in `result`."""
+        return self.result({}, {feature.name: reason for feature in self.features}, units_of)
 
 
 @frozen(kw_only=True)

@@ -16,7 +16,7 @@ from graspsense.core.components.setting import NAMES_INPUT, setting
 from graspsense.core.settings.selected import create
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError
-from graspsense.core.values.signals import EFFORT, Command
+from graspsense.core.values.signals import EFFORT, FORCE, POSITION, VELOCITY, Command
 
 EMULATED: Final = "emulated"
 
@@ -140,6 +140,25 @@ class FingerTarget(NamedTuple):
     gap_m: float
     speed_m_s: float
     force_n: float
+
+
+def finger_target(
+    command: Command, gap_m: float, open_m: float, force_speed_m_s: float = inf, closed_m: float = 0.0
+) -> FingerTarget:
+    """Return the target of a command to fingers at this gap, between the gaps of the open and the closed gripper.
+
+    Where only a force is asked for, they close at `force_speed_m_s` at most. Other commands, and NaN, stop them.
+    """
+    kind, value, force_n, speed_m_s = command
+    if value != value:
+        return FingerTarget(gap_m, 0.0, force_n)
+    if kind == VELOCITY:
+        return FingerTarget(open_m if value > 0.0 else closed_m, min(abs(value), speed_m_s), force_n)
+    if kind == POSITION:
+        return FingerTarget(min(max(value, closed_m), open_m), speed_m_s, force_n)
+    if kind == FORCE:
+        return FingerTarget(closed_m, min(force_speed_m_s, speed_m_s), min(value, force_n))
+    return FingerTarget(gap_m, 0.0, force_n)
 
 
 class EmulatedFingers:

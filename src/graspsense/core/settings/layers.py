@@ -242,7 +242,11 @@ def read_toml(source: Traversable, label: str, what: str) -> Layer:
 
     Raises ConfigError, also for a file of another kind.
     """
-    text = _settings_text(source, label, what)
+    return toml_layer(settings_text(source, label, what), label, what)
+
+
+def toml_layer(text: str, label: str, what: str) -> Layer:
+    """Return the values of a TOML text, with `label` and `what` as in `read_toml`. Raises ConfigError."""
     try:
         values = toml_values(text)
     except TomlError as error:
@@ -254,8 +258,8 @@ def read_toml(source: Traversable, label: str, what: str) -> Layer:
     return Layer(label=label, values=values, lines=key_lines(text))
 
 
-def _settings_text(source: Traversable, label: str, what: str) -> str:
-    """Return the text of a file of settings. Raises ConfigError."""
+def settings_text(source: Traversable, label: str, what: str) -> str:
+    """Return the text of a file of settings, with `label` and `what` as in `read_toml`. Raises ConfigError."""
     try:
         data = first_bytes(source, SETTINGS_BYTES.most)
     except FileNotFoundError:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
 
 from attrs import evolve, field, frozen
@@ -363,6 +364,21 @@ class CheckpointPrediction:
 def certainty_words(probability: float) -> str:
     """Return a probability in per cent. No model is certain, so that 1 is `over 99 %`."""
     return "over 99 %" if probability > 0.995 else f"{100 * probability:.0f} %"
+
+
+@lru_cache(maxsize=64)
+def units_in(t: str, gap: str, force: str, declared: tuple[str, ...]) -> tuple[str, ...]:
+    """Return declared units as those of a trace with these units: a recording can count time in frames.
+
+    >>> units_in("frame", "m", "N", ("s", "m/s", "J", "1"))
+    ('frame', 'm/frame', 'J', '1')
+    """
+    joule = "J" if (gap, force) == ("m", "N") else f"{force} {gap}"
+    unit_of = {"m": gap, "N": force, "s": t, "J": joule, "N/m": f"{force}/{gap}"}
+    unit_of |= {
+        f"{unit}/{time}": f"{unit_of[unit]}/{t}{time[1:]}" for unit in ("m", "N") for time in ("s", "s2")
+    }
+    return tuple(unit_of.get(unit, unit) for unit in declared)
 
 
 def missing(names: Iterable[str], reason: str) -> dict[str, str]:

@@ -13,7 +13,6 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 from attrs import frozen
@@ -232,12 +231,6 @@ def measure(params: ChittaParams, ticks: TickColumns) -> Measured:
     return without_rest(CONTACT, p_first, after_contact, window_s, unseen_s)
 
 
-@lru_cache(maxsize=16)
-def _units(t: str, gap: str, force: str) -> tuple[str, ...]:
-    """Return the units of `NAMES`, given those of the trace."""
-    return gap, gap, force, t, f"{gap}/{t}", f"{force}/{t}"
-
-
 class ChittaFeatures(FeatureSet[ChittaConfig]):
     """Extracts the six features of Table I."""
 
@@ -259,7 +252,7 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
         shows the rest, because at its beginning the last cell image can be from before the rest.
         """
         if trace.units.get("gap") == NO_GAP:
-            return self.undefined("no gap was recorded")
+            return self.undefined("no gap was recorded", trace.units)
         params = self._params(in_seconds=trace.units["t"] == "s")
         return self._features(measure(params, listed_columns(trace)), trace.units)
 
@@ -267,10 +260,8 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
         """Return the features that follow from what was measured; `units_of` are those of the trace."""
         reached, p_first, after_contact, p_steady, delta_t, f_first, f_steady, window_s, blind_s = measured
         t = units_of["t"]
-        units = _units(t, units_of["gap"], units_of["force_left"])
         if reached < CONTACT:
-            reasons = missing(NAMES, self._why_no_contact(reached))
-            return Features(names=NAMES, values=(math.nan,) * 6, units=units, reasons=reasons)
+            return self.undefined(self._why_no_contact(reached), units_of)
         if reached == CONTACT:
             why = f"not at rest within the {after_contact:.3g} {t} after contact"
             if blind_s > 0.0:
@@ -283,8 +274,7 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
                     f"rest not resolved: the gap is so coarse, or measured so rarely, that a rest shows after "
                     f"{window_s:.3g} {t}, and there is none within the {after_contact:.3g} {t} after contact"
                 )
-            values = (p_first, *(math.nan,) * 5)
-            return Features(names=NAMES, values=values, units=units, reasons=missing(AT_REST, why))
+            return self.result({"p_first": p_first}, missing(AT_REST, why), units_of)
         reasons = {}
         rates = (math.nan, math.nan)
         if blind_s > 0.0 and t == "s":
@@ -300,7 +290,7 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
             f_steady, rates = math.nan, (rates[0], math.nan)
             reasons |= missing(("f_steady", "df_dt"), "the pads gave no number when the fingers were at rest")
         values = (p_first, p_steady, f_steady, delta_t, *rates)
-        return Features(names=NAMES, values=values, units=units, reasons=reasons)
+        return self.result(dict(zip(NAMES, values, strict=True)), reasons, units_of)
 
     def _params(self, in_seconds: bool = True) -> ChittaParams:
         config = self.config

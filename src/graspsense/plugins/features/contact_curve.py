@@ -7,7 +7,7 @@ numbers and reach the contact force; where only one pad does, it is the force of
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from math import nan
 from typing import TYPE_CHECKING, Final
 
@@ -15,7 +15,7 @@ import numpy as np
 from attrs import evolve, frozen
 
 from graspsense.gripper_api import NO_GAP
-from graspsense.plugin_api import APPROACH, HOLD, RELEASE, Feature, Features, missing
+from graspsense.plugin_api import APPROACH, HOLD, RELEASE, Features, missing
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -47,17 +47,6 @@ def without_gap(trace: Trace, features: Features, names: Collection[str]) -> Fea
     )
     reasons = {**missing(names, "no gap was recorded"), **features.reasons}
     return evolve(features, values=values, reasons=reasons)
-
-
-def units_in(trace: Trace, features: Iterable[Feature]) -> tuple[str, ...]:
-    """Return the units of features, given those of the trace: a recording can count time in frames."""
-    t, gap, force = trace.units["t"], trace.units["gap"], trace.units["force_left"]
-    joule = "J" if (gap, force) == ("m", "N") else f"{force} {gap}"
-    unit_of = {"m": gap, "N": force, "s": t, "J": joule, "N/m": f"{force}/{gap}", "1": "1"}
-    unit_of |= {
-        f"{unit}/{time}": f"{unit_of[unit]}/{t}{time[1:]}" for unit in ("m", "N") for time in ("s", "s2")
-    }
-    return tuple(unit_of[feature.unit] for feature in features)
 
 
 @frozen(kw_only=True, eq=False)

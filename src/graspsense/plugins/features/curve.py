@@ -31,7 +31,6 @@ from graspsense.plugins.features.contact_curve import (
     contact_curve,
     first_crossing,
     samples_of,
-    units_in,
     without_gap,
 )
 from graspsense.plugins.features.contact_threshold import ContactThreshold
@@ -210,13 +209,7 @@ class CurveFeatures(FeatureSet[CurveConfig]):
         else:
             measured.add("contact_gap", curve.contact_gap_m, "the gap is not a number")
             self._squeeze(curve, measured)
-        features = Features(
-            names=NAMES,
-            values=tuple(measured.values.get(name, float("nan")) for name in NAMES),
-            units=units_in(trace, _FEATURES),
-            reasons=measured.reasons,
-        )
-        return without_gap(trace, features, OF_GAP)
+        return without_gap(trace, self.result(measured.values, measured.reasons, trace.units), OF_GAP)
 
     def _squeeze(self, curve: ContactCurve, measured: _Found) -> None:
         """Add everything after the contact."""

@@ -22,7 +22,7 @@ from attrs import frozen
 
 from graspsense.gripper_api import NO_GAP
 from graspsense.plugin_api import APPROACH, Channel, Feature, Features, FeatureSet
-from graspsense.plugins.features.contact_curve import increasing, units_in
+from graspsense.plugins.features.contact_curve import increasing
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -142,7 +142,7 @@ class QuantFeatures(FeatureSet[QuantConfig]):
             quantiles[lost] = np.nan
             reasons |= {own[i]: why for i in np.flatnonzero(lost).tolist()}
             values += quantiles.tolist()
-        return Features(names=names, values=tuple(values), units=units_in(trace, _FEATURES), reasons=reasons)
+        return self.result(dict(zip(names, values, strict=True)), reasons, trace.units)
 
 
 def interval_quantiles(series: Floats, step_s: float = 1.0) -> Floats:

@@ -10,13 +10,12 @@ functions of time that are linear between samples, at 128 evenly spaced times.
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, missing
-from graspsense.plugins.features.contact_curve import contact_curve, samples_of, units_in, without_gap
+from graspsense.plugins.features.contact_curve import contact_curve, first_crossing, samples_of, without_gap
 from graspsense.plugins.features.contact_threshold import ContactThreshold
 
 if TYPE_CHECKING:
@@ -91,14 +90,8 @@ class QuantileFeatures(FeatureSet[ContactThreshold]):
                 reasons = missing([feature.name for feature in _QUANTILES], why)
             else:
                 values += _quantiles(samples, start_s, end_s).tolist()
-        absent = [math.nan] * (len(self.features) - len(values))
-        features = Features(
-            names=tuple(feature.name for feature in self.features),
-            values=(*values, *absent),
-            units=units_in(trace, self.features),
-            reasons=reasons,
-        )
-        return without_gap(trace, features, _OF_GAP)
+        named = {feature.name: value for feature, value in zip(self.features, values, strict=False)}
+        return without_gap(trace, self.result(named, reasons, trace.units), _OF_GAP)
 
 
 def _contact(samples: CurveSamples, contact_force_n: float) -> tuple[float, float] | str:
@@ -107,11 +100,8 @@ def _contact(samples: CurveSamples, contact_force_n: float) -> tuple[float, floa
     if isinstance(curve, str):
         return curve
     last = int(np.flatnonzero(curve.lowest_n >= contact_force_n)[-1])
-    if last + 1 == len(curve.t_s):
-        return float(curve.t_s[0]), float(curve.t_s[last])
-    high, low = curve.lowest_n[last], curve.lowest_n[last + 1]
-    share = (high - contact_force_n) / (high - low)
-    return float(curve.t_s[0]), float(curve.t_s[last] + share * (curve.t_s[last + 1] - curve.t_s[last]))
+    end_s = first_crossing(curve.t_s[last:], -curve.lowest_n[last:], -contact_force_n)
+    return float(curve.t_s[0]), float(curve.t_s[last]) if end_s is None else end_s
 
 
 def _quantiles(samples: CurveSamples, start_s: float, end_s: float) -> Floats:

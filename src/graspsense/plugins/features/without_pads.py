@@ -89,7 +89,7 @@ class WithoutPads(FeatureSet[WithoutPadsConfig]):
             # The rest of the hold does not depend on the contact.
             holds = bool((trace.phase == HOLD).any())
             reasons |= {name: doubt for name in names if not (holds and name == "p_steady")}
-        return self.result({name: six[name] for name in names if name not in reasons}, reasons)
+        return self.result({name: six[name] for name in names if name not in reasons}, reasons, trace.units)
 
 
 def _without_start(

@@ -34,6 +34,7 @@ from graspsense.sources.trial_table.identifiers import (
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from graspsense.core.learn.target_value import TargetValue
     from graspsense.core.values.features import FeatureTable
     from graspsense.sources.formats.csv_columns import CsvColumns
 
@@ -139,7 +140,7 @@ def doubts(
     columns: CsvColumns,
     labels: Sequence[str],
     table: FeatureTable,
-    target: Sequence[float] | None,
+    target: TargetValue | None,
     lines: Sequence[int],
 ) -> list[str]:
     """Return notes on those columns that are features and may reveal the labels, or the number to predict.
@@ -147,13 +148,12 @@ def doubts(
     `lines` are those to be looked at, in the order of recording.
     """
     columns, table, labels = columns.rows(lines), table.rows(np.array(lines)), [labels[i] for i in lines]
-    target = None if target is None else [target[i] for i in lines]
     used = [name for name in columns.names if set(columns.columns_of(name)) <= set(table.names)]
     numbers = _numbers(columns, [name for name in used if not columns.is_nominal(name)])
     doubted: dict[str, list[str]] = {}
     for name in used if target is None else numbers:
         if target is not None:
-            reasons = [*_of_target(numbers[name], np.array(target))]
+            reasons = [*_of_target(numbers[name], np.array(target.values)[lines])]
         else:
             missing = np.isnan(table.columns(columns.columns_of(name)[:1]).values[:, 0]).tolist()
             reasons = [*_of_recording(columns, name, labels)]

@@ -99,7 +99,7 @@ def read_labelled(
     others = [name for name in columns.names if name not in {*reserved, *table.names}]
     if export is None:
         recorded = lines if ranks is None else sorted(lines, key=ranks.__getitem__)
-        notes += doubts(columns, labels, table, target and target.values, recorded)
+        notes += doubts(columns, labels, table, target, recorded)
         notes += not_held_out(columns, others, instances)
     return Labelled(
         source=str(path),

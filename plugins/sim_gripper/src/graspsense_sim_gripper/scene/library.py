@@ -14,8 +14,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
-from graspsense.plugin_api import ConfigError, ObjectKind, UnknownName
-from graspsense.simulator_api import fitted_results, given_claims, suggestion
+from graspsense.plugin_api import ObjectKind, UnknownName
+from graspsense.simulator_api import fitted_results, given_claims, settings_text, suggestion
 from graspsense_sim_gripper.scene.spec import (
     ObjectSpec,
     TomlTable,
@@ -26,8 +26,6 @@ from graspsense_sim_gripper.scene.spec import (
 
 CONTAINERS: Final = ("odwalla", "naked", "can", "water")
 """The containers of Chitta, Piccoli and Sturm (ICRA 2010), section III.E: trials are simulated with them by default."""
-LONGEST_SCENE: Final = 2**18
-"""Limit on the characters of a scene file; those that are shipped have some thousand."""
 SCENE_IN_MEMORY: Final = "scene in memory"
 """The name of an object that is given by the text of its scene."""
 
@@ -116,7 +114,7 @@ def find(name: str) -> ObjectSpec:
     if is_scene_text(name):
         return parse_scene(name, SCENE_IN_MEMORY, SCENE_IN_MEMORY)
     if name.endswith(".toml"):
-        return _read_scene(Path(name))
+        return parse_scene(settings_text(Path(name), name, "scene"), Path(name).stem, name)
     known = catalogue()
     if name in known:
         return known[name]
@@ -145,23 +143,6 @@ def kinds_in(scene: str) -> tuple[str, ...]:
     if scene == "none":
         return ()
     return find(split_number(scene)[0]).kinds
-
-
-def _read_scene(path: Path) -> ObjectSpec:
-    try:
-        if path.exists() and not path.is_file():
-            raise ConfigError(f"{path}: is not a file")
-        with path.open(encoding="utf-8") as file:
-            text = file.read(LONGEST_SCENE + 1)
-    except FileNotFoundError:
-        raise ConfigError(f"no scene file {str(path)!r} (looked in {Path.cwd()})") from None
-    except UnicodeDecodeError as error:
-        raise ConfigError(f"{path}: is not UTF-8 text ({error})") from error
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
-    if len(text) > LONGEST_SCENE:
-        raise ConfigError(f"{path}: a scene has at most {LONGEST_SCENE} characters, and this has more")
-    return parse_scene(text, path.stem, str(path))
 
 
 def _entry(name: str, table: TomlTable) -> ObjectSpec:

@@ -14,7 +14,7 @@ from attrs import field, fields_dict, frozen
 from attrs.validators import ge, gt, in_, le
 
 from graspsense.plugin_api import ConfigError, UnknownName
-from graspsense.simulator_api import TomlError, gives, refuse_other_kind, suggestion, toml_values
+from graspsense.simulator_api import gives, suggestion, toml_layer
 from graspsense_sim_gripper.scene.terms.liquid import GRAVITY_M_S2
 from graspsense_sim_gripper.scene.terms.registry import find_term, in_order
 from graspsense_sim_gripper.scene.terms.term import not_dented
@@ -207,14 +207,7 @@ def parse_scene(text: str, name: str, where: str) -> ObjectSpec:
 
     Raises ConfigError that lists all problems of the file.
     """
-    try:
-        table = toml_values(text)
-    except TomlError as error:
-        line = f" in line {error.line}" if error.line else ""
-        why = str(error).removeprefix("not TOML: ")
-        raise ConfigError(f"{where}: is not valid TOML{line}: {why}") from error
-    refuse_other_kind(table, "scene", where)
-    return spec_of(table, where, {"name": name, "file": where})
+    return spec_of(toml_layer(text, where, "scene").values, where, {"name": name, "file": where})
 
 
 def spec_of(table: TomlTable, where: str, more: TomlTable) -> ObjectSpec:
