@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from functools import update_wrapper
+from functools import cached_property, update_wrapper
 from math import nan
 from types import FunctionType
 from typing import (
@@ -469,6 +469,16 @@ class FeatureSet(ABC, Generic[ConfigT]):
     def extract(self, trace: Trace) -> Features:
         """Return the features of this trace. Any trace is allowed: an undefined feature is NaN with a reason."""
 
+    @cached_property
+    def _declared_units(self) -> tuple[str, ...]:
+        return tuple(feature.unit for feature in self.features)
+
+    def units_in(self, units_of: Mapping[str, str]) -> tuple[str, ...]:
+        """Return the declared units as those of a trace with the units `units_of`, which can count time in frames."""
+        from graspsense.core.values.features import units_in
+
+        return units_in(units_of["t"], units_of["gap"], units_of["force_left"], self._declared_units)
+
     def result(
         self,
         values: Mapping[str, float],
@@ -481,21 +491,19 @@ class FeatureSet(ABC, Generic[ConfigT]):
         time in frames; not given, the declared units hold. Raises ValueError for a name that the class does not
         declare, for what is no number or infinite, and for a NaN without a reason.
         """
-        from graspsense.core.values.features import Features, units_in
+        from graspsense.core.values.features import Features
 
         names = tuple(feature.name for feature in self.features)
+        units = self._declared_units if units_of is None else self.units_in(units_of)
         for name in values.keys() - set(names):
             raise ValueError(f"{type(self).__name__} declares no feature {name!r}; it has {', '.join(names)}")
-        units = tuple(feature.unit for feature in self.features)
-        if units_of is not None:
-            units = units_in(units_of["t"], units_of["gap"], units_of["force_left"], units)
         numbers = []
-        for name in names:
-            try:
+        try:
+            for name in names:
                 numbers.append(float(values.get(name, nan)))
-            except (TypeError, ValueError) as error:
-                kind = type(values[name]).__name__
-                raise ValueError(f"feature {name!r} is of type {kind}: give one number") from error
+        except (TypeError, ValueError) as error:
+            kind = type(values[name]).__name__
+            raise ValueError(f"feature {name!r} is of type {kind}: give one number") from error
         return Features(names=names, values=tuple(numbers), units=units, reasons=dict(reasons or {}))
 
     def undefined(self, reason: str, units_of: Mapping[str, str] | None = None) -> Features:

@@ -290,7 +290,7 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
             f_steady, rates = math.nan, (rates[0], math.nan)
             reasons |= missing(("f_steady", "df_dt"), "the pads gave no number when the fingers were at rest")
         values = (p_first, p_steady, f_steady, delta_t, *rates)
-        return self.result(dict(zip(NAMES, values, strict=True)), reasons, units_of)
+        return Features(names=NAMES, values=values, units=self.units_in(units_of), reasons=reasons)
 
     def _params(self, in_seconds: bool = True) -> ChittaParams:
         config = self.config
