@@ -73,9 +73,8 @@ def opens_and_closes_in_time(subject: Subject) -> None:
     """`open` and `close` take ten seconds at most, each."""
     session = subject.session
     if max(session.opened_s, session.closed_s) > LONGEST_OPEN_S:
-        session = readings_of(
-            subject
-        )  # a simulator compiles at its first opening, and other work may hold it up
+        # A simulator compiles at its first opening, and other work may hold it up.
+        session = readings_of(subject)
     for method, took in (("open", session.opened_s), ("close", session.closed_s)):
         demand(
             took <= LONGEST_OPEN_S,
