@@ -35,7 +35,7 @@ from graspsense.plugin_api import (
     create,
 )
 from graspsense.report.found_table import markdown_table
-from graspsense.testing.hostile import HOSTILE
+from graspsense.testing.hostile import HOSTILE, HostileController
 from graspsense_pr2_gripper.backend import Pr2Backend
 from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
 
@@ -107,7 +107,7 @@ def grasped(controller: Controller[Any], faults: FaultConfig, seed: int = SEED, 
 def controller_named(name: str) -> Controller[Any]:
     """Return one of graspsense's controllers, or a hostile one."""
     if name in HOSTILE:
-        return HOSTILE[name](EFFORT)
+        return HostileController((name, EFFORT))
     built: Controller[Any] = create("controller", name)
     return built
 

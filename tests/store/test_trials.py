@@ -309,7 +309,7 @@ def test_the_page_of_a_store_has_a_section_for_a_number(store, tmp_path):
     assert "Predicted number: fill" in page
     assert "mean absolute error of" in page
     assert page.count("predicted ") >= 24  # a mark with its words for each trial
-    for control in ("mean only", "width only", "shuffled values"):
+    for control in ("mean only", "width only"):
         assert control in page
     code, _, err = graspsense("report", store.folder, "--out", tmp_path / "page", "--target-value", "weight")
     assert code == 2
