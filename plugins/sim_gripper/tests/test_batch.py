@@ -466,7 +466,8 @@ def test_few_grasps_are_compiled_only_if_their_code_is_on_disk_or_others_came_be
 @pytest.mark.parametrize("kept", [True, False])
 def test_drawing_and_measuring_are_compiled_for_many_grasps_or_if_their_code_is_on_disk(monkeypatch, kept):
     monkeypatch.setattr(threads, "WORTH_COMPILING", 1)
-    monkeypatch.setattr(threads, "WORTH_COMPILING_AROUND", 4)
+    monkeypatch.setattr(threads, "WORTH_COMPILING_DRAWING", 4)
+    monkeypatch.setattr(threads, "WORTH_COMPILING_MEASURE", 4)
     monkeypatch.setattr(threads, "_interpreted_around", Counter())
     monkeypatch.setattr(threads, "is_drawing_kept", lambda: kept)
     monkeypatch.setattr(threads, "is_measure_kept", lambda form: kept)

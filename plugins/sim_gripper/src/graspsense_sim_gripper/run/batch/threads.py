@@ -45,9 +45,11 @@ WORTH_COMPILING: Final = 350
 half a minute, in which the interpreter runs about so many grasps."""
 WORTH_LOADING: Final = 16
 """The same where an earlier process has kept the compiled loop on disk."""
-WORTH_COMPILING_AROUND: Final = 10_000
+WORTH_COMPILING_DRAWING: Final = 10_000
 """Number of compiled grasps of this process from which it saves time to compile their drawing (a second, against 0.1 ms
-a grasp) or what measures their features (1.4 s, against 0.15 ms)."""
+a grasp)."""
+WORTH_COMPILING_MEASURE: Final = 500
+"""The same of what measures their features (1.4 s, against 2.7 ms a grasp for the six features)."""
 WORTH_A_PROCESS: Final = 16
 """Number of grasps per worker in the interpreter from which a process, which starts in half a second, saves time."""
 WORTH_A_WORKER: Final = 16
@@ -227,7 +229,7 @@ class _Batch:
     def _compile_around_the_loop(self) -> None:
         """Compile what each compiled grasp does before and after its loop, where that saves time."""
         try:
-            if self._is_worth_compiling_around(draw_numbers, is_drawing_kept):
+            if self._is_worth_compiling_around(draw_numbers, WORTH_COMPILING_DRAWING, is_drawing_kept):
                 self.drawing = compiled_drawing()
         except NotCompilable:
             # The loop cannot be compiled either, and says why.
@@ -235,15 +237,19 @@ class _Batch:
         form = self.job.extraction
         if form is not None:
             try:
-                if self._is_worth_compiling_around(form.measure, partial(is_measure_kept, form)):
+                is_kept = partial(is_measure_kept, form)
+                if self._is_worth_compiling_around(form.measure, WORTH_COMPILING_MEASURE, is_kept):
                     self.measure = compiled_measure(form)
             except NotCompilable as error:
                 self.notes[f"features are extracted from traces, which takes longer: {error}"] = None
 
-    def _is_worth_compiling_around(self, part: Hashable, is_kept: Callable[[], bool]) -> bool:
-        """Return whether it saves time to compile a part around the loop. Raises NotCompilable as `is_kept` does."""
+    def _is_worth_compiling_around(self, part: Hashable, worth: int, is_kept: Callable[[], bool]) -> bool:
+        """Return whether it saves time to compile a part around the loop, from `worth` grasps on.
+
+        Raises NotCompilable as `is_kept` does.
+        """
         n = sum(count for kinds, count in self.counts.items() if self.is_compiled[kinds])
-        if self.compiled or n + _interpreted_around[part] >= WORTH_COMPILING_AROUND or is_kept():
+        if self.compiled or n + _interpreted_around[part] >= worth or is_kept():
             return True
         _interpreted_around[part] += n
         return False
