@@ -47,46 +47,23 @@ def gap_resolution(times_s: Sequence[float], gaps_m: Sequence[float], contact: i
     >>> round(gap_resolution(times, coarse, 0).step_m, 9)
     0.0001
     """
-    end = len(gaps_m)
-    first_change, last_change = 1, contact
-    while first_change < end and not _changes(gaps_m[first_change - 1], gaps_m[first_change]):
-        first_change += 1
-    while last_change > first_change and not _changes(gaps_m[last_change - 1], gaps_m[last_change]):
-        last_change -= 1
-    n_changes = _count_changes(gaps_m[first_change - 1 : last_change], gaps_m[first_change : last_change + 1])
+    first_change, last_change, n_changes = 0, 0, 0
+    changed, closing, repeats, step_m = 0, False, False, 0.0
+    gap_m = gaps_m[0]
+    for i in range(1, len(gaps_m)):
+        previous_m, gap_m = gap_m, gaps_m[i]
+        change_m = abs(gap_m - previous_m)
+        if change_m > ROUNDING * abs(gap_m):
+            if changed == 0:
+                first_change, step_m = i, change_m
+            elif i - changed > 1 and closing and gap_m < previous_m:
+                repeats = True
+            if change_m < step_m:
+                step_m = change_m
+            if i <= contact:
+                last_change, n_changes = i, n_changes + 1
+            changed, closing = i, gap_m < previous_m
     period_s = 0.0
     if n_changes >= LEAST_CHANGES and last_change - first_change > HELD * (n_changes - 1):
         period_s = (times_s[last_change] - times_s[first_change]) / (n_changes - 1)
-    # An approach in which each sample is a change has no repeated number.
-    begin = last_change if n_changes == last_change - first_change + 1 else first_change
-    if not _repeats_while_closing(gaps_m, begin, end):
-        return GapResolution(0.0, period_s)
-    step_m = abs(gaps_m[first_change] - gaps_m[first_change - 1])
-    for i in range(first_change, end):
-        if _changes(gaps_m[i - 1], gaps_m[i]):
-            step_m = min(step_m, abs(gaps_m[i] - gaps_m[i - 1]))
-    return GapResolution(step_m, period_s)
-
-
-def _changes(previous_m: float, gap_m: float) -> bool:
-    return abs(gap_m - previous_m) > ROUNDING * abs(gap_m)
-
-
-def _count_changes(previous_m: Sequence[float], gaps_m: Sequence[float]) -> int:
-    """Return how many gaps differ from those before them."""
-    n = 0
-    for i in range(len(gaps_m)):
-        n += 1 if _changes(previous_m[i], gaps_m[i]) else 0
-    return n
-
-
-def _repeats_while_closing(gaps_m: Sequence[float], begin: int, end: int) -> bool:
-    """Return whether a number is repeated between two changes that close the gap."""
-    last_change, was_closing = end, False
-    for i in range(begin, end):
-        if _changes(gaps_m[i - 1], gaps_m[i]):
-            closing = gaps_m[i] < gaps_m[i - 1]
-            if i - last_change > 1 and closing and was_closing:
-                return True
-            last_change, was_closing = i, closing
-    return False
+    return GapResolution(step_m if repeats else 0.0, period_s)
