@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import attrs
 import click
@@ -15,6 +15,7 @@ import click
 from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import echo, echo_table, talk
+from graspsense.core.grasp import calibration
 from graspsense.core.grasp.calibrating import Rig, breakaways, unloaded_images
 from graspsense.core.grasp.calibration import counts_per_newton, load_table, motor_table
 from graspsense.core.grasp.calibration_files import (
@@ -27,11 +28,9 @@ from graspsense.core.grasp.calibration_files import (
     write_calibration,
 )
 from graspsense.core.values.channel import TactileArray
+from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError, DataDamaged
-
-if TYPE_CHECKING:
-    from graspsense.core.values.device import DeviceInfo
-    from graspsense.sources.formats.csv_columns import CsvColumns
+from graspsense.sources.formats.csv_columns import CsvColumns
 
 
 class _Setup(NamedTuple):
@@ -70,8 +69,6 @@ def calibrate() -> None:
 @_options
 def tare(images: int, replace: bool, as_json: bool, **asked: Any) -> None:
     """Store the zero of the pads: the mean of cell images with open fingers that touch nothing."""
-    from graspsense.core.grasp import calibration
-
     with _set_up(asked, replace) as setup:
         stored = stored_zero(setup.stored["tare"]) if "tare" in setup.stored else None
         counts_per_n = _counts_per_n(setup)
@@ -293,8 +290,6 @@ def _grouped(
 
 def _columns(path: str, *names: str) -> CsvColumns:
     """Return the columns of a CSV file, which has these. Raises DataDamaged."""
-    from graspsense.sources.formats.csv_columns import CsvColumns
-
     columns = CsvColumns(Path(path))
     if missing := set(names) - set(columns.names):
         raise DataDamaged(f"{path} lacks the columns {', '.join(sorted(missing))}")

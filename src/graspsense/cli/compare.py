@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import click
 
@@ -21,17 +22,14 @@ from graspsense.cli.sources import (
     trials_of,
 )
 from graspsense.cli.terminal import Style, echo, echo_entries, echo_entry
+from graspsense.core.components.entries import Role
 from graspsense.core.components.registry import installed
+from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import UnknownName
 from graspsense.evaluation.json_codec import to_json
+from graspsense.evaluation.ranking import Ranking, rank
+from graspsense.report.ranking_page import ranking_table
 from graspsense.report.write import write_html
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from graspsense.core.components.entries import Role
-    from graspsense.core.learn.labelled import Labelled
-    from graspsense.evaluation.ranking import Ranking
 
 DEFAULT_FEATURES: Final = ("chitta", "columns")
 """The features that are used where none are named: of recordings, and of a table."""
@@ -69,8 +67,6 @@ def compare(
     **given: Any,
 ) -> None:
     """Measure, print, and write the page."""
-    from graspsense.evaluation.ranking import rank
-
     if feature_sets and is_csv(source):
         raise click.UsageError("--feature-sets is not for a CSV source, which has its features as columns")
     if given["target_value"]:
@@ -114,8 +110,6 @@ def compared_trials(
 
 
 def _print(ranking: Ranking) -> None:
-    from graspsense.report.ranking_page import ranking_table
-
     echo(ranking.verdict, Style.HEADING)
     echo_entry("trials", f"{ranking.trials} of {ranking.source}; compared by {ranking.protocol}")
     echo()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Mapping
+from typing import Any, Final
 
 import click
 
@@ -11,14 +12,16 @@ from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import detector_of
 from graspsense.cli.terminal import Style, echo, echo_entries, echo_entry, echo_table
 from graspsense.core.values.events import NOT_KNOWN
+from graspsense.evaluation.events import STEPS, EventScore, EventsEvaluation, LabelledEvents, evaluate_kind
 from graspsense.evaluation.intervals import RecognitionRate, percent, percentages
 from graspsense.evaluation.json_codec import to_json
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from graspsense.evaluation.events import EventScore, EventsEvaluation, LabelledEvents
-    from graspsense.recording.replayable import Recording
+from graspsense.recording.replayable import Recording
+from graspsense.sources.recordings.event_recordings import (
+    EventTeller,
+    check_detector,
+    event_recordings,
+    threshold_factor,
+)
 
 _FOR_LABELS: Final = (
     *("png", "report", "keep", "checkpoints", "classifier", "target", "target_value"),
@@ -43,14 +46,6 @@ def evaluate_events(
 
 
 def _evaluated(source: str, tolerance_s: float, folds: int, given: Mapping[str, Any]) -> EventsEvaluation:
-    from graspsense.evaluation.events import STEPS, EventsEvaluation, evaluate_kind
-    from graspsense.sources.recordings.event_recordings import (
-        EventTeller,
-        check_detector,
-        event_recordings,
-        threshold_factor,
-    )
-
     selected = detector_of(source, given)
     controller: Any = selected.create()
     known = type(controller).events
@@ -100,8 +95,6 @@ def _evaluated(source: str, tolerance_s: float, folds: int, given: Mapping[str, 
 
 
 def _labelled(recording: Recording, group: str) -> LabelledEvents:
-    from graspsense.evaluation.events import LabelledEvents
-
     return LabelledEvents(
         labelled={
             name: tuple(

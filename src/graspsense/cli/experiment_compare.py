@@ -8,6 +8,8 @@ import click
 
 from graspsense.cli.output import echo_found, echo_json, file_to_write_as
 from graspsense.cli.terminal import Style, echo
+from graspsense.experiments.comparison import compare_experiments
+from graspsense.experiments.comparison_page import comparison_page, comparison_tables, doubts
 from graspsense.report.write import write_html
 
 DEFAULT_PAGE = "comparison.html"
@@ -30,9 +32,6 @@ def compare(folders: tuple[str, ...], out: str, as_json: bool) -> None:
     A, B, ... are folders that `graspsense experiment` wrote. The differences are paired by seed where both experiments
     simulate the same trials with the same seeds.
     """
-    from graspsense.experiments.comparison import compare_experiments
-    from graspsense.experiments.comparison_page import comparison_page, comparison_tables, doubts
-
     comparison = compare_experiments(folders)
     write_html(Path(out), comparison_page(comparison))
     if as_json:

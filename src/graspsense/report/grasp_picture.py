@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from graspsense.core.values.fingers import fingers_of
+from graspsense.core.values.trial import Trial
 from graspsense.core.values.units import display_unit
 from graspsense.report.trace_plot import draw_trace
 from graspsense.report.write import new_figure, write_picture
-
-if TYPE_CHECKING:
-    from graspsense.core.values.trial import Trial
 
 DPI: Final = 120
 """Pixels per inch: the picture is 1020 pixels wide and stays readable when a page scales it to 800."""

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from html import escape
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
+from graspsense.core.values.tree import TreeNode
 from graspsense.report.html import wide
-
-if TYPE_CHECKING:
-    from graspsense.core.values.tree import TreeNode
 
 MOST: Final = 400
 """Largest number of nodes that are shown; the page says so if a tree has more."""
