@@ -13,7 +13,7 @@ from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entries, ec
 from graspsense.core.values.errors import GraspsenseError, PluginUnavailable
 from graspsense.core.values.units import display_unit
 from graspsense.recording.atomic_file import write_new
-from graspsense.report.channels_picture import channels_png
+from graspsense.report.grasp_picture import channels_png
 from graspsense.sources.columns.channel_facts import ChannelFacts
 from graspsense.sources.importing.import_sources import is_plain_file
 from graspsense.sources.manifest.suggestion import suggested_manifest

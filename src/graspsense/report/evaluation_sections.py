@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from graspsense.core.values.tree import TreeNode
+from graspsense.core.values.reasons import TreeNode
 from graspsense.evaluation.doubt import Reliability, SetCoverage
 from graspsense.evaluation.intervals import percent
 from graspsense.evaluation.results import Confusion

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from html import escape
 from typing import Final
 
-from graspsense.core.values.tree import TreeNode
+from graspsense.core.values.reasons import TreeNode
 from graspsense.report.html import wide
 
 MOST: Final = 400
