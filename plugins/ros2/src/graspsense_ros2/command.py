@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from graspsense.plugin_api import Trial
     from graspsense_ros2.action_server import Goal
     from graspsense_ros2.held_gripper import HeldGripper
-    from graspsense_ros2.middleware import Through
-    from graspsense_ros2.node import Node
+    from graspsense_ros2.node import Node, Through
 
 GRASP: Final = "/graspsense/grasp"
 GRIPPER_COMMAND: Final = "/graspsense/gripper_cmd"
@@ -49,7 +48,7 @@ def ros2(
     The grasps are published as topics below /graspsense. Exit codes: 0 ended by Ctrl-C; 2 wrong settings.
     """
     from graspsense.gripper_api import LiveFeed, load_pipeline
-    from graspsense_ros2.middleware import open_node
+    from graspsense_ros2.node import open_node
 
     if not (grasps or moves):
         raise click.UsageError("say what others may ask for: --grasp, --action, or both")
