@@ -21,6 +21,7 @@ from graspsense.cli.options import (
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo_as_it_is, echo_entry, talk
 from graspsense.core.components.registry import installed
+from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.learn.conformal import COVERAGE, units_lacking
 from graspsense.core.learn.target_value import value_label
 from graspsense.core.pipeline.pipeline import model_for
@@ -29,7 +30,6 @@ from graspsense.core.settings.resolved import Settings
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.trial import Trial
 from graspsense.core.values.units import in_words
-from graspsense.recording.atomic_file import SaveFailed
 from graspsense.store.changes import refuse_other_units
 from graspsense.store.collecting import Collection, Wanted
 from graspsense.store.labels import agrees

@@ -16,6 +16,7 @@ from graspsense.cli.options import force_option, keys_option
 from graspsense.cli.output import echo_found, echo_json, file_to_write_as
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
+from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.values.errors import ExitCode, counted
 from graspsense.evaluation.intervals import percent, percentages
 from graspsense.experiments.answer import answer
@@ -31,7 +32,6 @@ from graspsense.experiments.page import findings_of, write_page
 from graspsense.experiments.results import Results
 from graspsense.experiments.run import Account, refuse_store, run_experiment
 from graspsense.experiments.summary import Summary, summarise
-from graspsense.recording.atomic_file import SaveFailed
 from graspsense.report.write import write_html
 
 _MOST_NAMED = 8

@@ -10,9 +10,9 @@ from attrs import asdict
 
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entries, echo_entry, echo_table, talk
+from graspsense.core.files.whole_file import write_new
 from graspsense.core.values.errors import GraspsenseError, PluginUnavailable
 from graspsense.core.values.units import display_unit
-from graspsense.recording.atomic_file import write_new
 from graspsense.report.grasp_picture import channels_png
 from graspsense.sources.columns.channel_facts import ChannelFacts
 from graspsense.sources.importing.import_sources import is_plain_file

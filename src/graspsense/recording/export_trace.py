@@ -13,9 +13,9 @@ import numpy as np
 
 from graspsense.core.components.channels import as_json
 from graspsense.core.files.csv_text import csv_text
+from graspsense.core.files.whole_file import write_new
 from graspsense.core.values.channel import FLOATS, FastChannel, TactileArray
 from graspsense.core.values.trace import PAD_COLUMNS, TICK_COLUMNS, ImageTrace
-from graspsense.recording.atomic_file import write_new
 from graspsense.recording.foxglove import with_pictures
 from graspsense.recording.layout import SIGNAL_TOPIC, TICK_FIELDS
 from graspsense.recording.parquet import parquet

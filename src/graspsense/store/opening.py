@@ -14,8 +14,8 @@ from typing import Final
 from urllib.parse import quote
 
 from graspsense import __version__
+from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.values.errors import ConfigError, DataDamaged
-from graspsense.recording.atomic_file import SaveFailed
 from graspsense.store.schema import APPLICATION_ID, NEWEST, tables_in, tables_of_version
 
 FILE: Final = "store.sqlite"

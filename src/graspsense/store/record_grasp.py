@@ -8,6 +8,7 @@ from pathlib import Path
 from attrs import evolve, frozen
 
 from graspsense.core.components.registry import Plugins
+from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.grasp.interrupts import Interrupts
 from graspsense.core.grasp.pair import Member
 from graspsense.core.grasp.sinks import Sink
@@ -15,7 +16,6 @@ from graspsense.core.pipeline.pipeline import GraspInterrupted, grasp_with
 from graspsense.core.settings.resolved import Settings
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.trial import Trial
-from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.layout import DEVICE, RESULT, START
 from graspsense.recording.recorder import Recorder
 from graspsense.recording.trial_record import Origin, TrialRecord

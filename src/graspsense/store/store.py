@@ -19,8 +19,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
 
+from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.values.errors import ConfigError, DataDamaged, named
-from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.recording_info import RecordingInfo
 from graspsense.recording.trial_record import TrialRecord
 from graspsense.store.naming import store_folder
