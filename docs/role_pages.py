@@ -37,11 +37,11 @@ from graspsense.core.control import contact, free_motion, tick
 from graspsense.core.values import signals
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.device import DeviceInfo
-from graspsense.core.values.events import GraspEvent
 from graspsense.core.values.features import Features, FeatureTable, Prediction
 from graspsense.core.values.fingers import FingerForce
 from graspsense.core.values.mounting import Mounting
 from graspsense.core.values.reasons import Contribution, FeatureValue, Reason
+from graspsense.core.values.signals import GraspEvent
 from graspsense.core.values.trace import ImageTrace, SampleTrace, Trace
 from graspsense.core.values.trial import RunInfo, Trial
 from graspsense.recording.labelled_recording import LabelledRecording

@@ -11,7 +11,7 @@ from graspsense.cli.output import echo_json
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import detector_of
 from graspsense.cli.terminal import Style, echo, echo_entries, echo_entry, echo_table
-from graspsense.core.values.events import NOT_KNOWN
+from graspsense.core.values.signals import NOT_KNOWN
 from graspsense.evaluation.events import STEPS, EventScore, EventsEvaluation, LabelledEvents, evaluate_kind
 from graspsense.evaluation.intervals import RecognitionRate, percent, percentages
 from graspsense.evaluation.json_codec import to_json

@@ -6,8 +6,7 @@ import sys
 from typing import Final
 
 from graspsense.cli.terminal import talk, terminal_width
-from graspsense.core.values.events import GraspEvent
-from graspsense.core.values.signals import Command, Phase, Reading
+from graspsense.core.values.signals import Command, GraspEvent, Phase, Reading
 
 BAR: Final = 24
 """Characters of the bar of the widest gap, where the terminal has room for it."""

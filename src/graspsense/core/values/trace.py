@@ -30,7 +30,7 @@ from graspsense.core.values.signals import (
 from graspsense.core.values.units import quantity
 
 if TYPE_CHECKING:
-    from graspsense.core.values.events import GraspEvent
+    from graspsense.core.values.signals import GraspEvent
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

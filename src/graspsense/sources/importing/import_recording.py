@@ -15,9 +15,8 @@ from graspsense.core.learn.labelled import class_of
 from graspsense.core.pipeline.pipeline import grasp_with
 from graspsense.core.settings.resolved import Settings
 from graspsense.core.values.errors import FAILURES
-from graspsense.core.values.events import LABELLED
 from graspsense.core.values.features import Features
-from graspsense.core.values.signals import Reading
+from graspsense.core.values.signals import LABELLED, Reading
 from graspsense.core.values.trace import Trace
 from graspsense.core.values.trial import Trial
 from graspsense.recording.labelled_recording import LabelledRecording
