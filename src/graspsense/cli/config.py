@@ -11,8 +11,6 @@ from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_as_it_is
 from graspsense.core.components.registry import installed
-from graspsense.core.pipeline.anytime import anytime_of
-from graspsense.core.pipeline.pipeline import model_for
 from graspsense.core.pipeline.wiring import check
 from graspsense.core.settings.resolved import Settings
 from graspsense.core.settings.settings_file import to_toml
@@ -55,6 +53,9 @@ def show(name: str | None, as_json: bool, **asked: Any) -> None:
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def validate(name: str | None, as_json: bool, **asked: Any) -> None:
     """Check that the settings are valid and the components fit together, without opening anything."""
+    from graspsense.core.pipeline.anytime import anytime_of
+    from graspsense.core.pipeline.pipeline import model_for
+
     settings = _settings(name, asked)
     check(settings)
     notes = []

@@ -8,7 +8,7 @@ import tempfile
 import weakref
 from collections.abc import Mapping, Sequence
 from itertools import chain
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from attrs import define, evolve, field, frozen
@@ -22,15 +22,13 @@ from graspsense.core.values.signals import (
     NO_PADS,
     Command,
     Frame,
+    GraspEvent,
     Image,
     Pads,
     Reading,
     Samples,
 )
 from graspsense.core.values.units import quantity
-
-if TYPE_CHECKING:
-    from graspsense.core.values.signals import GraspEvent
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
