@@ -5,9 +5,8 @@ from __future__ import annotations
 import os
 import shlex
 import sys
-from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -19,20 +18,18 @@ from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
 from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.values.errors import ExitCode, counted
 from graspsense.evaluation.intervals import percent, percentages
-from graspsense.experiments.answer import answer
-from graspsense.experiments.comparison import compare_experiments
-from graspsense.experiments.comparison_page import comparison_page, comparison_tables, doubts
-from graspsense.experiments.duration import ESTIMATED_FROM, Effort, effort_of
-from graspsense.experiments.executors.base import Executor
-from graspsense.experiments.executors.choose import chosen
-from graspsense.experiments.experiment import Planned
-from graspsense.experiments.experiment_file import read_experiment, shipped
-from graspsense.experiments.findings import Findings
-from graspsense.experiments.page import findings_of, write_page
-from graspsense.experiments.results import Results
-from graspsense.experiments.run import Account, refuse_store, run_experiment
-from graspsense.experiments.summary import Summary, summarise
 from graspsense.report.write import write_html
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from graspsense.experiments.duration import Effort
+    from graspsense.experiments.executors.base import Executor
+    from graspsense.experiments.experiment import Planned
+    from graspsense.experiments.findings import Findings
+    from graspsense.experiments.results import Results
+    from graspsense.experiments.run import Account
+    from graspsense.experiments.summary import Summary
 
 _MOST_NAMED = 8
 
@@ -84,9 +81,17 @@ def experiment(
 
     `graspsense experiment compare A B ...` compares the results of several experiments.
     """
+    from graspsense.experiments.experiment_file import read_experiment, shipped
+
     if experiment is None:
         _list(shipped(), as_json)
         return
+    from graspsense.experiments.answer import answer
+    from graspsense.experiments.executors.choose import chosen
+    from graspsense.experiments.page import findings_of
+    from graspsense.experiments.results import Results
+    from graspsense.experiments.run import refuse_store
+    from graspsense.experiments.summary import summarise
 
     planned = read_experiment(experiment, options, force=force)
     results = Results(Path(out or planned.name))
@@ -115,6 +120,8 @@ def _run(
     planned: Planned, results: Results, make: Callable[[], Executor], resume: bool, shown: Live
 ) -> Account:
     """Run the tasks, and show how many are done."""
+    from graspsense.experiments.run import run_experiment
+
     with ProgressLine() as line:
 
         def progress(what: str, done: int, total: int) -> None:
@@ -134,6 +141,8 @@ def _run(
 
 def _written_page(summary: Summary, results: Results) -> tuple[Path | None, str]:
     """Write the page and return its path, or None and why it could not be written."""
+    from graspsense.experiments.page import write_page
+
     try:
         return write_page(summary, results), ""
     except SaveFailed as error:
@@ -151,6 +160,9 @@ def _counts(account: Account, problem: str) -> dict[str, object]:
 
 
 def _list(known: Iterable[str], as_json: bool) -> None:
+    from graspsense.experiments.duration import ESTIMATED_FROM, effort_of
+    from graspsense.experiments.experiment_file import read_experiment
+
     cores = os.cpu_count() or 1
     planned = {name: read_experiment(name) for name in known}
     efforts = {name: effort_of(experiment) for name, experiment in planned.items()}
@@ -189,6 +201,8 @@ def _effort_as_json(effort: Effort) -> dict[str, object]:
 
 def _plan(planned: Planned, results: Results, workers: int, as_json: bool) -> None:
     """Print what the experiment consists of, what is done already, and how long it takes."""
+    from graspsense.experiments.duration import ESTIMATED_FROM, effort_of
+
     effort = effort_of(planned)
     if as_json:
         echo_json({"dry_run": True, "experiment": planned.name, **_effort_as_json(effort)})
@@ -222,6 +236,8 @@ def _print_json(
 
 
 def _print(summary: Summary, more: Findings | None, account: Account, page: str) -> None:
+    from graspsense.experiments.answer import answer
+
     echo(answer(summary) if more is None else more.answer, Style.HEADING)
     echo()
     if more is None:
@@ -300,6 +316,9 @@ def compare(folders: tuple[str, ...], out: str, as_json: bool) -> None:
     A, B, ... are folders that `graspsense experiment` wrote. The differences are paired by seed where both experiments
     simulate the same trials with the same seeds.
     """
+    from graspsense.experiments.comparison import compare_experiments
+    from graspsense.experiments.comparison_page import comparison_page, comparison_tables, doubts
+
     comparison = compare_experiments(folders)
     write_html(Path(out), comparison_page(comparison))
     if as_json:

@@ -1,14 +1,10 @@
-"""A ROS 2 node as the parts of this package use it: messages are bytes in CDR, whoever carries them.
-
-That is rclpy, or zenoh without a ROS installation.
-"""
+"""A ROS 2 node as the parts of this package use it: messages are bytes in CDR, whoever carries them."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from importlib.util import find_spec
-from typing import Final, Literal, Protocol
+from typing import Final, Protocol
 
 from graspsense.plugin_api import ConfigError
 
@@ -49,19 +45,3 @@ def domain_from_environment() -> int:
     if not (text.isascii() and text.isdecimal() and int(text) <= MOST_DOMAIN):
         raise ConfigError(f"ROS_DOMAIN_ID is {text!r}: set it to a number from 0 to {MOST_DOMAIN}")
     return int(text)
-
-
-Through = Literal["auto", "rclpy", "zenoh"]
-
-
-def open_node(name: str, through: Through = "auto") -> Node:
-    """Return a new node: by rclpy where it can be imported, otherwise by zenoh. Raises ConfigError."""
-    if through == "rclpy" or (through == "auto" and find_spec("rclpy") is not None):
-        from graspsense_ros2.rclpy_node import RclpyNode
-
-        return RclpyNode(name)
-    if find_spec("zenoh") is None:
-        raise ConfigError('zenoh cannot be imported: pip install "graspsense[ros2]"')
-    from graspsense_ros2.zenoh_node import ZenohNode
-
-    return ZenohNode(name)
