@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from math import isfinite
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import attrs
 import click
@@ -30,7 +30,9 @@ from graspsense.core.grasp.calibration_files import (
 from graspsense.core.values.channel import TactileArray
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError, DataDamaged
-from graspsense.sources.formats.csv_columns import CsvColumns
+
+if TYPE_CHECKING:
+    from graspsense.sources.formats.csv_columns import CsvColumns
 
 
 class _Setup(NamedTuple):
@@ -290,6 +292,8 @@ def _grouped(
 
 def _columns(path: str, *names: str) -> CsvColumns:
     """Return the columns of a CSV file, which has these. Raises DataDamaged."""
+    from graspsense.sources.formats.csv_columns import CsvColumns
+
     columns = CsvColumns(Path(path))
     if missing := set(names) - set(columns.names):
         raise DataDamaged(f"{path} lacks the columns {', '.join(sorted(missing))}")

@@ -15,18 +15,19 @@ from graspsense.cli.terminal import echo_as_it_is, echo_entries, echo_entry
 from graspsense.core.components.registry import Component, installed
 from graspsense.core.components.strict import keys_of, plain
 from graspsense.core.files.toml_text import toml_key, toml_value
-from graspsense.core.learn.labelled import Labelled
 from graspsense.core.settings.layers import read_toml, refuse_other_kind
 from graspsense.core.settings.selected import SelectedComponent, build
 from graspsense.core.values.errors import ConfigError, GraspsenseError, PluginUnavailable, counted
 from graspsense.core.values.features import FeatureTable
-from graspsense.evaluation.choosing import ChosenPipeline, choose
 from graspsense.evaluation.json_codec import to_json
 from graspsense.recording.provenance import recipe
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+    from graspsense.core.learn.labelled import Labelled
+    from graspsense.evaluation.choosing import ChosenPipeline
 
 CLASSIFIERS: Final = ("c45", "knn", "svm", "forest", "extra-trees", "mlp")
 """The classifiers to choose from, unless one is given."""
@@ -79,6 +80,8 @@ def chosen(
 
     Raises ConfigError.
     """
+    from graspsense.evaluation.choosing import choose
+
     names = (classifier or "given",) if classifier or _sets(given, "classifier.type") else CLASSIFIERS
     learners = {name: learner_of(source, None if name == "given" else name, given) for name in names}
     learners = {learner.component.name: learner for learner in learners.values()}

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -22,19 +22,18 @@ from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo_as_it_is, echo_entry, talk
 from graspsense.core.components.registry import installed
 from graspsense.core.files.whole_file import SaveFailed
-from graspsense.core.learn.conformal import COVERAGE, units_lacking
 from graspsense.core.learn.target_value import value_label
-from graspsense.core.pipeline.pipeline import model_for
 from graspsense.core.pipeline.wiring import check
 from graspsense.core.settings.resolved import Settings
 from graspsense.core.values.errors import ConfigError
-from graspsense.core.values.trial import Trial
 from graspsense.core.values.units import in_words
 from graspsense.store.changes import refuse_other_units
-from graspsense.store.collecting import Collection, Wanted
 from graspsense.store.labels import agrees
-from graspsense.store.recover import recover_store
-from graspsense.store.store import Store
+
+if TYPE_CHECKING:
+    from graspsense.core.values.trial import Trial
+    from graspsense.store.collecting import Collection
+    from graspsense.store.store import Store
 
 _LABEL = 14
 
@@ -80,6 +79,9 @@ def collect(
     or killed. Ctrl-C opens the gripper, stores a running grasp as aborted, and stops. With a simulated gripper, the
     label selects the object. Answers can come from a file.
     """
+    from graspsense.store.collecting import Collection, Wanted
+    from graspsense.store.store import Store
+
     live = LiveOptions.taken_from(asked)
     wanted = Wanted(
         words=tuple(word.strip() for word in labels.split(",") if word.strip()),
@@ -148,6 +150,8 @@ def _show(shown: Live, save: str, word: str, trial: Trial) -> None:
 
 
 def _print_counts(save: str, collection: Collection, as_json: bool) -> None:
+    from graspsense.core.learn.conformal import COVERAGE, units_lacking
+
     counts, each = collection.counts(), collection.wanted.each
     unit, lacking = units_lacking(collection.store.counts())
     if as_json:
@@ -193,6 +197,8 @@ def _has_model(settings: Settings) -> bool:
 
     A pipeline can name the model that is to be trained on these trials.
     """
+    from graspsense.core.pipeline.pipeline import model_for
+
     try:
         model_for(settings, installed())
     except ConfigError as error:
@@ -203,6 +209,8 @@ def _has_model(settings: Settings) -> bool:
 
 def _prepare(store: Store, values: tuple[str, ...]) -> None:
     """Complete the trials of an interrupted run, and print what became of each. Raises ConfigError for other units."""
+    from graspsense.store.recover import recover_store
+
     for recovered in recover_store(store):
         number = f" as trial {recovered.trial}" if recovered.trial is not None else ""
         talk(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -24,12 +24,13 @@ from graspsense.cli.sources import (
 from graspsense.cli.terminal import Style, echo, echo_entries, echo_entry
 from graspsense.core.components.entries import Role
 from graspsense.core.components.registry import installed
-from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import UnknownName
 from graspsense.evaluation.json_codec import to_json
-from graspsense.evaluation.ranking import Ranking, rank
-from graspsense.report.ranking_page import ranking_table
 from graspsense.report.write import write_html
+
+if TYPE_CHECKING:
+    from graspsense.core.learn.labelled import Labelled
+    from graspsense.evaluation.ranking import Ranking
 
 DEFAULT_FEATURES: Final = ("chitta", "columns")
 """The features that are used where none are named: of recordings, and of a table."""
@@ -67,6 +68,8 @@ def compare(
     **given: Any,
 ) -> None:
     """Measure, print, and write the page."""
+    from graspsense.evaluation.ranking import rank
+
     if feature_sets and is_csv(source):
         raise click.UsageError("--feature-sets is not for a CSV source, which has its features as columns")
     if given["target_value"]:
@@ -110,6 +113,8 @@ def compared_trials(
 
 
 def _print(ranking: Ranking) -> None:
+    from graspsense.report.ranking_page import ranking_table
+
     echo(ranking.verdict, Style.HEADING)
     echo_entry("trials", f"{ranking.trials} of {ranking.source}; compared by {ranking.protocol}")
     echo()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -28,19 +28,18 @@ from graspsense.cli.sources import (
 from graspsense.cli.target_value import evaluate_value
 from graspsense.cli.terminal import Style, echo, echo_entries, echo_entry, echo_table, talk
 from graspsense.core.components.strict import plain
-from graspsense.core.learn.checkpoints import CheckpointTrials, checkpoints_of, split_checkpoints
-from graspsense.core.learn.labelled import Labelled
 from graspsense.core.settings.selected import SelectedComponent
 from graspsense.core.values.errors import ConfigError
-from graspsense.evaluation.checkpoints import SURE, EarlyRecognition, early_recognition
-from graspsense.evaluation.evaluate import evaluate as measure
 from graspsense.evaluation.intervals import percent, percentages
 from graspsense.evaluation.json_codec import to_json
-from graspsense.evaluation.results import Evaluation, Measurement
 from graspsense.report.confusion import confusion_png, confusion_text
-from graspsense.report.evaluation_page import evaluation_page
-from graspsense.report.verdict import verdict
 from graspsense.report.write import write_html
+
+if TYPE_CHECKING:
+    from graspsense.core.learn.checkpoints import CheckpointTrials
+    from graspsense.core.learn.labelled import Labelled
+    from graspsense.evaluation.checkpoints import EarlyRecognition
+    from graspsense.evaluation.results import Evaluation, Measurement
 
 
 @click.command(
@@ -94,6 +93,7 @@ def evaluate(
     if given["events"]:
         evaluate_events(source, given["tolerance"], folds, as_json, given)
         return
+    from graspsense.core.learn.checkpoints import checkpoints_of
 
     check_outputs(keep, overwrite=overwrite, sources=[source])
     page = None if report is None else page_to_write(report)
@@ -132,6 +132,9 @@ def _measured(
     seed: int,
     progress: ProgressLine,
 ) -> tuple[Evaluation, EarlyRecognition | None]:
+    from graspsense.evaluation.checkpoints import early_recognition
+    from graspsense.evaluation.evaluate import evaluate as measure
+
     evaluation = measure(
         learner,
         labelled,
@@ -151,6 +154,8 @@ def _draw(evaluation: Evaluation, path: Path) -> None:
 
 
 def _write_page(path: Path, evaluation: Evaluation, learner: SelectedComponent, labelled: Labelled) -> None:
+    from graspsense.report.evaluation_page import evaluation_page
+
     command = command_line(("report", "as_json", "png", "keep", "overwrite"))
     write_html(path, evaluation_page(evaluation, learner, labelled, command))
     talk(f"page in {path}")
@@ -160,6 +165,8 @@ def _parts(
     labelled: Labelled, times: Sequence[float], target: str
 ) -> tuple[Labelled, tuple[CheckpointTrials, ...]]:
     """Return the trials, and the parts of them up to each checkpoint with the labels of the target."""
+    from graspsense.core.learn.checkpoints import split_checkpoints
+
     if not times:
         return labelled, ()
     if target == "state":
@@ -173,6 +180,8 @@ def _parts(
 
 
 def _print_early(recognition: EarlyRecognition) -> None:
+    from graspsense.evaluation.checkpoints import SURE
+
     echo(f"\nanswers while the grasp goes on, by {recognition.protocol}")
     if recognition.reason:
         echo(f"no prediction sets: {recognition.reason}", indent=2)
@@ -195,6 +204,8 @@ def _print_early(recognition: EarlyRecognition) -> None:
 
 
 def _print(evaluation: Evaluation) -> None:
+    from graspsense.report.verdict import verdict
+
     echo(verdict(evaluation), Style.HEADING)
     echo_entries("WARNING", evaluation.warnings, Style.CAUTION)
     echo()

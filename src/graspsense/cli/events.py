@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -12,16 +12,12 @@ from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import detector_of
 from graspsense.cli.terminal import Style, echo, echo_entries, echo_entry, echo_table
 from graspsense.core.values.signals import NOT_KNOWN
-from graspsense.evaluation.events import STEPS, EventScore, EventsEvaluation, LabelledEvents, evaluate_kind
 from graspsense.evaluation.intervals import RecognitionRate, percent, percentages
 from graspsense.evaluation.json_codec import to_json
-from graspsense.recording.replayable import Recording
-from graspsense.sources.recordings.event_recordings import (
-    EventTeller,
-    check_detector,
-    event_recordings,
-    threshold_factor,
-)
+
+if TYPE_CHECKING:
+    from graspsense.evaluation.events import EventScore, EventsEvaluation, LabelledEvents
+    from graspsense.recording.replayable import Recording
 
 _FOR_LABELS: Final = (
     *("png", "report", "keep", "checkpoints", "classifier", "target", "target_value"),
@@ -46,6 +42,14 @@ def evaluate_events(
 
 
 def _evaluated(source: str, tolerance_s: float, folds: int, given: Mapping[str, Any]) -> EventsEvaluation:
+    from graspsense.evaluation.events import STEPS, EventsEvaluation, evaluate_kind
+    from graspsense.sources.recordings.event_recordings import (
+        EventTeller,
+        check_detector,
+        event_recordings,
+        threshold_factor,
+    )
+
     selected = detector_of(source, given)
     controller: Any = selected.create()
     known = type(controller).events
@@ -95,6 +99,8 @@ def _evaluated(source: str, tolerance_s: float, folds: int, given: Mapping[str, 
 
 
 def _labelled(recording: Recording, group: str) -> LabelledEvents:
+    from graspsense.evaluation.events import LabelledEvents
+
     return LabelledEvents(
         labelled={
             name: tuple(

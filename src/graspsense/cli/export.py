@@ -13,11 +13,6 @@ from graspsense.cli.sources import named_store
 from graspsense.cli.terminal import echo
 from graspsense.core.components.firstparty import provider
 from graspsense.core.values.errors import ConfigError
-from graspsense.recording import export_trace
-from graspsense.recording.reader import read_recorded
-from graspsense.sources.recordings.dataset_recordings import datasets_to_write, write_dataset
-from graspsense.store import export_table
-from graspsense.store.stored_grasps import stored_grasp
 
 
 @click.command()
@@ -41,6 +36,12 @@ def export(source: str, target: str, pictures: bool, as_json: bool) -> None:
     .mcap (a copy of the recording) and .toml (its settings). NAME:FOLDER is a data set that a plugin writes, as
     lerobot:FOLDER. Existing files are never overwritten.
     """
+    from graspsense.recording import export_trace
+    from graspsense.recording.reader import read_recorded
+    from graspsense.sources.recordings.dataset_recordings import datasets_to_write, write_dataset
+    from graspsense.store import export_table
+    from graspsense.store.stored_grasps import stored_grasp
+
     path = Path(target)
     table = Path(source).is_dir()
     kind, _, place = target.partition(":")

@@ -11,13 +11,13 @@ from graspsense.cli.output import check_outputs, echo_json
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import keep_features, keep_option, named_store
 from graspsense.cli.terminal import echo, echo_entries, echo_entry, echo_table
-from graspsense.core.learn.labelled import Labelled
-from graspsense.store.dataset import labelled_store
 from graspsense.store.naming import STORE
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+    from graspsense.core.learn.labelled import Labelled
 
 
 @click.command()
@@ -34,6 +34,8 @@ def features(source: str, options: tuple[str, ...], keep: str | None, overwrite:
     Each recording is replayed with the changed settings, as `graspsense replay` does. The store does not change.
     `train`, `predict` and `evaluate` take the same -o.
     """
+    from graspsense.store.dataset import labelled_store
+
     check_outputs(keep, overwrite=overwrite)
     stored = labelled_store(source)
     with ProgressLine() as progress:

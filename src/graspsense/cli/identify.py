@@ -21,9 +21,7 @@ from graspsense.core.files.whole_file import write_or_replace
 from graspsense.core.settings.layers import Flag
 from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.errors import ConfigError
-from graspsense.report.identification import identification_page, identification_tables, percent_of_peak
 from graspsense.report.write import write_html
-from graspsense.sources.squeezes import recorded_squeezes
 
 
 @click.command()
@@ -86,6 +84,8 @@ def identify(
 
     `graspsense run --object FILE.toml` grasps the object in simulation.
     """
+    from graspsense.sources.squeezes import recorded_squeezes
+
     check_outputs(out, page, overwrite=overwrite, sources=sources)
     flags = [Flag("--gripper", "gripper.type", gripper)] if gripper else []
     settings = resolve(pipeline, options=options, flags=flags, force=force)
@@ -116,11 +116,15 @@ def identify(
 
 
 def _write_page(page: Path, result: Identification, scene: str) -> None:
+    from graspsense.report.identification import identification_page
+
     write_html(page, identification_page(result, scene))
 
 
 def _print(result: Identification) -> None:
     """Print the identified object, the candidates, and what is not determined."""
+    from graspsense.report.identification import identification_tables, percent_of_peak
+
     rms = [fit.rms_n for fit in result.fits]
     relative = [fit.residual for fit in result.fits]
     echo_entry("object", result.label or "without a label")

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 from attrs import asdict, frozen
@@ -20,7 +20,6 @@ from graspsense.cli.sources import named_source
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entries, echo_entry, echo_table
 from graspsense.core.components.registry import installed
 from graspsense.core.files.whole_file import SaveFailed
-from graspsense.core.pipeline.pipeline import grasp_with, model_for
 from graspsense.core.pipeline.wiring import check_recording
 from graspsense.core.settings.layers import Flag
 from graspsense.core.settings.resolved import Settings, resolve
@@ -37,15 +36,11 @@ from graspsense.core.values.units import display_unit
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.recording.readable import error_of_all, readable
 from graspsense.recording.replayable import recorded_channels
-from graspsense.sources.importing.import_outcomes import refuse_useless, tried
-from graspsense.sources.importing.import_recording import import_recording
-from graspsense.sources.importing.import_sources import ImportedRecording, is_csv, recordings_to_import
-from graspsense.sources.importing.import_summary import ImportSummary, summary_of
-from graspsense.sources.recordings.dataset_recordings import handed_over
-from graspsense.sources.recordings.noise_thresholds import THRESHOLDS, thresholds_for
-from graspsense.store.imported_contents import AlreadyImported, ImportedContents
 from graspsense.store.labels import labels_of
-from graspsense.store.store import Store
+
+if TYPE_CHECKING:
+    from graspsense.sources.importing.import_sources import ImportedRecording
+    from graspsense.sources.importing.import_summary import ImportSummary
 
 LISTED: Final = 20
 """Largest number of unreadable recordings whose errors are printed; `--json` lists all."""
@@ -112,6 +107,8 @@ def import_(
     MANIFEST.toml names the files, their labels and their columns (docs/import.md). A FILE.csv is one grasp and needs
     --time, --gap and --force. KIND:NAME is a file of another reader, or the folder of a data set.
     """
+    from graspsense.sources.importing.import_sources import is_csv, recordings_to_import
+
     if suggest is not None:
         suggest_manifest(sources, suggest)
         return
@@ -176,6 +173,8 @@ class _Chosen:
 
         Raises WiringError for a model that the user has chosen.
         """
+        from graspsense.core.pipeline.pipeline import model_for
+
         self._unpredicted = ""
         try:
             model_for(self._settings, installed())
@@ -221,6 +220,8 @@ class _Chosen:
 
     def fit(self, recordings: Sequence[ImportedRecording]) -> None:
         """Choose the thresholds that are not given. Raises ConfigError for implausible ones in SI units."""
+        from graspsense.sources.recordings.noise_thresholds import THRESHOLDS, thresholds_for
+
         self._any_unit = any(recording.labelled.recording.units for recording in recordings)
         if not self._any_unit:
             self._refuse_doubt()
@@ -273,6 +274,8 @@ def _import(
     as_json: bool,
 ) -> None:
     """Import the recordings and print what became of each; those that cannot be replayed join `unreadable`."""
+    from graspsense.sources.importing.import_outcomes import refuse_useless, tried
+
     ends = tried(recordings, chosen.settings)
     refuse_useless(recordings, ends.outcomes, chosen.settings(recordings[0]))
     stored = _store(save, recordings, unreadable, chosen)
@@ -325,6 +328,11 @@ def _store(
     save: str, recordings: Sequence[ImportedRecording], unreadable: list[UnreadableRecording], chosen: _Chosen
 ) -> _Stored:
     """Store the recordings that the store does not have. Raises SaveFailed."""
+    from graspsense.sources.importing.import_recording import import_recording
+    from graspsense.sources.recordings.dataset_recordings import handed_over
+    from graspsense.store.imported_contents import AlreadyImported, ImportedContents
+    from graspsense.store.store import Store
+
     stored = _Stored([], [], [])
     with Store.open(save) as store, ProgressLine() as progress:
         contents = ImportedContents(store)
@@ -379,6 +387,10 @@ def _show(
     as_json: bool,
 ) -> None:
     """Print what was understood of the recordings, and draw one of them. Raises ConfigError if most are useless."""
+    from graspsense.core.pipeline.pipeline import grasp_with
+    from graspsense.sources.importing.import_outcomes import refuse_useless, tried
+    from graspsense.sources.recordings.dataset_recordings import handed_over
+
     summary, tries = _summary(recordings), tried(recordings, chosen.settings)
     outcomes = tries.outcomes
     ends = {outcome.words: count for outcome, count in outcomes.most_common()}
@@ -411,6 +423,8 @@ def _show(
 
 
 def _summary(recordings: Sequence[ImportedRecording]) -> ImportSummary:
+    from graspsense.sources.importing.import_summary import summary_of
+
     return summary_of([recording.labelled for recording in recordings])
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from attrs import asdict
@@ -13,11 +14,10 @@ from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entries, ec
 from graspsense.core.files.whole_file import write_new
 from graspsense.core.values.errors import GraspsenseError, PluginUnavailable
 from graspsense.core.values.units import display_unit
-from graspsense.report.grasp_picture import channels_png
-from graspsense.sources.columns.channel_facts import ChannelFacts
-from graspsense.sources.importing.import_sources import is_plain_file
-from graspsense.sources.manifest.suggestion import suggested_manifest
-from graspsense.sources.manifest.understood import UnderstoodFile, understood_file
+
+if TYPE_CHECKING:
+    from graspsense.sources.columns.channel_facts import ChannelFacts
+    from graspsense.sources.manifest.understood import UnderstoodFile
 
 
 def show_files(sources: Sequence[str], picture: str, as_json: bool) -> bool:
@@ -25,6 +25,9 @@ def show_files(sources: Sequence[str], picture: str, as_json: bool) -> bool:
 
     Returns False if the sources are other ones, or cannot be read. Raises ConfigError for the picture.
     """
+    from graspsense.sources.importing.import_sources import is_plain_file
+    from graspsense.sources.manifest.understood import understood_file
+
     if not all(map(is_plain_file, sources)):
         return False
     try:
@@ -47,6 +50,8 @@ def show_files(sources: Sequence[str], picture: str, as_json: bool) -> bool:
 
 def suggest_manifest(sources: Sequence[str], name: str) -> None:
     """Write a manifest for a folder, and print it with what reading it says. Raises ConfigError, SaveFailed."""
+    from graspsense.sources.manifest.suggestion import suggested_manifest
+
     if len(sources) != 1:
         raise click.UsageError("--suggest is for one folder with recordings")
     path, folder = Path(name).expanduser(), Path(sources[0]).expanduser()
@@ -117,6 +122,8 @@ def _echo_file(file: UnderstoodFile) -> None:
 
 
 def _draw(file: UnderstoodFile, picture: Path) -> None:
+    from graspsense.report.grasp_picture import channels_png
+
     changing = {facts.name for facts in file.channels if facts.resolution is not None}
     forces = file.force.split(", ")
     courses = {name: file.courses[name] for name in (*forces, *file.courses) if name in changing}

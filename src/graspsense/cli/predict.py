@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -22,16 +22,15 @@ from graspsense.cli.terminal import (
 )
 from graspsense.core.components.entries import ModelEntry
 from graspsense.core.components.registry import installed
-from graspsense.core.learn.copies import learned_from
-from graspsense.core.learn.labelled import Labelled
-from graspsense.core.learn.model import Model
-from graspsense.core.learn.model_file import load_model
 from graspsense.core.values.errors import ConfigError, listed
 from graspsense.core.values.features import UNKNOWN, FeatureTable, Prediction, assumed_units
 from graspsense.core.values.label_text import alike_words, spelled_alike
 from graspsense.evaluation.intervals import RecognitionRate, rate_of
 from graspsense.evaluation.json_codec import to_json
-from graspsense.regression.model import is_regression
+
+if TYPE_CHECKING:
+    from graspsense.core.learn.labelled import Labelled
+    from graspsense.core.learn.model import Model
 
 MOST_WITH_REASONS: Final = 1000
 """Largest number of trials whose predictions are given with reasons, which take about a millisecond each."""
@@ -52,6 +51,10 @@ MOST_WITH_REASONS: Final = 1000
 @click.option("--json", "as_json", is_flag=True, help="Print every prediction with its reasons as JSON.")
 def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     """Predict and print."""
+    from graspsense.core.learn.copies import learned_from
+    from graspsense.core.learn.model_file import load_model
+    from graspsense.regression.model import is_regression
+
     _refuse_swapped(model, source)
     if is_regression(model):
         return predict_value(model, source, as_json, given)

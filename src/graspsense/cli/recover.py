@@ -11,8 +11,6 @@ from graspsense.cli.sources import named_store
 from graspsense.cli.terminal import echo, talk
 from graspsense.core.values.errors import ExitCode
 from graspsense.store.opening import RECORDINGS
-from graspsense.store.recover import recover_file, recover_store
-from graspsense.store.store import Store
 
 
 @click.command()
@@ -25,6 +23,9 @@ def recover(source: str, out: str | None, as_json: bool) -> None:
     Nothing is deleted: the original of an interrupted recording stays as .cut. Exit code 5 means that some data could
     not be recovered.
     """
+    from graspsense.store.recover import recover_file, recover_store
+    from graspsense.store.store import Store
+
     if Path(source).is_dir():
         if out is not None:
             raise click.UsageError("--out is for a FILE; in a store everything has its place")

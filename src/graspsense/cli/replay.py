@@ -11,13 +11,10 @@ from graspsense.cli.options import force_option, keys_option, plot_option
 from graspsense.cli.output import echo_json
 from graspsense.cli.run import draw_grasp, print_trial
 from graspsense.core.components.registry import installed
-from graspsense.core.pipeline.pipeline import grasp_with
 from graspsense.core.pipeline.wiring import check
 from graspsense.core.settings.layers import Flag
 from graspsense.core.settings.resolved import Settings, resolve
 from graspsense.core.values.trial import trial_as_json
-from graspsense.sources.recordings.replay import kind_and_name, known_kinds
-from graspsense.store.stored_grasps import recorded_settings
 
 
 @click.command()
@@ -42,6 +39,8 @@ def replay(
     FILE.mcap is a recording of graspsense, DIR#NUMBER a trial of a store, and KIND:NAME a file of another reader, for
     example icub:FOLDER/full_vitamin_water_1.txt, or manifest:FILE.toml#3 for the third grasp of a manifest.
     """
+    from graspsense.core.pipeline.pipeline import grasp_with
+
     settings = _settings(recording, pipeline, options, force)
     check(settings)
     trial = grasp_with(settings, installed())
@@ -54,6 +53,9 @@ def replay(
 
 
 def _settings(recording: str, pipeline: str | None, options: tuple[str, ...], force: bool) -> Settings:
+    from graspsense.sources.recordings.replay import kind_and_name, known_kinds
+    from graspsense.store.stored_grasps import recorded_settings
+
     kind, name = kind_and_name(recording)
     kinds = known_kinds()
     folder, number, _ = recording.rpartition("#")

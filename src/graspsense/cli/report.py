@@ -11,10 +11,6 @@ from graspsense.cli.output import echo_json
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import folds_option, named_store
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, warn
-from graspsense.experiments.page import NAME, experiment_page
-from graspsense.experiments.results import EXPERIMENT, Results
-from graspsense.report.number_section import number_sections, with_numbers
-from graspsense.report.store_page import store_page
 from graspsense.report.write import write_html
 
 
@@ -53,6 +49,11 @@ def report(
 
     The page is one file without external resources.
     """
+    from graspsense.experiments.page import NAME, experiment_page
+    from graspsense.experiments.results import EXPERIMENT, Results
+    from graspsense.report.number_section import number_sections, with_numbers
+    from graspsense.report.store_page import store_page
+
     path = Path(out or folder) / NAME
     if (Path(folder) / EXPERIMENT).is_file():
         from graspsense.experiments.summary import summary_of, unreadable_lines

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
@@ -15,18 +15,15 @@ from graspsense.cli.progress import ProgressLine
 from graspsense.core.components.entries import TABLE_OF_ROLE
 from graspsense.core.components.registry import installed
 from graspsense.core.components.strict import ValidationFailed, nearest_path, structured
-from graspsense.core.learn.copies import without_copies
-from graspsense.core.learn.groups import with_sessions
-from graspsense.core.learn.labelled import Labelled
 from graspsense.core.settings.layers import Flag, Merged, option_layers, typed_path
 from graspsense.core.settings.resolved import Settings, default_paths, resolve
 from graspsense.core.settings.selected import SelectedComponent, build_plausible
 from graspsense.core.values.errors import ConfigError
-from graspsense.core.values.features import FeatureTable
-from graspsense.sources.identified import gripper_flags
-from graspsense.sources.trial_source import TrialSource, groups_of, kind_of, labelled_trials
-from graspsense.store.extract_again import CHANGEABLE
 from graspsense.store.naming import STORE, as_source, store_folder
+
+if TYPE_CHECKING:
+    from graspsense.core.learn.labelled import Labelled
+    from graspsense.core.values.features import FeatureTable
 
 CommandT = TypeVar("CommandT", bound=Callable[..., Any])
 
@@ -186,6 +183,8 @@ def checkpoints_option(command: CommandT) -> CommandT:
 
 def is_csv(source: str) -> bool:
     """Whether this source is a file of features."""
+    from graspsense.sources.trial_source import kind_of
+
     return kind_of(source) == "CSV"
 
 
@@ -204,6 +203,10 @@ def trials_of(
     are left out, unless `copies` is set. More `folds` than simulated trials are refused before the first grasp.
     Raises ConfigError, DataDamaged.
     """
+    from graspsense.core.learn.copies import without_copies
+    from graspsense.core.learn.groups import with_sessions
+    from graspsense.sources.trial_source import TrialSource, groups_of, kind_of, labelled_trials
+
     kind = kind_of(source)
     _refuse_misplaced(kind)
     values = {
@@ -265,6 +268,8 @@ def to_predict(
 
 def learner_of(source: str, classifier: str | None, given: Mapping[str, Any]) -> SelectedComponent:
     """Return the classifier that is to learn: by its name, or that of the pipeline where there is one."""
+    from graspsense.sources.trial_source import kind_of
+
     if kind_of(source) == SIMULATED:
         chosen = _settings(source, given, classifier).classifier
         assert chosen is not None
@@ -315,6 +320,8 @@ def _refuse_misplaced(kind: str) -> None:
 
 
 def _settings(source: str, given: Mapping[str, Any], classifier: str | None) -> Settings:
+    from graspsense.sources.identified import gripper_flags
+
     flags = gripper_flags(source)
     flags += [Flag("--gripper", "gripper.type", given["gripper"])] if given["gripper"] else []
     if classifier:
@@ -328,6 +335,8 @@ def _settings(source: str, given: Mapping[str, Any], classifier: str | None) -> 
 
 def _alone(table: str, name: str, given: Mapping[str, Any], source: str) -> SelectedComponent:
     """Return a component outside of any pipeline, with the keys that options give it."""
+    from graspsense.store.extract_again import CHANGEABLE
+
     layers, complaints = option_layers(given["options"])
     merged = Merged()
     own = () if is_csv(source) else CHANGEABLE if source.startswith(STORE) else ("features",)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 from attrs import evolve
@@ -13,25 +13,16 @@ from graspsense.cli.output import echo_found, echo_json
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import command_line, keep_features, to_predict, trials_of
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entries, echo_entry, echo_table, talk
-from graspsense.core.learn.conformal import COVERAGE
-from graspsense.core.learn.copies import learned_from, row_hashes
-from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import assumed_units
 from graspsense.core.values.units import with_unit
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.evaluation.json_codec import to_json
-from graspsense.regression.estimators import DEFAULT_ESTIMATOR, check_estimator
-from graspsense.regression.evaluate import evaluate_regression
-from graspsense.regression.model import (
-    PredictedValue,
-    RegressionModel,
-    load_regression,
-    train_regression,
-    write_regression,
-)
 from graspsense.regression.results import RegressionEvaluation, error_of
-from graspsense.report.number_section import not_measured, number_table, number_verdict
+
+if TYPE_CHECKING:
+    from graspsense.core.learn.labelled import Labelled
+    from graspsense.regression.model import PredictedValue, RegressionModel
 
 _FOR_LABELS: Final = ("png", "target", "checkpoints")
 
@@ -54,6 +45,9 @@ def evaluate_value(
     source: str, estimator: str | None, folds: int, keep: str | None, as_json: bool, given: Mapping[str, Any]
 ) -> None:
     """Cross-validate the prediction of a number, and print it."""
+    from graspsense.regression.estimators import DEFAULT_ESTIMATOR
+    from graspsense.regression.evaluate import evaluate_regression
+
     refuse_options_for_labels(given["options"])
     with ProgressLine() as progress:
         labelled = _trials(source, estimator, progress, given)
@@ -71,6 +65,10 @@ def train_value(
     source: str, estimator: str | None, out: str, keep: str | None, as_json: bool, given: Mapping[str, Any]
 ) -> None:
     """Train a model of a number, write it, and print what it was trained on."""
+    from graspsense.core.learn.conformal import COVERAGE
+    from graspsense.regression.estimators import DEFAULT_ESTIMATOR
+    from graspsense.regression.model import train_regression, write_regression
+
     refuse_options_for_labels(given["options"])
     with ProgressLine() as progress:
         labelled = _trials(source, estimator, progress, given)
@@ -109,6 +107,9 @@ def train_value(
 
 def predict_value(model_name: str, source: str, as_json: bool, given: Mapping[str, Any]) -> None:
     """Predict a number for each trial, and compare it with the true one if --target-value names it."""
+    from graspsense.core.learn.copies import learned_from, row_hashes
+    from graspsense.regression.model import load_regression
+
     model = load_regression(model_name)
     table, labelled, notes = to_predict(source, model.table.names, given)
     value = None if labelled is None else labelled.value
@@ -163,6 +164,8 @@ def predict_value(model_name: str, source: str, as_json: bool, given: Mapping[st
 
 
 def _trials(source: str, estimator: str | None, progress: ProgressLine, given: Mapping[str, Any]) -> Labelled:
+    from graspsense.regression.estimators import check_estimator
+
     if estimator is not None:
         check_estimator(estimator)
     return trials_of(source, progress, given)
@@ -182,6 +185,8 @@ def _print_predictions(
 
 
 def _print_evaluation(evaluation: RegressionEvaluation) -> None:
+    from graspsense.report.number_section import not_measured, number_table, number_verdict
+
     echo(number_verdict(evaluation), Style.HEADING)
     echo_entries("WARNING", evaluation.warnings, Style.CAUTION)
     echo()

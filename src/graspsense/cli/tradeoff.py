@@ -12,8 +12,6 @@ from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.terminal import echo, echo_table
-from graspsense.experiments.simulation import SCENES, simulation_rows, trade_simulation
-from graspsense.experiments.simulation_recognition import conclusion, with_recognition
 
 
 @click.group()
@@ -54,6 +52,9 @@ def simulation(
     and halves its steps until nothing changes. Times are measured on the same grasps. Recognition is measured with the
     sensors of the gripper: a classifier learns grasps of each accuracy, and is tested on other grasps of the reference.
     """
+    from graspsense.experiments.simulation import SCENES, simulation_rows, trade_simulation
+    from graspsense.experiments.simulation_recognition import conclusion, with_recognition
+
     settings = settings_of(**asked)
     wanted = scenes or ((asked["object_name"],) if asked["object_name"] else SCENES)
     first_seed = settings.run.seed

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 from attrs import evolve
@@ -37,18 +37,15 @@ from graspsense.cli.sources import (
 from graspsense.cli.target_value import train_value
 from graspsense.cli.terminal import echo, echo_as_it_is, echo_entry, talk
 from graspsense.core.files.whole_file import write_whole
-from graspsense.core.learn.checkpoints import CheckpointTrials, checkpoints_of, split_checkpoints
-from graspsense.core.learn.conformal import units_needed
 from graspsense.core.learn.labelled import Labelled, class_of
-from graspsense.core.learn.model import Model
-from graspsense.core.learn.model_file import write_model
-from graspsense.core.learn.training import train as trained
 from graspsense.core.settings.selected import SelectedComponent
 from graspsense.core.values.errors import ConfigError, counted
-from graspsense.evaluation.checkpoints import checkpoint_models
-from graspsense.evaluation.doubt import calibrated, calibrated_by, calibrated_with
 from graspsense.evaluation.gathered_warnings import gathered_warnings
-from graspsense.sources.identified import IDENTIFIED, identified_scenes
+
+if TYPE_CHECKING:
+    from graspsense.core.learn.checkpoints import CheckpointTrials
+    from graspsense.core.learn.model import Model
+
 
 _NOT_EVALUATED: Final = ("out", "keep", "overwrite", "as_json", "calibration_instances", "choose")
 """Options of `train` that `evaluate` does not have."""
@@ -101,6 +98,9 @@ def train(
     **given: Any,
 ) -> None:
     """Train a model, write it, and print what it was trained on."""
+    from graspsense.core.learn.checkpoints import checkpoints_of
+    from graspsense.core.learn.model_file import write_model
+
     pipeline = pipeline_beside(out) if choose and not is_csv(source) else None
     check_outputs(out, keep, pipeline, overwrite=overwrite, sources=[source])
     times = checkpoints_of(checkpoints)
@@ -142,6 +142,8 @@ def train(
 
 def _maker(learner: SelectedComponent, name: str, target: str, seed: int) -> Callable[[Labelled], Model]:
     """Return a function that trains a model of this name, without calibration."""
+    from graspsense.core.learn.training import train as trained
+
     return partial(
         trained,
         learner.component,
@@ -176,6 +178,10 @@ def _made(
 
     That of a choice, `trained`, is calibrated with the answers of the whole procedure.
     """
+    from graspsense.core.learn.checkpoints import split_checkpoints
+    from graspsense.evaluation.checkpoints import checkpoint_models
+    from graspsense.evaluation.doubt import calibrated, calibrated_by, calibrated_with
+
     if trained is not None:
         return labelled, calibrated_with(made(labelled), trained.choice.answers, labelled)
     parts = split_checkpoints(labelled, times) if times else ()
@@ -230,6 +236,8 @@ def _as_values(model: Model) -> dict[str, Any]:
 
 def _say_trained(out: str, model: Model) -> None:
     """Print what was trained."""
+    from graspsense.core.learn.conformal import units_needed
+
     echo(f"{out}: {model.in_a_line}", indent=2)
     echo_entry("labels", ", ".join(model.classifier.classes()))
     if model.sets is not None:
@@ -256,6 +264,8 @@ def _say_trained(out: str, model: Model) -> None:
 
 def _refuse_single_scene(source: str) -> None:
     """Raise ConfigError for a single identified scene, before squeezes of it are simulated."""
+    from graspsense.sources.identified import IDENTIFIED, identified_scenes
+
     scenes = identified_scenes(source) if source.startswith(IDENTIFIED) else ()
     if len(scenes) == 1:
         raise ConfigError(

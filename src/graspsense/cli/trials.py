@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
@@ -14,12 +14,12 @@ from graspsense.cli.terminal import echo, echo_table
 from graspsense.core.learn.target_value import value_label
 from graspsense.core.settings.resolved import settings_from
 from graspsense.core.values.errors import ConfigError, GraspsenseError
-from graspsense.store import changes
 from graspsense.store.changes import Change, history
 from graspsense.store.labels import agrees, labels_of
-from graspsense.store.rows import StoredTrial
-from graspsense.store.store import Store
-from graspsense.store.stored_grasps import parse_trial_ref
+
+if TYPE_CHECKING:
+    from graspsense.store.rows import StoredTrial
+    from graspsense.store.store import Store
 
 CommandT = TypeVar("CommandT", bound=Callable[..., Any])
 
@@ -45,6 +45,8 @@ def trials() -> None:
 @_JSON
 def list_trials(folder: str, label: str | None, aside: bool | None, limit: int, as_json: bool) -> None:
     """List the newest trials of the store DIR, newest first."""
+    from graspsense.store.store import Store
+
     with Store.read(folder) as store:
         page = store.page(label=label, set_aside=aside, limit=limit)
         changes = history(store)
@@ -77,6 +79,8 @@ def relabel(refs: Sequence[str], label: str | None, as_recorded: bool, why: str,
 
     A trial of a simulated gripper keeps the label of the object that was simulated.
     """
+    from graspsense.store import changes
+
     if (label is None) != as_recorded:
         raise click.UsageError("give either --label CLASS:STATE or --as-recorded")
     labels = None if label is None else labels_of(label)
@@ -105,6 +109,8 @@ def change_value(
 
     `train`, `evaluate` and `report` use these numbers with --target-value.
     """
+    from graspsense.store import changes
+
     if (value is None) == (as_recorded is None):
         raise click.UsageError('give either --value "NAME [UNIT]=NUMBER" or --as-recorded NAME')
     heading, cell = (as_recorded or "", None) if value is None else value_label(value)
@@ -117,6 +123,8 @@ def change_value(
 @_JSON
 def aside(refs: Sequence[str], why: str, as_json: bool) -> None:
     """Set trials aside: they stay in the store, but are not counted, exported as a table, or learned from."""
+    from graspsense.store import changes
+
     if not why.strip():
         raise click.UsageError("--why is empty: give the reason")
     _change(refs, lambda store, numbers: changes.set_aside(store, numbers, why), as_json)
@@ -128,6 +136,8 @@ def aside(refs: Sequence[str], why: str, as_json: bool) -> None:
 @_JSON
 def restore(refs: Sequence[str], why: str, as_json: bool) -> None:
     """Bring trials back that were set aside."""
+    from graspsense.store import changes
+
     _change(refs, lambda store, numbers: changes.restore(store, numbers, why), as_json)
 
 
@@ -136,6 +146,9 @@ def restore(refs: Sequence[str], why: str, as_json: bool) -> None:
 @_JSON
 def show_history(source: str, as_json: bool) -> None:
     """Print the changes of all trials of the store DIR, or of one trial, the oldest first."""
+    from graspsense.store.store import Store
+    from graspsense.store.stored_grasps import parse_trial_ref
+
     folder, number = (source, None) if Path(source).is_dir() else parse_trial_ref(source)
     with Store.read(folder) as store:
         changes = history(store, number)
@@ -154,6 +167,9 @@ def _row(change: Change) -> tuple[str, str, str, str]:
 
 def _change(refs: Sequence[str], change: Callable[[Store, Sequence[int]], None], as_json: bool) -> None:
     """Change trials of one store, all or none, and print what was done to each."""
+    from graspsense.store.store import Store
+    from graspsense.store.stored_grasps import parse_trial_ref
+
     trials = [parse_trial_ref(ref) for ref in refs]
     folders = {folder for folder, _ in trials}
     if len(folders) > 1:

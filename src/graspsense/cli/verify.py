@@ -11,7 +11,6 @@ from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import named_store
 from graspsense.cli.terminal import Style, echo, echo_entries
 from graspsense.core.values.errors import ExitCode, counted
-from graspsense.store.verify import verify_file, verify_store
 
 
 @click.command()
@@ -22,6 +21,8 @@ def verify(source: str, as_json: bool) -> None:
 
     Exit code 5 means damage, and 2 that the disk could not be read.
     """
+    from graspsense.store.verify import verify_file, verify_store
+
     if Path(source).is_dir():
         with ProgressLine() as progress:
             verified = verify_store(source, lambda done, total: progress("checking", done, total))

@@ -18,12 +18,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from attrs import field, frozen
 
-from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import counted
+
+if TYPE_CHECKING:
+    from graspsense.core.learn.labelled import Labelled
 
 Z: Final = 1.959963984540054
 """97.5 % quantile of the standard normal distribution."""

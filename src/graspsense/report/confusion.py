@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from graspsense.evaluation.results import Confusion
 from graspsense.report.html import wide
 from graspsense.report.write import new_figure, write_picture
+
+if TYPE_CHECKING:
+    from graspsense.evaluation.results import Confusion
 
 
 def confusion_text(confusion: Confusion) -> list[str]:

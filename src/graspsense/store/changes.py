@@ -18,11 +18,12 @@ from graspsense.core.learn.target_value import name_and_unit
 from graspsense.core.values.errors import ConfigError
 from graspsense.store.labels import word_of
 from graspsense.store.opening import damaged, decoded
-from graspsense.store.rows import EncodedRow, TrialSummary
-from graspsense.store.store import Store
 
 if TYPE_CHECKING:
     import sqlite3
+
+    from graspsense.store.rows import EncodedRow, TrialSummary
+    from graspsense.store.store import Store
 
 Action = Literal["relabel", "value", "aside", "restore"]
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from graspsense.core.settings.resolved import Settings
-from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import UNKNOWN
 from graspsense.core.values.label_text import label_text
+
+if TYPE_CHECKING:
+    from graspsense.core.settings.resolved import Settings
+    from graspsense.core.values.device import DeviceInfo
 
 _WORD: Final = re.compile(r"(?P<kind>[^\s:#,]+)(?P<state>:[^\s:#,]+)?(?P<number>#[^\s:#,]+)?")
 
