@@ -4,7 +4,7 @@
 
 A test compares the drawing with what this gives. An arrow points from a subpackage to one that it imports from. It is
 left out if it follows from others: if A imports from B and C, and B imports from C, there is no arrow from A to C.
-Imports for type checking only are not counted. Only a circle of imports has an arrow that points upwards; it is red.
+Imports for type checking only are not counted.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 from functools import cache
+from graphlib import TopologicalSorter
 from html import escape
 from itertools import pairwise
 from pathlib import Path
@@ -100,48 +101,27 @@ def _statements(node: ast.AST) -> Iterator[ast.AST]:
             yield from _statements(statement)
 
 
+def _in_order(graph: Graph) -> list[str]:
+    """Return the subpackages with those before each that it imports from. Raises CycleError, which tests exclude."""
+    return list(TopologicalSorter(graph).static_order())
+
+
 def reduced(graph: Graph) -> Graph:
     """Return the graph without the arrows that follow from others."""
-    reached = {subpackage: _reached(graph, subpackage) for subpackage in graph}
+    reached: Graph = {}
+    for subpackage in _in_order(graph):
+        reached[subpackage] = graph[subpackage].union(*(reached[used] for used in graph[subpackage]))
     return {
-        subpackage: {
-            used
-            for used in targets
-            if not any(
-                used in reached[other] and other not in reached[used] for other in targets if other != used
-            )
-        }
+        subpackage: {used for used in targets if not any(used in reached[other] for other in targets)}
         for subpackage, targets in graph.items()
     }
-
-
-def _reached(graph: Graph, start: str) -> set[str]:
-    reached: set[str] = set()
-    waiting = [start]
-    while waiting:
-        for used in graph[waiting.pop()]:
-            if used not in reached:
-                reached.add(used)
-                waiting.append(used)
-    return reached
 
 
 def levels(graph: Graph) -> dict[str, int]:
     """Return the row of each subpackage, counted from the bottom: one above the highest that it imports from."""
     row_of: dict[str, int] = {}
-
-    def level(subpackage: str, above: tuple[str, ...]) -> int:
-        if subpackage not in row_of:
-            below = [
-                level(used, (*above, subpackage))
-                for used in sorted(graph[subpackage])
-                if used not in (*above, subpackage)
-            ]
-            row_of[subpackage] = 1 + max(below, default=-1)
-        return row_of[subpackage]
-
-    for subpackage in sorted(graph):
-        level(subpackage, ())
+    for subpackage in _in_order(graph):
+        row_of[subpackage] = 1 + max((row_of[used] for used in graph[subpackage]), default=-1)
     return row_of
 
 
@@ -152,8 +132,6 @@ class Panel:
     rows: tuple[tuple[str, ...], ...]
     arrows: tuple[tuple[str, ...], ...]
     """The places that an arrow goes through, from its subpackage to the one that it points to."""
-    against: frozenset[tuple[str, ...]]
-    """Arrows against the order of the rows."""
 
 
 def panel(graph: Graph) -> Panel:
@@ -162,19 +140,15 @@ def panel(graph: Graph) -> Panel:
     rows: list[list[str]] = [[] for _ in range(max(row_of.values()) + 1)]
     for subpackage in sorted(graph):
         rows[row_of[subpackage]].append(subpackage)
-    against = set()
     for subpackage, targets in sorted(reduced(graph).items()):
         for used in sorted(targets):
             between = [f"{subpackage}>{used}>{k}" for k in range(row_of[subpackage] - 1, row_of[used], -1)]
             for k, free in zip(range(row_of[subpackage] - 1, row_of[used], -1), between, strict=True):
                 rows[k].append(free)
-            arrow = (subpackage, *between, used)
-            arrows.append(arrow)
-            if row_of[subpackage] <= row_of[used]:
-                against.add(arrow)
+            arrows.append((subpackage, *between, used))
     pairs = [pair for arrow in arrows for pair in pairwise(arrow)]
     ordered = [tuple(row) for row in reversed(_ordered(rows, pairs))]
-    return Panel(tuple(ordered), tuple(arrows), frozenset(against))
+    return Panel(tuple(ordered), tuple(arrows))
 
 
 def _ordered(rows: list[list[str]], pairs: list[tuple[str, str]]) -> list[list[str]]:
@@ -205,14 +179,14 @@ def drawing() -> str:
     ):
         top = _draw(parts, panel(graph), title, top + 30)
     arrow = (
-        '<marker id="{}" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="8" markerHeight="8" orient="auto">'
-        '<path d="M0,0 L8,4 L0,8 z" fill="{}"/></marker>'
+        '<marker id="tip" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="8" markerHeight="8" orient="auto">'
+        '<path d="M0,0 L8,4 L0,8 z" fill="#5c5c5c"/></marker>'
     )
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {top:.0f}" width="{WIDTH}" '
         f'height="{top:.0f}" role="img" font-family="sans-serif">\n'
         "<title>Packages of the source, and which imports from which</title>\n"
-        f"<defs>{arrow.format('tip', '#5c5c5c')}{arrow.format('wrong', '#c00000')}</defs>\n"
+        f"<defs>{arrow}</defs>\n"
         f'<rect width="{WIDTH}" height="{top:.0f}" fill="#ffffff"/>\n' + "\n".join(parts) + "\n</svg>\n"
     )
 
@@ -229,10 +203,9 @@ def _draw(parts: list[str], drawn: Panel, title: str, top: float) -> float:
             places[name] = x + width / 2, top + 22 + k * ROW
             x += width + spare
     for arrow in drawn.arrows:
-        tip, ink = ("wrong", "#c00000") if arrow in drawn.against else ("tip", "#5c5c5c")
         parts.append(
-            f'<path d="{_way([places[name] for name in arrow])}" fill="none" stroke="{ink}" stroke-width="1.2" '
-            f'marker-end="url(#{tip})"/>'
+            f'<path d="{_way([places[name] for name in arrow])}" fill="none" stroke="#5c5c5c" stroke-width="1.2" '
+            'marker-end="url(#tip)"/>'
         )
     for name, (x, y) in places.items():
         if ">" not in name:

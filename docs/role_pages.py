@@ -37,11 +37,11 @@ from graspsense.core.control import contact, free_motion, tick
 from graspsense.core.values import signals
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.device import DeviceInfo
-from graspsense.core.values.events import GraspEvent
 from graspsense.core.values.features import Features, FeatureTable, Prediction
 from graspsense.core.values.fingers import FingerForce
 from graspsense.core.values.mounting import Mounting
 from graspsense.core.values.reasons import Contribution, FeatureValue, Reason
+from graspsense.core.values.signals import GraspEvent
 from graspsense.core.values.trace import ImageTrace, SampleTrace, Trace
 from graspsense.core.values.trial import RunInfo, Trial
 from graspsense.recording.labelled_recording import LabelledRecording
@@ -400,7 +400,8 @@ def _public_row(home: str, name: str) -> str:
     """Return the row of a name: with its signature if it is called, and the first sentence of its meaning."""
     value = getattr(import_module(home), name)
     if not callable(value):
-        return f"| `{name}` | {_cell(_sentence(_text_below(home, name)) or f'the value {value!r}')} |"
+        _, meaning = _docstrings(import_module(home)).get(name, ("", ""))
+        return f"| `{name}` | {_cell(_sentence(meaning) or f'the value {value!r}')} |"
     if inspect.isclass(value):
         shown = name if issubclass(value, BaseException | enum.Enum) else _fields_of(value)
     else:
@@ -421,32 +422,30 @@ def _sentence(text: str) -> str:
     return re.split(r"(?<=[.:]) (?=[A-Z])", " ".join(text.partition("\n\n")[0].split()))[0]
 
 
-def _text_below(home: str, name: str) -> str:
-    """Return the docstring that follows the definition of a constant in its module, empty if there is none."""
-    body = ast.parse(inspect.getsource(import_module(home))).body
+def _docstrings(thing: Any) -> dict[str, tuple[str, str]]:
+    """Return the annotation and the docstring of each name of a class or a module that has a docstring below it."""
+    tree = ast.parse(inspect.getsource(thing))
+    body = tree.body if inspect.ismodule(thing) else tree.body[0].body  # type: ignore[attr-defined]
+    documented = {}
     for statement, text in pairwise(body):
-        if isinstance(statement, ast.Assign | ast.AnnAssign) and isinstance(text, ast.Expr):
-            target = statement.targets[0] if isinstance(statement, ast.Assign) else statement.target
-            if ast.unparse(target) == name:
-                return str(ast.literal_eval(text.value))
-    return ""
+        if isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant):
+            if isinstance(statement, ast.AnnAssign):
+                kind = ast.unparse(statement.annotation)
+                documented[ast.unparse(statement.target)] = kind, str(text.value.value)
+            elif isinstance(statement, ast.Assign):
+                documented[ast.unparse(statement.targets[0])] = "", str(text.value.value)
+    return documented
+
+
+def _in_a_line(text: str) -> str:
+    return " ".join(text.split())
 
 
 def _constant(name: str) -> str:
     """Return the row of a constant, with the docstring that follows it in its module."""
-    value = public(name)
-    for module in (signals, contact, tick):
-        body = ast.parse(inspect.getsource(module)).body
-        for statement, text in pairwise(body):
-            if (
-                isinstance(statement, ast.AnnAssign)
-                and ast.unparse(statement.target) == name
-                and isinstance(text, ast.Expr)
-            ):
-                home = "" if DOOR_OF[name] is plugin_api else f" (in `{DOOR_OF[name].__name__}`)"
-                meaning = _cell(" ".join(ast.literal_eval(text.value).split()))
-                return f"| `{name}` | {value:g} | {meaning}{home} |"
-    raise LookupError(f"{name} has no docstring")
+    documented = _docstrings(signals) | _docstrings(contact) | _docstrings(tick)
+    home = "" if DOOR_OF[name] is plugin_api else f" (in `{DOOR_OF[name].__name__}`)"
+    return f"| `{name}` | {public(name):g} | {_cell(_in_a_line(documented[name][1]))}{home} |"
 
 
 def _attributes(base: Any) -> list[str]:
@@ -455,17 +454,14 @@ def _attributes(base: Any) -> list[str]:
     if not declared:
         return []
     lines = ["## What the class declares", "", "| attribute | type | meaning |", "|---|---|---|"]
-    body = ast.parse(inspect.getsource(base)).body[0].body  # type: ignore[attr-defined]
-    for statement, text in pairwise(body):
-        if isinstance(statement, ast.AnnAssign) and ast.unparse(statement.annotation).startswith("ClassVar"):
-            kind = ast.unparse(statement.annotation).removeprefix("ClassVar[").removesuffix("]")
-            meaning = " ".join(ast.literal_eval(text.value).split())  # type: ignore[attr-defined]
-            lines.append(f"| `{ast.unparse(statement.target)}` | {_cell(kind)} | {_cell(meaning)} |")
-    for statement in body:
-        if isinstance(statement, ast.FunctionDef) and statement.name in declared:
-            meaning = " ".join((ast.get_docstring(statement) or "").split())
-            kind = ast.unparse(statement.returns)  # type: ignore[arg-type]
-            lines.append(f"| `{statement.name}` | {_cell(kind)} | {_cell(meaning)} |")
+    for name, (kind, text) in _docstrings(base).items():
+        if kind.startswith("ClassVar"):
+            kind = kind.removeprefix("ClassVar[").removesuffix("]")
+            lines.append(f"| `{name}` | {_cell(kind)} | {_cell(_in_a_line(text))} |")
+    for name in declared:
+        if isinstance(value := vars(base).get(name), property):
+            kind = str(inspect.signature(value.fget).return_annotation)  # type: ignore[arg-type]
+            lines.append(f"| `{name}` | {_cell(kind)} | {_cell(_in_a_line(inspect.getdoc(value) or ''))} |")
     return [*lines, ""]
 
 
@@ -488,11 +484,9 @@ def _methods(base: Any) -> list[str]:
 
 def _many() -> list[str]:
     """Return the section on batch backends, with the docstring of each option."""
-    body = ast.parse(inspect.getsource(roles.BatchOptions)).body[0].body  # type: ignore[attr-defined]
     options = [
-        f"- `{statement.target.id}: {ast.unparse(statement.annotation)}`: {' '.join(text.value.value.split())}"
-        for statement, text in pairwise(body)
-        if isinstance(statement, ast.AnnAssign)
+        f"- `{name}: {kind}`: {_in_a_line(text)}"
+        for name, (kind, text) in _docstrings(roles.BatchOptions).items()
     ]
     return [
         "## Many grasps at once",
@@ -540,12 +534,7 @@ def _docstring_example(thing: Any) -> list[str]:
 
 def _documented_fields(cls: Any) -> list[str]:
     """Return a list of the fields of a class that have a docstring; nothing if none has one."""
-    body = ast.parse(inspect.getsource(cls)).body[0].body  # type: ignore[attr-defined]
-    lines = [
-        f"- `{ast.unparse(statement.target)}`: {' '.join(ast.literal_eval(text.value).split())}"
-        for statement, text in pairwise(body)
-        if isinstance(statement, ast.AnnAssign) and isinstance(text, ast.Expr)
-    ]
+    lines = [f"- `{name}`: {_in_a_line(text)}" for name, (kind, text) in _docstrings(cls).items() if kind]
     return [*lines, ""] if lines else []
 
 
@@ -556,20 +545,18 @@ def _text(thing: Any) -> str:
 
 def _entry(cls: Any) -> list[str]:
     lines = ["| field | type | default | meaning |", "|---|---|---|---|"]
-    sources = [ast.parse(inspect.getsource(base)) for base in reversed(cls.__mro__[:-1])]
-    body = [node for source in sources for node in source.body[0].body]  # type: ignore[attr-defined]
-    meanings = {
-        ast.unparse(statement.target): " ".join(ast.literal_eval(text.value).split())
-        for statement, text in pairwise(body)
-        if isinstance(statement, ast.AnnAssign) and isinstance(text, ast.Expr)
-    }
+    meanings: dict[str, tuple[str, str]] = {}
+    for base in reversed(cls.__mro__[:-1]):
+        meanings |= _docstrings(base)
     attrs.resolve_types(cls)
     for field in attrs.fields(cls):
         empty = field.default.factory() if isinstance(field.default, attrs.Factory) else field.default
         default = "required" if field.default is attrs.NOTHING else f"`{empty!r}`"
         kind = re.sub(r"(?:graspsense|collections)(?:\.[a-z_]+)*\.", "", strict._kind_words(field.type))
         kind = kind.replace("|", "or")
-        lines.append(f"| `{field.name}` | {_cell(kind)} | {default} | {_cell(meanings[field.name])} |")
+        lines.append(
+            f"| `{field.name}` | {_cell(kind)} | {default} | {_cell(_in_a_line(meanings[field.name][1]))} |"
+        )
     return [*lines, "", _text(cls), ""]
 
 

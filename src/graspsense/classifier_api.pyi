@@ -9,7 +9,7 @@ from graspsense.core.values.reasons import missing_feature as missing_feature
 from graspsense.core.values.units import in_words as in_words
 
 # Trees
-from graspsense.core.values.tree import TreeNode as TreeNode
+from graspsense.core.values.reasons import TreeNode as TreeNode
 from graspsense.core.learn.decision_path import SplitTest as SplitTest
 from graspsense.core.learn.decision_path import leaf_reason as leaf_reason
 from graspsense.core.learn.decision_path import path_reasons as path_reasons

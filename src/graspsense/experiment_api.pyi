@@ -54,4 +54,4 @@ from graspsense.report.svg import INKS as INKS
 from graspsense.report.svg import Picture as Picture
 from graspsense.report.svg import reaching as reaching
 from graspsense.report.traces import one_grasp as one_grasp
-from graspsense.report.tree import tree_list as tree_list
+from graspsense.report.evaluation_sections import tree_list as tree_list

@@ -88,7 +88,7 @@ from graspsense.core.grasp.interrupts import Interrupts as Interrupts
 
 # Readers of tables with several squeezes, and writers of data sets
 from graspsense.store.stored_grasps import StoredGrasp as StoredGrasp
-from graspsense.recording.atomic_file import SaveFailed as SaveFailed
+from graspsense.core.files.whole_file import SaveFailed as SaveFailed
 from graspsense.sources.formats.parquet_format import read_parquet as read_parquet
 from graspsense.sources.manifest.steps import squeezes as squeezes
 from graspsense.sources.formats.table import ColumnTable as ColumnTable

@@ -78,7 +78,7 @@ from graspsense.recording.labelled_recording import UnreadableRecording as Unrea
 from graspsense.recording.readable import each_readable as each_readable
 
 # Observers
-from graspsense.core.values.events import GraspEvent as GraspEvent
+from graspsense.core.values.signals import GraspEvent as GraspEvent
 from graspsense.core.values.trial import RunInfo as RunInfo
 from graspsense.core.values.trial import Trial as Trial
 

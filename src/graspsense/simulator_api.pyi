@@ -75,7 +75,7 @@ from graspsense.core.grasp.runner import tick_params as tick_params
 from graspsense.core.grasp.runner import ended_by_itself as ended_by_itself
 from graspsense.core.grasp.opened_gripper import overdue as overdue
 from graspsense.core.grasp.opened_gripper import seconds_at_most as seconds_at_most
-from graspsense.core.values.events import event_name as event_name
+from graspsense.core.values.signals import event_name as event_name
 
 # Compiling a function with all that it calls
 from graspsense.core.compiling.call_graph import NotCompilable as NotCompilable
@@ -91,5 +91,5 @@ from graspsense.core.compiling.compiling import is_on_disk as is_on_disk
 from graspsense.core.files.user_folders import cache_folder as cache_folder
 from graspsense.core.files.whole_file import write_whole as write_whole
 from graspsense.core.files.whole_file import first_bytes as first_bytes
-from graspsense.core.files.closed_paths import is_closed as is_closed
-from graspsense.core.files.closed_paths import make_closed as make_closed
+from graspsense.core.files.user_folders import is_closed as is_closed
+from graspsense.core.files.user_folders import make_closed as make_closed

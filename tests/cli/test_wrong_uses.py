@@ -27,7 +27,7 @@ from graspsense.core.values.signals import Outcome
 from graspsense.experiments.experiment import Experiment
 from graspsense.plugins.features.curve import CurveFeatures
 from graspsense.sources.manifest.description import Manifest
-from graspsense.store.naming import as_source, store_folder
+from graspsense.store.opening import as_source, store_folder
 from graspsense.store.store import Store
 
 FILES = {

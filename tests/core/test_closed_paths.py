@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 from commands import python
 
-from graspsense.core.files import closed_paths
-from graspsense.core.files.closed_paths import is_closed, make_closed, why_open
+from graspsense.core.files import user_folders
+from graspsense.core.files.user_folders import is_closed, make_closed, why_open
 from graspsense.core.grasp.calibration_files import (
     Calibration,
     calibration_path,
@@ -39,7 +39,7 @@ def to_stranger(monkeypatch):
         if IS_ROOT:
             os.lchown(path, STRANGER, STRANGER)
         else:
-            monkeypatch.setattr(closed_paths.os, "geteuid", lambda: STRANGER)
+            monkeypatch.setattr(user_folders.os, "geteuid", lambda: STRANGER)
 
     return give
 

@@ -23,8 +23,7 @@ from graspsense.core.components.entries import (
     ModelEntry,
 )
 from graspsense.core.components.registry import IsolatedPlugins
-from graspsense.core.values.events import GraspEvent
-from graspsense.core.values.signals import Phase
+from graspsense.core.values.signals import GraspEvent, Phase
 from graspsense.core.values.trial import RunInfo
 from graspsense.experiment_api import ExperimentKindEntry
 from graspsense.plugin_api import (

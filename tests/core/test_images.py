@@ -25,9 +25,8 @@ from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.pipeline import wiring
 from graspsense.core.values.errors import WiringError
-from graspsense.core.values.kept_images import KeptImages
 from graspsense.core.values.signals import Outcome
-from graspsense.core.values.trace import TraceRecorder, trace_of
+from graspsense.core.values.trace import KeptImages, TraceRecorder, trace_of
 from graspsense.plugin_api import (
     EFFORT,
     HOLD,

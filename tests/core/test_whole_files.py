@@ -18,10 +18,9 @@ from cases import every_case
 from repository import ROOT
 
 from graspsense.core.files import whole_file
-from graspsense.core.files.whole_file import write_whole
+from graspsense.core.files.whole_file import SaveFailed, write_new, write_or_replace, write_whole
 from graspsense.core.values.errors import ConfigError, GraspsenseError
 from graspsense.experiments.results import LOCK, Results
-from graspsense.recording.atomic_file import SaveFailed, write_new, write_or_replace
 from graspsense.recording.writer import RecordingWriter
 from graspsense.store.recover import recover_file, recover_store
 from graspsense.store.store import Store

@@ -158,7 +158,7 @@ def test_a_machine_with_the_range_as_scale_does_not_depend_on_units_and_fits_les
 
 
 def test_the_network_takes_the_steps_of_the_published_rule():
-    from graspsense.plugins.classifiers.backprop_training import train
+    from graspsense.plugins.classifiers.backprop import train
 
     x, wanted = np.array([[0.5, 1.0], [-0.25, 1.0]]), np.array([[1.0, 0.0], [0.0, 1.0]])
     hidden, output = np.array([[0.1, -0.2]]), np.array([[0.3, 0.1], [-0.1, 0.2]])

@@ -18,9 +18,9 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 from graspsense import load_pipeline
+from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.signals import Image, Reading, Samples
-from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.layout import START
 from graspsense.recording.reader import read_recorded
 from graspsense.recording.recorder import Recorder

@@ -14,8 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from graspsense.core.values.errors import ConfigError, DataDamaged
-from graspsense.core.values.events import GraspEvent, event_as_json, event_from_json
-from graspsense.core.values.signals import Phase
+from graspsense.core.values.signals import GraspEvent, Phase, event_as_json, event_from_json
 from graspsense.evaluation.events import LabelledEvents, evaluate_kind, outcomes
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.sources.recordings.dataset_recordings import readable_or_not

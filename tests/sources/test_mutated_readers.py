@@ -21,11 +21,11 @@ import recorded_files as write
 from attrs import frozen
 
 from graspsense.core.components.registry import installed
+from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.settings.layers import Flag
 from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.errors import GraspsenseError
 from graspsense.experiments.experiment_file import read_experiment
-from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.export_trace import declared_beside
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.recording.layout import TICK_FIELDS

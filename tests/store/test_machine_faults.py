@@ -15,6 +15,7 @@ from cases import every_case
 from commands import graspsense
 from kept import keep, write_recording
 
+from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.grasp.calibration_files import (
     Calibration,
     calibrations_of,
@@ -22,7 +23,6 @@ from graspsense.core.grasp.calibration_files import (
     write_calibration,
 )
 from graspsense.core.values.errors import ConfigError, DataDamaged
-from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.reader import read_recorded
 from graspsense.store.opening import refuse_read_fault
 from graspsense.store.recover import recover_store

@@ -9,8 +9,8 @@ from commands import graspsense
 from kept import begun, ended, keep, pads, write_recording
 from mcap.reader import make_reader
 
+from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.values.errors import ConfigError, DataDamaged
-from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.reader import read_recorded
 from graspsense.store.recover import recover_file, recover_store
 from graspsense.store.store import Store

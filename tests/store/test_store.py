@@ -14,8 +14,8 @@ from cases import every_case
 from commands import python
 from kept import ended, keep, write_recording
 
+from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.values.errors import ConfigError, DataDamaged
-from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.recording_info import RecordingInfo
 from graspsense.store import schema
 from graspsense.store.changes import set_aside

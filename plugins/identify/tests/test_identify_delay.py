@@ -8,11 +8,10 @@ from attrs import evolve
 from cases import every_case
 from squeezes import delayed, grasped, recorded
 
-from graspsense_identify.delay import Delay, Lag
+from graspsense_identify.delay import Delay, Lag, Timed, with_delay
 from graspsense_identify.prepare import prepared
 from graspsense_identify.run import identify
 from graspsense_identify.share import WHOLE
-from graspsense_identify.used_delay import Timed, with_delay
 from graspsense_sim_gripper.config import SimConfig
 
 SCENE = (

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from graspsense_pr2_gripper import pacing
+from graspsense_pr2_gripper.transports import emulated
 
 
 def test_what_is_late_is_made_up_for_so_that_the_devices_clock_stays_with_the_hosts(
@@ -18,10 +18,10 @@ def test_what_is_late_is_made_up_for_so_that_the_devices_clock_stays_with_the_ho
         slept.append(seconds)
         now[0] += seconds
 
-    monkeypatch.setattr(pacing, "time", SimpleNamespace(monotonic=lambda: now[0], sleep=sleep))
+    monkeypatch.setattr(emulated, "time", SimpleNamespace(monotonic=lambda: now[0], sleep=sleep))
     began = []
     late = []
-    for late_s in islice(pacing.on_time(0.001), 400):
+    for late_s in islice(emulated.on_time(0.001), 400):
         began.append(now[0])
         late.append(late_s)
         # The hundredth period takes 50 ms, all others a tenth of what they may.

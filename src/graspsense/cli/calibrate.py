@@ -15,6 +15,7 @@ import click
 from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import echo, echo_table, talk
+from graspsense.core.grasp import calibration
 from graspsense.core.grasp.calibrating import Rig, breakaways, unloaded_images
 from graspsense.core.grasp.calibration import counts_per_newton, load_table, motor_table
 from graspsense.core.grasp.calibration_files import (
@@ -27,10 +28,10 @@ from graspsense.core.grasp.calibration_files import (
     write_calibration,
 )
 from graspsense.core.values.channel import TactileArray
+from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError, DataDamaged
 
 if TYPE_CHECKING:
-    from graspsense.core.values.device import DeviceInfo
     from graspsense.sources.formats.csv_columns import CsvColumns
 
 
@@ -70,8 +71,6 @@ def calibrate() -> None:
 @_options
 def tare(images: int, replace: bool, as_json: bool, **asked: Any) -> None:
     """Store the zero of the pads: the mean of cell images with open fingers that touch nothing."""
-    from graspsense.core.grasp import calibration
-
     with _set_up(asked, replace) as setup:
         stored = stored_zero(setup.stored["tare"]) if "tare" in setup.stored else None
         counts_per_n = _counts_per_n(setup)

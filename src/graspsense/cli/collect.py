@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -20,18 +21,16 @@ from graspsense.cli.options import (
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo_as_it_is, echo_entry, talk
 from graspsense.core.components.registry import installed
+from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.learn.target_value import value_label
 from graspsense.core.pipeline.wiring import check
+from graspsense.core.settings.resolved import Settings
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.units import in_words
-from graspsense.recording.atomic_file import SaveFailed
 from graspsense.store.changes import refuse_other_units
 from graspsense.store.labels import agrees
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from graspsense.core.settings.resolved import Settings
     from graspsense.core.values.trial import Trial
     from graspsense.store.collecting import Collection
     from graspsense.store.store import Store

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -21,15 +22,13 @@ from graspsense.cli.sources import (
     trials_of,
 )
 from graspsense.cli.terminal import Style, echo, echo_entries, echo_entry
+from graspsense.core.components.entries import Role
 from graspsense.core.components.registry import installed
 from graspsense.core.values.errors import UnknownName
 from graspsense.evaluation.json_codec import to_json
 from graspsense.report.write import write_html
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from graspsense.core.components.entries import Role
     from graspsense.core.learn.labelled import Labelled
     from graspsense.evaluation.ranking import Ranking
 

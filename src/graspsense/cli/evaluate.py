@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +28,7 @@ from graspsense.cli.sources import (
 from graspsense.cli.target_value import evaluate_value
 from graspsense.cli.terminal import Style, echo, echo_entries, echo_entry, echo_table, talk
 from graspsense.core.components.strict import plain
+from graspsense.core.settings.selected import SelectedComponent
 from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.intervals import percent, percentages
 from graspsense.evaluation.json_codec import to_json
@@ -34,11 +36,8 @@ from graspsense.report.confusion import confusion_png, confusion_text
 from graspsense.report.write import write_html
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from graspsense.core.learn.checkpoints import CheckpointTrials
     from graspsense.core.learn.labelled import Labelled
-    from graspsense.core.settings.selected import SelectedComponent
     from graspsense.evaluation.checkpoints import EarlyRecognition
     from graspsense.evaluation.results import Evaluation, Measurement
 

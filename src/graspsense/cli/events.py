@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -10,13 +11,11 @@ from graspsense.cli.output import echo_json
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import detector_of
 from graspsense.cli.terminal import Style, echo, echo_entries, echo_entry, echo_table
-from graspsense.core.values.events import NOT_KNOWN
+from graspsense.core.values.signals import NOT_KNOWN
 from graspsense.evaluation.intervals import RecognitionRate, percent, percentages
 from graspsense.evaluation.json_codec import to_json
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from graspsense.evaluation.events import EventScore, EventsEvaluation, LabelledEvents
     from graspsense.recording.replayable import Recording
 

@@ -1,4 +1,4 @@
-"""`graspsense experiment`: run or resume an experiment that is described by a file."""
+"""`graspsense experiment`: run or resume an experiment that is described by a file, and compare several."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ import click
 
 from graspsense.cli.live import Live, LiveOptions, live_options, shown_live
 from graspsense.cli.options import force_option, keys_option
-from graspsense.cli.output import echo_found, echo_json
+from graspsense.cli.output import echo_found, echo_json, file_to_write_as
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
+from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.values.errors import ExitCode, counted
 from graspsense.evaluation.intervals import percent, percentages
-from graspsense.recording.atomic_file import SaveFailed
+from graspsense.report.write import write_html
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -41,8 +42,6 @@ class ExperimentCommand(click.Command):
     ) -> click.Context:
         """Return the context of this command, or of the comparison if that is asked for."""
         if args[:1] == ["compare"]:
-            from graspsense.cli.experiment_compare import compare
-
             return compare.make_context(f"{info_name} compare", args[1:], parent, **extra)
         return super().make_context(info_name, args, parent, **extra)
 
@@ -295,3 +294,45 @@ def _print_doubts(summary: Summary) -> None:
             echo_entry(key, text, style)
         if len(different) > _MOST_NAMED:
             echo_entry(key, f"and {len(different) - _MOST_NAMED} more, which --json tells", style)
+
+
+DEFAULT_PAGE = "comparison.html"
+
+
+@click.command(short_help="Compare the results of several experiments.")
+@click.argument("folders", metavar="A B ...", nargs=-1)
+@click.option(
+    "--out",
+    metavar="FILE.html",
+    default=DEFAULT_PAGE,
+    show_default=True,
+    callback=file_to_write_as(".html"),
+    help="The page.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the comparison as JSON.")
+def compare(folders: tuple[str, ...], out: str, as_json: bool) -> None:
+    """Compare experiments: their settings, their rates, and the differences from the first one.
+
+    A, B, ... are folders that `graspsense experiment` wrote. The differences are paired by seed where both experiments
+    simulate the same trials with the same seeds.
+    """
+    from graspsense.experiments.comparison import compare_experiments
+    from graspsense.experiments.comparison_page import comparison_page, comparison_tables, doubts
+
+    comparison = compare_experiments(folders)
+    write_html(Path(out), comparison_page(comparison))
+    if as_json:
+        echo_json({**comparison.as_json(), "page": out})
+        return
+    echo(comparison.answer, Style.RESULT)
+    echo()
+    for line in doubts(comparison):
+        echo(f"WARNING     {line}", Style.CAUTION, indent=12)
+    for table in comparison_tables(comparison):
+        echo(table.title, Style.HEADING)
+        if table.rows:
+            echo_found(table)
+        else:
+            echo(table.note)
+        echo()
+    echo(f"page        {out}", indent=12)

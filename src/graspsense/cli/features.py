@@ -11,7 +11,7 @@ from graspsense.cli.output import check_outputs, echo_json
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import keep_features, keep_option, named_store
 from graspsense.cli.terminal import echo, echo_entries, echo_entry, echo_table
-from graspsense.store.naming import STORE
+from graspsense.store.opening import STORE
 
 if TYPE_CHECKING:
     import numpy as np

@@ -11,8 +11,7 @@ from graspsense.cli.options import Seconds, pipeline_options, settings_of
 from graspsense.cli.run import finish, grasped, print_trial
 from graspsense.cli.terminal import talk
 from graspsense.core.pipeline.wiring import check
-from graspsense.core.values.events import GraspEvent
-from graspsense.core.values.signals import HOLD, Command, Reading
+from graspsense.core.values.signals import HOLD, Command, GraspEvent, Reading
 
 PIPELINE: Final = "hold"
 LONGEST_S: Final = 3500.0

@@ -17,10 +17,10 @@ from graspsense.cli.terminal import Style, echo, echo_entry, talk
 from graspsense.core.components.entries import IdentifierEntry
 from graspsense.core.components.identification import Identification, held_out_in_words, repeatability
 from graspsense.core.components.registry import installed
+from graspsense.core.files.whole_file import write_or_replace
 from graspsense.core.settings.layers import Flag
 from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.errors import ConfigError
-from graspsense.recording.atomic_file import write_or_replace
 from graspsense.report.write import write_html
 
 

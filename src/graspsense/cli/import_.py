@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -18,6 +19,7 @@ from graspsense.cli.run import draw_grasp
 from graspsense.cli.sources import named_source
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entries, echo_entry, echo_table
 from graspsense.core.components.registry import installed
+from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.pipeline.wiring import check_recording
 from graspsense.core.settings.layers import Flag
 from graspsense.core.settings.resolved import Settings, resolve
@@ -31,15 +33,12 @@ from graspsense.core.values.errors import (
     counted,
 )
 from graspsense.core.values.units import display_unit
-from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.recording.readable import error_of_all, readable
 from graspsense.recording.replayable import recorded_channels
 from graspsense.store.labels import labels_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
     from graspsense.sources.importing.import_sources import ImportedRecording
     from graspsense.sources.importing.import_summary import ImportSummary
 

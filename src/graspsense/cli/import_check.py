@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,13 +11,11 @@ from attrs import asdict
 
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entries, echo_entry, echo_table, talk
+from graspsense.core.files.whole_file import write_new
 from graspsense.core.values.errors import GraspsenseError, PluginUnavailable
 from graspsense.core.values.units import display_unit
-from graspsense.recording.atomic_file import write_new
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from graspsense.sources.columns.channel_facts import ChannelFacts
     from graspsense.sources.manifest.understood import UnderstoodFile
 
@@ -123,7 +122,7 @@ def _echo_file(file: UnderstoodFile) -> None:
 
 
 def _draw(file: UnderstoodFile, picture: Path) -> None:
-    from graspsense.report.channels_picture import channels_png
+    from graspsense.report.grasp_picture import channels_png
 
     changing = {facts.name for facts in file.channels if facts.resolution is not None}
     forces = file.force.split(", ")

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from graspsense.cli.terminal import talk, terminal_width
-from graspsense.core.values.signals import Command, Phase, Reading
-
-if TYPE_CHECKING:
-    from graspsense.core.values.events import GraspEvent
+from graspsense.core.values.signals import Command, GraspEvent, Phase, Reading
 
 BAR: Final = 24
 """Characters of the bar of the widest gap, where the terminal has room for it."""

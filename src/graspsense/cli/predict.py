@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -28,8 +29,6 @@ from graspsense.evaluation.intervals import RecognitionRate, rate_of
 from graspsense.evaluation.json_codec import to_json
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     from graspsense.core.learn.labelled import Labelled
     from graspsense.core.learn.model import Model
 

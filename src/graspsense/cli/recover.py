@@ -10,6 +10,7 @@ from graspsense.cli.output import echo_json
 from graspsense.cli.sources import named_store
 from graspsense.cli.terminal import echo, talk
 from graspsense.core.values.errors import ExitCode
+from graspsense.store.opening import RECORDINGS
 
 
 @click.command()
@@ -22,7 +23,6 @@ def recover(source: str, out: str | None, as_json: bool) -> None:
     Nothing is deleted: the original of an interrupted recording stays as .cut. Exit code 5 means that some data could
     not be recovered.
     """
-    from graspsense.store.opening import RECORDINGS
     from graspsense.store.recover import recover_file, recover_store
     from graspsense.store.store import Store
 

@@ -19,7 +19,7 @@ from graspsense.core.settings.layers import Flag, Merged, option_layers, typed_p
 from graspsense.core.settings.resolved import Settings, default_paths, resolve
 from graspsense.core.settings.selected import SelectedComponent, build_plausible
 from graspsense.core.values.errors import ConfigError
-from graspsense.store.naming import STORE, as_source, store_folder
+from graspsense.store.opening import STORE, as_source, store_folder
 
 if TYPE_CHECKING:
     from graspsense.core.learn.labelled import Labelled

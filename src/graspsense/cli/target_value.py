@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -20,8 +21,6 @@ from graspsense.evaluation.json_codec import to_json
 from graspsense.regression.results import RegressionEvaluation, error_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     from graspsense.core.learn.labelled import Labelled
     from graspsense.regression.model import PredictedValue, RegressionModel
 

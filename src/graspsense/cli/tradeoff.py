@@ -1,25 +1,22 @@
-"""`graspsense tradeoff`: speed against accuracy, measured."""
+"""`graspsense tradeoff`: recognition, or the accuracy of the simulator, against what it costs."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Final
 
 import click
 
+from graspsense.cli.experiment import experiment
 from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.terminal import echo, echo_table
-from graspsense.cli.tradeoff_recognition import commands
 
 
 @click.group()
 def tradeoff() -> None:
     """Measure recognition, or the accuracy of the simulator, against its cost."""
-
-
-for _command in commands():
-    tradeoff.add_command(_command)
 
 
 @tradeoff.command(short_help="Accuracy of the simulator against its run time.")
@@ -76,3 +73,39 @@ def simulation(
     echo_table(*simulation_rows(trade))
     if words := conclusion(trade):
         echo(f"\n{words}")
+
+
+EXPERIMENTS: Final[Mapping[str, tuple[str, str]]] = {
+    "recognition": ("trade_recognition", "Recognition against all of the following, on one page."),
+    "time": ("trade_time", "Recognition against the used seconds of a grasp."),
+    "force": ("trade_force", "Recognition against the probing force, and the damage it does."),
+    "speed": ("trade_speed", "Recognition against the approach speed."),
+    "joint": (
+        "trade_joint",
+        "Recognition of new bottles against approach speed, probing force, rest window and squeezes together.",
+    ),
+    "squeezes": ("trade_squeezes", "Recognition against the number of squeezes."),
+    "sensing": ("trade_sensing", "Recognition against frame rate, noise and number of cells."),
+    "physics": ("trade_physics", "Recognition against errors of the physics in the training data."),
+    "accuracy": ("trade_accuracy", "Recognition against the accuracy of the simulator."),
+}
+"""Name to the experiment and what it measures."""
+
+
+def _command(name: str, file: str, summary: str) -> click.Command:
+    """Return the command for an experiment, which takes what `graspsense experiment` takes."""
+
+    def run(**keys: Any) -> None:
+        click.get_current_context().invoke(experiment, experiment=file, **keys)
+
+    return click.Command(
+        name,
+        callback=run,
+        params=[param for param in experiment.params if param.name != "experiment"],
+        short_help=summary,
+        help=f"{summary}\n\nThe same as `graspsense experiment {file}`: resumable, with a page in --out. Simulated.",
+    )
+
+
+for _name, (_file, _summary) in EXPERIMENTS.items():
+    tradeoff.add_command(_command(_name, _file, _summary))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -37,15 +38,13 @@ from graspsense.cli.target_value import train_value
 from graspsense.cli.terminal import echo, echo_as_it_is, echo_entry, talk
 from graspsense.core.files.whole_file import write_whole
 from graspsense.core.learn.labelled import Labelled, class_of
+from graspsense.core.settings.selected import SelectedComponent
 from graspsense.core.values.errors import ConfigError, counted
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
     from graspsense.core.learn.checkpoints import CheckpointTrials
     from graspsense.core.learn.model import Model
-    from graspsense.core.settings.selected import SelectedComponent
 
 
 _NOT_EVALUATED: Final = ("out", "keep", "overwrite", "as_json", "calibration_instances", "choose")

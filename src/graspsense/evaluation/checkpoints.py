@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
+from graspsense.core.learn.checkpoints import CheckpointTrials
+from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.model import Model, checkpoint_model
 from graspsense.core.learn.training import train
+from graspsense.core.settings.selected import SelectedComponent
 from graspsense.evaluation.crossval import columns_of, cross_validate
 from graspsense.evaluation.doubt import HeldOut, calibrated, calibrated_by, exchangeable_instances
 from graspsense.evaluation.folds import Folds, held_out, held_out_protocol
 from graspsense.evaluation.intervals import RecognitionRate, rate_among
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from graspsense.core.learn.checkpoints import CheckpointTrials
-    from graspsense.core.learn.labelled import Labelled
-    from graspsense.core.settings.selected import SelectedComponent
 
 WHOLE: Final = "whole grasp"
 SURE: Final = "stop when sure"

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from math import nan
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
+from graspsense.core.components.roles import Classifier
 from graspsense.core.learn.conformal import scores_of
 from graspsense.core.learn.model import refuse_improbable
 from graspsense.core.learn.novelty import novelty_of
 from graspsense.core.values.errors import ComponentFailed, ConfigError, counted
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from graspsense.core.components.roles import Classifier
-    from graspsense.core.values.features import FeatureTable
-    from graspsense.evaluation.folds import Folds
+from graspsense.core.values.features import FeatureTable
+from graspsense.evaluation.folds import Folds
 
 
 class FitRefused(ConfigError):

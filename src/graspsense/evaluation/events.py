@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 from attrs import field, frozen
 
-from graspsense.core.values.events import NOT_KNOWN
+from graspsense.core.values.signals import NOT_KNOWN
 from graspsense.evaluation.folds import instance_held_out
 from graspsense.evaluation.intervals import MIN_INSTANCES, Interval, RecognitionRate, rate_of, too_few
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from graspsense.core.components.setting import worded
+from graspsense.core.files.whole_file import write_or_replace
 from graspsense.core.values.errors import counted
 from graspsense.experiments.answer import answer, headline
 from graspsense.experiments.findings import MARKDOWN, Findings
@@ -16,7 +17,6 @@ from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.results import EXPERIMENT, Results
 from graspsense.experiments.summary import ConditionResult, Summary, unreadable_lines
 from graspsense.experiments.task_results import RecognitionResult
-from graspsense.recording.atomic_file import write_or_replace
 from graspsense.recording.provenance import commit_text
 from graspsense.report.evaluation_sections import confusion_section, controls_section, tree_section
 from graspsense.report.html import Page, Section, bullets, code, facts, folded, pair, paragraph, table

@@ -17,8 +17,8 @@ from graspsense.core.settings.resolved import Settings, settings_from
 from graspsense.core.settings.selected import SelectedComponent, build
 from graspsense.core.values.errors import ConfigError, counted, listed
 from graspsense.core.values.features import FeatureTable
+from graspsense.core.values.reasons import TreeNode
 from graspsense.core.values.trace import Trace
-from graspsense.core.values.tree import TreeNode
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.evaluation.folds import trials_by_class
 from graspsense.evaluation.gathered_warnings import gathered_warnings

@@ -24,6 +24,7 @@ from attrs import evolve, frozen
 from graspsense.core.components.caller import option
 from graspsense.core.components.strict import plain
 from graspsense.core.files.toml_text import toml_key, toml_value
+from graspsense.core.files.whole_file import SaveFailed, write_or_replace
 from graspsense.core.settings.resolved import without_followers
 from graspsense.core.settings.settings_file import to_toml
 from graspsense.core.values.errors import ConfigError, named
@@ -31,7 +32,6 @@ from graspsense.experiments.experiment import PipelineOf, Planned
 from graspsense.experiments.experiment_file import read_experiment
 from graspsense.experiments.task import TaskResult
 from graspsense.experiments.versions import versions
-from graspsense.recording.atomic_file import SaveFailed, write_or_replace
 from graspsense.recording.provenance import process_provenance
 
 EXPERIMENT: Final = "experiment.toml"

@@ -8,6 +8,7 @@ from pathlib import Path
 from attrs import field, frozen
 
 from graspsense.core.components.caller import option
+from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.grasp.interrupts import Interrupts
 from graspsense.core.values.errors import ConfigError, counted, listed
 from graspsense.experiments.executors.base import Executor, ExecutorLost
@@ -16,7 +17,6 @@ from graspsense.experiments.results import Results
 from graspsense.experiments.task import Task, TaskResult
 from graspsense.experiments.timing import TimeLeft
 from graspsense.experiments.versions import differences, versions
-from graspsense.recording.atomic_file import SaveFailed
 from graspsense.sources.input_content import contents_of
 
 STORE_FILE = "store.sqlite"

@@ -9,7 +9,7 @@ from typing import Any, Final, Protocol
 from attrs import field, frozen
 
 from graspsense.core.learn.labelled import Labelled, Target
-from graspsense.core.values.tree import TreeNode
+from graspsense.core.values.reasons import TreeNode
 from graspsense.evaluation.intervals import RecognitionRate, rate_among, rate_of
 from graspsense.evaluation.results import Confusion, Measurement, confusion
 from graspsense.report.grasp_curve import GraspCurve

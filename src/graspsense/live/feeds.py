@@ -9,13 +9,13 @@ from typing import Any, Final
 
 from attrs import asdict
 
+from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.values.channel import FastChannel, TactileArray
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError
-from graspsense.core.values.events import GraspEvent, event_as_json
 from graspsense.core.values.json_values import json_ready
+from graspsense.core.values.signals import GraspEvent, event_as_json
 from graspsense.core.values.trial import Trial
-from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.feed import Feed
 
 QUEUE_BYTES: Final = 8 << 20

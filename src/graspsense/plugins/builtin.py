@@ -97,20 +97,20 @@ def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
 @hookimpl
 def graspsense_classifiers() -> Iterable[ClassifierEntry]:
     """Return the classifiers of this package. C4.5, which the paper uses, is in another distribution."""
-    for name, cls, summary in (
-        ("svm", "Svm", "support vector machine (scikit-learn)"),
-        ("mlp", "Mlp", "neural network with one hidden layer (scikit-learn)"),
-        ("backprop", "Backprop", "neural network trained trial by trial, as Weka's by default"),
-        ("forest", "Forest", "random forest (scikit-learn)"),
-        ("extra-trees", "ExtraTrees", "extremely randomised trees (scikit-learn)"),
-        ("boosted", "Boosted", "gradient-boosted trees (scikit-learn)"),
-        ("ebm", "Ebm", "explainable boosting: a sum of functions of the features (interpret)"),
-        ("knn", "Knn", "nearest neighbours (scikit-learn)"),
-        ("tree", "Cart", "binary decision tree, CART (scikit-learn)"),
+    for name, target, summary in (
+        ("svm", "svm:Svm", "support vector machine (scikit-learn)"),
+        ("mlp", "mlp:Mlp", "neural network with one hidden layer (scikit-learn)"),
+        ("backprop", "backprop:Backprop", "neural network trained trial by trial, as Weka's by default"),
+        ("forest", "forest:Forest", "random forest (scikit-learn)"),
+        ("extra-trees", "forest:ExtraTrees", "extremely randomised trees (scikit-learn)"),
+        ("boosted", "boosted:Boosted", "gradient-boosted trees (scikit-learn)"),
+        ("ebm", "ebm:Ebm", "explainable boosting: a sum of functions of the features (interpret)"),
+        ("knn", "knn:Knn", "nearest neighbours (scikit-learn)"),
+        ("tree", "tree:Cart", "binary decision tree, CART (scikit-learn)"),
     ):
         yield ClassifierEntry(
             name=name,
-            target=f"graspsense.plugins.classifiers.{name.replace('-', '_')}:{cls}",
+            target=f"graspsense.plugins.classifiers.{target}",
             summary=summary,
         )
 

@@ -13,16 +13,16 @@ import numpy as np
 
 from graspsense.core.components.channels import as_json
 from graspsense.core.files.csv_text import csv_text
+from graspsense.core.files.whole_file import write_new
 from graspsense.core.values.channel import FLOATS, FastChannel, TactileArray
 from graspsense.core.values.trace import PAD_COLUMNS, TICK_COLUMNS, ImageTrace
-from graspsense.recording.atomic_file import write_new
+from graspsense.recording.foxglove import with_pictures
 from graspsense.recording.layout import SIGNAL_TOPIC, TICK_FIELDS
 from graspsense.recording.parquet import parquet
+from graspsense.recording.recorded_grasp import RecordedGrasp
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-    from graspsense.recording.recorded_grasp import RecordedGrasp
 
 
 def write_csv(path: Path, grasp: RecordedGrasp) -> None:
@@ -84,8 +84,6 @@ def write_mcap(path: Path, grasp: RecordedGrasp) -> None:
 
 def write_pictures(path: Path, grasp: RecordedGrasp) -> None:
     """Copy the recording, with its tactile images as pictures for Foxglove. Raises ConfigError if it has none."""
-    from graspsense.recording.foxglove import with_pictures
-
     write_new(path, with_pictures(grasp))
 
 

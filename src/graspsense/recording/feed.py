@@ -19,8 +19,8 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any, Final
 
+from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.values.signals import Command, Reading
-from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.layout import (
     IS_METADATA,
     IS_SIGNAL,

@@ -8,14 +8,12 @@ from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from graspsense import __version__
+from graspsense.core.settings.resolved import Settings
 from graspsense.core.values.json_values import json_text
 from graspsense.recording.checkout import checkout_state
-
-if TYPE_CHECKING:
-    from graspsense.core.settings.resolved import Settings
 
 _WITH: Final = ("numpy", "scikit-learn", "mcap")
 

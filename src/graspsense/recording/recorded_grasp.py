@@ -22,8 +22,19 @@ from graspsense.core.components.channels import (
 from graspsense.core.values.channel import Channel as DeclaredChannel
 from graspsense.core.values.channel import FastChannel, TactileArray
 from graspsense.core.values.errors import DataDamaged
-from graspsense.core.values.events import LABELLED, GraspEvent, event_from_json
-from graspsense.core.values.signals import APPROACH, Frame, Image, Pads, Phase, Reading, Samples, no_pads
+from graspsense.core.values.signals import (
+    APPROACH,
+    LABELLED,
+    Frame,
+    GraspEvent,
+    Image,
+    Pads,
+    Phase,
+    Reading,
+    Samples,
+    event_from_json,
+    no_pads,
+)
 from graspsense.core.values.trace import SI_UNITS, Trace, trace_of
 from graspsense.recording.layout import (
     EVENT,

@@ -12,9 +12,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from graspsense.core.values.events import GraspEvent, event_as_json
+from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.values.json_values import json_text
-from graspsense.recording.atomic_file import SaveFailed
+from graspsense.core.values.signals import GraspEvent, event_as_json
 from graspsense.recording.feed import Feed, metadata_message
 from graspsense.recording.layout import (
     EVENT,

@@ -17,9 +17,8 @@ from graspsense.core.components.channels import dtype_of
 from graspsense.core.components.delivered import Delivered
 from graspsense.core.values.channel import FLOATS, Channel
 from graspsense.core.values.errors import DataDamaged
-from graspsense.core.values.events import GraspEvent
 from graspsense.core.values.mounting import Mounting
-from graspsense.core.values.signals import CHANNELS, Frame, Image, Reading
+from graspsense.core.values.signals import CHANNELS, Frame, GraspEvent, Image, Reading
 
 _FRAME: Final = struct.Struct(f"<{len(Frame._fields)}d")
 ALWAYS: Final = frozenset({"gap", "velocity", "force_left", "force_right"})

@@ -12,15 +12,18 @@ import struct
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from math import isnan, nan
-from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar, get_args
+from typing import Any, Final, Literal, TypeVar, get_args
 
 from attrs import evolve, field, frozen
 
 from graspsense import __version__
 from graspsense.core.components.channels import as_json, from_json, further
 from graspsense.core.files.toml_text import toml_key, toml_value, toml_values
+from graspsense.core.settings.resolved import Settings
 from graspsense.core.values.channel import Channel, TactileArray
+from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import DataDamaged
+from graspsense.core.values.features import Features
 from graspsense.core.values.json_values import json_text
 from graspsense.core.values.mounting import Mounting, mounting_from_json
 from graspsense.core.values.signals import Outcome
@@ -28,11 +31,6 @@ from graspsense.core.values.trial import Trial, trial_as_json
 from graspsense.recording.before_contact import before_contact, contact_force_of
 from graspsense.recording.layout import DEVICE, RESULT, START, VERSION
 from graspsense.recording.provenance import provenance
-
-if TYPE_CHECKING:
-    from graspsense.core.settings.resolved import Settings
-    from graspsense.core.values.device import DeviceInfo
-    from graspsense.core.values.features import Features
 
 T = TypeVar("T")
 Origin = Literal["run", "collect", "import"]

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from html import escape
+from typing import Final
 
-from graspsense.core.values.tree import TreeNode
+from graspsense.core.values.reasons import TreeNode
 from graspsense.evaluation.doubt import Reliability, SetCoverage
 from graspsense.evaluation.intervals import percent
 from graspsense.evaluation.results import Confusion
 from graspsense.report.confusion import confusion_table
-from graspsense.report.html import Section, bullets, figure, folded, pair, paragraph
+from graspsense.report.html import Section, bullets, figure, folded, pair, paragraph, wide
 from graspsense.report.rates import RateRow, rates_list, rates_picture, rates_table
 from graspsense.report.svg import INKS, QUIET, AxisScale, Picture
-from graspsense.report.tree import tree_list
 
 
 def controls_section(rows: Sequence[RateRow], missing: Sequence[str], subject: str) -> Section:
@@ -103,3 +104,30 @@ def tree_section(nodes: Sequence[TreeNode], what: str) -> Section:
         "the predicted label."
     )
     return Section(id="tree", title="Decision tree", body=paragraph(text) + tree_list(nodes))
+
+
+MOST: Final = 400
+"""Largest number of nodes that are shown; the page says so if a tree has more."""
+
+
+def tree_list(nodes: Sequence[TreeNode]) -> str:
+    """Return the tree, from the root on."""
+    children: dict[int | None, list[int]] = {}
+    for k, node in enumerate(nodes[:MOST]):
+        children.setdefault(node.parent, []).append(k)
+
+    def item(k: int) -> str:
+        node = nodes[k]
+        below = children.get(k, [])
+        branch = f"{escape(node.branch)} " if node.branch else ""
+        if not below:
+            wrong = f", {node.wrong:.3g} of them wrong" if node.wrong else ""
+            return (
+                f'<li>{branch}→ <span class="leaf">{escape(node.label)}</span> '
+                f'<span class="count">({node.trials:.4g} trials{wrong})</span></li>'
+            )
+        inner = "".join(map(item, below))
+        return f"<li>{branch or 'all trials '}<ul>{inner}</ul></li>"
+
+    cut = f"<p>Only the first {MOST} of {len(nodes)} nodes are shown.</p>" if len(nodes) > MOST else ""
+    return wide("Decision tree", f'<ul class="tree">{"".join(map(item, children.get(None, [])))}</ul>') + cut

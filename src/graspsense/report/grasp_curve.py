@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from math import inf
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from attrs import evolve, frozen
 
 from graspsense.core.values.signals import Phase
-
-if TYPE_CHECKING:
-    from graspsense.core.values.trace import Trace
+from graspsense.core.values.trace import Trace
 
 INSTANTS: Final = 240
 """Instants kept per grasp, equally spaced in ticks. The ticks around each change of phase are kept as well."""

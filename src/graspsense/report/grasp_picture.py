@@ -1,18 +1,20 @@
-"""The picture of one grasp: pad forces, gap and phases over time, beside the features and the prediction."""
+"""The picture of one grasp, beside its features and its prediction, and that of the channels of a file over time."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
 
 from graspsense.core.values.fingers import fingers_of
+from graspsense.core.values.trial import Trial
 from graspsense.core.values.units import display_unit
 from graspsense.report.trace_plot import draw_trace
 from graspsense.report.write import new_figure, write_picture
-
-if TYPE_CHECKING:
-    from graspsense.core.values.trial import Trial
 
 DPI: Final = 120
 """Pixels per inch: the picture is 1020 pixels wide and stays readable when a page scales it to 800."""
@@ -71,3 +73,29 @@ def _words(trial: Trial) -> list[str]:
     if trial.report.get("simulated"):
         lines += ["", "simulated gripper and object"]
     return lines
+
+
+MOST_PANELS: Final = 8
+PANEL_IN: Final = 1.3
+"""Height of a panel."""
+
+
+def channels_png(
+    path: Path,
+    series: Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]],
+    squeezes: Sequence[tuple[float, float]],
+) -> None:
+    """Draw times (s) and values of each channel as a PNG file; `squeezes` are shaded from begin to end (s).
+
+    Raises PluginUnavailable without matplotlib, ConfigError where `path` cannot be written.
+    """
+    shown = list(series.items())[:MOST_PANELS]
+    figure = new_figure(8.5, PANEL_IN * max(len(shown), 2), DPI)
+    panels: Any = figure.subplots(max(len(shown), 1), 1, sharex=True, squeeze=False)
+    for (name, (t_s, values)), panel in zip(shown, panels[:, 0], strict=False):
+        panel.plot(t_s, values, linewidth=0.8)
+        panel.set_ylabel(name[-24:], fontsize=7)
+        for begin, end in squeezes:
+            panel.axvspan(begin, end, alpha=0.2, color="tab:orange")
+    panels[-1, 0].set_xlabel("time, s; shaded: squeezes that were found")
+    write_picture(path, figure)

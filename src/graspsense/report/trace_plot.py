@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Sequence
+from typing import Any, Final
 
 import numpy as np
 
+from graspsense.core.values.fingers import FingerForce
 from graspsense.core.values.signals import Phase
 from graspsense.core.values.trace import Floats, ImageTrace, Integers, SampleTrace, Trace
 from graspsense.core.values.units import display_unit, without_underscores
@@ -19,11 +21,6 @@ from graspsense.report.moments import (
     shown_from,
 )
 from graspsense.report.write import require_matplotlib, show_literally
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from graspsense.core.values.fingers import FingerForce
 
 PHASE_COLOURS: Final = {Phase.APPROACH: "#e9eff6", Phase.SQUEEZE: "#fbdcb4", Phase.HOLD: "#c9e6cf"}
 OTHER_PHASE: Final = "#f3f3f3"

@@ -8,9 +8,8 @@ import warnings
 from pathlib import Path
 from typing import Any, Final
 
-from graspsense.core.files.whole_file import write_whole
+from graspsense.core.files.whole_file import write_or_replace, write_whole
 from graspsense.core.values.errors import ConfigError, PluginUnavailable
-from graspsense.recording.atomic_file import write_or_replace
 from graspsense.report.html import Page
 
 MATPLOTLIB_HINT: Final = (

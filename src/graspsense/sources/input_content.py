@@ -25,7 +25,7 @@ from graspsense.core.grasp.calibration_files import calibration_folder
 from graspsense.core.values.errors import GraspsenseError
 from graspsense.core.values.json_values import json_text
 from graspsense.recording.export_trace import all_beside
-from graspsense.store.naming import STORE, as_source
+from graspsense.store.opening import STORE, as_source
 
 FRAMEWORK: Final = "graspsense"
 _OWN_PLUGINS: Final = "graspsense.plugins"

@@ -14,7 +14,7 @@ from graspsense.core.learn.labelled import class_of
 from graspsense.core.values.errors import ConfigError, suggestion
 from graspsense.recording.recorded_grasp import RecordedGrasp
 from graspsense.recording.trial_record import TrialRecord
-from graspsense.store.naming import STORE, as_source
+from graspsense.store.opening import STORE, as_source
 from graspsense.store.stored_grasps import parse_trial_ref
 
 

@@ -20,7 +20,7 @@ from graspsense.core.values.label_text import alike_words, spelled_alike
 from graspsense.core.values.trace import Trace
 from graspsense.sources.identified import IDENTIFIED, gripper_flags, identified_scenes
 from graspsense.sources.simulated import Group, simulated
-from graspsense.store.naming import STORE, as_source
+from graspsense.store.opening import STORE, as_source
 
 SIMULATED: Final = "simulated"
 _OF_TOML: Final = {

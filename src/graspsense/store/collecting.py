@@ -15,13 +15,13 @@ from attrs import define, field, frozen
 
 from graspsense.core.components.caller import option
 from graspsense.core.components.registry import Plugins
+from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.grasp.sinks import Sink
 from graspsense.core.settings.resolved import Settings
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError, NoDevice
 from graspsense.core.values.signals import Outcome
 from graspsense.core.values.trial import Trial
-from graspsense.recording.atomic_file import SaveFailed
 from graspsense.store.changes import set_aside
 from graspsense.store.comparable import check_device, check_settings, newest_grasp
 from graspsense.store.labels import check_label, labels_of

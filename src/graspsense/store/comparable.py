@@ -7,19 +7,17 @@ store is therefore refused, unless the user wants the change.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from graspsense.core.components.caller import option
 from graspsense.core.components.setting import CHANGES_NO_RESULT, settings_marked
+from graspsense.core.settings.resolved import Settings
+from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError
 from graspsense.recording.provenance import recipe
 from graspsense.recording.trial_record import DeviceRecord, without_none
-
-if TYPE_CHECKING:
-    from graspsense.core.settings.resolved import Settings
-    from graspsense.core.values.device import DeviceInfo
-    from graspsense.store.rows import StoredTrial
-    from graspsense.store.store import Store
+from graspsense.store.rows import StoredTrial
+from graspsense.store.store import Store
 
 _COMPARED: Final = ("name", "serial", "calibration")
 

@@ -13,11 +13,11 @@ import numpy as np
 from attrs import frozen
 
 from graspsense.core.files.csv_text import csv_text
+from graspsense.core.files.whole_file import write_new
 from graspsense.core.learn.target_value import RESERVED, name_and_unit, number_of
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import FeatureTable
 from graspsense.core.values.printable import in_one_line
-from graspsense.recording.atomic_file import write_new
 from graspsense.recording.parquet import parquet
 from graspsense.store.changes import with_changed_numbers
 from graspsense.store.dataset import feature_table

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from attrs import evolve, frozen
 
@@ -28,10 +28,8 @@ from graspsense.recording.readable import error_of_all, readable
 from graspsense.recording.reader import read_recorded
 from graspsense.recording.recorded_grasp import with_phases_of
 from graspsense.recording.trial_record import FeatureValues
-
-if TYPE_CHECKING:
-    from graspsense.store.rows import StoredTrial
-    from graspsense.store.store import Store
+from graspsense.store.rows import StoredTrial
+from graspsense.store.store import Store
 
 CHANGEABLE: Final = ("features", "controller", "run")
 """Tables of settings that a recorded grasp can be evaluated with again; its gripper is the recording."""

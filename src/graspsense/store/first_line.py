@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
@@ -12,9 +12,7 @@ from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.features import FeatureTable
 from graspsense.core.values.signals import CHANNELS, Frame
 from graspsense.recording.reader import read_first_frame, read_recorded
-
-if TYPE_CHECKING:
-    from graspsense.store.store import Store
+from graspsense.store.store import Store
 
 _FIELDS: Final[Mapping[str, str]] = {
     "gap": "gap_m",

@@ -1,8 +1,10 @@
-"""Opening the SQLite file of a store: version checks before anything is touched, and errors that a user can act on."""
+"""Opening the SQLite file of a store: how a user names it, version checks before anything is touched, and errors that a
+user can act on."""
 
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
 import sqlite3
@@ -14,8 +16,8 @@ from typing import Final
 from urllib.parse import quote
 
 from graspsense import __version__
+from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.values.errors import ConfigError, DataDamaged
-from graspsense.recording.atomic_file import SaveFailed
 from graspsense.store.schema import APPLICATION_ID, NEWEST, tables_in, tables_of_version
 
 FILE: Final = "store.sqlite"
@@ -172,3 +174,29 @@ _REASONS: Final = {
     sqlite3.SQLITE_BUSY: f"has been locked by another program for more than {BUSY_S:g} s",
     sqlite3.SQLITE_LOCKED: "is locked by another program",
 }
+
+
+STORE: Final = "store:"
+
+
+def store_folder(text: str | os.PathLike[str]) -> str:
+    """Return the folder of a store, however it is named: `store:trials`, `trials`, `trials/store.sqlite`.
+
+    >>> store_folder("store:trials")
+    'trials'
+    """
+    name = os.fspath(text)
+    if name.startswith(STORE) and not Path(name).exists():
+        name = name.removeprefix(STORE)
+    path = Path(name).expanduser()
+    return str(path.parent) if path.name == FILE and path.is_file() else name
+
+
+def as_source(text: str) -> str:
+    """Return a source of trials or recordings with `store:` before the folder of a store; others as they are."""
+    if not text.startswith(STORE):
+        for name, mark, number in ((text, "", ""), text.rpartition("#")):
+            folder = store_folder(name)
+            if name and os.path.isfile(Path(folder).expanduser() / FILE):
+                return f"{STORE}{folder}{mark}{number}"
+    return text

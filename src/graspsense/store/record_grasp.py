@@ -4,25 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from attrs import evolve, frozen
 
+from graspsense.core.components.registry import Plugins
+from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.grasp.interrupts import Interrupts
+from graspsense.core.grasp.pair import Member
+from graspsense.core.grasp.sinks import Sink
 from graspsense.core.pipeline.pipeline import GraspInterrupted, grasp_with
-from graspsense.recording.atomic_file import SaveFailed
+from graspsense.core.settings.resolved import Settings
+from graspsense.core.values.device import DeviceInfo
+from graspsense.core.values.trial import Trial
 from graspsense.recording.layout import DEVICE, RESULT, START
 from graspsense.recording.recorder import Recorder
 from graspsense.recording.trial_record import Origin, TrialRecord
 from graspsense.store.store import Store
-
-if TYPE_CHECKING:
-    from graspsense.core.components.registry import Plugins
-    from graspsense.core.grasp.pair import Member
-    from graspsense.core.grasp.sinks import Sink
-    from graspsense.core.settings.resolved import Settings
-    from graspsense.core.values.device import DeviceInfo
-    from graspsense.core.values.trial import Trial
 
 
 @frozen(kw_only=True, eq=False)

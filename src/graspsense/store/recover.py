@@ -15,11 +15,11 @@ from typing import Any, Final, Literal
 from attrs import asdict, evolve, frozen
 
 from graspsense.core.components.registry import installed
+from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.settings.selected import build
 from graspsense.core.values.errors import FAILURES, ConfigError, DataDamaged, GraspsenseError
 from graspsense.core.values.features import Features
 from graspsense.core.values.trace import Trace
-from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.before_contact import before_contact, contact_force_of
 from graspsense.recording.layout import DEVICE, PART, START, TICK
 from graspsense.recording.reader import read_recorded

@@ -19,11 +19,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
 
+from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.values.errors import ConfigError, DataDamaged, named
-from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.recording_info import RecordingInfo
 from graspsense.recording.trial_record import TrialRecord
-from graspsense.store.naming import store_folder
 from graspsense.store.opening import (
     BUSY_S,
     FILE,
@@ -35,6 +34,7 @@ from graspsense.store.opening import (
     make_safe,
     refuse_read_fault,
     sqlite_errors,
+    store_folder,
 )
 from graspsense.store.rows import (
     DETAIL_COLUMNS,

@@ -16,7 +16,7 @@ from graspsense.core.values.trace import Trace
 from graspsense.recording.reader import read_recorded
 from graspsense.recording.recorded_grasp import RecordedGrasp
 from graspsense.recording.replayable import Recording
-from graspsense.store.naming import store_folder
+from graspsense.store.opening import store_folder
 from graspsense.store.store import Store
 
 

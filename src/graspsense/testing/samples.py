@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from graspsense.core.components.channels import further
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.device import DeviceInfo
-from graspsense.core.values.events import GraspEvent
 from graspsense.core.values.features import Features, FeatureTable
-from graspsense.core.values.signals import EFFORT, Command, Outcome, Pads, Phase
+from graspsense.core.values.signals import EFFORT, Command, GraspEvent, Outcome, Pads, Phase
 from graspsense.core.values.signals import Frame as _Frame
 from graspsense.core.values.trace import PAD_COLUMNS, ImageTrace, SampleTrace, SignalTrace, Trace, trace_of
 from graspsense.core.values.trial import RunInfo, Trial

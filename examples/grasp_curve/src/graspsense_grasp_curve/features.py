@@ -17,10 +17,11 @@ A cell image is taken relative to the last one before contact, so that no zero o
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 from graspsense.plugin_api import (
     CONTACT_FORCE_N,
@@ -30,17 +31,13 @@ from graspsense.plugin_api import (
     Feature,
     Features,
     FeatureSet,
+    Trace,
     create,
     missing,
     setting,
 )
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from graspsense.plugin_api import Trace
-
-    Floats = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 SIX: Final = (
     Feature("p_first", "m", "gap at the first contact of both fingers", width=True),

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from attrs import frozen
 
 from graspsense.gripper_api import MOVED_M, first_rest
-from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, setting
-
-if TYPE_CHECKING:
-    from graspsense.plugin_api import Trace
+from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, Trace, setting
 
 
 @frozen(kw_only=True)

@@ -4,16 +4,19 @@ A force that lags is lower than that of the object while the fingers close, and 
 A damper makes it higher and falls at once. For a spring of stiffness k, a lag of T at constant speed is the same as a
 damper of -k T, or as another width: where the speed does not change, no recording tells them apart. Where it does, each
 candidate is fitted with the lag as a further parameter, common to all squeezes, since they have one sensor.
+
+A lag is first found with all candidates, and may be one that only the terms of another choice need. So the terms are
+chosen anew with it, and it is used in place of that of the settings only if these show just this lag.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Callable, Sequence
+from typing import Final, NamedTuple
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 
 from graspsense.simulator_api import IdentifiedParameter, Undetermined
 from graspsense_identify.choose import LEAST_GAIN, Choice
@@ -21,6 +24,7 @@ from graspsense_identify.fit import Fitted, information
 from graspsense_identify.interval import identified, normal
 from graspsense_identify.prepare import MAX_LAG_S
 from graspsense_identify.refuse import shows_memory
+from graspsense_identify.share import Shares
 from graspsense_identify.spread import has_objects, refits
 from graspsense_identify.threads import in_threads
 
@@ -172,3 +176,39 @@ def delay_of(fitted: Fitted, settings_s: float, lag: Lag) -> Delay:
         high_s=shown + half,
         basis=again.basis,
     )
+
+
+MAX_ROUNDS: Final = 3
+"""How often the lag is corrected by that which the terms chosen with it show."""
+
+
+class Timed(NamedTuple):
+    """The shares of the cells, and the choice, for the squeezes at the times that a lag of the force gives them."""
+
+    shares: Shares
+    choice: Choice
+    lag: Lag
+
+
+def with_delay(
+    timed: Callable[[Lag], Timed], lag_of: Callable[[Choice], Lag], delay: Callable[[Timed], Delay]
+) -> tuple[Timed, Delay]:
+    """Return the choice with the delay that is used.
+
+    `timed` makes the choice with a lag, `lag_of` returns that which all candidates show, and `delay` what the chosen
+    terms show. That of the settings is
+    used where the interval of the chosen terms holds it, and where the lag does not settle.
+    """
+    recorded = timed(Lag())
+    lag = lag_of(recorded.choice)
+    for _ in range(MAX_ROUNDS):
+        if lag.lag_s == 0.0:
+            break
+        corrected = timed(lag)
+        shown = delay(corrected)
+        if shown.low_s <= shown.settings_s <= shown.high_s:
+            break
+        if abs(shown.shown_s - shown.used_s) <= PATH_ERROR_S:
+            return corrected, shown
+        lag = evolve(lag, lag_s=shown.shown_s - shown.settings_s)
+    return recorded, delay(recorded)

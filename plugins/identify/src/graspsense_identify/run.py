@@ -17,7 +17,7 @@ from graspsense.simulator_api import Identification, IdentifiedParameter, Record
 from graspsense_identify.block import lag_of_block, with_fingertips_of_block
 from graspsense_identify.check import predictive_checks
 from graspsense_identify.choose import choose
-from graspsense_identify.delay import Delay, Lag, delay_of, lag_of
+from graspsense_identify.delay import Delay, Lag, Timed, delay_of, lag_of, with_delay
 from graspsense_identify.fit import Fitted
 from graspsense_identify.forward import ForwardModel, path_forces
 from graspsense_identify.fracture import fracture_of, not_broken
@@ -28,7 +28,6 @@ from graspsense_identify.prepare import NoSqueeze, Squeeze, prepared
 from graspsense_identify.refuse import refusals, shows_memory, undetermined
 from graspsense_identify.share import WHOLE, Shares, measured_shares
 from graspsense_identify.spread import Uncertainty, uncertainty
-from graspsense_identify.used_delay import Timed, with_delay
 from graspsense_identify.write import scene_text
 from graspsense_sim_gripper.run.identification import CELLS, SimConfig, drive_and_pads
 

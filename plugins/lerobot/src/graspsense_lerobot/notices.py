@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from graspsense.plugin_api import GraspColumns
 from graspsense_lerobot.folder import Episode
 from graspsense_lerobot.names import TOUCH
 from graspsense_lerobot.understood import Understood, some, times_of
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 OTHER_RATE: Final = 0.02
 """Share by which the time between frames may differ from that of `fps` before it is told."""

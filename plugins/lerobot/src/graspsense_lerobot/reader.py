@@ -11,10 +11,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from attrs import evolve
+from numpy.typing import NDArray
 
 from graspsense.gripper_api import squeezes
 from graspsense.plugin_api import (
@@ -39,10 +39,7 @@ from graspsense_lerobot.understood import (
     units_of,
 )
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Numbers = NDArray[np.float64]
+Numbers = NDArray[np.float64]
 
 
 def recordings(place: str) -> Iterator[LabelledRecording | UnreadableRecording]:

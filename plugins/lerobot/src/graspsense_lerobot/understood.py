@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 from graspsense.plugin_api import ConfigError, DataDamaged, UnreadableRecording
 from graspsense.simulator_api import suggestion
@@ -15,10 +16,7 @@ from graspsense_lerobot.folder import DataColumn, Episode, Folder
 from graspsense_lerobot.names import CELL, Meaning, meaning_of, unit_of_name
 from graspsense_lerobot.place import PlaceOptions
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Numbers = NDArray[np.float64]
+Numbers = NDArray[np.float64]
 
 METRES: Final = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 """The units of a gap that need no option."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import Any, Final, Self
 
 import numpy as np
 import pyarrow
@@ -17,13 +17,10 @@ from attrs import frozen
 from pyarrow import parquet
 
 from graspsense.gripper_api import Phase, StoredGrasp
-from graspsense.plugin_api import ConfigError, TactileArray
+from graspsense.plugin_api import ConfigError, TactileArray, Trace
 from graspsense.testing_api import ImageTrace, SampleTrace
 from graspsense_lerobot.columns import Column, parquet_columns, statistics
 from graspsense_lerobot.folder import DATA_PATHS
-
-if TYPE_CHECKING:
-    from graspsense.plugin_api import Trace
 
 FPS: Final = 30
 """Frames per second that are written unless the user gives others."""

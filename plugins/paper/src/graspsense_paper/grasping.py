@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from attrs import evolve, field, frozen
@@ -22,12 +22,9 @@ from graspsense.experiment_api import (
     structured,
 )
 from graspsense.gripper_api import Phase
-from graspsense.plugin_api import CONTACT_FORCE_N, ConfigError
+from graspsense.plugin_api import CONTACT_FORCE_N, ConfigError, Trace
 from graspsense.simulator_api import BatchBackend
 from graspsense_paper.grasp_result import GraspResult, GraspRow
-
-if TYPE_CHECKING:
-    from graspsense.plugin_api import Trace
 
 PAD: Final = slice(7, 22)
 """The fifteen cells of the gripping face."""

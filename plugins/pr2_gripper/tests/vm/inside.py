@@ -28,8 +28,7 @@ from graspsense.cli.main import main as graspsense
 from graspsense.cli.options import settings_of
 from graspsense.core.components.registry import installed
 from graspsense.core.pipeline.pipeline import grasp_with
-from graspsense.core.values.events import GraspEvent
-from graspsense.core.values.signals import Command, Outcome, Phase, Reading
+from graspsense.core.values.signals import Command, GraspEvent, Outcome, Phase, Reading
 from graspsense.core.values.trial import Trial
 from graspsense.plugin_api import DeviceLost, NoDevice, create
 from graspsense.store.record_grasp import record_grasp

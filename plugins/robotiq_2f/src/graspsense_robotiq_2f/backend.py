@@ -36,14 +36,15 @@ from graspsense.plugin_api import (
 )
 from graspsense_robotiq_2f.config import RobotiqConfig
 from graspsense_robotiq_2f.emulator.lock_step import LockStepGripper
-from graspsense_robotiq_2f.faults import STATUS_BITS, bit_of
 from graspsense_robotiq_2f.link import ModbusLink, NoReply
 from graspsense_robotiq_2f.registers import (
     ACTIVE,
     AMPERES_A_STEP,
     MODELS,
+    STATUS_BITS,
     Request,
     Status,
+    bit_of,
     byte_of,
     status_of,
 )
@@ -55,7 +56,7 @@ RATE_HZ: Final = 100.0
 ACTIVATION_S: Final = 5.0
 COMMAND_DELAY_S: Final = 0.02
 """A command waits for the next exchange (10 ms), which takes 5 ms on the line, and the gripper's next period (5 ms)."""
-LET_GO: Final = "graspsense_robotiq_2f.stopping:let_go"
+LET_GO: Final = "graspsense_robotiq_2f.ur_cap:let_go"
 """What is called if the program is killed."""
 AHEAD_M: Final = 0.004
 """How far a target that moves can be ahead of the fingers."""

@@ -7,9 +7,8 @@ from typing import Final
 
 from graspsense.gripper_api import Finding, FoundDevice, converter_findings, found_converters, port_failed
 from graspsense_robotiq_2f.config import RobotiqConfig
-from graspsense_robotiq_2f.faults import STATUS_BITS, bit_of
 from graspsense_robotiq_2f.link import NoReply
-from graspsense_robotiq_2f.registers import MODELS, status_of
+from graspsense_robotiq_2f.registers import MODELS, STATUS_BITS, bit_of, status_of
 from graspsense_robotiq_2f.ur_cap import opened_link
 
 CONVERTERS: Final = {(0x0403, 0x6001), (0x0403, 0x6015)}

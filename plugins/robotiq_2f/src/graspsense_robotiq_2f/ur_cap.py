@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 import socket
 from collections.abc import Sequence
+from contextlib import closing
 from typing import Final, final
 
 from graspsense_robotiq_2f.link import ModbusLink, NoReply, discard_late
@@ -89,3 +90,12 @@ class UrCapLink:
 def opened_link(port: str, address: int, timeout_s: float) -> ModbusLink | UrCapLink:
     """Return the connection that the text of a port names. Raises OSError, ValueError."""
     return UrCapLink(port, timeout_s) if port.startswith(PREFIX) else ModbusLink(port, address, timeout_s)
+
+
+def let_go(port: str, address: int, timeout_s: float) -> None:
+    """Tell the gripper of a killed program to open, slowly. Raises OSError, NoReply.
+
+    One that only stops holds on, since its drive locks itself.
+    """
+    with closing(opened_link(port, address, timeout_s)) as link:
+        link.exchange(Request(active=True, go=True, position=0, speed=0, force=0).registers())

@@ -21,19 +21,15 @@ shake along the closing direction, the mass that the pads move.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
-from graspsense.plugin_api import HOLD, Channel, Feature, Features, FeatureSet, setting
+from graspsense.plugin_api import HOLD, Channel, Feature, Features, FeatureSet, Trace, setting
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from graspsense.plugin_api import Trace
-
-    Floats = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 BANDS_HZ: Final = {"low": (1.0, 10.0), "mid": (10.0, 50.0), "high": (50.0, 500.0)}
 PEAK_HZ: Final = (1.0, 50.0)

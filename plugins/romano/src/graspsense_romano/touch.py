@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from attrs import evolve, field, frozen
@@ -13,12 +13,9 @@ from attrs.validators import ge, gt, in_, le
 from numpy.typing import NDArray
 
 from graspsense.experiment_api import settings_from, structured
-from graspsense.plugin_api import HOLD, NO_PADS, ConfigError, Frame, Reading, Samples
+from graspsense.plugin_api import HOLD, NO_PADS, ConfigError, Frame, Reading, Samples, Trace
 from graspsense.simulator_api import BatchBackend
 from graspsense_romano.signals import Signals, filters, no_signals, updated
-
-if TYPE_CHECKING:
-    from graspsense.plugin_api import Trace
 
 LIFT_S: Final = 2.0
 """When the arm lifts, after both fingers touched."""

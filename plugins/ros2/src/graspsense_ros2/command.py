@@ -7,17 +7,17 @@ import queue
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import click
 
-if TYPE_CHECKING:
-    from graspsense.gripper_api import LiveFeed, Pipeline
-    from graspsense.plugin_api import Trial
-    from graspsense_ros2.action_server import Goal
-    from graspsense_ros2.held_gripper import HeldGripper
-    from graspsense_ros2.middleware import Through
-    from graspsense_ros2.node import Node
+from graspsense.gripper_api import GraspsenseError, LiveFeed, Pipeline, load_pipeline
+from graspsense.plugin_api import DeviceLost, Trial
+from graspsense_ros2.action_server import ActionServer, Goal
+from graspsense_ros2.held_gripper import HeldGripper
+from graspsense_ros2.message_types import decode, encode
+from graspsense_ros2.middleware import Through, open_node
+from graspsense_ros2.node import Node
 
 GRASP: Final = "/graspsense/grasp"
 GRIPPER_COMMAND: Final = "/graspsense/gripper_cmd"
@@ -48,9 +48,6 @@ def ros2(
 
     The grasps are published as topics below /graspsense. Exit codes: 0 ended by Ctrl-C; 2 wrong settings.
     """
-    from graspsense.gripper_api import LiveFeed, load_pipeline
-    from graspsense_ros2.middleware import open_node
-
     if not (grasps or moves):
         raise click.UsageError("say what others may ask for: --grasp, --action, or both")
     chosen = [] if gripper is None else [f"gripper.type={gripper}"]
@@ -89,14 +86,10 @@ class GripperServer:
 
     def can_move(self) -> None:
         """Take goals too. Raises ConfigError if the gripper cannot move to a position."""
-        from graspsense_ros2.held_gripper import HeldGripper
-
         self._held = HeldGripper(self._pipeline)
 
     def offer(self, node: Node, feed: LiveFeed, grasps: bool) -> None:
         """Offer the service and the action on this node."""
-        from graspsense_ros2.action_server import ActionServer
-
         self._feed = feed
         if grasps:
             node.service(GRASP, TRIGGER, self._answer_trigger)
@@ -105,8 +98,6 @@ class GripperServer:
 
     def serve(self) -> None:
         """Do what is asked for until KeyboardInterrupt."""
-        from graspsense.plugin_api import DeviceLost
-
         while True:
             try:
                 if self._held is not None and self._held.ticking:
@@ -122,8 +113,6 @@ class GripperServer:
 
     def end(self) -> None:
         """Open the gripper if it is held."""
-        from graspsense.gripper_api import GraspsenseError
-
         self._stop_moving()
         try:
             if self._held is not None:
@@ -133,8 +122,6 @@ class GripperServer:
 
     def _answer_trigger(self, request: bytes) -> bytes:
         """Wait for a grasp, and return its outcome, its prediction and its features as JSON."""
-        from graspsense_ros2.message_types import decode, encode
-
         decode(f"{TRIGGER}_Request", request)
         if not self._grasping.acquire(blocking=False):
             return encode(f"{TRIGGER}_Response", {"success": False, "message": "a grasp goes on already"})
@@ -146,8 +133,6 @@ class GripperServer:
         return encode(f"{TRIGGER}_Response", answer)
 
     def _grasp(self) -> Mapping[str, Any]:
-        from graspsense.gripper_api import GraspsenseError
-
         assert self._feed is not None
         try:
             if self._held is not None:
@@ -173,8 +158,6 @@ class GripperServer:
         return result
 
     def _move(self, goal: Goal) -> tuple[bool, Mapping[str, Any]]:
-        from graspsense.gripper_api import GraspsenseError
-
         assert self._held is not None
         if goal.stop.is_set():
             return False, {}

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from math import isfinite
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from attrs import frozen
 
-from graspsense.gripper_api import Interrupts
-from graspsense.plugin_api import POSITION, REST_SPEED_M_S, VELOCITY, Command, ConfigError, DeviceLost, Frame
+from graspsense.gripper_api import Interrupts, Pipeline
+from graspsense.plugin_api import (
+    POSITION,
+    REST_SPEED_M_S,
+    VELOCITY,
+    Command,
+    ConfigError,
+    DeviceInfo,
+    DeviceLost,
+    Frame,
+    SensorBackend,
+)
 from graspsense_ros2.action_server import Goal
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from graspsense.gripper_api import Pipeline
-    from graspsense.plugin_api import DeviceInfo, SensorBackend
 
 NEAR_M: Final = 0.001
 """Distance from the target at which it is reached, where the gripper has no coarser step."""

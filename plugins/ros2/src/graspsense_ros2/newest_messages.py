@@ -6,16 +6,14 @@ import threading
 import time
 from collections.abc import Mapping
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from attrs import define, field
+from numpy.typing import NDArray
 
 from graspsense.gripper_api import message_columns
 from graspsense_ros2.message_types import BadMessage, decode
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 
 @define(eq=False)

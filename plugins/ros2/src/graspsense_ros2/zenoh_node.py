@@ -6,8 +6,8 @@ import json
 import os
 import threading
 import time
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final
 
 import zenoh
 from zenoh.ext import CacheConfig, declare_advanced_publisher
@@ -26,9 +26,6 @@ from graspsense_ros2.names import (
     type_in,
 )
 from graspsense_ros2.node import MOST_REQUESTS, ServiceFailed, domain_from_environment
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 CONFIG_FILE: Final = "ZENOH_SESSION_CONFIG_URI"
 CONFIG_OVERRIDE: Final = "ZENOH_CONFIG_OVERRIDE"

@@ -30,10 +30,8 @@ from graspsense_so101_gripper.bus import NoStatusPacket, ServoBus
 from graspsense_so101_gripper.config import So101Config
 from graspsense_so101_gripper.discovery import serial_number
 from graspsense_so101_gripper.emulator.lock_step import LockStepBus
-from graspsense_so101_gripper.faults import STATUS_BITS
 from graspsense_so101_gripper.force import ForceOfMotor
-from graspsense_so101_gripper.identity import Unfit, jaw_of
-from graspsense_so101_gripper.jaw import RADIANS_A_STEP
+from graspsense_so101_gripper.jaw import RADIANS_A_STEP, Unfit, jaw_of
 from graspsense_so101_gripper.registers import (
     AMPERES_A_STEP,
     FULL_LOAD,
@@ -41,6 +39,7 @@ from graspsense_so101_gripper.registers import (
     KELVIN,
     REGISTERS,
     STATE,
+    STATUS_BITS,
     VOLTS_A_STEP,
     MotorRequest,
     MotorState,
@@ -51,7 +50,7 @@ RATE_HZ: Final = 100.0
 SPEED_LIMIT_M_S: Final = 0.3
 FORCE_SPEED_M_S: Final = 0.02
 """Speed of a closing that only a force was asked for."""
-STOP: Final = "graspsense_so101_gripper.stopping:stop"
+STOP: Final = "graspsense_so101_gripper.bus:stop"
 """What is called if the program is killed."""
 COMMAND_DELAY_S: Final = 0.02
 """A command is written at once (1 ms), and seen in the next frame (10 ms); the rest is for the motor to start."""

@@ -12,11 +12,12 @@ from __future__ import annotations
 import select
 import time
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import closing, suppress
 from typing import Any, Final, final
 
 from graspsense.gripper_api import why_not_opened
 from graspsense_so101_gripper.emulator.lock_step import LockStepBus
+from graspsense_so101_gripper.registers import STATE, MotorRequest, motor_state
 
 BAUD: Final = 1_000_000
 LENGTHS: Final = 4
@@ -120,3 +121,13 @@ class ServoBus:
             if packet[2] == motor and packet[3] == length + OVERHEAD:
                 return bytes(packet[5 : 5 + length])
             # A reply of another motor, or to an earlier request.
+
+
+def stop(port: str, motor: int, timeout_s: float, *earlier: int) -> None:
+    """Let the motor of a killed program stay where it is, and ask it for what it was asked `earlier`.
+
+    Raises OSError, NoStatusPacket.
+    """
+    with closing(ServoBus(port, timeout_s)) as bus:
+        position = motor_state(bus.read(motor, *STATE)).position
+        bus.write(motor, STATE[0], MotorRequest(*earlier).staying_at(position).written())

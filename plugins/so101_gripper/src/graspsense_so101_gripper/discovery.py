@@ -13,9 +13,15 @@ from graspsense.plugin_api import ConfigError, DataDamaged
 from graspsense_so101_gripper.arm_calibration import read_arm_calibration
 from graspsense_so101_gripper.bus import NoStatusPacket, ServoBus
 from graspsense_so101_gripper.config import So101Config
-from graspsense_so101_gripper.faults import STATUS_BITS
-from graspsense_so101_gripper.identity import Unfit, jaw_of
-from graspsense_so101_gripper.registers import FULL_LOAD, IDENTITY, STATE, VOLTS_A_STEP, motor_state
+from graspsense_so101_gripper.jaw import Unfit, jaw_of
+from graspsense_so101_gripper.registers import (
+    FULL_LOAD,
+    IDENTITY,
+    STATE,
+    STATUS_BITS,
+    VOLTS_A_STEP,
+    motor_state,
+)
 
 CONVERTERS: Final = {(0x1A86, 0x55D3), (0x1A86, 0x7523)}
 """USB numbers of the CH343 and CH340 chips on bus boards of such arms. Others have them too."""

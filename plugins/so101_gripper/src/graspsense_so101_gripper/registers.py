@@ -5,7 +5,10 @@ Numbers have their low byte first. Of a signed one, a bit is the sign and the bi
 
 from __future__ import annotations
 
+from math import inf
 from typing import Final, NamedTuple
+
+from graspsense.gripper_api import StatusBit
 
 MODEL_NUMBER: Final = 777
 STEPS: Final = 4096
@@ -115,3 +118,17 @@ def motor_state(memory: bytes) -> MotorState:
         status=REGISTERS["status"].number(memory, start),
         **{name: REGISTERS[f"present_{name}"].number(memory, start) for name in measured},
     )
+
+
+STATUS_BITS: Final = (
+    StatusBit(mask=1, name="voltage", meaning="its supply is outside of its limits", limit_s=0.0),
+    StatusBit(mask=2, name="angle sensor", meaning="its position cannot be trusted", limit_s=0.0),
+    StatusBit(mask=4, name="too hot", meaning="it is hotter than its limit: let it cool down", limit_s=0.5),
+    StatusBit(mask=8, name="overcurrent", meaning="its current is above its limit", limit_s=0.5),
+    StatusBit(
+        mask=32,
+        name="overload",
+        meaning="it pushed for too long, and lowers its torque by itself",
+        limit_s=inf,
+    ),
+)

@@ -8,8 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
-from graspsense.core.files.closed_paths import is_closed, make_closed
-from graspsense.core.files.user_folders import cache_folder
+from graspsense.core.files.user_folders import cache_folder, is_closed, make_closed
 
 _CONTENT: Final = "files with compiled code"
 MAX_FILES: Final = 2000

@@ -32,7 +32,7 @@ from graspsense.core.components.entries import (
 )
 
 if TYPE_CHECKING:
-    from graspsense.core.values.events import GraspEvent
+    from graspsense.core.values.signals import GraspEvent
     from graspsense.core.values.trial import RunInfo, Trial
 
 PROJECT = "graspsense"

@@ -42,8 +42,8 @@ if TYPE_CHECKING:
     from graspsense.core.components.run_config import RunConfig
     from graspsense.core.values.channel import Channel
     from graspsense.core.values.features import Features, FeatureTable, Prediction
+    from graspsense.core.values.reasons import TreeNode
     from graspsense.core.values.trace import Trace
-    from graspsense.core.values.tree import TreeNode
 
 ConfigT = TypeVar("ConfigT")
 

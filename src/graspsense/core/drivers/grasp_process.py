@@ -24,8 +24,7 @@ from attrs import asdict, evolve, fields
 from graspsense.core.components.roles import Controller
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.settings.selected import create, recipe_of
-from graspsense.core.values.events import GraspEvent
-from graspsense.core.values.signals import Outcome, Phase
+from graspsense.core.values.signals import GraspEvent, Outcome, Phase
 from graspsense.core.values.trace import Trace
 
 COLUMNS: Final = tuple(

@@ -18,6 +18,8 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import BinaryIO, Final, cast
 
+from graspsense.core.values.errors import ConfigError, ExitCode, GraspsenseError
+
 _LEFTOVER: Final = re.compile(r".+\.[0-9a-f]{16}\.part")
 _SWEPT: Final[set[str]] = set()
 """Folders in which this process has deleted what killed programs left: once is enough."""
@@ -144,3 +146,32 @@ def first_bytes(source: Traversable | Path, most: int) -> bytes:
     """Return the content of a regular file, of a larger one `most` + 1 bytes. Raises OSError, NotAFile."""
     with opened_file(source) as file:
         return file.read(most + 1)
+
+
+class SaveFailed(GraspsenseError):
+    """Data could not be written to the disk."""
+
+    exit_code = ExitCode.WRONG_USE
+
+
+def write_new(path: Path, data: bytes) -> None:
+    """Write a new file. Raises ConfigError if it already exists, SaveFailed if it cannot be written."""
+    try:
+        write_whole(path, data, replace=False)
+    except FileExistsError:
+        raise ConfigError(f"{path} already exists: name another file, or move it away") from None
+    except OSError as error:
+        raise SaveFailed(f"{path} cannot be written: {error.strerror}") from error
+
+
+def write_or_replace(path: Path, data: bytes, *, make_folder: bool = False) -> None:
+    """Write a file, or replace an existing one; when this returns, the data is on the disk.
+
+    `make_folder` creates the folder of the file if it does not exist. Raises SaveFailed.
+    """
+    try:
+        if make_folder:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(path, data)
+    except OSError as error:
+        raise SaveFailed(f"{path} cannot be written: {error.strerror}") from error

@@ -19,8 +19,7 @@ from typing import Any, Final
 from attrs import frozen
 
 from graspsense.core.components.caller import set_option
-from graspsense.core.files.closed_paths import make_closed, why_open
-from graspsense.core.files.user_folders import NOWHERE, data_folder
+from graspsense.core.files.user_folders import NOWHERE, data_folder, make_closed, why_open
 from graspsense.core.files.whole_file import first_bytes, write_whole
 from graspsense.core.grasp.calibration import Cells, LoadTable, MotorTable
 from graspsense.core.values.errors import ConfigError, DataDamaged

@@ -10,8 +10,7 @@ from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_uninterrupted
 from graspsense.core.grasp.wrapped_gripper import WrappedGripper
 from graspsense.core.values.device import DeviceInfo
-from graspsense.core.values.events import GraspEvent
-from graspsense.core.values.signals import EFFORT, FORCE, VELOCITY, Command, Phase, Reading
+from graspsense.core.values.signals import EFFORT, FORCE, VELOCITY, Command, GraspEvent, Phase, Reading
 
 
 class PhaseCommands(NamedTuple):

@@ -49,7 +49,6 @@ from graspsense.core.grasp.opened_gripper import (
 from graspsense.core.grasp.sinks import DeviceSink, EventSink, PictureSink, Sink, Watcher
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import FAILURES, DeviceLost, RecordingEnded, TareRefused, named, place_of
-from graspsense.core.values.events import EventSource, GraspEvent, event_name
 from graspsense.core.values.faults import LIMITED, Fault, faults_among
 from graspsense.core.values.features import Prediction
 from graspsense.core.values.signals import (
@@ -59,11 +58,14 @@ from graspsense.core.values.signals import (
     RUNNING,
     SQUEEZE,
     Command,
+    EventSource,
     Frame,
+    GraspEvent,
     Outcome,
     Pads,
     Phase,
     Reading,
+    event_name,
 )
 from graspsense.core.values.trace import SI_UNITS, Trace, TraceRecorder
 

@@ -7,9 +7,8 @@ from typing import Protocol, runtime_checkable
 
 from graspsense.core.components.roles import Viewer
 from graspsense.core.values.device import DeviceInfo
-from graspsense.core.values.events import GraspEvent
 from graspsense.core.values.features import Prediction
-from graspsense.core.values.signals import Command, Frame, Reading
+from graspsense.core.values.signals import Command, Frame, GraspEvent, Reading
 from graspsense.core.values.trace import TraceRecorder
 
 Tell = Callable[[float, int, str, Prediction | None], None]

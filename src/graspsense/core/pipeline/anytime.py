@@ -12,20 +12,18 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from math import inf
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from graspsense.core.components.caller import set_option
+from graspsense.core.components.roles import FeatureSet
 from graspsense.core.grasp.sinks import Tell
+from graspsense.core.learn.model import Model
+from graspsense.core.settings.resolved import Settings
+from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import FAILURES, ConfigError, named
 from graspsense.core.values.features import CheckpointPrediction, Features, Prediction
 from graspsense.core.values.signals import HOLD, SQUEEZE, Frame
 from graspsense.core.values.trace import TraceRecorder, trace_of
-
-if TYPE_CHECKING:
-    from graspsense.core.components.roles import FeatureSet
-    from graspsense.core.learn.model import Model
-    from graspsense.core.settings.resolved import Settings
-    from graspsense.core.values.device import DeviceInfo
 
 SWITCH_S: Final = 1e-4
 """Time after which the thread gives the interpreter back to the control loop that waits for it; usually 5 ms."""

@@ -27,7 +27,6 @@ from graspsense.core.settings.layers import Flag
 from graspsense.core.settings.resolved import Settings, resolve
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import FAILURES, ConfigError, WiringError, named, place_of
-from graspsense.core.values.events import GraspEvent
 from graspsense.core.values.faults import faults_among
 from graspsense.core.values.features import (
     UNKNOWN,
@@ -37,7 +36,7 @@ from graspsense.core.values.features import (
     Prediction,
     missing,
 )
-from graspsense.core.values.signals import Outcome
+from graspsense.core.values.signals import GraspEvent, Outcome
 from graspsense.core.values.trial import RunInfo, Trial
 
 if TYPE_CHECKING:

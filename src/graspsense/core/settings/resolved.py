@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import Any, Final, cast
 
 from attrs import fields, frozen
 
 from graspsense.core.components.entries import TABLE_OF_ROLE, Role
 from graspsense.core.components.registry import Component, Plugins, installed
+from graspsense.core.components.run_config import RunConfig
 from graspsense.core.components.setting import followed_settings
 from graspsense.core.components.strict import (
     InvalidValue,
@@ -38,9 +39,6 @@ from graspsense.core.settings.layers import (
 )
 from graspsense.core.settings.selected import ImplausibleSettings, SelectedComponent, listed_errors
 from graspsense.core.values.errors import ConfigError, PluginUnavailable, UnknownName
-
-if TYPE_CHECKING:
-    from graspsense.core.components.run_config import RunConfig
 
 NONE: Final = "none"
 """The `type` of a classifier table for a pipeline without a classifier."""
@@ -147,8 +145,6 @@ def _resolved_layers(
     pipeline: str, layers: Sequence[Layer], malformed: Sequence[str], plugins: Plugins, *, force: bool
 ) -> Settings:
     """Return the settings of these layers, of which each overrides those before. Raises ConfigError."""
-    from graspsense.core.components.run_config import RunConfig
-
     doubts: list[str] = []
     complaints: list[_Complaint] = list(malformed)
     classes: dict[str, type] = {}

@@ -2,13 +2,13 @@
 
 A reason is a rule that the trial meets, a contribution of one feature or of several together, or a text without either.
 Contributions of a prediction add up: to the probability of the label, or to the logarithm of its odds against another
-label (*log-odds*).
+label (*log-odds*). A decision tree, in which reasons can be looked up, has one form too.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final, Literal
 
 from attrs import frozen
@@ -135,3 +135,27 @@ def contribution_reasons(
     words = f"{100 * start:.1f} % for {label}" if scale == "probability" else base.words
     reasons.append(Reason(words=f"before any feature: {words}", contribution=base))
     return tuple(reasons)
+
+
+@frozen(kw_only=True)
+class TreeNode:
+    """A node: its label, the number of training trials that reach it, and the number of these with another label.
+
+    `parent` is the index of the parent node, None for the root; `branch` is the condition under which the parent leads
+    here, in words and units. A node without children is a leaf. Parents come before their children.
+    """
+
+    label: str
+    trials: float
+    wrong: float
+    parent: int | None = None
+    branch: str = ""
+
+    def as_json(self) -> dict[str, Any]:
+        """Return it as JSON values."""
+        return {name: getattr(self, name) for name in TreeNode.__annotations__}
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any]) -> TreeNode:
+        """Return the node that `as_json` gave."""
+        return cls(**values)

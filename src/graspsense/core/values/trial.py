@@ -10,9 +10,8 @@ from attrs import field, frozen
 
 from graspsense.core.values.display import html
 from graspsense.core.values.errors import UnknownName
-from graspsense.core.values.events import GraspEvent, event_as_json
 from graspsense.core.values.printable import in_one_line
-from graspsense.core.values.signals import Outcome
+from graspsense.core.values.signals import GraspEvent, Outcome, event_as_json
 
 if TYPE_CHECKING:
     from graspsense.core.values.device import DeviceInfo

@@ -9,20 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from math import nan
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from attrs import evolve, frozen
+from numpy.typing import NDArray
 
 from graspsense.gripper_api import NO_GAP
-from graspsense.plugin_api import APPROACH, HOLD, RELEASE, Features, missing
+from graspsense.plugin_api import APPROACH, HOLD, RELEASE, Features, Trace, missing
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from graspsense.plugin_api import Trace
-
-    Floats = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 STAIRCASE: Final = 0.5
 """Share of the samples with a new force below which the others repeat the last one, as between two cell images."""

@@ -23,10 +23,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 from graspsense.plugin_api import (
     HOLD,
@@ -36,15 +37,11 @@ from graspsense.plugin_api import (
     Features,
     FeatureSet,
     TactileArray,
+    Trace,
     setting,
 )
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from graspsense.plugin_api import Trace
-
-    Floats = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 FINGERTIPS: Final = "pads"
 """The array that stands for both fingertips."""

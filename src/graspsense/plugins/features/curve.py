@@ -13,16 +13,18 @@ force.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 from graspsense.plugin_api import (
     Channel,
     Feature,
     Features,
     FeatureSet,
+    Trace,
     missing,
     setting,
 )
@@ -35,12 +37,7 @@ from graspsense.plugins.features.contact_curve import (
 )
 from graspsense.plugins.features.contact_threshold import ContactThreshold
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from graspsense.plugin_api import Trace
-
-    Floats = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 LOADED: Final = 0.95
 """Share of the largest force at which the loading ends; a plateau reaches the largest force itself by noise only."""

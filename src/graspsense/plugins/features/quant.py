@@ -15,21 +15,17 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 from graspsense.gripper_api import NO_GAP
-from graspsense.plugin_api import APPROACH, Channel, Feature, Features, FeatureSet
+from graspsense.plugin_api import APPROACH, Channel, Feature, Features, FeatureSet, Trace
 from graspsense.plugins.features.contact_curve import increasing
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from graspsense.plugin_api import Trace
-
-    Floats = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 POINTS: Final = 128
 """Number of times at which a channel is evaluated."""

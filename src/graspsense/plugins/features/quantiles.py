@@ -10,21 +10,22 @@ functions of time that are linear between samples, at 128 evenly spaced times.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, missing
-from graspsense.plugins.features.contact_curve import contact_curve, first_crossing, samples_of, without_gap
+from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, Trace, missing
+from graspsense.plugins.features.contact_curve import (
+    CurveSamples,
+    contact_curve,
+    first_crossing,
+    samples_of,
+    without_gap,
+)
 from graspsense.plugins.features.contact_threshold import ContactThreshold
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from graspsense.plugin_api import Trace
-    from graspsense.plugins.features.contact_curve import CurveSamples
-
-    Floats = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 POINTS: Final = 128
 """Number of times at which gap and forces are evaluated."""

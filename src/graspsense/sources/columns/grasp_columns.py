@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.errors import DataDamaged, counted
-from graspsense.core.values.events import GraspEvent
 from graspsense.core.values.fingers import FingerForce, opposed_forces
-from graspsense.core.values.signals import NO_PADS, Frame, Phase, Reading, Samples
+from graspsense.core.values.signals import NO_PADS, Frame, GraspEvent, Phase, Reading, Samples
 from graspsense.recording.replayable import Recording
 from graspsense.sources.columns.fast_samples import most_in_a_tick, signals_in_ticks, values_in_ticks
 from graspsense.sources.formats.table import Numbers

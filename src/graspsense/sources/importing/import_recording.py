@@ -10,16 +10,15 @@ from typing import Any
 from attrs import evolve
 
 from graspsense.core.components.registry import Plugins
+from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.learn.labelled import class_of
 from graspsense.core.pipeline.pipeline import grasp_with
 from graspsense.core.settings.resolved import Settings
 from graspsense.core.values.errors import FAILURES
-from graspsense.core.values.events import LABELLED
 from graspsense.core.values.features import Features
-from graspsense.core.values.signals import Reading
+from graspsense.core.values.signals import LABELLED, Reading
 from graspsense.core.values.trace import Trace
 from graspsense.core.values.trial import Trial
-from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.labelled_recording import LabelledRecording
 from graspsense.recording.layout import DEVICE, RESULT, START, TICK, pads_numbers, pads_topic, signal_topics
 from graspsense.recording.recorded_grasp import with_phases_of

@@ -14,9 +14,9 @@ from graspsense.core.components.setting import setting
 from graspsense.core.components.strict import ValidationFailed, structured
 from graspsense.core.settings.layers import read_toml
 from graspsense.core.values.errors import ConfigError, listed
-from graspsense.core.values.events import NOT_KNOWN
 from graspsense.core.values.fingers import PREFIX, FingerForce
 from graspsense.core.values.limits import ENTRIES
+from graspsense.core.values.signals import NOT_KNOWN
 from graspsense.sources.formats.array_format import AXES, TIME
 from graspsense.sources.formats.patterns import file_template, regular_expression
 from graspsense.sources.manifest.expression import Expression, ExpressionError, parse

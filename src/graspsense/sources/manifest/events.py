@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from graspsense.core.values.errors import ConfigError, DataDamaged
-from graspsense.core.values.events import NOT_KNOWN
+from graspsense.core.values.signals import NOT_KNOWN
 from graspsense.core.values.written_numbers import is_missing, number_in
 from graspsense.sources.columns.grasp_columns import Spans
 from graspsense.sources.formats.table import Numbers

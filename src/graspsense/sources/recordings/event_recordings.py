@@ -20,7 +20,7 @@ from graspsense.recording.reader import read_recorded
 from graspsense.recording.replayable import content_sha256
 from graspsense.sources.recordings.dataset_recordings import datasets_with_recordings, readable_or_not
 from graspsense.sources.recordings.labelled_recordings import instances_of, order_of
-from graspsense.store.naming import STORE
+from graspsense.store.opening import STORE
 from graspsense.store.stored_grasps import StoredGrasp, stored_grasps
 
 if TYPE_CHECKING:

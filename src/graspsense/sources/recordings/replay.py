@@ -30,7 +30,7 @@ from graspsense.sources.recordings.dataset_recordings import (
     numbered_recording,
 )
 from graspsense.sources.recordings.icub import read_recording
-from graspsense.store.naming import as_source
+from graspsense.store.opening import as_source
 
 
 def _mcap(name: str) -> Recording:

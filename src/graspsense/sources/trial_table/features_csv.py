@@ -17,6 +17,7 @@ import numpy as np
 
 from graspsense.core.components.caller import option
 from graspsense.core.files.csv_text import csv_text
+from graspsense.core.files.whole_file import write_or_replace
 from graspsense.core.learn.confounding import LEAST_LINES
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.target_value import TargetValue
@@ -25,7 +26,6 @@ from graspsense.core.values.features import UNKNOWN, FeatureTable
 from graspsense.core.values.label_text import is_missing_label, label_text
 from graspsense.core.values.nominal import splits_of
 from graspsense.core.values.written_numbers import is_missing
-from graspsense.recording.atomic_file import write_or_replace
 from graspsense.recording.controls import Controls, controls
 from graspsense.sources.formats.arff_columns import ArffColumns
 from graspsense.sources.formats.csv_columns import CsvColumns

@@ -14,8 +14,8 @@ from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.emulation import emulated_board
 from graspsense_pr2_gripper.emulator.port import Plug, Port
 from graspsense_pr2_gripper.emulator.reasons import why_no_uhid, why_no_vhci
-from graspsense_pr2_gripper.pacing import on_time
 from graspsense_pr2_gripper.protocol import FEATURE_ID, INPUT_LAYOUT, OUTPUT_ID
+from graspsense_pr2_gripper.transports.emulated import on_time
 
 PRODUCT: Final = "graspsense emulated PR2 gripper"
 APPEARS_S: Final = 5.0

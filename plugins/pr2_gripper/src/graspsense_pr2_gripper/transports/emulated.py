@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from collections import deque
+from collections.abc import Iterator
 from typing import Final, final
 
 from graspsense_pr2_gripper.faults import Wire
-from graspsense_pr2_gripper.pacing import on_time
 from graspsense_pr2_gripper.transports.interface import Transport, TransportGone
 
 _GONE: Final = "the emulated cable was pulled"
@@ -109,3 +110,17 @@ class PacedTransport(Transport):
             with self._arrived:
                 self._failed = f"the emulated board failed: {type(error).__name__}: {error}"
                 self._arrived.notify()
+
+
+def on_time(period_s: float) -> Iterator[float]:
+    """Yield once a period on a grid of absolute times, with how late it is in seconds.
+
+    What is late is made up for, so that the device's clock stays with the host's.
+    """
+    due = time.monotonic()
+    while True:
+        yield max(time.monotonic() - due, 0.0)
+        due += period_s
+        wait_s = due - time.monotonic()
+        if wait_s > 0.0:
+            time.sleep(wait_s)

@@ -57,7 +57,7 @@ from graspsense.core.components.registry.parts import (
 from graspsense.core.values.errors import FAILURES, PluginUnavailable, UnknownName, suggestion
 
 if TYPE_CHECKING:
-    from graspsense.core.values.events import GraspEvent
+    from graspsense.core.values.signals import GraspEvent
     from graspsense.core.values.trial import RunInfo, Trial
 
 STRICT_VARIABLE: Final = "GRASPSENSE_STRICT_PLUGINS"
