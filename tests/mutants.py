@@ -905,6 +905,12 @@ nearest(
     probabilities=lambda self, table: Nearest.probabilities(self, table).astype(np.float32),
 )
 nearest(
+    "probabilities-are-valid",
+    "its support is float64 of shape (46,)",
+    support=lambda self, table: np.ones(len(table) + 1),
+)
+nearest("probabilities-are-valid", "its support is str", support=lambda self, table: "many")
+nearest(
     "separates-separable-trials",
     "is the order of `classes`",
     classes=lambda self: Nearest.classes(self)[::-1],
@@ -949,7 +955,7 @@ nearest(
     to_json=lambda self: {**self._model, "mean": np.array(self._model["mean"])},
 )
 nearest("single-trials-agree", "predict each trial independently", probabilities=of_all_trials)
-nearest("handles-missing-values", "fill or skip them", probabilities=without_missing)
+nearest("handles-missing-values", "fill or skip missing values", probabilities=without_missing)
 fitting(
     "one-label-is-refused-or-certain", "raise ValueError, or learn from", lambda labels: len(set(labels)) < 2
 )
@@ -963,6 +969,12 @@ nearest(
     "explain says 'bottle:full_open'",
     explain=lambda self, features: evolve(Nearest.explain(self, features), label="bottle:full_open"),
 )
+nearest(
+    "explains-its-predictions",
+    "the probability 'none'",
+    explain=lambda self, features: evolve(Nearest.explain(self, features), probabilities={}),
+)
+nearest("explains-its-predictions", "return TreeNode objects", tree=lambda self: ["root"])
 nearest(
     "explains-its-predictions",
     "give each reason in words and units",
