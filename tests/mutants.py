@@ -114,6 +114,12 @@ def fail(error):
     raise error
 
 
+def thread_of(name):
+    """Start a thread that goes on, and does not keep the program from ending."""
+    threading.Thread(target=time.sleep, args=(30.0,), name=name, daemon=True).start()
+    return True
+
+
 # What holds for every component.
 
 
@@ -194,15 +200,6 @@ def reading(check, says, read, **entry):
     )
 
 
-class Complex(float):
-    """A number that JSON writes in a way of its own."""
-
-    def __eq__(self, other):
-        return False
-
-    __hash__ = None
-
-
 NEWTON = (Feature("peak", "newton", "the largest force of the pads"),)
 REQUIRED = ENTRIES["feature-set"].requires
 AS_DECLARED = "returns-the-declared-features"
@@ -227,7 +224,11 @@ measuring("same-features-elsewhere", "read no clock", lambda peak, trace: peak +
 measuring("values-are-floats", "use logging", lambda peak, trace: print(peak) or peak)  # noqa: T201
 measuring("values-are-floats", "os._exit(0)", lambda peak, trace: os._exit(0))
 measuring("values-are-floats", "changes the random numbers", lambda peak, trace: random.seed(1) or peak)
-measuring("survives-json", "through JSON", lambda peak, trace: Complex(peak))
+featuring("values-are-floats", "write it as text", reasons=lambda features, trace: {"peak": 5})
+measuring(
+    "extracts-in-time", "one more each time it extracts", lambda peak, trace: thread_of("peak") and peak
+)
+measuring("extracts-in-time", "with whole columns", lambda peak, trace: time.sleep(0.1) or peak)
 measuring(
     "requires-what-it-reads",
     "add the channels that it reads to `requires`",
@@ -237,11 +238,6 @@ measuring(
     "independent-of-the-start-of-the-clock",
     "use differences of times",
     lambda peak, trace: peak + float(trace.t_s[-1:].sum()),
-)
-measuring(
-    "views-and-copies-agree",
-    "the memory behind them",
-    lambda peak, trace: peak + len(trace.gap_m if trace.gap_m.base is None else trace.gap_m.base),
 )
 
 
@@ -729,7 +725,7 @@ class SlowToOpen(Hand):
         return super().open(seed)
 
 
-@mutant("closes-in-any-state", "make it a daemon")
+@mutant("accepts-every-declared-kind", "make it a daemon")
 class LeavesAThread(Hand):
     def open(self, seed):
         threading.Thread(target=time.sleep, args=(3.0,)).start()
@@ -822,6 +818,11 @@ override(
     *(Hand, "reports-plain-values", "numbers, text and booleans only"), report=lambda self: {"self": self}
 )
 hand(
+    "closes-in-any-state",
+    "one more each time it is opened",
+    open=lambda self, seed: thread_of("reader") and Hand.open(self, seed),
+)
+hand(
     "dry-run-accepts-the-same-commands",
     "return a SensorBackend or None",
     dry_run_backend=lambda self: "somebody",
@@ -909,13 +910,18 @@ nearest(
     "its support is float64 of shape (46,)",
     support=lambda self, table: np.ones(len(table) + 1),
 )
-nearest("probabilities-are-valid", "its support is str", support=lambda self, table: "many")
+nearest("probabilities-are-valid", "its support is a value of type str", support=lambda self, table: "many")
 nearest(
     "separates-separable-trials",
     "is the order of `classes`",
     classes=lambda self: Nearest.classes(self)[::-1],
 )
 mutant("same-seed-same-model", "draw everything from the seed")(Dicing)
+nearest(
+    "same-seed-same-model",
+    "one more each time it is fitted",
+    fit=lambda self, *given: thread_of("fit") and Nearest.fit(self, *given),
+)
 
 
 class Remembering(Nearest):

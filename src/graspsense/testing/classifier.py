@@ -17,7 +17,7 @@ from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.features import FeatureTable, Prediction
 from graspsense.core.values.tree import TreeNode
 from graspsense.testing import component
-from graspsense.testing.checks import CheckFailed, checks_of, demand, raises_nothing
+from graspsense.testing.checks import CheckFailed, checks_of, demand, leaving_no_thread, raises_nothing
 from graspsense.testing.damage import damaged_at, paths
 from graspsense.testing.samples import sample_table
 from graspsense.testing.subject import Subject, elsewhere
@@ -106,7 +106,8 @@ def same_seed_same_model(subject: Subject) -> None:
     """The same trials and seed give the same model, bit for bit, whatever it was fitted to before."""
     fitted, table, labels = _learned(subject)
     again = _fitted(subject, *sample_table(30, missing=True))
-    again.fit(table, labels, SEED)
+    with leaving_no_thread("it is fitted"):
+        again.fit(table, labels, SEED)
     demand(
         _json(fitted) == _json(again)
         and bool((fitted.probabilities(table) == again.probabilities(table)).all()),

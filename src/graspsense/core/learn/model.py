@@ -396,7 +396,8 @@ def refuse_unsupported(support: Any, trials: int) -> None:
 
 
 def _kind(values: Any) -> str:
-    return f"{getattr(values, 'dtype', type(values).__name__)} of shape {getattr(values, 'shape', '-')}"
+    array = isinstance(values, np.ndarray)
+    return f"{values.dtype} of shape {values.shape}" if array else f"a value of type {type(values).__name__}"
 
 
 def _compared(
