@@ -246,7 +246,7 @@ def stop_early(trace):
         raise IndexError("no contact yet")
 
 
-reading("handles-every-trace", "ValueError", lambda trace: trace.gap_m.max())
+reading(AS_DECLARED, "ValueError", lambda trace: trace.gap_m.max())
 reading("handles-a-trace-that-ends-anywhere", "on trace.until(", stop_early)
 reading("does-not-change-the-trace", "force_left_n.copy()", lambda trace: trace.force_left_n.fill(0.0))
 reading(
@@ -283,7 +283,7 @@ AS_EXTRACTED = "compiled-features-are-those-of-extract"
 peak(AS_EXTRACTED, "make `compiled` measure what `extract` does", compiled=measured_by(half_of_the_peak))
 peak(AS_EXTRACTED, "the same tuple of floats for every grasp", compiled=measured_by(nothing_to_measure))
 reading(
-    "handles-every-trace",
+    AS_DECLARED,
     "has no attribute 'samples'",
     lambda trace: trace.signals["acceleration"].samples,
     requires=(ACCELERATION,),
@@ -369,8 +369,8 @@ def counting_step(params, state, reading):
 law("same-tick-same-command", "changes a global", step=staticmethod(counting_step))
 commanding("commands-are-finite", "makes sense in m and m/s", kind=VELOCITY, value=-10.0)
 commanding(
-    "grasps-are-independent",
-    "keep no state in the class",
+    "state-holds-everything",
+    "nothing in the class",
     value=lambda command, _: command.value + 1e-6 * next(_grasps),
 )
 commanding(
@@ -380,7 +380,7 @@ commanding(
 )
 
 
-@mutant("state-holds-everything", "keep everything in the state")
+@mutant("state-holds-everything", "everything in the state")
 class Forgetful(Law):
     @staticmethod
     def step(params, state, reading):

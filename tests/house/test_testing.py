@@ -33,7 +33,6 @@ def short_openings(monkeypatch):
 SLOW_CHECKS = {
     "ends-every-grasp",
     "read-returns-within-its-timeout",
-    "grasps-are-independent",
     "what-it-delivers-is-kept",
     "squeezes-with-what-it-is-asked",
     "says-what-it-asks-for",

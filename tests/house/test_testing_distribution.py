@@ -129,7 +129,6 @@ def changed(sound, part, other):
 MUTANTS = [
     ("plugins-load", {"plugin": HEAD + "    import no_such_driver"}, "'no_such_driver'"),
     ("plugin-modules-are-light", {"plugin": HEAD + "    import numpy"}, "imports numpy"),
-    ("everything-declared-loads", changed(SOUND, "parts:Peak", "lab_nowhere:Peak"), "'lab_nowhere'"),
     ("everything-declared-loads", {"plugin": SOUND + WATCHING}, "'lab_wall'"),
     ("everything-declared-loads", {"plugin": SOUND + MEASURING}, "has no source and no simulated"),
     ("names-are-unique", changed(SOUND, '"summit"', '"chitta"'), "'chitta' is taken by graspsense/chitta"),

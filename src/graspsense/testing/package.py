@@ -98,10 +98,7 @@ def plugin_modules_are_light(package: Package) -> None:
 
 
 def everything_declared_loads(package: Package) -> None:
-    """Every class, config, file, reader, command and kind of experiment that it declares can be loaded."""
-    for component in package.components:
-        component.config_class()
-        component.component_class()
+    """Every file, reader, command and kind of experiment that it declares can be loaded."""
     for resource in package.resources:
         if resource.is_file:
             resource.file()
