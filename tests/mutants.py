@@ -522,7 +522,7 @@ def sampling(check, says, change, channel="acceleration"):
         return reading._replace(signals=reading.signals._replace(**{channel: given}))
 
 
-def seeing(says, image):
+def seeing(says, image, check="signals-are-those-declared"):
     """Keep a mutant with a camera, whose image this function makes of the pixels of the driver."""
 
     class Seeing(Hand):
@@ -534,7 +534,7 @@ def seeing(says, image):
             seen = Image(frame.t_s, 1 + round(frame.t_s * 1000.0), image(self.pixels))
             return Reading(frame, pads, signals._replace(camera=seen))
 
-    mutant("images-stay-as-they-were-delivered", says)(Seeing)
+    mutant(check, says)(Seeing)
 
 
 def shown(pixels):
@@ -591,7 +591,8 @@ framing(VELOCITY_CHECK, "negative while it closes", velocity_m_s=lambda frame: -
 framing("same-seed-same-frames", "draw everything from the seed", edge_left_n=lambda frame: _rng.random())
 framing(OF_HAND, "declare each bit as a StatusBit", status=8)
 
-padding("frames-are-numbers", "a tuple of 22 floats", left=(0.0,) * 15)
+padding("frames-are-numbers", "give a tuple of floats", left=(0,) * 22)
+padding("signals-are-those-declared", "has 15 cells instead of 22", left=(0.0,) * 15)
 padding("images-count-up", "count up by one", counter=lambda pads: -pads.counter)
 padding("images-count-up", "while its counter stays", left=lambda pads: (float(next(_calls)),) * 22)
 padding(
@@ -613,13 +614,19 @@ sampling(
 sampling(UNBROKEN, "they repeat old ones", lambda block: block._replace(new=2))
 
 seeing("can still be changed", lambda pixels: pixels.copy())
-seeing("changed after it was delivered", shown)
+seeing("changed after it was delivered", shown, "images-stay-as-they-were-delivered")
 seeing("is not contiguous", turned)
 
 mutant(
     SIGNALS,
     "declared are acceleration, camera, motor_temperature, and read delivers acceleration, camera",
     channels=(*DECLARED, MOTOR),
+)(Hand)
+mutant(
+    "channels-are-those-declared",
+    "declare TactileArray",
+    channels=channels(*CHANNELS_OF_HAND, rate_hz=1000.0)[:-1]
+    + (Channel("pads", "counts", 24.0), ACCELERATION, CAMERA),
 )(Hand)
 mutant("fingers-are-those-declared", "declare two or more fingers", channels=(*DECLARED, FINGERS[0]))(Hand)
 mutant(

@@ -341,7 +341,7 @@ def in_a_name(key: str, value: Any) -> str:
 def shown(value: Any) -> str:
     """Return a value as text for the name of a case."""
     if isinstance(value, float):
-        return f"{value:g}"
+        return repr(value).removesuffix(".0")
     if isinstance(value, list | tuple):
         return "+".join(map(shown, value))
     return str(value)
