@@ -625,8 +625,7 @@ mutant(
 mutant(
     "channels-are-those-declared",
     "declare TactileArray",
-    channels=channels(*CHANNELS_OF_HAND, rate_hz=1000.0)[:-1]
-    + (Channel("pads", "counts", 24.0), ACCELERATION, CAMERA),
+    channels=(*channels(*CHANNELS_OF_HAND)[:-1], Channel("pads", "counts", 24.0), ACCELERATION, CAMERA),
 )(Hand)
 mutant("fingers-are-those-declared", "declare two or more fingers", channels=(*DECLARED, FINGERS[0]))(Hand)
 mutant(
