@@ -178,11 +178,6 @@ class Merged:
         return None
 
 
-def read_layer(path: str | os.PathLike[str]) -> Layer:
-    """Read a TOML file. Raises ConfigError if it is missing or is not TOML."""
-    return read_toml(Path(path), os.fspath(path), "configuration")
-
-
 def pipeline_layers(pipeline: str, plugins: Plugins) -> list[Layer]:
     """Return the layers of a pipeline; the first one extends nothing.
 
