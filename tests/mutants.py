@@ -294,9 +294,9 @@ reading(
     lambda trace: [event.time for event in trace.events],
 )
 peak(
-    "reads-no-release-unless-it-says-so",
+    AS_EXTRACTED,
     "remove `reads_release=False`",
-    extract=lambda self, trace: peak_measured(self, last_gap((), trace), trace.units),
+    extract=lambda self, trace: peak_measured(self, map(float, last_gap((), trace)), trace.units),
     compiled=measured_by(last_gap, reads_release=False),
 )
 
