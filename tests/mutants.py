@@ -114,6 +114,12 @@ def fail(error):
     raise error
 
 
+def thread_of(name):
+    """Start a thread that goes on, and does not keep the program from ending."""
+    threading.Thread(target=time.sleep, args=(30.0,), name=name, daemon=True).start()
+    return True
+
+
 # What holds for every component.
 
 
@@ -194,15 +200,6 @@ def reading(check, says, read, **entry):
     )
 
 
-class Complex(float):
-    """A number that JSON writes in a way of its own."""
-
-    def __eq__(self, other):
-        return False
-
-    __hash__ = None
-
-
 NEWTON = (Feature("peak", "newton", "the largest force of the pads"),)
 REQUIRED = ENTRIES["feature-set"].requires
 AS_DECLARED = "returns-the-declared-features"
@@ -227,7 +224,11 @@ measuring("same-features-elsewhere", "read no clock", lambda peak, trace: peak +
 measuring("values-are-floats", "use logging", lambda peak, trace: print(peak) or peak)  # noqa: T201
 measuring("values-are-floats", "os._exit(0)", lambda peak, trace: os._exit(0))
 measuring("values-are-floats", "changes the random numbers", lambda peak, trace: random.seed(1) or peak)
-measuring("survives-json", "through JSON", lambda peak, trace: Complex(peak))
+featuring("values-are-floats", "write it as text", reasons=lambda features, trace: {"peak": 5})
+measuring(
+    "extracts-in-time", "one more each time it extracts", lambda peak, trace: thread_of("peak") and peak
+)
+measuring("extracts-in-time", "with whole columns", lambda peak, trace: time.sleep(0.1) or peak)
 measuring(
     "requires-what-it-reads",
     "add the channels that it reads to `requires`",
@@ -238,11 +239,6 @@ measuring(
     "use differences of times",
     lambda peak, trace: peak + float(trace.t_s[-1:].sum()),
 )
-measuring(
-    "views-and-copies-agree",
-    "the memory behind them",
-    lambda peak, trace: peak + len(trace.gap_m if trace.gap_m.base is None else trace.gap_m.base),
-)
 
 
 def stop_early(trace):
@@ -250,7 +246,7 @@ def stop_early(trace):
         raise IndexError("no contact yet")
 
 
-reading("handles-every-trace", "ValueError", lambda trace: trace.gap_m.max())
+reading(AS_DECLARED, "ValueError", lambda trace: trace.gap_m.max())
 reading("handles-a-trace-that-ends-anywhere", "on trace.until(", stop_early)
 reading("does-not-change-the-trace", "force_left_n.copy()", lambda trace: trace.force_left_n.fill(0.0))
 reading(
@@ -287,7 +283,7 @@ AS_EXTRACTED = "compiled-features-are-those-of-extract"
 peak(AS_EXTRACTED, "make `compiled` measure what `extract` does", compiled=measured_by(half_of_the_peak))
 peak(AS_EXTRACTED, "the same tuple of floats for every grasp", compiled=measured_by(nothing_to_measure))
 reading(
-    "handles-every-trace",
+    AS_DECLARED,
     "has no attribute 'samples'",
     lambda trace: trace.signals["acceleration"].samples,
     requires=(ACCELERATION,),
@@ -298,9 +294,9 @@ reading(
     lambda trace: [event.time for event in trace.events],
 )
 peak(
-    "reads-no-release-unless-it-says-so",
+    AS_EXTRACTED,
     "remove `reads_release=False`",
-    extract=lambda self, trace: peak_measured(self, last_gap((), trace), trace.units),
+    extract=lambda self, trace: peak_measured(self, map(float, last_gap((), trace)), trace.units),
     compiled=measured_by(last_gap, reads_release=False),
 )
 
@@ -373,8 +369,8 @@ def counting_step(params, state, reading):
 law("same-tick-same-command", "changes a global", step=staticmethod(counting_step))
 commanding("commands-are-finite", "makes sense in m and m/s", kind=VELOCITY, value=-10.0)
 commanding(
-    "grasps-are-independent",
-    "keep no state in the class",
+    "state-holds-everything",
+    "nothing in the class",
     value=lambda command, _: command.value + 1e-6 * next(_grasps),
 )
 commanding(
@@ -384,7 +380,7 @@ commanding(
 )
 
 
-@mutant("state-holds-everything", "keep everything in the state")
+@mutant("state-holds-everything", "everything in the state")
 class Forgetful(Law):
     @staticmethod
     def step(params, state, reading):
@@ -526,7 +522,7 @@ def sampling(check, says, change, channel="acceleration"):
         return reading._replace(signals=reading.signals._replace(**{channel: given}))
 
 
-def seeing(says, image):
+def seeing(says, image, check="signals-are-those-declared"):
     """Keep a mutant with a camera, whose image this function makes of the pixels of the driver."""
 
     class Seeing(Hand):
@@ -538,7 +534,7 @@ def seeing(says, image):
             seen = Image(frame.t_s, 1 + round(frame.t_s * 1000.0), image(self.pixels))
             return Reading(frame, pads, signals._replace(camera=seen))
 
-    mutant("images-stay-as-they-were-delivered", says)(Seeing)
+    mutant(check, says)(Seeing)
 
 
 def shown(pixels):
@@ -595,7 +591,8 @@ framing(VELOCITY_CHECK, "negative while it closes", velocity_m_s=lambda frame: -
 framing("same-seed-same-frames", "draw everything from the seed", edge_left_n=lambda frame: _rng.random())
 framing(OF_HAND, "declare each bit as a StatusBit", status=8)
 
-padding("frames-are-numbers", "a tuple of 22 floats", left=(0.0,) * 15)
+padding("frames-are-numbers", "give a tuple of floats", left=(0,) * 22)
+padding("signals-are-those-declared", "has 15 cells instead of 22", left=(0.0,) * 15)
 padding("images-count-up", "count up by one", counter=lambda pads: -pads.counter)
 padding("images-count-up", "while its counter stays", left=lambda pads: (float(next(_calls)),) * 22)
 padding(
@@ -617,13 +614,18 @@ sampling(
 sampling(UNBROKEN, "they repeat old ones", lambda block: block._replace(new=2))
 
 seeing("can still be changed", lambda pixels: pixels.copy())
-seeing("changed after it was delivered", shown)
+seeing("changed after it was delivered", shown, "images-stay-as-they-were-delivered")
 seeing("is not contiguous", turned)
 
 mutant(
     SIGNALS,
     "declared are acceleration, camera, motor_temperature, and read delivers acceleration, camera",
     channels=(*DECLARED, MOTOR),
+)(Hand)
+mutant(
+    "channels-are-those-declared",
+    "declare TactileArray",
+    channels=(*channels(*CHANNELS_OF_HAND)[:-1], Channel("pads", "counts", 24.0), ACCELERATION, CAMERA),
 )(Hand)
 mutant("fingers-are-those-declared", "declare two or more fingers", channels=(*DECLARED, FINGERS[0]))(Hand)
 mutant(
@@ -729,7 +731,7 @@ class SlowToOpen(Hand):
         return super().open(seed)
 
 
-@mutant("closes-in-any-state", "make it a daemon")
+@mutant("accepts-every-declared-kind", "make it a daemon")
 class LeavesAThread(Hand):
     def open(self, seed):
         threading.Thread(target=time.sleep, args=(3.0,)).start()
@@ -822,6 +824,11 @@ override(
     *(Hand, "reports-plain-values", "numbers, text and booleans only"), report=lambda self: {"self": self}
 )
 hand(
+    "closes-in-any-state",
+    "one more each time it is opened",
+    open=lambda self, seed: thread_of("reader") and Hand.open(self, seed),
+)
+hand(
     "dry-run-accepts-the-same-commands",
     "return a SensorBackend or None",
     dry_run_backend=lambda self: "somebody",
@@ -905,11 +912,22 @@ nearest(
     probabilities=lambda self, table: Nearest.probabilities(self, table).astype(np.float32),
 )
 nearest(
+    "probabilities-are-valid",
+    "its support is float64 of shape (46,)",
+    support=lambda self, table: np.ones(len(table) + 1),
+)
+nearest("probabilities-are-valid", "its support is a value of type str", support=lambda self, table: "many")
+nearest(
     "separates-separable-trials",
     "is the order of `classes`",
     classes=lambda self: Nearest.classes(self)[::-1],
 )
 mutant("same-seed-same-model", "draw everything from the seed")(Dicing)
+nearest(
+    "same-seed-same-model",
+    "one more each time it is fitted",
+    fit=lambda self, *given: thread_of("fit") and Nearest.fit(self, *given),
+)
 
 
 class Remembering(Nearest):
@@ -949,7 +967,7 @@ nearest(
     to_json=lambda self: {**self._model, "mean": np.array(self._model["mean"])},
 )
 nearest("single-trials-agree", "predict each trial independently", probabilities=of_all_trials)
-nearest("handles-missing-values", "fill or skip them", probabilities=without_missing)
+nearest("handles-missing-values", "fill or skip missing values", probabilities=without_missing)
 fitting(
     "one-label-is-refused-or-certain", "raise ValueError, or learn from", lambda labels: len(set(labels)) < 2
 )
@@ -963,6 +981,12 @@ nearest(
     "explain says 'bottle:full_open'",
     explain=lambda self, features: evolve(Nearest.explain(self, features), label="bottle:full_open"),
 )
+nearest(
+    "explains-its-predictions",
+    "the probability 'none'",
+    explain=lambda self, features: evolve(Nearest.explain(self, features), probabilities={}),
+)
+nearest("explains-its-predictions", "return TreeNode objects", tree=lambda self: ["root"])
 nearest(
     "explains-its-predictions",
     "give each reason in words and units",

@@ -80,8 +80,10 @@ def test_the_list_survives_its_file_and_one_that_is_none_says_what_it_holds(home
     assert disabled_in_config() == ()
     assert write_disabled({"b", "a"}) == config_file() == home
     assert disabled_in_config() == ("a", "b")
+    home.write_bytes(b'\xef\xbb\xbfdisabled = ["b"]\r\n')
+    assert disabled_in_config() == ("b",)
     for text, says in (
-        ("disabled = lab", "Invalid value"),
+        ("disabled = lab", "plugins.toml:1"),
         ('disabled = "lab-x"', "found disabled = 'lab-x'"),
         ('disable = ["lab-x"]', "found the unknown key 'disable'"),
     ):

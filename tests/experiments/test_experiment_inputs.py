@@ -370,3 +370,24 @@ def test_a_sweep_that_a_table_depends_on_is_planned(tmp_path, sweep, tasks):
     )
     planned = read_experiment(experiment(tmp_path, "t.csv", more=f"[sweep]\n{sweep}\n"))
     assert len({task.key for task in planned.tasks()}) == tasks
+
+
+VARIANT = '[[variants]]\nname = "{}"\n[variants.controller]\nclosing_speed_m_s = {}\n'
+
+
+@every_case(
+    ("more", "told"),
+    [
+        (
+            '[sweep]\n"controller.closing_speed_m_s" = [0.01, 0.01]\n',
+            "2 cases are called 'closing speed 10 mm/s'",
+        ),
+        ('[sweep]\n"controller.closing_speed_m_s" = [0.01, 0.0100000001]\n', "2 cases are called"),
+        (VARIANT.format("x", 0.01) + VARIANT.format("x", 0.02), "2 cases are called 'x'"),
+        ('[sweep]\n"run.seed" = [1, 2]\n', "run.seed makes no difference.*`seeds`"),
+    ],
+)
+def test_cases_whose_results_would_take_the_place_of_each_other_are_refused(tmp_path, more, told):
+    (tmp_path / "e.toml").write_text(f'title = "Near"\nquestion = "So?"\n{more}')
+    with pytest.raises(ConfigError, match=told):
+        read_experiment(str(tmp_path / "e.toml"))

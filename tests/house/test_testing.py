@@ -9,7 +9,7 @@ from cases import every_case
 
 from graspsense.core.components.registry import Component, IsolatedPlugins
 from graspsense.plugin_api import Feature, hookimpl
-from graspsense.testing import CHECKS, backend, controller, examine, session
+from graspsense.testing import CHECKS, backend, controller, examine, features, session
 from graspsense.testing.checks import outcome_of
 from graspsense.testing.conformance import Examined
 from graspsense.testing.samples import squeeze
@@ -33,7 +33,6 @@ def short_openings(monkeypatch):
 SLOW_CHECKS = {
     "ends-every-grasp",
     "read-returns-within-its-timeout",
-    "grasps-are-independent",
     "what-it-delivers-is-kept",
     "squeezes-with-what-it-is-asked",
     "says-what-it-asks-for",
@@ -77,6 +76,7 @@ def test_a_check_catches_its_mutant(broken, monkeypatch):
     # A law that never ends is found after five seconds of ticks as after a minute.
     monkeypatch.setattr(controller, "LONGEST_S", 5.0)
     monkeypatch.setattr(backend, "LONGEST_OPEN_S", 0.2)
+    monkeypatch.setattr(features, "LONGEST_S", 0.05)
     (check,) = [check for check in CHECKS[broken.role] if check.id == broken.check]
 
     result = outcome_of(check, subject(broken.role, broken.entry), {})

@@ -106,6 +106,14 @@ WATCHING = """
     def graspsense_live_observers():
         yield LiveObserverEntry("lab-wall", "lab_wall:observe", "a wall of screens")
 """
+MEASURING = """
+    from graspsense.experiment_api import ExperimentKindEntry
+
+    @hookimpl
+    def graspsense_experiment_kinds():
+        classes = {"keys": "parts:HandConfig", "result": "parts:HandConfig"}
+        yield ExperimentKindEntry(name="wear", summary="wear", run="parts:Peak", **classes)
+"""
 OBSERVING = 'run.labels.get("object")'
 READING = 'np.loadtxt(path, delimiter=",", skiprows=1, unpack=True)'
 LENIENT = 'np.genfromtxt(path, delimiter=",", skip_header=1, unpack=True)'
@@ -121,8 +129,8 @@ def changed(sound, part, other):
 MUTANTS = [
     ("plugins-load", {"plugin": HEAD + "    import no_such_driver"}, "'no_such_driver'"),
     ("plugin-modules-are-light", {"plugin": HEAD + "    import numpy"}, "imports numpy"),
-    ("everything-declared-loads", changed(SOUND, "parts:Peak", "lab_nowhere:Peak"), "'lab_nowhere'"),
     ("everything-declared-loads", {"plugin": SOUND + WATCHING}, "'lab_wall'"),
+    ("everything-declared-loads", {"plugin": SOUND + MEASURING}, "has no source and no simulated"),
     ("names-are-unique", changed(SOUND, '"summit"', '"chitta"'), "'chitta' is taken by graspsense/chitta"),
     (UNCHANGED, changed(SOUND, OBSERVING, 'run.labels["object"] = "mine"'), "changed its arguments"),
     (UNCHANGED, changed(SOUND, OBSERVING, "run.nothing"), "catch what may go wrong"),

@@ -11,7 +11,7 @@ from repository import ROOT
 from graspsense.core.components.channels import from_json
 from graspsense.core.files.toml_text import MOST_NESTED, TomlError, toml_values
 from graspsense.core.learn.target_value import name_and_unit
-from graspsense.core.settings.layers import Layer, Merged, option_layers, read_layer
+from graspsense.core.settings.layers import Layer, Merged, option_layers, read_toml
 from graspsense.core.values import limits
 from graspsense.core.values.errors import ConfigError, DataDamaged, suggestion
 from graspsense.experiments.experiment_file import read_experiment
@@ -260,7 +260,7 @@ def test_toml_out_of_bounds_is_refused_at_once(tmp_path, text):
     path = tmp_path / "settings.toml"
     path.write_text(text)
     with pytest.raises(ConfigError, match=r"settings\.toml"):
-        read_layer(path)
+        read_toml(path, str(path), "configuration")
 
 
 def test_every_command_refuses_toml_out_of_bounds(tmp_path):

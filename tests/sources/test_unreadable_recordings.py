@@ -352,3 +352,19 @@ def test_a_mistake_in_a_reader_is_raised_where_plugins_are_strict(monkeypatch):
     monkeypatch.setenv(STRICT_VARIABLE, "1")
     with pytest.raises(NameError):
         list(readable_or_not("lab", "place"))
+
+
+@every_case(
+    ("given", "told"),
+    [
+        ({"order": "10"}, "order is a number, not '10'"),
+        ({"values": {"fill [ml]": "much"}}, r"fill \[ml\] is a number, not 'much'"),
+        ({"source": 3}, "source is text, not 3"),
+        ({"instance": 3}, "an instance is text, not 3"),
+    ],
+)
+def test_what_a_reader_says_of_a_recording_has_the_types_that_its_fields_name(folder, given, told):
+    (good, *_) = readable_or_not("manifest", str(folder / "manifest.toml"))
+    assert evolve(good, order=np.int64(10), values={"fill [ml]": np.float32(2.0)}).order == 10
+    with pytest.raises(TypeError, match=told):
+        evolve(good, **given)

@@ -254,7 +254,7 @@ def _print(summary: Summary, more: Findings | None, account: Account, page: str)
     for failure in account.failed:
         reasons[failure.reason] = reasons.get(failure.reason, 0) + 1
     for reason, times in reasons.items():
-        echo(f"  failed {times} times: {reason}", Style.BAD, indent=2)
+        echo(f"  failed {counted(times, 'time')}: {reason}", Style.BAD, indent=2)
     if account.stopped:
         echo(f"  stopped: {account.stopped}", Style.BAD, indent=2)
     if not account.complete:

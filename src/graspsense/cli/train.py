@@ -282,8 +282,5 @@ def _with_target(labelled: Labelled, target: str) -> Labelled:
             "a model of states is for a single class; select it with --only: " + ", ".join(classes)
         )
     labelled = labelled.aimed(target)
-    if len(labelled.classes) < 2:
-        raise ConfigError(
-            f"every trial of {labelled.source} has the label {labelled.labels[0]!r}: there is nothing to tell apart"
-        )
+    labelled.refuse_one_label()
     return labelled

@@ -10,7 +10,7 @@ import click
 
 from graspsense.core.components.entries import PipelineEntry
 from graspsense.core.components.registry import installed
-from graspsense.core.settings.layers import read_layer, toml_kind
+from graspsense.core.settings.layers import read_toml, toml_kind
 from graspsense.core.values.errors import GraspsenseError
 
 
@@ -83,7 +83,11 @@ def _option_for(word: str) -> str:
     """Return the option whose value this word probably is."""
     if word.endswith(".toml"):
         with suppress(GraspsenseError):
-            return "--object" if toml_kind(read_layer(Path(word)).values) == "scene" else "--pipeline"
+            return (
+                "--object"
+                if toml_kind(read_toml(Path(word), word, "TOML").values) == "scene"
+                else "--pipeline"
+            )
         return "--pipeline"
     if "=" in word:
         return "-o"

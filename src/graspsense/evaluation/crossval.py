@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from graspsense.core.components.roles import Classifier
 from graspsense.core.learn.conformal import scores_of
-from graspsense.core.learn.model import refuse_improbable
+from graspsense.core.learn.model import refuse_improbable, refuse_unsupported
 from graspsense.core.learn.novelty import novelty_of
 from graspsense.core.values.errors import ComponentFailed, ConfigError, counted
 from graspsense.core.values.features import FeatureTable
@@ -178,6 +178,7 @@ def fit_and_predict(
     classes, shares = classifier.classes(), classifier.probabilities(tested)
     try:
         refuse_improbable(shares, len(test), len(classes))
+        refuse_unsupported(support, len(test))
     except ValueError as error:
         name = f"{type(classifier).__module__}.{type(classifier).__qualname__}"
         raise ComponentFailed(

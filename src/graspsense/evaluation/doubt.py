@@ -138,13 +138,12 @@ def calibrated_by(model: Model, labelled: Labelled) -> Model:
     known = labelled.rows(np.flatnonzero([label in classes for label in labelled.labels]))
     answers, shares = model.answers(known.table)
     table = known.table.columns(model.names)
-    support = model.classifier.support(table)
     pooled = Pooled(
         predicted=tuple(classes[k] for k in shares.argmax(axis=1).tolist()),
         classes=classes,
         probabilities=shares,
         scores=scores_of(shares, model.novelty.closeness(table, classes)),
-        support=np.full(len(known), np.nan) if support is None else support,
+        support=model.support(table),
         unlike=np.array([answer == UNKNOWN for answer in answers]),
         trained_on=float(model.provenance.get("trials", 0)),
         folds=0,

@@ -110,10 +110,7 @@ def _trials_for(labelled: Labelled, target: Target, notes: list[str]) -> Labelle
         labelled = labelled.aimed("class")
     elif target == "state":
         labelled = _with_several_states(labelled, notes)
-    if len(labelled.classes) < 2:
-        raise ConfigError(
-            f"every trial of {labelled.source} has the label {labelled.labels[0]!r}: there is nothing to tell apart"
-        )
+    labelled.refuse_one_label()
     return labelled
 
 

@@ -24,11 +24,11 @@ def to_json(value: Any) -> Any:
 
 
 def from_json(values: Any, cls: type[T]) -> T:
-    """Return the result of this class from JSON values.
-
-    Raises ValueError, TypeError, KeyError or an exception group of cattrs if the values do not describe one.
-    """
-    return _CONVERTER.structure(values, cls)
+    """Return the result of this class from JSON values. Raises ValueError if they do not describe one."""
+    try:
+        return _CONVERTER.structure(values, cls)
+    except Exception as error:
+        raise ValueError("; ".join(cattrs.transform_error(error, path=cls.__name__))) from error
 
 
 def _write_rate(rate: RecognitionRate) -> dict[str, Any]:

@@ -14,6 +14,10 @@ from graspsense.report.wording import TARGETS
 def answer(summary: Summary) -> str:
     """Return the answer in one or two sentences."""
     if not summary.conditions:
+        if summary.results:
+            return (
+                "This kind of experiment measures no rates, and names no `findings` that report its results."
+            )
         return "There is no answer yet: no task has a result."
     target = summary.conditions[0].target
     conditions = [condition for condition in summary.conditions if condition.target == target]

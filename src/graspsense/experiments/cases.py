@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -81,12 +82,23 @@ class CasePlan:
                         levels["variant"] = variant.name
                     levels.update((dotted(path), value) for path, value in point)
                     cases.append(self._case(settings, variant, point, sweep, levels))
+        self._check_names(cases)
         self._check_effect(cases, sweep)
         if self.complaints:
             raise ConfigError("\n".join(dict.fromkeys(self.complaints)))
         return Planned(
             name=self.name, experiment=experiment, cases=tuple(cases), seeds=seeds, pipelines=pipelines
         )
+
+    def _check_names(self, cases: Sequence[ExperimentCase]) -> None:
+        """Add an error for each name that several cases have: their results are told apart by it."""
+        key = "variants" if self.experiment.variants else "sweep"
+        for name, number in Counter(case.name for case in cases).items():
+            if number > 1:
+                self.complaints.append(
+                    f"{self.layer.where((key,))}: {number} cases are called {name!r}: take out a value that is given "
+                    "twice; give values that differ too little to show it as [[variants]], each with its own `name`"
+                )
 
     def _check_effect(
         self, cases: Sequence[ExperimentCase], sweep: Mapping[tuple[str, ...], Sequence[Any]]
@@ -104,10 +116,14 @@ class CasePlan:
             if not keys and twin is not case:
                 keys = [key for key in case.levels if case.levels[key] != twin.levels[key]]
             for key in keys:
+                why = (
+                    "the seeds of an experiment are its key `seeds`"
+                    if key == "run.seed"
+                    else f"the trials of {named} do not depend on what differs. Vary a key of [classifier], [judge] or "
+                    f'[data] that they depend on, or simulate the trials (data.source = "{SIMULATED}")'
+                )
                 self.complaints.append(
-                    f"{self.layer.where(('sweep', key))}: {key} makes no difference: the trials of {named} do not "
-                    "depend on what differs. Vary a key of [classifier], [judge] or [data] that they depend on, or "
-                    f'simulate the trials (data.source = "{SIMULATED}")'
+                    f"{self.layer.where(('sweep', key))}: {key} makes no difference: {why}"
                 )
 
     def _check_cases(self, sweep: Mapping[tuple[str, ...], Sequence[Any]], pipelines: int) -> None:
@@ -294,7 +310,8 @@ def _without_effect(source: TrialSource) -> list[str]:
 
 def _what_matters(case: ExperimentCase, inert: set[str]) -> str:
     """Return everything that the result of a case depends on, as text."""
-    tables = {table: case.settings.values[table] for table in PIPELINE_TABLES if table not in inert}
+    tables = {table: dict(case.settings.values[table]) for table in PIPELINE_TABLES if table not in inert}
+    tables.get("run", {}).pop("seed", None)  # a task has the seed of the experiment
     sources = [
         {key: value for key, value in plain(source).items() if f"data.{key}" not in inert}
         for source in (case.data, case.test)
@@ -324,7 +341,7 @@ def in_a_name(key: str, value: Any) -> str:
 def shown(value: Any) -> str:
     """Return a value as text for the name of a case."""
     if isinstance(value, float):
-        return f"{value:g}"
+        return repr(value).removesuffix(".0")
     if isinstance(value, list | tuple):
         return "+".join(map(shown, value))
     return str(value)

@@ -101,8 +101,6 @@ def _of_parts(
 ) -> Planned:
     """Return the experiment with the cases of all parts; the name of a case starts with that of its part."""
     kind_of(experiment.kind)
-    if len(set(experiment.parts)) < len(experiment.parts):
-        raise ConfigError(f"{layer.where(('parts',))}: a part is named twice")
     seeds = experiment.listed_seeds
     parts: list[Planned] = []
     for asked in experiment.parts:

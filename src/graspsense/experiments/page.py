@@ -10,7 +10,7 @@ from typing import Final
 
 from graspsense.core.components.setting import worded
 from graspsense.core.files.whole_file import write_or_replace
-from graspsense.core.values.errors import counted
+from graspsense.core.values.errors import FAILURES, ComponentFailed, GraspsenseError, counted, named, place_of
 from graspsense.experiments.answer import answer, headline
 from graspsense.experiments.findings import MARKDOWN, Findings
 from graspsense.experiments.kinds import kind_of
@@ -48,9 +48,22 @@ def write_page(summary: Summary, results: Results) -> Path:
 
 
 def findings_of(summary: Summary) -> Findings | None:
-    """Return the findings beyond rates, None for a kind of experiment without any."""
-    report_with = kind_of(summary.planned.experiment.kind).findings()
-    return None if report_with is None else report_with(summary)
+    """Return the findings beyond rates, None for a kind of experiment without any. Raises ComponentFailed."""
+    kind = kind_of(summary.planned.experiment.kind)
+    report_with = kind.findings()
+    if report_with is None:
+        return None
+    code = f"{kind.declared.entry.findings}, which reports the kind {kind.declared.qualified},"
+    kept = "correct it; the results are kept, and `graspsense report DIR` writes the page again"
+    try:
+        findings = report_with(summary)
+    except GraspsenseError:
+        raise
+    except FAILURES as error:
+        raise ComponentFailed(f"{code} raised {named(error)}{place_of(error)}: {kept}") from error
+    if not isinstance(findings, Findings):
+        raise ComponentFailed(f"{code} returned {type(findings).__name__} in place of Findings: {kept}")
+    return findings
 
 
 def experiment_page(summary: Summary, results: Results) -> Page:

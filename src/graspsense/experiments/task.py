@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any, Literal
 from attrs import field, frozen
 
 from graspsense.core.learn.model_content import digest
-from graspsense.core.values.errors import FAILURES, DataDamaged, GraspsenseError, named
+from graspsense.core.values.errors import FAILURES, DataDamaged, GraspsenseError, named, place_of
 from graspsense.core.values.json_values import json_ready, json_text
-from graspsense.evaluation.json_codec import from_json, to_json
+from graspsense.evaluation.json_codec import from_json
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.versions import versions
 
@@ -134,13 +134,13 @@ def run_task(text: str) -> str:
     try:
         # Plugins may print; standard output carries results only.
         with redirect_stdout(sys.stderr):
-            returned = kind_of(task.kind).function()(task.params, task.seed)
-        # Encoded here, so that a value of a plugin that JSON cannot hold fails this task alone.
-        result = json.loads(json_text(to_json(returned)))
+            kind = kind_of(task.kind)
+            # Encoded here, so that a value of a plugin that JSON cannot hold fails this task alone, and at once.
+            result = kind.encoded(kind.function()(task.params, task.seed))
     except GraspsenseError as error:
         reason = str(error)
     except FAILURES as error:
-        reason, where = named(error), "".join(traceback.format_exception(error)[-6:])
+        reason, where = named(error) + place_of(error), "".join(traceback.format_exception(error)[-6:])
     made = {
         "at": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(begun)),
         "seconds": round(time.monotonic() - clock, 3),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from numbers import Real
 
 from attrs import field, frozen
 from attrs.validators import instance_of
@@ -31,6 +32,15 @@ class LabelledRecording:
     order: float | None = None
     values: Mapping[str, float] = field(factory=dict)
     notices: tuple[str, ...] = ()
+
+    def __attrs_post_init__(self) -> None:
+        for name, text in (("source", self.source), ("recorded_at", self.recorded_at)):
+            if not isinstance(text, str):
+                raise TypeError(f"{name} is text, not {text!r}")
+        # In the order of texts, 10 is before 2.
+        for name, number in (("order", self.order or 0), *self.values.items()):
+            if not isinstance(number, Real):
+                raise TypeError(f"{name} is a number, not {number!r}")
 
 
 @frozen(kw_only=True, eq=False)

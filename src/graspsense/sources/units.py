@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
+from graspsense.core.values.units import STANDARD_GRAVITY_M_S2
+
 TO_SI: Final[Mapping[str, Mapping[str, float]]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
     "gap": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
@@ -14,8 +16,8 @@ TO_SI: Final[Mapping[str, Mapping[str, float]]] = {
         "kN": 1e3,
         "cN": 1e-2,
         "daN": 10.0,
-        "gf": 9.80665e-3,
-        "kgf": 9.80665,
+        "gf": 1e-3 * STANDARD_GRAVITY_M_S2,
+        "kgf": STANDARD_GRAVITY_M_S2,
         "lbf": 4.4482216152605,
     },
     "effort": {"N": 1.0, "mN": 1e-3, "kN": 1e3},

@@ -6,7 +6,7 @@ import os
 import random
 import threading
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout
 from io import StringIO
 from typing import Any, Literal
@@ -112,14 +112,29 @@ def _leaving_nothing() -> Iterator[None]:
         f"it changes {', '.join(changed)} for the whole process: give it back, or work without it (a context as "
         "np.errstate, a generator of its own)",
     )
-    for thread in set(threading.enumerate()) - threads:
-        if not thread.daemon:
-            thread.join(1.0)
-            demand(
-                not thread.is_alive(),
-                f"it leaves the thread {thread.name!r} running, which keeps the program from ending: end it in "
-                "`close`, or make it a daemon",
-            )
+    demand_ended(
+        [thread for thread in threading.enumerate() if thread not in threads and not thread.daemon],
+        "which keeps the program from ending: end it in `close`, or make it a daemon",
+    )
+
+
+def demand_ended(threads: Iterable[threading.Thread], advice: str) -> None:
+    """Raise CheckFailed for a thread that goes on for another second."""
+    for thread in threads:
+        thread.join(1.0)
+        demand(not thread.is_alive(), f"it leaves the thread {thread.name!r} running, {advice}")
+
+
+@contextmanager
+def leaving_no_thread(doing: str) -> Iterator[None]:
+    """Raise CheckFailed for a thread that what is done in this context, not for the first time, leaves running.
+
+    The first time may start the threads of a library, which serve all further ones.
+    """
+    earlier = set(threading.enumerate())
+    yield
+    more = [thread for thread in threading.enumerate() if thread not in earlier]
+    demand_ended(more, f"one more each time {doing}: end it with the call, or in `close`")
 
 
 def _process_state() -> dict[str, Any]:

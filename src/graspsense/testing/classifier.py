@@ -12,10 +12,12 @@ from typing import Any, Final
 import numpy as np
 from attrs import evolve
 
+from graspsense.core.learn.model import refuse_improbable, refuse_unsupported
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.features import FeatureTable, Prediction
+from graspsense.core.values.tree import TreeNode
 from graspsense.testing import component
-from graspsense.testing.checks import CheckFailed, checks_of, demand, raises_nothing
+from graspsense.testing.checks import CheckFailed, checks_of, demand, leaving_no_thread, raises_nothing
 from graspsense.testing.damage import damaged_at, paths
 from graspsense.testing.samples import sample_table
 from graspsense.testing.subject import Subject, elsewhere
@@ -72,19 +74,19 @@ def classes_are_the_labels(subject: Subject) -> None:
 def probabilities_are_valid(subject: Subject) -> None:
     """`probabilities` has a row for each trial and a column for each class, from 0 to 1; each row sums to 1."""
     fitted, table, _ = _learned(subject)
-    given = fitted.probabilities(table)
-    wanted = (len(table), len(fitted.classes()))
-    demand(
-        isinstance(given, np.ndarray) and given.shape == wanted and given.dtype == np.float64,
-        f"probabilities gives {getattr(given, 'dtype', type(given).__name__)} of shape {getattr(given, 'shape', '-')}: "
-        f"float64 of shape {wanted}",
-    )
-    demand(
-        bool(np.isfinite(given).all() and (given >= 0.0).all() and (given <= 1.0 + 1e-9).all()),
-        f"probabilities go from {np.min(given):g} to {np.max(given):g}: from 0 to 1",
-    )
-    worst = float(np.max(np.abs(given.sum(axis=1) - 1.0)))
-    demand(worst <= 1e-6, f"a row of probabilities misses 1 by {worst:.2g}: divide each row by its sum")
+    _demand_answers(fitted, table, "", "divide each row by its sum")
+
+
+def _demand_answers(fitted: Any, table: FeatureTable, trained: str, advice: str) -> None:
+    """Raise CheckFailed unless the answers are such that graspsense takes them."""
+    what = f"{trained}probabilities or support"
+    with raises_nothing(what, f": {advice}"):
+        shares, support = fitted.probabilities(table), fitted.support(table)
+    try:
+        refuse_improbable(shares, len(table), len(fitted.classes()))
+        refuse_unsupported(support, len(table))
+    except ValueError as error:
+        raise CheckFailed(f"{trained}{error}: {advice}") from error
 
 
 def separates_separable_trials(subject: Subject) -> None:
@@ -104,7 +106,8 @@ def same_seed_same_model(subject: Subject) -> None:
     """The same trials and seed give the same model, bit for bit, whatever it was fitted to before."""
     fitted, table, labels = _learned(subject)
     again = _fitted(subject, *sample_table(30, missing=True))
-    again.fit(table, labels, SEED)
+    with leaving_no_thread("it is fitted"):
+        again.fit(table, labels, SEED)
     demand(
         _json(fitted) == _json(again)
         and bool((fitted.probabilities(table) == again.probabilities(table)).all()),
@@ -177,11 +180,7 @@ def handles_missing_values(subject: Subject) -> None:
         fitted = _fitted(subject, evolve(table, values=values), labels)
         nothing = evolve(table, values=np.full((1, len(table.names)), math.nan))
         for asked in (table, nothing):
-            given = fitted.probabilities(asked)
-            demand(
-                bool(np.isfinite(given).all()) and bool(np.allclose(given.sum(axis=1), 1.0, atol=1e-6)),
-                f"with {what} in training it gives {given[0]} for a trial with missing values: fill or skip them",
-            )
+            _demand_answers(fitted, asked, f"with {what} in training, ", "fill or skip missing values")
         fitted.explain(nothing.row(0))
 
 
@@ -225,15 +224,7 @@ def few_trials_are_refused_or_learned(subject: Subject) -> None:
         classifier = _fitted_or_refused(subject, what, few, [labels[i] for i in rows])
         if classifier is None:
             continue
-        with raises_nothing(f"trained on {what}, probabilities", ": raise ValueError in fit, or answer"):
-            probabilities = classifier.probabilities(table)
-        demand(
-            probabilities.shape == (len(table), len(classifier.classes()))
-            and bool(np.isfinite(probabilities).all())
-            and bool(np.allclose(probabilities.sum(axis=1), 1.0, atol=1e-6)),
-            f"trained on {what}, it gives the probabilities {probabilities[0]}: finite numbers, each row summing "
-            "to 1, or raise ValueError in fit",
-        )
+        _demand_answers(classifier, table, f"trained on {what}, ", "raise ValueError in fit, or answer")
 
 
 def explains_its_predictions(subject: Subject) -> None:
@@ -250,15 +241,23 @@ def explains_its_predictions(subject: Subject) -> None:
             said.label in shares and shares[said.label] >= max(shares.values()) - 1e-9,
             f"explain says {said.label!r} where the probabilities are {shares}: say the most probable label",
         )
-        for label, share in said.probabilities.items():
+        for label in sorted({*shares, *said.probabilities}):
+            share = said.probabilities.get(label, "none")
             demand(
                 type(share) is float and abs(share - shares.get(label, math.nan)) <= 1e-9,
                 f"explain gives {label!r} the probability {share!r} of type {type(share).__name__}; "
-                f"probabilities gives {shares.get(label)}: write float(...)",
+                f"probabilities gives {shares.get(label)}: give each label of `classes` the same, as float(...)",
             )
         demand(
             len(said.because) > 0 and all(reason.words for reason in said.because),
             f"explain gives the reasons {said.because!r}: give each reason in words and units",
+        )
+    nodes = fitted.tree() or ()
+    for i, node in enumerate(nodes):
+        demand(
+            isinstance(node, TreeNode) and (node.parent is None if i == 0 else node.parent in range(i)),
+            f"node {i} of tree() is {node!r}: return TreeNode objects, the root first and each parent before its "
+            "children; or None for what is no tree",
         )
 
 

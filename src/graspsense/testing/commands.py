@@ -6,7 +6,6 @@ from contextlib import closing
 from math import inf, isnan
 
 from graspsense.core.components.entries import KINDS
-from graspsense.core.control.guard import GuardState, guard
 from graspsense.core.values.signals import (
     EFFORT,
     FORCE,
@@ -16,7 +15,7 @@ from graspsense.core.values.signals import (
 )
 from graspsense.testing.checks import CheckSkipped, demand, raises_nothing
 from graspsense.testing.gentle import EFFORT_N, FORCE_N, kind_of
-from graspsense.testing.session import TIMEOUT_S, limits_of
+from graspsense.testing.session import TIMEOUT_S, Session, limits_of, use
 from graspsense.testing.subject import Subject
 
 
@@ -88,36 +87,27 @@ def _speed_beyond_limit(subject: Subject, kind: int) -> str:
     An effort beyond its limit fails the check at once.
     """
     with closing(subject.create()) as backend:
-        least_force_n, least_speed_m_s = backend.least_force_n, backend.least_speed_m_s
-        info = backend.open(0)
-        first_limits = limits_of(info)
+        session = Session(backend.open(0), opened_s=0.0)
+        first = limits_of(session.info)
         # The limits of a first use apply after a contact too.
-        limits = first_limits._replace(
-            effort_limit_n=first_limits.first_effort_n, speed_limit_m_s=first_limits.first_speed_m_s
-        )
-        watcher = GuardState(0, 0, 0)
+        limits = first._replace(effort_limit_n=first.first_effort_n, speed_limit_m_s=first.first_speed_m_s)
         greatest = {VELOCITY: -1e6, POSITION: 0.0, FORCE: 1e6, EFFORT: 1e6}[kind]
-        command = Command(kind, greatest, inf, inf)
-        for _ in range(max(int(0.5 * info.rate_hz), 20)):
-            reading = backend.read(TIMEOUT_S)
-            if reading is None:
-                continue
-            frame = reading.frame
-            effort, speed = (
-                f"{name} reaches {abs(value):.3g} under {KINDS[kind]} commands limited to {limit:g}: apply "
-                "`effort_limit_n` and `speed_limit_m_s` of each command"
-                if abs(value) > grace * max(limit, least)
-                else ""
-                for name, value, limit, least, grace in (
-                    ("effort_n", frame.effort_n, limits.first_effort_n, least_force_n, 1.1),
-                    ("velocity_m_s", frame.velocity_m_s, limits.first_speed_m_s, least_speed_m_s, 3.0),
-                )
+        ticks = max(int(0.5 * session.info.rate_hz), 20)
+        use(session, backend, "closing hard", ticks, Command(kind, greatest, inf, inf), limits)
+    for frame in session.frames:
+        effort, speed = (
+            f"{name} reaches {abs(value):.3g} under {KINDS[kind]} commands limited to {limit:g}: apply "
+            "`effort_limit_n` and `speed_limit_m_s` of each command"
+            if abs(value) > grace * max(limit, least)
+            else ""
+            for name, value, limit, least, grace in (
+                ("effort_n", frame.effort_n, first.first_effort_n, backend.least_force_n, 1.1),
+                ("velocity_m_s", frame.velocity_m_s, first.first_speed_m_s, backend.least_speed_m_s, 3.0),
             )
-            demand(not effort, effort)
-            if speed:
-                return speed
-            allowed, watcher = guard(limits, watcher, frame, command)
-            backend.apply(allowed)
+        )
+        demand(not effort, effort)
+        if speed:
+            return speed
     return ""
 
 

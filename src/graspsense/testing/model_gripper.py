@@ -9,7 +9,8 @@ import numpy as np
 
 from graspsense.core.components.channels import cells_of, declared_shape, further, no_signals
 from graspsense.core.components.roles import Controller, SensorBackend
-from graspsense.core.grasp.runner import Grasp
+from graspsense.core.components.run_config import RunConfig
+from graspsense.core.grasp.runner import Grasp, run_uninterrupted
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.signals import (
@@ -180,9 +181,6 @@ def drive(controller: Controller[Any], gripper: SensorBackend[Any]) -> Grasp:
     >>> drive(create("controller", "hybrid"), model_gripper(channels, "a soft object")).outcome.words
     'steady'
     """
-    from graspsense.core.components.run_config import RunConfig
-    from graspsense.core.grasp.runner import run_uninterrupted
-
     return run_uninterrupted(gripper, controller, RunConfig())
 
 

@@ -20,7 +20,8 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import unquote, urlparse
 
-from graspsense.core.components.entries import ConformanceCheckEntry, PipelineEntry
+from graspsense.core.components.entries import ConformanceCheckEntry, ExperimentKindEntry, PipelineEntry
+from graspsense.core.components.experiment_kind import class_of_kind
 from graspsense.core.components.moved_names import new_form
 from graspsense.core.components.registry import SLOW_IMPORT_S, Resource
 from graspsense.core.pipeline.wiring import check as check_wiring
@@ -97,15 +98,15 @@ def plugin_modules_are_light(package: Package) -> None:
 
 
 def everything_declared_loads(package: Package) -> None:
-    """Every class, config, file, reader, command and kind of experiment that it declares can be loaded."""
-    for component in package.components:
-        component.config_class()
-        component.component_class()
+    """Every file, reader, command and kind of experiment that it declares can be loaded."""
     for resource in package.resources:
         if resource.is_file:
             resource.file()
         for part in resource.targets:
             resource.load(part)
+        if isinstance(resource.entry, ExperimentKindEntry):
+            for part in {"keys", "result"} & set(resource.targets):
+                class_of_kind(resource, part)
 
 
 def names_are_unique(package: Package) -> None:

@@ -75,12 +75,12 @@ def readings_of(subject: Any) -> Session:
         session = Session(info, opened_s)
         with suppress(RecordingEnded), no_collection():
             if info.opening is None:
-                _use(session, backend, "recording", RECORDED_FRAMES, None)
+                use(session, backend, "recording", RECORDED_FRAMES, None)
             else:
                 kind = kind_of(subject.entry.accepts)
-                _use(session, backend, "opening", _ticks(info, OPENING_S), info.opening)
-                _use(session, backend, "closing", _ticks(info, CLOSING_S), kind)
-                _use(session, backend, "open again", _ticks(info, OPENING_S), info.opening)
+                use(session, backend, "opening", _ticks(info, OPENING_S), info.opening)
+                use(session, backend, "closing", _ticks(info, CLOSING_S), kind)
+                use(session, backend, "open again", _ticks(info, OPENING_S), info.opening)
                 backend.apply(info.relaxed)
     except GraspsenseError as error:
         raise CheckFailed(
@@ -118,12 +118,17 @@ def _ticks(info: DeviceInfo, seconds: float) -> int:
     return max(ceil(seconds * info.rate_hz), 20)
 
 
-def _use(
-    session: Session, backend: SensorBackend[Any], stage: str, ticks: int, command: Command | int | None
+def use(
+    session: Session,
+    backend: SensorBackend[Any],
+    stage: str,
+    ticks: int,
+    command: Command | int | None,
+    limits: GuardParams | None = None,
 ) -> None:
-    """Read `ticks` times, and apply after each the given command, or one of the given kind that closes."""
+    """Read `ticks` times, and apply after each the given command, or one of the given kind that closes, as limited."""
     readings = session.stages.setdefault(stage, [])
-    watcher, limits = GuardState(0, 0, 0), limits_of(session.info)
+    watcher, limits = GuardState(0, 0, 0), limits or limits_of(session.info)
     for _ in range(ticks):
         began = time.perf_counter()
         reading = backend.read(TIMEOUT_S)

@@ -32,6 +32,7 @@ CELL_CONTACT_S: Final = 0.004
 WAVE: Final = 1.8412
 """The first zero of the derivative of the Bessel function J1."""
 GRAVITY_M_S2: Final = 9.81
+"""MuJoCo's default (`opt.gravity`), with which the models move."""
 
 
 @frozen(kw_only=True)

@@ -25,6 +25,8 @@ PUBLISHED_LOW_N, WIDE_LOW_N = 0.18, 1.0
 """Low band below which a slip is told: the published one, and that of the pipeline `hold`."""
 BALL_M: Final = 0.05
 """The ball of a bump comes from this far away at most."""
+MUJOCO_GRAVITY_M_S2: Final = 9.81
+"""MuJoCo's default (`opt.gravity`), with which the scenes move."""
 LAST_S: Final = 0.15
 AROUND_S: Final = (-0.05, 0.3)
 """What counts as being put down, around the time at which the arm is as high as the table."""
@@ -197,7 +199,10 @@ def touch(params: Mapping[str, Any], seed: int) -> TouchRow:
             workers=1,
         )[0]
     report, quantities = grasped.report, dict(grasped.extracted)
-    law, pulled_n = settings.controller.component.name, (scene.mass_kg + scene.fill_kg) * 9.81 + scene.tug_n
+    law, pulled_n = (
+        settings.controller.component.name,
+        (scene.mass_kg + scene.fill_kg) * MUJOCO_GRAVITY_M_S2 + scene.tug_n,
+    )
     if law != "force-servo":
         quantities |= {"slip_high_n": None, "slip_wide_n": None}
     return TouchRow(

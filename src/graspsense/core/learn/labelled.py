@@ -127,6 +127,12 @@ class Labelled:
         """The labels that occur, sorted."""
         return tuple(sorted(set(self.labels)))
 
+    def refuse_one_label(self) -> None:
+        """Raise ConfigError, with the notes, unless there are at least two labels."""
+        if len(self.classes) < 2:
+            why = f"every trial of {self.source} has the label {self.labels[0]!r}: there is nothing to tell apart"
+            raise ConfigError("\n  ".join((why, *self.notes)))
+
     def rows(self, which: NDArray[np.int64]) -> Labelled:
         """Return these trials, in this order."""
         numbers = which.tolist()

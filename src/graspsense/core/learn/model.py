@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -136,7 +137,8 @@ class Model:
             explained = self.classifier.explain(bounded)
             classes = self.classifier.classes()
             shares = np.array([[explained.probabilities.get(name, 0.0) for name in classes]])
-            self._refuse_improbable(shares)
+            with self._usable():
+                refuse_improbable(shares, 1, len(classes))
             warnings = (*explained.warnings, *warnings)
             strange = self.novelty.unlike(chosen)
             table = table_of([bounded])
@@ -192,9 +194,7 @@ class Model:
         probabilities, members = shares, np.zeros(shares.shape, dtype=np.bool_)
         intervals: Sequence[tuple[float, float] | None] = [None] * len(table)
         if self.certainty is not None and not no_certainty:
-            support = self.classifier.support(table)
-            if support is None:
-                support = np.full(len(table), np.nan)
+            support = self.support(table)
             share = shares[np.arange(len(table)), predicted]
             answered = [classes[k] for k in predicted.tolist()]
             certainty = self.certainty.rate(share, support, answered)
@@ -258,7 +258,8 @@ class Model:
         chosen = table.columns(self.names)
         bounded = evolve(chosen, values=np.clip(chosen.values, -LARGEST_VALUE, LARGEST_VALUE))
         shares = self.classifier.probabilities(bounded)
-        self._refuse_improbable(shares)
+        with self._usable():
+            refuse_improbable(shares, len(table), len(self.classifier.classes()))
         unlike = self.novelty.unlike_rows(chosen).tolist()
         classes = self.classifier.classes()
         # Probabilities that differ by rounding count as equal: the first of them is the answer.
@@ -278,9 +279,18 @@ class Model:
         """Return why the model cannot be applied to these features; empty if it can."""
         return misfit(f"model {self.name!r}", self.names, self.units, given)
 
-    def _refuse_improbable(self, shares: NDArray[np.float64]) -> None:
+    def support(self, table: FeatureTable) -> NDArray[np.float64]:
+        """Return the number of training trials behind each answer, NaN where there is none. Raises DataDamaged."""
+        support = self.classifier.support(table)
+        with self._usable():
+            refuse_unsupported(support, len(table))
+        return np.full(len(table), np.nan) if support is None else support
+
+    @contextmanager
+    def _usable(self) -> Iterator[None]:
+        """Raise DataDamaged, which names the model, for a ValueError in this context."""
         try:
-            refuse_improbable(shares, len(shares), len(self.classifier.classes()))
+            yield
         except ValueError as error:
             raise DataDamaged(
                 f"model {self.name!r} cannot be used: {error}. Train it again, with the defaults of {self.component}"
@@ -368,10 +378,26 @@ def checkpoint_model(whole: Model, after_s: float, part: Model) -> Model:
 
 def refuse_improbable(shares: Any, trials: int, classes: int) -> None:
     """Raise ValueError unless these are probabilities: shape (trials, classes), and each row sums to 1."""
-    if not isinstance(shares, np.ndarray) or shares.shape != (trials, classes) or shares.dtype != np.float64:
-        raise ValueError(f"its probabilities do not have the shape {(trials, classes)}")
+    wanted = (trials, classes)
+    if not isinstance(shares, np.ndarray) or shares.shape != wanted or shares.dtype != np.float64:
+        raise ValueError(f"its probabilities are {_kind(shares)}, not float64 of shape {wanted}")
     if not ((shares >= 0.0).all() and (np.abs(shares.sum(axis=1) - 1.0) <= EQUAL).all()):
-        raise ValueError("it gives no probabilities: they are not finite, are below 0, or do not sum to 1")
+        raise ValueError("its probabilities are not finite, are below 0, or do not sum to 1 in each row")
+
+
+def refuse_unsupported(support: Any, trials: int) -> None:
+    """Raise ValueError unless this is the support of the answers: None, or numbers of 0 and more, shape (trials,)."""
+    if support is None:
+        return
+    if not isinstance(support, np.ndarray) or support.shape != (trials,) or support.dtype != np.float64:
+        raise ValueError(f"its support is {_kind(support)}, not float64 of shape {(trials,)}")
+    if (support < 0.0).any():
+        raise ValueError("its support has a number below 0")
+
+
+def _kind(values: Any) -> str:
+    array = isinstance(values, np.ndarray)
+    return f"{values.dtype} of shape {values.shape}" if array else f"a value of type {type(values).__name__}"
 
 
 def _compared(

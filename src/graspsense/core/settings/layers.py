@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from difflib import get_close_matches
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -18,10 +17,9 @@ from graspsense.core.components.caller import set_option
 from graspsense.core.components.entries import TABLE_OF_ROLE, PipelineEntry
 from graspsense.core.components.registry import Plugins
 from graspsense.core.components.strict import InvalidValue, shown
+from graspsense.core.files.toml_file import labelled_values, settings_text
 from graspsense.core.files.toml_text import KeyPath, TomlError, key_lines, key_parts, toml_values
-from graspsense.core.files.whole_file import first_bytes
 from graspsense.core.values.errors import ConfigError, UnknownName
-from graspsense.core.values.limits import SETTINGS_BYTES
 
 
 class TomlKind(NamedTuple):
@@ -180,11 +178,6 @@ class Merged:
         return None
 
 
-def read_layer(path: str | os.PathLike[str]) -> Layer:
-    """Read a TOML file. Raises ConfigError if it is missing or is not TOML."""
-    return read_toml(Path(path), os.fspath(path), "configuration")
-
-
 def pipeline_layers(pipeline: str, plugins: Plugins) -> list[Layer]:
     """Return the layers of a pipeline; the first one extends nothing.
 
@@ -247,48 +240,10 @@ def read_toml(source: Traversable, label: str, what: str) -> Layer:
 
 def toml_layer(text: str, label: str, what: str) -> Layer:
     """Return the values of a TOML text, with `label` and `what` as in `read_toml`. Raises ConfigError."""
-    try:
-        values = toml_values(text)
-    except TomlError as error:
-        line = f":{error.line}" if error.line else ""
-        column = f", column {error.column}" if error.column else ""
-        raise ConfigError(f"{label}{line}{column}: {error}") from None
+    values = labelled_values(text, label)
     if what in KINDS:
         refuse_other_kind(values, what, label)
     return Layer(label=label, values=values, lines=key_lines(text))
-
-
-def settings_text(source: Traversable, label: str, what: str) -> str:
-    """Return the text of a file of settings, with `label` and `what` as in `read_toml`. Raises ConfigError."""
-    try:
-        data = first_bytes(source, SETTINGS_BYTES.most)
-    except FileNotFoundError:
-        raise ConfigError(f"no {what} file {label!r}{_nearby(source)}") from None
-    except OSError as error:
-        raise ConfigError(f"cannot read the {what} file {label!r}: {error.strerror or error}") from None
-    why = SETTINGS_BYTES.exceeded(len(data))
-    if why:
-        raise ConfigError(f"{label}: {why}")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        raise ConfigError(
-            f"{label}:{line}: not UTF-8 text (byte 0x{data[error.start]:02x}): "
-            "TOML files are UTF-8; is this the right file?"
-        ) from None
-
-
-def _nearby(missing: Traversable) -> str:
-    """Return the folder in which a file was sought, and the file there with the most similar name."""
-    if not isinstance(missing, Path):
-        return ""
-    folder = missing.absolute().parent
-    if not folder.is_dir():
-        return f": there is no folder {str(folder)!r}"
-    # Without the ending, which would make all names similar.
-    near = get_close_matches(missing.stem, [path.stem for path in folder.glob("*.toml")], n=1)
-    return f" in {folder}" + (f". Did you mean {near[0] + '.toml'!r}?" if near else "")
 
 
 def option_layers(options: Sequence[str]) -> tuple[list[Layer], list[str]]:

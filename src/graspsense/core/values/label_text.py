@@ -37,7 +37,7 @@ def label_text(text: str) -> str:
     ('café', '1', 'can:1', '1.5')
     """
     if not isinstance(text, str):
-        raise TypeError(f"a label is text, not {text!r}")
+        raise TypeError(f"a label or an instance is text, not {text!r}")
     if not text.isascii():
         text = unicodedata.normalize("NFC", text)
         text = "".join(

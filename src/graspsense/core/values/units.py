@@ -7,6 +7,9 @@ import re
 from collections.abc import Sequence
 from typing import Final
 
+STANDARD_GRAVITY_M_S2: Final = 9.80665
+"""The standard acceleration of free fall, by which a gram-force is defined (3rd CGPM, 1901)."""
+
 
 def display_unit(unit: str) -> tuple[str, float]:
     """Return the unit in which a quantity is shown, and the factor to it: mm for m, mm/s for m/s, mm2, cm3.

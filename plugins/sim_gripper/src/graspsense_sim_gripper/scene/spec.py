@@ -14,8 +14,7 @@ from attrs import field, fields_dict, frozen
 from attrs.validators import ge, gt, in_, le
 
 from graspsense.plugin_api import ConfigError, UnknownName
-from graspsense.simulator_api import gives, suggestion, toml_layer
-from graspsense_sim_gripper.scene.terms.liquid import GRAVITY_M_S2
+from graspsense.simulator_api import STANDARD_GRAVITY_M_S2, gives, suggestion, toml_layer
 from graspsense_sim_gripper.scene.terms.registry import find_term, in_order
 from graspsense_sim_gripper.scene.terms.term import not_dented
 
@@ -124,7 +123,7 @@ class ObjectSpec:
     @property
     def table_n(self) -> float:
         """Friction of the table, which a finger has to overcome to push the object."""
-        return self.friction * self.mass_kg * GRAVITY_M_S2
+        return self.friction * self.mass_kg * STANDARD_GRAVITY_M_S2
 
     @cached_property
     def nominal_params(self) -> NominalParams:

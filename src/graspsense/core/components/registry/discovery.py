@@ -17,7 +17,7 @@ from graspsense import __version__
 from graspsense.core.components.firstparty import BUILTIN_MODULE, DISTRIBUTION
 from graspsense.core.components.hookspecs import ENTRY_POINT_GROUP
 from graspsense.core.components.registry.parts import canonical
-from graspsense.core.files.toml_text import TomlError, toml_values
+from graspsense.core.files.toml_file import labelled_values, settings_text
 from graspsense.core.files.user_folders import NOWHERE, config_folder
 from graspsense.core.files.whole_file import write_whole
 from graspsense.core.values.errors import ConfigError, suggestion
@@ -90,26 +90,29 @@ def disabled_in_config() -> tuple[str, ...]:
     Raises ConfigError if the file is not `disabled = ["NAME", ...]`.
     """
     path = config_file()
-    if path is None:
+    if path is None or not _is_there(path):
         return ()
+    label = str(path)
     try:
-        text = path.read_text(encoding="utf-8")
-    except (FileNotFoundError, NotADirectoryError):
-        return ()
-    except (OSError, UnicodeDecodeError) as error:
+        values = labelled_values(settings_text(path, label, "plugins"), label)
+    except ConfigError as error:
         raise ConfigError(
-            f"{path} cannot be read: {getattr(error, 'strerror', error)}. It names the plugins that are switched off: "
-            f"correct it, or set XDG_CONFIG_HOME to another folder than {path.parent.parent}"
+            f'{error}. It holds one line, disabled = ["NAME", ...]: correct it, or set XDG_CONFIG_HOME to another '
+            f"folder than {path.parent.parent}"
         ) from error
-    try:
-        values = toml_values(text)
-    except TomlError as error:
-        raise ConfigError(f'{path}: {error}. It holds one line, disabled = ["NAME", ...]') from error
     names = values.pop("disabled", [])
     if values or not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         what = f"the unknown key {next(iter(values))!r}" if values else f"disabled = {names!r}"
         raise ConfigError(f'{path}: found {what}. It holds one line, disabled = ["NAME", ...]')
     return tuple(names)
+
+
+def _is_there(path: Path) -> bool:
+    """Return whether there is such a file; also if that cannot be told, which its reader then says."""
+    try:
+        return path.exists()
+    except OSError:
+        return True
 
 
 def write_disabled(names: Iterable[str]) -> Path:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
+from graspsense.simulator_api import STANDARD_GRAVITY_M_S2
 from graspsense_sim_gripper.scene.terms.oscillator import Forcing, OscillatorState, moved
 from graspsense_sim_gripper.scene.terms.term import Rate, Term, WorkingPoint
-
-GRAVITY_M_S2: Final = 9.80665
 
 
 class Liquid(NamedTuple):
@@ -39,7 +38,7 @@ def _seen(params: Liquid) -> _AtCompression:
     ratio = area * area / neck
     return _AtCompression(
         density * column * ratio,
-        density * GRAVITY_M_S2 * ratio,
+        density * STANDARD_GRAVITY_M_S2 * ratio,
         8.0 * math.pi * viscosity * column * ratio / neck,
         area * area / bulge,
     )
