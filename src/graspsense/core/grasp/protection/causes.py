@@ -28,6 +28,7 @@ PAD: Final[Mapping[str, tuple[str, ...]]] = {
 }
 """What follows of the same pad, and of the grasp, from a fault of a pad."""
 ENCODER: Final = (
+    "gap against the command",
     "gap and velocity disagree",
     "gap late",
     "gap not as before",

@@ -134,6 +134,7 @@ class Motor:
         self._phase = -1
         self._start_m = self._extreme_m = nan
         self._start_m_s = nan
+        self._gap_jumped = False
 
     def apply(self, frame: Frame, command: Command) -> None:
         """Take the command that is applied after this frame."""
@@ -150,9 +151,11 @@ class Motor:
             commands.append(asked)
 
     def shift(self, step_m: float) -> None:
-        """Let the gap jump by this (m), which is no motion of the fingers."""
-        self._start_m += step_m
-        self._extreme_m += step_m
+        """Let the gap jump by this (m), which is no motion of the fingers; `nan`: what seemed jumps was one."""
+        self._gap_jumped = step_m == step_m
+        if self._gap_jumped:
+            self._start_m += step_m
+            self._extreme_m += step_m
 
     def see(self, frame: Frame, phase: int) -> Fault | None:
         """Take the frame of a tick and return a fault that it shows."""
@@ -254,14 +257,17 @@ class Motor:
         if self._wrong_way_s <= self._lasts_s or (closes and phase != APPROACH):
             return None
         commands_no_effort = all(asked.effort_n != asked.effort_n for asked in self._commands)
-        if closes and self._start_m - self._extreme_m >= FREE_TRAVEL_M and commands_no_effort:
+        closed = closes and self._start_m - self._extreme_m >= FREE_TRAVEL_M and commands_no_effort
+        moved, commanded = ("open", "a closing") if closes else ("close", "an opening")
+        # Of a motor whose gap has jumped, the motion is no witness: it must still open the fingers.
+        if closed or self._gap_jumped:
             return Fault(
                 "gap against the command",
-                f"it opens by {travel_m * 1e3:.1f} mm under a closing command that has closed the fingers before: it "
-                "is wrong, or something pushes them open; look at the encoder and the fingers",
+                f"it {moved}s by {travel_m * 1e3:.1f} mm under {commanded} command, and has "
+                f"{'jumped' if self._gap_jumped else 'closed under it'} before: it is wrong, or something pushes the "
+                "fingers; look at the encoder and the fingers",
                 ends=True,
             )
-        moved, commanded = ("open", "a closing") if closes else ("close", "an opening")
         return Fault(
             "motor reversed",
             f"the fingers {moved} by {travel_m * 1e3:.1f} mm under {commanded} command: check its wiring",

@@ -8,7 +8,7 @@ follow when the gripper has the command. A fault that they find ends the grasp i
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import inf
+from math import inf, nan
 from typing import Final
 
 from attrs import evolve
@@ -46,8 +46,6 @@ from graspsense.core.values.signals import (
 RELEASE: Final = int(Phase.RELEASE)
 CLOSING: Final = (APPROACH, SQUEEZE, HOLD)
 """The phases in which the fingers may press something."""
-FEW_JUMPS: Final = 4
-"""Jumps of a gap to one side that are not taken for motion; with more, the fingers may move as fast as it says."""
 
 
 class Protection:
@@ -149,8 +147,8 @@ class Protection:
         for fault in self._status.see(frame, phase):
             self._see(fault, phase)
         jump = self._jump.see(frame)
-        if abs(self._jump.jumps) <= FEW_JUMPS:
-            self._motor.shift(self._jump.step_m)
+        if jump is not None:
+            self._motor.shift(nan if self._jump.is_motion else self._jump.step_m)
         self._see(self._motor.see(frame, phase), phase)
         last_phase, self._phase = self._phase, phase
         if phase != APPROACH and last_phase == APPROACH:
