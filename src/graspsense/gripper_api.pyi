@@ -78,6 +78,8 @@ from graspsense.core.grasp.gap_resolution import gap_resolution as gap_resolutio
 from graspsense.core.grasp.gap_resolution import window_of_rest as window_of_rest
 from graspsense.core.control.contact import MOVED_M as MOVED_M
 from graspsense.core.control.contact import first_rest as first_rest
+from graspsense.core.control.tick import OPEN_SPEED_M_S as OPEN_SPEED_M_S
+from graspsense.core.control.tick import OPEN_WINDOW_S as OPEN_WINDOW_S
 
 # Observers of a grasp while it goes on, and commands that grasp
 from graspsense.core.components.entries import LiveObserverEntry as LiveObserverEntry
