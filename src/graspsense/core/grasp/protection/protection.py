@@ -28,7 +28,7 @@ from graspsense.core.grasp.protection.pad_curves import PadCurves
 from graspsense.core.grasp.protection.pad_forces import EmptyHold, PadBalance, StuckForce
 from graspsense.core.grasp.protection.reports import Repeats, Reports, StatusWatch
 from graspsense.core.grasp.protection.speed import GapJump, GapSpeed, Rush, Standstill
-from graspsense.core.grasp.protection.touch import Touch
+from graspsense.core.grasp.protection.touch import CLOSED_M, Touch
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.faults import LIMITED, Fault
 from graspsense.core.values.signals import (
@@ -104,7 +104,9 @@ class Protection:
         first_m_s = run.first_speed_m_s if info.clock == "device" else inf
         self._standstill, self._jump = Standstill(), GapJump(info.speed_limit_m_s)
         self._kept_speed, self._repeats = KeptSpeed(info.rate_hz), Repeats()
-        self.opening = Opening(info.rate_hz, command_delay_s, info.opening, "gap" in rates, info.friction_n)
+        self.opening = Opening(
+            info.rate_hz, command_delay_s, info.opening, "gap" in rates, info.friction_n, info.open_gap_m
+        )
         self._rush = Rush(min(first_m_s, info.speed_limit_m_s), info.rate_hz)
         self._reports = Reports(info.rate_hz, rates.get("pads", 0.0))
 
@@ -158,7 +160,7 @@ class Protection:
         closing = phase in CLOSING
         if closing:
             self._see(self._gap_speed.see(frame))
-            self._see(self._gap_absence.see(frame.gap_m, frame))
+            self._see(self._gap_absence.see(frame.gap_m if frame.gap_m > -CLOSED_M else nan, frame))
             self._see(self._effort_absence.see(frame.effort_n, frame))
         self._see_free_motion(frame, phase, applied, jumped=jump is not None)
         if self._effort is not None:
