@@ -103,6 +103,7 @@ from graspsense.sources.manifest.message_numbers import message_columns as messa
 # A grasp that another program makes
 from graspsense.core.pipeline.anytime import anytime_of as anytime_of
 from graspsense.core.pipeline.pipeline import model_for as model_for
+from graspsense.core.grasp.protection.protection import Protection as Protection
 
 # Recordings as they are replayed
 from graspsense.recording.replayable import Recording as Recording
