@@ -587,9 +587,12 @@ class _Grasp:
             pass
         with suppress(KeyboardInterrupt, *FAILURES):
             self.backend.apply(self.info.relaxed)
-        if self.info.opening is not None and not self.state.done and self.last is not None:
-            closes = bool(self.recorder.frames) and not self.info.harmless
-            self.may_be_closed = closes and not left.startswith(OPENED)
+        if self.info.opening is None or self.last is None:
+            return
+        if self.protection is not None and self.recorder.frames:
+            is_open = self.protection.opening.is_open(self.last.gap_m)
+            self.may_be_closed = not (is_open and (self.state.done or left.startswith(OPENED)))
+        if not self.state.done:
             self._event(self.last.t_s, Phase(self.state.phase), left)
 
     def _opened(self, opening: Command, last: Frame) -> str:
@@ -619,7 +622,9 @@ class _Grasp:
             still = update_rest(still, last.t_s, last.gap_m, OPEN_SPEED_M_S, OPEN_WINDOW_S)
             unknown_s = 0.0 if self.protection is None else self.protection.opening.unknown_s(last.gap_m)
             if at_rest(still, last.t_s, OPEN_WINDOW_S) and last.t_s - began_s >= unknown_s:
-                return f"{OPENED} {last.gap_m * 1e3:.1f} mm"
+                if self.protection is None or self.protection.opening.is_open(last.gap_m):
+                    return f"{OPENED} {last.gap_m * 1e3:.1f} mm"
+                break
             if last.t_s - began_s > run.opening_timeout_s:
                 break
         why = "" if answers else ": the gripper does not answer"

@@ -56,7 +56,7 @@ GRASP: Final[Mapping[str, tuple[str, ...]]] = {
     "gap jumps": ("effort not as before", *ENCODER),
     "gap and velocity disagree": ("gap late", "gap not as before", "not the commanded speed", "stalled"),
     "fingers did not open": ("gap late", "gap not as before"),
-    "effort stuck": ("effort has the wrong sign", "motor off", "motor too strong", "motor too weak"),
+    "effort stuck": ("effort has the wrong sign", "motor off", "motor reversed", "motor too strong", "motor too weak"),
     "motor reversed": ("motor too strong", "motor too weak", "gap late", *MOTOR),
     "motor too strong": ("fingers rush", "moves too easily", "stronger than commanded", *MOTOR),
     "moves too easily": ("stronger than commanded",),

@@ -222,7 +222,8 @@ class Motor:
             return None  # most ticks end here
         answer = f"it answers {answered_n:.1f} N to a command of {least if least > 0.0 else most:.1f} N"
         if self._reversed_s > self._lasts_s:
-            return Fault("motor reversed", f"{answer}: check its wiring", ends=True, relaxes=True)
+            # It can be the effort that is wrong: while the gap does not show that they close, they must open.
+            return Fault("motor reversed", f"{answer}: check its wiring, and the sign of its effort", ends=True)
         if self._strong_s > self._lasts_s:
             ends = self._strong_s > STRONG_S or above_n > STRONG_N + STRONG_SHARE * asked_n
             return Fault("motor too strong", f"{answer}: check its drive and its scale", ends=ends)

@@ -122,8 +122,14 @@ class Opening:
         A gap that stands still or has jumped is no witness. Then only the time tells in which they open from any width.
         """
         if self._target_m != self._target_m:
-            return 0.0 if self._opened else self.stands_s
+            return 0.0 if self.is_open(gap_m) else self.stands_s
         return 0.0 if self._opened and self._is_as_before(gap_m) else self._longest_s
+
+    def is_open(self, gap_m: float) -> bool:
+        """Return whether fingers at this gap have opened by half of the way that they had closed, if they had."""
+        closed_m = self._widest_m - self._start_m
+        half = gap_m - self._start_m >= 0.5 * closed_m
+        return (self._opened and half) or self._is_as_before(gap_m) or closed_m < LEAST_TRAVEL_M
 
     def released(self, frame: Frame) -> Fault | None:
         """Take the last frame of the release; return what is wrong with the width of the open fingers.
