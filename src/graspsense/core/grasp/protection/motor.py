@@ -42,6 +42,7 @@ class RecentMean:
         self.value = value if share >= 1.0 else self.value + share * (value - self.value)
 
 
+REVERSED: Final = "motor reversed"
 DELAY_S: Final = 0.03
 """Time within which the motor must follow a command: a command and its answer each take a few ticks."""
 PERIODS: Final = 3.0
@@ -223,7 +224,7 @@ class Motor:
         answer = f"it answers {answered_n:.1f} N to a command of {least if least > 0.0 else most:.1f} N"
         if self._reversed_s > self._lasts_s:
             # It can be the effort that is wrong: while the gap does not show that they close, they must open.
-            return Fault("motor reversed", f"{answer}: check its wiring, and the sign of its effort", ends=True)
+            return Fault(REVERSED, f"{answer}: check its wiring, and the sign of its effort", ends=True)
         if self._strong_s > self._lasts_s:
             ends = self._strong_s > STRONG_S or above_n > STRONG_N + STRONG_SHARE * asked_n
             return Fault("motor too strong", f"{answer}: check its drive and its scale", ends=ends)
@@ -270,7 +271,7 @@ class Motor:
                 ends=True,
             )
         return Fault(
-            "motor reversed",
+            REVERSED,
             f"the fingers {moved} by {travel_m * 1e3:.1f} mm under {commanded} command: check its wiring",
             ends=True,
             relaxes=True,

@@ -22,7 +22,7 @@ from graspsense.core.grasp.protection.drift import Drift
 from graspsense.core.grasp.protection.effort import ReportedEffort
 from graspsense.core.grasp.protection.effort_ceiling import asked_effort_n, effort_ceiling_n, limited
 from graspsense.core.grasp.protection.kept_speed import KeptSpeed
-from graspsense.core.grasp.protection.motor import FeltForce, FreeEffort, Motor
+from graspsense.core.grasp.protection.motor import REVERSED, FeltForce, FreeEffort, Motor
 from graspsense.core.grasp.protection.opening import Opening
 from graspsense.core.grasp.protection.pad_curves import PadCurves
 from graspsense.core.grasp.protection.pad_forces import EmptyHold, PadBalance, StuckForce
@@ -246,6 +246,9 @@ class Protection:
     def _see(self, fault: Fault | None, phase: int = APPROACH) -> None:
         if fault is None:
             return
+        if fault.name == REVERSED:
+            # If it does close, the command that opens presses no harder than a squeeze may.
+            self._opening_n = self.ceiling_n
         if phase == RELEASE and fault.ends and not fault.relaxes:
             fault = evolve(fault, ends=False)
         told = self._told.get(fault.name)
