@@ -106,7 +106,11 @@ def test_under_an_effort_a_gap_that_jumps_is_known_by_a_velocity_that_is_measure
         # A spike and a slip: the motor is judged by the motion without the jumps.
         (lambda k: closing(k) + 0.004 * (k == 30) + 0.004 * (k >= 60), None, False),
         # It goes the other way after a jump: the motor must still open the fingers.
-        (lambda k: closing(min(k, 40)) + (k > 40) * (0.004 + 0.0002 * (k - 40)), "gap against the command", False),
+        (
+            lambda k: closing(min(k, 40)) + (k > 40) * (0.004 + 0.0002 * (k - 40)),
+            "gap against the command",
+            False,
+        ),
         # Fingers that open faster than any command.
         (lambda k: 0.05 + 0.006 * max(k - 20, 0), "motor reversed", True),
     ],

@@ -235,7 +235,7 @@ def test_a_gripper_that_closes_by_itself_keeps_the_limit_of_its_effort(answer, t
         (20.0, 100.0, "motor too strong", True, False),  # five times the command: at once
         (20.0, 29.0, "motor too strong", False, False),  # half as much again: warned of at first
         (20.0, 5.0, "motor too weak", False, False),
-        # By the effort alone, whose sign can be wrong: the fingers are opened, and relaxed if the gap shows that they close.
+        # By the effort alone, whose sign can be wrong: the fingers are opened.
         (20.0, -20.0, "motor reversed", True, False),
         (-20.0, 20.0, "motor reversed", True, False),
     ],

@@ -54,11 +54,12 @@ STRONG_SHARE: Final = 0.5
 STRONG_N: Final = 3.0
 """By how much an effort above the command ends the grasp."""
 UNLIMITED_SHARE: Final = 2.0
-"""Share by which an effort that the gripper chooses itself may be above its limit: the scale of a current is unsure."""
+"""Share by which an effort that the gripper chooses itself may be above its limit: the scale of a current is unsure.
+Set with emulated motors."""
 LASTS_S: Final = 0.03
 """Time for which a difference must last to be a fault of the motor."""
 STRONG_S: Final = 0.3
-"""Time for which a motor may answer somewhat more than its command before the grasp ends."""
+"""Time for which a motor may answer somewhat more than its command before the grasp ends; set with emulated motors."""
 WEAK_S: Final = 0.5
 """Time for which a motor may answer less than its command, which crushes nothing, before the grasp ends."""
 OFF_SHARE: Final = 0.1
