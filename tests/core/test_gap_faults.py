@@ -124,8 +124,8 @@ def test_a_gap_that_jumps_is_no_motor_that_turns_the_wrong_way(gap_of, name, rel
         faults.append(motor.see(now, Phase.APPROACH))
         motor.apply(now, CLOSES)
         jump.apply(now, CLOSES)
-    found = next((fault for fault in faults if fault is not None), None)
-    assert (found and found.name, found is not None and found.relaxes) == (name, relaxes)
+    seen = [(fault.name, fault.relaxes) for fault in faults if fault is not None]
+    assert seen[:1] == ([] if name is None else [(name, relaxes)])
 
 
 OPENS = Command(POSITION, 0.08, inf, 0.05)

@@ -59,7 +59,7 @@ Set with emulated motors."""
 LASTS_S: Final = 0.03
 """Time for which a difference must last to be a fault of the motor."""
 STRONG_S: Final = 0.3
-"""Time for which a motor may answer somewhat more than its command before the grasp ends; set with emulated motors."""
+"""Time for which a motor may answer somewhat more than its command before the grasp ends. Set with emulated motors."""
 WEAK_S: Final = 0.5
 """Time for which a motor may answer less than its command, which crushes nothing, before the grasp ends."""
 OFF_SHARE: Final = 0.1

@@ -20,7 +20,7 @@ STOOD_S: Final = 0.4
 OPENED_M: Final = 0.001
 """Change of the gap that shows it."""
 LATE_S: Final = 0.16
-"""Time beyond the delay of a command after which the gap is late; at least four frames. It was set with the emulated grippers."""
+"""Time beyond the delay of a command after which the gap is late; at least four frames. Set with emulated grippers."""
 STANDS_S: Final = 0.5
 """Time beyond it after which the fingers count as not opened; at least six frames."""
 RESTED_S: Final = 0.1
