@@ -78,6 +78,8 @@ from graspsense.core.grasp.gap_resolution import gap_resolution as gap_resolutio
 from graspsense.core.grasp.gap_resolution import window_of_rest as window_of_rest
 from graspsense.core.control.contact import MOVED_M as MOVED_M
 from graspsense.core.control.contact import first_rest as first_rest
+from graspsense.core.control.tick import OPEN_SPEED_M_S as OPEN_SPEED_M_S
+from graspsense.core.control.tick import OPEN_WINDOW_S as OPEN_WINDOW_S
 
 # Observers of a grasp while it goes on, and commands that grasp
 from graspsense.core.components.entries import LiveObserverEntry as LiveObserverEntry
@@ -101,6 +103,7 @@ from graspsense.sources.manifest.message_numbers import message_columns as messa
 # A grasp that another program makes
 from graspsense.core.pipeline.anytime import anytime_of as anytime_of
 from graspsense.core.pipeline.pipeline import model_for as model_for
+from graspsense.core.grasp.protection.protection import Protection as Protection
 
 # Recordings as they are replayed
 from graspsense.recording.replayable import Recording as Recording

@@ -100,18 +100,32 @@ def test_under_an_effort_a_gap_that_jumps_is_known_by_a_velocity_that_is_measure
     assert jumps(PUSHES, lambda k: closing(k) - 0.004 * (k >= 50), velocity_m_s) == seen
 
 
-def test_a_gap_that_jumps_is_no_motor_that_turns_the_wrong_way():
-    """Against the command and back, as a spike does: the motor is judged by the motion without the jumps."""
-    jump, motor = GapJump(0.2), Motor(False, RATE_HZ)
+@every_case(
+    ("gap_of", "name", "relaxes"),
+    [
+        # A spike and a slip: the motor is judged by the motion without the jumps.
+        (lambda k: closing(k) + 0.004 * (k == 30) + 0.004 * (k >= 60), None, False),
+        # It goes the other way after a jump: the motor must still open the fingers.
+        (
+            lambda k: closing(min(k, 40)) + (k > 40) * (0.004 + 0.0002 * (k - 40)),
+            "gap against the command",
+            False,
+        ),
+        # Fingers that open faster than any command.
+        (lambda k: 0.05 + 0.006 * max(k - 20, 0), "motor reversed", True),
+    ],
+)
+def test_a_gap_that_jumps_is_no_motor_that_turns_the_wrong_way(gap_of, name, relaxes):
+    jump, motor, faults = GapJump(0.2), Motor(False, RATE_HZ), []
     for k in range(100):
-        now = frame(k, closing(k) + 0.004 * (k == 30) + 0.004 * (k >= 60))
-        jump.see(now)
-        motor.shift(jump.step_m)
-        assert motor.see(now, Phase.APPROACH) is None
+        now = frame(k, gap_of(k))
+        if jump.see(now) is not None:
+            motor.shift(nan if jump.is_motion else jump.step_m)
+        faults.append(motor.see(now, Phase.APPROACH))
         motor.apply(now, CLOSES)
         jump.apply(now, CLOSES)
-    # Up, down and up again: the second one takes the first one back.
-    assert jump.jumps == 1
+    seen = [(fault.name, fault.relaxes) for fault in faults if fault is not None]
+    assert seen[:1] == ([] if name is None else [(name, relaxes)])
 
 
 OPENS = Command(POSITION, 0.08, inf, 0.05)

@@ -2,14 +2,37 @@
 
 from __future__ import annotations
 
+from math import inf, nan
+
 import pytest
 from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.gripper_api import Polling
+from graspsense.gripper_api import Polling, finger_target
+from graspsense.plugin_api import EFFORT, FORCE, POSITION, VELOCITY, Command
 
 PERIOD_S = 0.01
+
+
+@every_case(
+    ("command", "target"),
+    [
+        ((POSITION, 0.03, 20.0, 0.02), (0.03, 0.02, 20.0)),
+        ((POSITION, inf, 20.0, 0.02), (0.08, 0.02, 20.0)),
+        ((POSITION, -inf, 20.0, 0.02), (0.0, 0.02, 20.0)),
+        ((VELOCITY, -inf, 20.0, 0.02), (0.0, 0.02, 20.0)),
+        ((VELOCITY, 0.01, 20.0, 0.02), (0.08, 0.01, 20.0)),
+        ((FORCE, inf, 20.0, inf), (0.0, 0.05, 20.0)),
+        # It stops where it is, and a number that is none never becomes a force or a speed.
+        ((EFFORT, 5.0, 20.0, 0.02), (0.06, 0.0, 20.0)),
+        *(((kind, nan, 20.0, 0.02), (0.06, 0.0, 0.0)) for kind in (POSITION, VELOCITY, FORCE, EFFORT)),
+        *(((kind, 0.01, nan, 0.02), (0.06, 0.0, 0.0)) for kind in (POSITION, VELOCITY, FORCE, EFFORT)),
+        *(((kind, 0.01, 20.0, nan), (0.06, 0.0, 0.0)) for kind in (POSITION, VELOCITY, FORCE, EFFORT)),
+    ],
+)
+def test_fingers_stop_at_a_command_that_is_no_number(command, target):
+    assert finger_target(Command(*command), 0.06, 0.08, 0.05) == target
 
 
 class OwnTime:

@@ -235,8 +235,9 @@ def test_a_gripper_that_closes_by_itself_keeps_the_limit_of_its_effort(answer, t
         (20.0, 100.0, "motor too strong", True, False),  # five times the command: at once
         (20.0, 29.0, "motor too strong", False, False),  # half as much again: warned of at first
         (20.0, 5.0, "motor too weak", False, False),
-        (20.0, -20.0, "motor reversed", True, True),
-        (-20.0, 20.0, "motor reversed", True, True),
+        # By the effort alone, whose sign can be wrong: the fingers are opened.
+        (20.0, -20.0, "motor reversed", True, False),
+        (-20.0, 20.0, "motor reversed", True, False),
     ],
 )
 def test_a_motor_that_gives_another_effort_warns_or_ends_the_grasp(asked, answer, name, ends_first, relaxes):

@@ -1,5 +1,6 @@
 """A robot of LeRobot as a gripper: one motor is commanded alone, gently, and stopped on every way out."""
 
+import json
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -24,6 +25,7 @@ from graspsense.plugin_api import (
 )
 from graspsense.testing_api import parametrize_checks
 from graspsense_lerobot import backend
+from graspsense_lerobot.stopping import stop
 
 KEYS = {"robot": "fake_arm", "load": "Present_Load"}
 
@@ -112,6 +114,13 @@ def test_close_stops_the_fingers_where_they_are():
     assert squeezed_m[-2] > 0.0
     assert arm.target_m == pytest.approx(arm.gap_m, abs=1e-6)
     assert not arm.connected
+
+
+def test_the_gripper_of_a_killed_program_is_stopped_where_it_is():
+    stop(json.dumps({"robot": "fake_arm", "motor": "gripper"}))
+    (arm,) = FakeArm.made
+    # Its gap is 70 of 80 mm.
+    assert (arm.actions, arm.connected) == ([{"gripper.pos": pytest.approx(87.5)}], False)
 
 
 def test_degrees_and_a_reversed_scale_become_metres():

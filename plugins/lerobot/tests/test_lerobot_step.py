@@ -66,7 +66,7 @@ def end_of_grasp(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "argv", ["graspsense"])
 
     def told(observations, *training):
-        printed("train", *training, "--classifier", "tree", "--out", "model.json")
+        printed("train", *training, "--classifier", "tree", "--out", "model.json", "--overwrite")
         step = processor_step()("default", ["classifier.type=tree", "classifier.model=model.json"], READING)
         seen = processed(step, observations)
         (end,) = [told for told in seen if told["graspsense.event"] == EVENTS.index("end")]
@@ -101,6 +101,17 @@ def test_a_certainty_that_was_measured_comes_with_its_interval(end_of_grasp):
     n = 40.0 / (1.0 + 10.0 / 9.0)
     assert certainty == pytest.approx((n + 1.0) / (n + 2.0) * (1.0 - 2.0 / (n + 2.0) ** 2))
     assert 0.65 < low < certainty < high < 1.0
+
+    # A finger whose forces stand still where they were at 4 N.
+    stuck, kept = grasp(), None
+    for observation in stuck:
+        finger = {name: value for name, value in observation.items() if name.startswith("f0.")}
+        kept = finger if kept is None and sum(finger.values()) >= 4.0 else kept
+        observation |= kept or {}
+    step, end = end_of_grasp(stuck, "widths.csv", "--label", "what")
+    assert [fault.split(":")[0] for fault in step.grasp.faults] == ["left pad stuck"]
+    assert step.grasp.classes[int(end["graspsense.prediction"]) - 1] == "jar"
+    assert math.isnan(end["graspsense.certainty"])
 
 
 def test_reset_begins_anew_and_a_missing_number_is_counted():

@@ -8,6 +8,7 @@ from gripper_faults import FAULTS
 
 from graspsense import load_pipeline
 from graspsense.core.components.registry import installed
+from graspsense.core.grasp.runner import MAY_BE_CLOSED
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.model_file import write_model
 from graspsense.core.learn.training import train
@@ -113,6 +114,23 @@ def test_hostile_laws_crush_nothing():
         # The ceiling less the friction of the drive.
         assert row.largest_force_n <= CEILING_N - 7.0, row
         assert row.outcome == "aborted", row
+
+
+@every_case(
+    ("faults", "ends"),
+    [
+        # The effort alone says that the motor is reversed: the fingers are opened.
+        ({"effort_report_gain": -1.0, "effort_report_at_s": 0.9}, "opened to"),
+        # The fingers close on the command that opens them: they are relaxed.
+        ({"motor_gain": -1.0, "motor_at_s": 0.9}, "let go at"),
+    ],
+)
+def test_only_a_motor_that_is_reversed_leaves_the_fingers_closed(faults, ends):
+    """The squeeze begins after 0.785 s."""
+    grasp = grasped(**faults)
+    assert [warning.split(":")[0] for warning in grasp.warnings] == ["motor reversed"]
+    assert grasp.events[-1].what.startswith(ends)
+    assert (MAY_BE_CLOSED in grasp.reason) is (ends == "let go at")
 
 
 def test_a_pad_that_is_known_to_be_bad_refuses_the_grasp():

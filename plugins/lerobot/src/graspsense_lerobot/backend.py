@@ -6,6 +6,7 @@ force is one of that distance, and a speed is that of a target that moves.
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Mapping
 from contextlib import suppress
@@ -13,7 +14,9 @@ from math import inf, nan
 from types import MappingProxyType
 from typing import Final, final
 
-from graspsense.gripper_api import Polling, finger_target
+from attrs import asdict
+
+from graspsense.gripper_api import DeadManSwitch, Polling, finger_target
 from graspsense.plugin_api import (
     NO_PADS,
     POSITION,
@@ -31,6 +34,7 @@ from graspsense_lerobot.robot_config import LeRobotConfig
 
 SLOPE_FRAMES: Final = 4
 OPENING_M_S: Final = 0.05
+STOP: Final = "graspsense_lerobot.stopping:stop"
 
 
 @final
@@ -49,6 +53,7 @@ class LeRobotBackend(SensorBackend[LeRobotConfig]):
     def __init__(self, config: LeRobotConfig) -> None:
         super().__init__(config)
         self._motor: OneMotor | None = None
+        self._switch: DeadManSwitch | None = None
         self._polling = Polling(config.rate_hz, time, SLOPE_FRAMES)
         self._gap_m = self._target_m = self._effort_n = 0.0
         self.command_delay_s = 1.0 / config.rate_hz
@@ -67,6 +72,7 @@ class LeRobotBackend(SensorBackend[LeRobotConfig]):
         self._polling = Polling(config.rate_hz, time, SLOPE_FRAMES)
         try:
             self._motor = OneMotor(config)
+            self._switch = DeadManSwitch(STOP, json.dumps(asdict(config), default=str))
             position, _ = self._polling.tried(self._motor.read, NoAnswer)
         except NoAnswer as error:
             self.close()
@@ -102,16 +108,19 @@ class LeRobotBackend(SensorBackend[LeRobotConfig]):
     def close(self) -> None:
         """Stop the fingers where they are, and disconnect the robot."""
         motor, self._motor = self._motor, None
-        if motor is None:
-            return
         try:
-            position = self.config.position_at(self._gap_m)
-            with suppress(NoAnswer):
-                position, _ = self._polling.tried(motor.read, NoAnswer)
-            with suppress(NoAnswer):
-                self._send(motor, position)
+            if motor is not None:
+                position = self.config.position_at(self._gap_m)
+                with suppress(NoAnswer):
+                    position, _ = self._polling.tried(motor.read, NoAnswer)
+                with suppress(NoAnswer):
+                    self._send(motor, position)
         finally:
-            motor.disconnect()
+            if motor is not None:
+                motor.disconnect()
+            switch, self._switch = self._switch, None
+            if switch is not None:
+                switch.release()
 
     def report(self) -> dict[str, float | int | str | bool]:
         """Return the number of frames, and of questions that were repeated."""

@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from math import inf, isfinite, nan
 from typing import Any, Final, NamedTuple, final
 
-from graspsense.gripper_api import anytime_of, load_pipeline, model_for
+from graspsense.gripper_api import Protection, anytime_of, load_pipeline, model_for
 from graspsense.plugin_api import (
+    EFFORT,
     HOLD,
     NO_PADS,
     RELEASE,
@@ -16,6 +17,7 @@ from graspsense.plugin_api import (
     SQUEEZE,
     STEADY,
     VELOCITY,
+    Channel,
     Command,
     ConfigError,
     DeviceInfo,
@@ -30,7 +32,12 @@ from graspsense_lerobot.place import PlaceOptions
 EVENTS: Final = ("nothing", "contact", "rest", "end")
 """What the numbers of events mean."""
 KNOWN: Final = ("gap", "velocity", "force_left", "force_right")
+UNITS: Final = ("m", "m/s", "N", "N")
 WIDEST_M: Final = 0.5
+UNKNOWN: Final = Command(EFFORT, nan, inf, inf)
+"""What the gripper is commanded, which another program does."""
+OF_TIME: Final = ("clock", "frames")
+"""How the faults of the time begin, which here is that of this computer or of a count."""
 
 
 class Running(NamedTuple):
@@ -105,14 +112,21 @@ class FollowedGrasp:
             self._now = self._now._replace(phase=RELEASE, event=0)
         return self._now
 
+    @property
+    def faults(self) -> list[str]:
+        """The faults of the sensors that were seen in this grasp, in words."""
+        return [words for words in self._protection.warnings if not words.startswith(OF_TIME)]
+
     def _begin(self) -> None:
         self._recorder, self._over, self._hold_until_s = TraceRecorder(), False, inf
         self._state = self._law.init()
+        device = _observations(self._given.fps or 30.0)
+        self._protection = Protection(device, self._law, self._settings.run, lambda fault: None)
         self._anytime = (
             None if self._model is None else anytime_of(self._model, self._features, self._settings)
         )
         if self._anytime is not None:
-            self._anytime.begin(self._recorder, _observations(self._given.fps or 30.0), _nobody)
+            self._anytime.begin(self._recorder, device, _nobody)
         self.prediction = None
 
     def _follow(self, reading: Reading) -> None:
@@ -123,6 +137,8 @@ class FollowedGrasp:
             command = Command(VELOCITY, 0.0, inf, inf)
         phase, outcome = int(self._state.phase), int(self._state.outcome)
         self._recorder.add(reading, phase, command)
+        self._protection.limit(reading, phase, UNKNOWN)
+        self._protection.watch(reading, phase, UNKNOWN)
         event = 0
         if phase != earlier_phase:
             event = {SQUEEZE: 1, HOLD: 2}.get(phase, 0)
@@ -138,6 +154,8 @@ class FollowedGrasp:
                 self.prediction = self._model.predict(
                     self._features.extract(self._recorder.trace()), None, None
                 )
+        if self.prediction is not None and self.faults:
+            self.prediction = self.prediction.without_certainty("a fault was seen in this grasp")
         made = self.prediction
         number = self.classes.index(made.label) + 1 if made is not None and made.label in self.classes else 0
         self._now = Running(phase, event, outcome, prediction=number, **_certainty(made))
@@ -204,6 +222,7 @@ def _observations(rate_hz: float) -> DeviceInfo:
         speed_limit_m_s=inf,
         opening=None,
         relaxed=Command(VELOCITY, 0.0, inf, inf),
+        channels=tuple(Channel(name, unit, rate_hz) for name, unit in zip(KNOWN, UNITS, strict=True)),
     )
 
 

@@ -32,7 +32,7 @@ from graspsense_pr2_gripper.ceilings import EFFORT_CEILING_N, SPEED_CEILING_M_S
 from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.fingertip import fingertips
 from graspsense_pr2_gripper.link import LockStepLink
-from graspsense_pr2_gripper.linkage import FRICTION_N
+from graspsense_pr2_gripper.linkage import FRICTION_N, OPEN_GAP_M
 from graspsense_pr2_gripper.measure import Measure
 from graspsense_pr2_gripper.opening import Opened, open_board
 from graspsense_pr2_gripper.protocol import (
@@ -228,6 +228,7 @@ class Pr2Backend(BackendWithEmulator[Pr2Config]):
             calibration={kind: calibration.sha256 for kind, calibration in stored.items()},
             notes=tuple(notes),
             friction_n=friction_n,
+            open_gap_m=OPEN_GAP_M if emulation is None else emulation.body_info.open_gap_m,
             status_bits=status_bits(config.swap_fingers),
         )
 

@@ -50,6 +50,9 @@ ENCODER_TICKS: Final = 1200
 FRICTION_N: Final = 7.0
 """Coulomb friction that pr2_gripper_sensor feeds forward to its position servo, as effort (gripper_controller.h)."""
 
+OPEN_GAP_M: Final = 0.086
+"""Gap of the open fingers: `open_gap_m` of the simulator. The stroke is 0.09 m (gripper.urdf.xacro of pr2_common)."""
+
 PAD_COUNTS_PER_N: Final = 1600
 """Counts of the sum of the fifteen cells of the gripping face under one newton (fingertip_pressure, scripts/
 fingertip_geometry.py)."""

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from attrs import frozen
 
-from graspsense.gripper_api import Interrupts, Pipeline
+from graspsense.gripper_api import OPEN_SPEED_M_S, OPEN_WINDOW_S, Interrupts, Pipeline
 from graspsense.plugin_api import (
     POSITION,
     REST_SPEED_M_S,
@@ -19,7 +19,10 @@ from graspsense.plugin_api import (
     DeviceInfo,
     DeviceLost,
     Frame,
+    RestState,
     SensorBackend,
+    at_rest,
+    update_rest,
 )
 from graspsense_ros2.action_server import Goal
 
@@ -125,14 +128,13 @@ class HeldGripper:
         with Interrupts(deferred=True):
             try:
                 self._command = self._info.opening or self._info.relaxed
-                began_s = still_s = self.tick().t_s
+                frame = self.tick()
+                # The rule of the end of a grasp: by the gap, since a gripper may not tell its velocity.
+                still = RestState(frame.t_s + self._backend.command_delay_s + BEGIN_S, frame.gap_m)
                 until = time.monotonic() + LONGEST_S
-                while time.monotonic() < until:
+                while not at_rest(still, frame.t_s, OPEN_WINDOW_S) and time.monotonic() < until:
                     frame = self.tick()
-                    if abs(frame.velocity_m_s) > REST_SPEED_M_S:
-                        still_s = frame.t_s
-                    if frame.t_s - began_s > BEGIN_S and frame.t_s - still_s > STALLED_S:
-                        break
+                    still = update_rest(still, frame.t_s, frame.gap_m, OPEN_SPEED_M_S, OPEN_WINDOW_S)
             finally:
                 self._close()
 

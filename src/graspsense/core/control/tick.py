@@ -36,8 +36,9 @@ RELEASE = int(Phase.RELEASE)
 """The fingers open again, after the grasp has ended."""
 
 OPEN_SPEED_M_S = 1e-3
+"""Speed below which fingers that were told to open are open: 1 mm/s, as in the authors' code."""
 OPEN_WINDOW_S = 0.1
-"""The fingers count as opened or released when slower than 1 mm/s for 0.1 s, the values of the authors' code."""
+"""Time for which they must be slower: 0.1 s, as in the authors' code."""
 
 
 class Schedule(NamedTuple):

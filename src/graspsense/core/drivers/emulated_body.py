@@ -147,11 +147,12 @@ def finger_target(
 ) -> FingerTarget:
     """Return the target of a command to fingers at this gap, between the gaps of the open and the closed gripper.
 
-    Where only a force is asked for, they close at `force_speed_m_s` at most. Other commands, and NaN, stop them.
+    Where only a force is asked for, they close at `force_speed_m_s` at most. Other commands, and those with a NaN, stop
+    them; of the latter, they get no force.
     """
     kind, value, force_n, speed_m_s = command
-    if value != value:
-        return FingerTarget(gap_m, 0.0, force_n)
+    if any(number != number for number in command):
+        return FingerTarget(gap_m, 0.0, 0.0)
     if kind == VELOCITY:
         return FingerTarget(open_m if value > 0.0 else closed_m, min(abs(value), speed_m_s), force_n)
     if kind == POSITION:

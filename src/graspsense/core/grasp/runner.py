@@ -232,6 +232,9 @@ MOSTLY: Final = 0.1
 """Share of the commands of a squeeze from which on it is not the one that the controller commanded."""
 UNHEARD_S: Final = 1.0
 """Time for which a gripper that does not answer is told to open."""
+OPENED: Final = "opened to"
+"""How the event begins that tells that the fingers are known to be open."""
+MAY_BE_CLOSED: Final = "the fingers may still be closed: look at them, and open them by hand"
 _PHASES: Final = frozenset(Phase)
 
 
@@ -272,6 +275,7 @@ class _Grasp:
         self.events: list[GraspEvent] = []
         self.late = self.guarded = self.squeezed = self.squeezed_guarded = 0
         self.failed_sinks: list[str] = []
+        self.may_be_closed = False
         self.first_t_s: float | None = None
         self.last: Frame | None = None
 
@@ -342,13 +346,17 @@ class _Grasp:
         return 0.0 if self.last is None or self.first_t_s is None else self.last.t_s - self.first_t_s
 
     def why(self, reason: str) -> str:
-        """Return this reason, or what the controller says of the end, with what was lost and which sinks failed."""
+        """Return this reason, or what the controller says of the end, with what a person must know besides.
+
+        That is whether the fingers may still be closed, which frames were lost, and which sinks failed.
+        """
         try:
             reason = reason or str(self.controller.reason(self.state.law))
         except FAILURES as error:
             reason = f"reason failed: {named(error)}"
         lost = "" if self.losses is None else lost_in_words(self.losses.lost)
-        return "; ".join(filter(None, (reason, lost, *self.failed_sinks)))
+        closed = MAY_BE_CLOSED if self.may_be_closed else ""
+        return "; ".join(filter(None, (reason, closed, lost, *self.failed_sinks)))
 
     def _loop(self) -> None:
         read, apply, run = self.backend.read, self.backend.apply, self.run
@@ -581,7 +589,12 @@ class _Grasp:
             pass
         with suppress(KeyboardInterrupt, *FAILURES):
             self.backend.apply(self.info.relaxed)
-        if self.info.opening is not None and not self.state.done and self.last is not None:
+        if self.info.opening is None or self.last is None:
+            return
+        if self.protection is not None and self.recorder.frames:
+            is_open = self.protection.opening.is_open(self.last.gap_m)
+            self.may_be_closed = not (is_open and (self.state.done or left.startswith(OPENED)))
+        if not self.state.done:
             self._event(self.last.t_s, Phase(self.state.phase), left)
 
     def _opened(self, opening: Command, last: Frame) -> str:
@@ -611,7 +624,9 @@ class _Grasp:
             still = update_rest(still, last.t_s, last.gap_m, OPEN_SPEED_M_S, OPEN_WINDOW_S)
             unknown_s = 0.0 if self.protection is None else self.protection.opening.unknown_s(last.gap_m)
             if at_rest(still, last.t_s, OPEN_WINDOW_S) and last.t_s - began_s >= unknown_s:
-                return f"opened to {last.gap_m * 1e3:.1f} mm"
+                if self.protection is None or self.protection.opening.is_open(last.gap_m):
+                    return f"{OPENED} {last.gap_m * 1e3:.1f} mm"
+                break
             if last.t_s - began_s > run.opening_timeout_s:
                 break
         why = "" if answers else ": the gripper does not answer"

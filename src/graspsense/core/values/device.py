@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import nan
 from typing import Literal
 
 from attrs import field, frozen
@@ -29,7 +30,8 @@ class DeviceInfo:
     `mounting` says where the frames of the tool and of the fingers are; the settings may add to it (`run.mounting`).
 
     `friction_n` is the greatest friction of the drive while it closes (N, on the scale of the effort), measured or
-    declared: the guard adds it to the force that the controller asks for. `status_bits` says what the bits of
+    declared: the guard adds it to the force that the controller asks for. `open_gap_m` is the gap of open fingers where
+    `opening` is no position (m, NaN: not known): another one is told. `status_bits` says what the bits of
     `Frame.status` mean. `harmless` is True where the fingers can hurt nothing, as in a pure model: the guard then only
     keeps commands within the limits of the device.
     """
@@ -53,5 +55,6 @@ class DeviceInfo:
     channels: tuple[Channel, ...] = ()
     mounting: Mapping[str, Mounting] = field(factory=dict)
     friction_n: float = field(default=0.0, converter=float)
+    open_gap_m: float = field(default=nan, converter=float)
     status_bits: tuple[StatusBit, ...] = ()
     harmless: bool = False

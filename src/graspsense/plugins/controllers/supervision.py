@@ -238,7 +238,8 @@ def _approaching(params: Any, now: GraspProgress, frame: Frame) -> GraspProgress
     if edge_left > edge or edge_right > edge:
         outcome = SIDE_IMPACT
     elif both_touch(left, right, contact):
-        if start_gap - gap >= params.too_wide_m or begun == 0:
+        # A gap that is no number tells nothing of the width.
+        if not start_gap - gap < params.too_wide_m or begun == 0:
             phase, force, deadline = SQUEEZE, 0.5 * (left + right), t + params.steady_timeout_s
         else:
             outcome = TOO_WIDE

@@ -82,6 +82,7 @@ def device_info(config: SimConfig) -> DeviceInfo:
         opening=Command(EFFORT, OPENING_N, math.inf, math.inf),
         relaxed=Command(EFFORT, 0.0, math.inf, math.inf),
         tare_images=0 if config.sensor == "ideal" else TARE_IMAGES,
+        open_gap_m=config.open_gap_m,
         notes=("simulated: every figure comes from a model",),
     )
 

@@ -14,7 +14,9 @@ AGAIN: Final = 5
 AGAIN_SHARE: Final = 0.02
 """Frames without a number, and their share, from which on they are told."""
 GAP_ABSENT: Final = Fault(
-    "gap absent", "the gripper does not tell its gap any more: check its encoder", ends=True
+    "gap absent",
+    "it is no number any more, or below zero: check the encoder and the sign of the gap",
+    ends=True,
 )
 EFFORT_ABSENT: Final = Fault(
     "effort absent",

@@ -28,6 +28,7 @@ PAD: Final[Mapping[str, tuple[str, ...]]] = {
 }
 """What follows of the same pad, and of the grasp, from a fault of a pad."""
 ENCODER: Final = (
+    "gap against the command",
     "gap and velocity disagree",
     "gap late",
     "gap not as before",
@@ -55,7 +56,13 @@ GRASP: Final[Mapping[str, tuple[str, ...]]] = {
     "gap jumps": ("effort not as before", *ENCODER),
     "gap and velocity disagree": ("gap late", "gap not as before", "not the commanded speed", "stalled"),
     "fingers did not open": ("gap late", "gap not as before"),
-    "effort stuck": ("effort has the wrong sign", "motor off", "motor too strong", "motor too weak"),
+    "effort stuck": (
+        "effort has the wrong sign",
+        "motor off",
+        "motor reversed",
+        "motor too strong",
+        "motor too weak",
+    ),
     "motor reversed": ("motor too strong", "motor too weak", "gap late", *MOTOR),
     "motor too strong": ("fingers rush", "moves too easily", "stronger than commanded", *MOTOR),
     "moves too easily": ("stronger than commanded",),

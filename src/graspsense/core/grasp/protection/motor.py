@@ -42,6 +42,7 @@ class RecentMean:
         self.value = value if share >= 1.0 else self.value + share * (value - self.value)
 
 
+REVERSED: Final = "motor reversed"
 DELAY_S: Final = 0.03
 """Time within which the motor must follow a command: a command and its answer each take a few ticks."""
 PERIODS: Final = 3.0
@@ -53,11 +54,12 @@ STRONG_SHARE: Final = 0.5
 STRONG_N: Final = 3.0
 """By how much an effort above the command ends the grasp."""
 UNLIMITED_SHARE: Final = 2.0
-"""Share by which an effort that the gripper chooses itself may be above its limit: the scale of a current is unsure."""
+"""Share by which an effort that the gripper chooses itself may be above its limit: the scale of a current is unsure.
+Set with emulated motors."""
 LASTS_S: Final = 0.03
 """Time for which a difference must last to be a fault of the motor."""
 STRONG_S: Final = 0.3
-"""Time for which a motor may answer somewhat more than its command before the grasp ends."""
+"""Time for which a motor may answer somewhat more than its command before the grasp ends. Set with emulated motors."""
 WEAK_S: Final = 0.5
 """Time for which a motor may answer less than its command, which crushes nothing, before the grasp ends."""
 OFF_SHARE: Final = 0.1
@@ -134,6 +136,7 @@ class Motor:
         self._phase = -1
         self._start_m = self._extreme_m = nan
         self._start_m_s = nan
+        self._gap_jumped = False
 
     def apply(self, frame: Frame, command: Command) -> None:
         """Take the command that is applied after this frame."""
@@ -150,9 +153,11 @@ class Motor:
             commands.append(asked)
 
     def shift(self, step_m: float) -> None:
-        """Let the gap jump by this (m), which is no motion of the fingers."""
-        self._start_m += step_m
-        self._extreme_m += step_m
+        """Let the gap jump by this (m), which is no motion of the fingers; `nan`: what seemed jumps was one."""
+        self._gap_jumped = step_m == step_m
+        if self._gap_jumped:
+            self._start_m += step_m
+            self._extreme_m += step_m
 
     def see(self, frame: Frame, phase: int) -> Fault | None:
         """Take the frame of a tick and return a fault that it shows."""
@@ -219,7 +224,8 @@ class Motor:
             return None  # most ticks end here
         answer = f"it answers {answered_n:.1f} N to a command of {least if least > 0.0 else most:.1f} N"
         if self._reversed_s > self._lasts_s:
-            return Fault("motor reversed", f"{answer}: check its wiring", ends=True, relaxes=True)
+            # It can be the effort that is wrong: while the gap does not show that they close, they must open.
+            return Fault(REVERSED, f"{answer}: check its wiring, and the sign of its effort", ends=True)
         if self._strong_s > self._lasts_s:
             ends = self._strong_s > STRONG_S or above_n > STRONG_N + STRONG_SHARE * asked_n
             return Fault("motor too strong", f"{answer}: check its drive and its scale", ends=ends)
@@ -254,16 +260,19 @@ class Motor:
         if self._wrong_way_s <= self._lasts_s or (closes and phase != APPROACH):
             return None
         commands_no_effort = all(asked.effort_n != asked.effort_n for asked in self._commands)
-        if closes and self._start_m - self._extreme_m >= FREE_TRAVEL_M and commands_no_effort:
+        closed = closes and self._start_m - self._extreme_m >= FREE_TRAVEL_M and commands_no_effort
+        moved, commanded = ("open", "a closing") if closes else ("close", "an opening")
+        # Of a motor whose gap has jumped, the motion is no witness: it must still open the fingers.
+        if closed or self._gap_jumped:
             return Fault(
                 "gap against the command",
-                f"it opens by {travel_m * 1e3:.1f} mm under a closing command that has closed the fingers before: it "
-                "is wrong, or something pushes them open; look at the encoder and the fingers",
+                f"it {moved}s by {travel_m * 1e3:.1f} mm under {commanded} command, and has "
+                f"{'jumped' if self._gap_jumped else 'closed under it'} before: it is wrong, or something pushes the "
+                "fingers; look at the encoder and the fingers",
                 ends=True,
             )
-        moved, commanded = ("open", "a closing") if closes else ("close", "an opening")
         return Fault(
-            "motor reversed",
+            REVERSED,
             f"the fingers {moved} by {travel_m * 1e3:.1f} mm under {commanded} command: check its wiring",
             ends=True,
             relaxes=True,

@@ -20,7 +20,7 @@ STOOD_S: Final = 0.4
 OPENED_M: Final = 0.001
 """Change of the gap that shows it."""
 LATE_S: Final = 0.16
-"""Time beyond the delay of a command after which the gap is late; at least four frames."""
+"""Time beyond the delay of a command after which the gap is late; at least four frames. Set with emulated grippers."""
 STANDS_S: Final = 0.5
 """Time beyond it after which the fingers count as not opened; at least six frames."""
 RESTED_S: Final = 0.1
@@ -38,7 +38,8 @@ AGAIN_SHARE: Final = 0.02
 class Opening:
     """Watches the gap of a gripper with this rate of frames (Hz) and delay of commands (s), which this command opens.
 
-    `tells_gap` says whether the frames have a gap at all, and `friction_n` is that of the drive (N; 0: not known).
+    `tells_gap` says whether the frames have a gap at all, and `friction_n` is that of the drive (N; 0: not known),
+    and `open_gap_m` the gap of open fingers where the command does not say it.
     """
 
     def __init__(
@@ -48,6 +49,7 @@ class Opening:
         opening: Command | None,
         tells_gap: bool,
         friction_n: float = 0.0,
+        open_gap_m: float = nan,
     ) -> None:
         self._late_s = command_delay_s + max(LATE_S, 4.0 / rate_hz)
         self.stands_s = command_delay_s + max(STANDS_S, 6.0 / rate_hz)
@@ -55,7 +57,8 @@ class Opening:
         self._target_m = opening.value if opening is not None and opening.kind == POSITION else nan
         self._longest_s = nan if opening is None else self.stands_s + self._target_m / opening.speed_limit_m_s
         self._tells_gap = tells_gap
-        self._ends_alike = self._target_m == self._target_m or (
+        self._width_m = self._target_m if self._target_m == self._target_m else open_gap_m
+        self._ends_alike = self._width_m == self._width_m or (
             opening is not None and opening.kind == EFFORT and -opening.value >= STOP * friction_n > 0.0
         )
         self._first_m = nan
@@ -74,12 +77,12 @@ class Opening:
                 "counts the other way; look at the fingers, the encoder and the sign of the gap",
                 ends=True,
             )
-        if not abs(gap_m - self._target_m) > max(TARGET_M, TARGET_SHARE * self._target_m):
+        if not abs(gap_m - self._width_m) > max(TARGET_M, TARGET_SHARE * self._width_m):
             return None
         return Fault(
             "opened to another width",
-            f"the fingers were told to open to {self._target_m * 1e3:.1f} mm, and their gap is {gap_m * 1e3:.1f} mm: "
-            "something holds them, or all gaps are off by as much; look at the fingers, and at the zero of the encoder",
+            f"the fingers open to {self._width_m * 1e3:.1f} mm, and their gap is {gap_m * 1e3:.1f} mm: something holds "
+            "them, or all gaps are off by as much; look at the fingers, and at the zero and the scale of the encoder",
         )
 
     def see(self, frame: Frame, phase: int) -> Fault | None:
@@ -119,8 +122,14 @@ class Opening:
         A gap that stands still or has jumped is no witness. Then only the time tells in which they open from any width.
         """
         if self._target_m != self._target_m:
-            return 0.0 if self._opened else self.stands_s
+            return 0.0 if self.is_open(gap_m) else self.stands_s
         return 0.0 if self._opened and self._is_as_before(gap_m) else self._longest_s
+
+    def is_open(self, gap_m: float) -> bool:
+        """Return whether fingers at this gap have opened by half of the way that they had closed, if they had."""
+        closed_m = self._widest_m - self._start_m
+        half = gap_m - self._start_m >= 0.5 * closed_m
+        return (self._opened and half) or self._is_as_before(gap_m) or closed_m < LEAST_TRAVEL_M
 
     def released(self, frame: Frame) -> Fault | None:
         """Take the last frame of the release; return what is wrong with the width of the open fingers.

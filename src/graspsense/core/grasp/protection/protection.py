@@ -8,7 +8,7 @@ follow when the gripper has the command. A fault that they find ends the grasp i
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import inf
+from math import inf, nan
 from typing import Final
 
 from attrs import evolve
@@ -22,13 +22,13 @@ from graspsense.core.grasp.protection.drift import Drift
 from graspsense.core.grasp.protection.effort import ReportedEffort
 from graspsense.core.grasp.protection.effort_ceiling import asked_effort_n, effort_ceiling_n, limited
 from graspsense.core.grasp.protection.kept_speed import KeptSpeed
-from graspsense.core.grasp.protection.motor import FeltForce, FreeEffort, Motor
+from graspsense.core.grasp.protection.motor import REVERSED, FeltForce, FreeEffort, Motor
 from graspsense.core.grasp.protection.opening import Opening
 from graspsense.core.grasp.protection.pad_curves import PadCurves
 from graspsense.core.grasp.protection.pad_forces import EmptyHold, PadBalance, StuckForce
 from graspsense.core.grasp.protection.reports import Repeats, Reports, StatusWatch
 from graspsense.core.grasp.protection.speed import GapJump, GapSpeed, Rush, Standstill
-from graspsense.core.grasp.protection.touch import Touch
+from graspsense.core.grasp.protection.touch import CLOSED_M, Touch
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.faults import LIMITED, Fault
 from graspsense.core.values.signals import (
@@ -46,8 +46,6 @@ from graspsense.core.values.signals import (
 RELEASE: Final = int(Phase.RELEASE)
 CLOSING: Final = (APPROACH, SQUEEZE, HOLD)
 """The phases in which the fingers may press something."""
-FEW_JUMPS: Final = 4
-"""Jumps of a gap to one side that are not taken for motion; with more, the fingers may move as fast as it says."""
 
 
 class Protection:
@@ -106,7 +104,9 @@ class Protection:
         first_m_s = run.first_speed_m_s if info.clock == "device" else inf
         self._standstill, self._jump = Standstill(), GapJump(info.speed_limit_m_s)
         self._kept_speed, self._repeats = KeptSpeed(info.rate_hz), Repeats()
-        self.opening = Opening(info.rate_hz, command_delay_s, info.opening, "gap" in rates, info.friction_n)
+        self.opening = Opening(
+            info.rate_hz, command_delay_s, info.opening, "gap" in rates, info.friction_n, info.open_gap_m
+        )
         self._rush = Rush(min(first_m_s, info.speed_limit_m_s), info.rate_hz)
         self._reports = Reports(info.rate_hz, rates.get("pads", 0.0))
 
@@ -149,8 +149,8 @@ class Protection:
         for fault in self._status.see(frame, phase):
             self._see(fault, phase)
         jump = self._jump.see(frame)
-        if abs(self._jump.jumps) <= FEW_JUMPS:
-            self._motor.shift(self._jump.step_m)
+        if jump is not None:
+            self._motor.shift(nan if self._jump.is_motion else self._jump.step_m)
         self._see(self._motor.see(frame, phase), phase)
         last_phase, self._phase = self._phase, phase
         if phase != APPROACH and last_phase == APPROACH:
@@ -160,7 +160,7 @@ class Protection:
         closing = phase in CLOSING
         if closing:
             self._see(self._gap_speed.see(frame))
-            self._see(self._gap_absence.see(frame.gap_m, frame))
+            self._see(self._gap_absence.see(frame.gap_m if frame.gap_m > -CLOSED_M else nan, frame))
             self._see(self._effort_absence.see(frame.effort_n, frame))
         self._see_free_motion(frame, phase, applied, jumped=jump is not None)
         if self._effort is not None:
@@ -246,6 +246,9 @@ class Protection:
     def _see(self, fault: Fault | None, phase: int = APPROACH) -> None:
         if fault is None:
             return
+        if fault.name == REVERSED:
+            # If it does close, the command that opens presses no harder than a squeeze may.
+            self._opening_n = self.ceiling_n
         if phase == RELEASE and fault.ends and not fault.relaxes:
             fault = evolve(fault, ends=False)
         told = self._told.get(fault.name)

@@ -36,6 +36,8 @@ JUMP: Final = 3.0
 """Speed over the commanded one that fingers can have between two frames, whose times are those of their arrival."""
 JUMP_M: Final = 0.001
 """Change of the gap between two frames that is no jump: a few steps of a coarse encoder."""
+FEW_JUMPS: Final = 4
+"""Jumps of a gap to one side, for each to the other side and one more, that are not taken for motion."""
 
 
 class GapSpeed:
@@ -145,8 +147,7 @@ class GapJump:
         self._velocity_m_s, self._moved = 0.0, False
         self.step_m = 0.0
         """The jump of the last frame (m), 0 without one."""
-        self.jumps = 0
-        """The number of jumps that open, less that of those that close."""
+        self._opens = self._closes = 0
 
     def apply(self, frame: Frame, command: Command) -> None:
         """Take the command that is applied after this frame; that of an effort leaves the speed to the gripper."""
@@ -170,12 +171,18 @@ class GapJump:
             self.step_m = 0.0
             return None
         self.step_m = step_m
-        self.jumps += 1 if step_m > 0.0 else -1
+        self._opens, self._closes = self._opens + (step_m > 0.0), self._closes + (step_m < 0.0)
         return Fault(
             "gap jumps",
             f"it changed by {step_m * 1e3:+.1f} mm within {frame.dt_s * 1e3:.0f} ms, faster than the fingers move "
             "or were told to: it is wrong before or after that, and so may be what follows from it; check the encoder",
         )
+
+    @property
+    def is_motion(self) -> bool:
+        """Whether the jumps go to one side, so that the fingers may move as fast as they say; noise jumps back."""
+        fewer, more = sorted((self._opens, self._closes))
+        return more > FEW_JUMPS * (1 + fewer)
 
     def _measured_m_s(self, velocity_m_s: float) -> float:
         """Return the larger speed of this frame and the one before; infinity if it is not measured."""
