@@ -78,7 +78,9 @@ def test_at_rest_means_the_gap_stayed_within_bounds_over_the_whole_window(steps)
             resting = [when for when, g in seen if abs(g - still.gap_m) <= bound_m]
             assert still.since_t_s in resting, "which is a sample, with its gap"
             pauses = [b - a for a, b in pairwise([*resting, t]) if a >= still.since_t_s]
-            assert max(pauses) <= AWAY * REST_WINDOW_S + 0.001 + 1e-9, "it may leave for a moment, and comes back"
+            assert max(pauses) <= AWAY * REST_WINDOW_S + 0.001 + 1e-9, (
+                "it may leave for a moment, and comes back"
+            )
 
 
 @every_case(

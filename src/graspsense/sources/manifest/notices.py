@@ -110,8 +110,8 @@ def _of_gap(columns: GraspColumns) -> Iterator[str]:
     meets = pressed < MEET_M and touched < gap.max() and _is_felt(force)
     if (meets or gap.min() < BELOW_ZERO_M) and gap.max() > 0.0 and not columns.units.get("gap"):
         yield (
-            f"the gap goes down to {gap.min() * 1e3:.3g} mm, and fingers meet at 0: did they close on each other, or is "
-            'it measured from another zero? Then add the difference: gap = "POSITION + 20 [mm]"'
+            f"the gap goes down to {gap.min() * 1e3:.3g} mm, and fingers meet at 0: did they press on each other, or "
+            'is it measured from another zero? Then add the difference: gap = "POSITION + 20 [mm]"'
         )
     if span > 0.0 and (pressed - began > 0.2 * span or pressed - touched > PART * span):
         yield (
