@@ -90,9 +90,11 @@ def update_rest(
         return RestState(left_since, left_gap)
     if abs(gap_m - gap) <= rest_speed_m_s * max(rest_window_s, t_s - since):
         return still
-    if away:
-        return RestState(t_s, gap_m, left_since, left_gap, left)
-    return RestState(t_s, gap_m, since, gap, t_s)
+    if not away:
+        left_since, left_gap, left = since, gap, t_s
+    return RestState(
+        since_t_s=t_s, gap_m=gap_m, left_since_t_s=left_since, left_gap_m=left_gap, left_t_s=left
+    )
 
 
 def at_rest(still: RestState, t_s: float, rest_window_s: float) -> bool:
