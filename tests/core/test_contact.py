@@ -1,17 +1,22 @@
 """First contact and rest: the two instants every feature hangs on."""
 
+from itertools import pairwise
 from math import nan
 
+import numpy as np
 import pytest
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
 from graspsense.core.control.contact import (
+    AWAY,
     REST_SPEED_M_S,
     REST_WINDOW_S,
     RestState,
     at_rest,
     both_touch,
+    first_rest,
     update_rest,
 )
 
@@ -69,5 +74,24 @@ def test_at_rest_means_the_gap_stayed_within_bounds_over_the_whole_window(steps)
         seen.append((t, gap))
         still = update_rest(still, t, gap, REST_SPEED_M_S, REST_WINDOW_S)
         if at_rest(still, t, REST_WINDOW_S):
-            within = [g for when, g in seen if when >= still.since_t_s]
-            assert max(abs(g - within[0]) for g in within) <= REST_SPEED_M_S * (t - still.since_t_s) + 1e-15
+            bound_m = REST_SPEED_M_S * (t - still.since_t_s) + 1e-15
+            resting = [when for when, g in seen if abs(g - still.gap_m) <= bound_m]
+            assert still.since_t_s in resting, "which is a sample, with its gap"
+            pauses = [b - a for a, b in pairwise([*resting, t]) if a >= still.since_t_s]
+            assert max(pauses) <= AWAY * REST_WINDOW_S + 0.001 + 1e-9, (
+                "it may leave for a moment, and comes back"
+            )
+
+
+@every_case(
+    ("rate_hz", "noise_m", "window_s"), [(50.0, 8e-6, 0.32), (250.0, 8e-6, 0.32), (1000.0, 20e-6, 0.8)]
+)
+def test_noise_does_not_begin_a_rest_anew(rate_hz, noise_m, window_s):
+    """A rest in whose noise one sample in 30 000 is further from the middle than the gap may move."""
+    late, rng = [], np.random.default_rng(1)
+    for _ in range(40):
+        times = np.arange(0.0, 2.5, 1.0 / rate_hz)
+        gaps = np.interp(times, [0.0, 0.5], [0.065, 0.06]) + noise_m * rng.normal(size=len(times))
+        resting = first_rest(times, gaps, np.ones(len(times), bool), REST_SPEED_M_S, window_s)
+        late.append(times[resting[0]] - 0.5 if resting else 2.5)
+    assert np.mean(np.abs(late) < 0.1) > 0.9

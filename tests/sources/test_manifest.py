@@ -384,6 +384,7 @@ GAP_M, FORCE_N = squeezing()
         ({"force": -FORCE_N}, "the force is negative where it is largest: .*-FORCE"),
         ({"force": 10.0 + 2.0 * np.cos(T_S)}, "the recording begins in contact: there is no approach"),
         ({"gap": np.full(300, 0.05)}, "the gap does not change"),
+        ({"gap": GAP_M - GAP_M.min()}, "fingers meet at 0"),
         ({"gap": 1e-3 * GAP_M}, r"the gap reaches 0\.\d+ mm only"),
         ({"force": 5e-4 * FORCE_N}, r"reaches 0.01 N, which few.*\[kN\]"),
         # From 1 N of 20 N on: the contact force is 0.625 N.

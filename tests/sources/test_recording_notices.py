@@ -138,6 +138,13 @@ TOLD = {
     "the friction of a drive in the current of its motor": (
         "stays low until 1.21 s", RELEASED_N + np.where((T_S > 0.1) & (T_S < 2.7), 0.8, 0.0), None, OPEN_AGAIN_M
     ),
+    "a zero that is set under a load": (
+        "falls by 2.57 N", spoilt(150, LEFT[150:] - LEFT[150], LEFT), spoilt(150, RIGHT[150:] - RIGHT[150], RIGHT)
+    ),
+    # A third of a second, in which no noise repeats itself.
+    "values that stay for the contact": (
+        "repeats one value from 0.9 to 1.06 s", spoilt(90, np.full(17, LEFT[90])), None, OPEN_AGAIN_M
+    ),
     # 6 N/s for 0.2 s.
     "a force that rises at once": ("rises by 1.2", RELEASED_N[CUT], None, OPEN_AGAIN_M[CUT]),
 }  # fmt: skip

@@ -25,7 +25,7 @@ from graspsense.core.grasp.calibration_files import calibration_folder
 from graspsense.core.values.errors import GraspsenseError
 from graspsense.core.values.json_values import json_text
 from graspsense.recording.export_trace import all_beside
-from graspsense.store.opening import STORE, as_source
+from graspsense.store.opening import STORE, as_source, place_and_number
 
 FRAMEWORK: Final = "graspsense"
 _OWN_PLUGINS: Final = "graspsense.plugins"
@@ -99,9 +99,7 @@ def _named_places(text: str) -> tuple[str, list[str]]:
 
 def _path(place: str) -> str:
     """Return the path of a place, without the number of an object or of a recording behind it."""
-    path = os.path.expanduser(place.strip())
-    whole, mark, number = path.rpartition("#")
-    return whole if mark and number.isdecimal() else path
+    return place_and_number(os.path.expanduser(place.strip()))[0]
 
 
 def located_text(text: str, base: Path) -> str:

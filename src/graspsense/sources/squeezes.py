@@ -14,8 +14,7 @@ from graspsense.core.learn.labelled import class_of
 from graspsense.core.values.errors import ConfigError, suggestion
 from graspsense.recording.recorded_grasp import RecordedGrasp
 from graspsense.recording.trial_record import TrialRecord
-from graspsense.store.opening import STORE, as_source
-from graspsense.store.stored_grasps import parse_trial_ref
+from graspsense.store.opening import STORE, as_source, place_and_number
 
 
 def recorded_squeezes(sources: Sequence[str], name: str | None = None) -> tuple[RecordedSqueeze, ...]:
@@ -57,11 +56,9 @@ def recorded_squeezes(sources: Sequence[str], name: str | None = None) -> tuple[
 
 def _of_source(source: str) -> Iterator[RecordedSqueeze]:
     source = as_source(source)
-    folder, mark, number = source.removeprefix(STORE).rpartition("#")
-    if mark and number.isdecimal() and (source.startswith(STORE) or Path(folder).expanduser().is_dir()):
-        yield from _of_store(*parse_trial_ref(source.removeprefix(STORE)))
-    elif source.startswith(STORE):
-        yield from _of_store(source.removeprefix(STORE))
+    folder, number = place_and_number(source.removeprefix(STORE))
+    if source.startswith(STORE) or (number is not None and Path(folder).expanduser().is_dir()):
+        yield from _of_store(folder, number)
     elif source.endswith(".mcap"):
         from graspsense.recording.reader import read_recorded
 

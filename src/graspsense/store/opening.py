@@ -192,6 +192,16 @@ def store_folder(text: str | os.PathLike[str]) -> str:
     return str(path.parent) if path.name == FILE and path.is_file() else name
 
 
+def place_and_number(text: str) -> tuple[str, int | None]:
+    """Return the two parts of `PLACE#NUMBER`, as of a trial of a store; the text itself and None if it has no number.
+
+    >>> place_and_number("trials#12"), place_and_number("cup#b.toml")
+    (('trials', 12), ('cup#b.toml', None))
+    """
+    place, _, number = text.rpartition("#")
+    return (place, int(number)) if place and number.isdecimal() and len(number) <= 18 else (text, None)
+
+
 def as_source(text: str) -> str:
     """Return a source of trials or recordings with `store:` before the folder of a store; others as they are."""
     if not text.startswith(STORE):

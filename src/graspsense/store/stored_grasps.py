@@ -16,7 +16,7 @@ from graspsense.core.values.trace import Trace
 from graspsense.recording.reader import read_recorded
 from graspsense.recording.recorded_grasp import RecordedGrasp
 from graspsense.recording.replayable import Recording
-from graspsense.store.opening import store_folder
+from graspsense.store.opening import place_and_number, store_folder
 from graspsense.store.store import Store
 
 
@@ -85,10 +85,10 @@ def _grasp(store: Store, number: int) -> StoredGrasp:
 
 def parse_trial_ref(text: str) -> tuple[str, int]:
     """Return the folder of the store and the number of the trial. Raises ConfigError."""
-    folder, mark, number = text.rpartition("#")
-    if not mark or not folder or not number.isdecimal() or len(number) > 18:
+    folder, number = place_and_number(text)
+    if number is None:
         raise ConfigError(f"{text!r} is not a trial of a store: write DIR#NUMBER, as in trials#12")
-    return store_folder(folder), int(number)
+    return store_folder(folder), number
 
 
 def stored_grasp(ref: str) -> RecordedGrasp:

@@ -22,6 +22,8 @@ REST_SPEED_M_S: Final = 1e-4
 """Rest threshold tau_2: 0.1 mm/s, as in the authors' code."""
 REST_WINDOW_S: Final = 0.05
 """Time for which the speed must stay below tau_2. One encoder tick in 1 ms is already 0.33 mm/s on the PR2."""
+AWAY: Final = 0.2
+"""Share of the window within which a gap that comes back has not moved: noise takes it away for less."""
 MOVED_M: Final = 1e-3
 """Travel after which the fingers have overcome static friction: fingers that stand still later have met something."""
 
@@ -29,11 +31,15 @@ MOVED_M: Final = 1e-3
 class RestState(NamedTuple):
     """The time since which the gap has been at rest (s), and its value then (m).
 
-    A control law keeps one in its state and begins with `RestState(0.0, 0.0)`.
+    A control law keeps one in its state and begins with `RestState(0.0, 0.0)`. The other fields are the rest that the
+    gap has left, and when (s): it goes on if the gap comes back soon.
     """
 
     since_t_s: float
     gap_m: float
+    left_since_t_s: float = math.nan
+    left_gap_m: float = math.nan
+    left_t_s: float = math.nan
 
 
 def both_touch(force_left_n: float, force_right_n: float, contact_force_n: float) -> bool:
@@ -59,21 +65,36 @@ def update_rest(
 ) -> RestState:
     """Return the state after one more sample: unchanged, or starting at this sample if the gap has moved.
 
+    A gap that comes back within `AWAY` of the window had not moved, and rests since before. So noise does not begin a
+    rest anew, and a gap that closes without noise never comes back.
+
     Call it in every tick with the time (s) and the gap (m) of the frame, the speed below which the fingers are at
     rest (m/s), and the time for which they must be at rest (s). The gap may differ from the value in the state by the
     rest speed times the window, or, if samples are further apart than the window, by the rest speed
     times the elapsed time. A gap of NaN is never at rest.
 
     >>> still = RestState(since_t_s=1.0, gap_m=0.05)
-    >>> update_rest(still, 1.02, 0.05, REST_SPEED_M_S, REST_WINDOW_S)
-    RestState(since_t_s=1.0, gap_m=0.05)
-    >>> update_rest(still, 1.02, 0.049, REST_SPEED_M_S, REST_WINDOW_S)
-    RestState(since_t_s=1.02, gap_m=0.049)
+    >>> update_rest(still, 1.02, 0.05, REST_SPEED_M_S, REST_WINDOW_S).since_t_s
+    1.0
+    >>> moved = update_rest(still, 1.02, 0.049, REST_SPEED_M_S, REST_WINDOW_S)
+    >>> moved.since_t_s, moved.gap_m
+    (1.02, 0.049)
+    >>> update_rest(moved, 1.021, 0.05, REST_SPEED_M_S, REST_WINDOW_S).since_t_s
+    1.0
     """
-    allowed_m = rest_speed_m_s * max(rest_window_s, t_s - still.since_t_s)
-    if abs(gap_m - still.gap_m) <= allowed_m:
+    since, gap, left_since, left_gap, left = still
+    away = t_s - left <= AWAY * rest_window_s
+    if gap_m != gap_m:
+        return RestState(t_s, gap_m)
+    if away and abs(gap_m - left_gap) <= rest_speed_m_s * max(rest_window_s, left - left_since):
+        return RestState(left_since, left_gap)
+    if abs(gap_m - gap) <= rest_speed_m_s * max(rest_window_s, t_s - since):
         return still
-    return RestState(t_s, gap_m)
+    if not away:
+        left_since, left_gap, left = since, gap, t_s
+    return RestState(
+        since_t_s=t_s, gap_m=gap_m, left_since_t_s=left_since, left_gap_m=left_gap, left_t_s=left
+    )
 
 
 def at_rest(still: RestState, t_s: float, rest_window_s: float) -> bool:
@@ -104,13 +125,11 @@ def first_rest(
     >>> first_rest(times, gaps, shows, REST_SPEED_M_S, REST_WINDOW_S)
     (2, 7)
     """
-    still, since = RestState(math.nan, math.nan), 0
+    still = RestState(math.nan, math.nan)
     for i, (t_s, gap_m, showing) in enumerate(
         zip(times_s.tolist(), gaps_m.tolist(), shows.tolist(), strict=True)
     ):
-        state = update_rest(still, t_s, gap_m, rest_speed_m_s, rest_window_s)
-        if state is not still:
-            still, since = state, i
+        still = update_rest(still, t_s, gap_m, rest_speed_m_s, rest_window_s)
         if showing and at_rest(still, t_s, rest_window_s):
-            return since, i
+            return int(times_s[: i + 1].searchsorted(still.since_t_s)), i
     return None

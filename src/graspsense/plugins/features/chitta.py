@@ -202,8 +202,10 @@ def measure(params: ChittaParams, ticks: TickColumns) -> Measured:
     for i in range(contact, end):
         if i > contact:
             state = update_rest(still, t[i], gap[i], params.rest_speed_m_s, window_s)
-            if state.since_t_s != still.since_t_s or state.gap_m != still.gap_m:
+            if state.since_t_s != still.since_t_s:
                 since = i
+                while t[since] > state.since_t_s:
+                    since -= 1
             still = state
         # A controller can wait for more than rest, such as a force. The rest in its hold phase is then the one meant.
         shows = phase[i] == HOLD or not holds

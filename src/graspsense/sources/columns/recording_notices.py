@@ -74,7 +74,7 @@ LINE: Final = 10
 FINE: Final = 5.0
 BEND: Final = 2.5
 """whose second difference is so many steps of a signal at least, and so many at most in a line that was rounded."""
-CHANGES: Final = 20.0
+CHANGES: Final = 15.0
 """Number of changes that a force would have had in the time in which its sensor has stopped."""
 TURNS: Final = 0.3
 """Share of the changes without a load that go against the one before, where they are noise."""
@@ -166,7 +166,7 @@ def signal_notices(recording: Recording) -> Iterator[str]:
             told += [*_glitches(force), *_seldom(force.what, force.t, force.n, FREE)]
             told += [] if doubtful else _rough(force)
         told += _drift(force)
-    yield from told or _rises_at_once(mean)
+    yield from told or [*_rises_at_once(mean), *_falls_at_once(mean)]
     if not {"gap", "t"} & recording.units.keys():
         yield from _bump(mean)
         yield from next(filter(None, map(list, map(_late, forces))), ())
@@ -341,6 +341,24 @@ def _rises_at_once(force: _Force) -> Iterator[str]:
         yield (
             f"the force rises by {force.amount(steps[k - 1])} at once at {force.when(k)}, under a load: are samples "
             "missing there, or did its sensor stop before?"
+        )
+
+
+def _falls_at_once(force: _Force) -> Iterator[str]:
+    """Yield that a force falls within a sample and grows again, while the fingers have not opened.
+
+    A tap on the way, which falls so as it rose, is none.
+    """
+    course, gap = _course(force.n, GLITCH_SAMPLES), force.gap
+    steps, closed = np.diff(course), gap <= np.minimum.accumulate(gap) + SLIGHT * np.ptp(gap)
+    k = _leap(-steps, closed[1:], max(FREE * force.span, force.noise))
+    if k is None or steps.max() > LOADED * -steps[k - 1]:
+        return
+    opened = np.flatnonzero(~closed[k:])[:1] + k
+    if float(np.ptp(course[k : opened[0] if len(opened) else None])) > FREE * force.span:
+        yield (
+            f"the force falls by {force.amount(course[k - 1] - course[k])} at once at {force.when(k)}, and then grows "
+            "again in the closed fingers: did the object break or slip, or was the zero of the sensor set under a load?"
         )
 
 

@@ -41,8 +41,10 @@ NO_GLITCH: Final = 0.05
 """Share of the samples with closed, and with open fingers, from which on these are no glitches of the gap."""
 TURNED: Final = 0.3
 """Share of its range by which a force is less with closed fingers than with open ones if its sign is turned."""
+MEET_M: Final = 5e-4
+"""Fingers that press in a smaller gap press on each other,"""
 BELOW_ZERO_M: Final = -0.005
-"""No fingertips are pressed into each other so far (m)."""
+"""and no fingertips are pressed into each other so far (m)."""
 _OFFSET: Final = ' If the fingers were free, the sensor has an offset: zero = "10 samples"'
 _FOUND: Final = 'split = "force" finds them, '
 
@@ -105,10 +107,11 @@ def _of_gap(columns: GraspColumns) -> Iterator[str]:
             f"the gap reaches {gap.max() * 1e3:.2g} mm only, which no gripper opens to: if it is in another unit, "
             "write that behind it, as [m] or [mm]"
         )
-    if gap.min() < BELOW_ZERO_M and gap.max() > 0.0 and not columns.units.get("gap"):
+    meets = pressed < MEET_M and touched < gap.max() and _is_felt(force)
+    if (meets or gap.min() < BELOW_ZERO_M) and gap.max() > 0.0 and not columns.units.get("gap"):
         yield (
-            f"the gap goes down to {gap.min() * 1e3:.3g} mm, and fingers meet at 0: is it measured from another zero? "
-            'Then add the difference: gap = "POSITION + 20 [mm]"'
+            f"the gap goes down to {gap.min() * 1e3:.3g} mm, and fingers meet at 0: did they press on each other, or "
+            'is it measured from another zero? Then add the difference: gap = "POSITION + 20 [mm]"'
         )
     if span > 0.0 and (pressed - began > 0.2 * span or pressed - touched > PART * span):
         yield (

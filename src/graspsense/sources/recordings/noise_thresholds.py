@@ -41,7 +41,8 @@ SAMPLE: Final = "sample"
 _NORMAL: Final = 1.4826
 _FORCE_SIGMAS: Final = 5.0
 """A contact threshold is at least so many standard deviations above the mean force without contact."""
-_GAP_SIGMAS: Final = 6.0
+_GAP_SIGMAS: Final = 4.0
+"""A gap at rest leaves the value that it began at by more than so many standard deviations for a moment only."""
 _EARLY_SHARE: Final = 0.2
 """Share of the peak force up to which a force counts as without contact."""
 _FEW: Final = 5
