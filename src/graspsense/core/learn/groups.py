@@ -6,13 +6,19 @@ to the next one, and fewer if there are more numbers to follow. More than that a
 
 Neighbours: where no instances are named, trials of a label that follow each other may be more alike than others, as
 grasps of one object, windows of one recording and a drifting sensor make them. They are held out in blocks, whose
-length is doubled as long as neighbouring blocks are alike. Of trials in another order, no values tell.
+length is doubled as long as neighbouring blocks are alike.
+
+Clumps: of trials in another order, two signs together tell. The nearest trials have the same label far more often than
+others close by, and trials are closer to each other than to trials drawn from the spread around them. So are windows of
+one recording, and grasps of one object. Each label is then held out in parts of trials close to each other, as in block
+cross-validation (D. R. Roberts et al., Ecography 40 (2017) 913).
 
 Sessions: instances of several classes that are called by the same day or session are no objects of their class.
 """
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable
 from itertools import pairwise
@@ -51,6 +57,16 @@ _STILL_ALIKE: Final = 2.0
 """The same for blocks, once it is known that neighbours are alike."""
 _FEWEST_BLOCKS: Final = 4
 """Blocks of a label from which on it can be told whether neighbouring ones are alike."""
+_FEWEST_CLUMPED: Final = 12
+"""Trials of a label from which on it can be told whether they are in clumps."""
+_LARGEST_CLUMP: Final = 40
+"""Trials of a clump up to which it may be a recording or an object; larger ones are kinds of their label."""
+_CLUMPED: Final = (3.0, 2.0)
+"""Standard deviations by which near trials have the label more often, and are closer, than others, if in clumps."""
+_LESS_FAR: Final = 0.6
+"""Share of the agreement of the labels, beyond chance, that is lost outside a clump."""
+_PARTS: Final = 10
+"""Parts of each label that are held out, if its trials are in clumps: ten folds."""
 
 
 def grouped(labelled: Labelled, copies: Numbers) -> Labelled:
@@ -61,16 +77,25 @@ def grouped(labelled: Labelled, copies: Numbers) -> Labelled:
     """
     pairs, notes = _near_copies(labelled)
     links = [pairs, copies]
+    together = ""
     if labelled.instances is not None:
         links.append(_to_the_first(np.unique(np.array(labelled.instances), return_inverse=True)[1]))
     elif labelled.value is None:
         length, block_of = _blocks(labelled)
         if length > 1:
+            together = (
+                f"trials of a label that follow each other are more alike than others. Blocks of {length}"
+            )
+        elif (part_of := _parts(labelled, np.concatenate(links, axis=1))) is not None:
+            block_of = part_of
+            together = (
+                f"trials of a label are in clumps of others that are alike. {_PARTS} parts of each label"
+            )
+        if together:
             links.append(_to_the_first(block_of))
             notes.append(
-                "trials of a label that follow each other are more alike than others, as grasps of one object, windows "
-                f"of one recording, and drift make them. Blocks of {length} are held out as if of one object: name the "
-                f"objects or sessions ({option('instance', 'COLUMN')})"
+                f"{together} are held out as if of one object: grasps of one object, windows of one recording, and "
+                f"drift are so. Name the objects or sessions ({option('instance', 'COLUMN')})"
             )
     if not notes and not copies.size:
         return labelled
@@ -144,8 +169,7 @@ def _near_copies(labelled: Labelled) -> tuple[Numbers, list[str]]:
     values = _scaled(labelled.table.values)
     if not 2 * _MOST_OTHERS < len(labelled) <= _MOST_TRIALS or values.shape[1] < 2:
         return pairs[0], []
-    squares = (values**2).sum(axis=1)
-    apart = np.sqrt(np.maximum(squares[:, np.newaxis] + squares - 2.0 * values @ values.T, 0.0))
+    apart = _distances(values, values)
     np.fill_diagonal(apart, np.inf)
     if labelled.instances is not None:
         instances = np.unique(np.array(labelled.instances), return_inverse=True)[1]
@@ -174,6 +198,77 @@ def _near_copies(labelled: Labelled) -> tuple[Numbers, list[str]]:
         f"name the objects ({option('instance', 'COLUMN')})"
     )
     return np.concatenate(pairs, axis=1), [note]
+
+
+def _distances(values: Values, others: Values) -> Values:
+    """Return the distance of each trial to each of the others."""
+    squares = (values**2).sum(axis=1)[:, np.newaxis] + (others**2).sum(axis=1)
+    distances: Values = np.sqrt(np.maximum(squares - 2.0 * values @ others.T, 0.0))
+    return distances
+
+
+def _parts(labelled: Labelled, copies: Numbers) -> Numbers | None:
+    """Return the part of its label that each trial is in, if trials are in clumps, besides these pairs of copies."""
+    from scipy.cluster.hierarchy import fcluster, ward
+
+    values = _scaled(labelled.table.values)
+    codes = np.unique(np.array(labelled.labels), return_inverse=True)[1]
+    if len(codes) > _MOST_TRIALS or values.shape[1] < 2 or not _in_clumps(values, codes, copies):
+        return None
+    part_of = np.zeros(len(codes), dtype=np.int64)
+    for code, size in enumerate(np.bincount(codes).tolist()):
+        rows = np.flatnonzero(codes == code)
+        part_of[rows] = fcluster(ward(values[rows]), _PARTS, "maxclust") if size > _PARTS else np.arange(size)
+    return codes * len(codes) + part_of
+
+
+def _in_clumps(values: Values, codes: Numbers, copies: Numbers) -> bool:
+    """Return whether near trials have the same label, and are close, more than smooth distributions make them.
+
+    The first is M. F. Schilling's count of neighbours (J. Am. Stat. Assoc. 81 (1986) 799), of the two nearest and of
+    others; the second compares distances as B. Hopkins and J. G. Skellam do (Ann. Bot. 18 (1954) 213), with points
+    drawn from the normal distribution of the third of a label that is around a trial.
+    """
+    apart = _distances(values, values)
+    np.fill_diagonal(apart, np.inf)
+    apart[copies[0], copies[1]] = apart[copies[1], copies[0]] = np.inf
+    sizes = np.bincount(codes)
+    many = sizes >= _FEWEST_CLUMPED
+    if many.sum() < 2:
+        return False
+    fewest, judged = int(sizes[many].min()), many[codes]
+    first = min(fewest // 4, _LARGEST_CLUMP)
+    same = codes[np.argsort(apart, axis=1, kind="stable")] == codes[:, np.newaxis]
+    near, far = same[:, :2].mean(axis=1), same[:, first : first + max(fewest // 12, 1)].mean(axis=1)
+    by_chance = (sizes[codes] - 1.0) / (len(codes) - 1.0)
+    # Each label weighs as much as any other.
+    weights = judged / sizes[codes] / many.sum()
+    near_beyond, far_beyond = (float(weights @ (share - by_chance)) for share in (near, far))
+    spread = math.sqrt(float(weights**2 @ (near - far - near_beyond + far_beyond) ** 2))
+    if far_beyond > _LESS_FAR * near_beyond or near_beyond - far_beyond <= _CLUMPED[0] * spread:
+        return False
+    rng = np.random.default_rng(0)
+    closer = np.concatenate(
+        [
+            _closer(values[codes == code], apart[np.ix_(codes == code, codes == code)], rng)
+            for code in np.flatnonzero(many)
+        ]
+    )
+    return bool(closer.mean() * math.sqrt(len(closer)) > _CLUMPED[1] * closer.std())
+
+
+def _closer(values: Values, apart: Values, rng: np.random.Generator) -> Values:
+    """Return the logarithm of how many times closer another trial is to each one than to a point drawn around it."""
+    n = len(values)
+    around = np.argsort(apart, axis=1, kind="stable")[:, : n // 3 - 1]
+    around = np.column_stack([np.arange(n), around])
+    drawn = rng.normal(size=around.shape)
+    shares = (drawn - drawn.mean(axis=1, keepdims=True)) / math.sqrt(around.shape[1] - 1.0)
+    weights = np.zeros((n, n))
+    np.put_along_axis(weights, around, shares + 1.0 / around.shape[1], axis=1)
+    to_a_point = _distances(weights @ values, values).min(axis=1)
+    closer: Values = np.log(np.maximum(to_a_point, _NEAREST) / np.maximum(apart.min(axis=1), _NEAREST))
+    return closer
 
 
 def _scaled(values: Values) -> Values:
