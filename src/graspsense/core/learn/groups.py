@@ -59,11 +59,11 @@ _FEWEST_BLOCKS: Final = 4
 """Blocks of a label from which on it can be told whether neighbouring ones are alike."""
 _FEWEST_CLUMPED: Final = 12
 """Trials of a label from which on it can be told whether they are in clumps."""
-_LARGEST_CLUMP: Final = 40
+_LARGEST_CLUMP: Final = 25
 """Trials of a clump up to which it may be a recording or an object; larger ones are kinds of their label."""
 _CLUMPED: Final = (3.0, 2.0)
 """Standard deviations by which near trials have the label more often, and are closer, than others, if in clumps."""
-_LESS_FAR: Final = 0.6
+_LESS_FAR: Final = 0.8
 """Share of the agreement of the labels, beyond chance, that is lost outside a clump."""
 _PARTS: Final = 10
 """Parts of each label that are held out, if its trials are in clumps: ten folds."""
