@@ -7,9 +7,9 @@ probability (isotonic regression, R. E. Barlow et al., Statistical Inference und
 of it has enough units. The rates are drawn together, and towards guessing, by what chance spreads them, and each is
 (right + 1) / (all + 2), so that no answer is certain. Its 95 % interval is that of a beta distribution with this mean:
 from few units a rate is known as badly as that, whatever the luck of these trials. Answers of a cross-validation count
-for less than others: its models share training trials, so that the answers of all of them are lucky together. Answers of
-one unit, such as grasps of an object, count as one, or as more where units differ little (the design effect of L. Kish,
-Survey Sampling, 1965).
+for less than others: its models share training trials, so that the answers of all of them are lucky together. Answers
+of one unit, such as grasps of an object, count as one, or as more where units differ little (the design effect of L.
+Kish, Survey Sampling, 1965).
 
 Where labels are not equally frequent, answers with a rare one are right less often than others that are as probable. So
 a rate is multiplied by how often the answers with its label were right, as a share of what their rates promise. Of few
@@ -237,7 +237,7 @@ def certainty_of(
     weights = 1.0 / trials_of_unit[unit_of]
     known = np.nan_to_num(support, nan=0.0)
     answers = np.array(right, dtype=np.float64)
-    effect *= _alike(np.bincount(unit_of, weights * answers))
+    effect *= _alike(np.bincount(unit_of, weights * answers).astype(np.float64))
     least_units = max(STEP_UNITS, STEP_SHARE * float(weights.sum())) - _ROUNDING
     guessing = 1.0 / max(len(set(labels)), 2)
     edges = [0.0, *_bounds(known, weights), np.inf]

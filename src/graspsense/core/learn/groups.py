@@ -13,6 +13,8 @@ others close by, and trials are closer to each other than to trials drawn from t
 one recording, and grasps of one object. Each label is then held out in parts of trials close to each other, as in block
 cross-validation (D. R. Roberts et al., Ecography 40 (2017) 913).
 
+Numbers to predict: trials with the same finely measured number, which chance hardly repeats, are of one object.
+
 Sessions: instances of several classes that are called by the same day or session are no objects of their class.
 """
 
@@ -65,6 +67,12 @@ _CLUMPED: Final = (3.0, 2.0)
 """Standard deviations by which near trials have the label more often, and are closer, than others, if in clumps."""
 _LESS_FAR: Final = 0.8
 """Share of the agreement of the labels, beyond chance, that is lost outside a clump."""
+_SURE: Final = 30.0
+"""Equal numbers to predict to be found for each one that is expected by chance, if they are of one object."""
+_USUAL: Final = 3.0
+"""Times as many trials as half of the numbers have, from which on a number is usual."""
+_ROUNDING: Final = 1e-9
+"""Differences below this share of a range are rounding errors."""
 _PARTS: Final = 10
 """Parts of each label that are held out, if its trials are in clumps: ten folds."""
 
@@ -73,29 +81,19 @@ def grouped(labelled: Labelled, copies: Numbers) -> Labelled:
     """Return the trials with groups as their instances, and notes on them, if some of them belong together.
 
     `copies` are pairs of trials, shape (2, pairs), that do. Named instances are joined where their trials are copies or
-    near copies. Numbers to predict have no blocks.
+    near copies.
     """
     pairs, notes = _near_copies(labelled)
     links = [pairs, copies]
-    together = ""
     if labelled.instances is not None:
         links.append(_to_the_first(np.unique(np.array(labelled.instances), return_inverse=True)[1]))
-    elif labelled.value is None:
-        length, block_of = _blocks(labelled)
-        if length > 1:
-            together = (
-                f"trials of a label that follow each other are more alike than others. Blocks of {length}"
-            )
-        elif (part_of := _parts(labelled, np.concatenate(links, axis=1))) is not None:
-            block_of = part_of
-            together = (
-                f"trials of a label are in clumps of others that are alike. {_PARTS} parts of each label"
-            )
-        if together:
-            links.append(_to_the_first(block_of))
+    else:
+        group_of, why = _together(labelled, np.concatenate(links, axis=1))
+        if why:
+            links.append(_to_the_first(group_of))
             notes.append(
-                f"{together} are held out as if of one object: grasps of one object, windows of one recording, and "
-                f"drift are so. Name the objects or sessions ({option('instance', 'COLUMN')})"
+                f"{why} are held out as if of one object: grasps of one object, windows of one recording, and drift "
+                f"are so. Name the objects or sessions ({option('instance', 'COLUMN')})"
             )
     if not notes and not copies.size:
         return labelled
@@ -106,6 +104,34 @@ def grouped(labelled: Labelled, copies: Numbers) -> Labelled:
         grouped=labelled.instances is None,
         notes=(*labelled.notes, *notes),
     )
+
+
+def _together(labelled: Labelled, copies: Numbers) -> tuple[Numbers, str]:
+    """Return the group of each trial, and in words which trials belong together besides copies; empty if none do."""
+    if labelled.value is not None:
+        return _of_one_number(np.array(labelled.value.values))
+    length, block_of = _blocks(labelled)
+    if length > 1:
+        words = f"trials of a label that follow each other are more alike than others. Blocks of {length}"
+        return block_of, words
+    part_of = _parts(labelled, copies)
+    if part_of is None:
+        return block_of, ""
+    return part_of, f"trials of a label are in clumps that are alike. {_PARTS} parts of each label"
+
+
+def _of_one_number(values: Values) -> tuple[Numbers, str]:
+    """Return groups of trials with the same number to predict, as `_together` does, if chance hardly makes them.
+
+    A number that far more trials have than others, such as a zero, may be the end of a range.
+    """
+    distinct, number_of, trials = np.unique(values, return_inverse=True, return_counts=True)
+    usual = trials > _USUAL * np.median(trials)
+    repeated = int((trials - 1)[~usual].sum())
+    if not repeated or repeated < _SURE * len(values) ** 2 / (2.0 * cells_in_range(distinct)):
+        return number_of, ""
+    alone = len(distinct) + np.arange(len(values))
+    return np.where(usual[number_of], alone, number_of), "trials with the same number to predict"
 
 
 def with_sessions(labelled: Labelled) -> Labelled:
@@ -237,9 +263,9 @@ def _in_clumps(values: Values, codes: Numbers, copies: Numbers) -> bool:
     if many.sum() < 2:
         return False
     fewest, judged = int(sizes[many].min()), many[codes]
-    first = min(fewest // 4, _LARGEST_CLUMP)
+    begin = min(fewest // 4, _LARGEST_CLUMP)
     same = codes[np.argsort(apart, axis=1, kind="stable")] == codes[:, np.newaxis]
-    near, far = same[:, :2].mean(axis=1), same[:, first : first + max(fewest // 12, 1)].mean(axis=1)
+    near, far = same[:, :2].mean(axis=1), same[:, begin : begin + max(fewest // 12, 1)].mean(axis=1)
     by_chance = (sizes[codes] - 1.0) / (len(codes) - 1.0)
     # Each label weighs as much as any other.
     weights = judged / sizes[codes] / many.sum()
@@ -279,6 +305,17 @@ def _scaled(values: Values) -> Values:
     spread = whole.std(axis=0)
     scaled: Values = whole[:, spread > 0.0] / spread[spread > 0.0]
     return scaled
+
+
+def cells_in_range(distinct: NDArray[np.float64]) -> float:
+    """Return how many values fit into the range of these at the resolution that they show."""
+    span = float(distinct[-1] - distinct[0])
+    step = span
+    for distance in (distinct[1:] - distinct[0]).tolist():
+        distance = abs(math.remainder(distance, step))
+        while distance > _ROUNDING * span:  # Euclid's algorithm
+            step, distance = distance, abs(math.remainder(step, distance))
+    return span / step
 
 
 def tail(successes: int, n: int, share: float) -> float:
