@@ -65,6 +65,8 @@ _LARGEST_CLUMP: Final = 25
 """Trials of a clump up to which it may be a recording or an object; larger ones are kinds of their label."""
 _CLUMPED: Final = (3.0, 2.0)
 """Standard deviations by which near trials have the label more often, and are closer, than others, if in clumps."""
+_SECOND: Final = 1
+"""Place of the nearest distance by which clumps are told, so that pairs, as copies with noise, are none."""
 _LESS_FAR: Final = 0.8
 """Share of the agreement of the labels, beyond chance, that is lost outside a clump."""
 _SURE: Final = 30.0
@@ -284,7 +286,7 @@ def _in_clumps(values: Values, codes: Numbers, copies: Numbers) -> bool:
 
 
 def _closer(values: Values, apart: Values, rng: np.random.Generator) -> Values:
-    """Return the logarithm of how many times closer another trial is to each one than to a point drawn around it."""
+    """Return the logarithm of how many times closer the second other trial is to each one than to a point around it."""
     n = len(values)
     around = np.argsort(apart, axis=1, kind="stable")[:, : n // 3 - 1]
     around = np.column_stack([np.arange(n), around])
@@ -292,8 +294,11 @@ def _closer(values: Values, apart: Values, rng: np.random.Generator) -> Values:
     shares = (drawn - drawn.mean(axis=1, keepdims=True)) / math.sqrt(around.shape[1] - 1.0)
     weights = np.zeros((n, n))
     np.put_along_axis(weights, around, shares + 1.0 / around.shape[1], axis=1)
-    to_a_point = _distances(weights @ values, values).min(axis=1)
-    closer: Values = np.log(np.maximum(to_a_point, _NEAREST) / np.maximum(apart.min(axis=1), _NEAREST))
+    to_a_trial, to_a_point = (
+        np.maximum(np.partition(distances, _SECOND, axis=1)[:, _SECOND], _NEAREST)
+        for distances in (apart, _distances(weights @ values, values))
+    )
+    closer: Values = np.log(to_a_point / to_a_trial)
     return closer
 
 
