@@ -504,6 +504,23 @@ def test_answers_of_a_cross_validation_count_for_less():
         assert certainty.rate(*asked([1.0])) == pytest.approx([rate])
 
 
+def test_answers_for_one_object_count_for_more_than_one_where_the_objects_hardly_differ():
+    """Of 160 answers, 144 are right: in each of 20 objects alike, or none in two of them."""
+    spread = [k % 10 != 0 for k in range(160)]
+    together = [k // 8 not in (0, 10) for k in range(160)]
+    objects = [str(k // 8) for k in range(160)]
+    said = []
+    for right, units in ((spread, objects), (together, objects), ([k > 1 for k in range(20)], None)):
+        n = len(right)
+        certainty = certainty_of(
+            np.ones(n), np.full(n, np.nan), ["can"] * n, right, units or [str(k) for k in range(n)], 2.0
+        )
+        said += certainty.rate(*asked([1.0])).tolist()
+    assert said[0] == pytest.approx(0.88, abs=0.02)
+    assert said[1] == pytest.approx(said[2])
+    assert said[1] < said[0] - 0.03
+
+
 def test_an_answer_that_is_seldom_given_has_no_certainty_and_no_set_of_its_own(tmp_path):
     rng = np.random.default_rng(0)
     force = np.concatenate([rng.normal(0.0, 1.0, 60), rng.normal(12.0, 1.0, 3)])

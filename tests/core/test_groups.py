@@ -80,7 +80,7 @@ def test_near_copies_of_one_named_instance_are_told_of_by_its_name():
 
 
 @every_case("make", [by_object, windows])
-def test_neighbours_that_are_alike_are_held_out_in_blocks_and_in_another_order_nothing_is_told(make):
+def test_neighbours_that_are_alike_are_held_out_in_blocks_of_the_order_of_recording(make):
     rng = np.random.default_rng(1)
     numbers, values = make(rng)
     trials = grouped(table_of(numbers, values), NO_COPIES)
@@ -92,11 +92,32 @@ def test_neighbours_that_are_alike_are_held_out_in_blocks_and_in_another_order_n
     )
     order = rng.permutation(len(numbers))
     mixed = table_of(numbers[order], values[order])
-    assert grouped(mixed, NO_COPIES) is mixed
     in_time = grouped(evolve(mixed, order=tuple(order.tolist())), NO_COPIES)
     assert [in_time.instances[i] == in_time.instances[k] for i, k in np.ndindex(30, 30)] == [
         trials.instances[order[i]] == trials.instances[order[k]] for i, k in np.ndindex(30, 30)
     ]
+
+
+def test_windows_and_grasps_of_unnamed_objects_in_any_order_are_held_out_together_and_other_trials_are_not():
+    told = {"windows": 0, "objects": 0, "single": 0, "inside and outside": 0}
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        numbers, values = windows(rng, recordings=12, each=20)
+        alone = np.repeat(np.arange(3), 80)
+        single = things(alone, rng)
+        distance = np.hypot(*single[:, :2].T)
+        made = {
+            "windows": table_of(numbers, values),
+            "objects": table_of(*by_object(rng, objects=9, each=9)),
+            "single": table_of(alone, single),
+            "inside and outside": table_of((distance > np.median(distance)).astype(int), single),
+        }
+        for name, trials in made.items():
+            mixed = trials.rows(rng.permutation(len(trials)))
+            told[name] += grouped(mixed, NO_COPIES) is not mixed
+    assert told["windows"] >= 9
+    assert told["objects"] >= 4
+    assert told["single"] == told["inside and outside"] == 0
 
 
 def test_neighbours_are_alike_or_not_also_where_rounded_features_are_equal_by_chance():

@@ -12,6 +12,7 @@ from commands import graspsense, printed
 from kept import keep
 
 from graspsense.core.components.registry import installed
+from graspsense.core.learn.groups import grouped
 from graspsense.core.learn.labelled import ControlFeatures, Labelled
 from graspsense.core.learn.model_file import load_model
 from graspsense.core.learn.target_value import TargetValue, value_label
@@ -163,6 +164,27 @@ def test_a_trial_without_a_feature_that_all_training_trials_had_has_no_interval(
     (lacking,) = model.predict(table([0.06], [np.nan]))
     assert (lacking.low, lacking.high, lacking.unlike) == (None, None, "")
     assert lacking.no_interval
+
+
+def test_trials_with_one_finely_measured_number_are_held_out_together_and_levels_and_zeros_are_not():
+    none = np.empty((2, 0), dtype=np.int64)
+    rng = np.random.default_rng(0)
+    measured = np.repeat(rng.uniform(0.0, 10.0, 12), 5)
+    levels, fresh = np.repeat([0.0, 50.0, 125.0, 250.0, 333.0], 12), rng.uniform(0.0, 10.0, 60)
+    cases = (
+        (measured, 12),
+        (levels, None),
+        (fresh.round(2), None),
+        (np.where(fresh < 3.0, 0.0, fresh), None),
+    )
+    for fill, groups in cases:
+        value = TargetValue(name="fill", unit="ml", values=tuple(fill.tolist()))
+        named = bottles(objects=12, each=5)
+        trials = grouped(
+            evolve(named, value=value, instances=None, table=table(*rng.normal(size=(2, 60)))), none
+        )
+        assert (trials.instances and len(set(trials.instances))) == groups
+        assert grouped(evolve(named, value=value), none).instances == named.instances
 
 
 def test_trials_under_other_settings_have_no_interval():

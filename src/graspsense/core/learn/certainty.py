@@ -7,7 +7,9 @@ probability (isotonic regression, R. E. Barlow et al., Statistical Inference und
 of it has enough units. The rates are drawn together, and towards guessing, by what chance spreads them, and each is
 (right + 1) / (all + 2), so that no answer is certain. Its 95 % interval is that of a beta distribution with this mean:
 from few units a rate is known as badly as that, whatever the luck of these trials. Answers of a cross-validation count
-for less than others: its models share training trials, so that the answers of all of them are lucky together.
+for less than others: its models share training trials, so that the answers of all of them are lucky together. Answers
+of one unit, such as grasps of an object, count as one, or as more where units differ little (the design effect of L.
+Kish, Survey Sampling, 1965).
 
 Where labels are not equally frequent, answers with a rare one are right less often than others that are as probable. So
 a rate is multiplied by how often the answers with its label were right, as a share of what their rates promise. Of few
@@ -54,6 +56,8 @@ LABEL_WEIGHT: Final = 7.0
 Over simulated tables, the true rate of a label rises by n / (n + 11) of that of n cross-validated answers, which tell
 as much as half as many independent ones: that would be 5. The labels that are told to be surest are the luckiest ones.
 """
+FURTHER_UNITS: Final = 3.0
+"""Units whose answers are all alike that count beside those that are known, for the variance between units."""
 AS_RARE: Final = 2.0
 """Labels with at most this many times the answers of a label are as rare."""
 SUPPORT_BOUNDS: Final = (5.0, 10.0, 20.0, 40.0, 80.0)
@@ -226,13 +230,14 @@ def certainty_of(
 ) -> Certainty:
     """Return the certainty that held-out answers give; at least one.
 
-    `probability` and `support` are those of `labels`, the predicted ones. Trials of one unit weigh as much as one.
+    `probability` and `support` are those of `labels`, the predicted ones. The trials of each unit weigh as much.
     `effect` is by how much the variance of their rates is larger than that of independent answers.
     """
     _, unit_of, trials_of_unit = np.unique(np.array(units), return_inverse=True, return_counts=True)
     weights = 1.0 / trials_of_unit[unit_of]
     known = np.nan_to_num(support, nan=0.0)
     answers = np.array(right, dtype=np.float64)
+    effect *= _alike(np.bincount(unit_of, weights * answers).astype(np.float64))
     least_units = max(STEP_UNITS, STEP_SHARE * float(weights.sum())) - _ROUNDING
     guessing = 1.0 / max(len(set(labels)), 2)
     edges = [0.0, *_bounds(known, weights), np.inf]
@@ -254,6 +259,18 @@ def certainty_of(
     of_all = Certainty(classes=tuple(classes))
     promised = of_all._rate(probability, support)
     return evolve(of_all, of_label=_shares(np.array(labels), answers, promised, weights / effect, effect))
+
+
+def _alike(of_unit: NDArray[np.float64]) -> float:
+    """Return the variance of the share of right answers between units, over that of units with a single answer.
+
+    It is at most 1, where all answers in a unit are right or all are wrong, and drawn to that as if by further units:
+    few units show the variance badly.
+    """
+    mean, likely = float(of_unit.mean()), (float(of_unit.sum()) + 1.0) / (len(of_unit) + 2.0)
+    further = FURTHER_UNITS * likely * (1.0 - likely)
+    between = float(((of_unit - mean) ** 2).sum())
+    return (between + further) / (len(of_unit) * mean * (1.0 - mean) + further)
 
 
 def _shares(

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import evolve
 
-from graspsense.core.learn.groups import grouped, tail, with_sessions
+from graspsense.core.learn.groups import cells_in_range, grouped, tail, with_sessions
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import ConfigError, counted
 from graspsense.core.values.features import misfit
@@ -34,8 +34,6 @@ _SURE: Final = 100.0
 """Equal pairs to be found for each one that is expected by chance, in a single feature."""
 _SURE_OF_ALL: Final = 10.0
 """The same for all features together."""
-_ROUNDING: Final = 1e-9
-"""Differences below this share of a range are rounding errors."""
 _COMPARED: Final = 32
 """Features that are compared with each other, those with the most values."""
 _HASH_DIGITS: Final = 12
@@ -236,17 +234,6 @@ def _is_measured(column: NDArray[np.float64], repeated: int) -> bool:
         cells = cells_in_range(distinct)
     ties = len(given) - len(distinct)
     return ties * _SURE < repeated and _SURE * len(given) ** 2 / (2.0 * cells) < repeated
-
-
-def cells_in_range(distinct: NDArray[np.float64]) -> float:
-    """Return how many values fit into the range of these at the resolution that they show."""
-    span = float(distinct[-1] - distinct[0])
-    step = span
-    for distance in (distinct[1:] - distinct[0]).tolist():
-        distance = abs(math.remainder(distance, step))
-        while distance > _ROUNDING * span:  # Euclid's algorithm
-            step, distance = distance, abs(math.remainder(step, distance))
-    return span / step
 
 
 def _can_be_chance(distinct: NDArray[np.float64], repeated: int) -> bool:

@@ -6,13 +6,21 @@ to the next one, and fewer if there are more numbers to follow. More than that a
 
 Neighbours: where no instances are named, trials of a label that follow each other may be more alike than others, as
 grasps of one object, windows of one recording and a drifting sensor make them. They are held out in blocks, whose
-length is doubled as long as neighbouring blocks are alike. Of trials in another order, no values tell.
+length is doubled as long as neighbouring blocks are alike.
+
+Clumps: of trials in another order, two signs together tell. The nearest trials have the same label far more often than
+others close by, and trials are closer to each other than to trials drawn from the spread around them. So are windows of
+one recording, and grasps of one object. Each label is then held out in parts of trials close to each other, as in block
+cross-validation (D. R. Roberts et al., Ecography 40 (2017) 913).
+
+Numbers to predict: trials with the same finely measured number, which chance hardly repeats, are of one object.
 
 Sessions: instances of several classes that are called by the same day or session are no objects of their class.
 """
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable
 from itertools import pairwise
@@ -51,26 +59,43 @@ _STILL_ALIKE: Final = 2.0
 """The same for blocks, once it is known that neighbours are alike."""
 _FEWEST_BLOCKS: Final = 4
 """Blocks of a label from which on it can be told whether neighbouring ones are alike."""
+_FEWEST_CLUMPED: Final = 12
+"""Trials of a label from which on it can be told whether they are in clumps."""
+_LARGEST_CLUMP: Final = 25
+"""Trials of a clump up to which it may be a recording or an object; larger ones are kinds of their label."""
+_CLUMPED: Final = (3.0, 2.0)
+"""Standard deviations by which near trials have the label more often, and are closer, than others, if in clumps."""
+_SECOND: Final = 1
+"""Place of the nearest distance by which clumps are told, so that pairs, as copies with noise, are none."""
+_LESS_FAR: Final = 0.8
+"""Share of the agreement of the labels, beyond chance, that is lost outside a clump."""
+_SURE: Final = 30.0
+"""Equal numbers to predict to be found for each one that is expected by chance, if they are of one object."""
+_USUAL: Final = 3.0
+"""Times as many trials as half of the numbers have, from which on a number is usual."""
+_ROUNDING: Final = 1e-9
+"""Differences below this share of a range are rounding errors."""
+_PARTS: Final = 10
+"""Parts of each label that are held out, if its trials are in clumps: ten folds."""
 
 
 def grouped(labelled: Labelled, copies: Numbers) -> Labelled:
     """Return the trials with groups as their instances, and notes on them, if some of them belong together.
 
     `copies` are pairs of trials, shape (2, pairs), that do. Named instances are joined where their trials are copies or
-    near copies. Numbers to predict have no blocks.
+    near copies.
     """
     pairs, notes = _near_copies(labelled)
     links = [pairs, copies]
     if labelled.instances is not None:
         links.append(_to_the_first(np.unique(np.array(labelled.instances), return_inverse=True)[1]))
-    elif labelled.value is None:
-        length, block_of = _blocks(labelled)
-        if length > 1:
-            links.append(_to_the_first(block_of))
+    else:
+        group_of, why = _together(labelled, np.concatenate(links, axis=1))
+        if why:
+            links.append(_to_the_first(group_of))
             notes.append(
-                "trials of a label that follow each other are more alike than others, as grasps of one object, windows "
-                f"of one recording, and drift make them. Blocks of {length} are held out as if of one object: name the "
-                f"objects or sessions ({option('instance', 'COLUMN')})"
+                f"{why} are held out as if of one object: grasps of one object, windows of one recording, and drift "
+                f"are so. Name the objects or sessions ({option('instance', 'COLUMN')})"
             )
     if not notes and not copies.size:
         return labelled
@@ -81,6 +106,34 @@ def grouped(labelled: Labelled, copies: Numbers) -> Labelled:
         grouped=labelled.instances is None,
         notes=(*labelled.notes, *notes),
     )
+
+
+def _together(labelled: Labelled, copies: Numbers) -> tuple[Numbers, str]:
+    """Return the group of each trial, and in words which trials belong together besides copies; empty if none do."""
+    if labelled.value is not None:
+        return _of_one_number(np.array(labelled.value.values))
+    length, block_of = _blocks(labelled)
+    if length > 1:
+        words = f"trials of a label that follow each other are more alike than others. Blocks of {length}"
+        return block_of, words
+    part_of = _parts(labelled, copies)
+    if part_of is None:
+        return block_of, ""
+    return part_of, f"trials of a label are in clumps that are alike. {_PARTS} parts of each label"
+
+
+def _of_one_number(values: Values) -> tuple[Numbers, str]:
+    """Return groups of trials with the same number to predict, as `_together` does, if chance hardly makes them.
+
+    A number that far more trials have than others, such as a zero, may be the end of a range.
+    """
+    distinct, number_of, trials = np.unique(values, return_inverse=True, return_counts=True)
+    usual = trials > _USUAL * np.median(trials)
+    repeated = int((trials - 1)[~usual].sum())
+    if not repeated or repeated < _SURE * len(values) ** 2 / (2.0 * cells_in_range(distinct)):
+        return number_of, ""
+    alone = len(distinct) + np.arange(len(values))
+    return np.where(usual[number_of], alone, number_of), "trials with the same number to predict"
 
 
 def with_sessions(labelled: Labelled) -> Labelled:
@@ -144,8 +197,7 @@ def _near_copies(labelled: Labelled) -> tuple[Numbers, list[str]]:
     values = _scaled(labelled.table.values)
     if not 2 * _MOST_OTHERS < len(labelled) <= _MOST_TRIALS or values.shape[1] < 2:
         return pairs[0], []
-    squares = (values**2).sum(axis=1)
-    apart = np.sqrt(np.maximum(squares[:, np.newaxis] + squares - 2.0 * values @ values.T, 0.0))
+    apart = _distances(values, values)
     np.fill_diagonal(apart, np.inf)
     if labelled.instances is not None:
         instances = np.unique(np.array(labelled.instances), return_inverse=True)[1]
@@ -176,6 +228,80 @@ def _near_copies(labelled: Labelled) -> tuple[Numbers, list[str]]:
     return np.concatenate(pairs, axis=1), [note]
 
 
+def _distances(values: Values, others: Values) -> Values:
+    """Return the distance of each trial to each of the others."""
+    squares = (values**2).sum(axis=1)[:, np.newaxis] + (others**2).sum(axis=1)
+    distances: Values = np.sqrt(np.maximum(squares - 2.0 * values @ others.T, 0.0))
+    return distances
+
+
+def _parts(labelled: Labelled, copies: Numbers) -> Numbers | None:
+    """Return the part of its label that each trial is in, if trials are in clumps, besides these pairs of copies."""
+    from scipy.cluster.hierarchy import fcluster, ward
+
+    values = _scaled(labelled.table.values)
+    codes = np.unique(np.array(labelled.labels), return_inverse=True)[1]
+    if len(codes) > _MOST_TRIALS or values.shape[1] < 2 or not _in_clumps(values, codes, copies):
+        return None
+    part_of = np.zeros(len(codes), dtype=np.int64)
+    for code, size in enumerate(np.bincount(codes).tolist()):
+        rows = np.flatnonzero(codes == code)
+        part_of[rows] = fcluster(ward(values[rows]), _PARTS, "maxclust") if size > _PARTS else np.arange(size)
+    return codes * len(codes) + part_of
+
+
+def _in_clumps(values: Values, codes: Numbers, copies: Numbers) -> bool:
+    """Return whether near trials have the same label, and are close, more than smooth distributions make them.
+
+    The first is M. F. Schilling's count of neighbours (J. Am. Stat. Assoc. 81 (1986) 799), of the two nearest and of
+    others; the second compares distances as B. Hopkins and J. G. Skellam do (Ann. Bot. 18 (1954) 213), with points
+    drawn from the normal distribution of the third of a label that is around a trial.
+    """
+    apart = _distances(values, values)
+    np.fill_diagonal(apart, np.inf)
+    apart[copies[0], copies[1]] = apart[copies[1], copies[0]] = np.inf
+    sizes = np.bincount(codes)
+    many = sizes >= _FEWEST_CLUMPED
+    if many.sum() < 2:
+        return False
+    fewest, judged = int(sizes[many].min()), many[codes]
+    begin = min(fewest // 4, _LARGEST_CLUMP)
+    same = codes[np.argsort(apart, axis=1, kind="stable")] == codes[:, np.newaxis]
+    near, far = same[:, :2].mean(axis=1), same[:, begin : begin + max(fewest // 12, 1)].mean(axis=1)
+    by_chance = (sizes[codes] - 1.0) / (len(codes) - 1.0)
+    # Each label weighs as much as any other.
+    weights = judged / sizes[codes] / many.sum()
+    near_beyond, far_beyond = (float(weights @ (share - by_chance)) for share in (near, far))
+    spread = math.sqrt(float(weights**2 @ (near - far - near_beyond + far_beyond) ** 2))
+    if far_beyond > _LESS_FAR * near_beyond or near_beyond - far_beyond <= _CLUMPED[0] * spread:
+        return False
+    rng = np.random.default_rng(0)
+    closer = np.concatenate(
+        [
+            _closer(values[codes == code], apart[np.ix_(codes == code, codes == code)], rng)
+            for code in np.flatnonzero(many)
+        ]
+    )
+    return bool(closer.mean() * math.sqrt(len(closer)) > _CLUMPED[1] * closer.std())
+
+
+def _closer(values: Values, apart: Values, rng: np.random.Generator) -> Values:
+    """Return the logarithm of how many times closer the second other trial is to each one than to a point around it."""
+    n = len(values)
+    around = np.argsort(apart, axis=1, kind="stable")[:, : n // 3 - 1]
+    around = np.column_stack([np.arange(n), around])
+    drawn = rng.normal(size=around.shape)
+    shares = (drawn - drawn.mean(axis=1, keepdims=True)) / math.sqrt(around.shape[1] - 1.0)
+    weights = np.zeros((n, n))
+    np.put_along_axis(weights, around, shares + 1.0 / around.shape[1], axis=1)
+    to_a_trial, to_a_point = (
+        np.maximum(np.partition(distances, _SECOND, axis=1)[:, _SECOND], _NEAREST)
+        for distances in (apart, _distances(weights @ values, values))
+    )
+    closer: Values = np.log(to_a_point / to_a_trial)
+    return closer
+
+
 def _scaled(values: Values) -> Values:
     """Return the features without missing values, those with the most different ones, by their standard deviation."""
     whole = values[:, ~np.isnan(values).any(axis=0)]
@@ -184,6 +310,17 @@ def _scaled(values: Values) -> Values:
     spread = whole.std(axis=0)
     scaled: Values = whole[:, spread > 0.0] / spread[spread > 0.0]
     return scaled
+
+
+def cells_in_range(distinct: NDArray[np.float64]) -> float:
+    """Return how many values fit into the range of these at the resolution that they show."""
+    span = float(distinct[-1] - distinct[0])
+    step = span
+    for distance in (distinct[1:] - distinct[0]).tolist():
+        distance = abs(math.remainder(distance, step))
+        while distance > _ROUNDING * span:  # Euclid's algorithm
+            step, distance = distance, abs(math.remainder(step, distance))
+    return span / step
 
 
 def tail(successes: int, n: int, share: float) -> float:

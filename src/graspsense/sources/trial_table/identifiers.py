@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from graspsense.core.learn.confounding import LEAST_LINES
-from graspsense.core.learn.copies import cells_in_range
+from graspsense.core.learn.groups import cells_in_range
 from graspsense.core.values.features import LARGEST_VALUE
 
 if TYPE_CHECKING:
