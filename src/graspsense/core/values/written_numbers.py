@@ -27,6 +27,9 @@ COMMA: Final = 4
 HEXADECIMAL: Final = 8
 """`0x7D0`, beside `0` at most: any other number can be a hexadecimal one without its sign."""
 _FEW: Final = 3
+_THOUSAND: Final = 1000.0
+_MUCH: Final = math.log(10.0)
+"""Logarithm of how many times farther away a number is than another one that is much nearer."""
 _EVERY: Final = POINT | THOUSANDS | COMMA
 _NOTATIONS: Final = (POINT, THOUSANDS, COMMA)
 
@@ -200,16 +203,17 @@ def _read(cells: Sequence[str], fit: _Fit, of_file: int) -> Numbers | NotNumbers
     if common & POINT:
         # `1.500` is 1500 where all other columns have decimal commas, and beside 975 and 1.000.
         grouped = common & COMMA and any("." in cell for cell in cells)
-        if not grouped or not (of_file & COMMA or _signs_of_thousands(cells, ".") == 2):
+        able = _nearer(cells) | (of_file & COMMA) if grouped else POINT
+        if able == POINT or (able == POINT | COMMA and of_file == THOUSANDS):
             return _values(cells, POINT) if fit.values is None else fit.values
-        if not of_file & THOUSANDS:
+        if not of_file & THOUSANDS and (able == COMMA or of_file):
             return _values(cells, COMMA)
     elif (common == THOUSANDS and of_file & COMMA) or _one_mark_of_two(cells):
         pass
     elif common == THOUSANDS | COMMA:
         if of_file == COMMA:
             return _values(cells, COMMA)
-        if of_file == THOUSANDS or _signs_of_thousands(cells, ",") > 0:
+        if of_file == THOUSANDS or _tells_thousands(cells):
             return _values(cells, THOUSANDS)
     else:
         return _values(cells, common)
@@ -222,16 +226,32 @@ def _read(cells: Sequence[str], fit: _Fit, of_file: int) -> Numbers | NotNumbers
     )
 
 
-def _signs_of_thousands(cells: Sequence[str], mark: str) -> int:
-    """Return how many of two signs tell that marks before three digits separate thousands: 0 to 2.
+def _nearer(cells: Sequence[str]) -> int:
+    """Return POINT, COMMA or both: in which the largest number without a mark is much nearer to one with a point.
+
+    A program that writes three decimals writes them in every cell, so that 950 beside 1.203 is hardly 950.000.
+    """
+    sizes = [(cell, abs(_number(cell, POINT))) for cell in cells if not is_missing(cell)]
+    sizes = [(cell, size) for cell, size in sizes if 0.0 < size < math.inf]
+    with_point = [size for cell, size in sizes if "." in cell]
+    plain = max((size for cell, size in sizes if "." not in cell), default=0.0)
+    if plain == 0.0 or not with_point:
+        return POINT
+    ones, thousands = (
+        min(abs(math.log(factor * size / plain)) for size in with_point) for factor in (1.0, _THOUSAND)
+    )
+    return (POINT if ones < thousands + _MUCH else 0) | (COMMA if thousands < ones + _MUCH else 0)
+
+
+def _tells_thousands(cells: Sequence[str]) -> bool:
+    """Return whether a sign tells that commas before three digits separate thousands.
 
     A program that writes three decimals writes them in every cell, and one that leaves out zeros leaves out the last.
     """
-    plain = [cell for cell in cells if mark not in cell and not is_missing(cell)]
-    if not plain:
-        return 0
-    return any(cell.endswith("0") for cell in cells if mark in cell) + any(
-        len(cell.lstrip("+-\u2212")) == 3 for cell in plain
+    plain = [cell for cell in cells if "," not in cell and not is_missing(cell)]
+    return bool(plain) and (
+        any(cell.endswith("0") for cell in cells if "," in cell)
+        or any(len(cell.lstrip("+-\u2212")) == 3 for cell in plain)
     )
 
 

@@ -12,6 +12,7 @@ import json
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any, Final
 
@@ -227,6 +228,8 @@ class _Layout:
         self, data: int, width: int, numeric: frozenset[int]
     ) -> tuple[list[str], list[str] | None, int, int]:
         """Return the same where `data` rows come before the numbers. Raises DataDamaged if none of them has names."""
+        if joined := self._joined_names(data, width):
+            return joined
         texts = [
             set() if k in numeric else {row[k] for _, row in self.rows[data:] if k < len(row)}
             for k in range(width)
@@ -260,6 +263,33 @@ class _Layout:
                 + _lines_words(skipped, "lines before them")
             )
         return self.rows[names][1], units, data if units else names + 1, self.rows[names][0]
+
+    def _joined_names(
+        self, data: int, width: int
+    ) -> tuple[list[str], list[str] | None, int, int] | None:
+        """Return the names that several lines before the numbers have together, None if the last of them has all.
+
+        pandas writes each level of its names in a line, and a spreadsheet a merged cell once, with blanks behind it.
+        """
+        written = [row for row in self.rows[:data] if len(row[1]) == width and sum(map(bool, row[1])) > 1]
+        units = written.pop()[1] if written and _are_units(written[-1][1]) else None
+        levels = [list(row) for _, row in written]
+        if len(levels) < 2 or any(map(is_number, chain(*levels))) or any(map(_names_all, levels)):
+            return None
+        lowest = [cell for cell in levels[-1] if cell]
+        if len(set(lowest)) == len(lowest):
+            return None
+        for row in levels[:-1]:
+            for k in range(1, width):
+                row[k] = row[k] or (row[k - 1] if levels[-1][k] else "")
+        names = ["_".join(filter(None, level_names)) for level_names in zip(*levels, strict=True)]
+        if not _names_all(names):
+            return None
+        lines = [number for number, _ in written]
+        self.notes.append(
+            f"the names of the columns are those of the lines {', '.join(map(str, lines))}, joined by _"
+        )
+        return names, units and [cell.strip("[]()") for cell in units], data, lines[-1]
 
     def _refuse_numbers_before(self, names: int) -> None:
         """Raise DataDamaged if rows of numbers that may be a part of the data come before the row `names`."""
@@ -513,6 +543,11 @@ def _can_be_names(row: Sequence[str], width: int, texts: Sequence[set[str]]) -> 
         and (2 * len(set(named)) > len(named) or _are_units(cells))
         and not any(cell in texts[k] for k, cell in enumerate(cells) if cell)
     )
+
+
+def _names_all(row: Sequence[str]) -> bool:
+    """Return whether a row has a different name for each column; an index, as the first one, may have none."""
+    return len(set(row)) == len(row) and all(row[1:])
 
 
 def _are_units(row: Sequence[str]) -> bool:
