@@ -122,6 +122,11 @@ class CsvColumns:
             self._numbers = columns_of_numbers({name: self._without_unit(name) for name in self.cells})
         return self._numbers
 
+    def numbers_or_none(self, name: str) -> Numbers | None:
+        """Return the numbers of a column, NaN where missing and also infinite; None if a cell is another text."""
+        numbers = self._read_numbers()[name]
+        return None if isinstance(numbers, NotNumbers) else numbers
+
     def has_numbers(self, name: str) -> bool:
         """Return whether half of the cells of a column are numbers: a few may be so by chance, as those of hashes."""
         number = self._read_numbers()[name]
