@@ -382,6 +382,32 @@ def test_a_table_of_trials_is_read_by_the_same_rules(lines, tmp_path):
     assert labelled.table.values[:, 0].tolist() == [k % 5 + 0.25 for k in range(12)]
 
 
+@every_case(
+    "lines",
+    [
+        # Levels of pandas, and merged cells of a spreadsheet, with and without an index and units.
+        ["what,pad,pad", ",p,q", *TRIALS],
+        [",what,pad,pad", ",,p,q", *(f"{k},{trial}" for k, trial in enumerate(TRIALS))],
+        ["what,pad,", ",p,q", ",N,N", *TRIALS],
+    ],
+)
+def test_names_in_several_lines_are_joined(lines, tmp_path):
+    labelled = trials(tmp_path, lines)
+    assert [name.rpartition("_")[2] for name in labelled.table.names] == ["p", "q"]
+    assert labelled.labels == ("a", "b") * 6
+
+
+def test_points_that_can_separate_thousands_are_told_in_a_table_with_semicolons(tmp_path):
+    lines = [f"{'ab'[k % 2]};{k % 5};{12 + 7 * k % 11}.{107 * k % 900 + 100}" for k in range(12)]
+    told = [note for note in trials(tmp_path, ["what;p;q", *lines]).notes if "thousands" in note]
+    assert len(told) == 1
+    for others in (
+        ["what,p,q", *(line.replace(";", ",") for line in lines)],
+        ["what;p;q", *lines, "a;0.5;12.000"],
+    ):
+        assert not [note for note in trials(tmp_path, others).notes if "thousands" in note]
+
+
 def test_words_for_a_missing_number_are_labels(tmp_path):
     lines = ["what,p,q", *(trial.replace("a,", "none,").replace("b,", "NA,") for trial in TRIALS)]
     assert trials(tmp_path, lines).labels == ("none", "NA") * 6

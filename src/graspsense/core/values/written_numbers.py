@@ -154,6 +154,21 @@ def columns_of_numbers(columns: Mapping[str, Sequence[str]]) -> dict[str, Number
     }
 
 
+def with_three_decimals(columns: Mapping[str, Sequence[str]]) -> list[str]:
+    """Return the columns that can have points between thousands, if no number of the file has other decimals.
+
+    >>> with_three_decimals({"N": ["12.008", "9.500"], "mm": ["4", "5"]}), with_three_decimals({"N": ["12.008", "0.5"]})
+    (['N'], [])
+    """
+    names = []
+    for name, cells in columns.items():
+        with_mark = [cell for cell in cells if ("." in cell or "," in cell) and is_number(cell)]
+        if not all(map(_POINT_GROUPS.fullmatch, with_mark)):
+            return []
+        names += [name] if with_mark else []
+    return names
+
+
 @frozen(eq=False)
 class _Fit:
     """The notations that every cell of a column fits, and the numbers in the notation with points if all are plain."""
@@ -179,7 +194,7 @@ def _common(cells: Sequence[str]) -> _Fit | NotNumbers:
             continue
         fits = _notations(cell)
         if not fits:
-            return NotNumbers(row, cell, "which is not a number")
+            return NotNumbers(row, cell, "which is not a number; a missing one is an empty cell")
         common &= fits
     return _Fit(common) if common else _mixed(cells)
 

@@ -54,6 +54,15 @@ SPREADSHEETS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"PAR1", b"ARROW1")
 """The first bytes of a ZIP file, as which spreadsheets are saved, of those of old programs, and of Apache's tables."""
 _CODE_PAGES: Final = ("cp1252", "cp1250", "iso8859-1", "iso8859-15")
 """They agree on degrees, micro and the letters of several languages."""
+_ZEROS: Final = (
+    ([False, False, True, True], "utf-32"),
+    ([True, True, False, False], "utf-32"),
+    ([False, True, True, True], "utf-32-le"),
+    ([True, True, True, False], "utf-32-be"),
+    ([False, True, False, True], "utf-16-le"),
+    ([True, False, True, False], "utf-16-be"),
+)
+"""Which of the first bytes are zero in an encoding with as many bytes for each letter, and letters of English first."""
 _WITH_UNIT: Final = re.compile(r"(.*[0-9.])\s*([^\s0-9]+)")
 _SAMPLED: Final = 400
 """Lines from which the separator and the kinds of the columns are found."""
@@ -80,6 +89,7 @@ class TextTable:
     notes: tuple[str, ...] = ()
     named_in: int = 0
     """The line with the names, 0 if there is none."""
+    separator: str = ""
 
 
 def read_lines(path: Path) -> tuple[list[Line], bool]:
@@ -157,6 +167,7 @@ class _Layout:
             lines=tuple(number for number, _ in rows),
             notes=tuple(self.notes),
             named_in=line,
+            separator=self.separator,
         )
 
     def _rows(self, lines: Sequence[Line]) -> Iterator[Row]:
@@ -264,9 +275,7 @@ class _Layout:
             )
         return self.rows[names][1], units, data if units else names + 1, self.rows[names][0]
 
-    def _joined_names(
-        self, data: int, width: int
-    ) -> tuple[list[str], list[str] | None, int, int] | None:
+    def _joined_names(self, data: int, width: int) -> tuple[list[str], list[str] | None, int, int] | None:
         """Return the names that several lines before the numbers have together, None if the last of them has all.
 
         pandas writes each level of its names in a line, and a spreadsheet a merged cell once, with blanks behind it.
@@ -274,15 +283,23 @@ class _Layout:
         written = [row for row in self.rows[:data] if len(row[1]) == width and sum(map(bool, row[1])) > 1]
         units = written.pop()[1] if written and _are_units(written[-1][1]) else None
         levels = [list(row) for _, row in written]
-        if len(levels) < 2 or any(map(is_number, chain(*levels))) or any(map(_names_all, levels)):
+        has_first = any(row[0] for row in levels)
+        named = any(_names_all(row) and (row[0] or not has_first) for row in levels)
+        if len(levels) < 2 or named or any(map(is_number, chain(*levels))):
             return None
-        lowest = [cell for cell in levels[-1] if cell]
-        if len(set(lowest)) == len(lowest):
+        *upper, lowest = levels
+        given = [cell for cell in lowest if cell]
+        if len(set(given)) < len(given):
+            for row in upper:
+                for k in range(1, width):
+                    row[k] = row[k] or (row[k - 1] if lowest[k] else "")
+        else:
+            upper = [
+                ["" if below else cell for cell, below in zip(row, lowest, strict=True)] for row in upper
+            ]
+        names = ["_".join(filter(None, parts)) for parts in zip(*upper, lowest, strict=True)]
+        if names == lowest:
             return None
-        for row in levels[:-1]:
-            for k in range(1, width):
-                row[k] = row[k] or (row[k - 1] if levels[-1][k] else "")
-        names = ["_".join(filter(None, level_names)) for level_names in zip(*levels, strict=True)]
         if not _names_all(names):
             return None
         lines = [number for number, _ in written]
@@ -614,16 +631,20 @@ def text_of(path: Path) -> str:
 
 
 def _decoded(path: Path, data: bytes) -> str:
-    """Return the text of bytes in UTF-8, in UTF-16 with its mark, or in a code page if those of Europe agree on it.
+    """Return the text of bytes in UTF-8, UTF-16 or UTF-32, or in a code page if those of Europe agree on it.
 
     Raises DataDamaged.
     """
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+    start = [byte == 0 for byte in data[:4]]
+    unicode = next((encoding for zeros, encoding in _ZEROS if zeros == start[: len(zeros)]), "")
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")) and unicode != "utf-32":
+        unicode = "utf-16"
+    if unicode:
         try:
-            return data.decode("utf-16")
+            return data.decode(unicode)
         except UnicodeDecodeError as error:
             raise DataDamaged(
-                f"{path} begins as UTF-16, and is none: {error.reason}. Save it as UTF-8"
+                f"{path} begins as {unicode.upper()}, and is none: {error.reason}. Save it as UTF-8"
             ) from None
     try:
         return data.decode("utf-8-sig")

@@ -77,9 +77,12 @@ def read_labelled(
     Raises ConfigError if a column does not exist or cannot be a label, DataDamaged if the file is not a valid table.
     """
     columns = columns_of_file(path)
-    notes = list(columns.notes)
     export = exported(columns)
     label = label or columns.default_label or ("label" if export is not None else None)
+    columns.take_words_as_missing(
+        [name for name in columns.names if name not in {label, instance or "instance", order}]
+    )
+    notes = list(columns.notes)
     if export is not None:
         export.keep_complete_trials(label if value is None else None, notes)
         features = features or export.features
@@ -208,7 +211,8 @@ def _target(columns: CsvColumns, value: str, export: ExportedTable | None, notes
 def read_table(path: Path, names: Sequence[str]) -> tuple[FeatureTable, tuple[str, ...]]:
     """Return these columns of a CSV file, and what was left out of it. Raises ConfigError, DataDamaged."""
     columns = columns_of_file(path)
-    return columns.table(list(names)), tuple(columns.notes)
+    columns.take_words_as_missing(names)
+    return columns.table(list(names)), (*columns.notes, *columns.unknown_values(names))
 
 
 def columns_of_file(path: Path) -> CsvColumns:
@@ -308,6 +312,7 @@ def _feature_table(
     for name in features:
         if name in columns.cells and (why := identified(name)):
             notes.append(f"{name} is used, although its values {why}: it may reveal the labels")
+    notes += columns.unknown_values(table.names)
     _note_uninformative_columns(columns.path, table, notes)
     return table
 

@@ -108,8 +108,9 @@ def _is_mean_or_sum(lines: Numbers, line: Numbers) -> bool:
     for number, error, values in zip(line.tolist(), errors.tolist(), lines.T, strict=True):
         step = float(np.diff(np.unique(values)).min())
         place = (number - float(values[0])) / step
-        # A mean has more digits than the trials. One that has not may be equal to a trial's.
-        chance *= min(1.0, (step if abs(place - round(place)) < _ON_GRID else 2.0 * error) / float(np.std(values)))
+        # A mean has more digits than the trials, and a sum is larger. Another number may be equal to a trial's.
+        alike = abs(place - round(place)) < _ON_GRID and values.min() <= number <= values.max()
+        chance *= min(1.0, (step if alike else 2.0 * error) / float(np.std(values)))
     return chance < _BY_CHANCE
 
 
