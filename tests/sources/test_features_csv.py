@@ -131,13 +131,13 @@ def test_a_word_in_several_cells_of_a_column_of_numbers_counts_as_missing(csv):
         GOOD.replace(",7\n", ",OL\n", 1),
         GOOD.replace(",7\n", ",OL\n", 2).replace(",6\n", ",UL\n", 2),
     ):
-        with pytest.raises(DataDamaged, match="'OL'|'UL'"):
+        with pytest.raises(DataDamaged, match=r"'OL'|'UL'"):
             read_labelled(csv(text), "what")
 
 
 def test_values_of_a_nominal_column_that_a_model_does_not_know_are_told(csv):
     path = csv(
-        "what,colour,p\n" + "".join(f"{'ab'[i % 2]},{'red blue Red'.split()[i % 3]},{i}\n" for i in range(9))
+        "what,colour,p\n" + "".join(f"{'ab'[i % 2]},{('red', 'blue', 'Red')[i % 3]},{i}\n" for i in range(9))
     )
     table, notes = read_table(path, ["colour=red", "colour=blue", "p"])
     assert np.isnan(table.values[:, 0]).tolist() == [False, False, True] * 3

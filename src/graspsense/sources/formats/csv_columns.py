@@ -135,7 +135,7 @@ class CsvColumns:
         return self._numbers
 
     def take_words_as_missing(self, names: Iterable[str]) -> None:
-        """Take a word as missing, with a note, that is the only one in one of these columns of numbers, several times."""
+        """Take a word that repeats in one of these columns of numbers, and is its only one, as missing; note it."""
         for name in names:
             if (
                 name in self.cells

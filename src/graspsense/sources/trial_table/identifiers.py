@@ -196,13 +196,14 @@ def text_identifies(texts: Sequence[str], labels: Sequence[str]) -> str:
         or (len(counts) > 2 and all(map(_WORDS_OF_DATES.fullmatch, lower)))
     ):
         return "are dates or times"
-    values, known = [text for text, _ in given], [label for _, label in given]
+    values = [text for text, _ in given]
+    known = groups_of_labels(values, [label for _, label in given])
     if name_objects(values, known):
         return NAME_OBJECTS
     if len(counts) > max(2, len(given) * _MOST_VALUES):
         return "are texts that hardly repeat, as names of trials, files and remarks do"
     numbered = all(re.search(r"\d", text) for text in counts)
-    if numbered and _enough_objects(len(counts), known) and len(set(given)) == len(counts):
+    if numbered and _enough_objects(len(counts), known) and len(set(known)) > 1:
         return NAME_OBJECTS
     return ""
 
@@ -355,6 +356,21 @@ def name_objects(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
     in_blocks = sum(1 for _ in groupby(values)) == objects
     alike = fewer <= max(_ENDS, among) or are_even([*counts.values()])
     return most > 1 and (alike or (in_blocks and min(counts.values()) > 1))
+
+
+def groups_of_labels(values: Sequence[Hashable], labels: Sequence[str]) -> list[str]:
+    """Return for each line a label that stands for all those that share values with its own one.
+
+    >>> groups_of_labels(["can1", "can1", "jar1", "jar1"], ["full can", "empty can", "full jar", "empty jar"])
+    ['full can', 'full can', 'full jar', 'full jar']
+    """
+    group = {label: label for label in labels}
+    first: dict[Hashable, str] = {}
+    for value, label in dict.fromkeys(zip(values, labels, strict=True)):
+        kept, joined = group[first.setdefault(value, label)], group[label]
+        if kept != joined:
+            group = {name: kept if of == joined else of for name, of in group.items()}
+    return [group[label] for label in labels]
 
 
 def are_even(counts: Sequence[int]) -> bool:
