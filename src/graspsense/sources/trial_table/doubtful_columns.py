@@ -228,9 +228,9 @@ def _probabilities(numbers: dict[str, Numbers], labels: Sequence[str]) -> Iterat
         group = names[first : first + n]
         values = np.array([numbers[name] for name in group])
         sums = values.sum(axis=0)
-        if n > 1 and (values >= 0.0).all() and (np.abs(sums - 1.0) <= _ROUNDED_SUM).all():
-            if mostly_says_the_label(values.argmax(axis=0).tolist(), labels):
-                yield from group
+        shares = n > 1 and (values >= 0.0).all() and (np.abs(sums - 1.0) <= _ROUNDED_SUM).all()
+        if shares and mostly_says_the_label(values.argmax(axis=0).tolist(), labels):
+            yield from group
 
 
 def _of_target(values: Numbers, target: Numbers) -> Iterator[str]:
@@ -303,20 +303,22 @@ def digits_tell_labels(values: Numbers, labels: Sequence[str]) -> bool:
 def values_have_one_label(values: Sequence[str] | Sequence[float], labels: Sequence[str]) -> bool:
     """Return whether several lines have each value, all with one label, and there are more values than labels.
 
-    Labels that share values count as one, as those of an object that is open or closed. Numbers of a label that have a
+    Labels that share texts count as one, as those of an object that is open or closed. Numbers of a label that have a
     range of their own are measured, unless each has about as many lines.
     """
     given = [pair for pair in zip(values, labels, strict=True) if pair[0] != "" and pair[0] == pair[0]]
     different = Counter(value for value, _ in given)
     if not different or _OFTEN * len(different) > len(given):
         return False
-    groups = groups_of_labels([value for value, _ in given], [label for _, label in given])
-    among = len(set(groups))
-    if not 1 < among < len(different):
+    texts = isinstance(given[0][0], str)
+    if texts:
+        known = groups_of_labels([value for value, _ in given], [label for _, label in given])
+        given = [(value, group) for (value, _), group in zip(given, known, strict=True)]
+    among = len({label for _, label in given})
+    if not among < len(different) == len(set(given)):
         return False
-    pairs = sorted(zip([value for value, _ in given], groups, strict=True))
-    ranges = sum(1 for _ in groupby(pairs, key=itemgetter(1)))
-    return isinstance(given[0][0], str) or ranges > among or are_even([*different.values()])
+    ranges = sum(1 for _ in groupby(sorted(given), key=itemgetter(1)))
+    return texts or ranges > among or are_even([*different.values()])
 
 
 def in_one_block_each(values: Sequence[str], labels: Sequence[str]) -> bool:

@@ -203,7 +203,7 @@ def text_identifies(texts: Sequence[str], labels: Sequence[str]) -> str:
     if len(counts) > max(2, len(given) * _MOST_VALUES):
         return "are texts that hardly repeat, as names of trials, files and remarks do"
     numbered = all(re.search(r"\d", text) for text in counts)
-    if numbered and _enough_objects(len(counts), known) and len(set(known)) > 1:
+    if numbered and _enough_objects(len(counts), known) and len(set(zip(values, known, strict=True))) == len(counts):
         return NAME_OBJECTS
     return ""
 
@@ -361,6 +361,8 @@ def name_objects(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
 def groups_of_labels(values: Sequence[Hashable], labels: Sequence[str]) -> list[str]:
     """Return for each line a label that stands for all those that share values with its own one.
 
+    The labels are returned as they are if only one value is shared by those of a group, or if all share some.
+
     >>> groups_of_labels(["can1", "can1", "jar1", "jar1"], ["full can", "empty can", "full jar", "empty jar"])
     ['full can', 'full can', 'full jar', 'full jar']
     """
@@ -370,7 +372,9 @@ def groups_of_labels(values: Sequence[Hashable], labels: Sequence[str]) -> list[
         kept, joined = group[first.setdefault(value, label)], group[label]
         if kept != joined:
             group = {name: kept if of == joined else of for name, of in group.items()}
-    return [group[label] for label in labels]
+    several = Counter(group[label] for label in first.values())
+    apart = len(several) > 1 and min(several.values()) > 1
+    return [group[label] if apart else label for label in labels]
 
 
 def are_even(counts: Sequence[int]) -> bool:
