@@ -81,6 +81,8 @@ VARIANTS = {
     "decimal commas": [HEADER.replace(",", ";"), *DECIMAL_COMMAS],
     "a semicolon in a text": ["t,pos,f1,f2,note", *(row + ",a;b" for row in ROWS)],
     "pipes": [line.replace(",", "|") for line in [HEADER, *ROWS]],
+    "names of numpy.savetxt with another sign": ["# t,pos,f1,f2", *(row.replace(",", " ") for row in ROWS)],
+    "names with another sign": [HEADER.replace(",", ";"), *ROWS],
     "two spaces": [line.replace(",", "  ") for line in [HEADER, *ROWS]],
     "numpy with names and units": ["# t pos f1 f2", "# s mm N N", *(row.replace(",", " ") for row in ROWS)],
     "MATLAB": ["% MATLAB", *(line.replace(";", " ") for line in ["t;pos;f1;f2", *DECIMAL_COMMAS])],

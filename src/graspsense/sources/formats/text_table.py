@@ -44,6 +44,7 @@ _SINGLE_UNITS: Final = frozenset("smgNVACK%\u00b0")
 """Units of one sign behind a number: in the other case, or as `12-`, it can be a factor or a sign of its own."""
 _LINE_ENDS: Final = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
 """The characters at which `str.splitlines` divides a text."""
+_SEPARATORS: Final = (";", "\t", ",", "|", " ")
 _COMMENTS: Final = ("#", "%")
 _RULE: Final = re.compile(r"(?=.*[-_=]{3})[-_=+|:\s]+")
 """A line of signs below the names, or around a table."""
@@ -200,6 +201,11 @@ class _Layout:
         """Return the names, the units if a line has them, the first row behind both, and the line of the names."""
         sample = _sample([row for _, row in self.rows])
         width = max(Counter(map(len, sample)).items(), key=lambda item: (item[1], item[0]))[0]
+        if (
+            len(self.rows[0][1]) == 1 < width
+            and len(names := self._cells(self.rows[0][1][0], width)) == width
+        ):
+            self.rows[0] = (self.rows[0][0], names)
         sample = sample[: max(2, _SAMPLED_CELLS // width)]
         numeric = _numeric_columns(sample, width)
         data = next((k for k, (_, row) in enumerate(self.rows) if _is_data(row, width, numeric)), None)
@@ -327,7 +333,9 @@ class _Layout:
 
         Units stand in the comment behind the names. None if the last comment, but for units, has no names.
         """
-        above = [(number, self._cells(line)) for number, line in self.comments if number < self.rows[0][0]]
+        above = [
+            (number, self._cells(line, width)) for number, line in self.comments if number < self.rows[0][0]
+        ]
         units = None
         if len(above) > 1 and len(above[-1][1]) == width and _are_units(above[-1][1]):
             units = [cell.strip("[]()") for cell in above.pop()[1]]
@@ -337,11 +345,14 @@ class _Layout:
         named = len(cells) == width and len(set(cells)) == width and not any(map(is_number, cells))
         return (number, cells, units) if named and all(cells) else None
 
-    def _cells(self, comment: str) -> list[str]:
+    def _cells(self, comment: str, width: int) -> list[str]:
+        """Return the names in a text, which may separate so many of them by another sign than the rows do."""
         text = comment.strip().lstrip("#% ")
-        return (
-            _words(text) if self.separator == " " else [cell.strip() for cell in text.split(self.separator)]
-        )
+        for separator in dict.fromkeys((self.separator, *_SEPARATORS)):
+            cells = _words(text) if separator == " " else [cell.strip() for cell in text.split(separator)]
+            if len(cells) == width:
+                break
+        return cells
 
     def _without_repeats(
         self, rows: list[Row], names: Sequence[str], units: Sequence[str] | None
@@ -495,7 +506,7 @@ def _separator(lines: Sequence[str]) -> str:
     It gives most lines the same number of cells, and the first line as many if any does. In a single column it is a
     sign that no text has: the name may have spaces.
     """
-    widths = {separator: _width(lines, separator) for separator in (";", "\t", ",", "|", " ")}
+    widths = {separator: _width(lines, separator) for separator in _SEPARATORS}
     agreeing = {separator: count for separator, (width, count) in widths.items() if width > 1}
     if agreeing.get(" ", 0) >= agreeing.get(",", 1) and _commas_are_within_numbers(lines):
         agreeing.pop(",", None)

@@ -203,7 +203,11 @@ def text_identifies(texts: Sequence[str], labels: Sequence[str]) -> str:
     if len(counts) > max(2, len(given) * _MOST_VALUES):
         return "are texts that hardly repeat, as names of trials, files and remarks do"
     numbered = all(re.search(r"\d", text) for text in counts)
-    if numbered and _enough_objects(len(counts), known) and len(set(zip(values, known, strict=True))) == len(counts):
+    if (
+        numbered
+        and _enough_objects(len(counts), known)
+        and len(set(zip(values, known, strict=True))) == len(counts)
+    ):
         return NAME_OBJECTS
     return ""
 
@@ -363,8 +367,9 @@ def groups_of_labels(values: Sequence[Hashable], labels: Sequence[str]) -> list[
 
     The labels are returned as they are if only one value is shared by those of a group, or if all share some.
 
-    >>> groups_of_labels(["can1", "can1", "jar1", "jar1"], ["full can", "empty can", "full jar", "empty jar"])
-    ['full can', 'full can', 'full jar', 'full jar']
+    >>> things, labels = ["can1", "can1", "can2", "jar1", "jar2", "jar2"], ["can", "lid", "can", "jar", "jar", "cap"]
+    >>> groups_of_labels(things, labels)
+    ['can', 'can', 'can', 'jar', 'jar', 'jar']
     """
     group = {label: label for label in labels}
     first: dict[Hashable, str] = {}
