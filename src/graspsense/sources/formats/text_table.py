@@ -18,7 +18,7 @@ from typing import Any, Final
 
 from attrs import frozen
 
-from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.core.values.errors import ConfigError, DataDamaged, listed
 from graspsense.core.values.limits import CELLS, COLUMNS, LINE_CHARACTERS, TEXT_BYTES
 from graspsense.core.values.written_numbers import is_missing, is_number
 from graspsense.recording.readable import not_opened, readable, refuse_devices
@@ -271,7 +271,7 @@ class _Layout:
             if k + 1 < data and _are_units(self.rows[k + 1][1]) and {*range(k + 2, data)} <= {*able}
         ]
         names = (with_units or able[-1:])[0]
-        units = [cell.strip("[]()") for cell in self.rows[names + 1][1]] if with_units else None
+        units = _without_brackets(self.rows[names + 1][1]) if with_units else None
         if names:
             self._refuse_numbers_before(names)
             skipped = [number for number, _ in self.rows[:names]]
@@ -304,15 +304,13 @@ class _Layout:
                 ["" if below else cell for cell, below in zip(row, lowest, strict=True)] for row in upper
             ]
         names = ["_".join(filter(None, parts)) for parts in zip(*upper, lowest, strict=True)]
-        if names == lowest:
-            return None
-        if not _names_all(names):
+        if names == lowest or not _names_all(names):
             return None
         lines = [number for number, _ in written]
         self.notes.append(
-            f"the names of the columns are those of the lines {', '.join(map(str, lines))}, joined by _"
+            f"the names of the columns are those of the lines {listed([*map(str, lines)])}, joined by _"
         )
-        return names, units and [cell.strip("[]()") for cell in units], data, lines[-1]
+        return names, units and _without_brackets(units), data, lines[-1]
 
     def _refuse_numbers_before(self, names: int) -> None:
         """Raise DataDamaged if rows of numbers that may be a part of the data come before the row `names`."""
@@ -338,7 +336,7 @@ class _Layout:
         ]
         units = None
         if len(above) > 1 and len(above[-1][1]) == width and _are_units(above[-1][1]):
-            units = [cell.strip("[]()") for cell in above.pop()[1]]
+            units = _without_brackets(above.pop()[1])
         if not above:
             return None
         number, cells = above[-1]
@@ -363,7 +361,7 @@ class _Layout:
         if not again or all(map(is_number, header)):
             return rows
         self.notes.append(_lines_words(again, "repeated headers"))
-        return [row for row in rows if row[1] != header and [cell.strip("[]()") for cell in row[1]] != units]
+        return [row for row in rows if row[1] != header and _without_brackets(row[1]) != units]
 
     def _without_texts(self, rows: list[Row], width: int) -> list[Row]:
         """Return the rows without lines that are one text, as a device prints them between its numbers."""
@@ -571,6 +569,10 @@ def _can_be_names(row: Sequence[str], width: int, texts: Sequence[set[str]]) -> 
         and (2 * len(set(named)) > len(named) or _are_units(cells))
         and not any(cell in texts[k] for k, cell in enumerate(cells) if cell)
     )
+
+
+def _without_brackets(units: Sequence[str]) -> list[str]:
+    return [unit.strip("[]()") for unit in units]
 
 
 def _names_all(row: Sequence[str]) -> bool:

@@ -224,8 +224,8 @@ def _of_numbers(name: str, unit: str, values: Numbers, labels: Sequence[str]) ->
 def _probabilities(numbers: dict[str, Numbers], labels: Sequence[str]) -> Iterator[str]:
     """Yield as many neighbouring columns as there are labels that are what a model said of each of them."""
     names, n = [*numbers], len(set(labels))
-    for first in range(len(names) - n + 1):
-        group = names[first : first + n]
+    for begin in range(len(names) - n + 1):
+        group = names[begin : begin + n]
         values = np.array([numbers[name] for name in group])
         sums = values.sum(axis=0)
         shares = n > 1 and (values >= 0.0).all() and (np.abs(sums - 1.0) <= _ROUNDED_SUM).all()

@@ -372,12 +372,12 @@ def groups_of_labels(values: Sequence[Hashable], labels: Sequence[str]) -> list[
     ['can', 'can', 'can', 'jar', 'jar', 'jar']
     """
     group = {label: label for label in labels}
-    first: dict[Hashable, str] = {}
+    label_of: dict[Hashable, str] = {}
     for value, label in dict.fromkeys(zip(values, labels, strict=True)):
-        kept, joined = group[first.setdefault(value, label)], group[label]
+        kept, joined = group[label_of.setdefault(value, label)], group[label]
         if kept != joined:
-            group = {name: kept if of == joined else of for name, of in group.items()}
-    several = Counter(group[label] for label in first.values())
+            group = {name: kept if head == joined else head for name, head in group.items()}
+    several = Counter(group[label] for label in label_of.values())
     apart = len(several) > 1 and min(several.values()) > 1
     return [group[label] if apart else label for label in labels]
 

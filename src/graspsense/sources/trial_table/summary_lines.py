@@ -86,8 +86,8 @@ def _computed(columns: CsvColumns) -> range:
         return any(_is_mean_or_sum(numbers[lines], numbers[i]) for lines in (range(i), *alike))
 
     able = range(n - 1, max(n // 2, n - _MOST_LAST) - 1, -1) if finite else range(0)
-    last = (first for first in able if any(_is_mean_or_sum(numbers[:first], row) for row in numbers[first:]))
-    begin = next(last, n)
+    begins = (k for k in able if any(_is_mean_or_sum(numbers[:k], row) for row in numbers[k:]))
+    begin = next(begins, n)
     while begin - 1 in able and is_computed(begin - 1):
         begin -= 1
     return range(begin, n)
@@ -102,7 +102,9 @@ def _is_mean_or_sum(lines: Numbers, line: Numbers) -> bool:
     lines, line = lines[:, used], line[used]
     digits = [Decimal(repr(number)).normalize().as_tuple().exponent for number in line.tolist()]
     errors = np.maximum(_ROUNDING * np.abs(line), 0.5 * 10.0 ** np.array(digits, dtype=np.float64))
-    if not any((np.abs(line - of(lines, axis=0)) <= 1.001 * errors).all() for of in (np.mean, np.sum)):
+    if not any(
+        (np.abs(line - statistic(lines, axis=0)) <= 1.001 * errors).all() for statistic in (np.mean, np.sum)
+    ):
         return False
     chance = 1.0
     for number, error, values in zip(line.tolist(), errors.tolist(), lines.T, strict=True):
