@@ -147,8 +147,9 @@ def test_values_of_a_nominal_column_that_a_model_does_not_know_are_told(csv):
 
 def test_a_table_with_a_line_for_each_feature_is_refused(csv):
     lines = [f"{k},{'ab'[k % 2]},{name},{k}.5" for k in range(12) for name in ("peak", "width")]
-    with pytest.raises(DataDamaged, match="one line per trial"):
-        read_labelled(csv("\n".join(["trial,what,variable,value", *lines, ""])), "what")
+    for names in ("variable,value", "Merkmal,Wert"):
+        with pytest.raises(DataDamaged, match="one line per trial"):
+            read_labelled(csv("\n".join([f"trial,what,{names}", *lines, ""])), "what")
 
 
 def test_a_table_that_is_repeated_gives_the_notes_of_its_lines(csv):

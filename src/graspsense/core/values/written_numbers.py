@@ -218,10 +218,10 @@ def _read(cells: Sequence[str], fit: _Fit, of_file: int) -> Numbers | NotNumbers
     if common & POINT:
         # `1.500` is 1500 where all other columns have decimal commas, and beside 975 and 1.000.
         grouped = common & COMMA and any("." in cell for cell in cells)
-        able = _nearer(cells) | (of_file & COMMA) if grouped else POINT
-        if able == POINT or (able == POINT | COMMA and of_file == THOUSANDS):
+        likely = _nearer(cells) | (of_file & COMMA) if grouped else POINT
+        if likely == POINT or (likely == POINT | COMMA and of_file == THOUSANDS):
             return _values(cells, POINT) if fit.values is None else fit.values
-        if not of_file & THOUSANDS and (able == COMMA or of_file):
+        if not of_file & THOUSANDS and (likely == COMMA or of_file):
             return _values(cells, COMMA)
     elif (common == THOUSANDS and of_file & COMMA) or _one_mark_of_two(cells):
         pass

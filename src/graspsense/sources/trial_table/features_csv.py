@@ -48,9 +48,11 @@ SMALL: Final = 1e-3
 """A column that varies by less than this has few values that differ by J48's 1e-5."""
 _ROUNDING: Final = 1e-13
 """Variation relative to the largest value that is only rounding, and no measurement, as in C4.5 trees."""
-_QUANTITY: Final = frozenset(
-    {"variable", "quantity", "parameter", "feature", "measure", "measurement", "metric"}
-)
+_QUANTITY: Final = frozenset({
+    "variable", "quantity", "parameter", "feature", "measure", "measurement", "metric", "attribute",
+    "merkmal", "gr\u00f6\u00dfe", "messgr\u00f6\u00dfe", "kennwert", "grandeur", "magnitud", "grandezza",
+})  # fmt: skip
+_VALUE: Final = frozenset({"value", "values", "val", "wert", "messwert", "valeur", "valor", "valore"})
 LARGEST_WHOLE: Final = 2.0**53
 """From here on, not every whole number is a number of the computer."""
 
@@ -158,10 +160,10 @@ def _identifying(
 
 
 def _refuse_long_form(columns: CsvColumns) -> None:
-    """Raise DataDamaged if a column names what the number in a column `value` is, so that a trial has several lines."""
+    """Raise DataDamaged if a column names what the number in another one is, so that a trial has several lines."""
     names = {name.lower(): name for name in columns.names}
     quantity = next((names[word] for word in _QUANTITY if word in names), None)
-    if quantity and columns.is_nominal(quantity) and {"value", "values"} & names.keys():
+    if quantity and columns.is_nominal(quantity) and _VALUE & names.keys():
         raise DataDamaged(
             f"{columns.path} has a line for each {quantity} of a trial: write one line per trial, with a column for "
             f"each {quantity}"
