@@ -373,6 +373,7 @@ def trials(folder, lines, **given):
         [",what,p,q", *(f"{(5 * k) % 12},{trial}" for k, trial in enumerate(TRIALS))],
         ["sep=,", "what,p,q", *TRIALS],
         ["made by a program", "", "what,p,q", *TRIALS],
+        ["sheet of Ann", "what,p,q", *TRIALS],
         ["what,p,q", *(trial.replace(".5", "00.5") for trial in TRIALS)],
         ["what\tp\tq", *(f"{'ab'[k % 2]}\t{k % 5 + 0.25}\t{250 * k * k % 3700:,}" for k in range(12))],
     ],
@@ -397,6 +398,10 @@ def test_names_in_several_lines_are_joined(lines, tmp_path):
     labelled = trials(tmp_path, lines)
     assert [name.rpartition("_")[2] for name in labelled.table.names] == ["p", "q"]
     assert labelled.labels == ("a", "b") * 6
+
+
+def test_a_first_trial_without_numbers_has_no_names(tmp_path):
+    assert trials(tmp_path, ["what,p,q", "a,NA,NA", *TRIALS]).labels == ("a", *"ab" * 6)
 
 
 def test_points_that_can_separate_thousands_are_told_in_a_table_with_semicolons(tmp_path):

@@ -344,13 +344,15 @@ class _Layout:
         return (number, cells, units) if named and all(cells) else None
 
     def _cells(self, comment: str, width: int) -> list[str]:
-        """Return the names in a text, which may separate so many of them by another sign than the rows do."""
+        """Return the names in a text, which may separate so many words by another sign than the rows do."""
         text = comment.strip().lstrip("#% ")
-        for separator in dict.fromkeys((self.separator, *_SEPARATORS)):
-            cells = _words(text) if separator == " " else [cell.strip() for cell in text.split(separator)]
-            if len(cells) == width:
-                break
-        return cells
+        for separator in _SEPARATORS[:-1]:
+            cells = [cell.strip() for cell in text.split(separator)]
+            if len(cells) == width and (
+                separator == self.separator or not any(" " in cell for cell in cells)
+            ):
+                return cells
+        return _words(text) if self.separator == " " else text.split(self.separator)
 
     def _without_repeats(
         self, rows: list[Row], names: Sequence[str], units: Sequence[str] | None
@@ -565,7 +567,7 @@ def _can_be_names(row: Sequence[str], width: int, texts: Sequence[set[str]]) -> 
     return (
         width - 1 <= len(cells) <= width
         and len(named) >= max(len(cells) - 1, 1)
-        and not any(map(is_number, named))
+        and not any(is_number(cell) or (is_missing(cell) and cell.strip("-.?\u2013\u2014")) for cell in named)
         and (2 * len(set(named)) > len(named) or _are_units(cells))
         and not any(cell in texts[k] for k, cell in enumerate(cells) if cell)
     )
