@@ -201,11 +201,9 @@ class _Layout:
         """Return the names, the units if a line has them, the first row behind both, and the line of the names."""
         sample = _sample([row for _, row in self.rows])
         width = max(Counter(map(len, sample)).items(), key=lambda item: (item[1], item[0]))[0]
-        if (
-            len(self.rows[0][1]) == 1 < width
-            and len(names := self._cells(self.rows[0][1][0], width)) == width
-        ):
-            self.rows[0] = (self.rows[0][0], names)
+        if len(self.rows[0][1]) == 1 < width:
+            divided = self._cells(self.rows[0][1][0], width)
+            self.rows[0] = (self.rows[0][0], divided if len(divided) == width else self.rows[0][1])
         sample = sample[: max(2, _SAMPLED_CELLS // width)]
         numeric = _numeric_columns(sample, width)
         data = next((k for k, (_, row) in enumerate(self.rows) if _is_data(row, width, numeric)), None)

@@ -78,12 +78,7 @@ def read_labelled(
 
     Raises ConfigError if a column does not exist or cannot be a label, DataDamaged if the file is not a valid table.
     """
-    columns = columns_of_file(path)
-    export = exported(columns)
-    label = label or columns.default_label or ("label" if export is not None else None)
-    columns.take_words_as_missing(
-        [name for name in columns.names if name not in {label, instance or "instance", order}]
-    )
+    columns, export, label = _opened(path, label, {instance or "instance", order})
     notes = list(columns.notes)
     if export is not None:
         export.keep_complete_trials(label if value is None else None, notes)
@@ -120,6 +115,17 @@ def read_labelled(
         notes=tuple(notes),
         provenance={"simulated": export is not None and "1" in columns.cells["simulated"]},
     )
+
+
+def _opened(
+    path: Path, label: str | None, others: set[str | None]
+) -> tuple[CsvColumns, ExportedTable | None, str | None]:
+    """Return the columns of a file, the same if they were exported, and the label; `others` are no features."""
+    columns = columns_of_file(path)
+    export = exported(columns)
+    label = label or columns.default_label or ("label" if export is not None else None)
+    columns.take_words_as_missing([name for name in columns.names if name not in {label, *others}])
+    return columns, export, label
 
 
 def _recording(columns: CsvColumns, instance: str | None, others: Sequence[str]) -> dict[str, Any]:
