@@ -22,6 +22,8 @@ def numbers(*cells, **others):
         (["975", "1,000", "2,475"], [975, 1000, 2475]),
         (["975", "1.000", "2.475"], [975, 1000, 2475]),
         (["0", "250", "-1.500"], [0, 250, -1500]),
+        (["975", "1.203", "12.008", "inf"], [975, 1203, 12008, math.inf]),
+        (["12", "1.203", "12.008"], [12, 1.203, 12.008]),
         (["100", "99.875", "0"], [100, 99.875, 0]),
         (["0", "1.500"], [0, 1.5]),
         (["0", "1,234,567", "12.5"], [0, 1234567, 12.5]),
@@ -76,6 +78,8 @@ def test_the_other_columns_decide_what_a_column_alone_does_not():
     assert numbers("1.500", "2.000", other=["49,5", "1"]).tolist() == [1500, 2000]
     assert numbers("1.500", "2.000").tolist() == [1.5, 2.0]
     assert isinstance(numbers("975", "1.000", other=["0.01", "1"]), NotNumbers)
+    assert isinstance(numbers("50", "1.203"), NotNumbers)
+    assert numbers("50", "1.203", other=["0.01", "1"]).tolist() == [50, 1.203]
     assert numbers("6,002", "999.9").tolist() == [6002, 999.9]
     assert numbers("1,234.567", "1,250", "0.125").tolist() == [1234.567, 1250, 0.125]
     assert isinstance(numbers("7,756", "6.002"), NotNumbers)

@@ -64,14 +64,14 @@ def test_what_cannot_be_read_says_where_and_why(csv, content, error, said):
         read_labelled(csv("").with_name("nothing.csv"), "what")
 
 
-@every_case("encoding", ["utf-16", "utf-16-be", "latin-1", "cp1252"])
+@every_case("encoding", ["utf-16", "utf-16-be", "utf-16-le", "utf-32", "utf-32-le", "latin-1", "cp1252"])
 def test_a_table_in_another_encoding_is_the_same_table(csv, encoding):
     text = GOOD.replace("b,", "öffner,").replace("f_steady", "f_steady [µm]")
-    mark = b"\xfe\xff" if encoding == "utf-16-be" else b""
-    read = read_labelled(csv(mark + text.encode(encoding)), "what")
     expected = read_labelled(csv(text.encode()), "what")
-    assert (read.labels, read.table.units) == (expected.labels, expected.table.units)
-    assert read.table.values.tolist() == expected.table.values.tolist()
+    for mark in ("\ufeff", "") if "-be" in encoding or "-le" in encoding else ("",):
+        read = read_labelled(csv((mark + text).encode(encoding)), "what")
+        assert (read.labels, read.table.units) == (expected.labels, expected.table.units)
+        assert read.table.values.tolist() == expected.table.values.tolist()
 
 
 def test_a_unit_in_every_cell_is_that_of_the_column_and_labels_keep_theirs(csv):
@@ -120,10 +120,36 @@ def test_a_table_without_labels(csv):
     assert (trials.names, trials.values[0].tolist()) == (("f_steady", "p_first"), [6.0, 0.05])
 
 
+def test_a_word_in_several_cells_of_a_column_of_numbers_counts_as_missing(csv):
+    """But not in the column of the label, and not if it stands there once, or is one of several."""
+    path = csv(GOOD.replace(",7\n", ",OL\n", 2).replace("a,", "1,").replace("b,", "no,"))
+    trials = read_labelled(path, "what")
+    assert np.isnan(trials.table.values[:, 1]).tolist() == [False, True, False, True, *[False] * 4]
+    assert trials.classes == ("1", "no")
+    assert any("'OL'" in note for note in trials.notes)
+    for text in (
+        GOOD.replace(",7\n", ",OL\n", 1),
+        GOOD.replace(",7\n", ",OL\n", 2).replace(",6\n", ",UL\n", 2),
+    ):
+        with pytest.raises(DataDamaged, match=r"'OL'|'UL'"):
+            read_labelled(csv(text), "what")
+
+
+def test_values_of_a_nominal_column_that_a_model_does_not_know_are_told(csv):
+    path = csv(
+        "what,colour,p\n" + "".join(f"{'ab'[i % 2]},{('red', 'blue', 'Red')[i % 3]},{i}\n" for i in range(9))
+    )
+    table, notes = read_table(path, ["colour=red", "colour=blue", "p"])
+    assert np.isnan(table.values[:, 0]).tolist() == [False, False, True] * 3
+    assert [note for note in notes if "3 trials" in note and "'Red' and 'red'" in note]
+    assert read_table(path, ["colour=red", "colour=blue", "colour=Red"])[1] == ()
+
+
 def test_a_table_with_a_line_for_each_feature_is_refused(csv):
     lines = [f"{k},{'ab'[k % 2]},{name},{k}.5" for k in range(12) for name in ("peak", "width")]
-    with pytest.raises(DataDamaged, match="one line per trial"):
-        read_labelled(csv("\n".join(["trial,what,variable,value", *lines, ""])), "what")
+    for names in ("variable,value", "Merkmal,Wert"):
+        with pytest.raises(DataDamaged, match="one line per trial"):
+            read_labelled(csv("\n".join([f"trial,what,{names}", *lines, ""])), "what")
 
 
 def test_a_table_that_is_repeated_gives_the_notes_of_its_lines(csv):
@@ -155,6 +181,13 @@ def test_objects_that_a_column_names_are_held_out_unless_a_column_is_named(csv):
     assert read_labelled(path, "what").instances == tuple(things)
     assert read_labelled(path, "what", instance="second").instances == tuple(turns)
     assert read_labelled(path, "what", features=["thing", "force"]).instances is None
+    # Six things of either kind, each open and closed.
+    states = [f"{kind} {'open' if i % 2 else 'closed'}" for i, kind in enumerate(kinds)]
+    assert read_labelled(table(states, things, turns, forces), "what").instances == tuple(things)
+    assert (
+        read_labelled(table(states, [f"n{i % 5}" for i in range(24)], turns, forces), "what").instances
+        is None
+    )
     # Two columns name the objects: which of them is meant, only the user knows.
     assert (
         read_labelled(table(kinds, things, [thing.upper() for thing in things], forces), "what").instances
@@ -165,6 +198,8 @@ def test_objects_that_a_column_names_are_held_out_unless_a_column_is_named(csv):
 HEAD, *TRIALS = GOOD.strip().splitlines()
 ANNOTATED = [f"{line},x" for line in TRIALS]
 STATISTICS = ["mean", "Total", "Average:", "std", "median", "Summe", "Std. Dev."]
+UNEVEN = [f"{'ab'[k % 2]},{k * 0.137 % 1:.3f},{k * k * 0.313 % 7:.3f}" for k in range(8)]
+MEANS = [sum(float(line.split(",")[k]) for line in UNEVEN) / 8 for k in (1, 2)]
 OBJECTS = [f"{k},{what},{k * 0.31 % 1:.3f}" for what in ("can", "jar") for k in range(6)]
 
 
@@ -177,6 +212,10 @@ OBJECTS = [f"{k},{what},{k * 0.31 % 1:.3f}" for what in ("can", "jar") for k in 
         *(([HEAD, *TRIALS[:k], "a mean,0.05,6", "mean (b),0.05,6", *TRIALS[k:]], "abababab") for k in (0, 8)),
         ([HEAD, *TRIALS[:3], "a mean,0.05,6", *TRIALS[3:]], "abababab"),
         *(([HEAD, *TRIALS[:k], "Summary,,", "mean,0.05,6", "N,8,8", *TRIALS[k:]], "abababab") for k in (0, 8)),
+        # Means and sums are known by their numbers, under any name, and so are the lines below them.
+        *(([HEAD, *UNEVEN, f"{word},{times * MEANS[0]:.5f},{times * MEANS[1]:.4f}", "b,0.1,0.1"], "abababab")
+          for word in ("a", "", "\u5e73\u5747") for times in (1, 8)),
+        ([HEAD, *UNEVEN, "b,0.5,2.25"], "ababababb"),
         # A trial without values, or with the remark `max`, is one.
         ([f"{HEAD},x", *ANNOTATED[:3], f"{TRIALS[3]},max", "a,,,", "c,,,", "c,,,", *ANNOTATED[4:]], "ababaccabab"),
         # Levels of filling are no quartiles.

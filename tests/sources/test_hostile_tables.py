@@ -148,7 +148,7 @@ def test_every_limit_is_documented():
     [
         b"label,x\na,\x001\n",
         "label,x\na,1\n".encode("utf-16")[:-1],
-        "label,x\na,1\n".encode("utf-32"),
+        "label,x\na,1\n".encode("utf-32")[:-1],
         "label,x\nж,1\n".encode("cp1251"),
         b'label,x\na,"' + b"1" * 200_000 + b'"\n',
         b"",

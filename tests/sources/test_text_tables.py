@@ -81,6 +81,8 @@ VARIANTS = {
     "decimal commas": [HEADER.replace(",", ";"), *DECIMAL_COMMAS],
     "a semicolon in a text": ["t,pos,f1,f2,note", *(row + ",a;b" for row in ROWS)],
     "pipes": [line.replace(",", "|") for line in [HEADER, *ROWS]],
+    "names of numpy.savetxt with another sign": ["# t,pos,f1,f2", *(row.replace(",", " ") for row in ROWS)],
+    "names with another sign": [HEADER.replace(",", ";"), *ROWS],
     "two spaces": [line.replace(",", "  ") for line in [HEADER, *ROWS]],
     "numpy with names and units": ["# t pos f1 f2", "# s mm N N", *(row.replace(",", " ") for row in ROWS)],
     "MATLAB": ["% MATLAB", *(line.replace(";", " ") for line in ["t;pos;f1;f2", *DECIMAL_COMMAS])],
@@ -371,6 +373,7 @@ def trials(folder, lines, **given):
         [",what,p,q", *(f"{(5 * k) % 12},{trial}" for k, trial in enumerate(TRIALS))],
         ["sep=,", "what,p,q", *TRIALS],
         ["made by a program", "", "what,p,q", *TRIALS],
+        ["sheet of Ann", "what,p,q", *TRIALS],
         ["what,p,q", *(trial.replace(".5", "00.5") for trial in TRIALS)],
         ["what\tp\tq", *(f"{'ab'[k % 2]}\t{k % 5 + 0.25}\t{250 * k * k % 3700:,}" for k in range(12))],
     ],
@@ -380,6 +383,36 @@ def test_a_table_of_trials_is_read_by_the_same_rules(lines, tmp_path):
     assert labelled.table.names == ("p", "q")
     assert labelled.labels == ("a", "b") * 6
     assert labelled.table.values[:, 0].tolist() == [k % 5 + 0.25 for k in range(12)]
+
+
+@every_case(
+    "lines",
+    [
+        # Levels of pandas, and merged cells of a spreadsheet, with and without an index and units.
+        ["what,pad,pad", ",p,q", *TRIALS],
+        [",what,pad,pad", ",,p,q", *(f"{k},{trial}" for k, trial in enumerate(TRIALS))],
+        ["what,pad,", ",p,q", ",N,N", *TRIALS],
+    ],
+)
+def test_names_in_several_lines_are_joined(lines, tmp_path):
+    labelled = trials(tmp_path, lines)
+    assert [name.rpartition("_")[2] for name in labelled.table.names] == ["p", "q"]
+    assert labelled.labels == ("a", "b") * 6
+
+
+def test_a_first_trial_without_numbers_has_no_names(tmp_path):
+    assert trials(tmp_path, ["what,p,q", "a,NA,NA", *TRIALS]).labels == ("a", *"ab" * 6)
+
+
+def test_points_that_can_separate_thousands_are_told_in_a_table_with_semicolons(tmp_path):
+    lines = [f"{'ab'[k % 2]};{k % 5};{12 + 7 * k % 11}.{107 * k % 900 + 100}" for k in range(12)]
+    told = [note for note in trials(tmp_path, ["what;p;q", *lines]).notes if "thousands" in note]
+    assert len(told) == 1
+    for others in (
+        ["what,p,q", *(line.replace(";", ",") for line in lines)],
+        ["what;p;q", *lines, "a;0.5;12.000"],
+    ):
+        assert not [note for note in trials(tmp_path, others).notes if "thousands" in note]
 
 
 def test_words_for_a_missing_number_are_labels(tmp_path):

@@ -12,6 +12,7 @@ from graspsense.core.values.errors import listed
 MISSING_LABELS: Final = frozenset({"", "nan", "?"})
 """What stands for a missing label. `none`, `null` and `NA` are labels."""
 _WHOLE: Final = re.compile(r"(?<![^:#])([-+]?[0-9]+)[.,]0+(?![^:#])")
+_SCIENTIFIC: Final = re.compile(r"[-+]?[0-9]\.[0-9]+[eE][-+]0[0-9]")
 
 _JOINTS: Final = re.compile(
     r"(?<=[^\W\d])[\s_\-\u2010-\u2015:/.]+(?=\w)|(?<=\w)[\s_\-\u2010-\u2015:/.]+(?=[^\W\d])|(?<=\s)\s+"
@@ -35,6 +36,8 @@ def label_text(text: str) -> str:
 
     >>> label_text("cafe\u0301\u200b "), label_text("1.0"), label_text("can:1.0"), label_text("1.5")
     ('café', '1', 'can:1', '1.5')
+    >>> label_text("2.000000e+00"), label_text("2.5e+00")  # as numpy and MATLAB write numbers
+    ('2', '2.5e+00')
     """
     if not isinstance(text, str):
         raise TypeError(f"a label or an instance is text, not {text!r}")
@@ -44,7 +47,10 @@ def label_text(text: str) -> str:
             sign for sign in _FILLERS.sub("", text) if unicodedata.category(sign) not in ("Cf", "Cc")
         )
         text = "".join(" " if unicodedata.category(sign) == "Zs" else sign for sign in text)
-    return _WHOLE.sub(r"\1", text.strip())
+    text = text.strip()
+    if _SCIENTIFIC.fullmatch(text) and float(text).is_integer():
+        return f"{float(text):.0f}"
+    return _WHOLE.sub(r"\1", text)
 
 
 def spelled_alike(texts: Iterable[str]) -> list[tuple[str, str]]:

@@ -27,6 +27,9 @@ COMMA: Final = 4
 HEXADECIMAL: Final = 8
 """`0x7D0`, beside `0` at most: any other number can be a hexadecimal one without its sign."""
 _FEW: Final = 3
+_THOUSAND: Final = 1000.0
+_MUCH: Final = math.log(10.0)
+"""Logarithm of how many times farther away a number is than another one that is much nearer."""
 _EVERY: Final = POINT | THOUSANDS | COMMA
 _NOTATIONS: Final = (POINT, THOUSANDS, COMMA)
 
@@ -151,6 +154,21 @@ def columns_of_numbers(columns: Mapping[str, Sequence[str]]) -> dict[str, Number
     }
 
 
+def with_three_decimals(columns: Mapping[str, Sequence[str]]) -> list[str]:
+    """Return the columns that can have points between thousands, if no number of the file has other decimals.
+
+    >>> with_three_decimals({"N": ["12.008", "9.500"], "mm": ["4", "5"]}), with_three_decimals({"N": ["12.008", "0.5"]})
+    (['N'], [])
+    """
+    names = []
+    for name, cells in columns.items():
+        with_mark = [cell for cell in cells if ("." in cell or "," in cell) and is_number(cell)]
+        if not all(map(_POINT_GROUPS.fullmatch, with_mark)):
+            return []
+        names += [name] if with_mark else []
+    return names
+
+
 @frozen(eq=False)
 class _Fit:
     """The notations that every cell of a column fits, and the numbers in the notation with points if all are plain."""
@@ -176,7 +194,7 @@ def _common(cells: Sequence[str]) -> _Fit | NotNumbers:
             continue
         fits = _notations(cell)
         if not fits:
-            return NotNumbers(row, cell, "which is not a number")
+            return NotNumbers(row, cell, "which is not a number; a missing one is an empty cell")
         common &= fits
     return _Fit(common) if common else _mixed(cells)
 
@@ -200,16 +218,17 @@ def _read(cells: Sequence[str], fit: _Fit, of_file: int) -> Numbers | NotNumbers
     if common & POINT:
         # `1.500` is 1500 where all other columns have decimal commas, and beside 975 and 1.000.
         grouped = common & COMMA and any("." in cell for cell in cells)
-        if not grouped or not (of_file & COMMA or _signs_of_thousands(cells, ".") == 2):
+        likely = _nearer(cells) | (of_file & COMMA) if grouped else POINT
+        if likely == POINT or (likely == POINT | COMMA and of_file == THOUSANDS):
             return _values(cells, POINT) if fit.values is None else fit.values
-        if not of_file & THOUSANDS:
+        if not of_file & THOUSANDS and (likely == COMMA or of_file):
             return _values(cells, COMMA)
     elif (common == THOUSANDS and of_file & COMMA) or _one_mark_of_two(cells):
         pass
     elif common == THOUSANDS | COMMA:
         if of_file == COMMA:
             return _values(cells, COMMA)
-        if of_file == THOUSANDS or _signs_of_thousands(cells, ",") > 0:
+        if of_file == THOUSANDS or _tells_thousands(cells):
             return _values(cells, THOUSANDS)
     else:
         return _values(cells, common)
@@ -222,16 +241,32 @@ def _read(cells: Sequence[str], fit: _Fit, of_file: int) -> Numbers | NotNumbers
     )
 
 
-def _signs_of_thousands(cells: Sequence[str], mark: str) -> int:
-    """Return how many of two signs tell that marks before three digits separate thousands: 0 to 2.
+def _nearer(cells: Sequence[str]) -> int:
+    """Return POINT, COMMA or both: in which the largest number without a mark is much nearer to one with a point.
+
+    A program that writes three decimals writes them in every cell, so that 950 beside 1.203 is hardly 950.000.
+    """
+    sizes = [(cell, abs(_number(cell, POINT))) for cell in cells if not is_missing(cell)]
+    sizes = [(cell, size) for cell, size in sizes if 0.0 < size < math.inf]
+    with_point = [size for cell, size in sizes if "." in cell]
+    plain = max((size for cell, size in sizes if "." not in cell), default=0.0)
+    if plain == 0.0 or not with_point:
+        return POINT
+    ones, thousands = (
+        min(abs(math.log(factor * size / plain)) for size in with_point) for factor in (1.0, _THOUSAND)
+    )
+    return (POINT if ones < thousands + _MUCH else 0) | (COMMA if thousands < ones + _MUCH else 0)
+
+
+def _tells_thousands(cells: Sequence[str]) -> bool:
+    """Return whether a sign tells that commas before three digits separate thousands.
 
     A program that writes three decimals writes them in every cell, and one that leaves out zeros leaves out the last.
     """
-    plain = [cell for cell in cells if mark not in cell and not is_missing(cell)]
-    if not plain:
-        return 0
-    return any(cell.endswith("0") for cell in cells if mark in cell) + any(
-        len(cell.lstrip("+-\u2212")) == 3 for cell in plain
+    plain = [cell for cell in cells if "," not in cell and not is_missing(cell)]
+    return bool(plain) and (
+        any(cell.endswith("0") for cell in cells if "," in cell)
+        or any(len(cell.lstrip("+-\u2212")) == 3 for cell in plain)
     )
 
 

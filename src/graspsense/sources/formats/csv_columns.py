@@ -6,7 +6,8 @@ A name can be followed by its unit: `p_first [m]`. A first column without a name
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Sequence
 from copy import copy
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Self
@@ -15,11 +16,17 @@ import numpy as np
 
 from graspsense.core.files.csv_text import text_of_cell
 from graspsense.core.learn.target_value import name_and_unit
-from graspsense.core.values.errors import ConfigError, DataDamaged, listed, suggestion
+from graspsense.core.values.errors import ConfigError, DataDamaged, counted, listed, suggestion
 from graspsense.core.values.features import FeatureTable
-from graspsense.core.values.label_text import is_missing_label
+from graspsense.core.values.label_text import alike_words, is_missing_label, spelled_alike
 from graspsense.core.values.nominal import splits_of, value_name
-from graspsense.core.values.written_numbers import NotNumbers, columns_of_numbers, is_missing, is_number
+from graspsense.core.values.written_numbers import (
+    NotNumbers,
+    columns_of_numbers,
+    is_missing,
+    is_number,
+    with_three_decimals,
+)
 from graspsense.core.values.written_times import seconds_since_first
 from graspsense.sources.formats.text_table import numbers_with_unit, read_lines, table_of
 
@@ -70,6 +77,11 @@ class CsvColumns:
             self.names.append(name)
             self.cells[name] = [text_of_cell(cell) for cell in column]
             self.units[name] = unit or unit_of_line or numbers_with_unit(self.cells[name])[1]
+        if table.separator == ";" and (doubtful := with_three_decimals(self.cells)):
+            self.notes += (
+                f"the point in {listed(doubtful)} is taken for that of decimals. If it separates thousands, leave it "
+                "out of the numbers",
+            )
         self._numbers: dict[str, Numbers | NotNumbers] | None = None
         self.levels: dict[str, tuple[str, ...]] = {}
 
@@ -121,6 +133,29 @@ class CsvColumns:
         if self._numbers is None:
             self._numbers = columns_of_numbers({name: self._without_unit(name) for name in self.cells})
         return self._numbers
+
+    def take_words_as_missing(self, names: Iterable[str]) -> None:
+        """Take a word that repeats in one of these columns of numbers, and is its only one, as missing; note it."""
+        for name in names:
+            if (
+                name in self.cells
+                and name not in self.levels
+                and self.numbers_or_none(name) is None
+                and self.has_numbers(name)
+            ):
+                cells = self._without_unit(name)
+                words = [cell for cell in cells if not (is_missing(cell) or is_number(cell))]
+                if len(words) > 1 == len(set(words)) and not re.search(r"\d", words[0]):
+                    self.cells[name] = ["" if cell == words[0] else cell for cell in cells]
+                    self.notes += (
+                        f"{words[0]!r} in {counted(len(words), 'cell')} of {name} counts as missing",
+                    )
+                    self._numbers = None
+
+    def numbers_or_none(self, name: str) -> Numbers | None:
+        """Return the numbers of a column, NaN where missing and also infinite; None if a cell is another text."""
+        numbers = self._read_numbers()[name]
+        return None if isinstance(numbers, NotNumbers) else numbers
 
     def has_numbers(self, name: str) -> bool:
         """Return whether half of the cells of a column are numbers: a few may be so by chance, as those of hashes."""
@@ -176,9 +211,7 @@ class CsvColumns:
     def table(self, names: Sequence[str]) -> FeatureTable:
         """Return these columns as a table of numbers. Raises ConfigError, DataDamaged."""
         wanted = [self._nominal_value(name) for name in names]
-        known: dict[str, set[str]] = {}
-        for column, value in filter(None, wanted):
-            known.setdefault(column, set()).add(value)
+        known = _values_by_column(wanted)
         values = np.array(
             [
                 self.numbers(name) if column is None else self._is_value(*column, known[column[0]])
@@ -192,6 +225,20 @@ class CsvColumns:
             values=values.reshape(len(self), len(names)),
         )
 
+    def unknown_values(self, names: Sequence[str]) -> list[str]:
+        """Return notes on nominal columns that have other values than these names of features know."""
+        notes = []
+        for column, known in _values_by_column([self._nominal_value(name) for name in names]).items():
+            unknown = [text for text in self.texts(column) if text and text not in known]
+            if unknown:
+                alike = alike_words(spelled_alike([*unknown, *known]))
+                notes.append(
+                    f"{column} counts as missing in {counted(len(unknown), 'trial')}: only "
+                    f"{listed(sorted(known))} is known of it, and not {listed(sorted(set(unknown)))}"
+                    + (f" (differing in spelling only: {alike})" if alike else "")
+                )
+        return notes
+
     def _nominal_value(self, name: str) -> tuple[str, str] | None:
         """Return the nominal column and the value that a name such as `colour=red` means; None for another name."""
         if name in self.cells:
@@ -201,3 +248,10 @@ class CsvColumns:
     def _is_value(self, column: str, value: str, known: set[str]) -> list[float]:
         """Return 1 where a nominal column has this value, NaN where it has none of those that are known."""
         return [float(text == value) if text in known else math.nan for text in self.texts(column)]
+
+
+def _values_by_column(wanted: Sequence[tuple[str, str] | None]) -> dict[str, set[str]]:
+    known: dict[str, set[str]] = {}
+    for column, value in filter(None, wanted):
+        known.setdefault(column, set()).add(value)
+    return known

@@ -12,12 +12,13 @@ import json
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any, Final
 
 from attrs import frozen
 
-from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.core.values.errors import ConfigError, DataDamaged, listed
 from graspsense.core.values.limits import CELLS, COLUMNS, LINE_CHARACTERS, TEXT_BYTES
 from graspsense.core.values.written_numbers import is_missing, is_number
 from graspsense.recording.readable import not_opened, readable, refuse_devices
@@ -43,6 +44,7 @@ _SINGLE_UNITS: Final = frozenset("smgNVACK%\u00b0")
 """Units of one sign behind a number: in the other case, or as `12-`, it can be a factor or a sign of its own."""
 _LINE_ENDS: Final = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
 """The characters at which `str.splitlines` divides a text."""
+_SEPARATORS: Final = (";", "\t", ",", "|", " ")
 _COMMENTS: Final = ("#", "%")
 _RULE: Final = re.compile(r"(?=.*[-_=]{3})[-_=+|:\s]+")
 """A line of signs below the names, or around a table."""
@@ -53,6 +55,15 @@ SPREADSHEETS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"PAR1", b"ARROW1")
 """The first bytes of a ZIP file, as which spreadsheets are saved, of those of old programs, and of Apache's tables."""
 _CODE_PAGES: Final = ("cp1252", "cp1250", "iso8859-1", "iso8859-15")
 """They agree on degrees, micro and the letters of several languages."""
+_ZEROS: Final = (
+    ([False, False, True, True], "utf-32"),
+    ([True, True, False, False], "utf-32"),
+    ([False, True, True, True], "utf-32-le"),
+    ([True, True, True, False], "utf-32-be"),
+    ([False, True, False, True], "utf-16-le"),
+    ([True, False, True, False], "utf-16-be"),
+)
+"""Which of the first bytes are zero in an encoding with as many bytes for each letter, and letters of English first."""
 _WITH_UNIT: Final = re.compile(r"(.*[0-9.])\s*([^\s0-9]+)")
 _SAMPLED: Final = 400
 """Lines from which the separator and the kinds of the columns are found."""
@@ -79,6 +90,7 @@ class TextTable:
     notes: tuple[str, ...] = ()
     named_in: int = 0
     """The line with the names, 0 if there is none."""
+    separator: str = ""
 
 
 def read_lines(path: Path) -> tuple[list[Line], bool]:
@@ -156,6 +168,7 @@ class _Layout:
             lines=tuple(number for number, _ in rows),
             notes=tuple(self.notes),
             named_in=line,
+            separator=self.separator,
         )
 
     def _rows(self, lines: Sequence[Line]) -> Iterator[Row]:
@@ -188,6 +201,9 @@ class _Layout:
         """Return the names, the units if a line has them, the first row behind both, and the line of the names."""
         sample = _sample([row for _, row in self.rows])
         width = max(Counter(map(len, sample)).items(), key=lambda item: (item[1], item[0]))[0]
+        if len(self.rows[0][1]) == 1 < width:
+            divided = self._cells(self.rows[0][1][0], width)
+            self.rows[0] = (self.rows[0][0], divided if len(divided) == width else self.rows[0][1])
         sample = sample[: max(2, _SAMPLED_CELLS // width)]
         numeric = _numeric_columns(sample, width)
         data = next((k for k, (_, row) in enumerate(self.rows) if _is_data(row, width, numeric)), None)
@@ -227,6 +243,8 @@ class _Layout:
         self, data: int, width: int, numeric: frozenset[int]
     ) -> tuple[list[str], list[str] | None, int, int]:
         """Return the same where `data` rows come before the numbers. Raises DataDamaged if none of them has names."""
+        if joined := self._joined_names(data, width):
+            return joined
         texts = [
             set() if k in numeric else {row[k] for _, row in self.rows[data:] if k < len(row)}
             for k in range(width)
@@ -251,7 +269,7 @@ class _Layout:
             if k + 1 < data and _are_units(self.rows[k + 1][1]) and {*range(k + 2, data)} <= {*able}
         ]
         names = (with_units or able[-1:])[0]
-        units = [cell.strip("[]()") for cell in self.rows[names + 1][1]] if with_units else None
+        units = _without_brackets(self.rows[names + 1][1]) if with_units else None
         if names:
             self._refuse_numbers_before(names)
             skipped = [number for number, _ in self.rows[:names]]
@@ -260,6 +278,37 @@ class _Layout:
                 + _lines_words(skipped, "lines before them")
             )
         return self.rows[names][1], units, data if units else names + 1, self.rows[names][0]
+
+    def _joined_names(self, data: int, width: int) -> tuple[list[str], list[str] | None, int, int] | None:
+        """Return the names that several lines before the numbers have together, None if the last of them has all.
+
+        pandas writes each level of its names in a line, and a spreadsheet a merged cell once, with blanks behind it.
+        """
+        written = [row for row in self.rows[:data] if len(row[1]) == width and sum(map(bool, row[1])) > 1]
+        units = written.pop()[1] if written and _are_units(written[-1][1]) else None
+        levels = [list(row) for _, row in written]
+        has_first = any(row[0] for row in levels)
+        named = any(_names_all(row) and (row[0] or not has_first) for row in levels)
+        if len(levels) < 2 or named or any(map(is_number, chain(*levels))):
+            return None
+        *upper, lowest = levels
+        given = [cell for cell in lowest if cell]
+        if len(set(given)) < len(given):
+            for row in upper:
+                for k in range(1, width):
+                    row[k] = row[k] or (row[k - 1] if lowest[k] else "")
+        else:
+            upper = [
+                ["" if below else cell for cell, below in zip(row, lowest, strict=True)] for row in upper
+            ]
+        names = ["_".join(filter(None, parts)) for parts in zip(*upper, lowest, strict=True)]
+        if names == lowest or not _names_all(names):
+            return None
+        lines = [number for number, _ in written]
+        self.notes.append(
+            f"the names of the columns are those of the lines {listed([*map(str, lines)])}, joined by _"
+        )
+        return names, units and _without_brackets(units), data, lines[-1]
 
     def _refuse_numbers_before(self, names: int) -> None:
         """Raise DataDamaged if rows of numbers that may be a part of the data come before the row `names`."""
@@ -280,21 +329,28 @@ class _Layout:
 
         Units stand in the comment behind the names. None if the last comment, but for units, has no names.
         """
-        above = [(number, self._cells(line)) for number, line in self.comments if number < self.rows[0][0]]
+        above = [
+            (number, self._cells(line, width)) for number, line in self.comments if number < self.rows[0][0]
+        ]
         units = None
         if len(above) > 1 and len(above[-1][1]) == width and _are_units(above[-1][1]):
-            units = [cell.strip("[]()") for cell in above.pop()[1]]
+            units = _without_brackets(above.pop()[1])
         if not above:
             return None
         number, cells = above[-1]
         named = len(cells) == width and len(set(cells)) == width and not any(map(is_number, cells))
         return (number, cells, units) if named and all(cells) else None
 
-    def _cells(self, comment: str) -> list[str]:
+    def _cells(self, comment: str, width: int) -> list[str]:
+        """Return the names in a text, which may separate so many words by another sign than the rows do."""
         text = comment.strip().lstrip("#% ")
-        return (
-            _words(text) if self.separator == " " else [cell.strip() for cell in text.split(self.separator)]
-        )
+        for separator in _SEPARATORS[:-1]:
+            cells = [cell.strip() for cell in text.split(separator)]
+            if len(cells) == width and (
+                separator == self.separator or not any(" " in cell for cell in cells)
+            ):
+                return cells
+        return _words(text) if self.separator == " " else text.split(self.separator)
 
     def _without_repeats(
         self, rows: list[Row], names: Sequence[str], units: Sequence[str] | None
@@ -305,7 +361,7 @@ class _Layout:
         if not again or all(map(is_number, header)):
             return rows
         self.notes.append(_lines_words(again, "repeated headers"))
-        return [row for row in rows if row[1] != header and [cell.strip("[]()") for cell in row[1]] != units]
+        return [row for row in rows if row[1] != header and _without_brackets(row[1]) != units]
 
     def _without_texts(self, rows: list[Row], width: int) -> list[Row]:
         """Return the rows without lines that are one text, as a device prints them between its numbers."""
@@ -448,7 +504,7 @@ def _separator(lines: Sequence[str]) -> str:
     It gives most lines the same number of cells, and the first line as many if any does. In a single column it is a
     sign that no text has: the name may have spaces.
     """
-    widths = {separator: _width(lines, separator) for separator in (";", "\t", ",", "|", " ")}
+    widths = {separator: _width(lines, separator) for separator in _SEPARATORS}
     agreeing = {separator: count for separator, (width, count) in widths.items() if width > 1}
     if agreeing.get(" ", 0) >= agreeing.get(",", 1) and _commas_are_within_numbers(lines):
         agreeing.pop(",", None)
@@ -509,10 +565,19 @@ def _can_be_names(row: Sequence[str], width: int, texts: Sequence[set[str]]) -> 
     return (
         width - 1 <= len(cells) <= width
         and len(named) >= max(len(cells) - 1, 1)
-        and not any(map(is_number, named))
+        and not any(is_number(cell) or (is_missing(cell) and cell.strip("-.?\u2013\u2014")) for cell in named)
         and (2 * len(set(named)) > len(named) or _are_units(cells))
         and not any(cell in texts[k] for k, cell in enumerate(cells) if cell)
     )
+
+
+def _without_brackets(units: Sequence[str]) -> list[str]:
+    return [unit.strip("[]()") for unit in units]
+
+
+def _names_all(row: Sequence[str]) -> bool:
+    """Return whether a row has a different name for each column; an index, as the first one, may have none."""
+    return len(set(row)) == len(row) and all(row[1:])
 
 
 def _are_units(row: Sequence[str]) -> bool:
@@ -579,16 +644,20 @@ def text_of(path: Path) -> str:
 
 
 def _decoded(path: Path, data: bytes) -> str:
-    """Return the text of bytes in UTF-8, in UTF-16 with its mark, or in a code page if those of Europe agree on it.
+    """Return the text of bytes in UTF-8, UTF-16 or UTF-32, or in a code page if those of Europe agree on it.
 
     Raises DataDamaged.
     """
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+    start = [byte == 0 for byte in data[:4]]
+    unicode = next((encoding for zeros, encoding in _ZEROS if zeros == start[: len(zeros)]), "")
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")) and unicode != "utf-32":
+        unicode = "utf-16"
+    if unicode:
         try:
-            return data.decode("utf-16")
+            return data.decode(unicode)
         except UnicodeDecodeError as error:
             raise DataDamaged(
-                f"{path} begins as UTF-16, and is none: {error.reason}. Save it as UTF-8"
+                f"{path} begins as {unicode.upper()}, and is none: {error.reason}. Save it as UTF-8"
             ) from None
     try:
         return data.decode("utf-8-sig")

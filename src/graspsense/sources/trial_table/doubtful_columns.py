@@ -24,6 +24,7 @@ from graspsense.sources.trial_table.identifiers import (
     are_even,
     can_be_days,
     follow_lines,
+    groups_of_labels,
     groups_trials,
     is_count,
     is_time,
@@ -71,6 +72,8 @@ _ROUNDED: Final = 6
 """Most digits of a number that is taken for a rounded one."""
 _MOSTLY: Final = 0.75
 """Share of the lines of each label from which on a value may be the setting that this label was recorded with."""
+_ROUNDED_SUM: Final = 0.02
+"""Largest error of a sum of probabilities."""
 _ENOUGH_LINES: Final = 30
 _USUAL: Final = 2.0
 """Largest step between two labels over the median step within labels."""
@@ -92,8 +95,12 @@ _DOUBTS: Final[Mapping[str, tuple[str, str]]] = {
         "most trials of each label have the same one of its few values",
         "If it is a setting of the experiment, or a prediction, it reveals the labels: ",
     ),
+    "probabilities": (
+        "these are between 0 and 1, their sum is 1, and most trials of each label have the largest one in one of them",
+        "If a model said so, it reveals the labels: ",
+    ),
     "one label": (
-        "each of its values occurs with one label only",
+        "each of its values occurs with one label only, or with labels that no other shares",
         "If it names sessions, devices or objects, or was measured once for each, it reveals the labels: ",
     ),
     "blocks": (
@@ -163,11 +170,13 @@ def doubts(
             )
         for reason in reasons:
             doubted.setdefault(reason, []).append(name)
+    if target is None:
+        doubted["probabilities"] = [*_probabilities(numbers, labels)]
     leave_out = f"leave it out ({option('features', python='columns')})"
     notes = [
         f"used, although {what}: {listed(doubted[reason])}. {advice}{leave_out}"
         for reason, (what, advice) in _DOUBTS.items()
-        if reason in doubted
+        if doubted.get(reason)
     ]
     return notes + _mixed(numbers) + list(_pads_apart(numbers))
 
@@ -210,6 +219,18 @@ def _of_numbers(name: str, unit: str, values: Numbers, labels: Sequence[str]) ->
         yield "without a gap"
     if digits_tell_labels(values, labels):
         yield "digits"
+
+
+def _probabilities(numbers: dict[str, Numbers], labels: Sequence[str]) -> Iterator[str]:
+    """Yield as many neighbouring columns as there are labels that are what a model said of each of them."""
+    names, n = [*numbers], len(set(labels))
+    for begin in range(len(names) - n + 1):
+        group = names[begin : begin + n]
+        values = np.array([numbers[name] for name in group])
+        sums = values.sum(axis=0)
+        shares = n > 1 and (values >= 0.0).all() and (np.abs(sums - 1.0) <= _ROUNDED_SUM).all()
+        if shares and mostly_says_the_label(values.argmax(axis=0).tolist(), labels):
+            yield from group
 
 
 def _of_target(values: Numbers, target: Numbers) -> Iterator[str]:
@@ -282,14 +303,22 @@ def digits_tell_labels(values: Numbers, labels: Sequence[str]) -> bool:
 def values_have_one_label(values: Sequence[str] | Sequence[float], labels: Sequence[str]) -> bool:
     """Return whether several lines have each value, all with one label, and there are more values than labels.
 
-    Numbers of a label that have a range of their own are measured, unless each has about as many lines.
+    Labels that share texts count as one, as those of an object that is open or closed. Numbers of a label that have a
+    range of their own are measured, unless each has about as many lines.
     """
     given = [pair for pair in zip(values, labels, strict=True) if pair[0] != "" and pair[0] == pair[0]]
-    different, among = Counter(value for value, _ in given), len(set(labels))
-    if not among < len(different) == len(set(given)) or _OFTEN * len(different) > len(given):
+    different = Counter(value for value, _ in given)
+    if not different or _OFTEN * len(different) > len(given):
+        return False
+    texts = isinstance(given[0][0], str)
+    if texts:
+        known = groups_of_labels([value for value, _ in given], [label for _, label in given])
+        given = [(value, group) for (value, _), group in zip(given, known, strict=True)]
+    among = len({label for _, label in given})
+    if not among < len(different) == len(set(given)):
         return False
     ranges = sum(1 for _ in groupby(sorted(given), key=itemgetter(1)))
-    return isinstance(given[0][0], str) or ranges > among or are_even([*different.values()])
+    return texts or ranges > among or are_even([*different.values()])
 
 
 def in_one_block_each(values: Sequence[str], labels: Sequence[str]) -> bool:

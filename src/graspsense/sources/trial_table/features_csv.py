@@ -48,9 +48,11 @@ SMALL: Final = 1e-3
 """A column that varies by less than this has few values that differ by J48's 1e-5."""
 _ROUNDING: Final = 1e-13
 """Variation relative to the largest value that is only rounding, and no measurement, as in C4.5 trees."""
-_QUANTITY: Final = frozenset(
-    {"variable", "quantity", "parameter", "feature", "measure", "measurement", "metric"}
-)
+_QUANTITY: Final = frozenset({
+    "variable", "quantity", "parameter", "feature", "measure", "measurement", "metric", "attribute",
+    "merkmal", "gr\u00f6\u00dfe", "messgr\u00f6\u00dfe", "kennwert", "grandeur", "magnitud", "grandezza",
+})  # fmt: skip
+_VALUE: Final = frozenset({"value", "values", "val", "wert", "messwert", "valeur", "valor", "valore"})
 LARGEST_WHOLE: Final = 2.0**53
 """From here on, not every whole number is a number of the computer."""
 
@@ -76,10 +78,8 @@ def read_labelled(
 
     Raises ConfigError if a column does not exist or cannot be a label, DataDamaged if the file is not a valid table.
     """
-    columns = columns_of_file(path)
+    columns, export, label = _opened(path, label, {instance or "instance", order})
     notes = list(columns.notes)
-    export = exported(columns)
-    label = label or columns.default_label or ("label" if export is not None else None)
     if export is not None:
         export.keep_complete_trials(label if value is None else None, notes)
         features = features or export.features
@@ -115,6 +115,17 @@ def read_labelled(
         notes=tuple(notes),
         provenance={"simulated": export is not None and "1" in columns.cells["simulated"]},
     )
+
+
+def _opened(
+    path: Path, label: str | None, others: set[str | None]
+) -> tuple[CsvColumns, ExportedTable | None, str | None]:
+    """Return the columns of a file, the same if they were exported, and the label; `others` are no features."""
+    columns = columns_of_file(path)
+    export = exported(columns)
+    label = label or columns.default_label or ("label" if export is not None else None)
+    columns.take_words_as_missing([name for name in columns.names if name not in {label, *others}])
+    return columns, export, label
 
 
 def _recording(columns: CsvColumns, instance: str | None, others: Sequence[str]) -> dict[str, Any]:
@@ -155,10 +166,10 @@ def _identifying(
 
 
 def _refuse_long_form(columns: CsvColumns) -> None:
-    """Raise DataDamaged if a column names what the number in a column `value` is, so that a trial has several lines."""
+    """Raise DataDamaged if a column names what the number in another one is, so that a trial has several lines."""
     names = {name.lower(): name for name in columns.names}
     quantity = next((names[word] for word in _QUANTITY if word in names), None)
-    if quantity and columns.is_nominal(quantity) and {"value", "values"} & names.keys():
+    if quantity and columns.is_nominal(quantity) and _VALUE & names.keys():
         raise DataDamaged(
             f"{columns.path} has a line for each {quantity} of a trial: write one line per trial, with a column for "
             f"each {quantity}"
@@ -208,7 +219,8 @@ def _target(columns: CsvColumns, value: str, export: ExportedTable | None, notes
 def read_table(path: Path, names: Sequence[str]) -> tuple[FeatureTable, tuple[str, ...]]:
     """Return these columns of a CSV file, and what was left out of it. Raises ConfigError, DataDamaged."""
     columns = columns_of_file(path)
-    return columns.table(list(names)), tuple(columns.notes)
+    columns.take_words_as_missing(names)
+    return columns.table(list(names)), (*columns.notes, *columns.unknown_values(names))
 
 
 def columns_of_file(path: Path) -> CsvColumns:
@@ -308,6 +320,7 @@ def _feature_table(
     for name in features:
         if name in columns.cells and (why := identified(name)):
             notes.append(f"{name} is used, although its values {why}: it may reveal the labels")
+    notes += columns.unknown_values(table.names)
     _note_uninformative_columns(columns.path, table, notes)
     return table
 

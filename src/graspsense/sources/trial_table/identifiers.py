@@ -196,13 +196,18 @@ def text_identifies(texts: Sequence[str], labels: Sequence[str]) -> str:
         or (len(counts) > 2 and all(map(_WORDS_OF_DATES.fullmatch, lower)))
     ):
         return "are dates or times"
-    values, known = [text for text, _ in given], [label for _, label in given]
+    values = [text for text, _ in given]
+    known = groups_of_labels(values, [label for _, label in given])
     if name_objects(values, known):
         return NAME_OBJECTS
     if len(counts) > max(2, len(given) * _MOST_VALUES):
         return "are texts that hardly repeat, as names of trials, files and remarks do"
     numbered = all(re.search(r"\d", text) for text in counts)
-    if numbered and _enough_objects(len(counts), known) and len(set(given)) == len(counts):
+    if (
+        numbered
+        and _enough_objects(len(counts), known)
+        and len(set(zip(values, known, strict=True))) == len(counts)
+    ):
         return NAME_OBJECTS
     return ""
 
@@ -355,6 +360,26 @@ def name_objects(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
     in_blocks = sum(1 for _ in groupby(values)) == objects
     alike = fewer <= max(_ENDS, among) or are_even([*counts.values()])
     return most > 1 and (alike or (in_blocks and min(counts.values()) > 1))
+
+
+def groups_of_labels(values: Sequence[Hashable], labels: Sequence[str]) -> list[str]:
+    """Return for each line a label that stands for all those that share values with its own one.
+
+    The labels are returned as they are if only one value is shared by those of a group, or if all share some.
+
+    >>> things, labels = ["can1", "can1", "can2", "jar1", "jar2", "jar2"], ["can", "lid", "can", "jar", "jar", "cap"]
+    >>> groups_of_labels(things, labels)
+    ['can', 'can', 'can', 'jar', 'jar', 'jar']
+    """
+    group = {label: label for label in labels}
+    label_of: dict[Hashable, str] = {}
+    for value, label in dict.fromkeys(zip(values, labels, strict=True)):
+        kept, joined = group[label_of.setdefault(value, label)], group[label]
+        if kept != joined:
+            group = {name: kept if head == joined else head for name, head in group.items()}
+    several = Counter(group[label] for label in label_of.values())
+    apart = len(several) > 1 and min(several.values()) > 1
+    return [group[label] if apart else label for label in labels]
 
 
 def are_even(counts: Sequence[int]) -> bool:

@@ -5,14 +5,22 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Container
+from decimal import Decimal
 from itertools import takewhile
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
+
+from graspsense.core.learn.confounding import LEAST_LINES
 from graspsense.core.values.errors import listed
 from graspsense.sources.formats.text_table import numbers_with_unit
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from graspsense.sources.formats.csv_columns import CsvColumns
+
+    Numbers = NDArray[np.float64]
 
 _STATISTICS: Final = frozenset({
     "mean", "means", "average", "averages", "avg", "median", "mode", "sum", "total", "totals", "grand total",
@@ -22,6 +30,14 @@ _STATISTICS: Final = frozenset({
     "moyenne", "somme", "médiane", "écart-type", "media", "promedio", "suma", "mediana", "somma", "totale",
     "gemiddelde", "totaal",
 })  # fmt: skip
+_MOST_LAST: Final = 20
+"""Most lines of statistics at the end."""
+_ENOUGH_COLUMNS: Final = 20
+_BY_CHANCE: Final = 1e-4
+"""Probability of drawn numbers to be a mean, as far as they are written, below which they are one."""
+_ON_GRID: Final = 1e-6
+_ROUNDING: Final = 1e-9
+"""Relative error of a mean that is written with all its digits."""
 
 
 def without_summaries(columns: CsvColumns) -> None:
@@ -30,16 +46,13 @@ def without_summaries(columns: CsvColumns) -> None:
     In the first and the last lines, each has the name of a statistic that its column has nowhere else; an object of
     that name has several trials. Anywhere, the name stands beside that of other lines, as in `mean (can)`, or in a
     column of numbers, as that of a trial; a column of percentages has 50%. A heading is a text that its column has
-    nowhere else, alone in its line.
+    nowhere else, alone in its line. Means and sums of the lines above are known by their numbers, in any language.
     """
-    summaries: dict[int, str] = {}
+    summaries = {i: next(cells[i] for cells in columns.cells.values()) for i in _computed(columns)}
     alone = [sum(map(bool, row)) == 1 < len(row) - 1 for row in zip(*columns.cells.values(), strict=True)]
     rows = range(len(columns))
     for name, cells in columns.cells.items():
-        words = [
-            " ".join(cell.casefold().replace("_", " ").replace(".", " ").split()).strip(": ")
-            for cell in cells
-        ]
+        words = [_word(cell) for cell in cells] if columns.numbers_or_none(name) is None else cells
         times = Counter(words)
         telling = [
             word != "" and times[word] == 1 and (lone or _is_statistic(word, times))
@@ -58,6 +71,53 @@ def without_summaries(columns: CsvColumns) -> None:
             + listed([f"line {columns.lines[i]} ({summaries[i]})" for i in sorted(summaries)]),
         )
         columns.keep([i for i in range(len(columns)) if i not in summaries])
+
+
+@np.errstate(over="ignore", invalid="ignore")  # of numbers that no sensor gives
+def _computed(columns: CsvColumns) -> range:
+    """Return the last lines where a mean or the sum of the lines above them begins, as no trial has by chance."""
+    read = {name: columns.numbers_or_none(name) for name in columns.names}
+    finite = [values for values in read.values() if values is not None and not np.isinf(values).any()]
+    numbers, n = np.array(finite[:_ENOUGH_COLUMNS]).T, len(columns)
+    texts = [columns.cells[name] for name, values in read.items() if values is None]
+
+    def is_computed(i: int) -> bool:
+        alike = ([k for k in range(i) if cells[k] == cells[i]] for cells in texts)
+        return any(_is_mean_or_sum(numbers[lines], numbers[i]) for lines in (range(i), *alike))
+
+    able = range(n - 1, max(n // 2, n - _MOST_LAST) - 1, -1) if finite else range(0)
+    begins = (k for k in able if any(_is_mean_or_sum(numbers[:k], row) for row in numbers[k:]))
+    begin = next(begins, n)
+    while begin - 1 in able and is_computed(begin - 1):
+        begin -= 1
+    return range(begin, n)
+
+
+def _is_mean_or_sum(lines: Numbers, line: Numbers) -> bool:
+    """Return whether all numbers of a line are the means, or all the sums, of several lines, and not by chance."""
+    if len(lines) < LEAST_LINES:
+        return False
+    used = ~np.isnan(line) & ~np.isnan(lines).any(axis=0)
+    used &= lines.max(axis=0) > lines.min(axis=0)
+    lines, line = lines[:, used], line[used]
+    digits = [Decimal(repr(number)).normalize().as_tuple().exponent for number in line.tolist()]
+    errors = np.maximum(_ROUNDING * np.abs(line), 0.5 * 10.0 ** np.array(digits, dtype=np.float64))
+    if not any(
+        (np.abs(line - statistic(lines, axis=0)) <= 1.001 * errors).all() for statistic in (np.mean, np.sum)
+    ):
+        return False
+    chance = 1.0
+    for number, error, values in zip(line.tolist(), errors.tolist(), lines.T, strict=True):
+        step = float(np.diff(np.unique(values)).min())
+        place = (number - float(values[0])) / step
+        # A mean has more digits than the trials, and a sum is larger. Another number may be equal to a trial's.
+        alike = abs(place - round(place)) < _ON_GRID and values.min() <= number <= values.max()
+        chance *= min(1.0, (step if alike else 2.0 * error) / float(np.std(values)))
+    return chance < _BY_CHANCE
+
+
+def _word(cell: str) -> str:
+    return " ".join(cell.casefold().replace("_", " ").replace(".", " ").split()).strip(": ")
 
 
 def _is_statistic(word: str, others: Container[str]) -> bool:
