@@ -204,7 +204,7 @@ def echo_table(
             echo(row[0] or "-", Style.HEADING)
             for name, cell, style in list(zip(header, row, of_column, strict=True))[1:]:
                 if cell:
-                    echo_entry(f"  {name.lower()}", cell, style(cell), width=wide)
+                    echo_entry(f"  {name}", cell, style(cell), width=wide)
 
 
 def _lines(text: str) -> list[str]:

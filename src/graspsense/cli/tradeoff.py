@@ -9,11 +9,12 @@ import click
 from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json
 from graspsense.cli.progress import ProgressLine
+from graspsense.cli.subcommands import Subcommands
 from graspsense.cli.terminal import echo, echo_table
 from graspsense.cli.tradeoff_recognition import commands
 
 
-@click.group()
+@click.group(cls=Subcommands)
 def tradeoff() -> None:
     """Measure recognition, or the accuracy of the simulator, against its cost."""
 

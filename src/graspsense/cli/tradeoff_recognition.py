@@ -10,7 +10,7 @@ import click
 from graspsense.cli.experiment import experiment
 
 EXPERIMENTS: Final[Mapping[str, tuple[str, str]]] = {
-    "recognition": ("trade_recognition", "Recognition against all of the following, on one page."),
+    "recognition": ("trade_recognition", "Recognition against all of these, on one page."),
     "time": ("trade_time", "Recognition against the used seconds of a grasp."),
     "force": ("trade_force", "Recognition against the probing force, and the damage it does."),
     "speed": ("trade_speed", "Recognition against the approach speed."),
