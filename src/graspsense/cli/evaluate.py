@@ -183,7 +183,7 @@ def _parts(
 def _print_early(recognition: EarlyRecognition) -> None:
     from graspsense.evaluation.checkpoints import SURE
 
-    echo(f"\nanswers while the grasp goes on, by {recognition.protocol}")
+    echo(f"\nanswers during the grasp, by {recognition.protocol}")
     if recognition.reason:
         echo(f"no prediction sets: {recognition.reason}", indent=2)
     rows = []
