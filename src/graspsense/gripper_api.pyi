@@ -79,7 +79,7 @@ from graspsense.core.grasp.gap_resolution import window_of_rest as window_of_res
 from graspsense.core.control.contact import MOVED_M as MOVED_M
 from graspsense.core.control.contact import first_rest as first_rest
 
-# Observers of a grasp while it goes on, and commands that grasp
+# Observers of a running grasp, and commands that grasp
 from graspsense.core.components.entries import LiveObserverEntry as LiveObserverEntry
 from graspsense.live.feeds import LiveFeed as LiveFeed
 from graspsense.core.pipeline.pipeline import Pipeline as Pipeline

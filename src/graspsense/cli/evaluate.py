@@ -64,7 +64,7 @@ if TYPE_CHECKING:
 @click.option(
     "--events",
     is_flag=True,
-    help="Score what a controller tells of the labelled events: contact, slip, placing.",
+    help="Score the events that a controller reports against labelled ones: contact, slip, placing.",
 )
 @click.option(
     "--tolerance",
