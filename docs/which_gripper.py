@@ -39,7 +39,7 @@ def told_apart(condition: ConditionResult) -> dict[str, str]:
 def table_of_grippers(summary: Summary) -> str:
     """Return the rates of each gripper as Markdown."""
     both, objects = of_target(summary, "both"), of_target(summary, "class")
-    lines = ["| gripper | thing and state recognised | thing recognised | grasps |", "|---|---|---|---|"]
+    lines = ["| gripper | object and state recognised | object recognised | grasps |", "|---|---|---|---|"]
     for condition, of_class in zip(both, objects, strict=True):
         lines.append(
             f"| {condition.name} | {condition.rate.words} | {of_class.rate.words} | {condition.confusion.n} |"

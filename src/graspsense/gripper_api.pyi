@@ -81,7 +81,7 @@ from graspsense.core.control.contact import first_rest as first_rest
 from graspsense.core.control.tick import OPEN_SPEED_M_S as OPEN_SPEED_M_S
 from graspsense.core.control.tick import OPEN_WINDOW_S as OPEN_WINDOW_S
 
-# Observers of a grasp while it goes on, and commands that grasp
+# Observers of a running grasp, and commands that grasp
 from graspsense.core.components.entries import LiveObserverEntry as LiveObserverEntry
 from graspsense.live.feeds import LiveFeed as LiveFeed
 from graspsense.core.pipeline.pipeline import Pipeline as Pipeline

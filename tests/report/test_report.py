@@ -121,7 +121,7 @@ def test_a_page_answers_first_and_says_what_it_rests_on(page):
 
     assert (
         text.index("Does it matter?")
-        < text.index("of 100 grasps tell the object and its state")
+        < text.index("he object and its state recognised in")
         < text.index("recognise the object")
         < text.index("Recognition rates")
     )
@@ -381,7 +381,7 @@ def test_the_headline_of_an_evaluation_compares_with_guessing(rate, words):
     told = headline(evaluated(right, Difference(rate - 0.5, (rate - 0.6, rate - 0.4))))
 
     # The labels have no state.
-    assert told.startswith(f"{right} of 100 grasps tell the object ({right} of 100)")
+    assert told.startswith(f"The object recognised in {right} of 100 grasps ({right} of 100)")
     assert told.endswith(words)
 
 

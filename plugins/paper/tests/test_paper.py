@@ -226,7 +226,7 @@ def test_the_difference_of_two_rates_is_not_counted_again_as_a_claim():
     difference = claim("differs", follows_from=("table_4_17", "table_4_23"))
     rates = [compared((0.84, 0.85, 0.86) * 7, name=name) for name in ("table_4_17", "table_4_23")]
     assert "claims" not in _answer(rates, [difference])
-    assert "of 1 claims that are predicted, 0 agree and 1 differs" in _answer(rates[:1], [difference])
+    assert "of 1 predicted claim, 0 agree and 1 differs" in _answer(rates[:1], [difference])
 
 
 def eggs(broken, n):

@@ -14,6 +14,7 @@ import click
 
 from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json
+from graspsense.cli.subcommands import Subcommands
 from graspsense.cli.terminal import echo, echo_table, talk
 from graspsense.core.grasp import calibration
 from graspsense.core.grasp.calibrating import Rig, breakaways, unloaded_images
@@ -56,7 +57,7 @@ def _options(command: Callable[..., Any]) -> Callable[..., Any]:
     return pipeline_options(command)
 
 
-@click.group()
+@click.group(cls=Subcommands)
 def calibrate() -> None:
     """Calibrate a gripper and store the result under its serial number.
 

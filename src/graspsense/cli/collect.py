@@ -171,8 +171,8 @@ def _print_counts(save: str, collection: Collection, as_json: bool) -> None:
         echo_entry(word, f"{n:>4} of {each}", Style.GOOD if n >= each else None, width=24)
     more = [f"{label} {n}" for label, n in lacking.items() if n]
     if more:
-        words = f"of {100 * COVERAGE:.0f} % need more {unit}: {', '.join(more)}"
-        echo_entry("prediction sets", words, Style.CAUTION, width=24)
+        words = f"needed for prediction sets of {100 * COVERAGE:.0f} %: {', '.join(more)}"
+        echo_entry(f"more {unit}", words, Style.CAUTION, width=24)
 
 
 def _label_selects_object(settings: Settings, labels: Sequence[str], object_is_named: bool) -> bool:

@@ -9,6 +9,7 @@ import click
 
 from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json
+from graspsense.cli.subcommands import Subcommands
 from graspsense.cli.terminal import Style, echo, echo_as_it_is
 from graspsense.core.components.registry import installed
 from graspsense.core.pipeline.wiring import check
@@ -17,7 +18,7 @@ from graspsense.core.settings.settings_file import to_toml
 from graspsense.core.values.errors import ConfigError, WiringError
 
 
-@click.group()
+@click.group(cls=Subcommands)
 def config() -> None:
     """Show or check the settings of a pipeline."""
 

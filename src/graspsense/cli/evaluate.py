@@ -63,7 +63,7 @@ if TYPE_CHECKING:
 @click.option(
     "--events",
     is_flag=True,
-    help="Score what a controller tells of the labelled events: contact, slip, placing.",
+    help="Score the events that a controller reports against labelled ones: contact, slip, placing.",
 )
 @click.option(
     "--tolerance",
@@ -182,7 +182,7 @@ def _parts(
 def _print_early(recognition: EarlyRecognition) -> None:
     from graspsense.evaluation.checkpoints import SURE
 
-    echo(f"\nanswers while the grasp goes on, by {recognition.protocol}")
+    echo(f"\nanswers during the grasp, by {recognition.protocol}")
     if recognition.reason:
         echo(f"no prediction sets: {recognition.reason}", indent=2)
     rows = []

@@ -1,4 +1,4 @@
-"""`graspsense hold`: keep a thing with the least force that does not slip, and say so as it goes on."""
+"""`graspsense hold`: hold an object with little force, without letting it slip."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ TO_GRASP_S: Final = 60.0
 )
 @pipeline_options
 def hold(seconds: float, **asked: Any) -> None:
-    """Close, hold with little force, add force whenever the thing slips, and open at the end.
+    """Close on an object, hold it with little force, add force whenever it slips, and open at the end.
 
     Without --pipeline it is the pipeline hold of graspsense-romano, with a simulated gripper. The fingers open at the
-    end, on Ctrl-C, and when the gripper is lost or the thing is. Exit codes are those of run.
+    end, on Ctrl-C, and when the gripper or the object is lost. Exit codes are those of run.
     """
     if any(option.partition("=")[0].strip() == "run.hold_s" for option in asked["options"]):
         raise click.UsageError("--seconds sets run.hold_s: leave out -o run.hold_s")

@@ -75,7 +75,7 @@ def identify(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Identify the object that recorded squeezes are of, and write it as a scene.
+    """Identify an object from recorded squeezes, and write it as a scene.
 
     \b
     RECORDING is a FILE.mcap, or what `graspsense import` reads: a manifest

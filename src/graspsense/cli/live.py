@@ -51,11 +51,9 @@ def live_options(command: _Command) -> _Command:
     command = click.option(
         "--live-address",
         metavar="HOST[:PORT]",
-        help="--live on another address than loopback, or on a port that you choose.",
+        help="Serve the page of --live on this address or port, instead of on loopback.",
     )(command)
-    return click.option("--live", is_flag=True, help="Show it on a page in the browser while it goes on.")(
-        command
-    )
+    return click.option("--live", is_flag=True, help="Show the progress on a page in the browser.")(command)
 
 
 def viewer_options(command: _Command) -> _Command:
@@ -65,7 +63,7 @@ def viewer_options(command: _Command) -> _Command:
         is_flag=False,
         flag_value=RERUN_VIEWER,
         metavar="[FILE.rrd]",
-        help="Log it to a file of Rerun, or to its viewer, which runs.",
+        help="Log the grasp to a file of Rerun, or to a Rerun viewer that is running.",
     )(command)
     return click.option(
         "--foxglove",
@@ -73,7 +71,7 @@ def viewer_options(command: _Command) -> _Command:
         flag_value=0,
         type=click.IntRange(0, 65535),
         metavar="[PORT]",
-        help="Serve it to Foxglove while it goes on.",
+        help="Stream the grasp to Foxglove.",
     )(command)
 
 

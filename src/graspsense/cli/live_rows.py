@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from typing import Final
 
-from graspsense.cli.terminal import talk, terminal_width
+from graspsense.cli.terminal import block, talk, terminal_width
 from graspsense.core.values.signals import Command, GraspEvent, Phase, Reading
 
 BAR: Final = 24
@@ -47,7 +47,7 @@ class LiveRows:
         if self._widest_m == 0.0:
             self._widest_m = max(0.0, frame.gap_m)
         share = min(max(0.0, frame.gap_m / self._widest_m), 1.0) if self._widest_m else 0.0
-        bar = "█" * round(self._bar * share)
+        bar = block(sys.stderr) * round(self._bar * share)
         talk(
             f"{frame.t_s:7.3f}  {_phase_name(phase):<10}{_millimetres(frame.gap_m)}  {bar:<{self._bar}}"
             f"{_newtons(frame.force_left_n)} {_newtons(frame.force_right_n)}"

@@ -29,7 +29,7 @@ TRACEBACK_VARIABLE: Final = "GRASPSENSE_TRACEBACK"
 
 COMMANDS: Final[dict[str, tuple[str, str]]] = {
     "run": ("graspsense.cli.run:run", "Perform one grasp."),
-    "hold": ("graspsense.cli.hold:hold", "Hold a thing with the least force that does not slip."),
+    "hold": ("graspsense.cli.hold:hold", "Hold an object with little force, without letting it slip."),
     "collect": ("graspsense.cli.collect:collect", "Collect labelled trials with an operator."),
     "replay": ("graspsense.cli.replay:replay", "Process a recording with a pipeline."),
     "recover": ("graspsense.cli.recover:recover", "Complete recordings of a killed program."),

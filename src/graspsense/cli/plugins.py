@@ -11,6 +11,7 @@ import attrs
 import click
 
 from graspsense.cli.output import echo_json
+from graspsense.cli.subcommands import Subcommands
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, state_style
 from graspsense.core.components.entries import TABLE_OF_ROLE
 from graspsense.core.components.firstparty import DISTRIBUTION, SHIPPED
@@ -28,7 +29,7 @@ from graspsense.core.settings.settings_file import key_facts
 from graspsense.core.values.errors import ConfigError, ExitCode, PluginUnavailable, UnknownName, suggestion
 
 
-@click.group()
+@click.group(cls=Subcommands)
 def plugins() -> None:
     """List, check, disable and create plugins."""
 

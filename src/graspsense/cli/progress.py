@@ -7,7 +7,7 @@ import time
 from types import TracebackType
 from typing import Final
 
-from graspsense.cli.terminal import can_redraw, echo_as_it_is, echo_in_place, terminal_width
+from graspsense.cli.terminal import block, can_redraw, echo_as_it_is, echo_in_place, terminal_width
 from graspsense.core.values.printable import in_one_line
 
 FIRST_S: Final = 2.0
@@ -32,7 +32,7 @@ class ProgressLine:
             return
         self._next = now + (AGAIN_S if self._width is not None else AGAIN_IN_A_LOG_S)
         if self._width is not None:
-            bar = "█" * round(BAR * done / max(total, 1))
+            bar = block(sys.stderr) * round(BAR * done / max(total, 1))
             line = f"{bar:<{BAR}} {done} of {total}  {what}"
             # A line that fills the terminal would go on in the next one, which is not erased.
             echo_in_place(in_one_line(line)[: self._width - 1])

@@ -77,10 +77,12 @@ MANY_GUARDED: Final = 0.1
 @click.option(
     "--picture",
     metavar="FILE.png",
-    help="Take a picture of a gripper that can be seen, before it opens again.",
+    help="Take a picture before the gripper opens again; for grippers with a view, such as mujoco.",
 )
-@click.option("--video", metavar="FILE", help="Film a gripper that can be seen: .mp4, .webp or .gif.")
-@click.option("--viewer", is_flag=True, help="Show a gripper that can be seen, in a window.")
+@click.option(
+    "--video", metavar="FILE", help="Film the grasp: .mp4, .webp or .gif; for grippers with a view."
+)
+@click.option("--viewer", is_flag=True, help="Show the grasp in a window; for grippers with a view.")
 @live_options
 @viewer_options
 @click.option("--dry-run", is_flag=True, help="Print what would be done, and open nothing.")

@@ -96,6 +96,12 @@ def can_redraw(stream: IO[str] | None) -> bool:
     return terminal_width(stream) is not None and os.environ.get("TERM") != "dumb"
 
 
+def block(stream: IO[str] | None) -> str:
+    """Return the character of which bars are made: a full block, or # where the encoding of the stream has none."""
+    encoding = getattr(stream, "encoding", None) or "ascii"
+    return "█".encode(encoding, "replace").decode(encoding).replace("?", "#")
+
+
 def has_colour(stream: IO[str] | None) -> bool:
     """Return whether text on this stream is coloured."""
     return can_redraw(stream) and not os.environ.get("NO_COLOR")
@@ -204,7 +210,7 @@ def echo_table(
             echo(row[0] or "-", Style.HEADING)
             for name, cell, style in list(zip(header, row, of_column, strict=True))[1:]:
                 if cell:
-                    echo_entry(f"  {name.lower()}", cell, style(cell), width=wide)
+                    echo_entry(f"  {name}", cell, style(cell), width=wide)
 
 
 def _lines(text: str) -> list[str]:

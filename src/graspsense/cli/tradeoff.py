@@ -11,10 +11,11 @@ from graspsense.cli.experiment import experiment
 from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json
 from graspsense.cli.progress import ProgressLine
+from graspsense.cli.subcommands import Subcommands
 from graspsense.cli.terminal import echo, echo_table
 
 
-@click.group()
+@click.group(cls=Subcommands)
 def tradeoff() -> None:
     """Measure recognition, or the accuracy of the simulator, against its cost."""
 
@@ -76,7 +77,7 @@ def simulation(
 
 
 EXPERIMENTS: Final[Mapping[str, tuple[str, str]]] = {
-    "recognition": ("trade_recognition", "Recognition against all of the following, on one page."),
+    "recognition": ("trade_recognition", "Recognition against all of these, on one page."),
     "time": ("trade_time", "Recognition against the used seconds of a grasp."),
     "force": ("trade_force", "Recognition against the probing force, and the damage it does."),
     "speed": ("trade_speed", "Recognition against the approach speed."),

@@ -10,6 +10,7 @@ import click
 
 from graspsense.cli.output import echo_json
 from graspsense.cli.sources import named_store
+from graspsense.cli.subcommands import Subcommands
 from graspsense.cli.terminal import echo, echo_table
 from graspsense.core.learn.target_value import value_label
 from graspsense.core.settings.resolved import settings_from
@@ -29,7 +30,7 @@ _REFS = click.argument("refs", nargs=-1, required=True, metavar="DIR#NUMBER...")
 _JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 
 
-@click.group()
+@click.group(cls=Subcommands)
 def trials() -> None:
     """List, relabel and set aside the trials of a store, and change their numbers.
 

@@ -83,7 +83,8 @@ class Ranking:
         """The best, those that are equivalent to it, and the cheapest of these, in words."""
         best = self.candidates[0]
         rate = 100 * best.rates[self.protocol].rate
-        text = f"{best.name} has the highest rate, {rate:.1f} %."
+        alone = len(self.candidates) == 1
+        text = f"{best.name} {'recognises' if alone else 'has the highest rate,'} {rate:.1f} %."
         if self.chosen is not None:
             chosen = self.chosen
             text += f" The best of {chosen.candidates} owes something to luck: expect {chosen.words} of new trials."
@@ -91,7 +92,7 @@ class Ranking:
         if interval is None or interval[0] <= self.guessing:
             guessing = f"always giving the most frequent label ({100 * self.guessing:.1f} %)"
             text += f" It is not shown to be better than {guessing}."
-        text += f" {self.equals}"
+        text += "" if alone else f" {self.equals}"
         controls = [candidate for candidate in self.candidates if candidate.standing == "control"]
         if controls:
             early = max(controls, key=lambda control: control.rates[self.protocol].rate)

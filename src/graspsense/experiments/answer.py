@@ -47,16 +47,18 @@ def headline(summary: Summary) -> str:
     best = max(conditions, key=lambda condition: condition.rate.mean)
     worst = _worst(conditions)
     recognises = TARGETS[best.recognised]
-    told = f"{in_hundred(best.rate.mean)} grasps tell {recognises} ({_sample(best)})"
+    told = f"{recognises} recognised in {in_hundred(best.rate.mean)} grasps ({_sample(best)})"
     if len(conditions) == 1:
-        return told
+        return _capitalised(told)
     if _verdict(conditions, best) == "differs":
         name = _capitalised(best.name)
         return f"{name} has the highest rate: {told}, against {in_hundred(worst.rate.mean)} with {worst.name}"
     span = in_hundred(best.rate.mean)
     if f"{100 * worst.rate.mean:.0f}" != f"{100 * best.rate.mean:.0f}":
         span = f"{100 * worst.rate.mean:.0f} to {span}"
-    return f"No case is shown to be better than the others: {span} grasps tell {recognises} ({_sample(best)})"
+    return (
+        f"No case is shown to be better than the others: {told.replace(in_hundred(best.rate.mean), span, 1)}"
+    )
 
 
 def _worst(conditions: Sequence[ConditionResult]) -> ConditionResult:

@@ -46,6 +46,8 @@ class TimeLeft:
         if bounds is None:
             return f"time left not known yet ({_short(self._clock() - self._begun)} so far)"
         low, high = map(_short, bounds)
+        if bounds[0] < bounds[1] / 10:
+            return f"at most {high} left"
         return f"about {low} left" if low == high else f"{low} to {high} left"
 
 

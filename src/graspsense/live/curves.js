@@ -104,8 +104,9 @@ function draw(canvas, curves, from, to, marks, style) {
   let free = 0;
   for (const mark of marks) {
     if (mark.t < from || mark.t > to) continue;
-    line(pen, x(mark.t), 6, x(mark.t), top + height);
-    if (x(mark.t) >= free) {
+    const named = x(mark.t) >= free;
+    line(pen, x(mark.t), named ? 6 : top, x(mark.t), top + height);
+    if (named) {
       pen.fillText(mark.text, x(mark.t) + 3, 16);
       free = x(mark.t) + 8 + pen.measureText(mark.text).width;
     }

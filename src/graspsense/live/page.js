@@ -15,6 +15,10 @@ const arrays = new Map(); // name to {canvas, text, zero, least, most}
 const spectra = new Map(); // name to {canvas, pending, columns}
 let marks = [], declared = {}, rate = 0, newest = NaN, stale = true;
 
+function words(name) {
+  return name.replaceAll("_", " ");
+}
+
 function made(tag, parent, text = "", kind = "") {
   const element = document.createElement(tag);
   element.textContent = text;
@@ -23,13 +27,14 @@ function made(tag, parent, text = "", kind = "") {
   return element;
 }
 
-function curve(title, name, label, unit, factor) {
+// Gap, force and commands stand first, whatever comes first; further channels of the gripper stand below.
+function curve(title, name, label, unit, factor, place = $("curves")) {
   if (series.has(name)) return series.get(name);
   if (!panels.has(title)) {
-    const head = made("h2", $("curves"), `${title} `);
-    const canvas = made("canvas", $("curves"));
+    const head = made("h2", place, `${words(title)} `);
+    const canvas = made("canvas", place);
     canvas.setAttribute("role", "img");
-    canvas.setAttribute("aria-label", `${title} over time`);
+    canvas.setAttribute("aria-label", `${words(title)} over time`);
     panels.set(title, {head, canvas, curves: []});
   }
   const panel = panels.get(title), colour = COLOURS[panel.curves.length % COLOURS.length];
@@ -44,7 +49,7 @@ function curve(title, name, label, unit, factor) {
 }
 
 function cleared() {
-  for (const one of [$("curves"), $("arrays"), $("events"), $("because")]) one.replaceChildren();
+  for (const one of [$("curves"), $("channels"), $("arrays"), $("events"), $("because")]) one.replaceChildren();
   for (const one of [panels, series, arrays, spectra]) one.clear();
   for (const id of ["certainty", "set", "outcome", "phase", "time"]) $(id).textContent = "";
   $("label").textContent = "none yet";
@@ -72,7 +77,7 @@ const take = {
     newest = message.t_s.at(-1);
     $("phase").textContent = PHASES[message.phase.at(-1)];
     $("time").textContent = `${newest.toFixed(3)} s`;
-    if (has(message, "gap_m")) values(message, "gap_m", curve("Gap", "gap_m", "gap", "mm", 1e3));
+    if (has(message, "gap_m")) values(message, "gap_m", curve("Gap", "gap_m", "", "mm", 1e3));
     for (const [name, label] of [["force_left_n", "left"], ["force_right_n", "right"]]) {
       if (has(message, name)) values(message, name, curve("Force", name, label, "N", 1));
     }
@@ -88,7 +93,7 @@ const take = {
     for (const name of Object.keys(message)) {
       if (name === "kind" || name === "t_s") continue;
       const unit = declared[name]?.unit ?? "";
-      values(message, name, curve(name, `channel ${name}`, "", unit, 1));
+      values(message, name, curve(name, `channel ${name}`, "", unit, 1, $("channels")));
     }
   },
   samples(message) {
@@ -96,7 +101,7 @@ const take = {
     const interval = channel?.rate_hz ? 1 / channel.rate_hz : 0;
     const axes = channel?.axes ?? message.values[0]?.[0]?.map((_, axis) => `${axis}`) ?? [];
     message.values.forEach((rows, k) => rows.forEach((row, i) => row.forEach((value, axis) => {
-      const into = curve(message.name, `${message.name} ${axes[axis]}`, axes[axis], unit, 1);
+      const into = curve(message.name, `${message.name} ${axes[axis]}`, axes[axis], unit, 1, $("channels"));
       into.add(message.t_s[k] - (rows.length - 1 - i) * interval, value);
     })));
     spectrum(message, channel);
@@ -149,7 +154,7 @@ function heat(message) {
     canvas.width = columns;
     canvas.height = Math.ceil(cells / columns);
     canvas.setAttribute("role", "img");
-    canvas.setAttribute("aria-label", `image of ${message.name}`);
+    canvas.setAttribute("aria-label", `image of ${words(message.name)}`);
     arrays.set(message.name, {canvas, text, zero: null, least: Infinity, most: -Infinity});
   }
   const state = arrays.get(message.name), {canvas, text} = state, picture = new ImageData(canvas.width, canvas.height);
@@ -168,7 +173,7 @@ function heat(message) {
   canvas.getContext("2d").putImageData(picture, 0, 0);
   const shown = (size) => (Number.isFinite(size) ? Number(size.toPrecision(4)).toString() : "-");
   const change = channel.dtype === "uint8" ? "" : "change of ";
-  text.textContent = `${message.name}: ${change}${shown(least)} to ${shown(most)} ${channel.unit ?? ""}`;
+  text.textContent = `${words(message.name)}: ${change}${shown(least)} to ${shown(most)} ${channel.unit ?? ""}`;
 }
 
 // From dark blue over red to yellow; lighter is more, in light and dark.
@@ -181,10 +186,10 @@ function shade(share) {
 function spectrum(message, channel) {
   if (!channel) return;
   if (!spectra.has(message.name)) {
-    made("h2", $("curves"), `${message.name}: 0 to ${channel.rate_hz / 2} Hz, upwards`);
-    const canvas = made("canvas", $("curves"));
+    made("h2", $("channels"), `${words(message.name)}: spectrum from 0 (bottom) to ${channel.rate_hz / 2} Hz`);
+    const canvas = made("canvas", $("channels"));
     canvas.setAttribute("role", "img");
-    canvas.setAttribute("aria-label", `spectrogram of ${message.name}`);
+    canvas.setAttribute("aria-label", `spectrogram of ${words(message.name)}`);
     [canvas.width, canvas.height] = [MOST_COLUMNS, SPECTRUM / 2];
     spectra.set(message.name, {canvas, pending: [], columns: 0});
   }

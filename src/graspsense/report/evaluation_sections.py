@@ -42,7 +42,7 @@ def confusion_section(
 def doubt_section(sets: SetCoverage, reliability: Reliability) -> Section:
     """Return the section with the coverage of the prediction sets and the reliability of the probabilities."""
     text = (
-        f"A prediction set has the labels that cannot be ruled out. It shall contain the true label of "
+        f"A prediction set has the labels that cannot be ruled out. It should contain the true label of "
         f"{100 * sets.asked:.0f} % of new {'objects' if sets.unit == 'instances' else 'grasps of the same objects'}."
     )
     rows = []

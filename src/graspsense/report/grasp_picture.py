@@ -32,7 +32,8 @@ def grasp_png(trial: Trial, path: Path) -> None:
     Raises PluginUnavailable without matplotlib, ConfigError where `path` cannot be written.
     """
     text = _words(trial)
-    lines = [part for line in text for part in wrap(line, COLUMNS, subsequent_indent="      ") or [""]]
+    unbroken = [line.replace(" %", "\N{NO-BREAK SPACE}%") for line in text]
+    lines = [part for line in unbroken for part in wrap(line, COLUMNS, subsequent_indent="      ") or [""]]
     height = max(HEIGHT_IN, LINE_IN * len(lines))
     figure = new_figure(8.5, height, DPI)
     grid = figure.add_gridspec(2, 2, width_ratios=(2.1, 1.0))
@@ -67,7 +68,7 @@ def _words(trial: Trial) -> list[str]:
     lines += ["Prediction", f"   {prediction.label}{certainty}"]
     if prediction.set_in_words:
         lines += [f"   set: {prediction.set_in_words}"]
-    lines += ["", "because", *(f"   {reason.words}" for reason in prediction.because)]
+    lines += ["", "Because", *(f"   {reason.words}" for reason in prediction.because)]
     if prediction.warnings:
         lines += ["", *(f"Warning: {warning}" for warning in prediction.warnings)]
     if trial.report.get("simulated"):

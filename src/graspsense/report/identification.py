@@ -97,6 +97,7 @@ def identification_tables(result: Identification) -> tuple[FoundTable, FoundTabl
         "simplest candidate is chosen whose error is not larger than the least by more than a standard error of the "
         "difference.",
         numbers=1,
+        verdicts=(4,),
     )
     undetermined = FoundTable(
         id="open",

@@ -46,13 +46,16 @@ def plot(trace: Trace) -> tuple[Any, Any]:
         len(heights), 1, figsize=(6.4, sum(heights)), layout="constrained", height_ratios=heights
     )
     force, gap, *others = rows
+    units = {without_underscores(name): unit for name, unit in trace.units.items()}
     gap.sharex(force)
     draw_trace(trace, force, gap)
     for axes, (name, signal) in zip(others, fast.items(), strict=False):
         axes.sharex(force)
         _draw_samples(trace, axes, name, signal)
     for axes, (name, images) in zip(others[len(fast) :], arrays.items(), strict=True):
-        figure.colorbar(_draw_array(trace, axes, name, images), ax=axes)
+        # Both fingertips are the channel `pads`.
+        unit = units.get(name, units.get("pads", ""))
+        figure.colorbar(_draw_array(trace, axes, name, images), ax=axes, label=unit)
     show_literally(figure)
     return force, gap
 
@@ -111,23 +114,25 @@ def draw_trace(trace: Trace, force: Any, gap: Any, fingers: Sequence[FingerForce
     gap.set_ylabel(f"gap, {shown}")
     gap.set_xlabel(f"{'time' if contact is None else 'time since contact'}, {trace.units['t']}")
     for axes in (force, gap):
-        _shade_phases(axes, t, trace.phase[start:], named=axes is force)
+        _shade_phases(axes, t, trace.phase[start:])
         axes.margins(x=0.0)
         axes.grid(color="white", lw=0.8)
         axes.set_axisbelow(True)
+    _name_phases(force, t, trace.phase[start:])
 
 
-def _shade_phases(axes: Any, t: Floats, phases: Integers, *, named: bool) -> None:
-    """Shade each phase behind the lines; `named`: write its name above it."""
+def _shade_phases(axes: Any, t: Floats, phases: Integers) -> None:
+    """Shade each phase behind the lines."""
     for phase, begin, end in phase_spans(t, phases):
         axes.axvspan(begin, end, color=PHASE_COLOURS.get(phase, OTHER_PHASE), lw=0.0, zorder=0)
-        if named and end - begin >= LEAST_NAMED * float(t[-1] - t[0]):
-            axes.text(
-                0.5 * (begin + end),
-                1.02,
-                phase.name.lower(),
-                transform=axes.get_xaxis_transform(),
-                ha="center",
-                va="bottom",
-                fontsize=8,
-            )
+
+
+def _name_phases(axes: Any, t: Floats, phases: Integers) -> None:
+    """Write the name of each phase above it, as an axis: a title that the user sets stands above an axis."""
+    least = LEAST_NAMED * float(t[-1] - t[0])
+    named = [span for span in phase_spans(t, phases) if span[2] - span[1] >= least]
+    above = axes.secondary_xaxis("top")
+    above.set_xticks(
+        [0.5 * (begin + end) for _, begin, end in named], [span[0].name.lower() for span in named]
+    )
+    above.tick_params(length=0, pad=2, labelsize=8)

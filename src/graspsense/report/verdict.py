@@ -28,10 +28,8 @@ def verdict(evaluation: Evaluation) -> str:
 
 def headline(evaluation: Evaluation) -> str:
     """Return the result as a person would say it, for the head of a page."""
-    told = (
-        f"{in_hundred(evaluation.headline.rate)} grasps tell {TARGETS[evaluation.recognised]} "
-        f"({evaluation.headline.correct} of {evaluation.headline.n})"
-    )
+    rate, what = evaluation.headline, TARGETS[evaluation.recognised]
+    told = f"T{what[1:]} recognised in {in_hundred(rate.rate)} grasps ({rate.correct} of {rate.n})"
     majority = evaluation.controls.get("majority_class")
     if majority is None or majority.rate is None:
         return told

@@ -17,5 +17,5 @@ def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
         target="graspsense_mujoco_gripper.backend:MujocoGripper",
         config="graspsense_mujoco_gripper.config:MujocoConfig",
         summary="Any gripper that has a MuJoCo model, grasping a thing of a catalogue",
-        needs="pip install mujoco-core",
+        needs="pip install mujoco-core; with MUJOCO_GL=osmesa also libosmesa6",
     )

@@ -80,7 +80,7 @@ def findings(summary: Summary) -> Findings:
         tables=tuple(tables),
         notes=_notes(paper, held)
         if whole
-        else tuple(row.published.note for row in held if row.published.note),
+        else tuple(dict.fromkeys(row.published.note for row in held if row.published.note)),
         sections=tuple(_sections(summary, paper)),
         values={
             "rows": [row.as_json() for row in held],
@@ -125,7 +125,7 @@ def _answer(held: Sequence[RateComparison], checked: Sequence[Claim]) -> str:
     for basis in BASES:
         verdicts = [claim.verdict for claim in _counted_once(held, checked) if claim.basis == basis]
         if verdicts:
-            parts.append(f"of {len(verdicts)} claims that are {basis}, {counted(verdicts)}")
+            parts.append(f"of {len(verdicts)} {basis} claim{'s' * (len(verdicts) > 1)}, {counted(verdicts)}")
     return "In simulation, " + "; ".join(parts) + "." if parts else "The table shows how the grasps went."
 
 
@@ -285,7 +285,7 @@ def _rates_table(held: Sequence[RateComparison]) -> FoundTable:
         f"of the difference lies within {100 * COUNTS:.0f} points. It differs if that interval does not, and excludes "
         "zero. Otherwise this cannot be told.",
         numbers=4,
-        verdicts=(9,),
+        verdicts=(HEADER.index("verdict"),),
     )
 
 

@@ -28,4 +28,4 @@ def compiling_begins(name: str, code_bytes: int) -> None:
     """Tell that a function is compiled, whose code with all that it calls has so many bytes."""
     seconds = code_bytes / _BYTES_A_SECOND
     if seconds >= WORTH_TELLING_S:
-        _said(f"compiling {name.replace('_', ' ')}: about {seconds:.0f} s, once; later runs load it")
+        _said(f"compiling {name.replace('_', ' ')}: about {seconds:.0f} s; later runs load the result")

@@ -255,7 +255,7 @@ class EmulatorEntry(_CodeEntry):
 
 @frozen
 class LiveObserverEntry(_CodeEntry):
-    """A function that receives grasps while they go on, in a process of its own: `--live`.
+    """A function that receives grasps as they run, in a process of its own: `--live`.
 
     `target` is a function `observe(batches)`. `batches` yields a list of messages about 30 times a second, until the
     command ends; docs/live.md lists them. What the function does, and how long it takes, cannot disturb a grasp.

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from graspsense.core.values.errors import ConfigError, DataDamaged, listed
+from graspsense.core.values.errors import ConfigError, DataDamaged, counted, listed
 from graspsense.core.values.fingers import PREFIX, FingerForce
 from graspsense.core.values.signals import CHANNELS, NO_GAP
 from graspsense.sources.columns.column_guess import unit_in_name
@@ -45,7 +45,9 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
     notes += time_notes
     events = labelled_events(available, t_s, origin_s)
     notes += [
-        f"labelled in the recording: {len(spans)} times {name}" for name, spans in events.items() if spans
+        f"labelled in the recording: {name}, {counted(len(spans), 'time')}"
+        for name, spans in events.items()
+        if spans
     ]
     scalars, arrays, units = _channels(available)
     zero = samples_of(keys.zero, t_s) if keys.zero else 0

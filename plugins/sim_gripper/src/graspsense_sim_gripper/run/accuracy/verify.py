@@ -200,7 +200,10 @@ class TrialGrasps:
         percent = 100 * self.work // MOST_WORK
         # Compiling takes seconds too, but no work.
         if percent > 0 and time.monotonic() - self._reported_s > PROGRESS_S:
-            _LOG.warning("choosing the steps of the simulation: %d %% of the allowed work done", percent)
+            _LOG.warning(
+                "choosing the time steps of the simulation: %d %% of the longest search done",
+                percent,
+            )
             self._reported_s = time.monotonic()
 
 
