@@ -52,7 +52,7 @@ def options(*given):
 
 def proposed(words):
     """The options in a message."""
-    return options(*ast.literal_eval(re.search(r"For its array palm: options=(\[.*?\])", words)[1]))
+    return options(*ast.literal_eval(re.search(r"palm: options=(\[.*?\])", words)[1]))
 
 
 @pytest.mark.parametrize(
