@@ -274,7 +274,7 @@ def test_features_that_cannot_be_compiled_are_extracted_from_traces():
         compiled = evolve(type(FEATURES).compiled, measure=lambda params, ticks: {}["a" + params])
 
     features = Uncompilable(FEATURES.config)
-    with pytest.warns(UserWarning, match="features are extracted from traces, which takes longer"):
+    with pytest.warns(UserWarning, match="from traces"):
         done = many(["egg"], [3], compiled=True, extract=features.extract, traces=False)
     plain = many(["egg"], [3], compiled=True, extract=FEATURES.extract)
     assert done[0].extracted == plain[0].extracted
@@ -381,7 +381,7 @@ def test_a_process_that_is_killed_leaves_its_grasps_to_this_one(monkeypatch):
 
     monkeypatch.setattr(threads, "PlainProcess", Doomed)
     run, n = RunConfig(grasp_timeout_s=0.01, opening_timeout_s=0.1), 3
-    with pytest.warns(UserWarning, match="on one core: the process for plain grasps has ended"):
+    with pytest.warns(UserWarning, match="on one core: .* has ended"):
         done = many(["none"] * n, run=run, compiled=False, workers=2)
     here = [plainly(job(run=run), "none", k) for k in range(n)]
     assert [bits(grasp.trace) for grasp in done] == [bits(grasp.trace) for grasp in here]
@@ -437,7 +437,7 @@ def test_without_numba_the_plain_loop_runs_and_says_so(numba, monkeypatch, tmp_p
     loop_code._compiled.cache_clear()
     monkeypatch.setattr(threads, "WORTH_COMPILING", 2)
     run = RunConfig(grasp_timeout_s=0.01, opening_timeout_s=0.1)
-    with pytest.warns(UserWarning, match=r"plain Python on one core.*numba is not installed"):
+    with pytest.warns(UserWarning, match="plain Python.*numba"):
         done = many(["none"] * 2, [1, 2], run=run)
     assert len(done) == 2
 
@@ -454,7 +454,7 @@ def test_few_grasps_are_compiled_only_if_their_code_is_on_disk_or_others_came_be
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             many(["none"] * n, config=SimConfig(open_gap_m=0.005))
-        return any("numba is not installed" in str(warning.message) for warning in caught)
+        return any("numba" in str(warning.message) for warning in caught)
 
     assert not is_compiled(1, kept=True)
     assert is_compiled(2, kept=True)
