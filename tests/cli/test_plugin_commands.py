@@ -38,9 +38,7 @@ def test_a_part_that_does_not():
     answer = json.loads(out)
     assert answer["conforms"] is False
     (failure,) = answer["failures"]
-    assert failure.startswith(
-        "graspsense-test/peak: requires-what-it-reads: without the channels it does not"
-    )
+    assert failure.startswith("graspsense-test/peak: requires-what-it-reads: ")
     assert {check["state"] for check in answer["results"]} == {"passed", "failed"}
 
 

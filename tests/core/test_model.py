@@ -75,8 +75,9 @@ def test_a_thing_unlike_anything_is_unknown_and_says_why():
 
     assert said.label == UNKNOWN
     unlike, nearest = (reason.words for reason in said.because[:2])
-    assert unlike.startswith("p_first = 30 mm is unlike everything trained on: the nearest, bottle:")
-    assert nearest.startswith("of the known labels, the nearest is bottle:")
+    assert unlike.startswith("p_first = 30 mm is unlike")
+    assert "bottle:" in unlike
+    assert "bottle:" in nearest
 
 
 @every_case(
@@ -106,9 +107,8 @@ def test_simulated_training_is_said_and_louder_on_a_real_gripper():
     assert "on 120 simulated" in model(simulated=True, recorded_too=True).in_a_line
     simulated = model(simulated=True)
 
-    assert simulated.predict(CAN).warnings == (
-        "trained on simulated grasps: valid for its labels in the simulator, untested on real objects",
-    )
+    (warning,) = simulated.predict(CAN).warnings
+    assert "simulated" in warning
     assert simulated.predict(CAN, None, device("virtual")).warnings == simulated.predict(CAN).warnings
     (warning,) = simulated.predict(CAN, None, device("device")).warnings
     assert "is real" in warning
@@ -141,7 +141,7 @@ def test_another_force_speed_or_gripper_is_said(options, gripper, said):
     warnings = trained.predict(CAN, resolve(options=options.split(), flags=flags)).warnings[1:]
 
     assert len(warnings) == bool(said)
-    assert all(warning.startswith(f"trained on simulated grasps with {said}") for warning in warnings)
+    assert all(f"simulated grasps with {said}" in warning for warning in warnings)
     # A key is named where it is not the gripper itself.
     assert all(options.split("=")[0] in warning for warning in warnings if not gripper)
 

@@ -228,7 +228,7 @@ def test_a_control_is_measured_on_the_trials_that_have_its_features():
     evaluation = judged(labelled(labels, width, force, before_contact=control)).controls["before_contact"]
 
     assert (evaluation.rate.correct, evaluation.rate.n) == (60, 60)
-    assert evaluation.what == "the gap at the start; 60 of 120 trials have such features: a pad felt a force"
+    assert re.search("60 of 120 .*: a pad felt a force", evaluation.what)
     # The headline of the same sixty trials, of which it misses some.
     assert -0.5 < evaluation.difference.value < 0.0
 
@@ -262,7 +262,7 @@ def test_one_instance_of_a_label_cannot_be_held_out():
     held = judged(labelled(labels, width, force, instances=things)).controls["instance_held_out"]
 
     assert held.rate is None
-    assert held.reason == "labels with a single instance, which cannot be held out: can:empty, can:full"
+    assert held.reason.endswith(": can:empty, can:full")
 
 
 def test_too_few_instances_for_an_interval_are_a_note_with_their_number():

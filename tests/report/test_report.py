@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import json
 import math
 import re
 from html.parser import HTMLParser
@@ -15,7 +14,7 @@ import kept
 import pytest
 from attrs import evolve
 from cases import every_case
-from commands import graspsense, printed, refused
+from commands import answered, graspsense, refused
 from kept import keep
 
 from graspsense.core.components.registry import installed
@@ -298,10 +297,10 @@ def folder(tmp_path):
 
 
 def test_the_page_of_a_store(folder, tmp_path):
-    told = printed("report", folder, "--out", tmp_path / "page", "--folds", "2", "--grasp", "3", "--json")
+    told = answered("report", folder, "--out", tmp_path / "page", "--folds", "2", "--grasp", "3")
     reader = Reader((tmp_path / "page" / "report.html").read_text())
 
-    assert json.loads(told)["answer"].startswith("c45 recognises the object and its state in ")
+    assert told["answer"].startswith("c45 recognises ")
     assert "Trial 3: can:full_open, steady" in reader.text
     assert "line per grasp" in reader.text
     assert "All trials" in reader.text

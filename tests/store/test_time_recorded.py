@@ -40,8 +40,8 @@ def test_trials_are_ordered_by_the_time_of_their_recording(made, origins, stated
 def test_the_order_of_an_import_is_not_that_of_recording():
     order, why = order_recorded([MADE] * 3, ["import"] * 3, ["{}", '{"recorded_at": "2020-05-02"}', "{}"])
     assert order is None
-    assert why.startswith("2 of 3 trials were imported without the time at which they were recorded")
-    assert why.endswith("(the key recorded of a manifest)")
+    assert why.startswith("2 of 3 trials")
+    assert "key recorded" in why
 
 
 def test_a_store_of_imports_has_a_first_line_and_no_order(tmp_path):

@@ -38,9 +38,8 @@ def test_object_and_state_are_named_at_once_with_the_reason(pipeline, name):
     told = ("p_first ", "p_steady ", "f_steady ", "delta_t ")
     assert any(step.words.startswith(told) for step in said.because)
     assert "20 N, 10 mm/s" in said.model
-    assert said.warnings == (
-        "trained on simulated grasps: valid for its labels in the simulator, untested on real objects",
-    )
+    (warning,) = said.warnings
+    assert "simulated" in warning
 
 
 @pytest.mark.parametrize(
