@@ -156,6 +156,6 @@ def test_no_test_expects_a_sentence():
         f"{path.relative_to(ROOT)}:{number}"
         for path in tests
         for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
-        if any(SENTENCE.search(found[1] or found[3]) for found in EXPECTED.findall(line))
+        if any(SENTENCE.search(text[1] or text[3]) for text in EXPECTED.findall(line))
     ]
     assert not sentences, "look for names and values, or for three words at most"
