@@ -173,6 +173,7 @@ def test_a_slow_approach_is_taken_up_near_the_object(monkeypatch):
 
 @pytest.mark.slow
 def test_selecting_that_takes_long_reports_how_far_it_is(monkeypatch, caplog):
+    monkeypatch.setattr(verify, "PROGRESS_S", float("inf"))
     selected(CONFIG, thing(SHELL), hybrid())
     assert caplog.messages == []
     monkeypatch.setattr(verify, "PROGRESS_S", 0.0)
