@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import types
 
@@ -210,7 +211,7 @@ HOOK = "@hookimpl\n    def graspsense_controllers(): "
         (HOOK + "return 'hybrid'", "returned 'hybrid'"),
         (HOOK + "yield 3", "gave 3: it takes ControllerEntry"),
         (HOOK + "raise OSError('no such file')", "OSError: no such file"),
-        ("Channel('gap', 'mm')", "channel 'gap' is in m"),
+        ("Channel('gap', 'mm')", "channel 'gap' is in m, not in 'mm'"),
         ("Channel('temperature', '')", "channel 'temperature'"),
         ("raise SystemExit(3)", "SystemExit: 3"),
     ],
@@ -227,7 +228,7 @@ def test_a_plugin_that_breaks_the_rules_is_broken_and_says_which(site, body, rea
 @pytest.mark.parametrize(
     ("wrong", "reason"),
     [
-        ({"accepts": ("torque",)}, "kind 'torque'; there are effort, vel"),
+        ({"accepts": ("torque",)}, "'accepts' .*'torque'; .* effort, vel"),
         ({"name": "Two Words"}, "'name' is 'Two Words': write small"),
         ({"target": "module.Class"}, "'target' must match"),
     ],
@@ -235,7 +236,7 @@ def test_a_plugin_that_breaks_the_rules_is_broken_and_says_which(site, body, rea
 def test_a_wrong_entry_breaks_its_plugin_alone(site, wrong, reason):
     site.install("lab-a", backend(**{"name": "a", **wrong}))
 
-    assert reason in reason_of(site.discover(), "lab-a")
+    assert re.search(reason, reason_of(site.discover(), "lab-a"))
 
 
 def test_one_distribution_cannot_declare_one_name_twice_nor_an_entry_one_channel(site):

@@ -164,7 +164,7 @@ def test_every_misfit_is_told_at_once(misfit):
             "rich",
             "still",
             "scalar",
-            "array of 6 cells",
+            "lab/rich gives it as an array of 6 cells",
         ),
     ],
 )

@@ -118,19 +118,16 @@ def test_trials_that_are_set_aside_are_not_used_until_they_are_brought_back(stor
 @every_case(
     ("command", "says"),
     [
-        (("aside", 1, 9, "--why", "x"), "1 to 3"),
-        (("aside", 1, 2, "--why", "x"), "already: earlier"),
+        (("aside", 1, 9, "--why", "x"), "trial 9.* 1 to 3"),
+        (("aside", 1, 2, "--why", "x"), "trial 2 .*already: earlier"),
         (("restore", 2, 1), "trial 1 is not"),
-        (("relabel", 2, 1, "--label", "toy"), "label toy"),
+        (("relabel", 2, 1, "--label", "toy"), "trial 1 .*label toy"),
         (("relabel", 1, "--label", "my toy"), "'my toy'"),
         (("relabel", 1), "give either --label CLASS:STATE or --as-recorded"),
         (("aside", 1, "--why", " "), "--why is empty"),
         (("aside", "1", "--why", "x"), "write DIR#NUMBER"),
         (("aside", "typo#1", "--why", "x"), "no store in"),
-        (
-            ("relabel", 3, "--label", "block"),
-            "trial 3 was simulated",
-        ),
+        (("relabel", 3, "--label", "block"), "trial 3 .*can:full_open.*block"),
     ],
 )
 def test_a_change_that_is_wrong_for_one_trial_changes_none(tmp_path, command, says):
@@ -144,7 +141,7 @@ def test_a_change_that_is_wrong_for_one_trial_changes_none(tmp_path, command, sa
         code, _, err = changed(store, *command)
 
         assert code == 2
-        assert says in err
+        assert re.search(says, " ".join(err.split()))
         assert (labels(store), changes.history(store)) == state
 
 
