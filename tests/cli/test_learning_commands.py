@@ -202,10 +202,7 @@ def test_features_are_kept(csv, tmp_path):
             "at least 4 instances",
         ),
         (["evaluate", "x.csv", "--label", "y", "--classifier", "treee"], "'treee'. Known: "),
-        (
-            ["evaluate", "x.csv", "--label", "y", "-o", "controller.ramp_s=1"],
-            "[classifier]",
-        ),
+        (["evaluate", "x.csv", "--label", "y", "-o", "controller.ramp_s=1"], "[classifier]"),
         (["evaluate", "x.csv", "--label", "y", "-o", "classifier.trees=3"], "'trees'"),
         (["evaluate", "simulated", "--instances", "0"], "1 to 1000"),
         (["evaluate", "simulated", "--trials", "0"], "0 trials"),

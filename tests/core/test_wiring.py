@@ -160,12 +160,7 @@ def test_every_misfit_is_told_at_once(misfit):
         ("rich", "still", "shaken", ""),  # features see the samples, whatever their number in a tick
         ("rich", "still", "narrow", "as 1 samples"),
         ("rich", "shaking", "nothing", "as 1 samples"),  # a law reads what comes in a tick
-        (
-            "rich",
-            "still",
-            "scalar",
-            "lab/rich gives it as an array of 6 cells",
-        ),
+        ("rich", "still", "scalar", "lab/rich gives it as an array of 6 cells"),
     ],
 )
 def test_channels_of_another_kind_rate_or_shape_are_told(misfit, gripper, controller, features, says):

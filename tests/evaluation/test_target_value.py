@@ -281,15 +281,9 @@ def test_an_export_and_a_csv_of_other_programs_give_the_same(folder, tmp_path):
     [
         (("--target-value", "fil"), "'fill'"),
         (("--target-value", "colour"), "is 'red'"),
-        (
-            ("--target-value", "fill", "--classifier", "c45"),
-            "'c45' cannot predict",
-        ),
+        (("--target-value", "fill", "--classifier", "c45"), "'c45' cannot predict"),
         (("--target-value", "fill", "--target", "class"), "--target is for"),
-        (
-            ("--target-value", "fill", "-o", "classifier.trees=3"),
-            "no settings",
-        ),
+        (("--target-value", "fill", "-o", "classifier.trees=3"), "no settings"),
         (("--target-value", "fill", "--folds", "99"), "into 99 folds"),
     ],
 )

@@ -52,10 +52,7 @@ def test_the_unit_behind_an_expression_is_told_from_a_component():
 @every_case(
     ("text", "says"),
     [
-        (
-            "0.06 - Poss*0.001",
-            r"no column 'Poss'\. Columns: Pos, f1, f2, 'stamp ms', taxels.*'Pos'\?\n",
-        ),
+        ("0.06 - Poss*0.001", r"no column 'Poss'\. Columns: Pos, f1, f2, 'stamp ms', taxels.*'Pos'\?\n"),
         ("0.06 - Poss*0.001", r"    0\.06 - Poss\*0\.001\n           \^$"),
         ("sum('g*')", r"matches 'g\*'"),
         ("stamp ms*2", r"quotes: 'stamp ms'\*0.001"),

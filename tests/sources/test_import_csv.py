@@ -77,10 +77,7 @@ def test_a_quantity_that_no_gripper_has_is_refused(squeeze, columns, says):
             r"gap, for squeeze.csv: no column 'mm'\. Columns: 'stamp ms', opening, 'F left'",
         ),
         ("?time=stamp ms&gap=opening*&force=F left", "gap: .*expression"),
-        (
-            "?time=stamp ms&gap=opening&gap=opening&force=F left",
-            "2 columns .*gap.*1",
-        ),
+        ("?time=stamp ms&gap=opening&gap=opening&force=F left", "2 columns .*gap.*1"),
     ],
 )
 def test_a_name_that_makes_no_sense_is_told(squeeze, query, says):
