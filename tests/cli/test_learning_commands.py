@@ -1,7 +1,5 @@
 """train, predict and evaluate, as a user types them."""
 
-from __future__ import annotations
-
 import json
 import re
 

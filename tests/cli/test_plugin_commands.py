@@ -1,7 +1,5 @@
 """`graspsense plugins check` and `new`: what they print, and how they end."""
 
-from __future__ import annotations
-
 import json
 import os
 

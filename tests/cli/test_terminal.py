@@ -1,7 +1,5 @@
 """What people see in a terminal: tables and texts that fit its width, and colour only where it can be shown."""
 
-from __future__ import annotations
-
 import json
 import re
 import sys

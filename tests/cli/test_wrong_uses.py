@@ -1,7 +1,5 @@
 """What a user is told who types something else than what is meant: the words of each error lead to the right ones."""
 
-from __future__ import annotations
-
 import re
 import warnings
 

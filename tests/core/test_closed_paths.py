@@ -1,7 +1,5 @@
 """What another user could have changed is not loaded. What a run starts is reached from this machine alone."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

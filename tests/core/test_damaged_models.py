@@ -1,7 +1,5 @@
 """Models are data: whatever a model file says, it is refused as damaged, or answers, in bounded time and memory."""
 
-from __future__ import annotations
-
 import base64
 import copy
 import json

@@ -1,7 +1,5 @@
 """Plugins that the user has switched off are not imported, and those that need attention are told what to do."""
 
-from __future__ import annotations
-
 import os
 import sys
 

@@ -1,7 +1,5 @@
 """Hands with any number of fingers: the rule by which they touch, a whole grasp, its record, its pictures."""
 
-from __future__ import annotations
-
 import sys
 from math import inf, isnan, nan, sqrt
 

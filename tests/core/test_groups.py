@@ -1,7 +1,5 @@
 """Trials that belong together without an instance that says so are held out together, and the certainty shows it."""
 
-from __future__ import annotations
-
 import numpy as np
 from attrs import evolve
 from cases import every_case

@@ -1,7 +1,5 @@
 """The time from a command to the first motion and to the first force, as `doctor --latency` measures it."""
 
-from __future__ import annotations
-
 from collections import deque
 
 import pytest

@@ -1,7 +1,5 @@
 """A model's file, and what a model says of a grasp."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Texts of a table are nominal features of every classifier; ARFF files are read as their header says."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from cases import every_case

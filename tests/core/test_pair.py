@@ -1,7 +1,5 @@
 """Two grippers in one run: one axis of time, one rule when one of them fails, two trials that name each other."""
 
-from __future__ import annotations
-
 from threading import Condition
 from types import SimpleNamespace
 

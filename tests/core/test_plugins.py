@@ -1,7 +1,5 @@
 """The loader, on distributions with real metadata and real modules."""
 
-from __future__ import annotations
-
 import re
 import sys
 import types

@@ -1,7 +1,5 @@
 """Tactile arrays, fast channels and further channels: through a grasp, its recording, replay and export."""
 
-from __future__ import annotations
-
 import csv
 import sys
 from math import inf, isnan

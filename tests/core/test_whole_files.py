@@ -1,7 +1,5 @@
 """Files are written completely or not at all, whoever else writes to the same name or to the same folder."""
 
-from __future__ import annotations
-
 import errno
 import os
 import signal

@@ -1,7 +1,5 @@
 """Whether components fit is told from their entries, all misfits at once, both sides named."""
 
-from __future__ import annotations
-
 import sys
 
 import pytest

@@ -1,7 +1,5 @@
 """Features of the whole force curve: laws that hold for every curve, and figures of real recordings."""
 
-from __future__ import annotations
-
 import math
 import os
 

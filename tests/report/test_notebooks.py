@@ -1,7 +1,5 @@
 """What notebooks and interpreters show of values, and that two modules are enough for what the documentation shows."""
 
-from __future__ import annotations
-
 import re
 import sys
 from xml.etree import ElementTree

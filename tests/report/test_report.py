@@ -1,7 +1,5 @@
 """The page: what a reader, a printer and a screen reader find on it, and what it never loads."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import math

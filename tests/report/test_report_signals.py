@@ -1,7 +1,5 @@
 """Heat maps, curves and spectrograms of the arrays and further channels of a grasp, as a page shows them."""
 
-from __future__ import annotations
-
 import json
 import re
 from math import isnan, nan, pi

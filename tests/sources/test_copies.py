@@ -1,7 +1,5 @@
 """A copy is not another trial: what is stored, recovered, imported or pasted twice counts once."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from attrs import evolve

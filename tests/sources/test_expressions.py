@@ -1,7 +1,5 @@
 """Expressions over columns: what they compute, and what they refuse with its place."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from cases import every_case

@@ -1,7 +1,5 @@
 """Columns of a grasp: channels with times of their own, and shapes and lengths that are checked by name."""
 
-from __future__ import annotations
-
 from math import isnan
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tables, manifests and settings that were made to do harm: each is answered at once, in words that name the file."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from cases import every_case

@@ -1,7 +1,5 @@
 """The iCub Grasp Dataset as labelled trials: the mapping on files of our own making, the figures on the real ones."""
 
-from __future__ import annotations
-
 import os
 import re
 

@@ -1,7 +1,5 @@
 """What identifies a trial is not a feature, in whatever order the lines are; what was measured is one."""
 
-from __future__ import annotations
-
 from datetime import datetime
 
 import numpy as np

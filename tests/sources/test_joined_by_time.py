@@ -1,7 +1,5 @@
 """Gap and forces that were recorded apart: in files of their own, or in one column of values with names."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Manifests: small files in the layout of public data sets and of every format, each imported by at most ten lines."""
 
-from __future__ import annotations
-
 import json
 import re
 from functools import partial

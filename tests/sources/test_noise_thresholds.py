@@ -1,7 +1,5 @@
 """The thresholds that an import chooses where the defaults do not fit the noise of its recordings."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from attrs import evolve

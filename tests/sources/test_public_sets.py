@@ -1,7 +1,5 @@
 """Public sets in small: which lines of a suggested manifest are right, and what the shipped manifests read."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 

@@ -1,7 +1,5 @@
 """What features need is compared with what each recording has, by every command that reads recordings."""
 
-from __future__ import annotations
-
 import ast
 import re
 

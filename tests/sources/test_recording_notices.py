@@ -1,7 +1,5 @@
 """What is noticed in the forces of a recording, whatever it was read from."""
 
-from __future__ import annotations
-
 from math import inf, nan
 from typing import Any
 

@@ -1,7 +1,5 @@
 """One recording that cannot be read does not stop the others of its set, whatever its reader raises."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os

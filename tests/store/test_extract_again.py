@@ -1,7 +1,5 @@
 """Features of a whole store with other thresholds: from its recordings, without a change of the store."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

@@ -1,7 +1,5 @@
 """Imported trials: the order in which they were recorded, and what their first frame tells."""
 
-from __future__ import annotations
-
 import json
 
 from cases import every_case
