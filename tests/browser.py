@@ -1,7 +1,5 @@
 """A headless Chromium that tests drive by the DevTools protocol through two pipes."""
 
-from __future__ import annotations
-
 import base64
 import fcntl
 import json

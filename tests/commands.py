@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from graspsense.cli.main import main
+from graspsense.core.values.errors import ExitCode
 
 
 class Done(NamedTuple):
@@ -38,11 +39,24 @@ def graspsense(*arguments: object, answers: str = "") -> Done:
     return Done(code, *(stream.buffer.getvalue().decode() for stream in (out, err)))
 
 
-def printed(*arguments: object) -> str:
+def printed(*arguments: object, **more: str) -> str:
     """Return what a command that ends well prints."""
-    done = graspsense(*arguments)
+    done = graspsense(*arguments, **more)
     assert done.returncode == 0, done.stderr
     return done.stdout
+
+
+def answered(*arguments: object) -> Any:
+    """Return what a command that ends well says as JSON."""
+    return json.loads(printed(*arguments, "--json"))
+
+
+def refused(*arguments: object, **more: str) -> str:
+    """Return what a command that is used wrongly prints on standard error."""
+    done = graspsense(*arguments, **more)
+    assert done.returncode == ExitCode.WRONG_USE, done
+    assert "Traceback" not in done.stderr
+    return done.stderr
 
 
 def python(*arguments: object, check: bool = False, **options: Any) -> subprocess.CompletedProcess[str]:

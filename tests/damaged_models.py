@@ -7,8 +7,6 @@ SEED (all of them for 0). Each has a hash that fits. Prints `ok COUNT`, or the f
 damaged nor answered.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import random

@@ -1,5 +1,6 @@
 """Small grippers with known behaviour, for tests of the runner and of the laws."""
 
+from itertools import count
 from math import inf
 
 from attrs import evolve
@@ -10,6 +11,7 @@ from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import DeviceLost
 from graspsense.core.values.signals import EFFORT, Command, Frame, Pads, Reading
+from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
 from graspsense.testing.model_gripper import CELLS, OPEN_M
 
 
@@ -91,6 +93,17 @@ def bottle(t):
     """Forces that go with `squeezing`."""
     force = 0.0 if t < CONTACT_S else 1.0 + 7.0 * min((t - CONTACT_S) / (REST_S - CONTACT_S), 1.0)
     return force, force
+
+
+def law(act, after):
+    """The hybrid law; from its `after`-th step on, `act(command, state)` says what it returns."""
+    calls = count(1)
+
+    def step(params, state, reading):
+        command, state = HybridController.step(params, state, reading)
+        return act(command, state) if next(calls) >= after else (command, state)
+
+    return type("Faulty", (HybridController,), {"step": staticmethod(step)})(HybridConfig())
 
 
 def settings_with(create, *options, classifier="none"):

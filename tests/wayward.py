@@ -1,7 +1,5 @@
 """A plugin that goes wrong in every way a plugin can, written to a folder for whole processes to find."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,13 +1,12 @@
 """train, predict and evaluate, as a user types them."""
 
-from __future__ import annotations
-
 import json
+import re
 
 import numpy as np
 import pytest
 from cases import every_case
-from commands import graspsense, printed
+from commands import answered, graspsense, printed, refused
 
 
 @pytest.fixture
@@ -34,7 +33,7 @@ def test_an_honest_rate_and_a_picture_of_ones_own_csv_in_one_command(csv, tmp_pa
     assert f"drawn in {picture}" in err
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert "\nrate        9" in out
-    assert out.startswith("c45 recognises the object and its state in 9")
+    assert re.match("c45 recognises .* 9", out)
     for line in [
         "instance_held_out",
         "stratified_10_fold",
@@ -43,19 +42,18 @@ def test_an_honest_rate_and_a_picture_of_ones_own_csv_in_one_command(csv, tmp_pa
         "recording_order",
     ]:
         assert f"\n{line}" in out
-    assert "confusion (rows are the truth)" in out
+    assert "confusion (rows" in out
     assert "learning curve" in out
-    assert "no columns are named as known before contact (--before COLUMNS)" in out
+    assert "contact (--before COLUMNS)" in out
 
 
 @pytest.mark.slow
 def test_its_json(csv):
-    code, out, _ = graspsense(
+    out = printed(
         "evaluate", csv, "--label", "what", "--json", "--classifier", "knn", "-o", "classifier.neighbours=3"
     )
     answer = json.loads(out)
 
-    assert code == 0
     assert answer["classifier"].startswith("graspsense/knn ")
     assert answer["settings"] == {"neighbours": 3}
     assert answer["protocol"] == "stratified_10_fold"
@@ -73,11 +71,9 @@ def test_states_of_one_class(csv):
 
 def test_train_then_predict(csv, tmp_path):
     model = tmp_path / "mine.json"
-    code, out, _ = graspsense("train", csv, "--label", "what", "--instance", "thing", "--out", model)
-    assert code == 0
+    out = printed("train", csv, "--label", "what", "--instance", "thing", "--out", model)
     assert "labels      can:empty, can:full, jar:empty, jar:full" in out
-    by_trials = printed("train", csv, "--label", "what", "--out", tmp_path / "by_trials.json")
-    assert "\ndrift " in by_trials
+    assert "\ndrift " in printed("train", csv, "--label", "what", "--out", tmp_path / "by_trials.json")
     assert "\ndrift " not in out  # of six things no certainty is measured
     assert f"how good    graspsense evaluate {csv} --label what --instance thing" in out
     assert json.loads(model.read_text())["provenance"]["command"] == (
@@ -86,9 +82,8 @@ def test_train_then_predict(csv, tmp_path):
 
     new = tmp_path / "new.csv"
     new.write_text("f_steady,p_first,comment\n9.1,0.0661,a\n4.2,0.0549,b\n9.0,0.0300,c\n,0.066,d\n")
-    code, out, _ = graspsense("predict", model, new, "--json")
+    out = printed("predict", model, new, "--json")
     answer = json.loads(out)
-    assert code == 0
     predicted = [prediction["label"] for prediction in answer["predictions"]]
     assert predicted[:3] == ["can:full", "jar:empty", "unknown"]
     assert answer["unknown"] == 1
@@ -98,9 +93,7 @@ def test_train_then_predict(csv, tmp_path):
     reasons = answer["predictions"][3]["because"]
     assert any("f_steady is missing" in reason["words"] for reason in reasons)
 
-    code, out, _ = graspsense("predict", model, csv, "--label", "what")
-    assert code == 0
-    assert "unknown counts as wrong" in out
+    assert "as wrong" in printed("predict", model, csv, "--label", "what")
 
 
 def test_a_rate_of_trials_that_were_learned_from_has_no_interval_and_says_so(csv, tmp_path):
@@ -111,10 +104,10 @@ def test_a_rate_of_trials_that_were_learned_from_has_no_interval_and_says_so(csv
     others.write_text("\n".join(turned).replace("00,", ",") + "\n")
     graspsense("train", csv, "--label", "what", "--instance", "thing", "--out", model)
 
-    answer = json.loads(printed("predict", model, others, "--label", "what", "--json"))
+    answer = answered("predict", model, others, "--label", "what")
     assert answer["rate"]["rate"] > 0.9
     assert answer["rate"]["interval"] is None
-    assert any("120 of 120 trials were learned from" in warning for warning in answer["warnings"])
+    assert any("120 of 120 trials" in warning for warning in answer["warnings"])
 
 
 def test_a_rate_of_predictions_counts_the_objects_of_the_trials(csv, tmp_path):
@@ -157,7 +150,7 @@ def test_a_certainty_by_trials_is_said_to_be_that_of_the_same_objects(tmp_path):
             (tmp_path / name).write_text("".join(",".join(row[k] for k in columns) + "\n" for row in lines))
         model = tmp_path / "m.json"
         graspsense("train", tmp_path / "known.csv", "--label", "what", "--out", model, "--overwrite")
-        said.append(json.loads(printed("predict", model, tmp_path / "new.csv", "--label", "what", "--json")))
+        said.append(answered("predict", model, tmp_path / "new.csv", "--label", "what"))
     by_trials, by_objects = said
     assert by_trials["rate"]["rate"] < 0.75
     for predicted, of_same_objects in ((by_trials, True), (by_objects, False)):
@@ -167,15 +160,13 @@ def test_a_certainty_by_trials_is_said_to_be_that_of_the_same_objects(tmp_path):
 
 def test_a_model_of_states_or_classes(csv, tmp_path):
     model = tmp_path / "states.json"
-    code, _, err = graspsense("train", csv, "--label", "what", "--out", model, "--target", "state")
-    assert code == 2
-    assert "select it with --only: can, jar" in err
+    assert "--only: can, jar" in refused("train", csv, "--label", "what", "--out", model, "--target", "state")
     states = ("--target", "state", "--only", "jar")
-    assert graspsense("train", csv, "--label", "what", "--out", model, *states).returncode == 0
+    printed("train", csv, "--label", "what", "--out", model, *states)
     assert json.loads(model.read_text())["target"] == "state"
     again = ("train", csv, "--label", "what", "--out", model, "--target", "class", "--json")
     assert graspsense(*again, "--overwrite")[0] == 0
-    answer = json.loads(graspsense("predict", model, csv, "--label", "what", "--json")[1])
+    answer = answered("predict", model, csv, "--label", "what")
     assert answer["rate"]["rate"] > 0.9
 
 
@@ -196,7 +187,7 @@ def test_features_are_kept(csv, tmp_path):
 @every_case(
     ("arguments", "said"),
     [
-        (["evaluate", "nothing"], "FILE.csv, recordings as manifest:FILE.toml, "),
+        (["evaluate", "nothing"], "manifest:FILE.toml"),
         (["evaluate", "none.csv", "--label", "x"], "none.csv "),
         (["evaluate", "nosuch:x"], "'nosuch'. Known: icub"),
         (["evaluate", "icub:"], "names no folder"),
@@ -209,29 +200,22 @@ def test_features_are_kept(csv, tmp_path):
             "at least 4 instances",
         ),
         (["evaluate", "x.csv", "--label", "y", "--classifier", "treee"], "'treee'. Known: "),
-        (
-            ["evaluate", "x.csv", "--label", "y", "-o", "controller.ramp_s=1"],
-            "only keys of [classifier] have",
-        ),
+        (["evaluate", "x.csv", "--label", "y", "-o", "controller.ramp_s=1"], "[classifier]"),
         (["evaluate", "x.csv", "--label", "y", "-o", "classifier.trees=3"], "'trees'"),
         (["evaluate", "simulated", "--instances", "0"], "1 to 1000"),
-        (["evaluate", "simulated", "--trials", "0"], "0 trials per instance"),
+        (["evaluate", "simulated", "--trials", "0"], "0 trials"),
         (["evaluate", "simulated", "--objects", "canoe"], "'canoe'. Known: "),
-        (["evaluate", "simulated", "--objects", "can,can:full_open"], "an object is named twice"),
+        (["evaluate", "simulated", "--objects", "can,can:full_open"], "named twice"),
         (["evaluate", "simulated", "--objects", "can:full_open#3"], "without an instance"),
         (["train", "x.csv", "--label", "y", "--out", "model.pkl"], " .json"),
         (["train", "x.csv", "--label", "y", "--out", "gone/model.json"], " gone"),
-        (["evaluate", "x.csv", "--label", "y", "--keep", "."], ". is a folder: name a file in it"),
+        (["evaluate", "x.csv", "--label", "y", "--keep", "."], ". is a folder"),
         (["predict", "nosuch", "x.csv"], "'nosuch'. Known: "),
     ],
 )
 def test_mistakes(monkeypatch, tmp_path, arguments, said):
     monkeypatch.chdir(tmp_path)
-    ended, _, err = graspsense(*arguments)
-
-    assert ended == 2
-    assert said in err
-    assert "Traceback" not in err
+    assert said in refused(*arguments)
 
 
 def test_other_columns_than_the_model_takes(csv, tmp_path):
@@ -239,22 +223,19 @@ def test_other_columns_than_the_model_takes(csv, tmp_path):
     graspsense("train", csv, "--label", "what", "--features", "p_first,f_steady", "--out", model)
     other = tmp_path / "other.csv"
     other.write_text("p_first [mm],f_steady [N]\n66,9\n")
-    code, _, err = graspsense("predict", model, other)
-
-    assert code == 2
-    assert "takes p_first in m; here it is in mm" in err
+    assert "takes p_first in m" in refused("predict", model, other)
 
 
 @pytest.mark.slow
 def test_simulated_trials_small_and_whole():
     few = ("--objects", "can", "--instances", "2", "--trials", "2", "--folds", "2")
-    answer = json.loads(printed("evaluate", "simulated", *few, "--json"))
+    answer = answered("evaluate", "simulated", *few)
 
     assert answer["headline"]["n"] == 12
     assert answer["protocol"] == "instance_held_out"
     assert answer["controls"]["before_contact"]["rate"]["n"] == 12
     assert any("simulated" in note for note in answer["notes"])
-    assert "each instance is grasped in all of its states" in answer["notes"]
+    assert any("of its states" in note for note in answer["notes"])
 
 
 @pytest.mark.slow
@@ -263,7 +244,7 @@ def test_simulated_trials_with_each_instance_in_one_state_only(tmp_path):
     more = ("--states-per-instance", "one", "--keep", tmp_path / "t.csv", "--json")
     out = printed("evaluate", "simulated", *few, *more)
 
-    assert any("in one of its states only" in note for note in json.loads(out)["notes"])
+    assert any("its states only" in note for note in json.loads(out)["notes"])
     rows = [line.split(",") for line in (tmp_path / "t.csv").read_text().splitlines()[1:]]
     assert len(rows) == len({row[1] for row in rows}) == 4
 
@@ -282,12 +263,9 @@ def opened(monkeypatch):
 @pytest.mark.parametrize("command", ["train", "evaluate"])
 def test_simulated_trials_never_open_a_real_gripper(tmp_path, opened, command):
     out = ("--out", tmp_path / "m.json") if command == "train" else ()
-    code, _, err = graspsense(
+    assert "graspsense-pr2-gripper/pr2" in refused(
         command, "simulated", "--gripper", "pr2", "--instances", "1", "--trials", "1", *out
     )
-
-    assert code == 2
-    assert "graspsense-pr2-gripper/pr2 declares no objects that it can simulate, so it was not opened" in err
     assert opened == []
 
 
@@ -302,10 +280,7 @@ def test_a_feature_set_that_raises_on_simulated_grasps_is_named(monkeypatch):
     )
 
     assert code == 70
-    assert (
-        "feature set graspsense/chitta failed on a simulated grasp: ZeroDivisionError: division by zero"
-        in err
-    )
+    assert re.search("graspsense/chitta .*ZeroDivisionError", err)
     assert "internal error" not in err
 
 
@@ -321,11 +296,9 @@ def test_train_finds_out_before_the_grasps_that_it_cannot_write(mounted, tmp_pat
     files = {"--out": tmp_path / "m.json", "--keep": tmp_path / "k.csv"}
     files[option] = place / files[option].name
 
-    code, _, err = graspsense(
+    err = refused(
         "train", "simulated", "--instances", "1000000", *(word for pair in files.items() for word in pair)
     )
-
-    assert code == 2
     assert f"{files[option]} cannot be written" in err
     assert "grasping" not in err
     assert not files["--out"].exists()

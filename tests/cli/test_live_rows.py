@@ -1,7 +1,5 @@
 """The rows of a grasp in the terminal."""
 
-from __future__ import annotations
-
 from math import nan
 
 import pytest

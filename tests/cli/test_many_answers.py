@@ -1,10 +1,8 @@
 """A model asked about many trials at once says what it says of each alone."""
 
-import json
-
 import numpy as np
 import pytest
-from commands import printed
+from commands import answered, printed
 
 from graspsense.core.components.registry import installed
 from graspsense.core.learn.labelled import Labelled
@@ -62,8 +60,8 @@ def test_predict_answers_many_without_reasons_and_says_so(rows, tmp_path):
     source, model = str(tmp_path / "t.csv"), str(tmp_path / "m.json")
 
     printed("train", source, "--label", "label", "--classifier", "tree", "--out", model)
-    answer = json.loads(printed("predict", model, source, "--label", "label", "--json"))
+    answer = answered("predict", model, source, "--label", "label")
     assert answer["n"] == len(answer["predictions"]) == 1200
-    assert any("the predictions have no reasons" in note for note in answer["notes"])
+    assert any("no reasons" in note for note in answer["notes"])
     right = sum(prediction["label"] == prediction["truth"] for prediction in answer["predictions"])
     assert answer["rate"]["correct"] == right > 600

@@ -1,13 +1,11 @@
 """`graspsense plugins check` and `new`: what they print, and how they end."""
 
-from __future__ import annotations
-
 import json
 import os
 
 import parts
 import pytest
-from commands import graspsense, python
+from commands import graspsense, printed, python, refused
 from mutants import MUTANTS
 
 from graspsense.core.components.registry import IsolatedPlugins
@@ -38,9 +36,7 @@ def test_a_part_that_does_not():
     answer = json.loads(out)
     assert answer["conforms"] is False
     (failure,) = answer["failures"]
-    assert failure.startswith(
-        "graspsense-test/peak: requires-what-it-reads: without the channels it does not"
-    )
+    assert failure.startswith("graspsense-test/peak: requires-what-it-reads: ")
     assert {check["state"] for check in answer["results"]} == {"passed", "failed"}
 
 
@@ -62,18 +58,13 @@ def test_settings_reach_the_part_that_is_checked(monkeypatch):
 
         code, _, err = graspsense("plugins", "check", "hand", "-o", "hear=true")
         assert code == 1
-        assert "has no key 'hear'. Did you mean 'here'?" in err
+        assert all(part in err for part in ("'hear'", "'here'"))
 
-        code, _, err = graspsense("plugins", "check", "hand", "-o", "nonsense")
-        assert code == 2
-        assert "-o nonsense: expected KEY=VALUE" in err
+        assert "-o nonsense: expected KEY=VALUE" in refused("plugins", "check", "hand", "-o", "nonsense")
 
 
 def test_a_name_that_nobody_has():
-    code, _, err = graspsense("plugins", "check", "chita")
-
-    assert code == 2
-    assert "Did you mean 'chitta'?" in err
+    assert "'chitta'?" in refused("plugins", "check", "chita")
 
 
 OLD = """import graspsense.plugin_api as api
@@ -115,11 +106,7 @@ def test_imports_that_moved_are_printed_with_the_new_form_beside(tmp_path):
 
 
 def test_a_new_package_says_what_to_do_next(tmp_path):
-    code, out, _ = graspsense(
-        "plugins", "new", "lab-thing", "--role", "observer", "--folder", str(tmp_path / "thing")
-    )
-
-    assert code == 0
+    out = printed("plugins", "new", "lab-thing", "--role", "observer", "--folder", str(tmp_path / "thing"))
     assert f"  pip install -e {tmp_path / 'thing'} pytest\n  graspsense plugins list\n" in out
     assert "  graspsense plugins check lab-thing\n" in out
 
@@ -135,12 +122,9 @@ def test_a_group_without_a_command_prints_its_help_once():
 @pytest.mark.slow
 def test_a_package_is_made_for_several_roles(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    code, out, _ = graspsense(
+    assert "graspsense run --pipeline lab-hand" in printed(
         "plugins", "new", "lab-hand", "--role", "controller", "--role", "sensor-backend"
     )
-
-    assert code == 0
-    assert "graspsense run --pipeline lab-hand" in out
     assert sorted(path.name for path in (tmp_path / "lab-hand/src/lab_hand").glob("*.py")) == [
         "__init__.py",
         "backend.py",

@@ -10,7 +10,7 @@ from math import inf
 import pytest
 from attrs import evolve
 from cases import every_case
-from commands import graspsense, printed, python
+from commands import graspsense, printed, python, refused
 from grippers import Scripted, bottle, squeezing
 
 from graspsense import load_pipeline
@@ -65,7 +65,7 @@ def test_nothing_there_is_an_outcome_with_reasons_and_exit_code_0():
     ("arguments", "code", "says"),
     [
         (["--gripper", "pr2"], 3, "searched for"),
-        (["--object", "odwala:full_open"], 2, "Did you mean 'odwalla'?"),
+        (["--object", "odwala:full_open"], 2, "'odwalla'?"),
         (["--gripper", "pr2", "--object", "block"], 2, "object"),
         (["-o", "controller.probing_forse_n=3"], 2, "probing_force_n"),
         (["-o", "controller.probing_force_n"], 2, "="),
@@ -135,10 +135,9 @@ def test_every_grasp_and_its_recording_is_drawn(tmp_path):
 @pytest.mark.slow
 def test_a_folder_that_cannot_be_written_is_found_out_before_the_grasp(tmp_path):
     (tmp_path / "file").write_text("in the way")
-    done = graspsense("run", "--save", str(tmp_path / "file"))
-    assert done.returncode == 2
-    assert "cannot create a store" in done.stderr
-    assert "approach" not in done.stderr
+    err = refused("run", "--save", str(tmp_path / "file"))
+    assert "create a store" in err
+    assert "approach" not in err
 
 
 @pytest.mark.slow
@@ -194,13 +193,10 @@ def test_a_full_disk_under_stdout_is_told_without_a_traceback(arguments):
 def test_a_label_and_the_object_of_a_simulated_gripper_agree(tmp_path):
     store = str(tmp_path / "kept")
     plain = ("run", "--json", "--save", store, "-o", "classifier.type=none")
-    told = graspsense(*plain, "--label", "can:full_open")
-    assert told.returncode == 0, told.stderr
+    printed(*plain, "--label", "can:full_open")
     with Store.read(store) as opened:
         assert opened.trial(1).record.settings["gripper"]["object"] == "can:full_open"
-    refused = graspsense(*plain, "--label", "can:full_open", "--object", "can:empty_open")
-    assert refused.returncode == 2
-    assert "label and object must agree" in refused.stderr
+    assert "must agree" in refused(*plain, "--label", "can:full_open", "--object", "can:empty_open")
     with Store.read(store) as opened:
         assert len(opened.page()) == 1
 

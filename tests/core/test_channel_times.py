@@ -1,7 +1,5 @@
 """How far the times of two channels can be apart, from what the devices tell of their clocks."""
 
-from __future__ import annotations
-
 from math import inf
 from types import SimpleNamespace
 

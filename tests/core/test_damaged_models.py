@@ -1,7 +1,5 @@
 """Models are data: whatever a model file says, it is refused as damaged, or answers, in bounded time and memory."""
 
-from __future__ import annotations
-
 import base64
 import copy
 import json
@@ -141,8 +139,8 @@ def test_settings_that_would_take_all_memory_or_time_are_refused(tmp_path, name,
         ("[" * 100_000 + "]" * 100_000, "nested too deeply"),
         ('{"format": "graspsense model", "a": ' + "[" * 400 + "]" * 400 + "}", "nested too deeply"),
         ('{"format": "graspsense model", "format": "graspsense model"}', "is there twice"),
-        ('{"a": NaN}', "not a finite number"),
-        ('{"a": 1e400}', "not a finite number"),
+        ('{"a": NaN}', "a finite number"),
+        ('{"a": 1e400}', "a finite number"),
         ('{"a": ' + "9" * 200 + "}", "200 digits"),
         ('{"a": "\\ud800"}', "is not JSON"),
     ],

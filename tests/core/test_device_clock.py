@@ -1,7 +1,5 @@
 """The clock of a device against the host's: offset and drift from the fastest arrivals, and how far off they can be."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

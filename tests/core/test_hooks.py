@@ -176,7 +176,7 @@ def test_a_kind_of_experiment_names_what_it_runs_and_its_keys():
     kind = IsolatedPlugins(example("graspsense_experiment_kinds")).resource(ExperimentKindEntry, "wear")
 
     assert kind.targets == ("run", "keys", "result", "findings")
-    with pytest.raises(ValueError, match="both 'run' and 'keys'"):
+    with pytest.raises(ValueError, match="'run' and 'keys'"):
         ExperimentKindEntry(name="wear", run="lab_study.wear:run", summary="without keys")
 
 
@@ -206,7 +206,7 @@ def test_a_hook_that_asks_for_devices_has_the_answer_or_the_error_of_each_plugin
 
 
 def test_a_finding_is_in_one_of_three_states():
-    with pytest.raises(ValueError, match=r"'state' must be in \('ok', 'note', 'problem'\)"):
+    with pytest.raises(ValueError, match=r"'state'.*\('ok', 'note', 'problem'\)"):
         Finding("cable", "fine", "straight")  # type: ignore[arg-type]
 
 

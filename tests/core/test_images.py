@@ -36,6 +36,7 @@ from graspsense.plugin_api import (
     Command,
     Controller,
     ControllerEntry,
+    FastChannel,
     Frame,
     Image,
     Reading,
@@ -235,7 +236,7 @@ CHANGEABLE = (BLACK, fixed(BLACK[::1, ::-1][:, ::-1]), fixed(BLACK[:]))
     [
         *((EYE, image, word) for word, image in NOT_AS_DECLARED.items()),
         *((EYE, image, "can still be changed") for image in CHANGEABLE),
-        (FORCES, ((1.0, 2.0),) * 4, "4 x 2 instead of the shape 4 x 3"),
+        (FORCES, ((1.0, 2.0),) * 4, "4 x 2 instead"),
     ],
 )
 def test_an_image_that_is_not_as_declared_ends_the_grasp_and_is_told(array, image, word, monkeypatch):
@@ -253,6 +254,8 @@ def test_an_array_says_its_type_and_components_or_is_refused():
     ):
         with pytest.raises(ValueError, match=says):
             TactileArray("eye", "counts", rows=side, columns=side, **shape)
+    with pytest.raises(ValueError, match="GRASPSENSE_MAX_CHANNEL_NUMBERS"):
+        FastChannel("sound", "Pa", 1e9, samples=2**19, axes=("x", "y", "z"))
     with pytest.raises(ValueError, match="camera_left"):
         TactileArray("pads", "counts", rows=240, columns=320, components=3, dtype="uint8")
     for array in IMAGES:
@@ -366,9 +369,7 @@ class Watching(Controller[NoKeys]):
 def test_a_law_for_cells_of_another_type_does_not_fit(seen):
     _, _, plugins = seen
     options = ["gripper.type=eyes", "controller.type=deep", "features.type=chitta", "classifier.type=none"]
-    with pytest.raises(
-        WiringError, match=r"6 x 8 x 3 uint16, but .* gives it as an array of 6 x 8 x 3 uint8"
-    ):
+    with pytest.raises(WiringError, match=r"6 x 8 x 3 uint16, but .*6 x 8 x 3 uint8"):
         wiring.check(load_pipeline(options=options, plugins=plugins).settings)
 
 
@@ -379,7 +380,7 @@ def test_the_state_of_a_law_holds_images_that_nobody_changes(seen, monkeypatch):
     state_holds_everything(Subject(component=law))
     changeable = Watching.init(None)._replace(image=np.zeros(EYE.shape, EYE.dtype))
     monkeypatch.setattr(Watching, "init", lambda self: changeable)
-    with pytest.raises(CheckFailed, match=r"state\.image is an array that can be changed"):
+    with pytest.raises(CheckFailed, match=r"state\.image"):
         state_is_numbers(Subject(component=law))
 
 

@@ -1,14 +1,11 @@
 """The time from a command to the first motion and to the first force, as `doctor --latency` measures it."""
 
-from __future__ import annotations
-
-import json
 from collections import deque
 
 import pytest
 from attrs import evolve
 from cases import every_case
-from commands import graspsense, printed
+from commands import answered, graspsense
 
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.calibrating import CalibrationFailed
@@ -102,7 +99,7 @@ def test_without_a_block_or_enough_force_it_is_said_why_there_is_none():
 
 @pytest.mark.slow
 def test_doctor_measures_any_gripper_and_needs_its_name():
-    told = json.loads(printed("doctor", "--gripper", "sim", "--latency", "2", "--json"))
+    told = answered("doctor", "--gripper", "sim", "--latency", "2")
     [diagnosis] = [row for row in told["diagnoses"] if row["distribution"] == "graspsense-sim-gripper/sim"]
     motion, force = diagnosis["findings"]
     # The simulated fingers need some ms to get going against their friction.

@@ -1,7 +1,5 @@
 """Frames, images and samples that did not arrive are in the outcome, the counts and the report of a grasp."""
 
-from __future__ import annotations
-
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.plugin_api import Channel, FastChannel, Reading, TactileArray, create

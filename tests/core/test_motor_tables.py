@@ -1,7 +1,5 @@
 """The force of a gripper from the load of its motor: tables by a load cell, for both directions."""
 
-from __future__ import annotations
-
 import json
 from math import inf
 

@@ -1,7 +1,5 @@
 """Where a gripper is mounted: what a user writes, and that it is kept with a trial, replayed and exported."""
 
-from __future__ import annotations
-
 import json
 from math import pi
 

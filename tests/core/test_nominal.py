@@ -1,13 +1,9 @@
 """Texts of a table are nominal features of every classifier; ARFF files are read as their header says."""
 
-from __future__ import annotations
-
-import json
-
 import numpy as np
 import pytest
 from cases import every_case
-from commands import printed
+from commands import answered, printed
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -107,7 +103,7 @@ def test_a_model_of_nominal_features_predicts_from_other_tables(weather, tmp_pat
     other.write_text(
         "windy,humidity,outlook,temperature\nTRUE,70,overcast,60\nFALSE,90,sunny,80\nTRUE,80,foggy,70\n"
     )
-    predictions = json.loads(printed("predict", model, other, "--json"))["predictions"]
+    predictions = answered("predict", model, other)["predictions"]
     assert [prediction["label"] for prediction in predictions[:2]] == ["yes", "no"]
     # A value that the training did not have is as a missing one.
     assert any("outlook is missing" in reason["words"] for reason in predictions[2]["because"])

@@ -109,7 +109,7 @@ def test_the_gain_of_each_cell_is_fitted_stored_and_used(calibrate, tmp_path):
         (gains_text(cells=23), "no cell 22"),
         (gains_text(scale=-1.0), "do not rise"),
         (gains_text(whole=".5"), "whole number"),
-        (gains_text().replace("cell", "taxel"), "lacks the columns cell"),
+        (gains_text().replace("cell", "taxel"), "columns cell"),
         (gains_text() + "\nleft,3,nan,1\n", "numbers"),
         (gains_text() + "\nmiddle,3,100,1\n", "left or right"),
     ],

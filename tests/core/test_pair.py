@@ -1,15 +1,12 @@
 """Two grippers in one run: one axis of time, one rule when one of them fails, two trials that name each other."""
 
-from __future__ import annotations
-
-import json
 from threading import Condition
 from types import SimpleNamespace
 
 import pytest
 from attrs import evolve
 from cases import every_case
-from commands import graspsense, printed
+from commands import answered, refused
 from grippers import Scripted, bottle, squeezing
 
 from graspsense.core.components.roles import SensorBackend
@@ -155,7 +152,7 @@ def test_the_trials_of_a_pair_are_kept_and_name_each_other(tmp_path):
         '[controller]\ntype = "hybrid"\n[features]\ntype = "chitta"\n'
     )
     simple = ("--object", "block", "-o", "classifier.type=none", "-o", "gripper.rate_hz=250")
-    both = json.loads(printed("run", "--beside", plain, *simple, "--save", store, "--json"))["grippers"]
+    both = answered("run", "--beside", plain, *simple, "--save", store)["grippers"]
     assert {each["kept"]["trial"] for each in both} == {1, 2}
     named = {each["labels"]["beside"] for each in both}
     paths = list((store / "recordings").glob("*.mcap"))
@@ -165,5 +162,4 @@ def test_the_trials_of_a_pair_are_kept_and_name_each_other(tmp_path):
 
 
 def test_what_is_of_one_grasp_does_not_go_with_a_pair():
-    code, _, said = graspsense("run", "--beside", "default", "--dry-run")
-    assert (code, "--beside" in said) == (2, True)
+    assert "--beside" in refused("run", "--beside", "default", "--dry-run")

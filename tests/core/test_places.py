@@ -1,7 +1,5 @@
 """Where an error arose is told by a line of the plugin, also where the standard library called it."""
 
-from __future__ import annotations
-
 from functools import cached_property
 from pathlib import Path
 

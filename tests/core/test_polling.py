@@ -1,7 +1,5 @@
 """A gripper that has to be asked for each frame: when it is asked, and what its frames say."""
 
-from __future__ import annotations
-
 from math import inf, nan
 
 import pytest

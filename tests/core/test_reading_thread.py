@@ -1,7 +1,5 @@
 """A thread that reads a device: the newest value, its age, what was replaced, and the error that ended it."""
 
-from __future__ import annotations
-
 import queue
 import threading
 

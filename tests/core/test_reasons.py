@@ -1,7 +1,5 @@
 """Reasons of predictions: contributions add up to the prediction, in words with units and as JSON."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from cases import every_case
-from commands import graspsense
+from commands import graspsense, refused
 
 from graspsense.core.files.whole_file import NotAFile, first_bytes
 from graspsense.core.grasp.calibration_files import read_calibration
@@ -58,8 +58,7 @@ def test_a_device_or_an_endless_file_as_a_model_is_refused(tmp_path, monkeypatch
     with (tmp_path / "sparse.json").open("wb") as file:
         file.truncate(40 * 10**9)
     for name in ("zero.json", "sparse.json"):
-        done = graspsense("run", "-o", f"classifier.model={tmp_path / name}")
-        assert (done.returncode, "model" in done.stderr) == (2, True)
+        assert "model" in refused("run", "-o", f"classifier.model={tmp_path / name}")
 
 
 def test_a_pipe_in_the_place_of_a_database_is_refused(tmp_path):
@@ -74,5 +73,4 @@ def test_a_scene_whose_instances_differ_without_bound_is_refused(tmp_path):
     scene.write_text(
         'width_m = 0.06\nstiffness_spread = 1e10\n[[terms]]\ntype = "elastic"\nk1_n_m = 2000.0\n'
     )
-    done = graspsense("run", "--object", scene)
-    assert (done.returncode, "stiffness_spread" in done.stderr) == (2, True)
+    assert "stiffness_spread" in refused("run", "--object", scene)

@@ -1,7 +1,5 @@
 """How much recorded squeezes differ among themselves."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

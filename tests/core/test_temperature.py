@@ -1,7 +1,5 @@
 """Calibrated probabilities: temperature scaling."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from cases import every_case

@@ -1,7 +1,5 @@
 """A trace that is read while its grasp goes on."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st

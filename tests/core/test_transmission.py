@@ -1,7 +1,5 @@
 """The linkage without fingers: the map of a straight drive and its inverse."""
 
-from __future__ import annotations
-
 import pytest
 
 from graspsense.core.drivers.transmission import gap_and_rate, revolutions_at, straight_linkage

@@ -1,7 +1,5 @@
 """Small files that unpack to a lot: refused with the name of the limit, in a process that has little memory."""
 
-from __future__ import annotations
-
 import bz2
 import io
 import os

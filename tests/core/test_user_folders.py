@@ -1,7 +1,5 @@
 """The user's own folders, and what a user does without who has no home directory."""
 
-from __future__ import annotations
-
 import os
 import pwd
 from pathlib import Path

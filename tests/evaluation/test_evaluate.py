@@ -96,7 +96,7 @@ def test_a_class_of_one_state_is_left_out_of_the_states():
     evaluation = judged(labelled(labels, width, force), target="state")
 
     assert evaluation.headline.n == 60
-    assert "classes left out because they have a single state: egg" in evaluation.notes
+    assert any("egg" in note for note in evaluation.notes)
     with pytest.raises(ConfigError, match="has no state"):
         judged(labelled(["a", "b"] * 20, width[:40]), target="state")
 
@@ -115,7 +115,7 @@ def test_a_rate_that_is_the_instance_is_found_out():
     held = evaluation.controls["instance_held_out"]
     assert held.rate == evaluation.headline
     assert held.difference.interval[0] > 0.1
-    assert any("having seen the same objects" in warning for warning in evaluation.warnings)
+    assert any("the same objects" in warning for warning in evaluation.warnings)
 
 
 def test_no_leak_is_found_in_noise():
@@ -130,7 +130,7 @@ def test_no_leak_is_found_in_noise():
         )
         evaluation = judged(trials, "knn", folds=12, permutations=0)
 
-        assert not any("part of the stratified rate" in warning for warning in evaluation.warnings)
+        assert not any("stratified rate" in warning for warning in evaluation.warnings)
 
 
 def test_a_rate_that_is_the_moment_of_the_recording_is_found_out():
@@ -144,7 +144,7 @@ def test_a_rate_that_is_the_moment_of_the_recording_is_found_out():
     assert evaluation.headline.rate > 0.85
     assert evaluation.controls["recording_order"].rate.rate < 0.7
     assert evaluation.controls["recording_order"].difference.interval[0] > 0.2
-    assert any("the time of recording" in warning for warning in evaluation.warnings)
+    assert any("time of recording" in warning for warning in evaluation.warnings)
 
 
 def test_drift_can_tell_labels_that_were_recorded_one_after_the_other_and_it_is_said():
@@ -193,7 +193,7 @@ def test_what_is_known_before_the_contact_is_a_warning_only_where_it_tells(name,
     assert any(says in warning for warning in evaluation.warnings) is leak
     assert evaluation.controls[name].what == "posture before the grasp"
     assert (evaluation.controls[name].rate.rate > 0.4) is leak
-    assert ("The first line of the recording alone" in verdict(evaluation)) is (leak and name == "first_line")
+    assert ("The first line" in verdict(evaluation)) is (leak and name == "first_line")
 
 
 def control_of(values, missing=""):
@@ -228,7 +228,7 @@ def test_a_control_is_measured_on_the_trials_that_have_its_features():
     evaluation = judged(labelled(labels, width, force, before_contact=control)).controls["before_contact"]
 
     assert (evaluation.rate.correct, evaluation.rate.n) == (60, 60)
-    assert evaluation.what == "the gap at the start; 60 of 120 trials have such features: a pad felt a force"
+    assert re.search("60 of 120 .*: a pad felt a force", evaluation.what)
     # The headline of the same sixty trials, of which it misses some.
     assert -0.5 < evaluation.difference.value < 0.0
 
@@ -241,12 +241,11 @@ def test_a_width_that_is_as_good_as_all_features_is_a_warning(squeeze_adds):
     force = np.array([9.0, 3.0 if squeeze_adds else 9.0] * 60) + rng.normal(size=120)
     control = ControlFeatures(table=table(width, names=("p_first",)), what="p_first alone")
     evaluation = judged(labelled(labels, width, force, width=control))
-    assert any("the width alone reaches" in warning for warning in evaluation.warnings) is not squeeze_adds
+    assert any("width alone" in warning for warning in evaluation.warnings) is not squeeze_adds
 
 
 def test_what_cannot_be_measured_is_null_with_a_reason():
-    labels, width, force = four_states()
-    evaluation = to_json(judged(labelled(labels, width, force, no_instances="one thing a class")))
+    evaluation = to_json(judged(labelled(*four_states(), no_instances="one thing a class")))
 
     assert evaluation["protocol"] == "stratified_4_fold"
     assert "first_line" not in evaluation["controls"]
@@ -263,12 +262,11 @@ def test_one_instance_of_a_label_cannot_be_held_out():
     held = judged(labelled(labels, width, force, instances=things)).controls["instance_held_out"]
 
     assert held.rate is None
-    assert held.reason == "labels with a single instance, which cannot be held out: can:empty, can:full"
+    assert held.reason.endswith(": can:empty, can:full")
 
 
 def test_too_few_instances_for_an_interval_are_a_note_with_their_number():
-    labels, width, force = four_states()
-    notes = judged(labelled(labels, width, force, instances=("can#1",) * 120)).notes
+    notes = judged(labelled(*four_states(), instances=("can#1",) * 120)).notes
     assert any(note.startswith("1 instance:") for note in notes), notes
 
 
@@ -280,8 +278,7 @@ def names_in(value):
 
 
 def test_the_json_is_whole_and_stable():
-    labels, width, force = four_states()
-    trials = labelled(labels, width, force, order=tuple(range(120)))
+    trials = labelled(*four_states(), order=tuple(range(120)))
     text, again = (
         json.dumps(to_json(judged(trials, seed=2, learning_curve=True)), allow_nan=False) for _ in range(2)
     )
@@ -303,15 +300,13 @@ def test_the_json_is_whole_and_stable():
 
 
 def test_the_learning_curve_ends_at_the_headline_and_grows():
-    labels, width, force = four_states(n=20)
-    evaluation = judged(labelled(labels, width, force), learning_curve=True)
+    evaluation = judged(labelled(*four_states(n=20)), learning_curve=True)
     curve = evaluation.learning_curve
 
     assert curve[-1].rate == evaluation.headline
     assert [round(point.trained_on) for point in curve] == [8, 12, 24, 40, 60]
     # Of few trials a tenth and a fifth come to the same ones: that is one point.
-    labels, width, force = four_states(n=4)
-    few = judged(labelled(labels, width, force), folds=4, learning_curve=True).learning_curve
+    few = judged(labelled(*four_states(n=4)), folds=4, learning_curve=True).learning_curve
     assert [point.trained_on for point in few] == sorted({point.trained_on for point in few})
     assert len(few) < len(curve)
 
@@ -322,7 +317,7 @@ def test_few_trials_are_said_or_refused(n):
     trials = labelled(labels, width, force)
     few = trials.rows(np.array([i for i in range(120) if i < 4 * n or labels[i] != "can:full"]))
 
-    assert "labels with fewer trials than folds (4): can:full" in judged(few).notes
+    assert any("(4): can:full" in note for note in judged(few).notes)
     with pytest.raises(ConfigError, match="10 folds"):
         judged(trials.rows(np.arange(8)), folds=10)
 
@@ -331,7 +326,7 @@ def test_a_label_of_one_trial_can_never_be_right_and_one_label_is_nothing():
     labels, width, force = four_states()
     alone = judged(labelled(["egg", *labels[1:]], width, force))
 
-    assert "labels with a single trial, which no fold can predict: egg" in alone.notes
+    assert any(note.endswith(": egg") for note in alone.notes)
     assert alone.by_class["egg"].correct == 0
     with pytest.raises(ConfigError, match=r"'can'(.|\n)*10 of 130 files are left out"):
         judged(labelled(["can"] * 120, width, notes=("10 of 130 files are left out",)))
@@ -357,18 +352,14 @@ class Choosy:
 
 
 def test_a_fit_that_refuses_few_trials_costs_its_figure_only():
-    labels, width, force = four_states()
-    trials = labelled(labels, width, force)
+    trials = labelled(*four_states())
 
     evaluation = evaluate(Choosy(60), trials, classifier="choosy", folds=4, permutations=1)
 
     assert evaluation.headline.rate > 0.95
     assert [point.trained_on >= 60 for point in evaluation.learning_curve] == [True, True]
-    assert any(
-        "no point at 10 % of the trials" in note and "60 trials are needed" in note
-        for note in evaluation.notes
-    )
-    with pytest.raises(ConfigError, match=r" 90 .* 4 .*1000 trials are needed"):
+    assert any("at 10 %" in note and "60 trials" in note for note in evaluation.notes)
+    with pytest.raises(ConfigError, match=r"90 .* 4 .*1000 trials"):
         evaluate(Choosy(1000), trials, classifier="choosy", folds=4)
 
 
@@ -439,17 +430,10 @@ class Unconverged(SelectedComponent):
 
 
 def test_warnings_of_scikit_learn_are_one_line_each_with_a_count(recwarn):
-    labels, width, force = four_states(10)
     learner_of_test = learner("knn")
     warning = Unconverged(learner_of_test.component, learner_of_test.config)
-    evaluation = evaluate(
-        warning,
-        labelled(labels, width, force),
-        classifier="knn",
-        folds=4,
-        permutations=1,
-        learning_curve=False,
-    )
+    few = {"classifier": "knn", "folds": 4, "permutations": 1, "learning_curve": False}
+    evaluation = evaluate(warning, labelled(*four_states(10)), **few)
     # Four folds of the headline and four of the shuffled labels.
     (note,) = [text for text in evaluation.notes if "iterations ended" in text]
     assert "8 times" in note

@@ -1,11 +1,9 @@
 """Classifiers and feature sets on the same folds: who is best, equivalent, undecided or worse."""
 
-import json
-
 import numpy as np
 import pytest
 from attrs import evolve
-from commands import graspsense, printed
+from commands import answered, printed, refused
 from test_conformal import bottles
 from test_evaluate import learner
 
@@ -76,9 +74,9 @@ def test_the_command_names_the_best_and_refuses_feature_sets_of_a_csv(tmp_path):
     arguments = compared(tmp_path)
 
     shown = printed(*arguments, "--classifiers", "tree,knn")
-    listed = json.loads(printed(*arguments, "--classifiers", "tree,knn", "--json"))
+    listed = answered(*arguments, "--classifiers", "tree,knn")
 
-    assert "has the highest rate" in shown
+    assert "highest rate" in shown
     assert "RECORDING ORDER" in shown
     assert {candidate["classifier"] for candidate in listed["candidates"]} == {"tree", "knn"}
     assert listed["verdict"].startswith(listed["candidates"][0]["classifier"])
@@ -87,9 +85,7 @@ def test_the_command_names_the_best_and_refuses_feature_sets_of_a_csv(tmp_path):
         ("--target-value", "compare is for classifiers"),
         ("--out", "curve: the name of the file must end in .html"),
     ):
-        done = graspsense(*arguments, option, "curve")
-        assert done.returncode == 2
-        assert says in done.stderr
+        assert says in refused(*arguments, option, "curve")
 
 
 def test_features_from_before_the_contact_are_a_control_and_not_compared():
@@ -101,7 +97,7 @@ def test_features_from_before_the_contact_are_a_control_and_not_compared():
 
     assert [candidate.standing for candidate in ranking.candidates] == ["best", "control"]
     assert ranking.candidates[1].loss is None
-    assert "From before the contact alone, tree recognises" in ranking.verdict
+    assert "tree recognises" in ranking.verdict
 
 
 def test_answers_from_outside_are_compared_like_any_other():
@@ -120,10 +116,9 @@ def test_an_unknown_name_is_refused_by_the_option_that_was_typed_before_any_gras
         ("--feature-sets", "nope", "feature set"),
         ("--classifiers", "svn", "classifier"),
     ):
-        done = graspsense("compare", "simulated", option, name)
-        assert done.returncode == 2
-        assert f"{option} {name}: no {role} named" in done.stderr
-        assert "grasping" not in done.stderr
+        err = refused("compare", "simulated", option, name)
+        assert f"{option} {name}: no {role} named" in err
+        assert "grasping" not in err
 
 
 @pytest.mark.slow

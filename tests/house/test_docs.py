@@ -44,12 +44,8 @@ def test_a_page_that_is_made_from_the_code_is_what_the_code_says(name):
 
 
 @pytest.mark.slow
-def test_the_drawing_of_the_packages_is_that_of_the_imports():
+def test_the_drawing_of_the_packages_is_that_of_the_imports_which_form_no_circle():
     assert DRAWING.FILE.read_text() == DRAWING.drawing(), "run: python docs/package_drawing.py"
-
-
-@pytest.mark.slow
-def test_no_package_imports_in_a_circle():
     for graph in (DRAWING.host_subpackages(), *map(DRAWING.rooms_of, ROOMS), DRAWING.simulator_subpackages()):
         DRAWING.panel(graph)  # raises CycleError for a circle of imports
 
@@ -107,7 +103,7 @@ def test_the_table_of_packages_is_the_rule_that_is_enforced():
     assert table == {name: used - {name} for name, used in packages.items()}
 
 
-def test_the_tables_of_rooms_are_their_order():
+def test_the_tables_of_rooms_are_their_order_and_that_of_the_simulator_has_every_folder():
     folders = [
         room
         for package, rooms in ROOMS.items()
@@ -115,9 +111,6 @@ def test_the_tables_of_rooms_are_their_order():
         if (ROOT / "src" / "graspsense" / package / room).is_dir()
     ]
     assert [row[0].strip("`") for row in architecture_rows("Rooms")] == folders
-
-
-def test_the_table_of_the_simulator_has_every_folder():
     package = ROOT / "plugins" / "sim_gripper" / "src" / "graspsense_sim_gripper"
     folders = {path.parent.name for path in package.glob("*/__init__.py")}
     named = {row[0].strip("`") for row in architecture_rows("The simulator")}
@@ -148,12 +141,9 @@ def code(page, count):
     return [line for block in blocks[:count] for line in block.splitlines() if line.strip()]
 
 
-def test_a_feature_set_takes_fewer_than_twenty_lines():
+def test_a_feature_set_takes_fewer_than_twenty_lines_and_a_gripper_fewer_than_a_hundred():
     assert len(code("tutorial.md", 1)) < 20
     assert "graspsense_feature_sets" in "".join(code("tutorial.md", 1))
-
-
-def test_a_gripper_takes_fewer_than_a_hundred_lines():
     lines = [line for line in code("roles/sensor-backend.md", 2) if not line.strip().startswith('"""')]
     assert len(lines) < 100
     assert any("def read" in line for line in lines)

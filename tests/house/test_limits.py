@@ -1,4 +1,4 @@
-"""Limits of functions, their parameters, and the fields of tuples; each exception has a reason.
+"""Limits of functions, their parameters, the fields of tuples, and what tests expect; each exception has a reason.
 
 The length of a function counts every line from `def` to the end of its body, with the docstring. Parameters count
 without `self` and `cls`. The limits hold everywhere; only that of the fields of a NamedTuple in the simulator, whose
@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 import re
 from functools import cache
+from itertools import chain
 from typing import Final
 
 from repository import ROOT
@@ -22,6 +23,11 @@ MAX_LINES: Final = 60
 MAX_PARAMETERS: Final = 7
 MAX_FIELDS: Final = 8
 MAX_BY_POSITION: Final = 4
+
+EXPECTED: Final = re.compile(r"""match=[rf]*(["'])(.+?)\1|(["'])([^"']+)\3 in """)
+"""A text that a test looks for in a message."""
+SENTENCE: Final = re.compile(r"\b(?!graspsense )[A-Za-z]*[a-z](?: [a-z]+){3}\b")
+"""Four words in sequence, but for those of a command."""
 
 OPTIONS: Final = "a click command: one parameter for each option"
 
@@ -102,31 +108,24 @@ def named_tuples():
     }
 
 
-def compare(over, exceptions, limit):
-    new = {name: count for name, count in over.items() if name not in exceptions}
-    assert not new, f"more than {limit}: divide them, or add an exception with its reason"
-    stale = sorted(set(exceptions) - set(over))
-    assert not stale, f"no longer over {limit}: remove these exceptions"
-    assert all(exceptions.values())
-
-
-def test_no_function_is_too_long():
-    over = {name: lines(node) for name, node in functions() if lines(node) > MAX_LINES}
-    compare(over, LONG_FUNCTIONS, f"{MAX_LINES} lines")
-
-
-def test_no_function_has_too_many_parameters():
-    over = {name: parameters(node) for name, node in functions() if parameters(node) > MAX_PARAMETERS}
-    compare(over, MANY_PARAMETERS, f"{MAX_PARAMETERS} parameters")
-
-
-def test_no_tuple_of_the_simulator_has_too_many_fields():
-    over = {
-        name: count
-        for name, count in named_tuples().items()
-        if name.startswith(SIMULATOR) and count > MAX_FIELDS
-    }
-    compare(over, LARGE_TUPLES, f"{MAX_FIELDS} fields")
+def test_no_function_and_no_tuple_of_the_simulator_is_over_its_limit():
+    fields_of = [item for item in named_tuples().items() if item[0].startswith(SIMULATOR)]
+    for what, counts, limit, exceptions in (
+        ("lines", [(name, lines(node)) for name, node in functions()], MAX_LINES, LONG_FUNCTIONS),
+        (
+            "parameters",
+            [(name, parameters(node)) for name, node in functions()],
+            MAX_PARAMETERS,
+            MANY_PARAMETERS,
+        ),
+        ("fields", fields_of, MAX_FIELDS, LARGE_TUPLES),
+    ):
+        over = {name for name, count in counts if count > limit}
+        assert over <= exceptions.keys(), (
+            f"more than {limit} {what}: divide them, or add an exception with its reason"
+        )
+        assert exceptions.keys() <= over, f"no longer over {limit} {what}: remove these exceptions"
+        assert all(exceptions.values())
 
 
 def test_no_large_tuple_is_built_by_position():
@@ -148,3 +147,15 @@ def test_no_large_tuple_is_built_by_position():
         )
     ]
     assert not by_position, f"more than {MAX_BY_POSITION} fields by position: name them"
+
+
+def test_no_test_expects_a_sentence():
+    # What a user needs of a message is its kind, its names and its values, however it is worded.
+    tests = chain((ROOT / "tests").rglob("*.py"), (ROOT / "plugins").glob("*/tests/**/*.py"))
+    sentences = [
+        f"{path.relative_to(ROOT)}:{number}"
+        for path in tests
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        if any(SENTENCE.search(text[1] or text[3]) for text in EXPECTED.findall(line))
+    ]
+    assert not sentences, "look for names and values, or for three words at most"

@@ -44,19 +44,19 @@ def test_a_package_is_whole(roles, tmp_path):
 @every_case(
     ("name", "role", "says"),
     [
-        ("lab-thing", "features", r"Did you mean 'feature-set'\?.*sensor-backend .*how each grasp ended$"),
-        ("Lab_Thing", "feature-set", "small letters, digits and single hyphens"),
+        ("lab-thing", "features", r"'feature-set'\?.*sensor-backend .*each grasp ended$"),
+        ("Lab_Thing", "feature-set", "small letters, digits"),
         ("graspsense-chitta", "feature-set", "'chitta' .* graspsense/chitta"),
-        ("numpy", "feature-set", "numpy has a package numpy, which this one would hide"),
-        ("json", "feature-set", "Python itself has a module json"),
+        ("numpy", "feature-set", "package numpy"),
+        ("json", "feature-set", "Python .*json"),
         ("graspsense", "controller", "graspsense itself has it"),
         ("graspsense-c45", "classifier", "graspsense itself has it"),
-        ("class", "observer", "class is a keyword of Python"),
+        ("class", "observer", "class .*keyword"),
         ("hybrid", "controller", "'hybrid' .* graspsense/hybrid"),
-        ("lab hand", "sensor-backend", "without spaces, as in lab-hand"),
-        ("lab-hand ", "sensor-backend", "without spaces, as in lab-hand"),
-        (" lab", "sensor-backend", "without spaces, as in lab-hand"),
-        ("lab\thand", "sensor-backend", "without spaces, as in lab-hand"),
+        *(
+            (name, "sensor-backend", "spaces.* lab-hand")
+            for name in ("lab hand", "lab-hand ", " lab", "lab\thand")
+        ),
     ],
 )
 def test_what_it_refuses(name, role, says, tmp_path):

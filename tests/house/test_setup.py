@@ -36,9 +36,12 @@ def test_every_folder_under_plugins_is_a_distribution():
     assert set(PLUGINS.values()) >= {"c45", "pr2_gripper", "sim_gripper"}
 
 
-def test_requirements_install_every_distribution_in_editable_form():
+def test_requirements_install_every_distribution_in_editable_form_and_the_tools_that_uv_installs():
     editable = [line.removeprefix("-e ") for line in requirement_lines() if line.startswith("-e ")]
     assert editable == [".", *(f"./plugins/{folder.name}" for folder in FOLDERS)]
+    assert "-c constraints.txt" in requirement_lines()
+    tools = [line for line in requirement_lines() if not line.startswith("-")]
+    assert tools == PROJECT["dependency-groups"]["dev"]
 
 
 def test_an_installation_for_use_has_every_distribution_with_the_same_versions():
@@ -58,22 +61,10 @@ def test_an_installation_for_use_has_every_distribution_with_the_same_versions()
     ]
 
 
-def test_uv_knows_every_plugin():
+def test_groups_sources_and_extras_have_every_plugin():
     names = sorted(PLUGINS)
     assert sorted(PROJECT["dependency-groups"]["plugins"]) == names
     assert sorted(PROJECT["tool"]["uv"]["sources"]) == ["graspsense", *names]
-
-
-def test_pip_and_uv_install_the_same_tools():
-    tools = [line for line in requirement_lines() if not line.startswith("-")]
-    assert tools == PROJECT["dependency-groups"]["dev"]
-
-
-def test_requirements_apply_the_constraints():
-    assert "-c constraints.txt" in requirement_lines()
-
-
-def test_extra_of_each_plugin_and_of_all():
     extras = PROJECT["project"]["optional-dependencies"]
     of_plugins = {name: extra for extra, (name, *_) in extras.items() if name in PLUGINS}
     assert set(of_plugins) == set(PLUGINS)

@@ -73,9 +73,9 @@ TOUCHED = [(0.06, 9.0, 9.0)]
     [
         ([], set(NAMES), "empty"),
         ([(0.06, 0.0, 0.0)] * 50, set(NAMES), "no pad felt"),
-        ([(0.06, 9.0, 0.0)] * 50, set(NAMES), "only the left pad"),
-        ([(0.06, 0.0, 9.0)] * 50, set(NAMES), "only the right pad"),
-        ([(0.06, 9.0, 0.0)] * 25 + [(0.06, 0.0, 9.0)] * 25, set(NAMES), "at the same time"),
+        ([(0.06, 9.0, 0.0)] * 50, set(NAMES), "left pad"),
+        ([(0.06, 0.0, 9.0)] * 50, set(NAMES), "right pad"),
+        ([(0.06, 9.0, 0.0)] * 25 + [(0.06, 0.0, 9.0)] * 25, set(NAMES), "same time"),
         ([(0.06, math.nan, math.nan)] * 50, set(NAMES), "no pad felt"),
         # A contact without rest, way, gap or force.
         (RISES, set(NAMES) - {"p_first"}, "not at rest"),
@@ -98,7 +98,7 @@ def test_the_release_is_no_part_of_the_squeeze():
     trace = made_trace([(0.06, 0.0, 0.0)] * 5 + TOUCHED, phases=[Phase.APPROACH] * 5 + [Phase.RELEASE])
     missing, reasons = missing_of(trace)
     assert missing == set(NAMES)
-    assert "only when the grasp had ended" in reasons["p_first"]
+    assert "grasp had ended" in reasons["p_first"]
 
 
 def test_until_is_a_trace_of_what_had_been_seen_by_then():
@@ -141,7 +141,7 @@ def test_a_held_grasp_has_the_same_features_without_its_release(seed):
     ("rows", "why"),
     [
         ([(0.06 - 1e-4 * k, 5.0, 5.0) for k in range(150)], "not at rest within the 0.099 s"),
-        ([(0.06, 0, 5)] * 100 + [(0.05, 0, 0)] * 20 + [(0.05, 5, 5)] * 30, "only the right pad felt"),
+        ([(0.06, 0, 5)] * 100 + [(0.05, 0, 0)] * 20 + [(0.05, 5, 5)] * 30, "right pad felt"),
     ],
 )
 def test_a_held_grasp_without_rest_or_contact_has_the_same_reasons_without_its_release(rows, why):

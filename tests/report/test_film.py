@@ -1,7 +1,5 @@
 """Pictures and videos of a grasp: which files can be written, and which picture is kept."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from PIL import Image

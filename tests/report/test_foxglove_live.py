@@ -1,7 +1,5 @@
 """Grasps in Foxglove while they go on: the messages of a recording, and what bad viewers cannot do."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import os

@@ -1,7 +1,5 @@
 """A grasp that is shown live: what viewers and observers receive, and what bad viewers cannot do."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,7 +1,5 @@
 """The page of live grasps in a real browser: what it shows is what was sent, in light and dark, on a narrow window."""
 
-from __future__ import annotations
-
 import json
 import math
 import resource

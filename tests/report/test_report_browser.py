@@ -1,7 +1,5 @@
 """Pages in a real browser: nothing overflows or is clipped, in light and dark, and tables and pictures can be used."""
 
-from __future__ import annotations
-
 import re
 
 import browser as browsers

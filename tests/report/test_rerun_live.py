@@ -1,7 +1,5 @@
 """Grasps in Rerun: what its own reader finds in a file, and what its viewer receives."""
 
-from __future__ import annotations
-
 import os
 import signal
 import socket

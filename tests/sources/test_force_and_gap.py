@@ -1,7 +1,5 @@
 """Whether a slow topic is told from a clock that is off, by the moment at which the fingers slow down."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

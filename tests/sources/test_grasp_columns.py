@@ -1,7 +1,5 @@
 """Columns of a grasp: channels with times of their own, and shapes and lengths that are checked by name."""
 
-from __future__ import annotations
-
 from math import isnan
 
 import numpy as np
@@ -112,13 +110,13 @@ LONG = np.ones(N + 1)
     ("more", "says"),
     [
         ({"left_n": LONG}, "'left_n' has 101 samples, and t_s has 100"),
-        ({"velocity_m_s": np.ones((N, 2))}, "'velocity_m_s' has the shape"),
+        ({"velocity_m_s": np.ones((N, 2))}, "'velocity_m_s'.*shape"),
         ({"arrays": {"palm": np.ones((N + 1, 6))}}, "'palm' has 101"),
-        ({"arrays": {"palm": np.ones(N)}}, "'palm' has the shape"),
+        ({"arrays": {"palm": np.ones(N)}}, "'palm'.*shape"),
         ({"arrays": {"palm": np.ones((N, 6))}, "shapes": {"palm": (2, 2)}}, "'palm' has 6 numbers a sample.*2 x 2"),
         ({"scalars": {"two words": np.ones(N)}}, "'two words'"),
         ({"arrays": {"palm": np.ones((N, 0))}}, "'palm'"),
-        ({"fast": frozenset({"imu"})}, "'imu', which is not in `arrays`"),
+        ({"fast": frozenset({"imu"})}, "'imu'.*`arrays`"),
         ({"times": {"imu": LONG}}, "'imu', which is neither"),
         ({"scalars": {"heat": np.ones(3)}, "times": {"heat": np.array([0.1, 0.1, 0.2])}}, "times of 'heat'.*sample 2"),
         ({"scalars": {"heat": np.ones(3)}, "times": {"heat": np.array([0.1, 0.2])}}, "'heat' has 3 samples.*`times`"),
@@ -126,7 +124,7 @@ LONG = np.ones(N + 1)
         (
             {"arrays": {"imu": np.ones((5, 3))}, "fast": frozenset({"imu"}), "shapes": {"imu": (1, 4)},
              "times": {"imu": np.linspace(0.1, 0.5, 5)}},
-            "'imu' has 3 numbers a sample",
+            "'imu' has 3 numbers",
         ),
     ],
 )  # fmt: skip

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 from cases import every_case
-from commands import graspsense
+from commands import answered, graspsense, printed, refused
 from grippers import bottle, squeezing
 
 from graspsense.core.values.errors import ConfigError, DataDamaged
@@ -48,16 +48,16 @@ def test_columns_are_what_the_user_says_in_si_units(squeeze):
     recording = read_squeeze(name_of(squeeze, force=["F left"]))
     frame = recording.readings[-1].frame
     assert frame.force_left_n == frame.force_right_n > 1.0
-    assert any("single force was recorded" in note for note in recording.notes)
+    assert any("single force" in note for note in recording.notes)
 
 
 @every_case(
     ("columns", "says"),
     [
-        ({"gap": "opening"}, r"reaches 74 m, which no gripper has.* its unit behind it: \[mm\]"),
-        ({"gap": "opening*-0.01"}, r"the gap reaches -0\.74 m, .*Plausible is -0\.05 to 0\.5 m"),
-        ({"force": ["F left*1000", "F right"]}, r"the force reaches .* N, .*\[mN\], in counts \[counts\]"),
-        ({"time": "stamp ms*10"}, r"the time between samples reaches 10 s, .*behind it: \[ms\]"),
+        ({"gap": "opening"}, r"reaches 74 m, which no.*\[mm\]"),
+        ({"gap": "opening*-0.01"}, r"reaches -0\.74 m, .*Plausible is -0\.05 to 0\.5 m"),
+        ({"force": ["F left*1000", "F right"]}, r"reaches .* N, .*\[mN\], in counts \[counts\]"),
+        ({"time": "stamp ms*10"}, r"reaches 10 s, .*behind it: \[ms\]"),
     ],
 )
 def test_a_quantity_that_no_gripper_has_is_refused(squeeze, columns, says):
@@ -70,17 +70,14 @@ def test_a_quantity_that_no_gripper_has_is_refused(squeeze, columns, says):
     [
         ("", "which column of .* is time"),
         ("?time=stamp ms&gap=opening", "is force"),
-        ("?time=stamp ms&gap=opning&force=F left", "no column 'opning'.*Did you mean 'opening'"),
-        ("?time=stamp ms&gap=opening&force=F left&forse=x", "'forse' is not a quantity of a grasp.*'force'"),
+        ("?time=stamp ms&gap=opning&force=F left", "no column 'opning'.*'opening'"),
+        ("?time=stamp ms&gap=opening&force=F left&forse=x", "'forse'.*grasp.*'force'"),
         (
             "?time=stamp ms&gap=opening*mm&force=F left",
             r"gap, for squeeze.csv: no column 'mm'\. Columns: 'stamp ms', opening, 'F left'",
         ),
-        ("?time=stamp ms&gap=opening*&force=F left", "gap: this is not an expression"),
-        (
-            "?time=stamp ms&gap=opening&gap=opening&force=F left",
-            "2 columns are given for gap; at most 1 can be",
-        ),
+        ("?time=stamp ms&gap=opening*&force=F left", "gap: .*expression"),
+        ("?time=stamp ms&gap=opening&gap=opening&force=F left", "2 columns .*gap.*1"),
     ],
 )
 def test_a_name_that_makes_no_sense_is_told(squeeze, query, says):
@@ -116,34 +113,28 @@ def test_it_is_kept_whole_with_its_label_and_its_features_worked_out_by_hand(squ
     # Its phases are those of the controller, so that a page draws it from the contact on, as any other trial.
     first_squeeze = recorded.trace().phase.tolist().index(Phase.SQUEEZE)
     assert recorded.trace().t_s[first_squeeze] == pytest.approx(6.0, abs=0.1)
-    code, out, err = graspsense("replay", f"{store}#1", "--json")
-    assert code == 0, err
-    assert json.loads(out)["features"] == features
+    assert answered("replay", f"{store}#1")["features"] == features
     # The page has the same phases, and its axis begins at the contact, not at the first line of the file.
-    code, _, err = graspsense("report", store, "--out", tmp_path / "page")
-    assert code == 0, err
+    printed("report", store, "--out", tmp_path / "page")
     page = (tmp_path / "page" / "report.html").read_text()
     approach, squeeze = map(float, re.search(r"approach for ([\d.]+), squeeze for ([\d.]+)", page).groups())
     assert approach == pytest.approx(1.0, abs=0.1)
     assert squeeze == pytest.approx(0.55, abs=0.1)
-    assert "seconds since the squeeze began" in page
+    assert "the squeeze began" in page
 
 
 def test_options_of_a_csv_with_another_kind_are_refused(tmp_path):
-    code, _, err = graspsense("import", "icub:x.txt", "--save", tmp_path / "s", "--gap", "g")
-    assert code == 2
-    assert "--gap is for a CSV" in err
-    assert "Traceback" not in err
+    assert "--gap" in refused("import", "icub:x.txt", "--save", tmp_path / "s", "--gap", "g")
     assert sys.exc_info() == (None, None, None)
 
 
 @every_case(
     ("line", "says"),
     [
-        ("5000;1;1;1;x", "line 4: the time goes from .* it must increase"),
-        ("5002;inf;1;1;x", r"line 4: the gap is missing or infinite"),
-        ("5002;wide;1;1;x", r"opening \(gap\) is not a column of numbers: line 4 has 'wide'"),
-        ("5002;1;1;1", "line 4: 4 values, but there are 5 columns"),
+        ("5000;1;1;1;x", "line 4: the time"),
+        ("5002;inf;1;1;x", "line 4: the gap"),
+        ("5002;wide;1;1;x", "numbers: line 4 has 'wide'"),
+        ("5002;1;1;1", "line 4: 4 values.*5 columns"),
     ],
 )
 def test_a_line_that_is_no_squeeze_is_told_with_its_number(squeeze, line, says):

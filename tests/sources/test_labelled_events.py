@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from cases import every_case
-from commands import graspsense, printed
+from commands import graspsense, printed, refused
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -115,10 +115,10 @@ def test_a_column_of_true_and_false_is_one_of_1_and_0_and_still_a_label(tmp_path
 @every_case(
     ("slips", "events", "says"),
     [
-        (2 * flags((1.0, 2.0)), 'events = { slip = "slip" }', "line 202.* is 2; it must be 0 or 1"),
-        (np.full(len(T_S), 7.0), 'events = { slip = "slip [s]" }', "7 s is outside of the recording"),
+        (2 * flags((1.0, 2.0)), 'events = { slip = "slip" }', "line 202.* is 2.*0 or 1"),
+        (np.full(len(T_S), 7.0), 'events = { slip = "slip [s]" }', "7 s is outside"),
         (flags((1.0, 2.0)), 'events = { slip = "slip [s]" }', "2 values"),
-        (flags(), 'events = { slip = "slip [mm]" }', "'mm' is not one of time"),
+        (flags(), 'events = { slip = "slip [mm]" }', "'mm' is not"),
         (flags(), 'events = { slip = "slid" }', "no column 'slid'"),
         (flags(), 'events = { "Slip, fast" = "slip" }', "small letters"),
         (flags(), 'events = { "slip not known" = "slip" }', "small letters"),
@@ -264,7 +264,7 @@ def test_the_threshold_of_a_group_does_not_come_from_its_own_recordings():
     # Of one group alone, none can be held out.
     alone = evaluate_kind("slip", *thresholds(kinds=1), factor=1.0, tolerance_s=0.1, folds=10, seed=0)
     assert (alone.fitted, alone.given.detected) == (None, 3)
-    assert "none can be held out" in alone.not_fitted
+    assert "held out" in alone.not_fitted
 
 
 def boxes(folder, newtons=0.15):
@@ -332,9 +332,9 @@ def test_an_acceleration_of_one_axis_is_told_and_its_threshold_can_be_set(tmp_pa
     [
         (("--events", "--png", "x.png"), 2, "--png"),
         (("--events", "--tolerance", "0"), 2, "tolerance"),
-        (("--events", "--tolerance", "nan"), 2, "nan is no time"),
+        (("--events", "--tolerance", "nan"), 2, "nan is no"),
         (("--events", "--instance", "box"), 2, "--instance"),
-        (("--events", "--only", "jar"), 2, "no event is labelled in 0 recordings of jar"),
+        (("--events", "--only", "jar"), 2, "0 recordings"),
         (("--events", "-o", "controller.type=grab"), 2, "no such channel"),
         (("--events", "-o", "features.type=curve"), 2, "[controller]"),
     ],
@@ -358,11 +358,10 @@ def test_recordings_without_labels_are_an_error_or_a_note(tmp_path):
     write(tmp_path, "box_1", force(), flags())
     code, _, err = graspsense("evaluate", f"manifest:{manifest(tmp_path, events='')}", "--events")
     assert code == 2
-    assert "no event is labelled" in err
+    assert "no event" in err
     write(tmp_path, "box_2", force(level=6.0), np.full(len(T_S), math.nan))
     scores = scored(f"manifest:{manifest(tmp_path)}")
     assert scores["recordings"] == 1
-    assert any("1 of 2 recordings left out" in note for note in scores["notes"])
+    assert any("1 of 2 recordings left" in note for note in scores["notes"])
     for source in ("simulated", "icub", str(tmp_path / "box_1.csv")):
-        code, _, err = graspsense("evaluate", source, "--events")
-        assert (code, "recordings" in err) == (2, True), err
+        assert "recordings" in refused("evaluate", source, "--events")

@@ -1,7 +1,5 @@
 """MAT files: our reader against that of scipy, on what scipy writes."""
 
-from __future__ import annotations
-
 import struct
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The thresholds that an import chooses where the defaults do not fit the noise of its recordings."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from attrs import evolve
@@ -179,7 +177,7 @@ def several(count=5, begin=0, **given):
 @every_case(
     ("recordings", "settings", "words"),
     [
-        (several(), {}, "the defaults, which fit the noise"),
+        (several(), {}, "the defaults"),
         # A hand whose fingers feel 0.5 N at most never touches by the default: above the noise, and below the peak.
         (several(peak_n=0.5), {FORCE: (0.04, 0.25)}, "default 0.625 N"),
         # Above what the noise of 0.5 N reaches in 10 000 samples.
@@ -191,10 +189,10 @@ def several(count=5, begin=0, **given):
         # Three of four recordings reach the default.
         ([*STRONG, *WEAK], {}, ""),
         ([*STRONG[:2], *WEAK], {FORCE: (0.0, 0.4)}, ""),
-        (several(3, peak_n=0.0, force_noise_n=1.0), {}, "check the unit and the zero"),
+        (several(3, peak_n=0.0, force_noise_n=1.0), {}, "check the unit"),
         # Metres and newtons of a data set that counts frames are nominal, and were chosen for the defaults.
         ([in_units(squeeze(peak_n=0.5, step_s=0.1), {"t": "frame"}, time=10.0)], {}, ""),
-        ([WHOLE, CLOSE], {"controller.too_wide_m": (0.0, 0.0)}, "1 of 2 recordings touch within 1 mm"),
+        ([WHOLE, CLOSE], {"controller.too_wide_m": (0.0, 0.0)}, "1 of 2 recordings"),
         # An object of two millimetres is not nothing.
         (
             [reframed(WHOLE, lambda frame: {"gap_m": frame.gap_m - 0.0535})],
@@ -221,7 +219,7 @@ def test_thresholds_are_those_of_the_recordings(recordings, settings, words):
 def test_a_time_out_that_is_shorter_than_a_recording_is_extended():
     chosen = thresholds_for([WHOLE], {"move_timeout_s": 10.0, "steady_timeout_s": 1.5})
     assert chosen.settings == {"controller.steady_timeout_s": 2.0}
-    assert "recordings last up to 2 s" in chosen.words
+    assert "up to 2 s" in chosen.words
 
 
 def test_the_thresholds_of_rest_are_not_those_of_open_fingers():

@@ -1,7 +1,5 @@
 """What becomes of each type of column of a Parquet file: numbers, several numbers a row, an image a row, or texts."""
 
-from __future__ import annotations
-
 import datetime
 from contextlib import suppress
 

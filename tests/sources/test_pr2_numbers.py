@@ -4,8 +4,6 @@ Each has them as data of its own, because none of them may import another: `gras
 `graspsense_sim_gripper.plant.drive_models`, `sensing` and `fingertip`, `graspsense.sources.recordings.rosbag`.
 """
 
-from __future__ import annotations
-
 from graspsense.sources.recordings import rosbag
 from graspsense_pr2_gripper import backend, fingertip, linkage
 from graspsense_sim_gripper.plant import drive_models, sensing

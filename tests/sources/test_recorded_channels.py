@@ -1,7 +1,5 @@
 """What features need is compared with what each recording has, by every command that reads recordings."""
 
-from __future__ import annotations
-
 import ast
 import re
 
@@ -52,7 +50,7 @@ def options(*given):
 
 def proposed(words):
     """The options in a message."""
-    return options(*ast.literal_eval(re.search(r"For its array palm: options=(\[.*?\])", words)[1]))
+    return options(*ast.literal_eval(re.search(r"palm: options=(\[.*?\])", words)[1]))
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 
 import pytest
@@ -99,7 +100,5 @@ def test_a_note_says_in_how_many_grasps_of_which_objects_the_accuracy_is_not_ver
 
     notes = simulated(settings, groups=groups).notes
 
-    assert [note for note in notes if "not verified" in note] == [
-        "2 of 4 grasps (rod:steel): accuracy not verified for trace, features (reasons: graspsense run --object NAME "
-        "--explain-model)"
-    ]
+    (note,) = [note for note in notes if "not verified" in note]
+    assert re.match(r"2 of 4 grasps \(rod:steel\): .* trace, features .*--explain-model", note)

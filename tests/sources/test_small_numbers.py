@@ -1,7 +1,5 @@
 """Numbers are small in SI units: every classifier tells apart what it tells apart in a smaller unit."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -113,7 +113,7 @@ def test_messages_that_are_stamped_when_they_come_in_bursts_are_told() -> None:
     """As of a serial port whose driver reads five lines at once: the first is 40 ms older than its time."""
     came_s = np.floor(T_S / 0.05 + 1e-6) * 0.05 + 0.05 + 1e-5 * (np.arange(len(T_S)) % 5)
     (told,) = common_clock("bag", {"/hand": HEALTHY, "/tip": messages(came_s)}).notices
-    assert "/tip has 5 messages at a time, every 50 ms" in told
+    assert all(part in told for part in ("/tip has 5 messages", "every 50 ms"))
 
 
 @pytest.mark.parametrize("seeds", [40, pytest.param(400, marks=pytest.mark.slow)])
@@ -209,11 +209,11 @@ RISES = (T_S < 1.5) | (T_S > 2.0)
 @pytest.mark.parametrize(
     ("kept", "stamped_s", "samples", "notice"),
     [
-        (T_S < 1.5, T_S, 151, "ends before the other topics"),
+        (T_S < 1.5, T_S, 151, "the other topics"),
         (T_S >= 0.03, T_S, 297, None),
         (ALL, T_S - 20.0, 300, "another clock"),
-        (ALL, T_S - 0.03, 298, "headers of the force are 30 ms older"),
-        (ALL, T_S - 0.2, 281, "headers of the force are 200 ms older"),
+        (ALL, T_S - 0.03, 298, "30 ms older"),
+        (ALL, T_S - 0.2, 281, "200 ms older"),
     ],
     ids=[
         "a topic that dies",

@@ -6,7 +6,7 @@ from collections import Counter
 import pytest
 from attrs import evolve
 from cases import every_case
-from commands import graspsense, printed
+from commands import graspsense, printed, refused
 from grippers import Scripted, bottle, settings_with, squeezing
 from kept import BENCH, keep
 
@@ -114,10 +114,9 @@ RUN = ("run", "--label", "block", *PLAIN, "--save")
     ],
 )
 def test_other_settings_are_refused_before_the_grasp(grasped, command, options, says):
-    done = graspsense(*command, grasped, *options, answers="\n")
-    assert done.returncode == 2
-    assert says in done.stderr
-    assert "add --changed if this is intended" in done.stderr
+    err = refused(*command, grasped, *options, answers="\n")
+    assert says in err
+    assert "add --changed if" in err
     assert len(trials_in(grasped)) == 1
 
 
@@ -125,11 +124,11 @@ def test_other_settings_are_refused_before_the_grasp(grasped, command, options, 
 def test_other_settings_are_taken_if_it_is_told(grasped):
     changed = (*COARSE, "-o", "controller.probing_force_n=12", "--changed")
     assert collect(grasped, "\nq\n", more=changed).returncode == 0
-    assert graspsense(*RUN, grasped, *changed).returncode == 0
+    printed(*RUN, grasped, *changed)
     assert len(trials_in(grasped)) == 3
     # Another classifier is no other setting.
     command = ("collect", "--labels", "block,can:full_open", "--save", grasped, *changed[:-1])
-    assert graspsense(*command, "-o", "classifier.type=knn", answers="q\n").returncode == 0
+    printed(*command, "-o", "classifier.type=knn", answers="q\n")
 
 
 def test_another_gripper_is_refused_before_it_moves(tmp_path):
@@ -191,12 +190,11 @@ def test_the_first_trials_are_collected_for_a_model_that_does_not_exist_yet(tmp_
         'extends = "default"\n[classifier]\ntype = "knn"\nmodel = "mine.json"\n'
     )
     collect_both = ("collect", "--pipeline", "mine.toml", "--labels", "can:full_open,can:empty_open")
-
     note = "note: `collect` works with it, `run` does not yet: there is no model mine.json yet"
     assert note in printed("config", "validate", "mine.toml")
     done = graspsense(*collect_both, "--each", "2", "--save", "t", *COARSE, answers="\n" * 4)
     assert done.returncode == 0
-    assert "note: collecting without predictions: there is no model mine.json yet" in done.stderr
+    assert "model mine.json yet" in done.stderr
     with Store.read(tmp_path / "t") as store:
         assert sum(store.counts("collect").values()) == 4
 
@@ -206,12 +204,10 @@ def test_the_first_trials_are_collected_for_a_model_that_does_not_exist_yet(tmp_
 
 def test_the_advice_on_a_missing_model_fits_the_gripper():
     model = ("-o", "classifier.type=knn", "-o", "classifier.model=mine.json")
-    real = graspsense("run", "--gripper", "pr2", *model)
-
-    assert real.returncode == 2
-    assert "graspsense collect --gripper pr2 --labels" in real.stderr
-    assert "graspsense train store:trials --classifier knn --out mine.json" in real.stderr
-    assert "simulated" not in real.stderr
+    err = refused("run", "--gripper", "pr2", *model)
+    assert "graspsense collect --gripper pr2 --labels" in err
+    assert "graspsense train store:trials --classifier knn --out mine.json" in err
+    assert "simulated" not in err
 
 
 def held(folder):
@@ -232,7 +228,7 @@ TOY = (("--object", "toy"), ("-o", "gripper.object=toy"))
         ("block,block", (), "named twice"),
         *((f"block,{label}", (), f"{label!r} is not a label") for label in ("my can:full", "can:full open", "can#2 b")),
         # An object that the gripper does not know, and one that contradicts the label.
-        ("block,nonsense:full", (), "no object named 'nonsense'"),
+        ("block,nonsense:full", (), "named 'nonsense'"),
         *((f"block,{label}", (), "object 'can'") for label in ("can", "can:full_opn")),
         *(("block", (*gripper, *toy), "the label block is not what the gripper holds, which is toy")
           for gripper in ((), EMULATED) for toy in TOY),
@@ -248,8 +244,7 @@ def test_labels_that_make_no_sense_are_refused_before_the_store_exists(tmp_path,
 
 @every_case("command", [("run", "--label"), ("import", "a.csv", "--label")])
 def test_a_label_with_a_space_is_refused_with_the_reason(tmp_path, command):
-    done = graspsense(*command, "can#2 b", "--save", tmp_path / "t")
-    assert (done.returncode, "without spaces" in done.stderr) == (2, True)
+    assert "without spaces" in refused(*command, "can#2 b", "--save", tmp_path / "t")
 
 
 @pytest.mark.slow
@@ -266,8 +261,7 @@ def test_an_object_from_a_file_can_have_any_label(tmp_path):
 @pytest.mark.slow
 def test_what_is_grasped_and_what_changes_no_result_may_differ(grasped):
     options = ("--seed", "3", "-o", "gripper.explain=true", "-o", "gripper.compile=never")
-    done = graspsense("run", "--label", "can:empty_open", *PLAIN, *options, "--save", grasped)
-    assert done.returncode == 0, done.stderr
+    printed("run", "--label", "can:empty_open", *PLAIN, *options, "--save", grasped)
     assert collect(grasped, "q\n", more=()).returncode == 0
 
 
@@ -289,7 +283,7 @@ def test_a_store_and_files_with_spaces_in_their_names_work_everywhere(tmp_path, 
 
     command = ("collect", *pipeline, *COARSE, "--labels", "block,none", "--each", "2")
     command += ("--operator", "A B", "--save", store)
-    assert graspsense(*command, answers="\n" * 4).returncode == 0
+    printed(*command, answers="\n" * 4)
     for command in (
         ("trials", "list", named),
         ("trials", "aside", f"{store}#1", "--why", "moved by hand"),
@@ -307,5 +301,4 @@ def test_a_store_and_files_with_spaces_in_their_names_work_everywhere(tmp_path, 
         ("run", "-o", "classifier.type=c45", "-o", "classifier.model=my model.json"),
         ("report", named, "--folds", "2"),
     ):
-        done = graspsense(*command)
-        assert done.returncode == 0, (command, done.stderr)
+        printed(*command)

@@ -11,7 +11,7 @@ import pytest
 import scipy
 from attrs import evolve
 from cases import every_case
-from commands import graspsense
+from commands import graspsense, printed, refused
 from kept import ended, frame, keep, pads, write_recording
 
 from graspsense.core.settings.selected import select_component
@@ -97,11 +97,11 @@ def test_the_table_of_a_store_is_no_grasp_to_import(stored, tmp_path, ending):
         pytest.importorskip("pyarrow.parquet", reason="needs the extra parquet")
     table = tmp_path / f"t.{ending}"
     export(stored, table)
-    code, _, err = graspsense("import", table, "--save", tmp_path / "other")
-    assert code == 2
-    assert f"graspsense export DIR#12 --to FILE.{ending}" in err
+    assert f"graspsense export DIR#12 --to FILE.{ending}" in refused(
+        "import", table, "--save", tmp_path / "other"
+    )
     learned = graspsense("train", table, "--label", "label", "--out", tmp_path / "model.json")
-    assert (learned.returncode, "name the store as store:DIR" in learned.stderr) == (
+    assert (learned.returncode, "store:DIR" in learned.stderr) == (
         (0, False) if ending == "csv" else (2, True)
     )
 
@@ -122,9 +122,9 @@ def test_labelled_trials_of_a_store_are_a_data_set(folder):
 
 def test_one_grasp_tick_by_tick(folder, tmp_path):
     for ending in ("csv", "npz", "mcap", "toml"):
-        code, out, _ = graspsense("export", f"{folder}#1", "--to", tmp_path / f"one.{ending}")
-        assert code == 0
-        assert ("the settings of" if ending == "toml" else "120 ticks, ") in out
+        assert ("the settings of" if ending == "toml" else "120 ticks, ") in printed(
+            "export", f"{folder}#1", "--to", tmp_path / f"one.{ending}"
+        )
     rows = rows_of(tmp_path / "one.csv")
     assert [float(row["gap_m"]) for row in rows] == [frame(k).gap_m for k in range(120)]
     assert {row["edge_left_n"] for row in rows} == {""}
@@ -148,7 +148,7 @@ def test_nothing_is_ever_overwritten_and_what_cannot_be_written_is_told(folder, 
     assert (tmp_path / "mine.csv").read_text() == "mine"
     for source, target in (("", "t.xlsx"), ("", "t.mcap"), ("#1", "t.arff"), ("#9", "t.csv")):
         told = export(f"{folder}{source}", tmp_path / target, code=2)
-        assert "can be written as" in told or "has no trial 9" in told
+        assert "be written as" in told or "trial 9" in told
         assert not (tmp_path / target).exists()
 
 

@@ -1,14 +1,12 @@
 """Features of a whole store with other thresholds: from its recordings, without a change of the store."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil
 
 import pytest
 from cases import every_case
-from commands import graspsense, printed
+from commands import answered, printed, refused
 from kept import frame, keep
 
 from graspsense.core.values.errors import ConfigError, DataDamaged
@@ -45,8 +43,8 @@ def test_other_thresholds_give_other_features_of_the_same_trials(folder, table):
     assert again.provenance["settings"]["features"]["contact_force_n"] == 0.2
     assert again.provenance["settings"]["gripper"]["type"] == "graspsense-sim-gripper/sim"
     told = "\n".join(again.notes)
-    assert f"extracted again from the recordings, with {table}.contact_force_n=0.2" in told
-    assert "outcomes that change with these settings: 6 from steady to" in told
+    assert f"{table}.contact_force_n=0.2" in told
+    assert "settings: 6 from steady" in told
     assert labelled_store(folder).table.values.tobytes() == stored.table.values.tobytes()
 
 
@@ -67,11 +65,8 @@ def test_the_settings_of_an_experiment_are_used_for_a_store(folder):
 @every_case(
     ("option", "says"),
     [
-        (
-            "gripper.object=can:full",
-            r"other keys of \[features\], \[controller\], \[run\] only; its gripper is",
-        ),
-        ("features.contact_force=1", "Did you mean 'contact_force_n'"),
+        ("gripper.object=can:full", r"\[features\], \[controller\], \[run\] only; its gripper"),
+        ("features.contact_force=1", "'contact_force_n'"),
         ("features.contact_force_n=-1", "must be > 0"),
         ("features.type=curv", "curve"),
         ("nonsense", "other keys of"),
@@ -89,7 +84,7 @@ def test_a_lost_recording_is_told(folder, tmp_path):
     trials = labelled_store(folder, ["features.force=left"])
     assert len(trials) == 5
     (told,) = (note for note in trials.notes if "cannot be read" in note)
-    assert re.search(r"1 of 6 .* the recording of trial 3 .* is lost", told)
+    assert re.search("1 of 6 .* the recording.*trial 3 .* is lost", told)
     with Store.read(folder) as store:
         for path in store.recordings.iterdir():
             path.unlink()
@@ -100,20 +95,18 @@ def test_a_lost_recording_is_told(folder, tmp_path):
 def test_the_command_compares_and_keeps(folder, tmp_path):
     kept = tmp_path / "again.csv"
     arguments = ("features", f"store:{folder}", "-o", "controller.contact_force_n=2", "--keep", kept)
-    told = json.loads(printed(*arguments, "--json"))
+    told = answered(*arguments)
     # The left pad reaches 1.19 N at most.
     (row,) = [row for row in told["features"] if row["name"] == "p_first"]
     assert (row["unit"], row["trials_before"], row["median_before"]) == ("m", 6, 0.066)
     assert (row["trials"], row["median"]) == (0, None)
     assert kept.read_text().startswith("label,instance,order,p_first [m]")
-    code, _, err = graspsense(*arguments)
-    assert (code, "already exists" in err) == (2, True)
+    assert "already exists" in refused(*arguments)
     other = ("-o", "controller.contact_force_n=0.2")
     assert "6 of 6" in printed("features", folder, "--overwrite", "--keep", kept, *other)
     assert "6 of 6" in printed("features", folder, *other)
     assert read_labelled(kept, "label").table.columns(["p_first"]).values[0, 0] == gap_at(0.2)
-    code, _, err = graspsense("features", tmp_path / "none", *other)
-    assert (code, "there is no store" in err) == (2, True)
+    assert "no store" in refused("features", tmp_path / "none", *other)
 
 
 def test_train_uses_the_features_of_its_options(folder, tmp_path):
@@ -122,6 +115,6 @@ def test_train_uses_the_features_of_its_options(folder, tmp_path):
     options = ("-o", "features.contact_force_n=0.2", "-o", "classifier.min_leaf=1", "--classifier", "tree")
     printed(*train, *options)
     assert json.loads(out.read_text())["provenance"]["settings"]["features"]["contact_force_n"] == 0.2
-    code, _, err = graspsense(*train, "--overwrite", "-o", "gripper.object=can:full")
-    assert code == 2
-    assert "only keys of [classifier], [features], [controller] and [run] have a meaning" in err
+    assert "[classifier], [features], [controller] and [run]" in refused(
+        *train, "--overwrite", "-o", "gripper.object=can:full"
+    )

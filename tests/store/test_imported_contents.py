@@ -1,7 +1,5 @@
 """The same grasp is imported once, whatever its file is called."""
 
-from __future__ import annotations
-
 import pytest
 from attrs import evolve
 from kept import keep

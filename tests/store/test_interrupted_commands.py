@@ -4,8 +4,6 @@ No finished trial is lost, every file is whole or as it was, and each loop says 
 harmed nothing fails. GRASPSENSE_KILLS is the number of kills of each command.
 """
 
-from __future__ import annotations
-
 import os
 import random
 import shutil

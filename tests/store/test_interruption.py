@@ -304,8 +304,8 @@ def test_two_operators_on_a_store_undo_and_repeat_only_what_each_has_grasped(tmp
     says_second("", "trial 3, toy")
 
     assert "trial 1, block" in says_first("u", "set aside")
-    assert "no trial to undo" in says_first("u", "no trial")
-    assert "no trial to undo" in says_first("r", "no trial")
+    assert "to undo" in says_first("u", "no trial")
+    assert "to undo" in says_first("r", "no trial")
     retaken = says_second("r", "trial 4, toy")
     assert "trial 3, toy: set aside" in retaken
     for process in (block_operator, toy_operator):

@@ -5,7 +5,7 @@ import shutil
 
 import pytest
 from attrs import evolve
-from commands import graspsense
+from commands import answered, graspsense
 from kept import begun, ended, keep, pads, write_recording
 from mcap.reader import make_reader
 
@@ -147,7 +147,7 @@ def test_a_damaged_file_alone_is_written_anew_as_far_as_it_can_be_read(tmp_path)
     again = read_recorded(recovery.recording)
     assert 240 <= len(again) < 300
     assert set(again.ticks["t_s"].tolist()) <= {10.0 + k * 0.001 for k in range(300)}
-    assert "messages in it are lost" in recovery.why
+    assert "are lost" in recovery.why
     with pytest.raises(SaveFailed, match="already exists"):
         recover_file(path)
 
@@ -172,12 +172,10 @@ def test_a_folder_without_a_store_does_not_become_one(tmp_path):
 def test_the_commands_say_what_they_did(store):
     keep(store)
     part(store)
-    done = graspsense("verify", store.folder, "--json")
-    assert done.returncode == 0
-    assert json.loads(done.stdout)["unfinished"] == ["20261121-103015-0001.mcap.part was never finished"]
-    done = graspsense("recover", store.folder, "--json")
-    assert done.returncode == 0
-    (file,) = json.loads(done.stdout)["files"]
+    assert answered("verify", store.folder)["unfinished"] == [
+        "20261121-103015-0001.mcap.part was never finished"
+    ]
+    (file,) = answered("recover", store.folder)["files"]
     assert (file["what"], file["trial"]) == ("recovered", 2)
     store.trial(1).recording.unlink()
     done = graspsense("verify", store.folder)
@@ -185,4 +183,4 @@ def test_the_commands_say_what_they_did(store):
     assert "is missing" in done.stdout
     done = graspsense("replay", f"{store.folder}#1")
     assert done.returncode == 5
-    assert "recording of trial 1" in done.stderr
+    assert "trial 1" in done.stderr

@@ -12,7 +12,7 @@ from contextlib import closing
 import pytest
 from attrs import evolve
 from cases import every_case
-from commands import graspsense
+from commands import graspsense, printed, refused
 from kept import BENCH, keep
 
 from graspsense.core.values.errors import ConfigError, DataDamaged
@@ -57,13 +57,13 @@ def test_a_relabelled_trial_has_its_new_label_everywhere_and_the_store_is_intact
     assert labelled_store(str(store.folder)).labels == ("can:full_open", "can:empty_open", "toy")
     (squeeze,) = recorded_squeezes([f"store:{store.folder}"], "can:empty_open")
     assert (squeeze.name, squeeze.instance) == (f"{store.folder}#2", "can#3")
-    assert any("labels of 1 trial were changed" in note for note in labelled_store(str(store.folder)).notes)
+    assert any("labels of 1 trial" in note for note in labelled_store(str(store.folder)).notes)
     assert store.counts() == {("can:full_open", "can#2"): 1, ("can:empty_open", "can#3"): 1, ("toy", None): 1}
     assert verify_store(store.folder).problems == ()
     code, out, _ = graspsense("trials", "list", store.folder)
-    assert "relabelled from can:full_open#2 to can:empty_open#3" in out
+    assert "can:full_open#2 to can:empty_open#3" in out
     page = store_page(str(store.folder)).html()
-    assert "relabelled from can:full_open#2 to can:empty_open#3" in page
+    assert "can:full_open#2 to can:empty_open#3" in page
     assert "was empty" in page
 
 
@@ -92,13 +92,11 @@ def test_trials_that_are_set_aside_are_not_used_until_they_are_brought_back(stor
     # Trials 2, 3, 5 and 6 of the alternating labels.
     left = ("can:empty_open", "can:full_open", "can:full_open", "can:empty_open")
     assert labelled_store(str(store.folder)).labels == left
-    assert "trials of the store that are not used: 2 set aside" in labelled_store(str(store.folder)).notes
+    assert any("2 set aside" in note for note in labelled_store(str(store.folder)).notes)
     for command in ("train", "evaluate"):
         out = ["--out", str(tmp_path / "m.json")] if command == "train" else ["--folds", "2"]
         assert "2 set aside" in "".join(map(str, graspsense(command, f"store:{store.folder}", *out)))
-    code, told, _ = graspsense("export", store.folder, "--to", tmp_path / "a.csv")
-    assert code == 0
-    assert "set aside and left out: 2" in told
+    assert "out: 2" in printed("export", store.folder, "--to", tmp_path / "a.csv")
     assert len((tmp_path / "a.csv").read_text().splitlines()) == 5
     listed = json.loads(graspsense("trials", "list", store.folder, "--aside", "--json")[1])
     assert [load["id"] for load in listed] == [4, 1]
@@ -120,19 +118,16 @@ def test_trials_that_are_set_aside_are_not_used_until_they_are_brought_back(stor
 @every_case(
     ("command", "says"),
     [
-        (("aside", 1, 9, "--why", "x"), "has no trial 9: its trials are 1 to 3"),
-        (("aside", 1, 2, "--why", "x"), "trial 2 is set aside already: earlier"),
-        (("restore", 2, 1), "trial 1 is not set aside"),
-        (("relabel", 2, 1, "--label", "toy"), "trial 1 has the label toy already"),
-        (("relabel", 1, "--label", "my toy"), "'my toy' is not a label"),
+        (("aside", 1, 9, "--why", "x"), "trial 9.* 1 to 3"),
+        (("aside", 1, 2, "--why", "x"), "trial 2 .*already: earlier"),
+        (("restore", 2, 1), "trial 1 is not"),
+        (("relabel", 2, 1, "--label", "toy"), "trial 1 .*label toy"),
+        (("relabel", 1, "--label", "my toy"), "'my toy'"),
         (("relabel", 1), "give either --label CLASS:STATE or --as-recorded"),
         (("aside", 1, "--why", " "), "--why is empty"),
         (("aside", "1", "--why", "x"), "write DIR#NUMBER"),
-        (("aside", "typo#1", "--why", "x"), "there is no store in"),
-        (
-            ("relabel", 3, "--label", "block"),
-            "trial 3 was simulated with can:full_open, so it cannot be a block",
-        ),
+        (("aside", "typo#1", "--why", "x"), "no store in"),
+        (("relabel", 3, "--label", "block"), "trial 3 .*can:full_open.*block"),
     ],
 )
 def test_a_change_that_is_wrong_for_one_trial_changes_none(tmp_path, command, says):
@@ -146,7 +141,7 @@ def test_a_change_that_is_wrong_for_one_trial_changes_none(tmp_path, command, sa
         code, _, err = changed(store, *command)
 
         assert code == 2
-        assert says in err
+        assert re.search(says, " ".join(err.split()))
         assert (labels(store), changes.history(store)) == state
 
 
@@ -243,7 +238,7 @@ def test_a_store_that_is_rebuilt_from_its_recordings_says_that_its_changes_are_l
     code, _, err = graspsense("recover", store.folder)
 
     assert code == 0
-    assert "Labels are as recorded, and no trial is set aside" in err
+    assert "as recorded" in err
     with Store.read(store.folder) as rebuilt:
         assert labels(rebuilt) == [(1, "toy", None), (2, "toy", None)]
     assert "as recorded" not in graspsense("recover", store.folder)[2]
@@ -258,11 +253,11 @@ def test_a_number_is_changed_given_and_restored(store):
     code, out, _ = changed(store, "value", 1, 3, "--value", "fill [ml]=250", "--why", "scale")
 
     assert code == 0
-    assert "trial 1: number changed from fill [ml]=200 to fill [ml]=250 (scale)" in out
-    assert "trial 3: number changed from none to fill [ml]=250 (scale)" in out
+    assert all(part in out for part in ("trial 1: number changed", "fill [ml]=200 to fill [ml]=250 (scale)"))
+    assert all(part in out for part in ("trial 3: number changed", "fill [ml]=250 (scale)"))
     trials = labelled_store(folder, value="fill")
     assert (trials.value.unit, trials.value.values) == ("ml", (250.0, 210.0, 250.0))
-    assert any("numbers of 2 trials were changed after recording" in note for note in trials.notes)
+    assert any("numbers of 2 trials" in note for note in trials.notes)
     assert trial_table(folder).further.values[:, -1].tolist() == [250.0, 210.0, 250.0]
     assert verify_store(store.folder).problems == ()
     # What was recorded stays, and comes back.
@@ -288,9 +283,7 @@ def test_a_number_that_cannot_be_changed_is_refused(store):
         assert changes.history(store) == []
     # Nor are trials collected with a number in another unit.
     collect = ("collect", "--save", store.folder, "--labels", "can:full_open", "--value", "fill=3")
-    code, _, err = graspsense(*collect)
-    assert code == 2
-    assert "fill of other trials is in ml, and 'fill' cannot be compared with them" in " ".join(err.split())
+    assert "ml, and 'fill'" in " ".join(refused(*collect).split())
 
 
 @pytest.mark.slow
@@ -300,18 +293,13 @@ def test_the_page_of_a_store_has_a_section_for_a_number(store, tmp_path):
         keep(store, "can:full_open", f"can#{k % 12}", device=REAL, ticks=3, values=(0.066, fill / 20.0), grasp=k,
              labels={"fill [ml]": repr(fill)})  # fmt: skip
 
-    code, out, _ = graspsense(
-        "report", store.folder, "--out", tmp_path / "page", "--target-value", "fill", "--folds", "3"
-    )
-
-    assert code == 0, out
+    printed("report", store.folder, "--out", tmp_path / "page", "--target-value", "fill", "--folds", "3")
     page = (tmp_path / "page" / "report.html").read_text()
     assert "Predicted number: fill" in page
-    assert "mean absolute error of" in page
+    assert "absolute error" in page
     assert page.count("predicted ") >= 24  # a mark with its words for each trial
     for control in ("mean only", "width only"):
         assert control in page
-    code, _, err = graspsense("report", store.folder, "--out", tmp_path / "page", "--target-value", "weight")
-    assert code == 2
-    assert "no trial of the store" in err
+    err = refused("report", store.folder, "--out", tmp_path / "page", "--target-value", "weight")
+    assert "of the store" in err
     assert "There are: fill" in " ".join(err.split())

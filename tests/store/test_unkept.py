@@ -145,7 +145,7 @@ def test_collect_neither_counts_it_nor_goes_on(tmp_path):
     code, out, err = plainly(*command, answers="\n\n")
     assert code != 0
     assert "0 of 2" in out
-    assert "ticks of the grasp" in err
+    assert "the grasp" in err
     assert "Recorder failed" in err
     assert numbers_in(folder) == []
 
@@ -177,7 +177,7 @@ def test_what_a_gripper_does_not_declare_ends_the_grasp_and_the_trial_until_then
     more = ("--gripper", "shortening", "-o", f"gripper.what={what}", "--save", str(folder))
     code, out, err = plainly("run", *more)
     assert code == 4, err
-    assert "aborted: hand delivered what it does not declare" in out
+    assert "aborted: hand delivered" in out
     with Store.read(folder) as store:
         (trial,) = store.page()
         assert trial.outcome == "aborted"

@@ -1,7 +1,5 @@
 """The features on curves whose answers can be written down."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

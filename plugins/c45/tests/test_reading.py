@@ -131,11 +131,11 @@ def test_json_is_exact_and_says_its_version():
     ("change", "words"),
     [
         ({"format": "x"}, "'format' must be"),
-        ({"version": 2}, "this release reads 1"),
+        ({"version": 2}, "reads 1"),
         ({"classes": [["a"], "b", "c"]}, "class label"),
         ({"classes": ["a"]}, "differ in length"),
         ({"nodes": {}}, "damaged"),
-        ({"attributes": []}, "does not fit its attribute"),
+        ({"attributes": []}, "its attribute"),
     ],
 )
 def test_damaged_json_is_refused(change, words):
@@ -158,7 +158,7 @@ UPWARDS["nodes"]["n_children"] = [0, 2, 0, 3, 0, 0]
 
 
 @every_case(
-    ("text", "words"), [(to_json(grasp_tree())[:-3], "not JSON"), (json.dumps(UPWARDS), "do not form a tree")]
+    ("text", "words"), [(to_json(grasp_tree())[:-3], "not JSON"), (json.dumps(UPWARDS), "form a tree")]
 )
 def test_text_that_is_no_tree_is_refused(text, words):
     with pytest.raises(StoredTreeError, match=words):

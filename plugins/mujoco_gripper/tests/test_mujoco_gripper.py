@@ -296,7 +296,7 @@ def test_a_gripper_file_is_written_from_a_model_and_grasps_as_it_is(grasped, tmp
     monkeypatch.chdir(tmp_path)
     told = new_file(PARALLEL).stdout
     assert "close" in told
-    assert "Left to fill in" in told
+    assert "to fill in" in told
     trial = grasped("gripper.file=lab-hand.toml")
     assert (trial.outcome.words, trial.features["f_steady"]) == ("steady", pytest.approx(20.0, abs=0.2))
     again = new_file(PARALLEL)

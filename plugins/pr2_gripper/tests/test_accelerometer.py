@@ -119,7 +119,7 @@ def test_reports_that_are_dropped_show_as_lost_samples(opened_and_read, drop, le
 def test_a_board_without_an_accelerometer_reads_as_before_and_says_so(opened_and_read):
     _, with_it = opened_and_read()
     info, without = opened_and_read({"identity": {"accelerometer_g": 0}})
-    assert "the board has no accelerometer" in " ".join(info.notes)
+    assert "no accelerometer" in " ".join(info.notes)
     assert {reading.signals.acceleration.new for reading in without} == {0}
     assert repr([reading.frame for reading in without]) == repr([reading.frame for reading in with_it])
 

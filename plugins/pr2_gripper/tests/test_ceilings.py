@@ -1,7 +1,5 @@
 """A board that claims what no PR2 gripper has is not opened, and no board raises the ceilings of the host."""
 
-from __future__ import annotations
-
 import math
 import re
 import sys

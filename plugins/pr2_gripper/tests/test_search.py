@@ -54,7 +54,7 @@ def test_two_grippers_and_no_serial_is_a_question_back():
 def test_device_that_may_not_be_opened_is_not_passed_off_as_ready():
     """The nodes of this listing do not exist, so nobody may open them."""
     assert [(device.serial, device.ready) for device in found_devices()] == [("L7", False), ("R2", False)]
-    assert "no permission on /dev/hidraw0" in found_devices()[0].advice
+    assert "/dev/hidraw0" in found_devices()[0].advice
 
 
 def test_missing_library_is_told(monkeypatch):

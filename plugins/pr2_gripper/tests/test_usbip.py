@@ -312,7 +312,7 @@ def test_the_command_does_what_it_is_told_until_it_is_told_to_quit(ports, monkey
     plugged = [("plug", True), ("unplug", False), ("state", False), ("plug", True)]
     assert [(state["did"], state["plugged"]) for state in states] == plugged
     assert "no word 'unplugg'" in said.err
-    assert "Did you mean 'unplug'?" in said.err
+    assert "'unplug'?" in said.err
     assert "complete nothing, in either direction" in said.err
     assert ports[0].host is None, "it is gone with the command"
 

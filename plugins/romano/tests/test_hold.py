@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 from cases import every_case
-from commands import graspsense
+from commands import graspsense, refused
 
 from graspsense.plugin_api import create
 from graspsense.testing.controller import LONGEST_S
@@ -46,16 +46,14 @@ def test_by_default_a_law_ends_within_the_time_that_conformance_allows(name):
     ],
 )
 def test_bad_input_is_a_wrong_use(arguments, said):
-    done = graspsense("hold", *arguments)
-    assert done.returncode == 2
-    assert said in done.stderr
+    assert said in refused("hold", *arguments)
 
 
 def test_a_gripper_that_is_lost_ends_it_and_may_not_be_open():
     done = graspsense("hold", "--seconds", "30", *PR2, "-o", "gripper.faults.unplug_at_s=0.7")
     assert done.returncode == 4
     assert "device lost" in done.stdout
-    assert "not known to be open: the gripper does not answer" in done.stderr
+    assert "does not answer" in done.stderr
 
 
 @pytest.mark.slow

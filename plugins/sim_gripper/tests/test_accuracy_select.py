@@ -173,11 +173,12 @@ def test_a_slow_approach_is_taken_up_near_the_object(monkeypatch):
 
 @pytest.mark.slow
 def test_selecting_that_takes_long_reports_how_far_it_is(monkeypatch, caplog):
+    monkeypatch.setattr(verify, "PROGRESS_S", float("inf"))
     selected(CONFIG, thing(SHELL), hybrid())
     assert caplog.messages == []
     monkeypatch.setattr(verify, "PROGRESS_S", 0.0)
     selected(CONFIG, thing(SHELL, ("loss", {"damping_n_s_m": 1.0})), hybrid())
-    assert "choosing the steps of the simulation: 1 % of the allowed work done" in caplog.messages
+    assert "simulation: 1 %" in caplog.messages
 
 
 class Ragged(NamedTuple):
@@ -360,7 +361,7 @@ def test_the_report_says_which_quantities_are_not_verified(terms, further, unsur
     [
         # On a free mass of 1 kg, the gain times the tick may be at most 2 kg: 1 - 4 is -3.
         ({}, 1900.0, ""),
-        ({}, 4000.0, "factor of 2.99 in each tick of 1 ms"),
+        ({}, 4000.0, "factor of 2.99"),
         ({"drive_lag_s": 1e-3}, 4000.0, "factor of 1.19"),
     ],
 )

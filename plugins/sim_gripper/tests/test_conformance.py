@@ -49,12 +49,12 @@ def test_a_sound_term_has_no_defect():
 @every_case(
     ("law", "says"),
     [
-        (lambda p, s, d0, d1, h, v1: (0, State(max(d1, s.worst_m))), "gives the force 0 (int)"),
+        (lambda p, s, d0, d1, h, v1: (0, State(max(d1, s.worst_m))), "force 0 (int)"),
         (lambda p, s, d0, d1, h, v1: (d1 / (d1 - 0.0001 * 10), s), "raised ZeroDivisionError"),
         (lambda p, s, d0, d1, h, v1: (float("inf"), s), "a finite float"),
-        (lambda p, s, d0, d1, h, v1: (time.perf_counter(), s), "depend on the arguments only"),
-        (lambda p, s, d0, d1, h, v1: (p.k_n_m * d1, State(1)), "the types of its numbers"),
-        (lambda p, s, d0, d1, h, v1: (p.k_n_m * d1 + 0.01, s), "at rest without compression"),
+        (lambda p, s, d0, d1, h, v1: (time.perf_counter(), s), "arguments only"),
+        (lambda p, s, d0, d1, h, v1: (p.k_n_m * d1, State(1)), "types"),
+        (lambda p, s, d0, d1, h, v1: (p.k_n_m * d1 + 0.01, s), "without compression"),
         (lambda p, s, d0, d1, h, v1: (p.k_n_m * (1.1 if d1 < d0 else 1.0) * d1, s), "has given back"),
         (lambda p, s, d0, d1, h, v1: (p.k_n_m * (d1 - 1e-3 * v1), s), "has given back"),
         (counted, "changes a global"),
@@ -63,7 +63,7 @@ def test_a_sound_term_has_no_defect():
 def test_a_law_with_a_defect_is_caught(law, says):
     (defect,) = defects(law)
 
-    assert "the law of term 'gel'" in defect
+    assert "term 'gel'" in defect
     assert says in defect
 
 

@@ -5,8 +5,6 @@
 with LeRobot 0.4.4 (`.ci/lerobot_itself`).
 """
 
-from __future__ import annotations
-
 import sys
 import tempfile
 from pathlib import Path

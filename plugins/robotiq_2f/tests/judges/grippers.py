@@ -6,8 +6,6 @@ It runs in an environment without graspsense. What each driver reads has to be w
 position or the reach of the thing between the fingers.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 

@@ -4,8 +4,6 @@ python services.py GRASPSENSE: GRASPSENSE is the program. The definitions below 
 the wire, one after the other, so that what they decode does not depend on our types.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import signal

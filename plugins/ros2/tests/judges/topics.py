@@ -4,8 +4,6 @@ python topics.py GRASPSENSE: GRASPSENSE is the program. Its node is asked for th
 the first one are listed, and those of the last one decoded.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -4,8 +4,6 @@ python with_rclpy.py, in an environment that has graspsense, rclpy, and the inte
 test_msgs/action/Fibonacci but no control_msgs.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import signal
