@@ -15,7 +15,7 @@ from attrs import evolve
 from graspsense.core.learn.model import refuse_improbable, refuse_unsupported
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.features import FeatureTable, Prediction
-from graspsense.core.values.tree import TreeNode
+from graspsense.core.values.reasons import TreeNode
 from graspsense.testing import component
 from graspsense.testing.checks import CheckFailed, checks_of, demand, leaving_no_thread, raises_nothing
 from graspsense.testing.damage import damaged_at, paths
