@@ -295,7 +295,7 @@ def _closer(values: Values, apart: Values, rng: np.random.Generator) -> Values:
     weights = np.zeros((n, n))
     np.put_along_axis(weights, around, shares + 1.0 / around.shape[1], axis=1)
     to_a_trial, to_a_point = (
-        np.maximum(np.partition(distances, _SECOND, axis=1)[:, _SECOND], _NEAREST)
+        np.clip(np.partition(distances, _SECOND, axis=1)[:, _SECOND], _NEAREST, 1.0 / _NEAREST)
         for distances in (apart, _distances(weights @ values, values))
     )
     closer: Values = np.log(to_a_point / to_a_trial)
