@@ -88,11 +88,9 @@ def _speed_beyond_limit(subject: Subject, kind: int) -> str:
     """
     with closing(subject.create()) as backend:
         session = Session(backend.open(0), opened_s=0.0)
-        declared = limits_of(session.info)
+        usual = limits_of(session.info)
         # The limits of a first use apply after a contact too.
-        limits = declared._replace(
-            effort_limit_n=declared.first_effort_n, speed_limit_m_s=declared.first_speed_m_s
-        )
+        limits = usual._replace(effort_limit_n=usual.first_effort_n, speed_limit_m_s=usual.first_speed_m_s)
         greatest = {VELOCITY: -1e6, POSITION: 0.0, FORCE: 1e6, EFFORT: 1e6}[kind]
         ticks = max(int(0.5 * session.info.rate_hz), 20)
         use(session, backend, "closing hard", ticks, Command(kind, greatest, inf, inf), limits)
@@ -103,8 +101,8 @@ def _speed_beyond_limit(subject: Subject, kind: int) -> str:
             if abs(value) > grace * max(limit, least)
             else ""
             for name, value, limit, least, grace in (
-                ("effort_n", frame.effort_n, declared.first_effort_n, backend.least_force_n, 1.1),
-                ("velocity_m_s", frame.velocity_m_s, declared.first_speed_m_s, backend.least_speed_m_s, 3.0),
+                ("effort_n", frame.effort_n, usual.first_effort_n, backend.least_force_n, 1.1),
+                ("velocity_m_s", frame.velocity_m_s, usual.first_speed_m_s, backend.least_speed_m_s, 3.0),
             )
         )
         demand(not effort, effort)
