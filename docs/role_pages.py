@@ -83,6 +83,7 @@ HELPERS = {
     "Contact and rest": (
         *("CONTACT_FORCE_N", "REST_SPEED_M_S", "REST_WINDOW_S"),
         *("both_touch", "RestState", "update_rest", "at_rest", "first_rest"),
+        *("RestCourse", "follow_rest"),
         *("gap_resolution", "window_of_rest"),
     ),
     "Phases that a controller reports": ("APPROACH", "SQUEEZE", "HOLD"),

@@ -73,6 +73,8 @@ from graspsense.core.drivers.transmission import screw_linkage as screw_linkage
 
 # Contact, and rest where the gap is coarse
 from graspsense.core.control.contact import either_touches as either_touches
+from graspsense.core.control.contact import RestCourse as RestCourse
+from graspsense.core.control.contact import follow_rest as follow_rest
 from graspsense.core.grasp.gap_resolution import GapResolution as GapResolution
 from graspsense.core.grasp.gap_resolution import gap_resolution as gap_resolution
 from graspsense.core.grasp.gap_resolution import window_of_rest as window_of_rest

@@ -31,15 +31,11 @@ MOVED_M: Final = 1e-3
 class RestState(NamedTuple):
     """The time since which the gap has been at rest (s), and its value then (m).
 
-    A control law keeps one in its state and begins with `RestState(0.0, 0.0)`. The other fields are the rest that the
-    gap has left, and when (s): it goes on if the gap comes back soon.
+    A control law keeps one in its state and begins with `RestState(0.0, 0.0)`.
     """
 
     since_t_s: float
     gap_m: float
-    left_since_t_s: float = math.nan
-    left_gap_m: float = math.nan
-    left_t_s: float = math.nan
 
 
 def both_touch(force_left_n: float, force_right_n: float, contact_force_n: float) -> bool:
@@ -65,36 +61,21 @@ def update_rest(
 ) -> RestState:
     """Return the state after one more sample: unchanged, or starting at this sample if the gap has moved.
 
-    A gap that comes back within `AWAY` of the window had not moved, and rests since before. So noise does not begin a
-    rest anew, and a gap that closes without noise never comes back.
-
     Call it in every tick with the time (s) and the gap (m) of the frame, the speed below which the fingers are at
     rest (m/s), and the time for which they must be at rest (s). The gap may differ from the value in the state by the
     rest speed times the window, or, if samples are further apart than the window, by the rest speed
     times the elapsed time. A gap of NaN is never at rest.
 
     >>> still = RestState(since_t_s=1.0, gap_m=0.05)
-    >>> update_rest(still, 1.02, 0.05, REST_SPEED_M_S, REST_WINDOW_S).since_t_s
-    1.0
-    >>> moved = update_rest(still, 1.02, 0.049, REST_SPEED_M_S, REST_WINDOW_S)
-    >>> moved.since_t_s, moved.gap_m
-    (1.02, 0.049)
-    >>> update_rest(moved, 1.021, 0.05, REST_SPEED_M_S, REST_WINDOW_S).since_t_s
-    1.0
+    >>> update_rest(still, 1.02, 0.05, REST_SPEED_M_S, REST_WINDOW_S)
+    RestState(since_t_s=1.0, gap_m=0.05)
+    >>> update_rest(still, 1.02, 0.049, REST_SPEED_M_S, REST_WINDOW_S)
+    RestState(since_t_s=1.02, gap_m=0.049)
     """
-    since, gap, left_since, left_gap, left = still
-    away = t_s - left <= AWAY * rest_window_s
-    if gap_m != gap_m:
-        return RestState(t_s, gap_m)
-    if away and abs(gap_m - left_gap) <= rest_speed_m_s * max(rest_window_s, left - left_since):
-        return RestState(left_since, left_gap)
-    if abs(gap_m - gap) <= rest_speed_m_s * max(rest_window_s, t_s - since):
+    allowed_m = rest_speed_m_s * max(rest_window_s, t_s - still.since_t_s)
+    if abs(gap_m - still.gap_m) <= allowed_m:
         return still
-    if not away:
-        left_since, left_gap, left = since, gap, t_s
-    return RestState(
-        since_t_s=t_s, gap_m=gap_m, left_since_t_s=left_since, left_gap_m=left_gap, left_t_s=left
-    )
+    return RestState(t_s, gap_m)
 
 
 def at_rest(still: RestState, t_s: float, rest_window_s: float) -> bool:
@@ -110,6 +91,44 @@ def at_rest(still: RestState, t_s: float, rest_window_s: float) -> bool:
     return t_s - still.since_t_s >= rest_window_s - 5e-10
 
 
+class RestCourse(NamedTuple):
+    """The rest of a recorded gap, as `RestState`, and the one that the gap has left, with the time (s) of that.
+
+    It begins with NaN for what was left.
+    """
+
+    since_t_s: float
+    gap_m: float
+    left_since_t_s: float
+    left_gap_m: float
+    left_t_s: float
+
+
+def follow_rest(
+    course: RestCourse, t_s: float, gap_m: float, rest_speed_m_s: float, rest_window_s: float
+) -> RestCourse:
+    """Return the course after one more sample: by `update_rest`, but a gap that comes back soon had not moved.
+
+    So noise does not begin a rest anew. A gap that closes without noise never comes back, and rests as `update_rest`
+    says; so does one that was no number.
+    """
+    since, gap, left_since, left_gap, left = course
+    away = t_s - left <= AWAY * rest_window_s
+    if away and abs(gap_m - left_gap) <= rest_speed_m_s * max(rest_window_s, left - left_since):
+        since, gap, left = left_since, left_gap, math.nan
+    else:
+        still = update_rest(RestState(since, gap), t_s, gap_m, rest_speed_m_s, rest_window_s)
+        if still.since_t_s != since:
+            if not away:
+                left_since, left_gap, left = since, gap, t_s
+            since, gap = still
+    if gap_m != gap_m:
+        left = math.nan
+    return RestCourse(
+        since_t_s=since, gap_m=gap, left_since_t_s=left_since, left_gap_m=left_gap, left_t_s=left
+    )
+
+
 def first_rest(
     times_s: NDArray[np.float64],
     gaps_m: NDArray[np.float64],
@@ -119,17 +138,18 @@ def first_rest(
 ) -> tuple[int, int] | None:
     """Return the index of the sample at which rest begins and that of the first that shows it, or None.
 
-    Arrays of shape (n,). Only samples in `shows` can show a rest. The result is that of `update_rest` and `at_rest`.
+    Arrays of shape (n,). Only samples in `shows` can show a rest. The result is that of `follow_rest` and `at_rest`.
 
     >>> times, gaps, shows = np.arange(11) * 0.01, np.array([0.06, 0.055] + [0.05] * 9), np.ones(11, bool)
     >>> first_rest(times, gaps, shows, REST_SPEED_M_S, REST_WINDOW_S)
     (2, 7)
     """
-    still = RestState(math.nan, math.nan)
+    nan = math.nan
+    course = RestCourse(since_t_s=nan, gap_m=nan, left_since_t_s=nan, left_gap_m=nan, left_t_s=nan)
     for i, (t_s, gap_m, showing) in enumerate(
         zip(times_s.tolist(), gaps_m.tolist(), shows.tolist(), strict=True)
     ):
-        still = update_rest(still, t_s, gap_m, rest_speed_m_s, rest_window_s)
-        if showing and at_rest(still, t_s, rest_window_s):
-            return int(times_s[: i + 1].searchsorted(still.since_t_s)), i
+        course = follow_rest(course, t_s, gap_m, rest_speed_m_s, rest_window_s)
+        if showing and at_rest(RestState(course.since_t_s, course.gap_m), t_s, rest_window_s):
+            return int(times_s[: i + 1].searchsorted(course.since_t_s)), i
     return None

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 from attrs import frozen
 
-from graspsense.gripper_api import NO_GAP, gap_resolution, window_of_rest
+from graspsense.gripper_api import NO_GAP, RestCourse, follow_rest, gap_resolution, window_of_rest
 from graspsense.plugin_api import (
     APPROACH,
     HOLD,
@@ -30,7 +30,6 @@ from graspsense.plugin_api import (
     both_touch,
     missing,
     setting,
-    update_rest,
 )
 from graspsense.plugins.features.contact_threshold import RestThresholds
 from graspsense.simulator_api import CompiledFeatures, TickColumns, listed_columns
@@ -198,15 +197,19 @@ def measure(params: ChittaParams, ticks: TickColumns) -> Measured:
         window_s = window_of_rest(
             gap_resolution(t[:end], gap[:end], contact), params.rest_speed_m_s, window_s
         )
-    still, since, unseen_s = RestState(t[contact], gap[contact]), contact, 0.0
+    since, unseen_s, nan = contact, 0.0, math.nan
+    course = RestCourse(
+        since_t_s=t[contact], gap_m=gap[contact], left_since_t_s=nan, left_gap_m=nan, left_t_s=nan
+    )
     for i in range(contact, end):
         if i > contact:
-            state = update_rest(still, t[i], gap[i], params.rest_speed_m_s, window_s)
-            if state.since_t_s != still.since_t_s:
+            before_s = course.since_t_s
+            course = follow_rest(course, t[i], gap[i], params.rest_speed_m_s, window_s)
+            if course.since_t_s != before_s:
                 since = i
-                while t[since] > state.since_t_s:
+                while t[since] > course.since_t_s:
                     since -= 1
-            still = state
+        still = RestState(course.since_t_s, course.gap_m)
         # A controller can wait for more than rest, such as a force. The rest in its hold phase is then the one meant.
         shows = phase[i] == HOLD or not holds
         let_go = gap[i] > p_first + params.rest_speed_m_s * window_s and left[i] < tau_1 and right[i] < tau_1
