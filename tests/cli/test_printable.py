@@ -2,13 +2,14 @@
 
 import ast
 import json
+import os
 import re
 import shutil
 from pathlib import Path
 
 import pytest
 from attrs import evolve
-from commands import graspsense, printed
+from commands import graspsense, printed, python
 from hypothesis import given
 from hypothesis import strategies as st
 from kept import BENCH, keep
@@ -66,6 +67,19 @@ def test_whatever_prints_a_text_prints_it_harmlessly(capsys, monkeypatch, stream
     out, err = capsys.readouterr()
     assert acts(out + err) == []
     assert "\\u001b" in out
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
+def test_what_the_encoding_of_the_output_lacks_is_escaped(tmp_path, encoding):
+    path = tmp_path / "größe カップ 🥤.csv"
+    path.write_text("t,gap\n0,1\n1,2\n")
+    command = ["-m", "graspsense", "import", path, "--check"]
+    environ = {**os.environ, "PYTHONIOENCODING": encoding}
+    options = {"cwd": tmp_path, "env": environ, "encoding": encoding, "check": True}
+
+    assert ".csv" in python(*command, **options).stdout
+    (told,) = json.loads(python(*command, "--json", **options).stdout)
+    assert told["path"] == str(path)
 
 
 def test_a_text_of_several_lines_looks_like_no_other_text_and_a_row_of_a_table_is_one_line(capsys):

@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Sequence
 from contextlib import nullcontext, suppress
 from importlib import import_module
+from io import TextIOWrapper
 from typing import Any, Final, NoReturn
 
 import click
@@ -122,6 +123,10 @@ def cli(ctx: click.Context) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command line and exit with its code; no argument means the process's own."""
+    if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.errors == "strict":
+        sys.stdout.reconfigure(
+            errors="backslashreplace"
+        )  # as stderr: a label may have what the encoding lacks
     with ended_like_ctrl_c(), command_line(), warnings.catch_warnings():
         warnings.showwarning = _Notes()
         code = _exit_code(list(sys.argv[1:] if arguments is None else arguments))

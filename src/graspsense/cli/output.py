@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from graspsense.cli.terminal import StyleOf, echo_as_it_is, echo_table
+from graspsense.cli.terminal import StyleOf, echo_as_it_is, echo_table, writes_unicode
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.json_values import json_ready
 
@@ -27,7 +27,12 @@ def echo_json(value: object, long: bool = False) -> None:
     A long one comes in one line, which takes a fifth of the time.
     """
     echo_as_it_is(
-        json.dumps(json_ready(value), indent=None if long else 2, ensure_ascii=False, allow_nan=False)
+        json.dumps(
+            json_ready(value),
+            indent=None if long else 2,
+            ensure_ascii=not writes_unicode(),
+            allow_nan=False,
+        )
     )
 
 

@@ -96,10 +96,14 @@ def can_redraw(stream: IO[str] | None) -> bool:
     return terminal_width(stream) is not None and os.environ.get("TERM") != "dumb"
 
 
+def writes_unicode(stream: IO[str] | None = None) -> bool:
+    """Return whether the encoding of the stream, by default that of the results, has every character."""
+    return (getattr(stream or _stream(), "encoding", None) or "ascii").lower().startswith("utf")
+
+
 def block(stream: IO[str] | None) -> str:
-    """Return the character of which bars are made: a full block, or # where the encoding of the stream has none."""
-    encoding = getattr(stream, "encoding", None) or "ascii"
-    return "█".encode(encoding, "replace").decode(encoding).replace("?", "#")
+    """Return the character of which bars are made on this stream."""
+    return "█" if writes_unicode(stream) else "#"
 
 
 def has_colour(stream: IO[str] | None) -> bool:
