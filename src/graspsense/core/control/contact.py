@@ -94,7 +94,10 @@ def at_rest(still: RestState, t_s: float, rest_window_s: float) -> bool:
 class RestCourse(NamedTuple):
     """The rest of a recorded gap, as `RestState`, and the one that the gap has left, with the time (s) of that.
 
-    It begins with NaN for what was left.
+    It begins with NaN for what was left:
+
+    >>> RestCourse(1.0, 0.05, math.nan, math.nan, math.nan).since_t_s
+    1.0
     """
 
     since_t_s: float
@@ -111,6 +114,11 @@ def follow_rest(
 
     So noise does not begin a rest anew. A gap that closes without noise never comes back, and rests as `update_rest`
     says; so does one that was no number.
+
+    >>> left = RestCourse(1.03, 0.049, 1.0, 0.05, 1.03)
+    >>> back = follow_rest(left, 1.031, 0.05, REST_SPEED_M_S, REST_WINDOW_S)
+    >>> back.since_t_s, back.gap_m
+    (1.0, 0.05)
     """
     since, gap, left_since, left_gap, left = course
     away = t_s - left <= AWAY * rest_window_s
