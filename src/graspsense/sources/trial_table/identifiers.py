@@ -82,6 +82,7 @@ _PER_SECOND: Final = (1.0, 1e3, 1e6, 1e9)
 """The units of such times."""
 NAME_OBJECTS: Final = "name the objects (say so by --instance)"
 NUMBER_OBJECTS: Final = "number the objects (name them by --instance)"
+NAME_THINGS: Final = "name the objects, which have several labels (say so by --instance)"
 OF_OBJECTS: Final = (NAME_OBJECTS, NUMBER_OBJECTS)
 """How the values of a column identify trials that are of the same object."""
 _MOST_VALUES: Final = 1.0 / 3.0
@@ -196,19 +197,17 @@ def text_identifies(texts: Sequence[str], labels: Sequence[str]) -> str:
         or (len(counts) > 2 and all(map(_WORDS_OF_DATES.fullmatch, lower)))
     ):
         return "are dates or times"
-    values = [text for text, _ in given]
-    known = groups_of_labels(values, [label for _, label in given])
-    if name_objects(values, known):
-        return NAME_OBJECTS
-    if len(counts) > max(2, len(given) * _MOST_VALUES):
-        return "are texts that hardly repeat, as names of trials, files and remarks do"
+    values, own = [text for text, _ in given], [label for _, label in given]
     numbered = all(re.search(r"\d", text) for text in counts)
-    if (
-        numbered
-        and _enough_objects(len(counts), known)
-        and len(set(zip(values, known, strict=True))) == len(counts)
-    ):
-        return NAME_OBJECTS
+    hardly = len(counts) > max(2, len(given) * _MOST_VALUES)
+    for known, why in ((own, NAME_OBJECTS), (groups_of_labels(values, own), NAME_THINGS)):
+        if name_objects(values, known):
+            return why
+        if hardly:
+            return "are texts that hardly repeat, as names of trials, files and remarks do"
+        pairs = len(set(zip(values, known, strict=True)))
+        if numbered and _enough_objects(len(counts), known) and pairs == len(counts):
+            return why
     return ""
 
 
