@@ -328,7 +328,7 @@ def test_a_label_of_one_trial_can_never_be_right_and_one_label_is_nothing():
 
     assert any(note.endswith(": egg") for note in alone.notes)
     assert alone.by_class["egg"].correct == 0
-    with pytest.raises(ConfigError, match=r"'can'(.|\n)*10 of 130 files are left out"):
+    with pytest.raises(ConfigError, match=r"'can'(.|\n)*10 of 130"):
         judged(labelled(["can"] * 120, width, notes=("10 of 130 files are left out",)))
 
 
