@@ -74,7 +74,7 @@ def test_a_class_that_is_no_result_is_told(declared, told):
 
 
 def test_keys_of_another_class_are_told():
-    with pytest.raises(ComponentFailed, match="`keys`.*graspsense-test/wear"):
+    with pytest.raises(ComponentFailed, match=r"`keys`.*graspsense-test/wear"):
         kind(keys="Plain").keys_class()
 
 

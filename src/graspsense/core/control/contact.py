@@ -4,8 +4,8 @@ These are equations 1 and 2 of Chitta, Piccoli and Sturm (ICRA 2010) with two co
 which *both* pads are at or above tau_1, as the text says; the printed formula has the inequality reversed. Rest is a
 gap that *stays*, over a window, within what tau_2 would move it in that window; the printed formula takes the speed
 of a single sample, which noise would pass.
-Controllers and features share these functions, so that they agree on contact, and on the rest of a gap without noise. In
-noise, a rest that was recorded is not begun anew (`follow_rest`), while a controller waits until one shows.
+Controllers and features share these functions, so that they agree on contact, and on the rest of a gap without noise.
+In noise, a rest that was recorded is not begun anew (`follow_rest`), while a controller waits until one shows.
 """
 
 from __future__ import annotations
