@@ -174,7 +174,7 @@ def test_without_a_folder_it_is_trials_and_what_is_there_is_printed(tmp_path, mo
     assert "next: block  (1 of 1)" in done.stderr
     counts, sets = done.stdout.splitlines()[:2]
     assert counts.split() == ["block", "1", "of", "1"]
-    assert sets.endswith("of 90 % need more trials: block 8")
+    assert sets.endswith(": block 8")
     assert trials_in(tmp_path / "trials") == [(1, "block", None)]
 
 
