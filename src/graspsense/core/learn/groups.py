@@ -8,10 +8,7 @@ Neighbours: where no instances are named, trials of a label that follow each oth
 grasps of one object, windows of one recording and a drifting sensor make them. They are held out in blocks, whose
 length is doubled as long as neighbouring blocks are alike.
 
-Clumps: of trials in another order, two signs together tell. The nearest trials have the same label far more often than
-others close by, and trials are closer to each other than to trials drawn from the spread around them. So are windows of
-one recording, and grasps of one object. Each label is then held out in parts of trials close to each other, as in block
-cross-validation (D. R. Roberts et al., Ecography 40 (2017) 913).
+Clumps: of trials in another order, their distances may tell (`clumps`).
 
 Numbers to predict: trials with the same finely measured number, which chance hardly repeats, are of one object.
 
@@ -30,6 +27,7 @@ import numpy as np
 from attrs import evolve
 
 from graspsense.core.components.caller import option
+from graspsense.core.learn.clumps import NEAREST, PARTS, distances_between, parts_of_clumps
 from graspsense.core.learn.labelled import class_of
 from graspsense.core.values.errors import counted
 
@@ -50,8 +48,6 @@ _FEWEST_OF_LABEL: Final = 3
 """A label with fewer trials than this times those that are close is a group of its own."""
 _MOST_TRIALS: Final = 2000
 _MOST_FEATURES: Final = 32
-_NEAREST: Final = 1e-7
-"""Distances, in standard deviations, below which the difference of two squares is not known."""
 _PERMUTATIONS: Final = 199
 _ALIKE: Final = 3.5
 """Standard deviations by which neighbours are more alike than trials in random order, if they belong together."""
@@ -59,24 +55,12 @@ _STILL_ALIKE: Final = 2.0
 """The same for blocks, once it is known that neighbours are alike."""
 _FEWEST_BLOCKS: Final = 4
 """Blocks of a label from which on it can be told whether neighbouring ones are alike."""
-_FEWEST_CLUMPED: Final = 12
-"""Trials of a label from which on it can be told whether they are in clumps."""
-_LARGEST_CLUMP: Final = 25
-"""Trials of a clump up to which it may be a recording or an object; larger ones are kinds of their label."""
-_CLUMPED: Final = (3.0, 2.0)
-"""Standard deviations by which near trials have the label more often, and are closer, than others, if in clumps."""
-_SECOND: Final = 1
-"""Place of the nearest distance by which clumps are told, so that pairs, as copies with noise, are none."""
-_LESS_FAR: Final = 0.8
-"""Share of the agreement of the labels, beyond chance, that is lost outside a clump."""
 _SURE: Final = 30.0
 """Equal numbers to predict to be found for each one that is expected by chance, if they are of one object."""
 _USUAL: Final = 3.0
 """Times as many trials as half of the numbers have, from which on a number is usual."""
 _ROUNDING: Final = 1e-9
 """Differences below this share of a range are rounding errors."""
-_PARTS: Final = 10
-"""Parts of each label that are held out, if its trials are in clumps: ten folds."""
 
 
 def grouped(labelled: Labelled, copies: Numbers) -> Labelled:
@@ -116,10 +100,11 @@ def _together(labelled: Labelled, copies: Numbers) -> tuple[Numbers, str]:
     if length > 1:
         words = f"trials of a label that follow each other are more alike than others. Blocks of {length}"
         return block_of, words
-    part_of = _parts(labelled, copies)
+    values = _scaled(labelled.table.values)
+    part_of = None if len(labelled) > _MOST_TRIALS else parts_of_clumps(values, labelled.labels, copies)
     if part_of is None:
         return block_of, ""
-    return part_of, f"trials of a label are in clumps that are alike. {_PARTS} parts of each label"
+    return part_of, f"trials of a label are in clumps that are alike. {PARTS} parts of each label"
 
 
 def _of_one_number(values: Values) -> tuple[Numbers, str]:
@@ -197,7 +182,7 @@ def _near_copies(labelled: Labelled) -> tuple[Numbers, list[str]]:
     values = _scaled(labelled.table.values)
     if not 2 * _MOST_OTHERS < len(labelled) <= _MOST_TRIALS or values.shape[1] < 2:
         return pairs[0], []
-    apart = _distances(values, values)
+    apart = distances_between(values, values)
     np.fill_diagonal(apart, np.inf)
     if labelled.instances is not None:
         instances = np.unique(np.array(labelled.instances), return_inverse=True)[1]
@@ -210,7 +195,7 @@ def _near_copies(labelled: Labelled) -> tuple[Numbers, list[str]]:
     copies: set[int] = set()
     for others in range(1, _MOST_OTHERS + 1):
         near, next_one = nearest[:, others - 1], nearest[:, others]
-        judged = (near > _NEAREST) & np.isfinite(next_one)
+        judged = (near > NEAREST) & np.isfinite(next_one)
         judged &= trials_of_label > _FEWEST_OF_LABEL * (others + 1)
         close = np.flatnonzero(judged & (near < _CLOSER * next_one))
         if len(close) and tail(len(close), int(judged.sum()), _CLOSER) < _BY_CHANCE:
@@ -226,80 +211,6 @@ def _near_copies(labelled: Labelled) -> tuple[Numbers, list[str]]:
         f"name the objects ({option('instance', 'COLUMN')})"
     )
     return np.concatenate(pairs, axis=1), [note]
-
-
-def _distances(values: Values, others: Values) -> Values:
-    """Return the distance of each trial to each of the others."""
-    squares = (values**2).sum(axis=1)[:, np.newaxis] + (others**2).sum(axis=1)
-    distances: Values = np.sqrt(np.maximum(squares - 2.0 * values @ others.T, 0.0))
-    return distances
-
-
-def _parts(labelled: Labelled, copies: Numbers) -> Numbers | None:
-    """Return the part of its label that each trial is in, if trials are in clumps, besides these pairs of copies."""
-    from scipy.cluster.hierarchy import fcluster, ward
-
-    values = _scaled(labelled.table.values)
-    codes = np.unique(np.array(labelled.labels), return_inverse=True)[1]
-    if len(codes) > _MOST_TRIALS or values.shape[1] < 2 or not _in_clumps(values, codes, copies):
-        return None
-    part_of = np.zeros(len(codes), dtype=np.int64)
-    for code, size in enumerate(np.bincount(codes).tolist()):
-        rows = np.flatnonzero(codes == code)
-        part_of[rows] = fcluster(ward(values[rows]), _PARTS, "maxclust") if size > _PARTS else np.arange(size)
-    return codes * len(codes) + part_of
-
-
-def _in_clumps(values: Values, codes: Numbers, copies: Numbers) -> bool:
-    """Return whether near trials have the same label, and are close, more than smooth distributions make them.
-
-    The first is M. F. Schilling's count of neighbours (J. Am. Stat. Assoc. 81 (1986) 799), of the two nearest and of
-    others; the second compares distances as B. Hopkins and J. G. Skellam do (Ann. Bot. 18 (1954) 213), with points
-    drawn from the normal distribution of the third of a label that is around a trial.
-    """
-    apart = _distances(values, values)
-    np.fill_diagonal(apart, np.inf)
-    apart[copies[0], copies[1]] = apart[copies[1], copies[0]] = np.inf
-    sizes = np.bincount(codes)
-    many = sizes >= _FEWEST_CLUMPED
-    if many.sum() < 2:
-        return False
-    fewest, judged = int(sizes[many].min()), many[codes]
-    begin = min(fewest // 4, _LARGEST_CLUMP)
-    same = codes[np.argsort(apart, axis=1, kind="stable")] == codes[:, np.newaxis]
-    near, far = same[:, :2].mean(axis=1), same[:, begin : begin + max(fewest // 12, 1)].mean(axis=1)
-    by_chance = (sizes[codes] - 1.0) / (len(codes) - 1.0)
-    # Each label weighs as much as any other.
-    weights = judged / sizes[codes] / many.sum()
-    near_beyond, far_beyond = (float(weights @ (share - by_chance)) for share in (near, far))
-    spread = math.sqrt(float(weights**2 @ (near - far - near_beyond + far_beyond) ** 2))
-    if far_beyond > _LESS_FAR * near_beyond or near_beyond - far_beyond <= _CLUMPED[0] * spread:
-        return False
-    rng = np.random.default_rng(0)
-    closer = np.concatenate(
-        [
-            _closer(values[codes == code], apart[np.ix_(codes == code, codes == code)], rng)
-            for code in np.flatnonzero(many)
-        ]
-    )
-    return bool(closer.mean() * math.sqrt(len(closer)) > _CLUMPED[1] * closer.std())
-
-
-def _closer(values: Values, apart: Values, rng: np.random.Generator) -> Values:
-    """Return the logarithm of how many times closer the second other trial is to each one than to a point around it."""
-    n = len(values)
-    around = np.argsort(apart, axis=1, kind="stable")[:, : n // 3 - 1]
-    around = np.column_stack([np.arange(n), around])
-    drawn = rng.normal(size=around.shape)
-    shares = (drawn - drawn.mean(axis=1, keepdims=True)) / math.sqrt(around.shape[1] - 1.0)
-    weights = np.zeros((n, n))
-    np.put_along_axis(weights, around, shares + 1.0 / around.shape[1], axis=1)
-    to_a_trial, to_a_point = (
-        np.clip(np.partition(distances, _SECOND, axis=1)[:, _SECOND], _NEAREST, 1.0 / _NEAREST)
-        for distances in (apart, _distances(weights @ values, values))
-    )
-    closer: Values = np.log(to_a_point / to_a_trial)
-    return closer
 
 
 def _scaled(values: Values) -> Values:

@@ -1,0 +1,112 @@
+"""Trials of a label in clumps, as windows of one recording and grasps of one object are, whatever their order.
+
+Two signs together tell: the nearest trials have the same label far more often than others close by, and trials are
+closer to each other than to trials drawn from the spread around them. Each label is then held out in parts of trials
+close to each other, as in block cross-validation (D. R. Roberts et al., Ecography 40 (2017) 913).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    Numbers = NDArray[np.int64]
+    Values = NDArray[np.float64]
+
+NEAREST: Final = 1e-7
+"""Distances, in standard deviations, below which the difference of two squares is not known."""
+_FEWEST_CLUMPED: Final = 12
+"""Trials of a label from which on it can be told whether they are in clumps."""
+_LARGEST_CLUMP: Final = 25
+"""Trials of a clump up to which it may be a recording or an object; larger ones are kinds of their label."""
+_CLUMPED: Final = (3.0, 2.0)
+"""Standard deviations by which near trials have the label more often, and are closer, than others, if in clumps."""
+_SECOND: Final = 1
+"""Place of the nearest distance by which clumps are told, so that pairs, as copies with noise, are none."""
+_LESS_FAR: Final = 0.8
+"""Share of the agreement of the labels, beyond chance, that is lost outside a clump."""
+PARTS: Final = 10
+"""Parts of each label that are held out, if its trials are in clumps: ten folds."""
+
+
+def distances_between(values: Values, others: Values) -> Values:
+    """Return the distance of each trial to each of the others."""
+    squares = (values**2).sum(axis=1)[:, np.newaxis] + (others**2).sum(axis=1)
+    distances: Values = np.sqrt(np.maximum(squares - 2.0 * values @ others.T, 0.0))
+    return distances
+
+
+def parts_of_clumps(values: Values, labels: Sequence[str], copies: Numbers) -> Numbers | None:
+    """Return the part of its label that each trial is in, shape (n,); None if trials are not in clumps.
+
+    `values` are the scaled features, shape (n, features). The pairs of trials `copies`, shape (2, pairs), do not count.
+    """
+    from scipy.cluster.hierarchy import fcluster, ward
+
+    codes = np.unique(np.array(labels), return_inverse=True)[1]
+    if values.shape[1] < 2 or not _in_clumps(values, codes, copies):
+        return None
+    part_of = np.zeros(len(codes), dtype=np.int64)
+    for code, size in enumerate(np.bincount(codes).tolist()):
+        rows = np.flatnonzero(codes == code)
+        part_of[rows] = fcluster(ward(values[rows]), PARTS, "maxclust") if size > PARTS else np.arange(size)
+    return codes * len(codes) + part_of
+
+
+def _in_clumps(values: Values, codes: Numbers, copies: Numbers) -> bool:
+    """Return whether near trials have the same label, and are close, more than smooth distributions make them.
+
+    The first is M. F. Schilling's count of neighbours (J. Am. Stat. Assoc. 81 (1986) 799), of the two nearest and of
+    others; the second compares distances as B. Hopkins and J. G. Skellam do (Ann. Bot. 18 (1954) 213), with points
+    drawn from the normal distribution of the third of a label that is around a trial.
+    """
+    apart = distances_between(values, values)
+    np.fill_diagonal(apart, np.inf)
+    apart[copies[0], copies[1]] = apart[copies[1], copies[0]] = np.inf
+    sizes = np.bincount(codes)
+    many = sizes >= _FEWEST_CLUMPED
+    if many.sum() < 2:
+        return False
+    fewest, judged = int(sizes[many].min()), many[codes]
+    begin = min(fewest // 4, _LARGEST_CLUMP)
+    same = codes[np.argsort(apart, axis=1, kind="stable")] == codes[:, np.newaxis]
+    near, far = same[:, :2].mean(axis=1), same[:, begin : begin + max(fewest // 12, 1)].mean(axis=1)
+    by_chance = (sizes[codes] - 1.0) / (len(codes) - 1.0)
+    # Each label weighs as much as any other.
+    weights = judged / sizes[codes] / many.sum()
+    near_beyond, far_beyond = (float(weights @ (share - by_chance)) for share in (near, far))
+    spread = math.sqrt(float(weights**2 @ (near - far - near_beyond + far_beyond) ** 2))
+    if far_beyond > _LESS_FAR * near_beyond or near_beyond - far_beyond <= _CLUMPED[0] * spread:
+        return False
+    rng = np.random.default_rng(0)
+    closer = np.concatenate(
+        [
+            _closer(values[codes == code], apart[np.ix_(codes == code, codes == code)], rng)
+            for code in np.flatnonzero(many)
+        ]
+    )
+    return bool(closer.mean() * math.sqrt(len(closer)) > _CLUMPED[1] * closer.std())
+
+
+def _closer(values: Values, apart: Values, rng: np.random.Generator) -> Values:
+    """Return the logarithm of how many times closer the second other trial is to each one than to a point around it."""
+    n = len(values)
+    around = np.argsort(apart, axis=1, kind="stable")[:, : n // 3 - 1]
+    around = np.column_stack([np.arange(n), around])
+    drawn = rng.normal(size=around.shape)
+    shares = (drawn - drawn.mean(axis=1, keepdims=True)) / math.sqrt(around.shape[1] - 1.0)
+    weights = np.zeros((n, n))
+    np.put_along_axis(weights, around, shares + 1.0 / around.shape[1], axis=1)
+    to_a_trial, to_a_point = (
+        np.clip(np.partition(distances, _SECOND, axis=1)[:, _SECOND], NEAREST, 1.0 / NEAREST)
+        for distances in (apart, distances_between(weights @ values, values))
+    )
+    closer: Values = np.log(to_a_point / to_a_trial)
+    return closer
