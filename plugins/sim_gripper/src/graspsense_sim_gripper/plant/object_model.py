@@ -28,11 +28,12 @@ class ObjectModel(NamedTuple):
     """Relative tolerance of the balance of forces."""
 
 
-def _unbound(params: Any, states: Any, d0: float, d1: float, h: float, v1: float) -> tuple[float, Any]:
-    raise TypeError("the object has no terms: bind object_force to the sum of its laws")
+def unbound(*_arguments: Any) -> Any:
+    """Raise TypeError: it stands for a part that the composition of a scene binds."""
+    raise TypeError("a part is not bound: run.compiled.compose binds the parts of a scene")
 
 
-object_force: Callable[[Any, Any, float, float, float, float], tuple[float, Any]] = _unbound
+object_force: Callable[[Any, Any, float, float, float, float], tuple[float, Any]] = unbound
 """The law of the whole object; the composition of a scene binds it."""
 
 

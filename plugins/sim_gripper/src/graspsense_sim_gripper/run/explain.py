@@ -91,5 +91,5 @@ def _contribution(kind: str, params: TermParams, along: _Path, point: WorkingPoi
         "at_peak_n": forces[peak],
         "work_j": work_to_peak,
         "lost_j": work,
-        "rates": [{"what": rate.what, "per_s": rate.per_s} for rate in term.rates(params, point)],
+        "rates": [rate._asdict() for rate in (term.rates(params, point) if term.rates else ())],
     }

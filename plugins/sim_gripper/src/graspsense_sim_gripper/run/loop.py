@@ -11,6 +11,7 @@ from typing import Any, Final, NamedTuple
 
 from graspsense.plugin_api import APPROACH, HOLD, SQUEEZE, Command, Frame, Pads, Reading
 from graspsense.simulator_api import TARING, TickParams, TickState
+from graspsense_sim_gripper.plant.object_model import unbound
 from graspsense_sim_gripper.plant.sensing import (
     PadBuffers,
     SensorParams,
@@ -183,16 +184,6 @@ NOT_NEGATIVE: Final = 0x3FFFFFFF
 """After `&` with this mask the compiler knows that an index is not negative, and omits the check at each access."""
 
 
-def move_unbound(plant: PlantParams, state: PlantState, effort_n: float, dt_s: float) -> PlantState:
-    """Raise TypeError: the composition binds the motion of the plant."""
-    raise TypeError("the loop has no plant: compose.grasp_loop binds one")
-
-
-def control_unbound(params: TickParams, state: TickState, reading: Reading) -> tuple[Command, TickState]:
-    """Raise TypeError: the composition binds the controller."""
-    raise TypeError("the loop has no controller: compose.grasp_loop binds one")
-
-
 def no_step(plant: PlantState, control: MacroControl) -> Ahead:
     """Return that no macro-step is taken."""
     return Ahead(0, constant_values(plant), plant, control)
@@ -215,8 +206,8 @@ def _every_tick(
     return progress
 
 
-move: Callable[[PlantParams, PlantState, float, float], PlantState] = move_unbound
-control: Callable[[TickParams, TickState, Reading], tuple[Command, TickState]] = control_unbound
+move: Callable[[PlantParams, PlantState, float, float], PlantState] = unbound
+control: Callable[[TickParams, TickState, Reading], tuple[Command, TickState]] = unbound
 begin_macro_step: Callable[..., Ahead] = _never_begins
 """`macro_ticks.begin_macro_step` where a step may last several ticks."""
 run_approach_ticks: Callable[[GraspParams, LoopProgress, Frame, Table, Any], LoopProgress] = _every_tick

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from graspsense_sim_gripper.run.accuracy.chosen_steps import QUANTITIES, ChosenSteps
 from graspsense_sim_gripper.run.nested import TupleType, first_place, with_places
 from graspsense_sim_gripper.scene.terms.registry import find_term
-from graspsense_sim_gripper.scene.terms.term import TermState, never_beyond
+from graspsense_sim_gripper.scene.terms.term import TermState
 from graspsense_sim_gripper.solve.state import PlantState
 
 
@@ -102,7 +102,7 @@ def stored_report(plant: TupleType, terms: tuple[int, ...], kinds: tuple[str, ..
 def _checked(kinds: tuple[str, ...]) -> list[tuple[int, str, Callable[[TermState], str]]]:
     """Return place and kind of each term whose law may be used beyond its validity, with what says so."""
     terms = [(i, kind, find_term(kind)[1].beyond) for i, kind in enumerate(kinds)]
-    return [term for term in terms if term[2] is not never_beyond]
+    return [(i, kind, beyond) for i, kind, beyond in terms if beyond]
 
 
 class GraspModel(NamedTuple):

@@ -16,7 +16,6 @@ from attrs.validators import ge, gt, in_, le
 from graspsense.plugin_api import ConfigError, UnknownName
 from graspsense.simulator_api import STANDARD_GRAVITY_M_S2, gives, suggestion, toml_layer
 from graspsense_sim_gripper.scene.terms.registry import find_term, in_order
-from graspsense_sim_gripper.scene.terms.term import not_dented
 
 PATCHES: Final = ("line", "face", "point")
 
@@ -173,7 +172,7 @@ class ObjectSpec:
     def dents(self) -> tuple[tuple[int, Callable[[TermParams], float]], ...]:
         """The terms that earlier use may have dented: the index of each, and its `Term.dent`."""
         dents = [find_term(kind)[1].dent for kind in self.kinds]
-        return tuple((i, dent) for i, dent in enumerate(dents) if dent is not not_dented)
+        return tuple((i, dent) for i, dent in enumerate(dents) if dent)
 
     @cached_property
     def content(self) -> str:
@@ -322,7 +321,7 @@ def _term(table: TomlTable, label: str, problems: list[str]) -> ParsedTerm | Non
             if key in term.positive and values[key] <= 0.0
         ]
     if len(problems) == n_problems and not missing:
-        reason = term.refusal(term.params(**values))
+        reason = term.refusal(term.params(**values)) if term.refusal else ""
         problems += [f"{label}: {reason}"] if reason else []
     return ParsedTerm(kind, values, spread)
 

@@ -24,7 +24,7 @@ from graspsense_sim_gripper.run.accuracy.probe import FORCE_N, SPEED_M_S, Grip
 from graspsense_sim_gripper.run.build import Problem
 from graspsense_sim_gripper.scene.terms.registry import find_term
 from graspsense_sim_gripper.scene.terms.switchable import Switchable
-from graspsense_sim_gripper.scene.terms.term import NO_STATE, Term, WorkingPoint, no_rates
+from graspsense_sim_gripper.scene.terms.term import NO_STATE, Term, WorkingPoint
 from graspsense_sim_gripper.solve.scheme import Steps
 
 USUAL_POINT: Final = WorkingPoint(1e-3, SPEED_M_S, 1.0, FORCE_N)
@@ -131,14 +131,15 @@ def _with_settings(steps: Steps, config: SimConfig) -> Steps:
 def _oscillates(kind: str, term: Switchable) -> bool:
     """Return whether a term is active and has a state that oscillates, or a state without declared rates."""
     law = find_term(kind)[1]
-    if law.rates is no_rates:
+    if law.rates is None:
         return term.active == 1 and bool(law.at_rest != NO_STATE)
     return term.active == 1 and bool(_swings(law, term))
 
 
 def _swings(law: Term, term: Switchable) -> list[float]:
     """Return the angular frequencies (rad/s) with which a term oscillates."""
-    return [rate.per_s for rate in law.rates(term.params, USUAL_POINT) if rate.what == "swings"]
+    rates = law.rates(term.params, USUAL_POINT) if law.rates else ()
+    return [rate.per_s for rate in rates if rate.what == "swings"]
 
 
 def _frequencies(kinds: Sequence[str], model: ObjectModel) -> dict[int, float]:

@@ -27,7 +27,15 @@ from graspsense_sim_gripper.run.macro_ticks import begin_macro_step
 from graspsense_sim_gripper.run.problem import ControllerStep
 from graspsense_sim_gripper.scene.terms.registry import active_laws, find_term, laws_of, moving_of, phases_of
 from graspsense_sim_gripper.scene.terms.switchable import Switchable, switched_on_sum
-from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS, Law, Moves, OnSum, Phase, SumLaw
+from graspsense_sim_gripper.scene.terms.term import (
+    LAW_ERRORS,
+    Law,
+    Moves,
+    OnSum,
+    Phase,
+    SumLaw,
+    TermState,
+)
 from graspsense_sim_gripper.solve.advance import advance, move
 from graspsense_sim_gripper.solve.converge import refine_until_converged
 from graspsense_sim_gripper.solve.scheme import Attempt, PlantParams, Start
@@ -65,14 +73,7 @@ head: Law = _no_terms
 tail: Law = _no_terms
 
 
-def _sum_of_1(
-    params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
-) -> tuple[float, TermsStates]:
-    force, state = head(params[0], states[0], d0, d1, h, v1)
-    return force, (state,)
-
-
-def _sum_of_more(
+def _sum_of_two(
     params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
 ) -> tuple[float, TermsStates]:
     force, state = head(params[0], states[0], d0, d1, h, v1)
@@ -105,11 +106,10 @@ def sum_of(laws: Sequence[Law | OnSum]) -> Law:
 
 
 def _summed(laws: Sequence[Any]) -> Law:
-    if not laws:
-        return _no_terms
-    if len(laws) == 1:
-        return bind(_sum_of_1, head=laws[0])
-    return bind(_sum_of_more, head=laws[0], tail=_summed(laws[1:]))
+    total: Law = _no_terms
+    for law in reversed(laws):
+        total = bind(_sum_of_two, head=law, tail=total)
+    return total
 
 
 def sum_of_active(laws: Sequence[Law | OnSum]) -> Law:
@@ -165,41 +165,29 @@ def _no_phase(states: TermsStates) -> int:
     return 0
 
 
-N_PHASES: Final = 8
-PLACE: int = 0
-phase: Phase = _no_phase
-others: Phase = _no_phase
-
-
-def _phase_and_others(states: TermsStates) -> int:
-    return phase(states[PLACE]) + N_PHASES * others(states)
-
-
-def phase_of_all(phases: Sequence[tuple[int, Phase]]) -> Phase:
-    """Return one number for the phases of these terms, each given with its place among the states."""
-    combined: Phase = _no_phase
-    for place, term_phase in reversed(phases):
-        combined = bind(_phase_and_others, PLACE=place, phase=term_phase, others=combined)
-    return combined
-
-
 def _no_move(states: TermsStates) -> bool:
     return False
 
 
-moves: Moves = _no_move
-others_move: Moves = _no_move
+N_PHASES: Final = 8
+PLACE: int = 0
+term: Callable[[TermState], Any] = _no_phase
+others: Callable[[TermsStates], Any] = _no_phase
 
 
-def _one_moves(states: TermsStates) -> bool:
-    return moves(states[PLACE]) or others_move(states)
+def _phase_and_others(states: TermsStates) -> Any:
+    return term(states[PLACE]) + N_PHASES * others(states)
 
 
-def any_moves(moving: Sequence[tuple[int, Moves]]) -> Moves:
-    """Return whether one of these terms moves, each given with its place among the states."""
-    combined: Moves = _no_move
-    for place, term_moves in reversed(moving):
-        combined = bind(_one_moves, PLACE=place, moves=term_moves, others_move=combined)
+def _one_moves(states: TermsStates) -> Any:
+    return term(states[PLACE]) or others(states)
+
+
+def _of_all(one: Any, nothing: Any, terms: Sequence[tuple[int, Any]]) -> Any:
+    """Return a function of the states of all terms; `terms`: the place of each among them, and its own function."""
+    combined = nothing
+    for place, own in reversed(terms):
+        combined = bind(one, PLACE=place, term=own, others=combined)
     return combined
 
 
@@ -287,9 +275,11 @@ def _object_parts(
     hardens: bool,
 ) -> dict[str, Any]:
     """Return what the contact of the object calls: its force, its events, and the law of the pads."""
-    events: dict[str, Any] = {"object_phase": phase_of_all(phases)} if phases else {"has_event": no_event}
+    # One number for the phases of all terms.
+    phase = _of_all(_phase_and_others, _no_phase, phases)
+    events: dict[str, Any] = {"object_phase": phase} if phases else {"has_event": no_event}
     if moving:
-        events["object_moves"] = any_moves(moving)
+        events["object_moves"] = _of_all(_one_moves, _no_move, moving)
     return {"object_force": sum_of(laws), **events, **pad_parts(hardens)}
 
 

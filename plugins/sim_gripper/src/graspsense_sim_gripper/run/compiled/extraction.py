@@ -16,17 +16,14 @@ from graspsense.simulator_api import (
     entry_point,
     is_on_disk,
 )
+from graspsense_sim_gripper.plant.object_model import unbound
 from graspsense_sim_gripper.run.compiled.jit import generating
 from graspsense_sim_gripper.run.loop import COLUMNS, EVENT_SHIFT, Table
 
 PHASE_BITS: Final = (1 << EVENT_SHIFT) - 1
 
 
-def _measure_unbound(params: Any, ticks: TickColumns) -> Any:
-    raise TypeError("nothing is measured: compiled_measure binds a measure")
-
-
-measure: Callable[[Any, TickColumns], Any] = _measure_unbound
+measure: Callable[[Any, TickColumns], Any] = unbound
 
 
 def measure_buffers(params: Any, columns: Table, phases: Any, n: int) -> Any:

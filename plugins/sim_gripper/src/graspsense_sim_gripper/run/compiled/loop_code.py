@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graspsense.simulator_api import NotCompilable, bind, entry_point, is_on_disk
+from graspsense_sim_gripper.plant.object_model import unbound
 from graspsense_sim_gripper.plant.sensing import PadBuffers
 from graspsense_sim_gripper.run.binding import bind_reachable
 from graspsense_sim_gripper.run.compiled.compose import Composition, grasp_loop
@@ -40,21 +41,9 @@ Numbers = NDArray[np.float64]
 Arrays = tuple[NDArray[Any], ...]
 
 
-def _grasp_unbound(params: GraspParams, progress: SimulationState, buffers: Buffers) -> SimulationState:
-    raise TypeError("no loop is bound: use CompiledLoops")
-
-
-def _tuples_unbound(pattern: Pattern, numbers: Any, arrays: Any) -> Any:
-    raise TypeError("only compiled code makes tuples of numbers: use CompiledLoops")
-
-
-def _store_unbound(array: Any, values: Any) -> None:
-    raise TypeError("only compiled code stores numbers: use CompiledLoops")
-
-
-grasp: Callable[[GraspParams, SimulationState, Buffers], SimulationState] = _grasp_unbound
-tuples_of: Callable[[Pattern, Any, Any], Any] = _tuples_unbound
-store_numbers: Callable[[Any, Any], None] = _store_unbound
+grasp: Callable[[GraspParams, SimulationState, Buffers], SimulationState] = unbound
+tuples_of: Callable[[Pattern, Any, Any], Any] = unbound
+store_numbers: Callable[[Any, Any], None] = unbound
 
 
 class CellNoise(NamedTuple):

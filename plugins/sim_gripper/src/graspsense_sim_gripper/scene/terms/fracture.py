@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from graspsense_sim_gripper.scene.terms.term import Rate, Term, WorkingPoint, no_force
+from graspsense_sim_gripper.scene.terms.term import Term, no_force, no_rates
 
 
 class Fracture(NamedTuple):
@@ -37,12 +37,6 @@ def fracture(
     return force_n, state
 
 
-def rates(params: Fracture, point: WorkingPoint) -> tuple[Rate, ...]:
-    """Return no rates: the state changes once at most."""
-    del params, point
-    return ()
-
-
 def phase(state: FractureState) -> int:
     """Return whether the object has broken."""
     return state.broken
@@ -64,7 +58,7 @@ TERM = Term(
     law=no_force,
     on_sum=fracture,
     at_rest=FractureState(0),
-    rates=rates,
+    rates=no_rates,
     phase=phase,
     positive=("force_n", "compression_m"),
     refusal=refusal,

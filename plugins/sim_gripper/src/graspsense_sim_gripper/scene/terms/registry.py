@@ -24,7 +24,7 @@ from graspsense_sim_gripper.scene.terms import (
     worn,
 )
 from graspsense_sim_gripper.scene.terms.switchable import switched, switched_on_sum
-from graspsense_sim_gripper.scene.terms.term import Law, Moves, OnSum, Phase, Term, never_moves, one_phase
+from graspsense_sim_gripper.scene.terms.term import Law, Moves, OnSum, Phase, Term
 
 TERMS: Final[dict[str, Term]] = {
     module.TERM.name: module.TERM
@@ -106,7 +106,7 @@ def active_laws(names: Sequence[str]) -> list[Law | OnSum]:
 def phases_of(names: Sequence[str]) -> list[tuple[int, Phase]]:
     """Return the terms with events among those of `laws_of`: the place of each, and its `phase`. Raises UnknownName."""
     terms = [find_term(name)[1] for name in names]
-    return [(i, term.phase) for i, term in enumerate(terms) if term.phase is not one_phase]
+    return [(i, term.phase) for i, term in enumerate(terms) if term.phase]
 
 
 def moving_of(names: Sequence[str]) -> list[tuple[int, Moves]]:
@@ -115,4 +115,4 @@ def moving_of(names: Sequence[str]) -> list[tuple[int, Moves]]:
     Raises UnknownName.
     """
     terms = [find_term(name)[1] for name in names]
-    return [(i, term.moves) for i, term in enumerate(terms) if term.moves is not never_moves]
+    return [(i, term.moves) for i, term in enumerate(terms) if term.moves]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from graspsense_sim_gripper.scene.terms.term import Rate, Term, WorkingPoint
+from graspsense_sim_gripper.scene.terms.term import Term, no_rates
 
 
 class Rigid(NamedTuple):
@@ -41,12 +41,6 @@ def rigid(
     return force, state
 
 
-def rates(params: Rigid, point: WorkingPoint) -> tuple[Rate, ...]:
-    """Return no rates: the state changes once at most."""
-    del params, point
-    return ()
-
-
 def phase(state: RigidState) -> int:
     """Return whether it has broken."""
     return state.broken
@@ -58,7 +52,7 @@ TERM = Term(
     params=Rigid,
     law=rigid,
     at_rest=RigidState(0),
-    rates=rates,
+    rates=no_rates,
     phase=phase,
     positive=("hertz_n_m15",),
     stiffnesses=("hertz_n_m15", "crush_force_n"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from graspsense_sim_gripper.scene.terms.term import Rate, Term, WorkingPoint
+from graspsense_sim_gripper.scene.terms.term import Term, no_rates
 
 
 class Snap(NamedTuple):
@@ -42,12 +42,6 @@ def snap(
     return peak - drop + k2 * (d1 - critical - fall), SnapState(2)
 
 
-def rates(params: Snap, point: WorkingPoint) -> tuple[Rate, ...]:
-    """Return no rates: the state follows from the compression."""
-    del params, point
-    return ()
-
-
 def phase(state: SnapState) -> int:
     """Return the part of the characteristic."""
     return state.part
@@ -59,7 +53,7 @@ TERM = Term(
     params=Snap,
     law=snap,
     at_rest=SnapState(0),
-    rates=rates,
+    rates=no_rates,
     phase=phase,
     positive=("k1_n_m", "fall_m", "k2_n_m"),
     stiffnesses=("k1_n_m", "k2_n_m", "drop_n"),

@@ -52,21 +52,8 @@ class Rate(NamedTuple):
 
 
 def no_rates(params: TermParams, point: WorkingPoint) -> tuple[Rate, ...]:
-    """Return the rates of a term that declares none: unknown if it has a state."""
-    del params, point
+    """Return the rates of a state that changes at events only, or follows from the compression: none."""
     return ()
-
-
-def never_beyond(state: TermState) -> str:
-    """Return "": the law always holds."""
-    del state
-    return ""
-
-
-def never_refused(params: TermParams) -> str:
-    """Return "": there is a law for all parameters."""
-    del params
-    return ""
 
 
 def no_force(
@@ -74,24 +61,6 @@ def no_force(
 ) -> tuple[float, TermState]:
     """Return no force: the law of a term that acts on the sum of the others."""
     return 0.0, state
-
-
-def one_phase(state: TermState) -> int:
-    """Return 0: one law holds throughout."""
-    del state
-    return 0
-
-
-def never_moves(state: TermState) -> bool:
-    """Return False: in a free object that has its shape, the state no longer changes."""
-    del state
-    return False
-
-
-def not_dented(params: TermParams) -> float:
-    """Return the dent (m) of a term that earlier use has not deformed."""
-    del params
-    return 0.0
 
 
 NO_STATE: Final = NoState()
@@ -103,8 +72,8 @@ class Term:
 
     `params` is a named tuple of floats; a scene may omit a field that has a default. The law is a pure function that
     runs both in the interpreter and compiled: floats and named tuples, no closure, no `x**2`. It integrates its own
-    state, and is stable however fast that is. `rates` gives the rates of its states at a working point. `positive`
-    names the parameters that must not be zero; only those that `signed` names may be negative.
+    state, and is stable however fast that is. `positive` names the parameters that must not be zero; only those that
+    `signed` names may be negative.
     """
 
     name: str
@@ -112,14 +81,16 @@ class Term:
     params: type[Any]
     law: Law
     at_rest: TermState = NO_STATE
-    rates: Callable[[TermParams, WorkingPoint], tuple[Rate, ...]] = no_rates
+    rates: Callable[[TermParams, WorkingPoint], tuple[Rate, ...]] | None = None
+    """Returns the rates of its states at a working point; None: those of a term with a state are unknown."""
     divides_steps: bool = False
     """Whether the law divides a step by itself to resolve the oscillation that its rates give, as a contact inside of
     the term needs it. For any other term the simulator takes steps that are short enough."""
     positive: tuple[str, ...] = ()
     signed: tuple[str, ...] = ()
-    refusal: Callable[[TermParams], str] = never_refused
-    """Returns why there is no law with these parameters and what is allowed, "" if there is one."""
+    refusal: Callable[[TermParams], str] | None = None
+    """Returns why there is no law with these parameters and what is allowed, "" if there is one; None: there is one for
+    all parameters."""
     on_sum: SumLaw | None = None
     """The law of a term that acts on the sum of the other terms' forces, as a fracture does; its `law` is `no_force`.
 
@@ -127,18 +98,21 @@ class Term:
     """
     stiffnesses: tuple[str, ...] = ()
     """Parameters that grow with the thickness of the wall; they vary between instances."""
-    beyond: Callable[[TermState], str] = never_beyond
-    """Returns why a state is outside of the range of the law, "" if it is not."""
-    phase: Phase = one_phase
-    """Returns which part of the law (0 to 7) the state is in, such as 1 for broken. Runs compiled, like the law.
+    beyond: Callable[[TermState], str] | None = None
+    """Returns why a state is outside of the range of the law, "" if it is not; None: the law always holds."""
+    phase: Phase | None = None
+    """Returns which part of the law (0 to 7) the state is in, such as 1 for broken; None: there is one part. Runs
+    compiled, like the law.
 
     Where it changes, law or slope of the force change at once: an event, which the simulator locates within the tick.
     """
-    moves: Callable[[TermState], bool] = never_moves
+    moves: Moves | None = None
     """Returns whether the state still changes in a free object that has its shape, as a mass does that swings behind a
-    separated contact. Until it is still, the object counts as touched. Runs compiled, like the law."""
-    dent: Callable[[TermParams], float] = not_dented
-    """By how much (m) earlier use has made the object thinner. Compression is counted from the dented surface on."""
+    separated contact; None: it never does. Until it is still, the object counts as touched. Runs compiled, like the
+    law."""
+    dent: Callable[[TermParams], float] | None = None
+    """Returns by how much (m) earlier use has made the object thinner; None: it has not. Compression is counted from
+    the dented surface on."""
 
     def __attrs_post_init__(self) -> None:
         fields = getattr(self.params, "_fields", None)
