@@ -2,100 +2,73 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from graspsense_sim_gripper.run.accuracy.chosen_steps import QUANTITIES, ChosenSteps
-from graspsense_sim_gripper.run.nested import TupleType, first_place, with_places
+from graspsense_sim_gripper.run.nested import Stored, TupleType, taken, with_places
 from graspsense_sim_gripper.scene.terms.registry import find_term
 from graspsense_sim_gripper.scene.terms.term import TermState
 from graspsense_sim_gripper.solve.state import PlantState
 
 
+class _Told(NamedTuple):
+    """What the report tells of the state in which a grasp ended, or where it is among the numbers of the state."""
+
+    peak_n: float
+    unresolved: float
+    unbalanced: float
+    left: tuple[TermState, ...]
+    """The states of the object's own terms."""
+    right: tuple[TermState, ...]
+    """Those of its half at the right finger, if it has one."""
+
+
 def model_report(state: PlantState, kinds: Sequence[str]) -> dict[str, Any]:
     """Return the report of a grasp that ended in this state, of an object with terms of these kinds."""
-    contact = state.contact
-    beyond = (
-        (kind, check(half.states[i]))
-        for half in (contact.left, *contact.right)
-        for i, kind, check in _checked(tuple(kinds))
-    )
-    return _report(
-        state.peak_n,
-        state.step.unresolved + contact.unbalanced,
-        any(getattr(term, "broken", 0) == 1 for term in contact.left.states),
-        beyond,
-    )
+    return _report(_told(state, range(len(kinds))), tuple(kinds))
 
 
-def _report(
-    peak_n: float, unresolved: float, broken: bool, beyond: Iterable[tuple[str, str]]
-) -> dict[str, Any]:
-    """Return a report; `beyond` gives the kind of a term and why its law was used beyond its validity, or ''."""
-    return {
-        "simulated": True,
-        "true_peak_force_n": peak_n,
-        "resolved": unresolved == 0,
-        "broken": broken,
-        "beyond": "; ".join(dict.fromkeys(f"{kind}: {reason}" for kind, reason in beyond if reason)),
-    }
+def stored_report(end: Stored, terms: tuple[int, ...], kinds: tuple[str, ...]) -> dict[str, Any]:
+    """Return the same of a stored state of a padded object, without the named tuples of the state.
 
-
-class _CheckedTerm(NamedTuple):
-    """A term whose law may be used beyond its validity, in an array of the numbers of a state."""
-
-    kind: str
-    check: Callable[[TermState], str]
-    type: TupleType
-    """That of its state."""
-    begin: int
-    """Where the numbers of its state begin."""
-
-
-class StoredReport(NamedTuple):
-    """Makes `model_report` of the numbers of a state, without the named tuples of the state."""
-
-    places: NDArray[np.int64]
-    """Where the peak force is among the numbers, the unresolved steps, the unbalanced ones, and what says that a term
-    is broken."""
-    checked: tuple[_CheckedTerm, ...]
-
-    def report(self, numbers: NDArray[np.float64]) -> dict[str, Any]:
-        """Return the report of a grasp that ended in the state of these numbers."""
-        peak_n, unresolved, unbalanced, *broken = numbers[self.places].tolist()
-        beyond = [
-            (kind, check(state.filled(numbers[begin : begin + state.count])))
-            for kind, check, state, begin in self.checked
-        ]
-        return _report(peak_n, unresolved + unbalanced, 1.0 in broken, beyond)
+    `terms`: the places of the object's own terms in it; `kinds`: their kinds.
+    """
+    return _report(taken(_places_told(end.type, terms), end.numbers.tolist()), kinds)
 
 
 @lru_cache(maxsize=256)
-def stored_report(plant: TupleType, terms: tuple[int, ...], kinds: tuple[str, ...]) -> StoredReport:
-    """Return what makes the reports of padded states of the plant of this type.
+def _places_told(plant: TupleType, terms: tuple[int, ...]) -> Any:
+    return _told(with_places(plant.pattern), terms)
 
-    `terms`: the places of the object's own terms in them; `kinds`: their kinds.
-    """
-    padded = plant.filled([0.0] * plant.count)
-    places_of = with_places(padded)
-    states = zip(
-        (padded.contact.left, *padded.contact.right),
-        (places_of.contact.left, *places_of.contact.right),
-        strict=True,
+
+def _told(state: PlantState, terms: Sequence[int]) -> _Told:
+    contact = state.contact
+    own = [tuple([half.states[i] for i in terms]) for half in (contact.left, *contact.right)]
+    return _Told(
+        peak_n=state.peak_n,
+        unresolved=state.step.unresolved,
+        unbalanced=contact.unbalanced,
+        left=own[0],
+        right=own[1] if len(own) > 1 else (),
     )
-    of_kinds = [(kind, check, terms[i]) for i, kind, check in _checked(kinds)]
-    checked = tuple(
-        _CheckedTerm(kind, check, TupleType.made_of(half.states[place]), first_place(places.states[place]))
-        for half, places in states
-        for kind, check, place in of_kinds
+
+
+def _report(told: _Told, kinds: tuple[str, ...]) -> dict[str, Any]:
+    beyond = (
+        (kind, check(states[i]))
+        for states in (told.left, told.right)
+        if states
+        for i, kind, check in _checked(kinds)
     )
-    broken = tuple(state.broken for state in places_of.contact.left.states if hasattr(state, "broken"))
-    places = places_of.peak_n, places_of.step.unresolved, places_of.contact.unbalanced, *broken
-    return StoredReport(np.array(places, np.int64), checked)
+    return {
+        "simulated": True,
+        "true_peak_force_n": told.peak_n,
+        "resolved": told.unresolved + told.unbalanced == 0,
+        "broken": any(getattr(term, "broken", 0) == 1 for term in told.left),
+        "beyond": "; ".join(dict.fromkeys(f"{kind}: {reason}" for kind, reason in beyond if reason)),
+    }
 
 
 @lru_cache(maxsize=256)

@@ -10,14 +10,16 @@ from attrs import define, frozen
 from numpy.typing import NDArray
 
 
-@frozen(eq=False)
+@define(eq=False)
 class TupleType:
     """The types of nested tuples of numbers, from which such tuples are made of their numbers."""
 
     pattern: Any
-    """Nested tuples of these types, or a number."""
+    """Nested tuples of these types, or a number. It may hold arrays, if only compiled code makes tuples of it."""
     count: int
     """Number of numbers."""
+    compiled_type: Any = None
+    """The type in compiled code that stands for this one, once it is known."""
 
     @classmethod
     def made_of(cls, pattern: Any) -> TupleType:
@@ -37,15 +39,6 @@ def _filled(pattern: Any, numbers: Iterator[float]) -> Any:
         # `tuple.__new__` makes named tuples in half of the time of their constructors.
         return tuple.__new__(type(pattern), [_filled(part, numbers) for part in pattern])
     return type(pattern)(next(numbers))
-
-
-@define(eq=False)
-class Pattern:
-    """Nested tuples of numbers and arrays that stand for their types only."""
-
-    values: Any
-    compiled_type: Any = None
-    """Their type in compiled code, once it is known."""
 
 
 @frozen(eq=False)
@@ -83,13 +76,11 @@ def with_places(pattern: Any, begin: int = 0) -> Any:
     return tuple.__new__(type(pattern), parts)
 
 
-def first_place(places: Any) -> int:
-    """Return the first of nested places; 0 if there is none."""
-    while isinstance(places, tuple):
-        if not places:
-            return 0
-        places = places[0]
-    return int(places)
+def taken(places: Any, numbers: Sequence[float]) -> Any:
+    """Return nested tuples like `places`, in which each place is replaced by the number there."""
+    if isinstance(places, tuple):
+        return tuple.__new__(type(places), [taken(part, numbers) for part in places])
+    return numbers[places]
 
 
 def append(values: Any, numbers: MutableSequence[float], arrays: list[NDArray[Any]]) -> None:

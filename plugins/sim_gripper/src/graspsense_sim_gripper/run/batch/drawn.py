@@ -7,7 +7,7 @@ bit as by `build.instantiate` (`test_a_drawn_grasp_is_that_of_the_seed`), drawn 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cache, lru_cache
+from functools import cache
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from graspsense.simulator_api import CompileOptions, compile_function, entry_point, is_on_disk
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.plant.sensing import PadCells
 from graspsense_sim_gripper.run.binding import bind_reachable
 from graspsense_sim_gripper.run.build import Problem, check_fit
 from graspsense_sim_gripper.run.compiled.jit import generating
@@ -37,7 +36,6 @@ from graspsense_sim_gripper.run.drawing import (
     scene_numbers,
 )
 from graspsense_sim_gripper.run.loop import GraspParams, SimulationState
-from graspsense_sim_gripper.run.nested import append, with_places
 from graspsense_sim_gripper.run.problem import GraspSetup
 from graspsense_sim_gripper.scene.instance import deepest_dent, draws_of_number
 from graspsense_sim_gripper.scene.random_numbers import IN_COMPILED_CODE, Word, key_of
@@ -133,31 +131,6 @@ class DrawMemory(NamedTuple):
     """Those of a grasp, some of which are written to."""
 
 
-class StartLayout(NamedTuple):
-    """What the grasps of a composition have in common at their beginning."""
-
-    types: LoopTypes
-    places: Any
-    """Parameters and state, in which each number is its place among all numbers."""
-    cells: tuple[int, ...]
-    """The places of the weights and offsets of the left and of the right cells among all arrays."""
-
-
-@lru_cache(maxsize=64)
-def _start_layout(types: LoopTypes) -> StartLayout:
-    """Return that of the grasps of these types. It takes a millisecond, and scenes of a composition share it."""
-    params, state = types.pattern.values
-    # Other arrays in their stead are told apart, while both fingertips may share theirs.
-    left, right = (PadCells(np.zeros(0), np.zeros(0)) for _ in range(2))
-    arrays: list[NDArray[Any]] = []
-    append(params._replace(sensor=params.sensor._replace(left=left, right=right)), [], arrays)
-
-    def place(wanted: Any) -> int:
-        return next(i for i, array in enumerate(arrays) if array is wanted)
-
-    return StartLayout(types, with_places((params, state)), tuple(place(array) for array in (*left, *right)))
-
-
 @frozen(eq=False)
 class DrawnScene:
     """What the grasps of a scene are drawn from."""
@@ -166,7 +139,7 @@ class DrawnScene:
     spec: ObjectSpec | None
     terms: tuple[int, ...]
     """The places of the object's own terms."""
-    start: StartLayout
+    types: LoopTypes
     numbers: Numbers
     """Those of the parameters and of the first state of a grasp; which a seed decides is arbitrary."""
     arrays: Arrays
@@ -184,7 +157,7 @@ class DrawnScene:
         buffers = _array_buffers(self.scene)
         arrays, (weights, left, right) = [*self.arrays], buffers.cells
         if self.has_cells:
-            for place, array in zip(self.start.cells, (weights, left, weights, right), strict=True):
+            for place, array in zip(self.types.cells, (weights, left, weights, right), strict=True):
                 arrays[place] = array
         return DrawMemory(buffers, tuple(arrays))
 
@@ -202,7 +175,7 @@ class DrawnScene:
             numbers[places.width_m] -= deepest_dent(spec, buffers.params.tolist())
         if spec is not None and spec.file:
             check_fit(self.config, spec, float(numbers[places.width_m]), float(numbers[places.offset_m]))
-        return LoopStart(self.start.types, numbers, arrays)
+        return LoopStart(self.types, numbers, arrays)
 
 
 def drawn_scene(
@@ -212,17 +185,16 @@ def drawn_scene(
 
     `example`: one of them; `begun`: its parameters and its first state, padded.
     """
-    terms, start = places_of(example.kinds), _start_layout(LoopTypes.made_of(*begun))
-    numbers = loop_start(*begun, start.types)
+    terms, start = places_of(example.kinds), loop_start(*begun)
     return DrawnScene(
         config=problem.config,
         spec=problem.spec,
         terms=terms,
-        start=start,
-        numbers=numbers.numbers,
-        arrays=numbers.arrays,
+        types=start.types,
+        numbers=start.numbers,
+        arrays=start.arrays,
         scene=_with_arrays(scene_numbers(problem.config, problem.spec)),
-        places=_places(start.places, terms),
+        places=_places(start.types.places, terms),
     )
 
 

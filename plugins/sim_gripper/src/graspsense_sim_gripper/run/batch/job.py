@@ -84,7 +84,7 @@ class FinishedGrasp:
         """Return the `model_report` of the grasp, with what its model does not verify."""
         kinds, chosen, unstable_loop = self.model
         if isinstance(self.end, Stored) and self.terms is not None:
-            report = stored_report(self.end.type, self.terms, kinds).report(self.end.numbers)
+            report = stored_report(self.end, self.terms, kinds)
         else:
             report = model_report(self.state, kinds)
         if chosen is not None:

@@ -8,27 +8,28 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+from attrs import frozen
 from numpy.typing import NDArray
 
 from graspsense.simulator_api import NotCompilable, bind, entry_point, is_on_disk
 from graspsense_sim_gripper.plant.object_model import unbound
-from graspsense_sim_gripper.plant.sensing import PadBuffers
+from graspsense_sim_gripper.plant.sensing import PadBuffers, PadCells
 from graspsense_sim_gripper.run.binding import bind_reachable
 from graspsense_sim_gripper.run.compiled.compose import Composition, grasp_loop
 from graspsense_sim_gripper.run.compiled.jit import COMPILING, OPTIONS, compile_part, generating
 from graspsense_sim_gripper.run.drawing import draw_image_noise
 from graspsense_sim_gripper.run.loop import Buffers, Ending, GraspParams, LoopEnd, SimulationState, ending
 from graspsense_sim_gripper.run.nested import (
-    Pattern,
     Stored,
     TupleType,
     append,
     count_numbers,
     structure,
+    with_places,
 )
 from graspsense_sim_gripper.run.problem import ControllerStep
 from graspsense_sim_gripper.scene.random_numbers import IN_COMPILED_CODE, Word, key_of
@@ -42,7 +43,7 @@ Arrays = tuple[NDArray[Any], ...]
 
 
 grasp: Callable[[GraspParams, SimulationState, Buffers], SimulationState] = unbound
-tuples_of: Callable[[Pattern, Any, Any], Any] = unbound
+tuples_of: Callable[[TupleType, Any, Any], Any] = unbound
 store_numbers: Callable[[Any, Any], None] = unbound
 
 
@@ -59,7 +60,7 @@ NO_NOISE: Final = CellNoise(0, key_of(0))
 
 
 def stored_grasp(
-    pattern: Pattern, start: Any, arrays: Any, buffers: Buffers, noise: CellNoise, end: Any
+    pattern: TupleType, start: Any, arrays: Any, buffers: Buffers, noise: CellNoise, end: Any
 ) -> Ending:
     """Run `grasp` from the numbers and arrays of its parameters and its state, which have the types of `pattern`.
 
@@ -103,17 +104,16 @@ class LoopStart(NamedTuple):
         return LoopStart(self.types, np.concatenate([of_params, state.numbers]), self.arrays)
 
 
-class LoopTypes(NamedTuple):
+@frozen(eq=False, slots=False)
+class LoopTypes:
     """The types of the parameters and the states of the grasps of a compiled loop."""
 
-    pattern: Pattern
+    begun: TupleType
     """Parameters and state."""
     state: TupleType
     plant: TupleType
     before_plant: int
     """Number of numbers of the state before those of the plant."""
-    n_numbers: int
-    """Number of numbers of both."""
 
     @classmethod
     def made_of(cls, params: GraspParams, state: SimulationState) -> LoopTypes:
@@ -124,10 +124,25 @@ class LoopTypes(NamedTuple):
         if known is None:
             if len(_TYPES) >= MOST_TYPES:
                 _TYPES.clear()
-            types = TupleType.made_of(state), TupleType.made_of(state.plant)
-            known = cls(Pattern(begun), *types, count_numbers(state.loop), count_numbers(begun))
-            _TYPES[key] = known
+            types = (TupleType.made_of(part) for part in (begun, state, state.plant))
+            known = _TYPES[key] = cls(*types, before_plant=count_numbers(state.loop))
         return known
+
+    @cached_property
+    def places(self) -> Any:
+        """Parameters and state, in which each number is its place among all numbers. It takes a millisecond."""
+        return with_places(self.begun.pattern)
+
+    @cached_property
+    def cells(self) -> tuple[int, ...]:
+        """The places of the weights and offsets of the left and of the right cells among all arrays."""
+        params, _ = self.begun.pattern
+        # Other arrays in their stead are told apart, while both fingertips may share theirs.
+        left, right = (PadCells(np.zeros(0), np.zeros(0)) for _ in range(2))
+        arrays: list[NDArray[Any]] = []
+        append(params._replace(sensor=params.sensor._replace(left=left, right=right)), [], arrays)
+        places = {id(array): place for place, array in enumerate(arrays)}
+        return tuple(places[id(array)] for array in (*left, *right))
 
 
 MOST_TYPES: Final = 64
@@ -145,8 +160,8 @@ def loop_start(params: GraspParams, state: SimulationState, types: LoopTypes | N
         append((params, state), numbers, arrays)
     except TypeError as error:
         raise NotCompilable(f"the parameters or the state of a grasp are not all numbers: {error}") from error
-    if len(numbers) != types.n_numbers:
-        raise TypeError(f"a grasp with {len(numbers)} numbers in a loop for grasps with {types.n_numbers}")
+    if len(numbers) != types.begun.count:
+        raise TypeError(f"a grasp with {len(numbers)} numbers in a loop for grasps with {types.begun.count}")
     return LoopStart(types, np.frombuffer(numbers), tuple(arrays))
 
 
@@ -169,7 +184,7 @@ class CompiledLoop:
         Raises NotCompilable if numba refuses.
         """
         types, state = start.types, np.empty(start.types.state.count)
-        arguments = types.pattern, start.numbers, start.arrays, buffers, noise or NO_NOISE, state
+        arguments = types.begun, start.numbers, start.arrays, buffers, noise or NO_NOISE, state
         if self._machine_code is not None:
             end = self._machine_code(*arguments)
         else:

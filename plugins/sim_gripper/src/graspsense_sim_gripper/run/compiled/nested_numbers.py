@@ -12,11 +12,11 @@ from llvmlite import ir
 from numba import extending, types
 from numba.extending import intrinsic, typeof_impl
 
-from graspsense_sim_gripper.run.nested import Pattern
+from graspsense_sim_gripper.run.nested import TupleType
 
 
 class PatternType(types.Type):
-    """The type of a `Pattern` in compiled code, which knows the types in the pattern but none of its values."""
+    """The type of a `TupleType` in compiled code, which knows the types in its pattern but none of the values."""
 
     def __init__(self, values_type: Any) -> None:
         """Take the type of the nested tuples."""
@@ -24,11 +24,11 @@ class PatternType(types.Type):
         super().__init__(name=f"Pattern({values_type})")
 
 
-@typeof_impl.register(Pattern)
-def _type_of(pattern: Pattern, context: Any) -> PatternType:
-    if pattern.compiled_type is None:
-        pattern.compiled_type = PatternType(typeof_impl(pattern.values, context))
-    known: PatternType = pattern.compiled_type
+@typeof_impl.register(TupleType)
+def _type_of(kind: TupleType, context: Any) -> PatternType:
+    if kind.compiled_type is None:
+        kind.compiled_type = PatternType(typeof_impl(kind.pattern, context))
+    known: PatternType = kind.compiled_type
     return known
 
 
