@@ -30,8 +30,7 @@ from graspsense.report.found_table import markdown_table
 from graspsense.simulator_api import NotCompilable, RunConfig, bind
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.chosen_steps import ChosenSteps
-from graspsense_sim_gripper.run.accuracy.probe import FORCE_N, grip_of
-from graspsense_sim_gripper.run.accuracy.propose import propose
+from graspsense_sim_gripper.run.accuracy.propose import FORCE_N, grip_of, propose
 from graspsense_sim_gripper.run.accuracy.select import select
 from graspsense_sim_gripper.run.batch.job import FinishedGrasp, Job, grasp_plain
 from graspsense_sim_gripper.run.build import Problem, instantiate
@@ -41,8 +40,7 @@ from graspsense_sim_gripper.run.problem import GraspController, GraspSetup
 from graspsense_sim_gripper.scene.library import find
 from graspsense_sim_gripper.scene.spec import ObjectSpec
 from graspsense_sim_gripper.scene.terms.registry import laws_of
-from graspsense_sim_gripper.solve.scheme import PlantParams
-from graspsense_sim_gripper.solve.state import PlantState
+from graspsense_sim_gripper.solve.scheme import PlantParams, PlantState
 
 Row = dict[str, Any]
 FloatArray = NDArray[np.float64]

@@ -5,8 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.run.accuracy.probe import grip_of
-from graspsense_sim_gripper.run.accuracy.propose import propose
+from graspsense_sim_gripper.run.accuracy.propose import grip_of, propose
 from graspsense_sim_gripper.run.build import Problem, build, instantiate
 from graspsense_sim_gripper.run.problem import GraspSetup
 from graspsense_sim_gripper.scene.spec import ObjectSpec

@@ -13,8 +13,7 @@ from click.testing import CliRunner
 from graspsense.cli.main import cli
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.levels import PLAIN
-from graspsense_sim_gripper.run.accuracy.probe import grip_of
-from graspsense_sim_gripper.run.accuracy.propose import propose
+from graspsense_sim_gripper.run.accuracy.propose import grip_of, propose
 from graspsense_sim_gripper.run.build import Problem, instantiate
 from graspsense_sim_gripper.scene.library import find
 from graspsense_sim_gripper.scene.spec import ObjectSpec

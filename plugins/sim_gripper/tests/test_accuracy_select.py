@@ -20,8 +20,7 @@ from graspsense_sim_gripper.run.accuracy import select as selection
 from graspsense_sim_gripper.run.accuracy import verify
 from graspsense_sim_gripper.run.accuracy.error import deviation
 from graspsense_sim_gripper.run.accuracy.levels import CONTROLLED, PLAIN
-from graspsense_sim_gripper.run.accuracy.probe import grip_of
-from graspsense_sim_gripper.run.accuracy.propose import propose
+from graspsense_sim_gripper.run.accuracy.propose import grip_of, propose
 from graspsense_sim_gripper.run.accuracy.select import select
 from graspsense_sim_gripper.run.backend import SimBackend
 from graspsense_sim_gripper.run.batch.job import Job, grasp_plain

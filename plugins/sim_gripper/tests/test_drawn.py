@@ -12,8 +12,7 @@ from graspsense.core.components.run_config import RunConfig
 from graspsense.core.values.errors import ConfigError
 from graspsense.plugin_api import create
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.run.accuracy.probe import grip_of
-from graspsense_sim_gripper.run.accuracy.propose import propose
+from graspsense_sim_gripper.run.accuracy.propose import grip_of, propose
 from graspsense_sim_gripper.run.batch.drawn import compiled_drawing, draw_numbers
 from graspsense_sim_gripper.run.batch.job import Job, started
 from graspsense_sim_gripper.run.batch.scenes import Scenes, number_in, scene_key

@@ -18,8 +18,7 @@ from graspsense_sim_gripper.run.binding import bind_reachable
 from graspsense_sim_gripper.run.compiled.compose import composition, plant_move, step_parts, uncompressed
 from graspsense_sim_gripper.scene.terms.registry import laws_of
 from graspsense_sim_gripper.solve.macro_step import macro_step, next_ticks
-from graspsense_sim_gripper.solve.scheme import Steps
-from graspsense_sim_gripper.solve.state import PlantState
+from graspsense_sim_gripper.solve.scheme import PlantState, Steps
 from graspsense_sim_gripper.solve.trend import UNKNOWN
 
 CONFIG = SimConfig(sensor="ideal", spread=False)

@@ -32,8 +32,7 @@ from graspsense_sim_gripper.scene.terms.slosh import Slosh
 from graspsense_sim_gripper.scene.terms.surface import Surface, surface
 from graspsense_sim_gripper.scene.terms.term import NoState
 from graspsense_sim_gripper.scene.terms.worn import Worn
-from graspsense_sim_gripper.solve.scheme import PlantParams, Steps
-from graspsense_sim_gripper.solve.state import PlantState
+from graspsense_sim_gripper.solve.scheme import PlantParams, PlantState, Steps
 
 slow = partial(pytest.param, marks=pytest.mark.slow)
 LINK = LINKAGES["pr2"]

@@ -38,19 +38,18 @@ from graspsense_sim_gripper.plant.sensing import (
     with_listed_cells,
 )
 from graspsense_sim_gripper.plant.state import PlantReadings, right_of
-from graspsense_sim_gripper.run.accuracy.probe import FORCE_N, SPEED_M_S
+from graspsense_sim_gripper.run.accuracy.propose import FORCE_N, SPEED_M_S
 from graspsense_sim_gripper.run.accuracy.select import select
 from graspsense_sim_gripper.run.binding import bind_reachable
 from graspsense_sim_gripper.run.build import build, device_info, instantiate
 from graspsense_sim_gripper.run.compiled.compose import INTERPRETED, composed_move, composition
-from graspsense_sim_gripper.run.explain import explain
 from graspsense_sim_gripper.run.model_report import accuracy_report, model_report
 from graspsense_sim_gripper.run.problem import IMAGES_PER_BLOCK, GraspController
 from graspsense_sim_gripper.run.sampled_loop import instability
 from graspsense_sim_gripper.run.term_failure import TermFailed, not_finite_in_tick
 from graspsense_sim_gripper.scene.library import kinds_in, object_kinds
 from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
-from graspsense_sim_gripper.solve.state import PlantState, is_finite
+from graspsense_sim_gripper.solve.scheme import PlantState, is_finite
 
 SIDES: Final = ("left", "right")
 
@@ -214,18 +213,20 @@ class SimBackend(BatchBackend[SimConfig]):
             controller = self._controller or default_controller()
             report |= accuracy_report(report, chosen, instability(setup, controller, chosen))
         if self.config.explain:
-            report["model"] = explain(setup, self._compressions) | {"without": self._without()}
+            report["model"] = self._explained()
         return report
 
-    def _without(self) -> list[dict[str, Any]]:
-        """Return what each feature would lose without each term, see `accuracy.without`."""
-        # Imported here, since only `explain` needs it.
-        from graspsense_sim_gripper.run.accuracy.without import without_each_term
+    def _explained(self) -> dict[str, Any]:
+        """Return what each term contributes, and what each feature would lose without it."""
+        # Imported here, since only this needs it.
+        from graspsense_sim_gripper.run.explain import explain, without_each_term
 
-        if self._chosen is None:
-            return []
-        controller = self._controller or default_controller()
-        return without_each_term(build(self.config, self.config.object), controller, self._chosen)
+        model = explain(self._setup, self._compressions) | {"without": []}
+        if self._chosen is not None:
+            problem = build(self.config, self.config.object)
+            controller = self._controller or default_controller()
+            model["without"] = without_each_term(problem, controller, self._chosen)
+        return model
 
     def _draw_noise(self) -> None:
         """Draw the noise of the next images, and extend the buffer of images by as many."""

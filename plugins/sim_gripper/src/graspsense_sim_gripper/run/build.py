@@ -46,8 +46,7 @@ from graspsense_sim_gripper.scene.instance import PAD_CELLS, deepest_dent, draws
 from graspsense_sim_gripper.scene.library import find, split_number
 from graspsense_sim_gripper.scene.random_numbers import key_of
 from graspsense_sim_gripper.scene.spec import ObjectSpec, TermParams
-from graspsense_sim_gripper.solve.scheme import PlantParams, Steps
-from graspsense_sim_gripper.solve.state import PlantState
+from graspsense_sim_gripper.solve.scheme import PlantParams, PlantState, Steps
 
 EFFORT_LIMIT_N: Final = 100.0
 SPEED_LIMIT_M_S: Final = 0.2

@@ -23,8 +23,7 @@ from graspsense_sim_gripper.run.compiled.compose import (
 )
 from graspsense_sim_gripper.run.compiled.jit import compile_part
 from graspsense_sim_gripper.scene.terms.registry import active_laws, find_term, laws_of
-from graspsense_sim_gripper.scene.terms.switchable import Switchable
-from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
+from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS, Switchable
 
 __all__ = [
     "BALANCE_RTOL",

@@ -28,8 +28,7 @@ from graspsense_sim_gripper.solve.macro_step import (
     values_at,
     with_peak,
 )
-from graspsense_sim_gripper.solve.scheme import PlantParams
-from graspsense_sim_gripper.solve.state import PlantState, is_finite
+from graspsense_sim_gripper.solve.scheme import PlantParams, PlantState, is_finite
 from graspsense_sim_gripper.solve.trend import UNKNOWN, Trend
 
 COLUMNS: Final = (
@@ -58,8 +57,8 @@ class GraspParams(NamedTuple):
     dt_s: float
     max_ticks: int
     macro_steps: int = 0
-    """1: steps of the plant may last several ticks (`macro_ticks`), and the ticks of an approach are run at once
-    (`approach`)."""
+    """1: steps of the plant may last several ticks, and the ticks of an approach are run at once
+    (`ticks_at_once`)."""
 
 
 class MacroControl(NamedTuple):
@@ -209,9 +208,9 @@ def _every_tick(
 move: Callable[[PlantParams, PlantState, float, float], PlantState] = unbound
 control: Callable[[TickParams, TickState, Reading], tuple[Command, TickState]] = unbound
 begin_macro_step: Callable[..., Ahead] = _never_begins
-"""`macro_ticks.begin_macro_step` where a step may last several ticks."""
+"""`ticks_at_once.begin_macro_step` where a step may last several ticks."""
 run_approach_ticks: Callable[[GraspParams, LoopProgress, Frame, Table, Any], LoopProgress] = _every_tick
-"""`approach.approach_ticks` where ticks are run at once."""
+"""`ticks_at_once.approach_ticks` where ticks are run at once."""
 
 
 def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> SimulationState:

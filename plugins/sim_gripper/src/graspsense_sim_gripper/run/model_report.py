@@ -10,7 +10,7 @@ from graspsense_sim_gripper.run.accuracy.chosen_steps import QUANTITIES, ChosenS
 from graspsense_sim_gripper.run.nested import Stored, TupleType, taken, with_places
 from graspsense_sim_gripper.scene.terms.registry import find_term
 from graspsense_sim_gripper.scene.terms.term import TermState
-from graspsense_sim_gripper.solve.state import PlantState
+from graspsense_sim_gripper.solve.scheme import PlantState
 
 
 class _Told(NamedTuple):

@@ -17,8 +17,7 @@ from graspsense_sim_gripper.run.drawing import image_noise
 from graspsense_sim_gripper.run.loop import NOT_STARTED, GraspParams, SimulationState
 from graspsense_sim_gripper.scene.random_numbers import key_of
 from graspsense_sim_gripper.scene.spec import TermParams
-from graspsense_sim_gripper.solve.scheme import PlantParams
-from graspsense_sim_gripper.solve.state import PlantState
+from graspsense_sim_gripper.solve.scheme import PlantParams, PlantState
 
 IMAGES_PER_BLOCK: Final = 64
 """Number of cell images whose noise is drawn at once where it is not known how many a grasp needs."""

@@ -8,10 +8,8 @@ from collections.abc import Callable, Iterator, Sequence
 from graspsense.gripper_api import GraspsenseError
 from graspsense_sim_gripper.run.compiled.compose import hardens, plant_move
 from graspsense_sim_gripper.scene.terms.registry import active_laws, phases_of
-from graspsense_sim_gripper.scene.terms.switchable import Switchable
-from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS, Law, OnSum, SumLaw, TermState
-from graspsense_sim_gripper.solve.scheme import PlantParams
-from graspsense_sim_gripper.solve.state import PlantState
+from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS, Law, OnSum, SumLaw, Switchable, TermState
+from graspsense_sim_gripper.solve.scheme import PlantParams, PlantState
 
 
 class TermFailed(GraspsenseError):

@@ -25,10 +25,12 @@ from graspsense_sim_gripper.solve.control import (
 from graspsense_sim_gripper.solve.events import HALF, event_share
 from graspsense_sim_gripper.solve.scheme import (
     PlantParams,
+    PlantState,
+    StepState,
     comes_to_rest,
     start_of,
+    with_step,
 )
-from graspsense_sim_gripper.solve.state import PlantState, StepState, with_step
 from graspsense_sim_gripper.solve.stick import stick
 from graspsense_sim_gripper.solve.verlet import verlet
 

@@ -15,8 +15,7 @@ from graspsense_sim_gripper.plant.contact import offset_of_pushed, with_forces_o
 from graspsense_sim_gripper.plant.drive import ARREST_M_S, is_held, stribeck_excess
 from graspsense_sim_gripper.plant.object_model import ObjectModel
 from graspsense_sim_gripper.plant.state import Contact, Motion, right_of
-from graspsense_sim_gripper.solve.scheme import SPEED_SCALE_M_S, PlantParams
-from graspsense_sim_gripper.solve.state import PlantState, StepState
+from graspsense_sim_gripper.solve.scheme import SPEED_SCALE_M_S, PlantParams, PlantState, StepState
 
 SHAPE_SCALE_M: Final = 1e-3
 """The change of a released object's shape is relative to its compression, or to this where that is smaller."""

@@ -15,8 +15,8 @@ from graspsense_sim_gripper.solve.scheme import (
     Attempt,
     Start,
     Steps,
+    StepState,
 )
-from graspsense_sim_gripper.solve.state import StepState
 
 SAFETY: Final = 0.9
 """Factor on the step whose error would be the tolerance."""

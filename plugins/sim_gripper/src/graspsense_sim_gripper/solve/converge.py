@@ -8,8 +8,15 @@ from graspsense_sim_gripper.plant.state import right_of
 from graspsense_sim_gripper.solve.advance import rests, take_steps
 from graspsense_sim_gripper.solve.coast import SHAPE_SCALE_M, coast
 from graspsense_sim_gripper.solve.control import MAX_STEPS, fits_a_step
-from graspsense_sim_gripper.solve.scheme import FORCE_SCALE_N, SPEED_SCALE_M_S, PlantParams, Steps
-from graspsense_sim_gripper.solve.state import PlantState, StepState, with_step
+from graspsense_sim_gripper.solve.scheme import (
+    FORCE_SCALE_N,
+    SPEED_SCALE_M_S,
+    PlantParams,
+    PlantState,
+    Steps,
+    StepState,
+    with_step,
+)
 
 MAX_HALVINGS: Final = 4
 """Halvings after which a change of `LOOSE` times the tolerance is accepted too."""

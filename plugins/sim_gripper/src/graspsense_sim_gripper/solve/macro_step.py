@@ -31,12 +31,13 @@ from graspsense_sim_gripper.solve.scheme import (
     SPEED_SCALE_M_S,
     Attempt,
     PlantParams,
+    PlantState,
     Start,
     Steps,
+    StepState,
     comes_to_rest,
     start_of,
 )
-from graspsense_sim_gripper.solve.state import PlantState, StepState
 from graspsense_sim_gripper.solve.stick import stick
 from graspsense_sim_gripper.solve.trend import (
     UNKNOWN,

@@ -9,8 +9,7 @@ from graspsense_sim_gripper.plant.drive import breakaway_friction, load_at_rest
 from graspsense_sim_gripper.plant.state import Contact, Motion, right_of
 from graspsense_sim_gripper.solve.control import MIN_STEP_S
 from graspsense_sim_gripper.solve.events import until_event
-from graspsense_sim_gripper.solve.scheme import PlantParams
-from graspsense_sim_gripper.solve.state import PlantState
+from graspsense_sim_gripper.solve.scheme import PlantParams, PlantState
 
 SLIP_ITERATIONS: Final = 6
 SLIP_TOL_N: Final = 1e-6

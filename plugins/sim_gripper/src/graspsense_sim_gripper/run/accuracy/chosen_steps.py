@@ -7,7 +7,7 @@ from typing import Any, Final
 from attrs import asdict, field, frozen
 
 from graspsense_sim_gripper.run.accuracy.levels import Level, balance_rtol
-from graspsense_sim_gripper.scene.terms.switchable import switched_off
+from graspsense_sim_gripper.scene.terms.term import switched_off
 from graspsense_sim_gripper.solve.scheme import PlantParams, Steps
 
 QUANTITIES: Final = ("peak", "trace", "features")

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from graspsense.plugin_api import Features, FeatureSet
 from graspsense.simulator_api import CHANNELS
 from graspsense_sim_gripper.run.accuracy.error import UNIT_SCALES
+from graspsense_sim_gripper.run.buffers import recorded_trace
 from graspsense_sim_gripper.run.loop import COLUMNS, EVENT_SHIFT
-from graspsense_sim_gripper.run.recorded_trace import recorded_trace
 
 HELD: Final = tuple(COLUMNS.index(name) for name in ("effort_n", "command"))
 """The columns that are constant within a tick."""

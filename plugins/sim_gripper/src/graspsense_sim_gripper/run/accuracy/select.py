@@ -30,8 +30,7 @@ from graspsense_sim_gripper.run.accuracy.chosen_steps import (
 from graspsense_sim_gripper.run.accuracy.error import GraspRecord, deviation
 from graspsense_sim_gripper.run.accuracy.levels import CONTROLLED, PLAIN, REFERENCE_SCALES, LevelScale
 from graspsense_sim_gripper.run.accuracy.own_features import NOT_READ
-from graspsense_sim_gripper.run.accuracy.probe import FORCE_N, Grip, grip_of
-from graspsense_sim_gripper.run.accuracy.propose import propose
+from graspsense_sim_gripper.run.accuracy.propose import FORCE_N, Grip, grip_of, propose
 from graspsense_sim_gripper.run.accuracy.verify import (
     MOST_WORK,
     TooMuchWork,

@@ -43,8 +43,8 @@ from graspsense_sim_gripper.run.loop import (
 )
 from graspsense_sim_gripper.run.problem import GraspController, GraspSetup
 from graspsense_sim_gripper.run.term_failure import TermFailed, not_finite_in_tick
-from graspsense_sim_gripper.scene.terms.switchable import switched_off
-from graspsense_sim_gripper.solve.state import PlantState
+from graspsense_sim_gripper.scene.terms.term import switched_off
+from graspsense_sim_gripper.solve.scheme import PlantState
 
 _LOG: Final = logging.getLogger(__name__)
 MAX_SECONDS: Final = 40.0

@@ -25,7 +25,7 @@ from graspsense.simulator_api import (
 )
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.sensing import with_listed_cells
-from graspsense_sim_gripper.run.buffers import as_lists, begin_images, longer, new_buffers
+from graspsense_sim_gripper.run.buffers import as_lists, begin_images, longer, new_buffers, recorded_trace
 from graspsense_sim_gripper.run.build import device_info
 from graspsense_sim_gripper.run.compiled.compose import composition, grasp_loop
 from graspsense_sim_gripper.run.compiled.padding import unpadded
@@ -46,10 +46,9 @@ from graspsense_sim_gripper.run.model_report import (
 )
 from graspsense_sim_gripper.run.nested import Stored
 from graspsense_sim_gripper.run.problem import GraspController, GraspSetup
-from graspsense_sim_gripper.run.recorded_trace import recorded_trace
 from graspsense_sim_gripper.run.term_failure import not_finite_in_tick
 from graspsense_sim_gripper.scene.random_numbers import key_of
-from graspsense_sim_gripper.solve.state import PlantState
+from graspsense_sim_gripper.solve.scheme import PlantState
 
 Extracted = Any
 """What `Job.extract` returns, such as features."""

@@ -20,13 +20,11 @@ from graspsense_sim_gripper.plant.object_model import ObjectModel
 from graspsense_sim_gripper.plant.pads import hardening
 from graspsense_sim_gripper.plant.sensing import CellReading, EncoderReading, SensorState
 from graspsense_sim_gripper.plant.state import Contact, ContactState, Motion, Past
-from graspsense_sim_gripper.run.approach import approach_ticks
 from graspsense_sim_gripper.run.binding import Constructors, bind_reachable
 from graspsense_sim_gripper.run.loop import SimulationState, grasp
-from graspsense_sim_gripper.run.macro_ticks import begin_macro_step
 from graspsense_sim_gripper.run.problem import ControllerStep
+from graspsense_sim_gripper.run.ticks_at_once import approach_ticks, begin_macro_step
 from graspsense_sim_gripper.scene.terms.registry import active_laws, find_term, laws_of, moving_of, phases_of
-from graspsense_sim_gripper.scene.terms.switchable import Switchable, switched_on_sum
 from graspsense_sim_gripper.scene.terms.term import (
     LAW_ERRORS,
     Law,
@@ -34,12 +32,13 @@ from graspsense_sim_gripper.scene.terms.term import (
     OnSum,
     Phase,
     SumLaw,
+    Switchable,
     TermState,
+    switched_on_sum,
 )
 from graspsense_sim_gripper.solve.advance import advance, move
 from graspsense_sim_gripper.solve.converge import refine_until_converged
-from graspsense_sim_gripper.solve.scheme import Attempt, PlantParams, Start
-from graspsense_sim_gripper.solve.state import PlantState, StepState
+from graspsense_sim_gripper.solve.scheme import Attempt, PlantParams, PlantState, Start, StepState
 
 TermsStates = Any
 """A tuple with a state of its own type for each term."""

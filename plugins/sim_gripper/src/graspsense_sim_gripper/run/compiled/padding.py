@@ -19,9 +19,8 @@ from graspsense_sim_gripper.run.compiled.compose import Composition, composition
 from graspsense_sim_gripper.run.problem import GraspSetup
 from graspsense_sim_gripper.scene.library import catalogue
 from graspsense_sim_gripper.scene.terms.registry import find_term, in_order
-from graspsense_sim_gripper.scene.terms.switchable import Switchable
-from graspsense_sim_gripper.scene.terms.term import TermState
-from graspsense_sim_gripper.solve.state import PlantState
+from graspsense_sim_gripper.scene.terms.term import Switchable, TermState
+from graspsense_sim_gripper.solve.scheme import PlantState
 
 TermStates = tuple[TermState, ...]
 """The states of the terms of an object, or of one half of it."""

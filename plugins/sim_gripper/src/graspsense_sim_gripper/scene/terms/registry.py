@@ -23,8 +23,7 @@ from graspsense_sim_gripper.scene.terms import (
     surface,
     worn,
 )
-from graspsense_sim_gripper.scene.terms.switchable import switched, switched_on_sum
-from graspsense_sim_gripper.scene.terms.term import Law, Moves, OnSum, Phase, Term
+from graspsense_sim_gripper.scene.terms.term import Law, Moves, OnSum, Phase, Term, switched, switched_on_sum
 
 TERMS: Final[dict[str, Term]] = {
     module.TERM.name: module.TERM

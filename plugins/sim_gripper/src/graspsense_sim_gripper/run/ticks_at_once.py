@@ -1,9 +1,13 @@
-"""The ticks of an approach, run at once: the fingers close under a controller's law of free motion and meet nothing.
+"""Ticks that are run at once: steps of the plant over several ticks, and the ticks of an approach.
 
-In each of them the sensors are read and the law gives the command, as tick by tick, but the equation of motion is
-simplified: the friction is linear in the speed, about that at the beginning, and the linkage is a cubic polynomial of
-the motor's angle. So a tick is solved in a closed form, with the acceleration at its middle. The run ends where the
-speed has changed by more than the linear friction allows, and at the end of the polynomial.
+Where the effort does not change, a step of the plant may last several ticks; the loop runs sensors and controller in
+each of them.
+
+In an approach the fingers close under a controller's law of free motion and meet nothing. In each of its ticks the
+sensors are read and the law gives the command, as tick by tick, but the equation of motion is simplified: the friction
+is linear in the speed, about that at the beginning, and the linkage is a cubic polynomial of the motor's angle. So a
+tick is solved in a closed form, with the acceleration at its middle. The run ends where the speed has changed by more
+than the linear friction allows, and at the end of the polynomial.
 """
 
 from __future__ import annotations
@@ -21,19 +25,86 @@ from graspsense_sim_gripper.plant.state import Contact, Motion
 from graspsense_sim_gripper.run.loop import (
     NOT_NEGATIVE,
     ROWS_AT_ONCE,
+    Ahead,
     GraspParams,
     LastTick,
     LoopProgress,
+    MacroControl,
     Table,
+    no_step,
 )
 from graspsense_sim_gripper.scene.terms.phi import phi_1_2
+from graspsense_sim_gripper.solve.events import HALF
+from graspsense_sim_gripper.solve.macro_step import (
+    FIRST_TICKS,
+    MAX_TICKS,
+    MacroStep,
+    constant_values,
+    macro_step,
+    next_ticks,
+)
 from graspsense_sim_gripper.solve.polynomial import Cubic, derivative, hermite, value
-from graspsense_sim_gripper.solve.scheme import SPEED_SCALE_M_S
-from graspsense_sim_gripper.solve.state import PlantState, StepState
+from graspsense_sim_gripper.solve.scheme import SPEED_SCALE_M_S, PlantState, StepState
+from graspsense_sim_gripper.solve.trend import UNKNOWN
+
+SHORTEST_ERROR: Final = 8.0
+"""Largest error, relative to the tolerance, of a macro-step of `FIRST_TICKS`. Two steps of a tick, which would take its
+place, are of lower order and less exact (docs/numerics.md, "Steps over several ticks")."""
+MAX_WAIT: Final = 16
+"""Most ticks to wait after a macro-step that was not accepted."""
+
+
+def begin_macro_step(
+    params: GraspParams,
+    plant: PlantState,
+    sensor: SensorState,
+    effort_n: float,
+    ticks: int,
+    now: MacroControl,
+) -> Ahead:
+    """Return the macro-step that begins after the controller has run in the tick before `ticks`.
+
+    None is taken if it would contain an event or have too large an error, and no cell image is taken before its end.
+    """
+    most = min(params.max_ticks - ticks, _ticks_to_image(params, sensor, ticks))
+    if params.macro_steps == 0 or most < FIRST_TICKS:
+        return no_step(plant, now)
+    n, event = min(now.length, most), False
+    step = MacroStep(
+        error=math.inf, event_share=0.0, after=plant, values=constant_values(plant), trend=UNKNOWN
+    )
+    # In any other tick the plant has moved since the last macro-step ended.
+    trend = now.trend if ticks == now.from_tick + 1 else UNKNOWN
+    accepted = False
+    while n >= FIRST_TICKS and not accepted:
+        step = macro_step(params.plant, plant, effort_n, n * params.dt_s, trend)
+        accepted = step.error <= (SHORTEST_ERROR if n == FIRST_TICKS else 1.0)
+        if not accepted:
+            event = event or not step.error < math.inf
+            n = _fewer_ticks(n, step)
+    if not accepted:
+        wait = min(2 * now.wait, MAX_WAIT)
+        return no_step(plant, MacroControl(FIRST_TICKS, ticks + wait, wait, UNKNOWN))
+    # A step that an image cut short does not shorten the next one, and one that ends shortly before an event does.
+    length = max(next_ticks(n, step.error, HALF), now.length if n == most else FIRST_TICKS)
+    following = MacroControl(FIRST_TICKS if event else length, ticks + n - 1, 1, step.trend)
+    return Ahead(n, step.values, step.after, following)
+
+
+def _fewer_ticks(n: int, step: MacroStep) -> int:
+    """Return the number of ticks with which a step of `n` that was not accepted is repeated; below 2: not at all."""
+    fewer = next_ticks(n, step.error, step.event_share)
+    return max(fewer, FIRST_TICKS) if step.error < math.inf and n > FIRST_TICKS else fewer
+
+
+def _ticks_to_image(params: GraspParams, sensor: SensorState, ticks: int) -> int:
+    """Return the number of ticks up to the one in which a cell image is taken or arrives, at least 1."""
+    ahead = (next_image_s(params.sensor, sensor) - ticks * params.dt_s) / params.dt_s
+    return max(math.ceil(min(ahead, float(MAX_TICKS))), 0) + 1
+
 
 MIN_TICKS: Final = 4
-MAX_TICKS: Final = ROWS_AT_ONCE
-"""Fewest and most ticks that are run at once."""
+"""Fewest ticks of an approach that are run at once; the most are `ROWS_AT_ONCE`."""
 LINKAGE_CHANGE: Final = 0.02
 """Largest relative change of the Jacobian of the linkage in a run. The gap of its polynomial is right to 10 nm then."""
 
@@ -150,7 +221,7 @@ def _most_ticks(params: GraspParams, progress: LoopProgress, nearest_m: float, l
     if closing <= 0.0:
         return 0
     t_s = progress.tick.ticks * dt_s
-    left_s = min((motion.gap_m - nearest_m) / closing, limits.until_s - t_s, MAX_TICKS * dt_s)
+    left_s = min((motion.gap_m - nearest_m) / closing, limits.until_s - t_s, ROWS_AT_ONCE * dt_s)
     left_s = min(left_s, next_image_s(params.sensor, progress.sensor) - t_s)
     if left_s <= 0.0:
         return 0
