@@ -24,7 +24,7 @@ from graspsense_c45 import (
     to_rules,
     to_text,
 )
-from graspsense_c45.numbers_as_text import short, weka_number, weka_weight
+from graspsense_c45.branch_words import short, weka_number, weka_weight
 
 
 def grasp_tree():

@@ -14,37 +14,29 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from graspsense_c45.arff import ArffError, parse_arff, read_arff
     from graspsense_c45.classifier import C45Classifier
-    from graspsense_c45.dot import to_dot
     from graspsense_c45.drawing import draw
     from graspsense_c45.fitting import fit
-    from graspsense_c45.importances import feature_importances
     from graspsense_c45.options import J48, PAPER, Options
     from graspsense_c45.path import Path, explain
     from graspsense_c45.prediction import class_indices, distributions
-    from graspsense_c45.rules import Rule, to_rules
-    from graspsense_c45.schema import Attribute, Schema
     from graspsense_c45.stored import StoredTreeError, from_document, from_json, to_document, to_json
-    from graspsense_c45.table import Table, make_table
-    from graspsense_c45.text import to_text
-    from graspsense_c45.tree import Tree
+    from graspsense_c45.table import Attribute, Schema, Table, make_table
+    from graspsense_c45.text import Rule, to_dot, to_rules, to_text
+    from graspsense_c45.tree import Tree, feature_importances
     from graspsense_c45.weka_folds import Fold, JavaRandom, hold_out, stratified_folds
 
 _HOMES = {
     "arff": ("ArffError", "parse_arff", "read_arff"),
     "classifier": ("C45Classifier",),
-    "dot": ("to_dot",),
     "drawing": ("draw",),
     "fitting": ("fit",),
-    "importances": ("feature_importances",),
     "options": ("J48", "PAPER", "Options"),
     "path": ("Path", "explain"),
     "prediction": ("class_indices", "distributions"),
-    "rules": ("Rule", "to_rules"),
-    "schema": ("Attribute", "Schema"),
     "stored": ("StoredTreeError", "from_document", "from_json", "to_document", "to_json"),
-    "table": ("Table", "make_table"),
-    "text": ("to_text",),
-    "tree": ("Tree",),
+    "table": ("Attribute", "Schema", "Table", "make_table"),
+    "text": ("Rule", "to_dot", "to_rules", "to_text"),
+    "tree": ("Tree", "feature_importances"),
     "weka_folds": ("Fold", "JavaRandom", "hold_out", "stratified_folds"),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}

@@ -12,8 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from graspsense_c45.schema import Attribute, Schema
-from graspsense_c45.table import MISSING_CLASS, Table, make_table
+from graspsense_c45.table import MISSING_CLASS, Attribute, Schema, Table, make_table
 
 _TOKEN = re.compile(r"""[\s,]*(?:'((?:\\.|[^'\\])*)'|"((?:\\.|[^"\\])*)"|([{}])|([^\s,{}'"][^\s,{}]*))""")
 _ESCAPE = re.compile(r"\\(.)")

@@ -16,19 +16,15 @@ from sklearn.utils.multiclass import check_classification_targets
 from sklearn.utils.validation import _check_sample_weight, check_is_fitted, column_or_1d, validate_data
 
 from graspsense_c45.arrays import AnyArray, Indices, Reals
-from graspsense_c45.dot import to_dot
 from graspsense_c45.drawing import draw
 from graspsense_c45.fitting import fit
-from graspsense_c45.importances import feature_importances
 from graspsense_c45.options import PAPER, Options
 from graspsense_c45.path import Path, explain
 from graspsense_c45.prediction import class_indices, distributions
-from graspsense_c45.rules import Rule, to_rules
-from graspsense_c45.schema import Attribute, Schema
 from graspsense_c45.stored import from_json, to_json
-from graspsense_c45.table import make_table
-from graspsense_c45.text import to_text
-from graspsense_c45.tree import Tree
+from graspsense_c45.table import Attribute, Schema, make_table
+from graspsense_c45.text import Rule, to_dot, to_rules, to_text
+from graspsense_c45.tree import Tree, feature_importances
 from graspsense_c45.weka_folds import hold_out
 
 _OPTIONS = tuple(field.name for field in fields(Options))

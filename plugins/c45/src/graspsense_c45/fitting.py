@@ -1,13 +1,20 @@
-"""From a table to a tree."""
+"""From a table to a tree.
+
+J48 cuts only between values that differ by more than `GAP`, in whatever unit a column has. A column that varies by few
+gaps, such as compliances in m/N or capacities in F, has equal values for it. In `fit_scaled` such a column is
+multiplied by a power of two, which is exact: the tree is the one in a smaller unit.
+"""
 
 from __future__ import annotations
 
 import time
 
 import numpy as np
+from attrs import evolve
 
 from graspsense_c45.arrays import Indices, Reals
 from graspsense_c45.building.builder import TreeBuilder
+from graspsense_c45.criteria import GAP
 from graspsense_c45.engines import PARTS, Fits
 from graspsense_c45.options import J48, Engine, Options
 from graspsense_c45.splits import LEAF, GrowingTree
@@ -82,3 +89,35 @@ def _use_actual_values(tree: GrowingTree, values: Reals) -> None:
                 # 0.0 and -0.0 are equal; J48 has the one that comes first in the rows.
                 actual[actual == 0.0] = values[np.argmax(values[:, a] == 0.0), a]
             tree.threshold[nodes] = actual
+
+
+_GAPS = 100
+"""Fewest gaps that the values of a column must span to be used as they are."""
+_ROUNDING = 1e-13
+"""Variation relative to the largest value that is only rounding, and no measurement."""
+
+
+def fit_scaled(table: Table, options: Options) -> Tree:
+    """Return the tree of a table whose columns that vary by little are scaled."""
+    doublings = _doublings(table)
+    if not doublings.any():
+        return fit(table, options)
+    tree = fit(evolve(table, values=np.ldexp(table.values, doublings)), options)
+    feature, threshold = tree.splits.feature, tree.splits.threshold.copy()
+    inner = np.flatnonzero(feature != LEAF)
+    threshold[inner] = np.ldexp(threshold[inner], -doublings[feature[inner]])
+    return Tree(tree.schema, evolve(tree.splits, threshold=threshold), tree.class_weights, tree.laplace)
+
+
+def _doublings(table: Table) -> Indices:
+    """Return how often each column is doubled: 0 if it is used as it is."""
+    doublings = np.zeros(len(table.schema.attributes), dtype=np.int64)
+    for k, attribute in enumerate(table.schema.attributes):
+        column = table.values[:, k]
+        column = column[~np.isnan(column)]
+        if attribute.is_nominal or not column.size:
+            continue
+        span = float(column.max() - column.min())
+        if _ROUNDING * float(np.abs(column).max()) < span < _GAPS * GAP:
+            doublings[k] = -int(np.floor(np.log2(span)))
+    return doublings

@@ -7,10 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from attrs import frozen
 
-from graspsense_c45.branch_words import branch, with_unit
-from graspsense_c45.numbers_as_text import short
+from graspsense_c45.branch_words import branch, short, with_unit
 from graspsense_c45.prediction import class_indices, distributions
-from graspsense_c45.schema import Attribute
+from graspsense_c45.table import Attribute
 from graspsense_c45.tree import Tree, largest_class
 
 

@@ -100,10 +100,9 @@ class C45(Classifier[C45Config]):
 
     def fit(self, table: FeatureTable, labels: Sequence[str], seed: int) -> None:
         """Grow and prune a tree; the seed is not used. Raises ValueError for data without a label."""
+        from graspsense_c45.fitting import fit_scaled
         from graspsense_c45.options import Options
-        from graspsense_c45.scaling import fit_scaled
-        from graspsense_c45.schema import Attribute, Schema
-        from graspsense_c45.table import make_table
+        from graspsense_c45.table import Attribute, Schema, make_table
 
         del seed
         config = self.config

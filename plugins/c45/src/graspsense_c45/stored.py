@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from graspsense_c45.arrays import NodeColumn, Reals
-from graspsense_c45.schema import Attribute, Schema
 from graspsense_c45.splits import ALL_VALUES, LEAF, Splits
+from graspsense_c45.table import Attribute, Schema
 from graspsense_c45.tree import Tree, first_children
 
 FORMAT = "graspsense-c45-tree"

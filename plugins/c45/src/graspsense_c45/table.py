@@ -1,4 +1,4 @@
-"""The rows that a tree is grown on, checked."""
+"""The names of attributes and classes, and the rows that a tree is grown on, checked."""
 
 from __future__ import annotations
 
@@ -7,7 +7,37 @@ from attrs import frozen
 from numpy.typing import ArrayLike
 
 from graspsense_c45.arrays import Indices, Reals
-from graspsense_c45.schema import Schema
+
+
+@frozen
+class Attribute:
+    """A column of the table.
+
+    name: its name.
+    unit: the unit of a numeric attribute; may be empty.
+    values: the declared values of a nominal attribute, in order; None for a numeric one.
+    """
+
+    name: str
+    unit: str = ""
+    values: tuple[str, ...] | None = None
+
+    @property
+    def is_nominal(self) -> bool:
+        """Whether the attribute has a few declared values instead of numbers."""
+        return self.values is not None
+
+
+@frozen
+class Schema:
+    """The attributes and the declared classes, both in order; a declared class need not occur.
+
+    A class label is a string, an integer, a float or a boolean, and keeps its type through JSON.
+    """
+
+    attributes: tuple[Attribute, ...]
+    classes: tuple[str | int | float | bool, ...]
+
 
 LARGEST_WEIGHT = 1e150
 """The largest sum of the weights: four times its square is still finite."""

@@ -17,12 +17,11 @@ from numpy.typing import NDArray
 
 from graspsense.simulator_api import CandidateScore
 from graspsense_identify.corners import with_corners
-from graspsense_identify.fit import LEAST_ERROR, Fitted, fit
+from graspsense_identify.fit import LEAST_ERROR, Fitted, fit, in_threads
 from graspsense_identify.forward import ForwardModel
 from graspsense_identify.held_out import held_out_errors
 from graspsense_identify.laws import DataScale, memories, static_candidates
 from graspsense_identify.prepare import Squeeze
-from graspsense_identify.threads import in_threads
 
 Floats = NDArray[np.float64]
 

@@ -20,13 +20,12 @@ from attrs import evolve, frozen
 
 from graspsense.simulator_api import IdentifiedParameter, Undetermined
 from graspsense_identify.choose import LEAST_GAIN, Choice
-from graspsense_identify.fit import Fitted, information
+from graspsense_identify.fit import Fitted, in_threads, information
 from graspsense_identify.interval import identified, normal
 from graspsense_identify.prepare import MAX_LAG_S
 from graspsense_identify.refuse import shows_memory
 from graspsense_identify.share import Shares
 from graspsense_identify.spread import has_objects, refits
-from graspsense_identify.threads import in_threads
 
 EVIDENCE: Final = 5.0
 """The logarithm of the Bayes factor (Schwarz's approximation) from which on a lag is taken for real."""

@@ -14,8 +14,10 @@ which the force lags behind the gap is common to all squeezes, where it is fitte
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any, Final, NamedTuple
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, Final, NamedTuple, TypeVar
 
 import numpy as np
 from attrs import evolve, frozen
@@ -24,6 +26,25 @@ from numpy.typing import NDArray
 from graspsense_identify.forward import ForwardModel
 from graspsense_identify.laws import CandidateLaw
 from graspsense_identify.prepare import MAX_LAG_S, Squeeze
+
+ItemT = TypeVar("ItemT")
+ResultT = TypeVar("ResultT")
+
+
+def in_threads(
+    function: Callable[[ItemT], ResultT], items: Sequence[ItemT], done: Callable[[], None] = lambda: None
+) -> list[ResultT]:
+    """Return the results in the order of the items; `done` is called after each, in this thread."""
+    from threadpoolctl import threadpool_limits
+
+    results = []
+    # Each fit is on one core. Threads of the linear algebra inside it would wait for each other most of the time.
+    with threadpool_limits(1, "blas"), ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
+        for result in pool.map(function, items):
+            results.append(result)
+            done()
+    return results
+
 
 Floats = NDArray[np.float64]
 

@@ -12,9 +12,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from graspsense_identify.fit import FACTOR_RANGE, STEP, TOLERANCE, WIDTH_RANGE, Fitted, relative
+from graspsense_identify.fit import FACTOR_RANGE, STEP, TOLERANCE, WIDTH_RANGE, Fitted, in_threads, relative
 from graspsense_identify.prepare import Squeeze
-from graspsense_identify.threads import in_threads
 
 MAX_FOLDS: Final = 5
 CONFIRMS: Final = 0.1

@@ -19,10 +19,9 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from graspsense_identify.corners import corner_errors
-from graspsense_identify.fit import Fitted, linear_covariance
+from graspsense_identify.fit import Fitted, in_threads, linear_covariance
 from graspsense_identify.interval import normal, student
 from graspsense_identify.prepare import Squeeze
-from graspsense_identify.threads import in_threads
 
 Floats = NDArray[np.float64]
 

@@ -13,8 +13,13 @@ import math
 from typing import Any, Final, NamedTuple
 
 from graspsense_sim_gripper.plant.object_model import ObjectModel, object_force
-from graspsense_sim_gripper.plant.pads import ARGUMENT_RTOL, NO_CREEP, creep_over, pad_excess
-from graspsense_sim_gripper.plant.roots import MAX_ITERATIONS, bracketed_secant
+from graspsense_sim_gripper.plant.pads import (
+    ARGUMENT_RTOL,
+    MAX_ITERATIONS,
+    NO_CREEP,
+    creep_over,
+    pad_excess,
+)
 from graspsense_sim_gripper.plant.state import ContactState, Past, without_past
 
 BALANCE_SCALE_N: Final = 100.0
@@ -301,3 +306,20 @@ def _balance(
         n=n,
     )
     return search, force, states
+
+
+def bracketed_secant(
+    x: float, value: float, last_x: float, slope: float, lower: float, upper: float
+) -> float:
+    """Return the next argument: that of the secant, or that of bisection if the secant leaves the bracket.
+
+    `lower` and `upper` are the nearest arguments known to lie below and above the root, or infinite. While one of them
+    is infinite, a secant that leaves the bracket is replaced by a step of twice the last length.
+    """
+    secant = x - value / slope
+    if lower < secant < upper:
+        return secant
+    if lower > -math.inf and upper < math.inf:
+        return 0.5 * (lower + upper)
+    length = max(2.0 * abs(x - last_x), abs(value / slope))
+    return x - length if value > 0.0 else x + length

@@ -6,10 +6,11 @@ import math
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
-from graspsense_sim_gripper.plant.roots import MAX_ITERATIONS
 from graspsense_sim_gripper.plant.state import ContactState
 from graspsense_sim_gripper.scene.terms.phi import phi1, phi_ramp
 
+MAX_ITERATIONS: Final = 100
+"""Maximum number of evaluations of a search."""
 ARGUMENT_RTOL: Final = 4e-16
 """Relative width of a bracket below which it contains no further floating-point number."""
 
