@@ -18,7 +18,7 @@ PADS = {"pad_stiffness_n_m": 2e4, "pad_hardening_m": 4e-4}
 def pressed(pads, stiffness_n_m):
     """Return the states of an object of this stiffness behind these fingertips, at growing closures."""
     model = ObjectModel(0.06, 0.0, pads, all_active([Elastic(stiffness_n_m, 0.0)]))
-    solve, state = contact_solver(("elastic",), pads.hardening_m < math.inf), uncompressed(["elastic"])
+    solve, state = contact_solver(("elastic",)), uncompressed(["elastic"])
     states = []
     for closure in np.linspace(1e-5, 1.3e-3, 60):
         state, unbalanced = solve(model, state, closure, 0.0015, 0.017)

@@ -1,7 +1,7 @@
 """The fingertips from squeezes of a rigid block: all of the closure beyond the contact is theirs.
 
 Two equal fingertips in series, each with the force k u (1 + (u / h)^2) at its compression u, have the force
-k x / 2 + k x^3 / (8 h^2) at the closure x of both (`plant.pads.hardening` with exponent 2). That is the law of an
+k x / 2 + k x^3 / (8 h^2) at the closure x of both (`plant.pads.pad_excess` with exponent 2). That is the law of an
 elastic object between rigid fingertips, and it is fitted as such.
 """
 

@@ -61,13 +61,10 @@ def forces_along(
 
 
 @cache
-def path_forces(hardens: bool) -> Callable[..., None]:
-    """Return `forces_along` for the terms of all candidates, compiled where that is possible.
-
-    `hardens`: whether the fingertips are nonlinear.
-    """
+def path_forces() -> Callable[..., None]:
+    """Return `forces_along` for the terms of all candidates, compiled where that is possible."""
     try:
-        compiled = compiled_with_laws(forces_along, SLOTS, hardens=hardens)
+        compiled = compiled_with_laws(forces_along, SLOTS)
         path = np.linspace(-1e-4, 1e-3, 4)
         with first_call():
             compiled(
@@ -75,7 +72,7 @@ def path_forces(hardens: bool) -> Callable[..., None]:
             )
         return entry_point(compiled)
     except NotCompilable:
-        return interpreted_with_laws(forces_along, SLOTS, hardens=hardens)
+        return interpreted_with_laws(forces_along, SLOTS)
 
 
 @cache
@@ -101,11 +98,6 @@ class ForwardModel:
 
     pads: PadCompliance
 
-    @property
-    def hardens(self) -> bool:
-        """Whether the fingertips are nonlinear."""
-        return self.pads.hardening_m < math.inf
-
     def compressed_m(self, force_n: Floats) -> Floats:
         """Return the compression of both fingertips at rest under these forces."""
         return np.array([pad_compression(self.pads, force) for force in force_n.tolist()])
@@ -120,9 +112,7 @@ class ForwardModel:
         forces = np.zeros(len(squeeze.t_s))
         pressed = _pressed(self.pads, width_m, law.terms(values, factor))
         try:
-            path_forces(self.hardens)(
-                pressed, _at_rest(), squeeze.gap_m, squeeze.speed_m_s, squeeze.step_s, forces
-            )
+            path_forces()(pressed, _at_rest(), squeeze.gap_m, squeeze.speed_m_s, squeeze.step_s, forces)
         except LAW_ERRORS:
             forces[:] = math.nan
         return forces

@@ -62,7 +62,7 @@ def identify(
     config, notes = _settings(config, squeezes, block)
     model = ForwardModel(pads=drive_and_pads(config)[1])
     # Compiled before several threads call it.
-    path_forces(model.hardens)
+    path_forces()
     recorded, has_cells = _used(_distinct(squeezes, notes), notes), _has_cells(config, squeezes)
     notes += _looks_wrong(recorded)
 

@@ -30,11 +30,6 @@ def has_event(earlier: Contact, later: Contact) -> bool:
     ) != object_phase(right_of(later.left, later.right).states)
 
 
-def no_event(earlier: Contact, later: Contact) -> bool:
-    """Return False: `has_event` of an object whose terms have no events."""
-    return False
-
-
 def next_contacts(model: ObjectModel, contact: Contact, gap_m: float) -> tuple[float, float]:
     """Return the gap at which the nearer finger touches the object, and that of the next contact of closing fingers.
 

@@ -34,20 +34,8 @@ def unbound(*_arguments: Any) -> Any:
 
 
 object_force: Callable[[Any, Any, float, float, float, float], tuple[float, Any]] = unbound
-"""The law of the whole object; the composition of a scene binds it."""
-
-
-def _no_events(states: Any) -> int:
-    return 0
-
-
-object_phase: Callable[[Any], int] = _no_events
-"""A number that changes at the events of the terms; the composition of a scene binds it where a term has events."""
-
-
-def _nothing_moves(states: Any) -> bool:
-    return False
-
-
-object_moves: Callable[[Any], bool] = _nothing_moves
-"""Whether a term moves in a free object (see `Term.moves`); the composition of a scene binds it where one can."""
+"""The law of the whole object; the composition of a scene binds it, and the following ones."""
+object_phase: Callable[[Any], int] = unbound
+"""A number that changes at the events of the terms."""
+object_moves: Callable[[Any], bool] = unbound
+"""Whether a term moves in a free object (see `Term.moves`)."""

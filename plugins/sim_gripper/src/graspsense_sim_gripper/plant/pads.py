@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Final, NamedTuple
 
 from graspsense_sim_gripper.plant.state import ContactState
@@ -49,20 +48,12 @@ class Creep(NamedTuple):
 NO_CREEP: Final = Creep(decay=1.0, mean_n_m=0.0, ramp_n_m=0.0, damper_n_s_m=0.0, free_pad_m=0.0)
 
 
-def _linear(pads: PadCompliance, pad_m: float) -> tuple[float, float]:
-    return 0.0, 0.0
-
-
-def hardening(pads: PadCompliance, pad_m: float) -> tuple[float, float]:
+def pad_excess(pads: PadCompliance, pad_m: float) -> tuple[float, float]:
     """Return the force (N) of the pads beyond that of their linear spring at this compression, and its slope (N/m)."""
-    if pad_m <= 0.0:
+    if pads.hardening_m == math.inf or pad_m <= 0.0:
         return 0.0, 0.0
     stiffness = pads.stiffness_n_m * (pad_m / pads.hardening_m) ** pads.exponent
     return stiffness * pad_m, stiffness * (1.0 + pads.exponent)
-
-
-pad_excess: Callable[[PadCompliance, float], tuple[float, float]] = _linear
-"""The composition of a scene binds it to `hardening` where the pads are nonlinear."""
 
 
 def pad_compression(pads: PadCompliance, force_n: float) -> float:
@@ -70,7 +61,7 @@ def pad_compression(pads: PadCompliance, force_n: float) -> float:
     pad = force_n / pads.stiffness_n_m
     if pads.hardening_m < math.inf and pad > 0.0:
         for _ in range(MAX_ITERATIONS):
-            excess, slope = hardening(pads, pad)
+            excess, slope = pad_excess(pads, pad)
             step = (pads.stiffness_n_m * pad + excess - force_n) / (pads.stiffness_n_m + slope)
             pad -= step
             if abs(step) <= ARGUMENT_RTOL * pad:

@@ -16,7 +16,6 @@ from graspsense_sim_gripper.run.binding import bind_reachable
 from graspsense_sim_gripper.run.build import drive_and_pads
 from graspsense_sim_gripper.run.compiled.compose import (
     INTERPRETED,
-    pad_parts,
     sum_of,
     sum_of_active,
     uncompressed,
@@ -48,16 +47,15 @@ __all__ = [
 FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
 
 
-def compiled_with_laws(function: FunctionT, kinds: Sequence[str], *, hardens: bool) -> FunctionT:
+def compiled_with_laws(function: FunctionT, kinds: Sequence[str]) -> FunctionT:
     """Return a function that calls `solve_contact`, compiled with the force laws of these kinds of terms.
 
-    `hardens`: whether the fingertips are nonlinear. Raises NotCompilable, at the first call at the latest.
+    Raises NotCompilable, at the first call at the latest.
     """
-    parts = {"object_force": sum_of(laws_of(kinds)), **pad_parts(hardens)}
-    return cast("FunctionT", compile_part(bind_reachable(function, parts)))
+    force = sum_of(laws_of(kinds))
+    return cast("FunctionT", compile_part(bind_reachable(function, {"object_force": force})))
 
 
-def interpreted_with_laws(function: FunctionT, kinds: Sequence[str], *, hardens: bool) -> FunctionT:
+def interpreted_with_laws(function: FunctionT, kinds: Sequence[str]) -> FunctionT:
     """Return the same function for the interpreter, which skips the terms that are switched off."""
-    parts = {"object_force": sum_of_active(active_laws(kinds)), **pad_parts(hardens)}
-    return bind_reachable(function, parts, INTERPRETED)
+    return bind_reachable(function, {"object_force": sum_of_active(active_laws(kinds))}, INTERPRETED)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 
 from graspsense.gripper_api import GraspsenseError
-from graspsense_sim_gripper.run.compiled.compose import hardens, plant_move
+from graspsense_sim_gripper.run.compiled.compose import plant_move
 from graspsense_sim_gripper.scene.terms.registry import active_laws, phases_of
 from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS, Law, OnSum, SumLaw, Switchable, TermState
 from graspsense_sim_gripper.solve.scheme import PlantParams, PlantState
@@ -24,7 +24,7 @@ def not_finite_in_tick(
         OnSum(_checked_on_sum(kind, law.law)) if isinstance(law, OnSum) else _checked(kind, law)
         for kind, law in zip(kinds, active_laws(kinds), strict=True)
     ]
-    move = plant_move(laws, phases_of(kinds), hardens=hardens(plant.object))
+    move = plant_move(laws, phases_of(kinds))
     try:
         move(plant, state, effort_n, dt_s)
     except (TermFailed, *LAW_ERRORS) as error:

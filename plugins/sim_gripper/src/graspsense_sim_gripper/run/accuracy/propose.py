@@ -25,7 +25,7 @@ from graspsense_sim_gripper.run.accuracy.levels import (
     steps_for,
 )
 from graspsense_sim_gripper.run.build import Problem
-from graspsense_sim_gripper.run.compiled.compose import contact_solver, hardens, uncompressed
+from graspsense_sim_gripper.run.compiled.compose import contact_solver, uncompressed
 from graspsense_sim_gripper.scene.terms.registry import find_term
 from graspsense_sim_gripper.scene.terms.term import NO_STATE, Switchable, Term, WorkingPoint
 from graspsense_sim_gripper.solve.scheme import Steps
@@ -64,7 +64,7 @@ def grip_of(problem: Problem, force_n: float = FORCE_N) -> Grip:
     drive, model = setup.plant.drive, setup.plant.object
     # Only orders of magnitude follow from the forces, so their balance need not be that of a reference.
     model = model._replace(balance_rtol=MAX_BALANCE_RTOL)
-    press, untouched = contact_solver(setup.kinds, hardens(model)), uncompressed(setup.kinds)
+    press, untouched = contact_solver(setup.kinds), uncompressed(setup.kinds)
     contact, last_closure, closure, largest = untouched, 0.0, FIRST_M, 0.0
     while closure < MAX_DEPTH * model.width_m and contact.force_n < force_n:
         contact, _ = press(model, contact, closure, (closure - last_closure) / POINT_S, POINT_S)

@@ -15,9 +15,7 @@ from typing import Any, Final, NamedTuple
 from graspsense.plugin_api import Frame
 from graspsense.simulator_api import bind, events_of, free_parts, maker, tick
 from graspsense_sim_gripper.plant.balance import BalanceSearch, PadLoad, solve_contact
-from graspsense_sim_gripper.plant.contact import no_event
 from graspsense_sim_gripper.plant.object_model import ObjectModel
-from graspsense_sim_gripper.plant.pads import hardening
 from graspsense_sim_gripper.plant.sensing import CellReading, EncoderReading, SensorState
 from graspsense_sim_gripper.plant.state import Contact, ContactState, Motion, Past
 from graspsense_sim_gripper.run.binding import Constructors, bind_reachable
@@ -215,8 +213,6 @@ class Composition(NamedTuple):
     """Whether the steps of a tick are halved until the result no longer changes."""
     lags: bool = False
     """Whether the force of the drive lags behind the command."""
-    hardens: bool = False
-    """Whether the pads are nonlinear."""
     held: bool = False
     """Whether the object is held fast, so that its state has two halves."""
 
@@ -225,24 +221,13 @@ def composition(kinds: tuple[str, ...], plant: PlantParams) -> Composition:
     """Return the composition of a loop for this plant."""
     converges, lags = plant.steps.settle > 0.0, plant.drive.lag_s > 0.0
     held = plant.object.held == 1
-    return Composition(kinds=kinds, converges=converges, lags=lags, hardens=hardens(plant.object), held=held)
-
-
-def hardens(model: ObjectModel) -> bool:
-    """Return whether the pads are nonlinear."""
-    return model.pads.hardening_m < math.inf
-
-
-def pad_parts(nonlinear: bool) -> dict[str, Any]:
-    """Return what `bind_reachable` binds for nonlinear pads; nothing for linear ones."""
-    return {"pad_excess": hardening} if nonlinear else {}
+    return Composition(kinds=kinds, converges=converges, lags=lags, held=held)
 
 
 @lru_cache(maxsize=64)
-def contact_solver(kinds: tuple[str, ...], hardens: bool = False) -> ContactSolver:
-    """Return `solve_contact` for an object of these terms. `hardens`: whether the pads are nonlinear."""
-    parts = {"object_force": sum_of_active(active_laws(kinds)), **pad_parts(hardens)}
-    return bind_reachable(solve_contact, parts, INTERPRETED)
+def contact_solver(kinds: tuple[str, ...]) -> ContactSolver:
+    """Return `solve_contact` for an object of these terms."""
+    return bind_reachable(solve_contact, {"object_force": sum_of_active(active_laws(kinds))}, INTERPRETED)
 
 
 def plant_move(
@@ -252,34 +237,29 @@ def plant_move(
     *,
     converges: bool = True,
     lags: bool = True,
-    hardens: bool = False,
 ) -> Callable[[PlantParams, PlantState, float, float], PlantState]:
     """Return `move` for an object whose force is the sum of these laws, with the events of `phases_of`.
 
     `moving`: the terms that move in a free object, as `moving_of` returns them.
 
     `converges`: whether the steps of a tick may be halved until the result no longer changes; `lags`: whether the force
-    of the drive may lag behind the command; `hardens`: whether the pads are nonlinear.
+    of the drive may lag behind the command.
     """
     over_a_tick: PlantMove = refine_until_converged if converges else advance
     if lags:
         over_a_tick = bind(move, advance=over_a_tick)
-    return bind_reachable(over_a_tick, _object_parts(laws, phases, moving, hardens))
+    return bind_reachable(over_a_tick, _object_parts(laws, phases, moving))
 
 
 def _object_parts(
-    laws: Sequence[Law | OnSum],
-    phases: Sequence[tuple[int, Phase]],
-    moving: Sequence[tuple[int, Moves]],
-    hardens: bool,
+    laws: Sequence[Law | OnSum], phases: Sequence[tuple[int, Phase]], moving: Sequence[tuple[int, Moves]]
 ) -> dict[str, Any]:
-    """Return what the contact of the object calls: its force, its events, and the law of the pads."""
-    # One number for the phases of all terms.
-    phase = _of_all(_phase_and_others, _no_phase, phases)
-    events: dict[str, Any] = {"object_phase": phase} if phases else {"has_event": no_event}
-    if moving:
-        events["object_moves"] = _of_all(_one_moves, _no_move, moving)
-    return {"object_force": sum_of(laws), **events, **pad_parts(hardens)}
+    """Return what the contact of the object calls: its force, a number for the phases of its terms, its motion."""
+    return {
+        "object_force": sum_of(laws),
+        "object_phase": _of_all(_phase_and_others, _no_phase, phases),
+        "object_moves": _of_all(_one_moves, _no_move, moving),
+    }
 
 
 @lru_cache(maxsize=64)
@@ -292,7 +272,6 @@ def composed_move(composition: Composition, *, interpreted: bool = True) -> Plan
         moving_of(kinds),
         converges=composition.converges,
         lags=composition.lags,
-        hardens=composition.hardens,
     )
     if not interpreted:
         return move
@@ -302,7 +281,7 @@ def composed_move(composition: Composition, *, interpreted: bool = True) -> Plan
 def step_parts(composition: Composition) -> dict[str, Any]:
     """Return what the steps of this plant call."""
     kinds = composition.kinds
-    return _object_parts(laws_of(kinds), phases_of(kinds), moving_of(kinds), composition.hardens)
+    return _object_parts(laws_of(kinds), phases_of(kinds), moving_of(kinds))
 
 
 def _may_last_several_ticks(composition: Composition) -> bool:
