@@ -92,17 +92,6 @@ def _with_more_images(buffers: Buffers, key: Word) -> Buffers:
     )
 
 
-def first_images(buffers: Buffers) -> Buffers:
-    """Return the arrays with the images that every grasp begins with, so that none draws noise which it needs not."""
-    pads = buffers.pads
-    if len(pads.images) == IMAGES:
-        return buffers
-    return buffers._replace(
-        pads=pads._replace(noise=pads.noise[:IMAGES], images=pads.images[:IMAGES]),
-        image_times=buffers.image_times[:IMAGES],
-    )
-
-
 def recorded_trace(
     event_names: Sequence[str],
     table: NDArray[np.float64],

@@ -143,21 +143,16 @@ def _model_config(config: SimConfig, spread: bool) -> SimConfig:
     return evolve(config, **_NOT_OF_THE_MODEL, spread=spread)
 
 
-def instantiate(problem: Problem, chosen: ChosenSteps | None, seed: int) -> GraspSetup:
+def instantiate(problem: Problem, chosen: ChosenSteps | None, seed: int | None) -> GraspSetup:
     """Return the grasp with this seed, of an instance; `chosen` None: in steps that are not chosen for it.
+
+    `seed` None: that of the nominal object, for what all grasps of a scene have in common. It may not fit between the
+    fingers, and its cells measure nothing.
 
     Raises ConfigError for an object of a scene file that the open fingers would cut into, and ValueError for a seed
     that is negative or has more than 64 bits.
     """
     return _setup(problem.config, problem.spec, problem.number, seed, chosen)
-
-
-def example_of(problem: Problem, chosen: ChosenSteps | None) -> GraspSetup:
-    """Return a grasp of the nominal object, for what all grasps of a scene have in common.
-
-    It may not fit between the fingers, and its cells measure nothing.
-    """
-    return _setup(problem.config, problem.spec, problem.number, None, chosen)
 
 
 def _setup(
@@ -167,10 +162,7 @@ def _setup(
     seed: int | None,
     chosen: ChosenSteps | None = None,
 ) -> GraspSetup:
-    """Return the grasp with a seed; `chosen` None: in steps that are not chosen for it.
-
-    `seed` None: that of the nominal object, without cells. Otherwise this raises as `check_fit` does.
-    """
+    """Return what `instantiate` does."""
     scene = scene_numbers(config, spec)
     if seed is None:
         scene = scene._replace(varies=0, period_s=0.0)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 from graspsense.gripper_api import GraspsenseError
 from graspsense_sim_gripper.run.compiled.compose import plant_move
-from graspsense_sim_gripper.scene.terms.registry import active_laws, phases_of
-from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS, Law, OnSum, SumLaw, Switchable, TermState
+from graspsense_sim_gripper.scene.terms.registry import active_laws, phases_of, switchable
+from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS, OnSum, TermParams, TermState
 from graspsense_sim_gripper.solve.scheme import PlantParams, PlantState
 
 
@@ -20,11 +21,11 @@ def not_finite_in_tick(
     kinds: Sequence[str], plant: PlantParams, state: PlantState, effort_n: float, dt_s: float
 ) -> str:
     """Return in words which term raises, or gives no finite force, in the tick that begins with `state`."""
-    laws = [
-        OnSum(_checked_on_sum(kind, law.law)) if isinstance(law, OnSum) else _checked(kind, law)
+    checked = [
+        OnSum(_checked(kind, law.law)) if isinstance(law, OnSum) else _checked(kind, law)
         for kind, law in zip(kinds, active_laws(kinds), strict=True)
     ]
-    move = plant_move(laws, phases_of(kinds))
+    move = plant_move(switchable(checked), phases_of(kinds))
     try:
         move(plant, state, effort_n, dt_s)
     except (TermFailed, *LAW_ERRORS) as error:
@@ -32,43 +33,27 @@ def not_finite_in_tick(
     return "the simulation gave a force that is not a finite number"
 
 
-def _checked(kind: str, law: Law) -> Law:
-    """Return the switchable law, which raises TermFailed where it raises, or its force or its state is not finite."""
+def _checked(kind: str, law: Callable[..., tuple[float, TermState]]) -> Any:
+    """Return a law, or that of a term that acts on the sum, which checks its results.
 
-    def checked(
-        term: Switchable, state: TermState, d0: float, d1: float, h: float, v1: float
-    ) -> tuple[float, TermState]:
-        if term.active == 0:
-            return 0.0, state
-        return _finite(kind, lambda: law(term.params, state, d0, d1, h, v1), d1)
+    It raises TermFailed where the law raises, or its force or a number of its state is not finite.
+    """
+
+    def checked(params: TermParams, state: TermState, *given: float) -> tuple[float, TermState]:
+        # The second of these is the compression, of both forms of laws.
+        where = f"at a compression of {given[1] * 1e3:.3g} mm"
+        try:
+            force, after = law(params, state, *given)
+        except LAW_ERRORS as error:
+            raise TermFailed(f"term {kind!r} raised {type(error).__name__}: {error} {where}") from error
+        for name, value in (("the force", force), *_numbers(after)):
+            if not math.isfinite(value):
+                raise TermFailed(
+                    f"term {kind!r} gave {name} {value} {where}; a law has to give finite numbers at every compression"
+                )
+        return force, after
 
     return checked
-
-
-def _checked_on_sum(kind: str, law: SumLaw) -> SumLaw:
-    """Return the switchable law of a term that acts on the sum, which raises TermFailed as that of `_checked` does."""
-
-    def checked(term: Switchable, state: TermState, force_n: float, d1: float) -> tuple[float, TermState]:
-        if term.active == 0:
-            return force_n, state
-        return _finite(kind, lambda: law(term.params, state, force_n, d1), d1)
-
-    return checked
-
-
-def _finite(kind: str, call: Callable[[], tuple[float, TermState]], d1: float) -> tuple[float, TermState]:
-    """Return force and state. Raises TermFailed if the law raises, or one of their numbers is not finite."""
-    where = f"at a compression of {d1 * 1e3:.3g} mm"
-    try:
-        force, state = call()
-    except LAW_ERRORS as error:
-        raise TermFailed(f"term {kind!r} raised {type(error).__name__}: {error} {where}") from error
-    for name, value in (("the force", force), *_numbers(state)):
-        if not math.isfinite(value):
-            raise TermFailed(
-                f"term {kind!r} gave {name} {value} {where}; a law has to give finite numbers at every compression"
-            )
-    return force, state
 
 
 def _numbers(state: TermState) -> Iterator[tuple[str, float]]:

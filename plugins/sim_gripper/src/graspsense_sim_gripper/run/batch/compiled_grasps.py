@@ -19,7 +19,7 @@ from graspsense_sim_gripper.run.batch.job import (
     started,
 )
 from graspsense_sim_gripper.run.batch.scenes import Scenes, SelectedScene, number_in
-from graspsense_sim_gripper.run.buffers import Storage, begin_images, first_images, longer
+from graspsense_sim_gripper.run.buffers import Storage, begin_images, longer
 from graspsense_sim_gripper.run.compiled.loop_code import (
     NO_NOISE,
     CellNoise,
@@ -99,7 +99,7 @@ def grasp_compiled(
         last_plant = before_failure(loop, *started(job, setup), buffers, end.ticks)
         effort_n, plant = state().loop.tick.effort_n, lambda: last_plant
         reason = not_finite_in_tick(setup.kinds, setup.plant, last_plant, effort_n, setup.dt_s)
-    storage.buffers = first_images(buffers)
+    storage.buffers = buffers
     extracted, kept = extracted_from(job, buffers, end, measure)
     return FinishedGrasp(
         outcome=outcome,

@@ -11,7 +11,7 @@ from graspsense_sim_gripper.run.accuracy.chosen_steps import ChosenSteps
 from graspsense_sim_gripper.run.accuracy.select import select
 from graspsense_sim_gripper.run.batch.drawn import DrawnScene, drawn_scene
 from graspsense_sim_gripper.run.batch.job import Job, started
-from graspsense_sim_gripper.run.build import Problem, build, example_of, instantiate
+from graspsense_sim_gripper.run.build import Problem, build, instantiate
 from graspsense_sim_gripper.run.compiled.compose import Composition
 from graspsense_sim_gripper.run.compiled.padding import composition_of, padded
 from graspsense_sim_gripper.run.model_report import GraspModel
@@ -39,7 +39,7 @@ class SelectedScene:
     @cached_property
     def example(self) -> GraspSetup:
         """Any of its grasps, for what all of them have in common."""
-        return example_of(self.problem, self.chosen)
+        return instantiate(self.problem, self.chosen, None)
 
     @cached_property
     def composition(self) -> Composition:

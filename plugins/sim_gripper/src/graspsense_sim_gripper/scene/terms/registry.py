@@ -90,9 +90,14 @@ def in_order(names: Sequence[str]) -> list[int]:
 
 def laws_of(names: Sequence[str]) -> list[Law | OnSum]:
     """Return the laws of an object with these terms. The parameters of each are `Switchable`. Raises UnknownName."""
+    return switchable(active_laws(names))
+
+
+def switchable(laws: Sequence[Law | OnSum]) -> list[Law | OnSum]:
+    """Return these laws with parameters that are `Switchable`."""
     return [
         OnSum(bind(switched_on_sum, on_sum=law.law)) if isinstance(law, OnSum) else bind(switched, law=law)
-        for law in active_laws(names)
+        for law in laws
     ]
 
 
