@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -98,7 +99,7 @@ class FinishedGrasp:
         return self.kept
 
 
-@frozen(kw_only=True, eq=False)
+@frozen(kw_only=True, eq=False, slots=False)
 class Job:
     """The settings that all grasps of a batch share."""
 
@@ -111,38 +112,34 @@ class Job:
     """Whether traces are kept."""
     features: FeatureSet[Any] | None = None
     """The feature set whose features are verified where a model is selected."""
-    extraction: CompiledExtraction | None = field(init=False)
-    """The form of `extract` that can be compiled; None if there is none, or if traces are kept."""
     ends_with_hold: bool = field()
     """Whether a held grasp ends with its hold, because nothing that is extracted reads its release."""
-    params: TickParams = field(init=False)
-    """The parameters of controller and guard in every grasp."""
-    initial: TickState = field(init=False)
-    """The state of controller and guard before the first tick."""
-    max_ticks: int = field(init=False)
-    """The most ticks of a grasp."""
-
-    @extraction.default
-    def _extraction(self) -> CompiledExtraction | None:
-        return None if self.traces else compiled_extraction(self.extract)
 
     @ends_with_hold.default
     def _ends_with_hold(self) -> bool:
         return self.extraction is not None and not self.extraction.reads_release
 
-    @params.default
-    def _params(self) -> TickParams:
+    @cached_property
+    def extraction(self) -> CompiledExtraction | None:
+        """The form of `extract` that can be compiled; None if there is none, or if traces are kept."""
+        return None if self.traces else compiled_extraction(self.extract)
+
+    @cached_property
+    def params(self) -> TickParams:
+        """The parameters of controller and guard in every grasp."""
         params = tick_params(device_info(self.config), self.controller, self.run)
         if not self.ends_with_hold:
             return params
         return params._replace(schedule=params.schedule._replace(releases=0))
 
-    @initial.default
-    def _initial(self) -> TickState:
+    @cached_property
+    def initial(self) -> TickState:
+        """The state of controller and guard before the first tick."""
         return first_state(self.controller.init())
 
-    @max_ticks.default
-    def _max_ticks(self) -> int:
+    @cached_property
+    def max_ticks(self) -> int:
+        """The most ticks of a grasp."""
         return math.ceil(seconds_at_most(self.run) / (1.0 / self.config.rate_hz))
 
     @property
