@@ -153,7 +153,7 @@ def flags_of(done: FinishedGrasp, chosen: ChosenSteps, config: SimConfig) -> lis
     flags = [NOT_VERIFIED] if chosen.unresolved else []
     if done.state.step.unresolved + done.state.contact.unbalanced > 0:
         flags.append("not resolved")
-    if chosen.verification is None and not config.has_forced_steps:
+    if chosen.verification is None and config.step_s is None:
         flags.append("not verified")
     return flags
 

@@ -237,11 +237,6 @@ class SimConfig:
     )
 
     @property
-    def has_forced_steps(self) -> bool:
-        """Whether the settings prescribe the length of the steps."""
-        return self.step_s is not None
-
-    @property
     def force_delay_s(self) -> float:
         """Time between the measurement of a force and its arrival: that of the pads, and none with the ideal sensor."""
         return float(self.pad_delay_s) if self.sensor == "pads" else 0.0

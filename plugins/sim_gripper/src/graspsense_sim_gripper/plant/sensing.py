@@ -163,36 +163,6 @@ def sense(
     """
     if params.ideal == 0:
         state = _with_image(params, state, measured, t_s, pads)
-    return read_frame(params, state, measured, t_s, dt_s, effort_n)
-
-
-def _with_image(
-    params: SensorParams, state: SensorState, measured: PlantReadings, t_s: float, pads: PadBuffers
-) -> SensorState:
-    """Return the state of the sensors with the image that is taken, or that arrives, at `t_s`, if there is one."""
-    count, image_t, forces, pending = state.cells
-    due_s = image_due_s(params, state)
-    if pending.waiting == 0 and t_s >= due_s:
-        pending = Pending(1, measured.left_n, measured.right_n)
-    if pending.waiting == 1 and t_s >= due_s + params.clock.delay_s:
-        image, noise = pads.images[count], pads.noise[count]
-        _write_image(params, params.left, pending.left_n, noise, 0, image[0])
-        _write_image(params, params.right, pending.right_n, noise, CELLS, image[1])
-        forces = image_forces(image[0], image[1], pads)
-        count, image_t = count + 1, t_s - params.clock.delay_s
-        pending = Pending(0, pending.left_n, pending.right_n)
-    return SensorState(state.encoder, CellReading(count, image_t, forces, pending))
-
-
-def read_frame(
-    params: SensorParams,
-    state: SensorState,
-    measured: PlantReadings,
-    t_s: float,
-    dt_s: float,
-    effort_n: float,
-) -> tuple[Frame, SensorState]:
-    """Return the frame at `t_s` (s) and the new state of the sensors, if no cell image is taken or arrives."""
     encoder = sense_motion(params, state.encoder, measured.motion, dt_s)
     left_n, right_n, left_edge_n, right_edge_n = state.cells.forces
     if params.ideal == 1:
@@ -212,6 +182,24 @@ def read_frame(
         status=0,
     )
     return frame, state
+
+
+def _with_image(
+    params: SensorParams, state: SensorState, measured: PlantReadings, t_s: float, pads: PadBuffers
+) -> SensorState:
+    """Return the state of the sensors with the image that is taken, or that arrives, at `t_s`, if there is one."""
+    count, image_t, forces, pending = state.cells
+    due_s = image_due_s(params, state)
+    if pending.waiting == 0 and t_s >= due_s:
+        pending = Pending(1, measured.left_n, measured.right_n)
+    if pending.waiting == 1 and t_s >= due_s + params.clock.delay_s:
+        image, noise = pads.images[count], pads.noise[count]
+        _write_image(params, params.left, pending.left_n, noise, 0, image[0])
+        _write_image(params, params.right, pending.right_n, noise, CELLS, image[1])
+        forces = image_forces(image[0], image[1], pads)
+        count, image_t = count + 1, t_s - params.clock.delay_s
+        pending = Pending(0, pending.left_n, pending.right_n)
+    return SensorState(state.encoder, CellReading(count, image_t, forces, pending))
 
 
 def sense_motion(params: SensorParams, last: EncoderReading, motion: Motion, dt_s: float) -> EncoderReading:

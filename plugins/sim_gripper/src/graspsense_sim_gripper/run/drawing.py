@@ -28,9 +28,9 @@ from graspsense_sim_gripper.scene.random_numbers import (
     GRASP,
     NOISE,
     Word,
+    draw_normals,
     draw_units,
     make_normal,
-    normal_rows,
 )
 from graspsense_sim_gripper.scene.spec import PATCHES, InstanceSpread, NominalParams, ObjectSpec
 
@@ -166,4 +166,6 @@ def draw_image_noise(key: Word, begin: int, end: int, noise: Any) -> None:
 
 def image_noise(key: Word, begin: int, count: int) -> NDArray[np.float64]:
     """Return the noise (count, 44) of the cells in the images of a grasp from image `begin` on."""
-    return normal_rows(key, NOISE, begin, count, NOISE_NUMBERS)
+    numbers = np.empty(count * NOISE_NUMBERS)
+    draw_normals(key, NOISE, begin * NOISE_NUMBERS, len(numbers), numbers)
+    return numbers.reshape(count, NOISE_NUMBERS)

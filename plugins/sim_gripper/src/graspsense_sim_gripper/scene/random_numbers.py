@@ -17,7 +17,6 @@ from statistics import NormalDist
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 Word = Any
 """An unsigned 64-bit number, or an array of these; in a counter and in a product it holds 32 bits."""
@@ -136,14 +135,3 @@ def draw_normals(key: Word, stream: Word, begin: int, count: int, numbers: Any) 
     """Write standard normal numbers, otherwise as `draw_units`."""
     draw_units(key, stream, begin, count, numbers)
     make_normal(numbers, count)
-
-
-def normal_rows(key: Word, stream: Word, begin: int, count: int, width: int) -> NDArray[np.float64]:
-    """Return rows (count, width) of standard normal numbers from row `begin` of a stream on.
-
-    Each row has whole blocks, so that it is the same whatever rows are drawn with it.
-    """
-    blocked = width + -width % BLOCK
-    numbers = np.empty(count * blocked)
-    draw_normals(key, stream, begin * blocked, len(numbers), numbers)
-    return np.ascontiguousarray(numbers.reshape(count, blocked)[:, :width])

@@ -69,7 +69,7 @@ def advance(params: PlantParams, state: PlantState, effort_n: float, dt: float) 
     if state.motion.speed_rev_s == 0.0 and rests(params.drive, state, effort_n):
         return state
     if fits_a_step(params.steps, state.step, dt):
-        coasts, after = coast(params, state, effort_n, dt)
+        coasts, after = coast(params, params.steps.tolerance, state, effort_n, dt)
         if coasts:
             return after
     after, _ = take_steps(params, state, effort_n, dt)

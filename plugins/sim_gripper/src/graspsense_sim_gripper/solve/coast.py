@@ -21,9 +21,14 @@ SHAPE_SCALE_M: Final = 1e-3
 """The change of a released object's shape is relative to its compression, or to this where that is smaller."""
 
 
-def coast(params: PlantParams, state: PlantState, effort_n: float, h: float) -> tuple[bool, PlantState]:
-    """Return whether a tick of `h` is of this kind, and the plant after it."""
-    coasts, motion, contact = _glide(params, state.motion, state.contact, effort_n, h)
+def coast(
+    params: PlantParams, tolerance: float, state: PlantState, effort_n: float, h: float
+) -> tuple[bool, PlantState]:
+    """Return whether a tick of `h` is of this kind, and the plant after it.
+
+    `tolerance`: its relative error, beyond which it is not.
+    """
+    coasts, motion, contact = _glide(params, tolerance, state.motion, state.contact, effort_n, h)
     if not coasts:
         return False, state
     _, _, (next_s, n_steps, unresolved), given, peak = state
@@ -39,22 +44,22 @@ def coast(params: PlantParams, state: PlantState, effort_n: float, h: float) -> 
 
 
 def _glide(
-    params: PlantParams, motion: Motion, contact: Contact, effort_n: float, h: float
+    params: PlantParams, tolerance: float, motion: Motion, contact: Contact, effort_n: float, h: float
 ) -> tuple[bool, Motion, Contact]:
     """Return whether a tick of `h` is of this kind, or the fingers rest in it; and motion and contact after it.
 
     The forces on the pads do not change.
     """
     if motion.speed_rev_s == 0.0:
-        return _rested(params, motion, contact, effort_n, h)
+        return _rested(params, tolerance, motion, contact, effort_n, h)
     pending = 0.0
     reach = params.object.width_m + 2.0 * abs(contact.offset_m)
     if contact.touched == 1:
-        coasts, reach, pending = _free_until(params, contact, motion, h)
+        coasts, reach, pending = _free_until(params, tolerance, contact, motion, h)
         if not coasts:
             return False, motion, contact
     load = 0.5 * (contact.left_n + contact.right_n)
-    coasts, motion1 = _coasted(params, motion, load, effort_n, h)
+    coasts, motion1 = _coasted(params, tolerance, motion, load, effort_n, h)
     if not coasts or motion1.gap_m <= reach:
         return False, motion, contact
     if contact.touched == 1:
@@ -67,7 +72,7 @@ def _glide(
 
 
 def _rested(
-    params: PlantParams, motion: Motion, contact: Contact, effort_n: float, h: float
+    params: PlantParams, tolerance: float, motion: Motion, contact: Contact, effort_n: float, h: float
 ) -> tuple[bool, Motion, Contact]:
     """Return what `_glide` does for fingers that stand still."""
     if not is_held(params.drive, motion, contact, effort_n):
@@ -76,11 +81,13 @@ def _rested(
         return True, motion, contact
     if contact.left_n + contact.right_n > 0.0:
         return False, motion, contact
-    recovers, _, pending = _free_until(params, contact, motion, h)
+    recovers, _, pending = _free_until(params, tolerance, contact, motion, h)
     return recovers, motion, with_forces_of(contact, contact.offset_m, pending)
 
 
-def _free_until(params: PlantParams, contact: Contact, motion: Motion, h: float) -> tuple[bool, float, float]:
+def _free_until(
+    params: PlantParams, tolerance: float, contact: Contact, motion: Motion, h: float
+) -> tuple[bool, float, float]:
     """Return whether an object that was touched is not pressed, the gap down to which, and the time it is behind."""
     model: ObjectModel = params.object
     left, right, pending = contact.left, right_of(contact.left, contact.right), contact.pending_s
@@ -98,17 +105,17 @@ def _free_until(params: PlantParams, contact: Contact, motion: Motion, h: float)
         or model.overshoots == 1
         or model.pads.damping_n_s_m > 0.0
         or model.pads.branch_n_m > 0.0
-        or change * change > 2.0 * params.steps.tolerance * shape * shape
+        or change * change > 2.0 * tolerance * shape * shape
     )
     return recovers, reach, pending
 
 
 def _coasted(
-    params: PlantParams, motion: Motion, load_n: float, effort_n: float, h: float
+    params: PlantParams, tolerance: float, motion: Motion, load_n: float, effort_n: float, h: float
 ) -> tuple[bool, Motion]:
     """Return whether the motion over `h` has no event of the drive and little error, and the motion after it."""
     # Fields by name would take the interpreter a third of the time of this function.
-    (link, inertia, friction, closed_rev, open_rev, _), _, steps = params
+    link, inertia, friction, closed_rev, open_rev, _ = params.drive
     coulomb_n, _, _, load_coefficient, damping = friction
     revolutions, speed, _, jacobian = motion
     direction = 1.0 if speed > 0.0 else -1.0
@@ -140,6 +147,6 @@ def _coasted(
     coasts = (
         speed1 * direction > 0.0
         and closed_rev < revolutions1 < open_rev
-        and h * abs(jacobian) * error <= steps.tolerance * SPEED_SCALE_M_S
+        and h * abs(jacobian) * error <= tolerance * SPEED_SCALE_M_S
     )
     return coasts, Motion(revolutions1, speed1, gap1, jacobian1)

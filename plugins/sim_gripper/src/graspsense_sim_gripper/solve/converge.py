@@ -39,7 +39,7 @@ def refine_until_converged(params: PlantParams, state: PlantState, effort_n: flo
         if rests(drive, state, effort_n):
             return state
     elif steps.settle <= 0.0 and fits_a_step(steps, state.step, dt):
-        coasts, finer = coast(params, state, effort_n, dt)
+        coasts, finer = coast(params, steps.tolerance, state, effort_n, dt)
         if coasts:
             return finer
     coarser = finer = state

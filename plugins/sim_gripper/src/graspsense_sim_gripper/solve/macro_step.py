@@ -135,22 +135,13 @@ def _moved(
     weights of Simpson's rule; `trend` gives the middle, and the errors, more exactly. The third stage is at the end of
     the path, so that the object has two steps of `h` / 2.
     """
-    drive, model, steps = params
+    drive, model, _ = params
     link, contact, motion = drive.link, state.contact, state.motion
     if contact.touched == 1 and contact.left.force_n <= 0.0:
         # A released object that recovers its shape, which is computed later, or one that a finger pushes.
         scale = max(abs(motion.speed_rev_s * motion.jacobian_m_rev) / SPEED_SCALE_M_S, 1.0)
-        # All values are given: with defaults, `coast` would be compiled twice.
-        limits = Steps(
-            tolerance=scale * steps.macro_tolerance,
-            longest_s=math.inf,
-            settle=0.0,
-            growth=math.inf,
-            longest_touched_s=math.inf,
-            macro_tolerance=0.0,
-        )
-        coasting = PlantParams(drive, model, limits)
-        coasts, after = coast(coasting, state, effort_n, h)
+        tolerance = scale * params.steps.macro_tolerance
+        coasts, after = coast(params, tolerance, state, effort_n, h)
         if coasts or contact.left_n + contact.right_n > 0.0:
             return 0.0 if coasts else math.inf, HALF, contact, after, UNKNOWN
     start = start_of(params, state, effort_n)

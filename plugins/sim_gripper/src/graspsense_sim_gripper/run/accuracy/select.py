@@ -109,7 +109,7 @@ def _select(problem: Problem, trial: TrialGrasps) -> ChosenSteps:
     config = problem.model_config
     usual = grip_of(problem)
     unverified = propose(problem, usual)
-    prescribed = config.has_forced_steps or config.fidelity == "reference"
+    prescribed = config.step_s is not None or config.fidelity == "reference"
     if prescribed or unverified.unresolved:
         return unverified
     finer = propose(problem, usual, _reference_scale(config, CONTROLLED[0]))

@@ -124,8 +124,8 @@ class LoopTypes:
         if known is None:
             if len(_TYPES) >= MOST_TYPES:
                 _TYPES.clear()
-            types = (TupleType.made_of(part) for part in (begun, state, state.plant))
-            known = _TYPES[key] = cls(*types, before_plant=count_numbers(state.loop))
+            own = TupleType.made_of(state), TupleType.made_of(state.plant)
+            known = _TYPES[key] = cls(TupleType.made_of(begun), *own, count_numbers(state.loop))
         return known
 
     @cached_property
