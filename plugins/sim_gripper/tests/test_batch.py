@@ -42,9 +42,8 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run import buffers
 from graspsense_sim_gripper.run.backend import SimBackend
 from graspsense_sim_gripper.run.batch import threads
-from graspsense_sim_gripper.run.batch.drawn import draw_numbers
 from graspsense_sim_gripper.run.batch.job import Job, grasp_plain
-from graspsense_sim_gripper.run.batch.scenes import Scenes
+from graspsense_sim_gripper.run.batch.scenes import Scenes, draw_numbers
 from graspsense_sim_gripper.run.batch.threads import SLICE, run_many, slices_of
 from graspsense_sim_gripper.run.batch.worker import PlainProcess
 from graspsense_sim_gripper.run.compiled import loop_code

@@ -13,9 +13,14 @@ from graspsense.core.values.errors import ConfigError
 from graspsense.plugin_api import create
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.propose import grip_of, propose
-from graspsense_sim_gripper.run.batch.drawn import compiled_drawing, draw_numbers
 from graspsense_sim_gripper.run.batch.job import Job, started
-from graspsense_sim_gripper.run.batch.scenes import Scenes, number_in, scene_key
+from graspsense_sim_gripper.run.batch.scenes import (
+    Scenes,
+    compiled_drawing,
+    draw_numbers,
+    number_in,
+    scene_key,
+)
 from graspsense_sim_gripper.run.build import build
 from graspsense_sim_gripper.run.compiled.loop_code import loop_start
 from graspsense_sim_gripper.run.compiled.padding import padded

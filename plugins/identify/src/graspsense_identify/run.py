@@ -15,13 +15,12 @@ from attrs import evolve, fields_dict
 from graspsense.plugin_api import ConfigError
 from graspsense.simulator_api import Identification, IdentifiedParameter, RecordedSqueeze, SqueezeFit
 from graspsense_identify.block import lag_of_block, with_fingertips_of_block
-from graspsense_identify.check import predictive_checks
 from graspsense_identify.choose import choose
 from graspsense_identify.delay import Delay, Lag, Timed, delay_of, lag_of, with_delay
 from graspsense_identify.fit import Fitted
 from graspsense_identify.forward import ForwardModel, path_forces
 from graspsense_identify.fracture import fracture_of, not_broken
-from graspsense_identify.held_out import held_out_errors
+from graspsense_identify.held_out import held_out_errors, predictive_checks
 from graspsense_identify.interval import identified, identified_mean
 from graspsense_identify.laws import scale_of
 from graspsense_identify.prepare import NoSqueeze, Squeeze, prepared

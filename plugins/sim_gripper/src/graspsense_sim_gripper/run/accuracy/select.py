@@ -27,9 +27,8 @@ from graspsense_sim_gripper.run.accuracy.chosen_steps import (
     StepDecision,
     Verification,
 )
-from graspsense_sim_gripper.run.accuracy.error import GraspRecord, deviation
+from graspsense_sim_gripper.run.accuracy.error import NOT_READ, GraspRecord, deviation
 from graspsense_sim_gripper.run.accuracy.levels import CONTROLLED, PLAIN, REFERENCE_SCALES, LevelScale
-from graspsense_sim_gripper.run.accuracy.own_features import NOT_READ
 from graspsense_sim_gripper.run.accuracy.propose import FORCE_N, Grip, grip_of, propose
 from graspsense_sim_gripper.run.accuracy.verify import (
     MOST_WORK,

@@ -26,8 +26,14 @@ from graspsense.simulator_api import (
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.state import Motion
 from graspsense_sim_gripper.run.accuracy.chosen_steps import ChosenSteps
-from graspsense_sim_gripper.run.accuracy.error import SCALES, UNIT_SCALES, GraspRecord
-from graspsense_sim_gripper.run.accuracy.own_features import OwnFeatures, beyond, own_features
+from graspsense_sim_gripper.run.accuracy.error import (
+    SCALES,
+    UNIT_SCALES,
+    GraspRecord,
+    OwnFeatures,
+    beyond,
+    own_features,
+)
 from graspsense_sim_gripper.run.buffers import as_lists, new_buffers
 from graspsense_sim_gripper.run.build import Problem
 from graspsense_sim_gripper.run.compiled.compose import composition, grasp_loop

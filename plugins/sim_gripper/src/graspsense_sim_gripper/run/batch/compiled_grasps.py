@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 from attrs import field, frozen
 
-from graspsense_sim_gripper.run.batch.drawn import Drawing, DrawMemory, draw_numbers
 from graspsense_sim_gripper.run.batch.job import (
     FinishedGrasp,
     Job,
@@ -18,7 +17,14 @@ from graspsense_sim_gripper.run.batch.job import (
     grasp_plain,
     started,
 )
-from graspsense_sim_gripper.run.batch.scenes import Scenes, SelectedScene, number_in
+from graspsense_sim_gripper.run.batch.scenes import (
+    Drawing,
+    DrawMemory,
+    Scenes,
+    SelectedScene,
+    draw_numbers,
+    number_in,
+)
 from graspsense_sim_gripper.run.buffers import Storage, begin_images, longer
 from graspsense_sim_gripper.run.compiled.loop_code import (
     NO_NOISE,

@@ -25,14 +25,21 @@ from graspsense.plugin_api import Controller, FeatureSet
 from graspsense.simulator_api import BatchOptions, NotCompilable, NotHandedOver, RunConfig
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.batch.compiled_grasps import CompiledGrasps
-from graspsense_sim_gripper.run.batch.drawn import Drawing, compiled_drawing, draw_numbers, is_drawing_kept
 from graspsense_sim_gripper.run.batch.job import (
     FinishedGrasp,
     Job,
     Measure,
     grasp_plain,
 )
-from graspsense_sim_gripper.run.batch.scenes import Scenes, SelectedScene, scene_key
+from graspsense_sim_gripper.run.batch.scenes import (
+    Drawing,
+    Scenes,
+    SelectedScene,
+    compiled_drawing,
+    draw_numbers,
+    is_drawing_kept,
+    scene_key,
+)
 from graspsense_sim_gripper.run.batch.worker import PlainProcess
 from graspsense_sim_gripper.run.build import build
 from graspsense_sim_gripper.run.compiled.extraction import compiled_measure, is_measure_kept
