@@ -1,7 +1,8 @@
 """How well the identified object predicts squeezes.
 
-Of a recording that is held out nothing was used. The object is fitted to the other recordings. The one that is held out has only a width of its own, which is where the
-object stands between the fingers: a sensor of 24 Hz shows it to some 0.4 mm. Its stiffness is the mean of the others.
+Of a recording that is held out nothing was used: the object is fitted to the others. It has only a width of its own,
+which is where the object stands between the fingers: a sensor of 24 Hz shows it to some 0.4 mm. Its stiffness is the
+mean of the others.
 
 The posterior predictive check puts new simulated squeezes beside the recorded ones. Each simulated set has as many
 squeezes as were recorded. Its parameters are a draw of the identified ones, its objects and placements are drawn from

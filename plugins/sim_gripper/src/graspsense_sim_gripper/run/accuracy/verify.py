@@ -120,7 +120,7 @@ class TrialGrasps:
     def features_beyond(self, chosen: ChosenSteps, full: ChosenSteps) -> tuple[str, ...]:
         """Return the features of the pipeline that differ from those in finer steps by more than the accuracy.
 
-        Empty without a feature set, `own_features.NOT_READ` for one that ideal sensors do not suffice for.
+        Empty without a feature set, `error.NOT_READ` for one that ideal sensors do not suffice for.
         """
         if self.features is None:
             return ()
