@@ -180,11 +180,11 @@ def _one_moves(states: TermsStates) -> Any:
     return term(states[PLACE]) or others(states)
 
 
-def _of_all(one: Any, nothing: Any, terms: Sequence[tuple[int, Any]]) -> Any:
+def _of_all(fold: Any, nothing: Any, terms: Sequence[tuple[int, Any]]) -> Any:
     """Return a function of the states of all terms; `terms`: the place of each among them, and its own function."""
     combined = nothing
     for place, own in reversed(terms):
-        combined = bind(one, PLACE=place, term=own, others=combined)
+        combined = bind(fold, PLACE=place, term=own, others=combined)
     return combined
 
 
