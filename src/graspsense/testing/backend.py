@@ -26,12 +26,10 @@ from graspsense.core.values.signals import (
     Outcome,
     Pads,
 )
-from graspsense.testing import commands, component, protection, readings, recorded
 from graspsense.testing.checks import (
     CheckFailed,
     CheckNotTried,
     CheckSkipped,
-    checks_of,
     demand,
     leaving_no_thread,
     raises_nothing,
@@ -370,46 +368,3 @@ def reports_a_missing_device(subject: Subject) -> None:
     took = time.perf_counter() - began
     demand(took < LONGEST_OPEN_S, f"it took {took:.1f} s to say so: `open` is bounded in time")
     demand(len(text) > 20, f"NoDevice says {text!r}: say what was searched for, where, and what to try")
-
-
-CHECKS: Final = (
-    *component.CHECKS,
-    *checks_of(
-        describes_itself,
-        commands.opening_and_relaxing_are_accepted,
-        opens_and_closes_in_time,
-        readings.frames_are_numbers,
-        readings.channels_follow_from_the_settings,
-        readings.channels_are_those_declared,
-        readings.signals_are_those_declared,
-        readings.images_stay_as_they_were_delivered,
-        readings.signals_have_no_gaps_or_repeats,
-        readings.fingers_are_those_declared,
-        readings.time_runs_forward,
-        readings.rate_is_as_declared,
-        readings.images_count_up,
-        readings.gap_is_in_metres,
-        readings.forces_are_in_newtons,
-        commands.velocity_is_the_rate_of_the_gap,
-        commands.closing_closes,
-        commands.stays_within_its_limits,
-        commands.says_what_commands_become,
-        commands.accepts_every_declared_kind,
-        read_returns_within_its_timeout,
-        pads_can_be_zeroed,
-        closes_in_any_state,
-        same_seed_same_frames,
-        expect_accepts_any_controller,
-        objects_can_be_grasped,
-        performs_a_whole_grasp,
-        squeezes_with_what_it_is_asked,
-        recorded.what_it_delivers_is_kept,
-        reports_plain_values,
-        dry_run_accepts_the_same_commands,
-        reports_a_lost_device,
-        reports_a_missing_device,
-        protection.declares_what_protects,
-        protection.hostile_laws_stay_below_the_ceiling,
-        protection.a_silent_pad_ends_the_grasp,
-    ),
-)

@@ -12,12 +12,13 @@ from typing import Any, Final
 import numpy as np
 from attrs import evolve
 
+from graspsense.core.components.roles import ClassifierConfig
 from graspsense.core.learn.model import refuse_improbable, refuse_unsupported
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.features import FeatureTable, Prediction
 from graspsense.core.values.reasons import TreeNode
-from graspsense.testing import component
-from graspsense.testing.checks import CheckFailed, checks_of, demand, leaving_no_thread, raises_nothing
+from graspsense.testing.checks import CheckFailed, demand, leaving_no_thread, raises_nothing
+from graspsense.testing.component import RUNS_CODE, config_name, watched
 from graspsense.testing.damage import damaged_at, paths
 from graspsense.testing.samples import sample_table
 from graspsense.testing.subject import Subject, elsewhere
@@ -55,6 +56,15 @@ def _again(subject: Subject, fitted: Any) -> Any:
     other = subject.create()
     other.from_json(_json(fitted))
     return other
+
+
+def a_classifier_has_a_model_key(subject: Subject) -> None:
+    """The config of a classifier extends ClassifierConfig, which holds the key `model`."""
+    cls = subject.component.config_class()
+    demand(
+        issubclass(cls, ClassifierConfig),
+        f"{config_name(subject)} has no key 'model': let it extend graspsense.plugin_api.ClassifierConfig",
+    )
 
 
 def classes_are_the_labels(subject: Subject) -> None:
@@ -141,7 +151,7 @@ def survives_json(subject: Subject) -> None:
     """A model read from its JSON gives the same probabilities, bit for bit, and reasons, and runs nothing in it."""
     fitted, table, _ = _learned(subject)
     _again(subject, fitted)  # which may import what it needs
-    with component.watched(component.RUNS_CODE) as seen:
+    with watched(RUNS_CODE) as seen:
         again = _again(subject, fitted)
     demand(
         not seen,
@@ -306,25 +316,3 @@ def a_damaged_model_raises_a_documented_error(subject: Subject) -> None:
             )
             with raises_nothing("from_json", advice), suppress(*REFUSALS):
                 subject.create().from_json(damaged)
-
-
-CHECKS: Final = (
-    *component.CHECKS,
-    *checks_of(
-        component.a_classifier_has_a_model_key,
-        classes_are_the_labels,
-        probabilities_are_valid,
-        separates_separable_trials,
-        same_seed_same_model,
-        same_model_elsewhere,
-        survives_json,
-        single_trials_agree,
-        handles_missing_values,
-        one_label_is_refused_or_certain,
-        few_trials_are_refused_or_learned,
-        explains_its_predictions,
-        does_not_change_the_table,
-        refuses_an_invalid_model,
-        a_damaged_model_raises_a_documented_error,
-    ),
-)

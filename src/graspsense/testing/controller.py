@@ -36,8 +36,7 @@ from graspsense.core.values.signals import (
     Reading,
     no_pads,
 )
-from graspsense.testing import component
-from graspsense.testing.checks import CheckFailed, checks_of, demand, raises_nothing
+from graspsense.testing.checks import CheckFailed, demand, raises_nothing
 from graspsense.testing.model_gripper import CELLS, CHANNELS_OF_FIELD, OBJECTS, model_gripper
 from graspsense.testing.subject import Subject
 
@@ -458,27 +457,3 @@ def ends_every_grasp(subject: Subject) -> None:
             f"with {object_name} between the fingers the grasp ended as {grasp.outcome.words}: "
             f"{grasp.reason}. Let the state's `outcome` leave RUNNING, after {LONGEST_S:g} s at the latest",
         )
-
-
-CHECKS: Final = (
-    *component.CHECKS,
-    *checks_of(
-        step_is_a_plain_function,
-        params_are_numbers,
-        state_is_numbers,
-        starts_in_the_approach,
-        types_do_not_change,
-        commands_are_numbers,
-        commands_are_of_declared_kinds,
-        commands_are_finite,
-        same_tick_same_command,
-        state_holds_everything,
-        requires_what_it_reads,
-        handles_frames_of_nan,
-        says_what_it_asks_for,
-        events_are_declared,
-        free_motion_is_step,
-        phases_are_in_order,
-        ends_every_grasp,
-    ),
-)

@@ -16,8 +16,7 @@ from graspsense.core.values.features import Features
 from graspsense.core.values.signals import Phase
 from graspsense.core.values.trace import Trace
 from graspsense.core.values.units import is_si
-from graspsense.testing import component
-from graspsense.testing.checks import checks_of, demand, leaving_no_thread, raises_nothing
+from graspsense.testing.checks import demand, leaving_no_thread, raises_nothing
 from graspsense.testing.samples import (
     COLUMNS_OF_CHANNEL,
     an_event,
@@ -245,22 +244,3 @@ def compiled_features_are_those_of_extract(subject: Subject) -> None:
 
 def _with_reasons(features: Features) -> str:
     return f"{features.as_dict()} with the reasons {dict(features.reasons)}"
-
-
-CHECKS: Final = (
-    *component.CHECKS,
-    *checks_of(
-        returns_the_declared_features,
-        units_are_of_the_si,
-        values_are_floats,
-        a_whole_grasp_has_features,
-        handles_a_trace_that_ends_anywhere,
-        same_trace_same_features,
-        extracts_in_time,
-        same_features_elsewhere,
-        does_not_change_the_trace,
-        requires_what_it_reads,
-        independent_of_the_start_of_the_clock,
-        compiled_features_are_those_of_extract,
-    ),
-)
