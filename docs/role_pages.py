@@ -32,7 +32,6 @@ from graspsense import (
     testing_api,
 )
 from graspsense.core.components import compiled_features, entries, hookspecs, roles, strict
-from graspsense.core.components.entries import DECLARED, TABLE_OF_ROLE
 from graspsense.core.control import contact, free_motion, tick
 from graspsense.core.values import signals
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
@@ -71,13 +70,6 @@ BASES = {
     "feature-set": roles.FeatureSet,
     "classifier": roles.Classifier,
 }
-HOOKS = {
-    "sensor-backend": "graspsense_sensor_backends",
-    "controller": "graspsense_controllers",
-    "feature-set": "graspsense_feature_sets",
-    "classifier": "graspsense_classifiers",
-}
-ROLE_OF_BASE = {base: role for role, base in BASES.items()}
 HELPERS = {
     "Settings": ("setting",),
     "Contact and rest": (
@@ -145,7 +137,7 @@ HEAD = "<!-- Written by docs/role_pages.py from the code: change that. -->\n"
 
 def _fields_section(cls: type) -> list[str]:
     """Return the section on a class of values: its fields and its meaning."""
-    return [f"## {cls.__name__}", "", f"    {_fields_signature(cls)}", "", _text(cls), ""]
+    return [f"## {cls.__name__}", "", f"    {_fields_of(cls)}", "", _text(cls), ""]
 
 
 def dataset_page() -> str:
@@ -201,20 +193,20 @@ def page(role: str) -> str:
     lines = [HEAD + f"# {TITLES[role]}", ""]
     if role != "distribution":
         base: Any = BASES[role]
-        table = TABLE_OF_ROLE[role]  # type: ignore[index]
+        kind = entries.ROLES[role]  # type: ignore[index]
         lines += [
-            f"This page describes the role `{role}`. A component of this role is selected in the table `[{table}]` "
-            "of a pipeline file.",
+            f"This page describes the role `{role}`. A component of this role is selected in the table "
+            f"`[{kind.table}]` of a pipeline file.",
             "",
             f"- `graspsense plugins new NAME --role {role}` creates a package to start from: the example below.",
             "- `graspsense plugins check NAME` checks whether a component conforms to the role.",
             "- [The tutorial](../tutorial.md) creates a package by hand.",
             "- [Values and units](signals.md) describes the values that pass between components.",
             "- [Helpers](helpers.md) describes the functions and constants that a component is written with.",
-            f"- The hook [{HOOKS[role]}](hooks.md#{HOOKS[role]}) declares components of this role.",
+            f"- The hook [{kind.hook}](hooks.md#{kind.hook}) declares components of this role.",
             *(FURTHER.get(role, ())),
             "",
-            *_attributes(base),
+            *_attributes(base, kind.declared),
             "## Methods",
             "",
             f"`graspsense.plugin_api.{base.__name__}`: {_text(base)}",
@@ -224,7 +216,7 @@ def page(role: str) -> str:
             *(_faster(*FASTER[role]) if role in FASTER else ()),
             "## Fields of the entry",
             "",
-            *_entry(getattr(entries, f"{base.__name__}Entry")),
+            *_entry(kind.entry),
             "## Complete example",
             "",
             *_example(role),
@@ -320,7 +312,7 @@ def terms_page() -> str:
         "",
         "[A term of your own](../simulator.md#a-term-of-your-own) is declared by these fields.",
         "",
-        f"    {_fields_signature(Term)}",
+        f"    {_fields_of(Term)}",
         "",
         _text(Term),
         "",
@@ -407,7 +399,7 @@ def _public_row(home: str, name: str) -> str:
         shown = name if issubclass(value, BaseException | enum.Enum) else _fields_of(value)
     else:
         shown = f"{name}{_signature(value)}"
-    return f"| `{_cell(shown)}` | {_cell(_sentence(inspect.getdoc(value) or ''))} |"
+    return f"| {_cell(f'`{shown}`')} | {_cell(_sentence(inspect.getdoc(value) or ''))} |"
 
 
 def _fields_of(cls: Any) -> str:
@@ -449,9 +441,8 @@ def _constant(name: str) -> str:
     return f"| `{name}` | {public(name):g} | {_cell(_in_a_line(documented[name][1]))}{home} |"
 
 
-def _attributes(base: Any) -> list[str]:
+def _attributes(base: Any, declared: Sequence[str]) -> list[str]:
     """Return what the class of a component declares by attributes."""
-    declared = DECLARED[ROLE_OF_BASE[base]]
     if not declared:
         return []
     lines = ["## What the class declares", "", "| attribute | type | meaning |", "|---|---|---|"]
@@ -510,21 +501,14 @@ def _faster(title: str, attribute: str, module: Any, classes: Sequence[Any]) -> 
     """Return the section on what a class may declare so that simulated grasps take less time."""
     lines = [f"## {title}", "", f"`{attribute}` is optional. {_text(module)}", ""]
     for cls in classes:
-        lines += [f"### {cls.__name__}", "", f"    {_fields_signature(cls)}", ""]
+        lines += [f"### {cls.__name__}", "", f"    {_fields_of(cls)}", ""]
         lines += [*_meaning(cls), *_documented_fields(cls), *_docstring_example(cls)]
     return lines
 
 
-def _fields_signature(cls: Any) -> str:
-    """Return the name of a class of attrs or a named tuple, with its fields."""
-    names = getattr(cls, "_fields", None) or tuple(field.name for field in attrs.fields(cls))
-    return f"{cls.__name__}({', '.join(names)})"
-
-
 def _meaning(thing: Any) -> list[str]:
     """Return the docstring up to its example."""
-    text = (inspect.getdoc(thing) or "").partition("\n\n>>> ")[0]
-    return [re.sub(r"(?<!\n)\n(?!\n)", " ", text), ""]
+    return [_text(thing).partition("\n\n>>> ")[0], ""]
 
 
 def _docstring_example(thing: Any) -> list[str]:
@@ -572,7 +556,10 @@ def _example(role: str) -> list[str]:
 
 
 def _cell(text: str) -> str:
-    return text.replace("|", "\\|").replace("[", "\\[")
+    """Return a text for a cell of a table: a bracket begins a link only outside of code."""
+    parts = text.replace("|", "\\|").split("`")
+    parts[::2] = (part.replace("[", "\\[") for part in parts[::2])
+    return "`".join(parts)
 
 
 def main() -> None:

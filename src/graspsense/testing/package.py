@@ -21,7 +21,6 @@ from typing import Any, Final
 from urllib.parse import unquote, urlparse
 
 from graspsense.core.components.entries import ConformanceCheckEntry, ExperimentKindEntry, PipelineEntry
-from graspsense.core.components.experiment_kind import class_of_kind
 from graspsense.core.components.moved_names import new_form
 from graspsense.core.components.registry import SLOW_IMPORT_S, Resource
 from graspsense.core.pipeline.wiring import check as check_wiring
@@ -105,7 +104,7 @@ def everything_declared_loads(package: Package) -> None:
             resource.load(part)
         if isinstance(resource.entry, ExperimentKindEntry):
             for part in {"keys", "result"} & set(resource.targets):
-                class_of_kind(resource, part)
+                resource.class_of_kind(part)
 
 
 def names_are_unique(package: Package) -> None:

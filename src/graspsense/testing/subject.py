@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import os
-import pickle
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
+from importlib import import_module
 from typing import Any
 
-from attrs import define, field
+from attrs import asdict, define, field
 
+from graspsense.core.components.channels import as_json, from_json
+from graspsense.core.components.entries import ROLES, Feature, Role
 from graspsense.core.components.registry import Component, Plugins, PluginStatus, Resource, canonical
 from graspsense.core.settings.selected import build
 from graspsense.testing.checks import CheckFailed
@@ -88,20 +91,36 @@ class Package:
 def elsewhere(subject: Subject, what: Callable[[Subject], str]) -> str:
     """Return what a module function gives in a fresh interpreter, at another time of the day and of other hashes."""
     code = (
-        "import pickle, sys; sys.path[:] = pickle.load(sys.stdin.buffer)"
-        "; what, subject = pickle.load(sys.stdin.buffer); sys.stdout.write('\\n' + what(subject))"
+        "import json, sys; given = json.load(sys.stdin); sys.path[:] = given.pop('path')"
+        "; from graspsense.testing.subject import answer; answer(**given)"
     )
-    same = Subject(component=subject.component, keys=subject.keys)
+    entry = asdict(subject.entry, recurse=False)
+    listed: dict[str, Callable[[Any], Any]] = {"requires": as_json, "features": asdict}
+    entry |= {name: [plain(part) for part in entry[name]] for name, plain in listed.items() if name in entry}
+    given = {"role": subject.role, "entry": entry, "keys": dict(subject.keys), "path": sys.path}
     ran = subprocess.run(
         [sys.executable, "-P", "-c", code],
-        input=pickle.dumps(sys.path) + pickle.dumps((what, same)),
-        env={**os.environ, "PYTHONHASHSEED": "77", "TZ": "ELSEWHERE-13", "PYTHONIOENCODING": "utf-8"},
+        input=json.dumps({**given, "what": [what.__module__, what.__name__]}),
+        env={**os.environ, "PYTHONHASHSEED": "77", "TZ": "ELSEWHERE-13"},
         capture_output=True,
+        text=True,
         check=False,
     )
     if ran.returncode:
-        raise CheckFailed(f"it fails in a fresh interpreter: {ran.stderr.decode().strip()[-300:]}")
-    return ran.stdout.decode().rpartition("\n")[2]
+        raise CheckFailed(f"it fails in a fresh interpreter: {ran.stderr.strip()[-300:]}")
+    return ran.stdout.rpartition("\n")[2]
+
+
+def answer(role: Role, entry: dict[str, Any], keys: Mapping[str, Any], what: Sequence[str]) -> None:
+    """Print what `elsewhere` was asked for; it made the arguments."""
+    listed: dict[str, Callable[[Any], Any]] = {
+        "requires": from_json,
+        "features": lambda given: Feature(**given),
+    }
+    entry |= {name: tuple(map(made, entry[name])) for name, made in listed.items() if name in entry}
+    component = Component(ROLES[role].entry(**entry), "elsewhere", "0")
+    text = getattr(import_module(what[0]), what[1])(Subject(component=component, keys=keys))
+    sys.stdout.write("\n" + text)
 
 
 def package_of(

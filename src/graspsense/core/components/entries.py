@@ -22,14 +22,6 @@ from graspsense.core.values.signals import CommandKind
 
 Role = Literal["sensor-backend", "controller", "feature-set", "classifier"]
 
-TABLE_OF_ROLE: Final[dict[Role, str]] = {
-    "sensor-backend": "gripper",
-    "controller": "controller",
-    "feature-set": "features",
-    "classifier": "classifier",
-}
-"""The table of a pipeline file in which a component of each role is selected."""
-
 KINDS: Final = tuple(kind.name.lower() for kind in CommandKind)
 """The kinds of command as entries name them: effort, velocity, position, force."""
 
@@ -405,17 +397,32 @@ RESOURCES: Final = (
 )
 KIND_OF_ENTRY: Final = {kind.entry: kind.words for kind in RESOURCES}
 
-ENTRY_OF_ROLE: dict[Role, type] = {
-    "sensor-backend": SensorBackendEntry,
-    "controller": ControllerEntry,
-    "feature-set": FeatureSetEntry,
-    "classifier": ClassifierEntry,
-}
 
-DECLARED: Final[Mapping[Role, tuple[str, ...]]] = {
-    "sensor-backend": ("channels", "accepts"),
-    "controller": ("requires", "commands", "alternatives"),
-    "feature-set": ("requires", "features"),
-    "classifier": (),
+class ComponentKind(NamedTuple):
+    """What belongs to a role: the hook whose entries declare components, and the type of these entries.
+
+    `table` is the table of a pipeline file in which a component is selected, `declared` what its class declares by
+    attributes, unless the entry has it. The base class of the role is named as the entry, without `Entry`.
+    """
+
+    hook: str
+    entry: type
+    table: str
+    declared: tuple[str, ...]
+
+
+ROLES: Final[Mapping[Role, ComponentKind]] = {
+    "sensor-backend": ComponentKind(
+        "graspsense_sensor_backends", SensorBackendEntry, "gripper", ("channels", "accepts")
+    ),
+    "controller": ComponentKind(
+        "graspsense_controllers", ControllerEntry, "controller", ("requires", "commands", "alternatives")
+    ),
+    "feature-set": ComponentKind(
+        "graspsense_feature_sets", FeatureSetEntry, "features", ("requires", "features")
+    ),
+    "classifier": ComponentKind("graspsense_classifiers", ClassifierEntry, "classifier", ()),
 }
-"""What the class of a component declares by attributes, unless the entry has it."""
+ROLE_OF_ENTRY: Final[Mapping[type, Role]] = {kind.entry: role for role, kind in ROLES.items()}
+TABLE_OF_ROLE: Final[Mapping[Role, str]] = {role: kind.table for role, kind in ROLES.items()}
+"""The table of a pipeline file in which a component of each role is selected."""

@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
 from attrs import evolve
 
 from graspsense.core.components.entries import (
-    ENTRY_OF_ROLE,
     KIND_OF_ENTRY,
     RESOURCES,
+    ROLES,
     TABLE_OF_ROLE,
     ExperimentKindEntry,
     FeatureSetEntry,
@@ -62,13 +62,6 @@ if TYPE_CHECKING:
 
 STRICT_VARIABLE: Final = "GRASPSENSE_STRICT_PLUGINS"
 """If this environment variable is 1, the error of a plugin that cannot be loaded is raised."""
-
-COMPONENT_HOOKS: Final[dict[str, Role]] = {
-    "graspsense_sensor_backends": "sensor-backend",
-    "graspsense_controllers": "controller",
-    "graspsense_feature_sets": "feature-set",
-    "graspsense_classifiers": "classifier",
-}
 
 PartT = TypeVar("PartT", bound=Component | Resource[Any])
 
@@ -115,7 +108,7 @@ class Plugins:
 
     def components(self, role: Role | None = None) -> tuple[Component, ...]:
         """Return the components of this role, or all, in the order of role and name."""
-        order = list(ENTRY_OF_ROLE)
+        order = list(ROLES)
         of_role = (part for part in self._components if role in (None, part.role))
         return tuple(sorted(of_role, key=lambda part: (order.index(part.role), part.name, part.distribution)))
 
@@ -257,10 +250,10 @@ class Plugins:
         try:
             hooks = self._hooks.register(plugin, source)
             components = [
-                Component(entry, source.distribution, source.version, role)
-                for hook, role in COMPONENT_HOOKS.items()
-                if hook in hooks
-                for entry in self._hooks.entries(plugin, hook, ENTRY_OF_ROLE[role])
+                Component(entry, source.distribution, source.version)
+                for kind in ROLES.values()
+                if kind.hook in hooks
+                for entry in self._hooks.entries(plugin, kind.hook, kind.entry)
             ]
             resources = [
                 Resource(entry, source.distribution, source.version)
