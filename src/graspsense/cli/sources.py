@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
-from graspsense.cli.options import SEED, force_option, keys_option
+from graspsense.cli.options import SEED, dashed, force_option, keys_option, refuse_typed, typed
 from graspsense.cli.output import file_to_write
 from graspsense.cli.progress import ProgressLine
 from graspsense.core.components.entries import TABLE_OF_ROLE
@@ -229,7 +229,7 @@ def trials_of(
         described = structured(values, TrialSource, source)
     except ValidationFailed as misfit:
         raise ConfigError(
-            "\n".join(f"--{_dashed(problem.path[0])}: {problem.text}" for problem in misfit.problems)
+            "\n".join(f"{dashed(str(problem.path[0]))}: {problem.text}" for problem in misfit.problems)
         ) from None
     if kind == SIMULATED and folds is not None:
         from graspsense.evaluation.folds import check_folds
@@ -286,12 +286,11 @@ def command_line(without: Sequence[str], command: str = "") -> str:
     """Return the command that is running, or another one with its arguments, without some of its options."""
     context = click.get_current_context()
     words = ["graspsense", command or str(context.info_name)]
+    by_user = set(typed()).difference(without)
     for param in context.command.params:
-        name = str(param.name)
-        typed = context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
-        if name in without or not typed:
+        if param.name not in by_user:
             continue
-        value = context.params[name]
+        value = context.params[param.name]
         if isinstance(param, click.Argument):
             words.append(str(value))
         elif isinstance(param, click.Option) and param.is_flag:
@@ -302,21 +301,14 @@ def command_line(without: Sequence[str], command: str = "") -> str:
     return shlex.join(words)
 
 
-def _dashed(name: object) -> str:
-    """Return the name of an option without its dashes in front."""
-    return str(name).replace("_", "-")
-
-
 def _refuse_misplaced(kind: str) -> None:
     """Refuse options that say nothing about this kind of source. Raises UsageError."""
-    context = click.get_current_context()
     for owner, names in _ONLY_FOR.items():
-        for name in names:
-            from_user = context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
-            if from_user and owner != kind:
-                other = ": a feature set is selected by -o features.type=NAME" if name == "features" else ""
-                kinds = f"a source of the kind {owner!r}; this one is of the kind {kind!r}"
-                raise click.UsageError(f"--{_dashed(name)} is for {kinds}{other}", context)
+        if owner != kind:
+            why = f"is for a source of the kind {owner!r}; this one is of the kind {kind!r}"
+            if "features" in names:
+                refuse_typed(["features"], f"{why}: a feature set is selected by -o features.type=NAME")
+            refuse_typed(names, why)
 
 
 def _settings(source: str, given: Mapping[str, Any], classifier: str | None) -> Settings:
