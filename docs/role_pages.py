@@ -13,6 +13,7 @@ import inspect
 import re
 import sys
 from collections.abc import Sequence
+from functools import partial
 from importlib import import_module
 from importlib.resources import files
 from itertools import pairwise
@@ -34,20 +35,7 @@ from graspsense import (
 from graspsense.core.components import compiled_features, entries, hookspecs, roles, strict
 from graspsense.core.control import contact, free_motion, tick
 from graspsense.core.values import signals
-from graspsense.core.values.channel import Channel, FastChannel, TactileArray
-from graspsense.core.values.device import DeviceInfo
-from graspsense.core.values.features import Features, FeatureTable, Prediction
-from graspsense.core.values.fingers import FingerForce
-from graspsense.core.values.mounting import Mounting
-from graspsense.core.values.reasons import Contribution, FeatureValue, Reason
-from graspsense.core.values.signals import GraspEvent
-from graspsense.core.values.trace import ImageTrace, SampleTrace, Trace
-from graspsense.core.values.trial import RunInfo, Trial
-from graspsense.recording.labelled_recording import LabelledRecording
-from graspsense.recording.replayable import Recording
 from graspsense.scaffold.make import KINDS, plugin_module, words_of
-from graspsense.sources.columns.grasp_columns import GraspColumns, checked_recording
-from graspsense.store.stored_grasps import StoredGrasp
 from graspsense.testing import CHECKS
 from graspsense_sim_gripper.scene.terms import Term
 from graspsense_sim_gripper.scene.terms.registry import TERMS
@@ -63,12 +51,6 @@ TITLES = {
     "classifier": "A classifier",
     "dataset": "A reader of a data set",
     "distribution": "A distribution",
-}
-BASES = {
-    "sensor-backend": roles.SensorBackend,
-    "controller": roles.Controller,
-    "feature-set": roles.FeatureSet,
-    "classifier": roles.Classifier,
 }
 HELPERS = {
     "Settings": ("setting",),
@@ -91,53 +73,29 @@ HELPERS = {
         *("squeeze", "with_channels", "sample_table", "a_trial"),
     ),
 }
-FURTHER = {
-    "sensor-backend": (
-        "- [A gripper on a network socket](../tcp_gripper.md) has an example with a fake server, the options of the "
-        "conformance checks, and what to do with a single force sensor.",
-    )
+GRIPPER_EXAMPLE = (
+    "- [A gripper on a network socket](../tcp_gripper.md) has an example with a fake server, the options of the "
+    "conformance checks, and what to do with a single force sensor."
+)
+FASTER: dict[str, tuple[str, str, Any, tuple[str, ...]]] = {
+    "controller": ("Free motion in closed form", "free_motion", free_motion, ("FreeMotion", "FreeLimits")),
+    "feature-set": ("A compiled form", "compiled", compiled_features, ("CompiledFeatures", "TickColumns")),
 }
-FASTER: dict[str, tuple[str, str, Any, tuple[Any, ...]]] = {
-    "controller": (
-        "Free motion in closed form",
-        "free_motion",
-        free_motion,
-        (free_motion.FreeMotion, free_motion.FreeLimits),
-    ),
-    "feature-set": (
-        "A compiled form",
-        "compiled",
-        compiled_features,
-        (compiled_features.CompiledFeatures, compiled_features.TickColumns),
-    ),
-}
-"""What a role may declare so that simulated grasps take less time: title, attribute, module and classes."""
-FLOWING: tuple[Any, ...] = (
-    *(signals.Reading, signals.Frame, signals.Pads, signals.Image, signals.Samples, signals.Command),
-    *(Channel, TactileArray, FastChannel, FingerForce, DeviceInfo, Mounting),
-    *(
-        Trace,
-        ImageTrace,
-        SampleTrace,
-        Features,
-        FeatureTable,
-        Prediction,
-        Reason,
-        FeatureValue,
-        Contribution,
-        RunInfo,
-        GraspEvent,
-        Trial,
-    ),
+"""What a role may declare so that simulated grasps take less time: title, attribute, module and names of classes."""
+FLOWING = (
+    *("Reading", "Frame", "Pads", "Image", "Samples", "Command"),
+    *("Channel", "TactileArray", "FastChannel", "FingerForce", "DeviceInfo", "Mounting"),
+    *("Trace", "ImageTrace", "SampleTrace", "Features", "FeatureTable", "Prediction"),
+    *("Reason", "FeatureValue", "Contribution", "RunInfo", "GraspEvent", "Trial"),
 )
 EXAMPLE = "\n\nExample::\n\n"
 """What stands before the example in the docstring of a hook."""
 HEAD = "<!-- Written by docs/role_pages.py from the code: change that. -->\n"
 
 
-def _fields_section(cls: type) -> list[str]:
+def _fields_section(name: str) -> list[str]:
     """Return the section on a class of values: its fields and its meaning."""
-    return [f"## {cls.__name__}", "", f"    {_fields_of(cls)}", "", _text(cls), ""]
+    return [f"## {name}", "", f"    {_fields_of(public(name))}", "", _text(public(name)), ""]
 
 
 def dataset_page() -> str:
@@ -170,12 +128,12 @@ def dataset_page() -> str:
             "data={NAME: FOLDER})`) reads the sound examples in this folder twice, which must give the same, and then "
             "with an empty file and with a word in each column: the error must name the file and the column.",
             "",
-            *_fields_section(LabelledRecording),
-            *_fields_section(Recording),
-            *_fields_section(GraspColumns),
-            f"`checked_recording(columns)`: {_text(checked_recording)}",
+            *_fields_section("LabelledRecording"),
+            *_fields_section("Recording"),
+            *_fields_section("GraspColumns"),
+            f"`checked_recording(columns)`: {_text(public('checked_recording'))}",
             "",
-            *_fields_section(StoredGrasp),
+            *_fields_section("StoredGrasp"),
             "## Fields of the entry",
             "",
             *_entry(entries.DatasetEntry),
@@ -192,8 +150,8 @@ def page(role: str) -> str:
         return dataset_page()
     lines = [HEAD + f"# {TITLES[role]}", ""]
     if role != "distribution":
-        base: Any = BASES[role]
         kind = entries.ROLES[role]  # type: ignore[index]
+        base = public(kind.entry.__name__.removesuffix("Entry"))
         lines += [
             f"This page describes the role `{role}`. A component of this role is selected in the table "
             f"`[{kind.table}]` of a pipeline file.",
@@ -204,7 +162,7 @@ def page(role: str) -> str:
             "- [Values and units](signals.md) describes the values that pass between components.",
             "- [Helpers](helpers.md) describes the functions and constants that a component is written with.",
             f"- The hook [{kind.hook}](hooks.md#{kind.hook}) declares components of this role.",
-            *(FURTHER.get(role, ())),
+            *((GRIPPER_EXAMPLE,) if role == "sensor-backend" else ()),
             "",
             *_attributes(base, kind.declared),
             "## Methods",
@@ -243,9 +201,8 @@ def page(role: str) -> str:
 def signals_page() -> str:
     """Return the page of the values that pass between the parts."""
     lines = [HEAD + "# Values and units", "", _text(signals), ""]
-    for cls in FLOWING:
-        lines += _fields_section(cls)
-        lines += _documented_fields(cls)
+    for name in FLOWING:
+        lines += [*_fields_section(name), *_documented_fields(public(name))]
     lines += ["## Channels", "", "| channel | unit |", "|---|---|"]
     lines += [f"| `{name}` | {unit} |" for name, unit in signals.CHANNELS.items()]
     return "\n".join([*lines, ""])
@@ -497,11 +454,12 @@ def _many() -> list[str]:
     ]
 
 
-def _faster(title: str, attribute: str, module: Any, classes: Sequence[Any]) -> list[str]:
+def _faster(title: str, attribute: str, module: Any, classes: Sequence[str]) -> list[str]:
     """Return the section on what a class may declare so that simulated grasps take less time."""
     lines = [f"## {title}", "", f"`{attribute}` is optional. {_text(module)}", ""]
-    for cls in classes:
-        lines += [f"### {cls.__name__}", "", f"    {_fields_of(cls)}", ""]
+    for name in classes:
+        cls = public(name)
+        lines += [f"### {name}", "", f"    {_fields_of(cls)}", ""]
         lines += [*_meaning(cls), *_documented_fields(cls), *_docstring_example(cls)]
     return lines
 
@@ -562,16 +520,22 @@ def _cell(text: str) -> str:
     return "`".join(parts)
 
 
+PAGES = {
+    "signals": signals_page,
+    "hooks": hooks_page,
+    "terms": terms_page,
+    "helpers": helpers_page,
+    "names": names_page,
+    **{role: partial(page, role) for role in TITLES},
+}
+"""Each page in docs/roles, and what gives its text."""
+
+
 def main() -> None:
     """Write every page."""
     FOLDER.mkdir(exist_ok=True)
-    for role in TITLES:
-        (FOLDER / f"{role}.md").write_text(page(role), encoding="utf-8")
-    (FOLDER / "hooks.md").write_text(hooks_page(), encoding="utf-8")
-    (FOLDER / "helpers.md").write_text(helpers_page(), encoding="utf-8")
-    (FOLDER / "names.md").write_text(names_page(), encoding="utf-8")
-    (FOLDER / "signals.md").write_text(signals_page(), encoding="utf-8")
-    (FOLDER / "terms.md").write_text(terms_page(), encoding="utf-8")
+    for name, made in PAGES.items():
+        (FOLDER / f"{name}.md").write_text(made(), encoding="utf-8")
 
 
 if __name__ == "__main__":
