@@ -162,9 +162,9 @@ def _exit_code(arguments: list[str]) -> int:
     ) as error:  # a group without a subcommand: the message is its help
         echo_as_it_is(error.format_message(), err=True)
         return ExitCode.WRONG_USE
-    except (click.Abort, KeyboardInterrupt):
+    except (click.Abort, KeyboardInterrupt) as ended:
         with suppress(OSError):  # the terminal may have gone
-            echo_as_it_is("interrupted", err=True)
+            echo_as_it_is("\n  ".join(["interrupted", *getattr(ended, "__notes__", ())]), err=True)
         _flush_stdout()
         return ExitCode.INTERRUPTED
     except BrokenPipeError:

@@ -35,7 +35,7 @@ from graspsense.testing.checks import (
     raises_nothing,
 )
 from graspsense.testing.gentle import EFFORT_N, FORCE_N, REST_S, GentleController, kind_of
-from graspsense.testing.session import TIMEOUT_S, readings_of
+from graspsense.testing.session import TIMEOUT_S, description, next_reading, opened, readings_of
 from graspsense.testing.subject import Subject
 
 GRACE_S: Final = 1.0
@@ -98,8 +98,7 @@ def pads_can_be_zeroed(subject: Subject) -> None:
     info, declared = subject.session.info, {channel.name for channel in subject.entry.channels}
     if not info.tare_images or not declared & {"force_left", "force_right"}:
         raise CheckSkipped("this gripper is not tared")
-    with closing(subject.create()) as backend:
-        info = backend.open(0)
+    with opened(subject) as (backend, info):
         with (
             raises_nothing("a tare without images", ": raise TareRefused with what to do"),
             suppress(TareRefused),
@@ -107,7 +106,7 @@ def pads_can_be_zeroed(subject: Subject) -> None:
             backend.tare([])
         images: list[Pads] = []
         for _ in range(int(5.0 * info.rate_hz)):
-            reading = backend.read(TIMEOUT_S)
+            reading = next_reading(backend)
             newest = images[-1].counter if images else 0
             if reading is not None and reading.pads.counter > newest:
                 images.append(reading.pads)
@@ -121,7 +120,7 @@ def pads_can_be_zeroed(subject: Subject) -> None:
         backend.tare(images)
         forces = []
         for _ in range(20):
-            reading = backend.read(TIMEOUT_S)
+            reading = next_reading(backend)
             backend.apply(info.relaxed)
             if reading is not None:
                 forces += [reading.frame.force_left_n, reading.frame.force_right_n]
@@ -142,7 +141,7 @@ def closes_in_any_state(subject: Subject) -> None:
         for attempt in ("the first", "the second"):
             stage = f"after {attempt} opening"
             with leaving_no_thread("it is opened") if attempt == "the second" else nullcontext():
-                info = backend.open(0)
+                info = description(backend.open(0))
                 _first_frame(backend)
                 backend.apply(info.relaxed)
                 backend.close()
@@ -158,7 +157,7 @@ def closes_in_any_state(subject: Subject) -> None:
 
 def _first_frame(backend: SensorBackend[Any]) -> Frame:
     for _ in range(20):
-        reading = backend.read(TIMEOUT_S)
+        reading = next_reading(backend)
         if reading is not None:
             return reading.frame
     raise CheckFailed("no frame came after it was opened again")
@@ -171,8 +170,7 @@ def same_seed_same_frames(subject: Subject) -> None:
     texts = []
     for _ in range(2):
         readings: list[str] = []
-        with closing(subject.create()) as backend, suppress(RecordingEnded):
-            info = backend.open(3)
+        with opened(subject, seed=3) as (backend, info), suppress(RecordingEnded):
             for _ in range(100):
                 readings.append(repr(backend.read(TIMEOUT_S)))
                 backend.apply(info.opening or info.relaxed)
@@ -286,8 +284,7 @@ def performs_a_whole_grasp(subject: Subject) -> None:
 
 def reports_plain_values(subject: Subject) -> None:
     """`report` returns numbers, text and booleans that JSON represents, while it is open and after it was closed."""
-    with closing(subject.create()) as backend:
-        backend.open(0)
+    with opened(subject) as (backend, _):
         reports = [backend.report()]
     reports.append(backend.report())
     for report in reports:
@@ -305,7 +302,7 @@ def dry_run_accepts_the_same_commands(subject: Subject) -> None:
         f"dry_run_backend returned {other!r}: return a SensorBackend or None",
     )
     with closing(other):
-        info = other.open(0)
+        info = description(other.open(0))
         demand(
             info.opening is None or KINDS[info.opening.kind] in subject.entry.accepts,
             f"the gripper of a dry run opens with {info.opening}, of a kind that the real one does not accept",
@@ -319,8 +316,7 @@ def reports_a_lost_device(subject: Subject) -> None:
         raise CheckNotTried(
             "no settings were given under which it vanishes (--unplugged, or `unplugged` in a test)"
         )
-    with closing(subject.create(**subject.unplugged)) as backend:
-        info = backend.open(0)
+    with opened(subject, **subject.unplugged) as (backend, info):
         text = _lost(backend, info.relaxed, info.rate_hz)
     demand(len(text) > 10, f"DeviceLost says {text!r}: say which gripper, and what to look at")
     grasp = run_uninterrupted(

@@ -165,6 +165,9 @@ def outcome_of(check: Check, subject: Any, expected: Mapping[str, str]) -> Resul
     try:
         with _leaving_nothing():
             check.test(subject)
+    except KeyboardInterrupt as error:
+        error.add_note(f"in the check {check.id} of {subject.name}{place_of(error)}")
+        raise
     except CheckSkipped as skipped:
         state, text, untried = "skipped", str(skipped), isinstance(skipped, CheckNotTried)
     except CheckFailed as failed:

@@ -92,7 +92,12 @@ def fresh_ticks(
             "a command and a state; a channel that the gripper lacks is NaN"
         )
         with raises_nothing("step", advice):
-            command, after = step(params, state, reading)
+            returned = step(params, state, reading)
+        demand(
+            isinstance(returned, tuple) and len(returned) == 2,
+            f"step returned {returned!r:.200}: return two things, the Command and the state after this tick",
+        )
+        command, after = returned
         demand(
             isinstance(command, tuple) and len(command) == len(Command._fields),
             f"step returned {command!r} as the command: return graspsense.plugin_api.Command",

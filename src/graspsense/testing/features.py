@@ -70,6 +70,23 @@ def _same(a: Features, b: Features) -> bool:
     return same and repr(a.as_dict()) == repr(b.as_dict())
 
 
+def extracts_in_time(subject: Subject) -> None:
+    """A further `extract` of a whole grasp takes two seconds at most, and leaves no thread running."""
+    set_, trace, took_s = subject.create(), _whole(subject), []
+    _features(subject, trace, set_=set_)
+    # Other work on the computer can hold it up, but hardly twice.
+    for _ in range(2):
+        began = time.perf_counter()
+        with leaving_no_thread("it extracts"):
+            _features(subject, trace, set_=set_)
+        took_s.append(time.perf_counter() - began)
+    demand(
+        min(took_s) <= LONGEST_S,
+        f"extract takes {min(took_s):.1f} s for a grasp of {trace.t_s[-1]:.1f} s, and an evaluation has thousands: "
+        "compute with whole columns in place of loops, or give a form of it in `compiled`",
+    )
+
+
 def returns_the_declared_features(subject: Subject) -> None:
     """Any trace (empty, short, without a channel, with gaps) gives the declared names and units, in their order."""
     declared = tuple((feature.name, feature.unit) for feature in subject.entry.features)
@@ -139,23 +156,6 @@ def same_trace_same_features(subject: Subject) -> None:
             f"called again it gives {again.as_dict()}, not {features.as_dict()}: keep no state between calls and draw "
             "nothing at random",
         )
-
-
-def extracts_in_time(subject: Subject) -> None:
-    """A further `extract` of a whole grasp takes two seconds at most, and leaves no thread running."""
-    set_, trace, took_s = subject.create(), _whole(subject), []
-    _features(subject, trace, set_=set_)
-    # Other work on the computer can hold it up, but hardly twice.
-    for _ in range(2):
-        began = time.perf_counter()
-        with leaving_no_thread("it extracts"):
-            _features(subject, trace, set_=set_)
-        took_s.append(time.perf_counter() - began)
-    demand(
-        min(took_s) <= LONGEST_S,
-        f"extract takes {min(took_s):.1f} s for a grasp of {trace.t_s[-1]:.1f} s, and an evaluation has thousands: "
-        "compute with whole columns in place of loops, or give a form of it in `compiled`",
-    )
 
 
 def same_features_elsewhere(subject: Subject) -> None:
