@@ -98,16 +98,26 @@ def fresh_ticks(
             f"step returned {returned!r:.200}: return two things, the Command and the state after this tick",
         )
         command, after = returned
-        demand(
-            isinstance(command, tuple) and len(command) == len(Command._fields),
-            f"step returned {command!r} as the command: return graspsense.plugin_api.Command",
-        )
+        _demand_command(command)
         ticks.append(Tick(state, reading, command, after))
         state = after
         if getattr(after, "outcome", RUNNING) != RUNNING:
             break
         gripper.apply(command)
     return ticks
+
+
+def _demand_command(command: Any) -> None:
+    demand(
+        isinstance(command, tuple) and len(command) == len(Command._fields),
+        f"step returned {command!r} as the command: return graspsense.plugin_api.Command(kind, value, effort limit, "
+        "speed limit)",
+    )
+    demand(
+        type(command[0]) is int and command[0] in range(len(KINDS)),
+        f"the kind of a command is {command[0]!r} ({type(command[0]).__name__}): use the integers EFFORT, VELOCITY, "
+        "POSITION, FORCE of plugin_api",
+    )
 
 
 def _all_channels(subject: Subject) -> set[str | Channel]:
@@ -225,13 +235,7 @@ def commands_are_numbers(subject: Subject) -> None:
     for tick in ticks_of(subject):
         command = tick.command
         demand(
-            isinstance(command, Command),
-            f"step returned {command!r}: return graspsense.plugin_api.Command(kind, value, effort limit, speed limit)",
-        )
-        demand(
-            type(command.kind) is int,
-            f"the kind of a command is {command.kind!r} ({type(command.kind).__name__}): use the integers EFFORT, "
-            "VELOCITY, POSITION, FORCE of plugin_api",
+            isinstance(command, Command), f"step returned {command!r}: return graspsense.plugin_api.Command"
         )
         for name in ("value", "effort_limit_n", "speed_limit_m_s"):
             number = getattr(command, name)
@@ -245,8 +249,7 @@ def commands_are_of_declared_kinds(subject: Subject) -> None:
     """Every command is of a kind that `commands` lists."""
     for object_name in OBJECTS:
         for tick in ticks_of(subject, object_name):
-            kind = tick.command.kind
-            name = KINDS[kind] if 0 <= kind < len(KINDS) else str(kind)
+            name = KINDS[tick.command.kind]
             demand(
                 name in subject.entry.commands,
                 f"it commands {name} at t = {tick.frame.t_s:.3f} s with {object_name} between the fingers; "

@@ -10,11 +10,12 @@ none of that; a field that is given here is for a class that does not declare it
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any, Final, Literal, NamedTuple
 
 from attrs import Attribute, field, frozen
-from attrs.validators import and_, deep_iterable, ge, in_, instance_of, matches_re, optional
+from attrs.validators import and_, deep_iterable, ge, in_, instance_of, optional
 
 from graspsense.core.values.channel import IS_NAME, Channel
 from graspsense.core.values.errors import suggestion
@@ -42,9 +43,19 @@ def _distinct_channels(entry: object, attribute: Attribute[Any], channels: tuple
             raise ValueError(f"'{attribute.name}' names channel {name!r} twice")
 
 
-_IS_TARGET: Final = [instance_of(str), matches_re(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")]
-_IS_TARGET_OR_EMPTY: Final = [instance_of(str), matches_re(r"([A-Za-z_][\w.]*:[A-Za-z_]\w*)?")]
-_IS_RESOURCE: Final = [instance_of(str), matches_re(r"[A-Za-z_][\w.]*:[^/:][^:]*")]
+def _written_as(pattern: str, example: str) -> Any:
+    """Return the validator of a text of this form, of which the error shows an example."""
+
+    def check(entry: object, attribute: Attribute[Any], text: object) -> None:
+        if not (isinstance(text, str) and re.fullmatch(pattern, text)):
+            raise ValueError(f"'{attribute.name}' is {text!r}: write it as in {example!r}")
+
+    return check
+
+
+_IS_TARGET: Final = _written_as(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*", "lab_hand.backend:LabHand")
+_IS_TARGET_OR_EMPTY: Final = _written_as(r"([A-Za-z_][\w.]*:[A-Za-z_]\w*)?", "lab_hand.backend:LabHand")
+_IS_RESOURCE: Final = _written_as(r"[A-Za-z_][\w.]*:[^/:][^:]*", "lab_hand:pipelines/lab.toml")
 _ARE_KINDS: Final = optional(and_(instance_of(tuple), _known_kinds))
 
 

@@ -132,6 +132,10 @@ def with_plain_commands(step: Step) -> Step:
                 and type(speed_limit) is float
             ):
                 return command, state
+            if not isinstance(kind, int) and not hasattr(kind, "__index__"):
+                raise TypeError(
+                    f"the kind of the command is {kind!r}; EFFORT, VELOCITY, POSITION, FORCE are numbers"
+                )
             plain = Command(_integer(kind), _number(value), _number(effort_limit), _number(speed_limit))
             return plain, state
         except FAILURES as error:

@@ -32,7 +32,13 @@ from graspsense.core.components.entries import (
     ResourceEntry,
     Role,
 )
-from graspsense.core.values.errors import FAILURES, ComponentFailed, ConfigError, PluginUnavailable
+from graspsense.core.values.errors import (
+    FAILURES,
+    ComponentFailed,
+    ConfigError,
+    PluginUnavailable,
+    suggestion,
+)
 
 _ADVICE = {
     "channels": 'write channels = (Channel("gap", "m", 100.0), ...) in the class, all that `read` delivers',
@@ -105,11 +111,14 @@ class Declared(ABC, Generic[EntryT]):
 
     def _import(self, target: str) -> Any:
         """Return what an import string names. Raises PluginUnavailable."""
-        module, _, name = target.partition(":")
+        path, _, name = target.partition(":")
         try:
-            return getattr(importlib.import_module(module), name)
+            module = importlib.import_module(path)
+            if hasattr(module, name):
+                return getattr(module, name)
         except FAILURES as error:  # the import of a third party's module can raise anything
             raise self._unavailable(f"{type(error).__name__}: {error}") from error
+        raise self._unavailable(f"{path} has no {name!r}.{suggestion(name, dir(module))}")
 
     def _unavailable(self, why: str) -> PluginUnavailable:
         needs = getattr(self.entry, "needs", "")
