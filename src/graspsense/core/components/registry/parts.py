@@ -118,7 +118,8 @@ class Declared(ABC, Generic[EntryT]):
                 return getattr(module, name)
         except FAILURES as error:  # the import of a third party's module can raise anything
             raise self._unavailable(f"{type(error).__name__}: {error}") from error
-        raise self._unavailable(f"{path} has no {name!r}.{suggestion(name, dir(module))}")
+        near = suggestion(name, dir(module))
+        raise self._unavailable(f"{path} has no {name!r}" + (near and f".{near}"))
 
     def _unavailable(self, why: str) -> PluginUnavailable:
         needs = getattr(self.entry, "needs", "")
