@@ -17,7 +17,7 @@ from graspsense.core.components.registry import installed
 from graspsense.core.components.strict import ValidationFailed, nearest_path, structured
 from graspsense.core.settings.layers import Flag, Merged, option_layers, typed_path
 from graspsense.core.settings.resolved import Settings, default_paths, resolve
-from graspsense.core.settings.selected import SelectedComponent, build_plausible
+from graspsense.core.settings.selected import SelectedComponent, build
 from graspsense.core.values.errors import ConfigError
 from graspsense.store.opening import STORE, as_source, store_folder
 
@@ -348,7 +348,7 @@ def _alone(table: str, name: str, given: Mapping[str, Any], source: str) -> Sele
     role = next(role for role, name in TABLE_OF_ROLE.items() if name == table)
     values = merged.values
     component = installed().find(role, str(values.pop("type", name)))
-    return SelectedComponent(component, build_plausible(component, values, force=given["force"]))
+    return SelectedComponent(component, build(component, values, force=given["force"]))
 
 
 def _names(text: str | tuple[str, ...] | None) -> tuple[str, ...]:
