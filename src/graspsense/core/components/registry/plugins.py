@@ -76,10 +76,10 @@ class Plugins:
     def __init__(
         self, sources: Iterable[PluginSource], environ: Mapping[str, str], disabled: Iterable[str] = ()
     ) -> None:
-        self._hooks = HookCalls(trace=environ.get(TRACE_VARIABLE) == "1")
+        self._trace = environ.get(TRACE_VARIABLE) == "1"
         self._strict = environ.get(STRICT_VARIABLE) == "1"
         self._statuses: list[PluginStatus] = []
-        self._loaded: list[tuple[PluginStatus, object]] = []
+        self._loaded: list[tuple[PluginStatus, HookCalls]] = []
         self._components: list[Component] = []
         self._resources: list[Resource[Any]] = []
         sources = list(sources)
@@ -176,9 +176,9 @@ class Plugins:
 
     def _answers(self, hook: str, kind: type[AnswerT], **arguments: Any) -> tuple[HookAnswer[AnswerT], ...]:
         answers: list[HookAnswer[AnswerT]] = []
-        for status, plugin in self._implementing(hook):
+        for status, calls in self._implementing(hook):
             try:
-                given = self._hooks.entries(plugin, hook, kind, **arguments)
+                given = calls.entries(hook, kind, **arguments)
                 answers.append(HookAnswer(status.distribution, tuple(given)))
             except FAILURES as error:
                 answers.append(HookAnswer(status.distribution, error=error_text(error)))
@@ -203,11 +203,9 @@ class Plugins:
         implementation raises is left out with a warning.
         """
         results: list[tuple[str, Any]] = []
-        for status, plugin in self._implementing(hook):
-            with self._hooks.isolated(status, hook):
-                results.extend(
-                    (status.distribution, result) for result in self._hooks.call(plugin, hook, **arguments)
-                )
+        for status, calls in self._implementing(hook):
+            with calls.isolated(status, hook):
+                results.extend((status.distribution, result) for result in calls.call(hook, **arguments))
         return tuple(results)
 
     def called(self, status: PluginStatus, hook: str, /, **arguments: Any) -> list[Any]:
@@ -215,8 +213,8 @@ class Plugins:
 
         Returns its result in a list, or an empty list for None.
         """
-        (plugin,) = [plugin for known, plugin in self._loaded if known is status]
-        return self._hooks.call(plugin, hook, **arguments)
+        (calls,) = [calls for known, calls in self._loaded if known is status]
+        return calls.call(hook, **arguments)
 
     def _load(self, source: PluginSource) -> None:
         try:
@@ -224,7 +222,7 @@ class Plugins:
             with contextlib.redirect_stdout(sys.stderr):
                 plugin, cost = imported(source)
                 check_api(plugin, source)
-                status, components, resources = self._registered(plugin, source)
+                calls, components, resources = self._registered(plugin, source)
         except FAILURES as error:
             if self._strict:
                 error.add_note(
@@ -234,47 +232,48 @@ class Plugins:
             broken = _status(source, "broken", error_text(error))
             self._statuses.append(evolve(broken, traceback="".join(traceback.format_exception(error))))
             return
-        status = evolve(status, import_s=cost.processor_s, advice=advice_on(source, cost))
+        status = evolve(
+            _status(source, "loaded"),
+            hooks=calls.hooks,
+            import_s=cost.processor_s,
+            advice=advice_on(source, cost),
+        )
         self._statuses.append(status)
-        self._loaded.append((status, plugin))
+        self._loaded.append((status, calls))
         self._components += components
         self._resources += resources
 
     def _registered(
         self, plugin: object, source: PluginSource
-    ) -> tuple[PluginStatus, list[Component], list[Resource[Any]]]:
-        """Register a plugin and return what it declares. Leaves nothing behind if it is refused."""
-        known_as = self._hooks.registered_as(plugin)
-        if known_as is not None:
-            raise PluginRefused(f"{source.module} is loaded already, as {known_as}")
-        try:
-            hooks = self._hooks.register(plugin, source)
-            components = [
-                Component(entry, source.distribution, source.version)
-                for kind in ROLES.values()
-                if kind.hook in hooks
-                for entry in self._hooks.entries(plugin, kind.hook, kind.entry)
-            ]
-            resources = [
-                Resource(entry, source.distribution, source.version)
-                for kind in RESOURCES
-                if kind.hook in hooks
-                for entry in self._hooks.entries(plugin, kind.hook, kind.entry)
-            ]
-            _check_distinct([*self._components, *components])
-            _check_distinct([*self._resources, *resources])
-        except BaseException:
-            self._hooks.unregister(plugin)
-            raise
-        return evolve(_status(source, "loaded"), hooks=hooks), components, resources
+    ) -> tuple[HookCalls, list[Component], list[Resource[Any]]]:
+        """Return the hooks of a plugin, and what it declares by them. Raises PluginRefused."""
+        for _, known in self._loaded:
+            if known.plugin is plugin:
+                raise PluginRefused(f"{source.module} is loaded already, as {known.name}")
+        calls = HookCalls(plugin, source, self._trace)
+        components = [
+            Component(entry, source.distribution, source.version)
+            for kind in ROLES.values()
+            if kind.hook in calls.hooks
+            for entry in calls.entries(kind.hook, kind.entry)
+        ]
+        resources = [
+            Resource(entry, source.distribution, source.version)
+            for kind in RESOURCES
+            if kind.hook in calls.hooks
+            for entry in calls.entries(kind.hook, kind.entry)
+        ]
+        _check_distinct([*self._components, *components])
+        _check_distinct([*self._resources, *resources])
+        return calls, components, resources
 
-    def _implementing(self, hook: str) -> Iterator[tuple[PluginStatus, object]]:
-        return ((status, plugin) for status, plugin in self._loaded if hook in status.hooks)
+    def _implementing(self, hook: str) -> Iterator[tuple[PluginStatus, HookCalls]]:
+        return ((status, calls) for status, calls in self._loaded if hook in calls.hooks)
 
     def _notify(self, hook: str, **arguments: Any) -> None:
-        for status, plugin in self._implementing(hook):
-            with self._hooks.isolated(status, hook):
-                self._hooks.call(plugin, hook, **arguments)
+        for status, calls in self._implementing(hook):
+            with calls.isolated(status, hook):
+                calls.call(hook, **arguments)
 
     def _only(
         self,
