@@ -83,6 +83,12 @@ def test_built_in_parts_need_no_metadata(site):
     assert plugins.find("feature-set", "chitta").declared().width == "p_first"
 
 
+def test_a_distribution_without_an_entry_point_is_told_apart_from_one_that_is_not_installed(site):
+    plugins = site.discover()
+    assert "graspsense.plugins" in str(plugins.unknown("attrs"))
+    assert "graspsense.plugins" not in str(plugins.unknown("attr"))
+
+
 def test_text_for_an_unknown_name(site):
     site.install("lab-pr2", backend("pr2"))
     site.install("graspsense-hid", BROKEN)

@@ -11,6 +11,7 @@ import os
 import sys
 import traceback
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from importlib.metadata import distributions
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
 
@@ -28,6 +29,7 @@ from graspsense.core.components.entries import (
     Role,
 )
 from graspsense.core.components.firstparty import provider
+from graspsense.core.components.hookspecs import ENTRY_POINT_GROUP
 from graspsense.core.components.registry.discovery import (
     PluginSource,
     builtin_source,
@@ -154,6 +156,12 @@ class Plugins:
                 *(component.name for component in self._components),
             }
         )
+        if name and any(distributions(name=name)):
+            return UnknownName(
+                f"{name} is installed and has no plugin: name its module in its pyproject.toml, under "
+                f'[project.entry-points."{ENTRY_POINT_GROUP}"], as in lab-hand = "lab_hand.plugin", and install it '
+                "again"
+            )
         return UnknownName(
             f"no plugin or component named {name!r}. Known: {', '.join(known)}.{suggestion(name, known)}"
         )
