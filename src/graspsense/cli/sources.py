@@ -115,6 +115,13 @@ _ONLY_FOR: Final = {
 }
 
 
+_SAME_KEYS: Final = (
+    *("only", "label", "instance", "order", "unreliable"),
+    *("instances", "trials", "states_per_instance"),
+)
+"""Options that are keys of `TrialSource` as they are."""
+
+
 def source_options(command: CommandT) -> CommandT:
     """Add the options that say where trials come from; they arrive as keywords for `trials_of`."""
     for option in reversed(_OPTIONS):
@@ -210,26 +217,19 @@ def trials_of(
     kind = kind_of(source)
     _refuse_misplaced(kind)
     values = {
+        **{key: given[key] for key in _SAME_KEYS},
         "source": source,
-        "only": given["only"],
-        "label": given["label"],
-        "instance": given["instance"],
-        "order": given["order"],
         "columns": _names(given["features"]),
         "before": _names(given["before"]),
         "value": given["target_value"],
-        "unreliable": given["unreliable"],
         "objects": _names(given["objects"]),
-        "instances": given["instances"],
-        "trials": given["trials"],
-        "states_per_instance": given["states_per_instance"],
         "checkpoints_s": tuple(checkpoints_s),
     }
     try:
         described = structured(values, TrialSource, source)
     except ValidationFailed as misfit:
         raise ConfigError(
-            "\n".join(f"{dashed(str(problem.path[0]))}: {problem.text}" for problem in misfit.problems)
+            "\n".join(f"{dashed(str(problem.path[0]))}: {problem.words()}" for problem in misfit.problems)
         ) from None
     if kind == SIMULATED and folds is not None:
         from graspsense.evaluation.folds import check_folds

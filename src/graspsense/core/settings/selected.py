@@ -58,7 +58,9 @@ def build(component: Component, values: Mapping[str, Any], *, force: bool = True
     """
 
     def listed(problems: Iterable[InvalidValue]) -> str:
-        return listed_errors([f"{dotted((component.table, *each.path))}: {each.text}" for each in problems])
+        return listed_errors(
+            [f"{dotted((component.table, *each.path))}: {each.words()}" for each in problems]
+        )
 
     try:
         config: Any = structured(values, component.config_class(), component.qualified)
