@@ -13,6 +13,7 @@ import inspect
 import re
 import sys
 from collections.abc import Sequence
+from functools import partial
 from importlib import import_module
 from importlib.resources import files
 from itertools import pairwise
@@ -32,23 +33,9 @@ from graspsense import (
     testing_api,
 )
 from graspsense.core.components import compiled_features, entries, hookspecs, roles, strict
-from graspsense.core.components.entries import DECLARED, TABLE_OF_ROLE
 from graspsense.core.control import contact, free_motion, tick
 from graspsense.core.values import signals
-from graspsense.core.values.channel import Channel, FastChannel, TactileArray
-from graspsense.core.values.device import DeviceInfo
-from graspsense.core.values.features import Features, FeatureTable, Prediction
-from graspsense.core.values.fingers import FingerForce
-from graspsense.core.values.mounting import Mounting
-from graspsense.core.values.reasons import Contribution, FeatureValue, Reason
-from graspsense.core.values.signals import GraspEvent
-from graspsense.core.values.trace import ImageTrace, SampleTrace, Trace
-from graspsense.core.values.trial import RunInfo, Trial
-from graspsense.recording.labelled_recording import LabelledRecording
-from graspsense.recording.replayable import Recording
 from graspsense.scaffold.make import KINDS, plugin_module, words_of
-from graspsense.sources.columns.grasp_columns import GraspColumns, checked_recording
-from graspsense.store.stored_grasps import StoredGrasp
 from graspsense.testing import CHECKS
 from graspsense_sim_gripper.scene.terms import Term
 from graspsense_sim_gripper.scene.terms.registry import TERMS
@@ -65,19 +52,6 @@ TITLES = {
     "dataset": "A reader of a data set",
     "distribution": "A distribution",
 }
-BASES = {
-    "sensor-backend": roles.SensorBackend,
-    "controller": roles.Controller,
-    "feature-set": roles.FeatureSet,
-    "classifier": roles.Classifier,
-}
-HOOKS = {
-    "sensor-backend": "graspsense_sensor_backends",
-    "controller": "graspsense_controllers",
-    "feature-set": "graspsense_feature_sets",
-    "classifier": "graspsense_classifiers",
-}
-ROLE_OF_BASE = {base: role for role, base in BASES.items()}
 HELPERS = {
     "Settings": ("setting",),
     "Contact and rest": (
@@ -99,53 +73,29 @@ HELPERS = {
         *("squeeze", "with_channels", "sample_table", "a_trial"),
     ),
 }
-FURTHER = {
-    "sensor-backend": (
-        "- [A gripper on a network socket](../tcp_gripper.md) has an example with a fake server, the options of the "
-        "conformance checks, and what to do with a single force sensor.",
-    )
+GRIPPER_EXAMPLE = (
+    "- [A gripper on a network socket](../tcp_gripper.md) has an example with a fake server, the options of the "
+    "conformance checks, and what to do with a single force sensor."
+)
+FASTER: dict[str, tuple[str, str, Any, tuple[str, ...]]] = {
+    "controller": ("Free motion in closed form", "free_motion", free_motion, ("FreeMotion", "FreeLimits")),
+    "feature-set": ("A compiled form", "compiled", compiled_features, ("CompiledFeatures", "TickColumns")),
 }
-FASTER: dict[str, tuple[str, str, Any, tuple[Any, ...]]] = {
-    "controller": (
-        "Free motion in closed form",
-        "free_motion",
-        free_motion,
-        (free_motion.FreeMotion, free_motion.FreeLimits),
-    ),
-    "feature-set": (
-        "A compiled form",
-        "compiled",
-        compiled_features,
-        (compiled_features.CompiledFeatures, compiled_features.TickColumns),
-    ),
-}
-"""What a role may declare so that simulated grasps take less time: title, attribute, module and classes."""
-FLOWING: tuple[Any, ...] = (
-    *(signals.Reading, signals.Frame, signals.Pads, signals.Image, signals.Samples, signals.Command),
-    *(Channel, TactileArray, FastChannel, FingerForce, DeviceInfo, Mounting),
-    *(
-        Trace,
-        ImageTrace,
-        SampleTrace,
-        Features,
-        FeatureTable,
-        Prediction,
-        Reason,
-        FeatureValue,
-        Contribution,
-        RunInfo,
-        GraspEvent,
-        Trial,
-    ),
+"""What a role may declare so that simulated grasps take less time: title, attribute, module and names of classes."""
+FLOWING = (
+    *("Reading", "Frame", "Pads", "Image", "Samples", "Command"),
+    *("Channel", "TactileArray", "FastChannel", "FingerForce", "DeviceInfo", "Mounting"),
+    *("Trace", "ImageTrace", "SampleTrace", "Features", "FeatureTable", "Prediction"),
+    *("Reason", "FeatureValue", "Contribution", "RunInfo", "GraspEvent", "Trial"),
 )
 EXAMPLE = "\n\nExample::\n\n"
 """What stands before the example in the docstring of a hook."""
 HEAD = "<!-- Written by docs/role_pages.py from the code: change that. -->\n"
 
 
-def _fields_section(cls: type) -> list[str]:
+def _fields_section(name: str) -> list[str]:
     """Return the section on a class of values: its fields and its meaning."""
-    return [f"## {cls.__name__}", "", f"    {_fields_signature(cls)}", "", _text(cls), ""]
+    return [f"## {name}", "", f"    {_fields_of(public(name))}", "", _text(public(name)), ""]
 
 
 def dataset_page() -> str:
@@ -178,12 +128,12 @@ def dataset_page() -> str:
             "data={NAME: FOLDER})`) reads the sound examples in this folder twice, which must give the same, and then "
             "with an empty file and with a word in each column: the error must name the file and the column.",
             "",
-            *_fields_section(LabelledRecording),
-            *_fields_section(Recording),
-            *_fields_section(GraspColumns),
-            f"`checked_recording(columns)`: {_text(checked_recording)}",
+            *_fields_section("LabelledRecording"),
+            *_fields_section("Recording"),
+            *_fields_section("GraspColumns"),
+            f"`checked_recording(columns)`: {_text(public('checked_recording'))}",
             "",
-            *_fields_section(StoredGrasp),
+            *_fields_section("StoredGrasp"),
             "## Fields of the entry",
             "",
             *_entry(entries.DatasetEntry),
@@ -200,21 +150,21 @@ def page(role: str) -> str:
         return dataset_page()
     lines = [HEAD + f"# {TITLES[role]}", ""]
     if role != "distribution":
-        base: Any = BASES[role]
-        table = TABLE_OF_ROLE[role]  # type: ignore[index]
+        kind = entries.ROLES[role]  # type: ignore[index]
+        base = public(kind.entry.__name__.removesuffix("Entry"))
         lines += [
-            f"This page describes the role `{role}`. A component of this role is selected in the table `[{table}]` "
-            "of a pipeline file.",
+            f"This page describes the role `{role}`. A component of this role is selected in the table "
+            f"`[{kind.table}]` of a pipeline file.",
             "",
             f"- `graspsense plugins new NAME --role {role}` creates a package to start from: the example below.",
             "- `graspsense plugins check NAME` checks whether a component conforms to the role.",
             "- [The tutorial](../tutorial.md) creates a package by hand.",
             "- [Values and units](signals.md) describes the values that pass between components.",
             "- [Helpers](helpers.md) describes the functions and constants that a component is written with.",
-            f"- The hook [{HOOKS[role]}](hooks.md#{HOOKS[role]}) declares components of this role.",
-            *(FURTHER.get(role, ())),
+            f"- The hook [{kind.hook}](hooks.md#{kind.hook}) declares components of this role.",
+            *((GRIPPER_EXAMPLE,) if role == "sensor-backend" else ()),
             "",
-            *_attributes(base),
+            *_attributes(base, kind.declared),
             "## Methods",
             "",
             f"`graspsense.plugin_api.{base.__name__}`: {_text(base)}",
@@ -224,7 +174,7 @@ def page(role: str) -> str:
             *(_faster(*FASTER[role]) if role in FASTER else ()),
             "## Fields of the entry",
             "",
-            *_entry(getattr(entries, f"{base.__name__}Entry")),
+            *_entry(kind.entry),
             "## Complete example",
             "",
             *_example(role),
@@ -251,9 +201,8 @@ def page(role: str) -> str:
 def signals_page() -> str:
     """Return the page of the values that pass between the parts."""
     lines = [HEAD + "# Values and units", "", _text(signals), ""]
-    for cls in FLOWING:
-        lines += _fields_section(cls)
-        lines += _documented_fields(cls)
+    for name in FLOWING:
+        lines += [*_fields_section(name), *_documented_fields(public(name))]
     lines += ["## Channels", "", "| channel | unit |", "|---|---|"]
     lines += [f"| `{name}` | {unit} |" for name, unit in signals.CHANNELS.items()]
     return "\n".join([*lines, ""])
@@ -320,7 +269,7 @@ def terms_page() -> str:
         "",
         "[A term of your own](../simulator.md#a-term-of-your-own) is declared by these fields.",
         "",
-        f"    {_fields_signature(Term)}",
+        f"    {_fields_of(Term)}",
         "",
         _text(Term),
         "",
@@ -407,7 +356,7 @@ def _public_row(home: str, name: str) -> str:
         shown = name if issubclass(value, BaseException | enum.Enum) else _fields_of(value)
     else:
         shown = f"{name}{_signature(value)}"
-    return f"| `{_cell(shown)}` | {_cell(_sentence(inspect.getdoc(value) or ''))} |"
+    return f"| {_cell(f'`{shown}`')} | {_cell(_sentence(inspect.getdoc(value) or ''))} |"
 
 
 def _fields_of(cls: Any) -> str:
@@ -449,9 +398,8 @@ def _constant(name: str) -> str:
     return f"| `{name}` | {public(name):g} | {_cell(_in_a_line(documented[name][1]))}{home} |"
 
 
-def _attributes(base: Any) -> list[str]:
+def _attributes(base: Any, declared: Sequence[str]) -> list[str]:
     """Return what the class of a component declares by attributes."""
-    declared = DECLARED[ROLE_OF_BASE[base]]
     if not declared:
         return []
     lines = ["## What the class declares", "", "| attribute | type | meaning |", "|---|---|---|"]
@@ -506,25 +454,19 @@ def _many() -> list[str]:
     ]
 
 
-def _faster(title: str, attribute: str, module: Any, classes: Sequence[Any]) -> list[str]:
+def _faster(title: str, attribute: str, module: Any, classes: Sequence[str]) -> list[str]:
     """Return the section on what a class may declare so that simulated grasps take less time."""
     lines = [f"## {title}", "", f"`{attribute}` is optional. {_text(module)}", ""]
-    for cls in classes:
-        lines += [f"### {cls.__name__}", "", f"    {_fields_signature(cls)}", ""]
+    for name in classes:
+        cls = public(name)
+        lines += [f"### {name}", "", f"    {_fields_of(cls)}", ""]
         lines += [*_meaning(cls), *_documented_fields(cls), *_docstring_example(cls)]
     return lines
 
 
-def _fields_signature(cls: Any) -> str:
-    """Return the name of a class of attrs or a named tuple, with its fields."""
-    names = getattr(cls, "_fields", None) or tuple(field.name for field in attrs.fields(cls))
-    return f"{cls.__name__}({', '.join(names)})"
-
-
 def _meaning(thing: Any) -> list[str]:
     """Return the docstring up to its example."""
-    text = (inspect.getdoc(thing) or "").partition("\n\n>>> ")[0]
-    return [re.sub(r"(?<!\n)\n(?!\n)", " ", text), ""]
+    return [_text(thing).partition("\n\n>>> ")[0], ""]
 
 
 def _docstring_example(thing: Any) -> list[str]:
@@ -572,19 +514,28 @@ def _example(role: str) -> list[str]:
 
 
 def _cell(text: str) -> str:
-    return text.replace("|", "\\|").replace("[", "\\[")
+    """Return a text for a cell of a table: a bracket begins a link only outside of code."""
+    parts = text.replace("|", "\\|").split("`")
+    parts[::2] = (part.replace("[", "\\[") for part in parts[::2])
+    return "`".join(parts)
+
+
+PAGES = {
+    "signals": signals_page,
+    "hooks": hooks_page,
+    "terms": terms_page,
+    "helpers": helpers_page,
+    "names": names_page,
+    **{role: partial(page, role) for role in TITLES},
+}
+"""Each page in docs/roles, and what gives its text."""
 
 
 def main() -> None:
     """Write every page."""
     FOLDER.mkdir(exist_ok=True)
-    for role in TITLES:
-        (FOLDER / f"{role}.md").write_text(page(role), encoding="utf-8")
-    (FOLDER / "hooks.md").write_text(hooks_page(), encoding="utf-8")
-    (FOLDER / "helpers.md").write_text(helpers_page(), encoding="utf-8")
-    (FOLDER / "names.md").write_text(names_page(), encoding="utf-8")
-    (FOLDER / "signals.md").write_text(signals_page(), encoding="utf-8")
-    (FOLDER / "terms.md").write_text(terms_page(), encoding="utf-8")
+    for name, made in PAGES.items():
+        (FOLDER / f"{name}.md").write_text(made(), encoding="utf-8")
 
 
 if __name__ == "__main__":

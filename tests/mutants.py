@@ -341,6 +341,7 @@ law("step-is-a-plain-function", "staticmethod(step)", step=lambda self, *given: 
 law("params-are-numbers", "annotated float and is 1", params=lambda self: WholeParams(EFFORT, 1))
 law("state-is-numbers", "hold plain floats and ints", init=lambda self: Texts(2, 0, "calm"))
 law("starts-in-the-approach", "begins as APPROACH", init=lambda self: Law.init(self)._replace(phase=SQUEEZE))
+law("types-do-not-change", "the Command and the state", step=staticmethod(lambda *given: step(*given)[0]))
 leaving("types-do-not-change", "keep one type throughout", gap_m=1)
 leaving("ends-every-grasp", "leave RUNNING", outcome=0, phase=lambda after, _: min(after.phase, HOLD))
 leaving("phases-are-in-order", "one way", phase=lambda _, frame: SQUEEZE if frame.t_s < 0.5 else APPROACH)
@@ -565,6 +566,8 @@ describing(OF_HAND, "is declared twice", status_bits=(HOT, HOT))
 describing("hostile-laws-stay-below-the-ceiling", "exerts an effort", relaxed=Command(EFFORT, 5.0, inf, inf))
 describing("objects-can-be-grasped", "give DeviceInfo(simulated=True, ...)", simulated=False)
 
+giving("frames-are-numbers", "return Reading(Frame(...)")(lambda reading: reading.frame)
+giving("closes-in-any-state", "return Reading(Frame(...)")(lambda reading: reading.frame)
 framing("frames-are-numbers", "gap_m of a frame is 0 of type int: write float(...)", gap_m=0)
 framing("channels-are-those-declared", "NaN in all", edge_left_n=nan)
 framing("time-runs-forward", "each is later than the last", t_s=1.0)
@@ -967,6 +970,13 @@ nearest(
     to_json=lambda self: {**self._model, "mean": np.array(self._model["mean"])},
 )
 nearest("single-trials-agree", "predict each trial independently", probabilities=of_all_trials)
+nearest(
+    "finds-features-by-their-names",
+    "features in another order",
+    probabilities=lambda self, table: Nearest.probabilities(
+        self, evolve(table, names=tuple(self._model["features"]))
+    ),
+)
 nearest("handles-missing-values", "fill or skip missing values", probabilities=without_missing)
 fitting(
     "one-label-is-refused-or-certain", "raise ValueError, or learn from", lambda labels: len(set(labels)) < 2

@@ -214,6 +214,7 @@ class Nearest(Classifier[ClassifierConfig]):
         scaled = np.nan_to_num((values - mean) / scale)
         centres = np.array([scaled[which == i].mean(axis=0) for i in range(len(known))])
         self._model = {
+            "features": list(table.names),
             "classes": known,
             "mean": mean.tolist(),
             "scale": scale.tolist(),
@@ -225,7 +226,8 @@ class Nearest(Classifier[ClassifierConfig]):
 
     def probabilities(self, table):
         model = self._model
-        scaled = np.nan_to_num((table.values - np.array(model["mean"])) / np.array(model["scale"]))
+        values = table.columns(model["features"]).values
+        scaled = np.nan_to_num((values - np.array(model["mean"])) / np.array(model["scale"]))
         apart = ((scaled[:, None, :] - np.array(model["centres"])[None]) ** 2).sum(axis=2)
         weight = np.exp(-0.5 * (apart - apart.min(axis=1, keepdims=True)))
         return weight / weight.sum(axis=1, keepdims=True)
@@ -248,7 +250,7 @@ class Nearest(Classifier[ClassifierConfig]):
     def from_json(self, model):
         if len(model["centres"]) != len(model["classes"]):
             raise ValueError("as many centres as classes are needed")
-        self._model = {key: model[key] for key in ("classes", "mean", "scale", "centres")}
+        self._model = {key: model[key] for key in ("features", "classes", "mean", "scale", "centres")}
 
 
 def channels(*names, rate_hz=1000.0):

@@ -132,7 +132,7 @@ def test_a_value_of_several_types_is_asked_for_in_words():
     with pytest.raises(ValidationFailed) as refused:
         structured({"title": "x", "seeds": "a"}, Experiment, "an experiment")
     (problem,) = refused.value.problems
-    assert "or a list" in problem.text
+    assert "or a list" in problem.words()
 
 
 @pytest.fixture

@@ -219,7 +219,7 @@ class Wayward(Nearest):
 @pytest.mark.parametrize("mean", [["raise", 0.0, 0.0], ["x", 0.0, 0.0], [0.0, 0.0]])
 def test_whatever_a_classifier_raises_on_a_file_is_damage_of_the_file(mean):
     entry = evolve(parts.ENTRIES["classifier"], target="test_damaged_models:Wayward")
-    component = Component(entry, "graspsense-test", "0.1", "classifier")
+    component = Component(entry, "graspsense-test", "0.1")
     model = train(component, component.config_class()(), labelled(), name="m")
     kept = as_json(model)
     kept["model"] = {**kept["model"], "mean": mean}

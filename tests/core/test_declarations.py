@@ -14,7 +14,6 @@ from commands import python
 from parts import GentleState, Hand, HandConfig, Peak, PeakConfig
 
 from graspsense.core.components.registry import Component, IsolatedPlugins
-from graspsense.core.components.registry.parts import config_of
 from graspsense.core.components.step_params import params_of
 from graspsense.core.pipeline.wiring import check
 from graspsense.core.settings.resolved import settings_from
@@ -23,7 +22,7 @@ from graspsense.plugin_api import (
     EFFORT,
     VELOCITY,
     Channel,
-    Classifier,
+    ClassifierEntry,
     Controller,
     ControllerEntry,
     Feature,
@@ -78,12 +77,8 @@ class Law(Controller[LawConfig]):
         return GentleState(2, 0, 0.0, 0)
 
 
-def component(role, entry):
-    return Component(entry, "lab", "0.1", role)
-
-
-def part(cls, role="feature-set", entry=FeatureSetEntry, **given):
-    return component(role, entry("a", f"{__name__}:{cls.__name__}", "a thing", **given))
+def part(cls, entry=FeatureSetEntry, **given):
+    return Component(entry("a", f"{cls.__module__}:{cls.__name__}", "a thing", **given), "lab", "0.1")
 
 
 def test_an_entry_is_completed_by_the_class():
@@ -95,8 +90,8 @@ def test_an_entry_is_completed_by_the_class():
 
 def test_the_config_class_is_that_of_the_nearest_base():
     assert part(Summit).config_class() is PeakConfig
-    assert part(Fingers, "sensor-backend", SensorBackendEntry).config_class() is FingersConfig
-    assert config_of(parts.Nearest, Classifier) is parts.ClassifierConfig
+    assert part(Fingers, SensorBackendEntry).config_class() is FingersConfig
+    assert part(parts.Nearest, ClassifierEntry).config_class() is parts.ClassifierConfig
 
 
 class Bare(FeatureSet):

@@ -16,7 +16,7 @@ from grippers import CONTACT_S, REST_S, Scripted, bottle, law, squeezing
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp import runner
 from graspsense.core.grasp.runner import MAY_BE_CLOSED, run_grasp
-from graspsense.core.values.errors import NoDevice, RecordingEnded, TareRefused
+from graspsense.core.values.errors import ComponentFailed, NoDevice, RecordingEnded, TareRefused
 from graspsense.core.values.signals import EFFORT, VELOCITY, Command, Outcome, Phase, Reading
 from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
 from graspsense.testing import gentle
@@ -376,7 +376,7 @@ def test_a_device_whose_clock_stands_still_does_not_squeeze_for_ever():
     [
         (partial(fail, error=NoDevice("looked for a gripper")), NoDevice, None),
         (partial(fail, error=FileNotFoundError()), OSError, "was running"),
-        (lambda seed: None, TypeError, "returned None: return graspsense.plugin_api.DeviceInfo"),
+        (lambda seed: None, ComponentFailed, "returned None: return graspsense.plugin_api.DeviceInfo"),
     ],
 )
 def test_a_gripper_that_cannot_be_opened_is_an_error_that_names_it_and_no_outcome(opened, error, says):

@@ -20,7 +20,7 @@ ROLES = tuple(parts.ENTRIES)
 
 def subject(role, entry):
     given = {"unplugged": parts.HAND_LOST, "absent": parts.HAND_ABSENT} if role == "sensor-backend" else {}
-    return Subject(component=Component(entry, "graspsense-test", "0.1", role), keys={}, **given)
+    return Subject(component=Component(entry, "graspsense-test", "0.1"), keys={}, **given)
 
 
 @pytest.fixture(autouse=True)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 from attrs import evolve, frozen
 
+from graspsense.cli.options import dashed, sets_key
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import is_csv, learner_of, trials_of
 from graspsense.cli.terminal import echo_as_it_is, echo_entries, echo_entry
@@ -67,7 +68,7 @@ def refuse_with_choice(given: Mapping[str, Any]) -> None:
     """Raise UsageError if options are given that do not go together with --choose."""
     for name in ("checkpoints", "calibration_instances", "target_value"):
         if given.get(name):
-            raise click.UsageError(f"--choose does not go with --{name.replace('_', '-')}")
+            raise click.UsageError(f"--choose does not go with {dashed(name)}")
 
 
 def chosen(
@@ -82,7 +83,11 @@ def chosen(
     """
     from graspsense.evaluation.choosing import choose
 
-    names = (classifier or "given",) if classifier or _sets(given, "classifier.type") else CLASSIFIERS
+    names = (
+        (classifier or "given",)
+        if classifier or sets_key(given["options"], "classifier.type")
+        else CLASSIFIERS
+    )
     learners = {name: learner_of(source, None if name == "given" else name, given) for name in names}
     learners = {learner.component.name: learner for learner in learners.values()}
     notes: list[str] = []
@@ -122,11 +127,6 @@ def _pairs(
     return quick
 
 
-def _sets(given: Mapping[str, Any], key: str) -> bool:
-    """Return whether an option -o gives this key."""
-    return any(option.partition("=")[0].strip() == key for option in given["options"])
-
-
 def _tables(
     source: str, progress: ProgressLine, given: Mapping[str, Any], notes: list[str]
 ) -> dict[str, Labelled]:
@@ -139,7 +139,7 @@ def _tables(
 
     if is_csv(source):
         return {"columns": trials_of(source, progress, given)}
-    if _sets(given, "features.type"):
+    if sets_key(given["options"], "features.type"):
         trials = trials_of(source, progress, given)
         features = trials.provenance.get("settings", {}).get("features", {})
         return {str(features.get("type", "given")).rpartition("/")[2]: trials}

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
-import click
-
+from graspsense.cli.options import refuse_typed
 from graspsense.cli.output import echo_json
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import detector_of
@@ -30,10 +29,7 @@ def evaluate_events(
     source: str, tolerance_s: float, folds: int, as_json: bool, given: Mapping[str, Any]
 ) -> None:
     """Score the events, and print how well each kind is told."""
-    context = click.get_current_context()
-    for name in _FOR_LABELS:
-        if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
-            raise click.UsageError(f"--{name.replace('_', '-')} has no meaning with --events", context)
+    refuse_typed(_FOR_LABELS, "has no meaning with --events")
     evaluation = _evaluated(source, tolerance_s, folds, given)
     if as_json:
         echo_json(to_json(evaluation))

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import click
 
-from graspsense.cli.options import Seconds, pipeline_options, settings_of
+from graspsense.cli.options import Seconds, pipeline_options, sets_key, settings_of
 from graspsense.cli.run import finish, grasped, print_trial
 from graspsense.cli.terminal import talk
 from graspsense.core.pipeline.wiring import check
@@ -36,7 +36,7 @@ def hold(seconds: float, **asked: Any) -> None:
     Without --pipeline it is the pipeline hold of graspsense-romano, with a simulated gripper. The fingers open at the
     end, on Ctrl-C, and when the gripper or the object is lost. Exit codes are those of run.
     """
-    if any(option.partition("=")[0].strip() == "run.hold_s" for option in asked["options"]):
+    if sets_key(asked["options"], "run.hold_s"):
         raise click.UsageError("--seconds sets run.hold_s: leave out -o run.hold_s")
     lasting = (f"run.hold_s={seconds}", f"run.grasp_timeout_s={max(seconds + TO_GRASP_S, 300.0)}")
     options = (*lasting, *asked["options"])

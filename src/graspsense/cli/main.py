@@ -34,7 +34,7 @@ COMMANDS: Final[dict[str, tuple[str, str]]] = {
     "collect": ("graspsense.cli.collect:collect", "Collect labelled trials with an operator."),
     "replay": ("graspsense.cli.replay:replay", "Process a recording with a pipeline."),
     "recover": ("graspsense.cli.recover:recover", "Complete recordings of a killed program."),
-    "verify": ("graspsense.cli.verify:verify", "Check a store or a recording for damage."),
+    "verify": ("graspsense.cli.recover:verify", "Check a store or a recording for damage."),
     "trials": ("graspsense.cli.trials:trials", "List, relabel and set aside stored trials."),
     "export": ("graspsense.cli.export:export", "Export trials or a recording."),
     "import": ("graspsense.cli.import_:import_", "Import recordings of other programs."),
@@ -56,7 +56,7 @@ COMMANDS: Final[dict[str, tuple[str, str]]] = {
     "devices": ("graspsense.cli.devices:devices", "List connected grippers."),
     "doctor": ("graspsense.cli.doctor:doctor", "Diagnose plugins, permissions and devices."),
     "emulate": ("graspsense.cli.emulate:emulate", "Emulate a gripper as a device of this machine."),
-    "completion": ("graspsense.cli.completion:completion", "Print the completion script for a shell."),
+    "completion": ("graspsense.cli.main:completion", "Print the completion script for a shell."),
 }
 """Name to import string and summary of each command of our own."""
 
@@ -121,6 +121,21 @@ def cli(ctx: click.Context) -> None:
         echo_as_it_is(ctx.get_help())
 
 
+@click.command()
+@click.argument("shell", type=click.Choice(["bash", "zsh", "fish"]))
+def completion(shell: str) -> None:
+    """Print the completion script for a shell.
+
+    For bash: eval "$(graspsense completion bash)", in ~/.bashrc to keep it. The same for zsh in ~/.zshrc; for
+    fish: graspsense completion fish > ~/.config/fish/completions/graspsense.fish
+    """
+    from click.shell_completion import get_completion_class
+
+    kind = get_completion_class(shell)
+    assert kind is not None, "the choice above names shells that click knows"
+    echo_as_it_is(kind(cli, {}, PROGRAM, COMPLETION_VARIABLE).source())
+
+
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command line and exit with its code; no argument means the process's own."""
     if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.errors == "strict":
@@ -162,9 +177,9 @@ def _exit_code(arguments: list[str]) -> int:
     ) as error:  # a group without a subcommand: the message is its help
         echo_as_it_is(error.format_message(), err=True)
         return ExitCode.WRONG_USE
-    except (click.Abort, KeyboardInterrupt):
+    except (click.Abort, KeyboardInterrupt) as ended:
         with suppress(OSError):  # the terminal may have gone
-            echo_as_it_is("interrupted", err=True)
+            echo_as_it_is("\n  ".join(["interrupted", *getattr(ended, "__notes__", ())]), err=True)
         _flush_stdout()
         return ExitCode.INTERRUPTED
     except BrokenPipeError:

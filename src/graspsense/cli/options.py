@@ -99,11 +99,33 @@ def pipeline_options(command: CommandT) -> CommandT:
     return command
 
 
+def sets_key(options: Sequence[str], key: str) -> bool:
+    """Return whether an option -o gives this key."""
+    return any(option.partition("=")[0].strip() == key for option in options)
+
+
 def names_object(object_name: str | None, options: Sequence[str]) -> bool:
     """Return whether these options say which object a simulated gripper holds."""
-    return object_name is not None or any(
-        option.partition("=")[0].strip() == "gripper.object" for option in options
-    )
+    return object_name is not None or sets_key(options, "gripper.object")
+
+
+def typed() -> list[str]:
+    """Return the names of the parameters of the running command that the user has typed, in their order."""
+    context, by_user = click.get_current_context(), click.core.ParameterSource.COMMANDLINE
+    names = [str(param.name) for param in context.command.params]
+    return [name for name in names if context.get_parameter_source(name) is by_user]
+
+
+def dashed(name: str) -> str:
+    """Return an option as it is typed, given the name of its parameter."""
+    return f"--{name.replace('_', '-')}"
+
+
+def refuse_typed(names: Sequence[str], why: str) -> None:
+    """Raise UsageError for an option among these that the user has typed: `--png` and why not."""
+    for name in typed():
+        if name in names:
+            raise click.UsageError(f"{dashed(name)} {why}", click.get_current_context())
 
 
 def contradiction(settings: Settings, label: str) -> click.UsageError:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
 from pathlib import Path
 from secrets import randbelow
 from typing import TYPE_CHECKING, Any, Final
@@ -38,12 +39,16 @@ from graspsense.store.labels import agrees, check_label, labels_of
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from graspsense.core.grasp.pair import Member
     from graspsense.core.grasp.sinks import Sink
     from graspsense.core.settings.resolved import Settings
     from graspsense.core.values.device import DeviceInfo
     from graspsense.core.values.features import Prediction
     from graspsense.report.film import Film
+    from graspsense.store.record_grasp import RecordedTrial
 
+Ended = tuple["Trial", bool, dict[str, Any] | None]
+"""A trial, whether it was interrupted, and what is printed about the stored trial."""
 LARGEST_DRAWN_SEED: Final = 999_999
 MANY_GUARDED: Final = 0.1
 """Share of the ticks of a grasp from which on `run` names the settings by which the guard limits the approach."""
@@ -114,11 +119,7 @@ def run(
         )
     if explain_model:
         asked["options"] = (*asked["options"], "gripper.explain=true")
-    settings = _labelled_settings(label, asked)
-    drawn = save is not None and settings.origins["run.seed"] == "default"
-    if drawn:  # a grasp with the seed of another one is a copy of it, not another trial
-        asked["seed"] = randbelow(LARGEST_DRAWN_SEED + 1)
-        settings = _labelled_settings(label, asked)
+    settings, drawn = _settings_to_run(save, label, asked)
     check(settings)
     if dry_run:
         _say_what_would_be_done(settings, as_json)
@@ -132,8 +133,8 @@ def run(
     sinks: tuple[Sink, ...] = film if as_json else (LiveRows(), *film)
     with shown_live(live, save) as shown:
         trial, interrupted, kept = _performed(settings, (*sinks, *shown.sinks), save, label, changed)
-        if drawn:
-            talk(f"seed {asked['seed']}, drawn for this trial; --seed {asked['seed']} repeats the grasp")
+        if drawn is not None:
+            talk(f"seed {drawn}, drawn for this trial; --seed {drawn} repeats the grasp")
         shown.finished(trial, save)
         if as_json:
             echo_json(_as_json(trial, kept))
@@ -149,7 +150,7 @@ def run(
 
 def _performed(
     settings: Settings, sinks: Sequence[Sink], save: str | None, label: str | None, changed: bool
-) -> tuple[Trial, bool, dict[str, Any] | None]:
+) -> Ended:
     """Grasp, and return the trial, whether it was interrupted, and its place in a store if it is saved."""
     if save is None:
         return (*grasped(settings, sinks), None)
@@ -163,14 +164,19 @@ def _run_beside(
 
     Ends the command with the exit code of the first trial that was not kept or did not end by itself.
     """
-    from graspsense.cli.run_beside import grasp_beside
+    from graspsense.core.grasp.pair import run_pair
 
-    other = _labelled_settings(label, {"pipeline": pipeline})
-    if save is not None and other.origins["run.seed"] == "default":
-        drawn = randbelow(LARGEST_DRAWN_SEED + 1)
-        other = _labelled_settings(label, {"pipeline": pipeline, "seed": drawn})
+    other, _ = _settings_to_run(save, label, {"pipeline": pipeline})
     check(other)
-    both = grasp_beside(settings, other, save, label)
+    recordings = _reserved(save)
+
+    def grasp(member: Member, own: Settings, place: int) -> tuple[Ended, str]:
+        ended = _beside(member, own, save, label, recordings[place:] + recordings[:place])
+        trial = ended[0]
+        failed = trial.outcome in (Outcome.ABORTED, Outcome.DEVICE_LOST)
+        return ended, f"ended as {trial.outcome.words} ({trial.reason})" if failed else ""
+
+    both = run_pair(lambda member: grasp(member, settings, 0), lambda member: grasp(member, other, 1))
     if as_json:
         echo_json({"grippers": [_as_json(trial, kept) for trial, _, kept in both]})
     for trial, _, kept in () if as_json else both:
@@ -183,17 +189,58 @@ def _run_beside(
         finish(trial, interrupted, "" if kept is None else kept["problem"])
 
 
+def _reserved(save: str | None) -> tuple[Path, ...]:
+    """Return the paths of the two recordings of a pair; none where nothing is kept."""
+    from graspsense.store.store import Store
+
+    if save is None:
+        return ()
+    with Store.open(save) as store:
+        made_at = datetime.now(UTC).isoformat(timespec="milliseconds")
+        return store.new_recording(made_at), store.new_recording(made_at)
+
+
+def _beside(
+    member: Member, settings: Settings, save: str | None, label: str | None, recordings: Sequence[Path]
+) -> Ended:
+    """Grasp as one of a pair, and store the trial if it is to be kept; `recordings`: of this gripper and the other.
+
+    It is not compared with those that are in the store.
+    """
+    from graspsense.store.record_grasp import Beside, record_grasp
+    from graspsense.store.store import Store
+
+    if save is None:
+        return (*grasped(settings, (), member), None)
+    own, other = recordings
+    labels = {} if label is None else labels_of(label)
+    beside = Beside(member=member, recording=own, other=other.name)
+    with Store.open(save) as store:
+        grasp = record_grasp(store, settings, installed(), labels=labels, origin="run", beside=beside)
+    return grasp.trial, grasp.interrupted, {**_place(save, grasp), "beside": other.name}
+
+
+def _place(save: str, grasp: RecordedTrial) -> dict[str, Any]:
+    """Return what is printed about a stored trial."""
+    return {
+        "store": save,
+        "trial": grasp.number,
+        "recorder": dict(grasp.counts),
+        "problem": grasp.problem,
+    }
+
+
 def _as_json(trial: Trial, kept: Mapping[str, Any] | None) -> dict[str, Any]:
     """Return a trial as JSON values, with what is known of its place in a store."""
     return {**trial_as_json(trial), **({} if kept is None else {"kept": kept})}
 
 
-def grasped(settings: Settings, sinks: Sequence[Sink]) -> tuple[Trial, bool]:
-    """Grasp, and return the trial and whether it was interrupted."""
+def grasped(settings: Settings, sinks: Sequence[Sink], beside: Member | None = None) -> tuple[Trial, bool]:
+    """Grasp, as one of a pair with `beside`, and return the trial and whether it was interrupted."""
     from graspsense.core.pipeline.pipeline import GraspInterrupted, grasp_with
 
     try:
-        return grasp_with(settings, installed(), sinks=sinks), False
+        return grasp_with(settings, installed(), sinks=sinks, beside=beside), False
     except GraspInterrupted as error:
         return error.trial, True
 
@@ -228,6 +275,18 @@ def _print_model(trial: Trial) -> None:
         if "selection" in trial.report:
             print_without(trial.report["model"].get("without", ()), trial.report["selection"]["accuracy"])
             print_selection(trial.report["selection"])
+
+
+def _settings_to_run(
+    save: str | None, label: str | None, asked: Mapping[str, Any]
+) -> tuple[Settings, int | None]:
+    """Return the settings of a grasp, and the seed that was drawn for it; None where it was not drawn."""
+    settings = _labelled_settings(label, asked)
+    if save is None or settings.origins["run.seed"] != "default":
+        return settings, None
+    # A grasp with the seed of another one is a copy of it, not another trial.
+    drawn = randbelow(LARGEST_DRAWN_SEED + 1)
+    return _labelled_settings(label, {**asked, "seed": drawn}), drawn
 
 
 def _labelled_settings(label: str | None, asked: Mapping[str, Any]) -> Settings:
@@ -301,13 +360,7 @@ def _kept(
         talk(f"kept as trial {grasp.number} in {save}")
         if grasp.counts["dropped"]:
             warn(f"the recorder could not follow: {grasp.counts['dropped']} messages are missing")
-    kept = {
-        "store": save,
-        "trial": grasp.number,
-        "recorder": dict(grasp.counts),
-        "problem": grasp.problem,
-    }
-    return grasp.trial, grasp.interrupted, kept
+    return grasp.trial, grasp.interrupted, _place(save, grasp)
 
 
 def print_trial(trial: Trial, *, events: bool = True) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
-from graspsense.cli.options import SEED, force_option, keys_option
+from graspsense.cli.options import SEED, dashed, force_option, keys_option, refuse_typed, typed
 from graspsense.cli.output import file_to_write
 from graspsense.cli.progress import ProgressLine
 from graspsense.core.components.entries import TABLE_OF_ROLE
@@ -17,7 +17,7 @@ from graspsense.core.components.registry import installed
 from graspsense.core.components.strict import ValidationFailed, nearest_path, structured
 from graspsense.core.settings.layers import Flag, Merged, option_layers, typed_path
 from graspsense.core.settings.resolved import Settings, default_paths, resolve
-from graspsense.core.settings.selected import SelectedComponent, build_plausible
+from graspsense.core.settings.selected import SelectedComponent, build
 from graspsense.core.values.errors import ConfigError
 from graspsense.store.opening import STORE, as_source, store_folder
 
@@ -115,6 +115,13 @@ _ONLY_FOR: Final = {
 }
 
 
+_SAME_KEYS: Final = (
+    *("only", "label", "instance", "order", "unreliable"),
+    *("instances", "trials", "states_per_instance"),
+)
+"""Options that are keys of `TrialSource` as they are."""
+
+
 def source_options(command: CommandT) -> CommandT:
     """Add the options that say where trials come from; they arrive as keywords for `trials_of`."""
     for option in reversed(_OPTIONS):
@@ -210,26 +217,19 @@ def trials_of(
     kind = kind_of(source)
     _refuse_misplaced(kind)
     values = {
+        **{key: given[key] for key in _SAME_KEYS},
         "source": source,
-        "only": given["only"],
-        "label": given["label"],
-        "instance": given["instance"],
-        "order": given["order"],
         "columns": _names(given["features"]),
         "before": _names(given["before"]),
         "value": given["target_value"],
-        "unreliable": given["unreliable"],
         "objects": _names(given["objects"]),
-        "instances": given["instances"],
-        "trials": given["trials"],
-        "states_per_instance": given["states_per_instance"],
         "checkpoints_s": tuple(checkpoints_s),
     }
     try:
         described = structured(values, TrialSource, source)
     except ValidationFailed as misfit:
         raise ConfigError(
-            "\n".join(f"--{_dashed(problem.path[0])}: {problem.text}" for problem in misfit.problems)
+            "\n".join(f"{dashed(str(problem.path[0]))}: {problem.words()}" for problem in misfit.problems)
         ) from None
     if kind == SIMULATED and folds is not None:
         from graspsense.evaluation.folds import check_folds
@@ -286,12 +286,11 @@ def command_line(without: Sequence[str], command: str = "") -> str:
     """Return the command that is running, or another one with its arguments, without some of its options."""
     context = click.get_current_context()
     words = ["graspsense", command or str(context.info_name)]
+    by_user = set(typed()).difference(without)
     for param in context.command.params:
-        name = str(param.name)
-        typed = context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
-        if name in without or not typed:
+        if param.name not in by_user:
             continue
-        value = context.params[name]
+        value = context.params[param.name]
         if isinstance(param, click.Argument):
             words.append(str(value))
         elif isinstance(param, click.Option) and param.is_flag:
@@ -302,21 +301,14 @@ def command_line(without: Sequence[str], command: str = "") -> str:
     return shlex.join(words)
 
 
-def _dashed(name: object) -> str:
-    """Return the name of an option without its dashes in front."""
-    return str(name).replace("_", "-")
-
-
 def _refuse_misplaced(kind: str) -> None:
     """Refuse options that say nothing about this kind of source. Raises UsageError."""
-    context = click.get_current_context()
     for owner, names in _ONLY_FOR.items():
-        for name in names:
-            from_user = context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
-            if from_user and owner != kind:
-                other = ": a feature set is selected by -o features.type=NAME" if name == "features" else ""
-                kinds = f"a source of the kind {owner!r}; this one is of the kind {kind!r}"
-                raise click.UsageError(f"--{_dashed(name)} is for {kinds}{other}", context)
+        if owner != kind:
+            why = f"is for a source of the kind {owner!r}; this one is of the kind {kind!r}"
+            if "features" in names:
+                refuse_typed(["features"], f"{why}: a feature set is selected by -o features.type=NAME")
+            refuse_typed(names, why)
 
 
 def _settings(source: str, given: Mapping[str, Any], classifier: str | None) -> Settings:
@@ -356,7 +348,7 @@ def _alone(table: str, name: str, given: Mapping[str, Any], source: str) -> Sele
     role = next(role for role, name in TABLE_OF_ROLE.items() if name == table)
     values = merged.values
     component = installed().find(role, str(values.pop("type", name)))
-    return SelectedComponent(component, build_plausible(component, values, force=given["force"]))
+    return SelectedComponent(component, build(component, values, force=given["force"]))
 
 
 def _names(text: str | tuple[str, ...] | None) -> tuple[str, ...]:

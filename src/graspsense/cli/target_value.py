@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 from attrs import evolve
 
+from graspsense.cli.options import refuse_typed
 from graspsense.cli.output import echo_found, echo_json
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import command_line, keep_features, to_predict, trials_of
@@ -29,15 +30,12 @@ _FOR_LABELS: Final = ("png", "target", "checkpoints")
 
 def refuse_options_for_labels(options: Sequence[str]) -> None:
     """Refuse options that mean nothing for a number. Raises UsageError."""
-    context = click.get_current_context()
-    for name in _FOR_LABELS:
-        if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
-            raise click.UsageError(f"--{name} is for labels, and --target-value names a number", context)
+    refuse_typed(_FOR_LABELS, "is for labels, and --target-value names a number")
     for option in options:
         if option.partition(".")[0].strip() == "classifier":
             raise click.UsageError(
                 f"-o {option}: the estimators of numbers have no settings; select one with --classifier",
-                context,
+                click.get_current_context(),
             )
 
 

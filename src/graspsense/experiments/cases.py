@@ -15,7 +15,7 @@ from graspsense.core.components.strict import InvalidValue, ValidationFailed, pl
 from graspsense.core.learn.copies import without_copies
 from graspsense.core.settings.layers import Layer, Merged, dotted
 from graspsense.core.settings.resolved import Settings, resolve
-from graspsense.core.settings.selected import build_plausible
+from graspsense.core.settings.selected import build
 from graspsense.core.values.errors import ConfigError, GraspsenseError, counted, suggestion
 from graspsense.core.values.limits import CASES
 from graspsense.experiments.experiment import (
@@ -282,7 +282,7 @@ class CasePlan:
                     _put(keys, path[1:], value)
                 try:
                     component = installed().find("classifier", str(keys.pop("type")))
-                    config = _fresh(build_plausible(component, keys, force=self.force))
+                    config = _fresh(build(component, keys, force=self.force))
                 except KeyError:
                     self.complaints.append(
                         self.layer.complain(

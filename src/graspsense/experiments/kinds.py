@@ -9,7 +9,6 @@ from typing import Any
 from attrs import frozen
 
 from graspsense.core.components.entries import ExperimentKindEntry
-from graspsense.core.components.experiment_kind import class_of_kind
 from graspsense.core.components.registry import Resource, installed
 from graspsense.core.values.errors import ComponentFailed
 from graspsense.core.values.json_values import json_text
@@ -35,7 +34,7 @@ class TaskKind:
 
     def keys_class(self) -> type:
         """Return the class of the keys under `[judge]`."""
-        cls: type = class_of_kind(self.declared, "keys")
+        cls: type = self.declared.class_of_kind("keys")
         return cls
 
     def result_class(self) -> type:
@@ -44,7 +43,7 @@ class TaskKind:
             from graspsense.experiments.task_results import RecognitionResult
 
             return RecognitionResult
-        cls: type = class_of_kind(self.declared, "result")
+        cls: type = self.declared.class_of_kind("result")
         return cls
 
     def encoded(self, returned: Any) -> Any:

@@ -108,7 +108,7 @@ def load_trials(
         described = structured({**keys, "source": source}, TrialSource, source)
     except ValidationFailed as misfit:
         raise ConfigError(
-            "\n".join(f"{problem.path[0]}: {problem.text}" for problem in misfit.problems)
+            "\n".join(f"{problem.path[0]}: {problem.words()}" for problem in misfit.problems)
         ) from None
     settings = cache(lambda: resolve(pipeline, options=options, flags=gripper_flags(source)))
     return without_copies(

@@ -26,18 +26,16 @@ from graspsense.core.values.signals import (
     Outcome,
     Pads,
 )
-from graspsense.testing import commands, component, protection, readings, recorded
 from graspsense.testing.checks import (
     CheckFailed,
     CheckNotTried,
     CheckSkipped,
-    checks_of,
     demand,
     leaving_no_thread,
     raises_nothing,
 )
 from graspsense.testing.gentle import EFFORT_N, FORCE_N, REST_S, GentleController, kind_of
-from graspsense.testing.session import TIMEOUT_S, readings_of
+from graspsense.testing.session import TIMEOUT_S, description, next_reading, opened, readings_of
 from graspsense.testing.subject import Subject
 
 GRACE_S: Final = 1.0
@@ -100,8 +98,7 @@ def pads_can_be_zeroed(subject: Subject) -> None:
     info, declared = subject.session.info, {channel.name for channel in subject.entry.channels}
     if not info.tare_images or not declared & {"force_left", "force_right"}:
         raise CheckSkipped("this gripper is not tared")
-    with closing(subject.create()) as backend:
-        info = backend.open(0)
+    with opened(subject) as (backend, info):
         with (
             raises_nothing("a tare without images", ": raise TareRefused with what to do"),
             suppress(TareRefused),
@@ -109,7 +106,7 @@ def pads_can_be_zeroed(subject: Subject) -> None:
             backend.tare([])
         images: list[Pads] = []
         for _ in range(int(5.0 * info.rate_hz)):
-            reading = backend.read(TIMEOUT_S)
+            reading = next_reading(backend)
             newest = images[-1].counter if images else 0
             if reading is not None and reading.pads.counter > newest:
                 images.append(reading.pads)
@@ -123,7 +120,7 @@ def pads_can_be_zeroed(subject: Subject) -> None:
         backend.tare(images)
         forces = []
         for _ in range(20):
-            reading = backend.read(TIMEOUT_S)
+            reading = next_reading(backend)
             backend.apply(info.relaxed)
             if reading is not None:
                 forces += [reading.frame.force_left_n, reading.frame.force_right_n]
@@ -144,7 +141,7 @@ def closes_in_any_state(subject: Subject) -> None:
         for attempt in ("the first", "the second"):
             stage = f"after {attempt} opening"
             with leaving_no_thread("it is opened") if attempt == "the second" else nullcontext():
-                info = backend.open(0)
+                info = description(backend.open(0))
                 _first_frame(backend)
                 backend.apply(info.relaxed)
                 backend.close()
@@ -160,7 +157,7 @@ def closes_in_any_state(subject: Subject) -> None:
 
 def _first_frame(backend: SensorBackend[Any]) -> Frame:
     for _ in range(20):
-        reading = backend.read(TIMEOUT_S)
+        reading = next_reading(backend)
         if reading is not None:
             return reading.frame
     raise CheckFailed("no frame came after it was opened again")
@@ -173,8 +170,7 @@ def same_seed_same_frames(subject: Subject) -> None:
     texts = []
     for _ in range(2):
         readings: list[str] = []
-        with closing(subject.create()) as backend, suppress(RecordingEnded):
-            info = backend.open(3)
+        with opened(subject, seed=3) as (backend, info), suppress(RecordingEnded):
             for _ in range(100):
                 readings.append(repr(backend.read(TIMEOUT_S)))
                 backend.apply(info.opening or info.relaxed)
@@ -288,8 +284,7 @@ def performs_a_whole_grasp(subject: Subject) -> None:
 
 def reports_plain_values(subject: Subject) -> None:
     """`report` returns numbers, text and booleans that JSON represents, while it is open and after it was closed."""
-    with closing(subject.create()) as backend:
-        backend.open(0)
+    with opened(subject) as (backend, _):
         reports = [backend.report()]
     reports.append(backend.report())
     for report in reports:
@@ -307,7 +302,7 @@ def dry_run_accepts_the_same_commands(subject: Subject) -> None:
         f"dry_run_backend returned {other!r}: return a SensorBackend or None",
     )
     with closing(other):
-        info = other.open(0)
+        info = description(other.open(0))
         demand(
             info.opening is None or KINDS[info.opening.kind] in subject.entry.accepts,
             f"the gripper of a dry run opens with {info.opening}, of a kind that the real one does not accept",
@@ -321,8 +316,7 @@ def reports_a_lost_device(subject: Subject) -> None:
         raise CheckNotTried(
             "no settings were given under which it vanishes (--unplugged, or `unplugged` in a test)"
         )
-    with closing(subject.create(**subject.unplugged)) as backend:
-        info = backend.open(0)
+    with opened(subject, **subject.unplugged) as (backend, info):
         text = _lost(backend, info.relaxed, info.rate_hz)
     demand(len(text) > 10, f"DeviceLost says {text!r}: say which gripper, and what to look at")
     grasp = run_uninterrupted(
@@ -370,46 +364,3 @@ def reports_a_missing_device(subject: Subject) -> None:
     took = time.perf_counter() - began
     demand(took < LONGEST_OPEN_S, f"it took {took:.1f} s to say so: `open` is bounded in time")
     demand(len(text) > 20, f"NoDevice says {text!r}: say what was searched for, where, and what to try")
-
-
-CHECKS: Final = (
-    *component.CHECKS,
-    *checks_of(
-        describes_itself,
-        commands.opening_and_relaxing_are_accepted,
-        opens_and_closes_in_time,
-        readings.frames_are_numbers,
-        readings.channels_follow_from_the_settings,
-        readings.channels_are_those_declared,
-        readings.signals_are_those_declared,
-        readings.images_stay_as_they_were_delivered,
-        readings.signals_have_no_gaps_or_repeats,
-        readings.fingers_are_those_declared,
-        readings.time_runs_forward,
-        readings.rate_is_as_declared,
-        readings.images_count_up,
-        readings.gap_is_in_metres,
-        readings.forces_are_in_newtons,
-        commands.velocity_is_the_rate_of_the_gap,
-        commands.closing_closes,
-        commands.stays_within_its_limits,
-        commands.says_what_commands_become,
-        commands.accepts_every_declared_kind,
-        read_returns_within_its_timeout,
-        pads_can_be_zeroed,
-        closes_in_any_state,
-        same_seed_same_frames,
-        expect_accepts_any_controller,
-        objects_can_be_grasped,
-        performs_a_whole_grasp,
-        squeezes_with_what_it_is_asked,
-        recorded.what_it_delivers_is_kept,
-        reports_plain_values,
-        dry_run_accepts_the_same_commands,
-        reports_a_lost_device,
-        reports_a_missing_device,
-        protection.declares_what_protects,
-        protection.hostile_laws_stay_below_the_ceiling,
-        protection.a_silent_pad_ends_the_grasp,
-    ),
-)

@@ -9,7 +9,8 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout
 from io import StringIO
-from typing import Any, Literal
+from types import ModuleType
+from typing import Any, Final, Literal
 
 import numpy as np
 from attrs import define, field, frozen
@@ -38,6 +39,10 @@ class CheckNotTried(CheckSkipped):
     """The reason why a check that may apply was not tried: what it needs was not given."""
 
 
+_SIGNATURES: Final = ({"subject": "Subject", "return": "None"}, {"package": "Package", "return": "None"})
+"""The annotations of a function that is a check."""
+
+
 @frozen
 class Check:
     """One requirement. Its title is the first line of the docstring of its function."""
@@ -63,15 +68,19 @@ class Result:
     """Whether it was skipped because what it needs was not given."""
 
 
-def checks_of(*functions: Callable[[Any], None]) -> tuple[Check, ...]:
-    """Return a check for each of these functions, with its name."""
+def checks_of(*modules: ModuleType) -> tuple[Check, ...]:
+    """Return the checks that these modules define: their public functions of a subject alone, which return nothing."""
     return tuple(
         Check(
-            function.__name__.replace("_", "-"),
+            name.replace("_", "-"),
             (function.__doc__ or "").partition("\n")[0].rstrip("."),
             function,
         )
-        for function in functions
+        for module in modules
+        for name, function in vars(module).items()
+        if getattr(function, "__module__", "") == module.__name__
+        and not name.startswith("_")
+        and getattr(function, "__annotations__", {}) in _SIGNATURES
     )
 
 
@@ -156,6 +165,9 @@ def outcome_of(check: Check, subject: Any, expected: Mapping[str, str]) -> Resul
     try:
         with _leaving_nothing():
             check.test(subject)
+    except KeyboardInterrupt as error:
+        error.add_note(f"in the check {check.id} of {subject.name}{place_of(error)}")
+        raise
     except CheckSkipped as skipped:
         state, text, untried = "skipped", str(skipped), isinstance(skipped, CheckNotTried)
     except CheckFailed as failed:

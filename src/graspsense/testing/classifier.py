@@ -11,13 +11,15 @@ from typing import Any, Final
 
 import numpy as np
 from attrs import evolve
+from numpy.typing import NDArray
 
+from graspsense.core.components.roles import ClassifierConfig
 from graspsense.core.learn.model import refuse_improbable, refuse_unsupported
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.features import FeatureTable, Prediction
 from graspsense.core.values.reasons import TreeNode
-from graspsense.testing import component
-from graspsense.testing.checks import CheckFailed, checks_of, demand, leaving_no_thread, raises_nothing
+from graspsense.testing.checks import CheckFailed, demand, leaving_no_thread, raises_nothing
+from graspsense.testing.component import RUNS_CODE, config_name, watched
 from graspsense.testing.damage import damaged_at, paths
 from graspsense.testing.samples import sample_table
 from graspsense.testing.subject import Subject, elsewhere
@@ -57,6 +59,15 @@ def _again(subject: Subject, fitted: Any) -> Any:
     return other
 
 
+def a_classifier_has_a_model_key(subject: Subject) -> None:
+    """The config of a classifier extends ClassifierConfig, which holds the key `model`."""
+    cls = subject.component.config_class()
+    demand(
+        issubclass(cls, ClassifierConfig),
+        f"{config_name(subject)} has no key 'model': let it extend graspsense.plugin_api.ClassifierConfig",
+    )
+
+
 def classes_are_the_labels(subject: Subject) -> None:
     """`classes` returns the labels of the training trials, each once, as text."""
     fitted, _, labels = _learned(subject)
@@ -74,26 +85,32 @@ def classes_are_the_labels(subject: Subject) -> None:
 def probabilities_are_valid(subject: Subject) -> None:
     """`probabilities` has a row for each trial and a column for each class, from 0 to 1; each row sums to 1."""
     fitted, table, _ = _learned(subject)
-    _demand_answers(fitted, table, "", "divide each row by its sum")
+    _shares(fitted, table)
 
 
-def _demand_answers(fitted: Any, table: FeatureTable, trained: str, advice: str) -> None:
-    """Raise CheckFailed unless the answers are such that graspsense takes them."""
-    what = f"{trained}probabilities or support"
-    with raises_nothing(what, f": {advice}"):
+def _shares(fitted: Any, table: FeatureTable, trained: str = "", advice: str = "") -> NDArray[Any]:
+    """Return the probabilities. Raises CheckFailed unless they and the support are such that graspsense takes them."""
+    advice = (
+        advice
+        or "give a row for each trial and a column for each of `classes`, and divide each row by its sum"
+    )
+    with raises_nothing(f"{trained}probabilities or support", f": {advice}"):
         shares, support = fitted.probabilities(table), fitted.support(table)
     try:
         refuse_improbable(shares, len(table), len(fitted.classes()))
         refuse_unsupported(support, len(table))
     except ValueError as error:
-        raise CheckFailed(f"{trained}{error}: {advice}") from error
+        cause = "its probabilities are of another shape" if np.shape(shares)[:1] != (len(table),) else ""
+        raise CheckFailed(f"{trained}{error}: {advice}", cause) from error
+    given: NDArray[Any] = shares
+    return given
 
 
 def separates_separable_trials(subject: Subject) -> None:
     """At least nine in ten separable training trials are predicted correctly."""
     fitted, table, labels = _learned(subject)
     classes = fitted.classes()
-    said = [classes[int(i)] for i in np.argmax(fitted.probabilities(table), axis=1)]
+    said = [classes[int(i)] for i in np.argmax(_shares(fitted, table), axis=1)]
     right = sum(a == b for a, b in zip(said, labels, strict=True)) / len(labels)
     demand(
         right >= LEAST_RIGHT,
@@ -141,7 +158,7 @@ def survives_json(subject: Subject) -> None:
     """A model read from its JSON gives the same probabilities, bit for bit, and reasons, and runs nothing in it."""
     fitted, table, _ = _learned(subject)
     _again(subject, fitted)  # which may import what it needs
-    with component.watched(component.RUNS_CODE) as seen:
+    with watched(RUNS_CODE) as seen:
         again = _again(subject, fitted)
     demand(
         not seen,
@@ -163,11 +180,22 @@ def survives_json(subject: Subject) -> None:
 def single_trials_agree(subject: Subject) -> None:
     """Trials predicted one by one have the same probabilities as all at once."""
     fitted, table, _ = _learned(subject)
-    whole = fitted.probabilities(table)
-    single = np.concatenate([fitted.probabilities(table.rows(np.array([i]))) for i in range(len(table))])
+    whole = _shares(fitted, table)
+    single = np.concatenate([_shares(fitted, table.rows(np.array([i]))) for i in range(len(table))])
     demand(
         bool(np.allclose(whole, single, rtol=1e-9, atol=1e-12)),
         "single trials have other probabilities than all at once: predict each trial independently",
+    )
+
+
+def finds_features_by_their_names(subject: Subject) -> None:
+    """Trials whose features are in another order have the same probabilities."""
+    fitted, table, _ = _learned(subject)
+    whole, turned = _shares(fitted, table), _shares(fitted, table.columns(table.names[::-1]))
+    demand(
+        bool(np.allclose(whole, turned, rtol=1e-9, atol=1e-12)),
+        "with the features in another order it gives other probabilities: keep the names that it was fitted to, and "
+        "take the features by them (`table.columns(names)`)",
     )
 
 
@@ -180,7 +208,7 @@ def handles_missing_values(subject: Subject) -> None:
         fitted = _fitted(subject, evolve(table, values=values), labels)
         nothing = evolve(table, values=np.full((1, len(table.names)), math.nan))
         for asked in (table, nothing):
-            _demand_answers(fitted, asked, f"with {what} in training, ", "fill or skip missing values")
+            _shares(fitted, asked, f"with {what} in training, ", "fill or skip missing values")
         fitted.explain(nothing.row(0))
 
 
@@ -224,7 +252,7 @@ def few_trials_are_refused_or_learned(subject: Subject) -> None:
         classifier = _fitted_or_refused(subject, what, few, [labels[i] for i in rows])
         if classifier is None:
             continue
-        _demand_answers(classifier, table, f"trained on {what}, ", "raise ValueError in fit, or answer")
+        _shares(classifier, table, f"trained on {what}, ", "raise ValueError in fit, or answer")
 
 
 def explains_its_predictions(subject: Subject) -> None:
@@ -236,7 +264,7 @@ def explains_its_predictions(subject: Subject) -> None:
             isinstance(said, Prediction),
             f"explain returned {said!r}: return graspsense.plugin_api.Prediction",
         )
-        shares = dict(zip(fitted.classes(), fitted.probabilities(table)[i].tolist(), strict=True))
+        shares = dict(zip(fitted.classes(), _shares(fitted, table)[i].tolist(), strict=True))
         demand(
             said.label in shares and shares[said.label] >= max(shares.values()) - 1e-9,
             f"explain says {said.label!r} where the probabilities are {shares}: say the most probable label",
@@ -306,25 +334,3 @@ def a_damaged_model_raises_a_documented_error(subject: Subject) -> None:
             )
             with raises_nothing("from_json", advice), suppress(*REFUSALS):
                 subject.create().from_json(damaged)
-
-
-CHECKS: Final = (
-    *component.CHECKS,
-    *checks_of(
-        component.a_classifier_has_a_model_key,
-        classes_are_the_labels,
-        probabilities_are_valid,
-        separates_separable_trials,
-        same_seed_same_model,
-        same_model_elsewhere,
-        survives_json,
-        single_trials_agree,
-        handles_missing_values,
-        one_label_is_refused_or_certain,
-        few_trials_are_refused_or_learned,
-        explains_its_predictions,
-        does_not_change_the_table,
-        refuses_an_invalid_model,
-        a_damaged_model_raises_a_documented_error,
-    ),
-)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import closing
 from math import inf, isnan
 
 from graspsense.core.components.entries import KINDS
@@ -15,7 +14,7 @@ from graspsense.core.values.signals import (
 )
 from graspsense.testing.checks import CheckSkipped, demand, raises_nothing
 from graspsense.testing.gentle import EFFORT_N, FORCE_N, kind_of
-from graspsense.testing.session import TIMEOUT_S, Session, limits_of, use
+from graspsense.testing.session import TIMEOUT_S, Session, limits_of, opened, use
 from graspsense.testing.subject import Subject
 
 
@@ -86,8 +85,8 @@ def _speed_beyond_limit(subject: Subject, kind: int) -> str:
 
     An effort beyond its limit fails the check at once.
     """
-    with closing(subject.create()) as backend:
-        session = Session(backend.open(0), opened_s=0.0)
+    with opened(subject) as (backend, info):
+        session = Session(info, opened_s=0.0)
         usual = limits_of(session.info)
         # The limits of a first use apply after a contact too.
         limits = usual._replace(effort_limit_n=usual.first_effort_n, speed_limit_m_s=usual.first_speed_m_s)
@@ -131,8 +130,7 @@ def says_what_commands_become(subject: Subject) -> None:
 def accepts_every_declared_kind(subject: Subject) -> None:
     """Each kind in `accepts` can be applied, and frames continue to come."""
     demand(bool(subject.entry.accepts), "`accepts` is empty: a gripper takes at least one kind of command")
-    with closing(subject.create()) as backend:
-        info = backend.open(0)
+    with opened(subject) as (backend, info):
         for name in subject.entry.accepts:
             kind = KINDS.index(name)
             value = {

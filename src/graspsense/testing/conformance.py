@@ -12,16 +12,28 @@ from graspsense.core.components.entries import ConformanceCheckEntry
 from graspsense.core.components.registry import Component, Plugins, installed
 from graspsense.core.components.strict import keys_of
 from graspsense.core.values.errors import PluginUnavailable, UnknownName
-from graspsense.testing import backend, classifier, controller, features, package
-from graspsense.testing.checks import Check, ConformanceReport, Result, outcome_of
+from graspsense.testing import (
+    backend,
+    classifier,
+    commands,
+    component,
+    controller,
+    features,
+    package,
+    protection,
+    reader,
+    readings,
+    recorded,
+)
+from graspsense.testing.checks import Check, ConformanceReport, Result, checks_of, outcome_of
 from graspsense.testing.subject import Package, Subject, package_of
 
 CHECKS: Final[Mapping[str, tuple[Check, ...]]] = {
-    "distribution": package.CHECKS,
-    "sensor-backend": backend.CHECKS,
-    "controller": controller.CHECKS,
-    "feature-set": features.CHECKS,
-    "classifier": classifier.CHECKS,
+    "distribution": checks_of(package, reader),
+    "sensor-backend": checks_of(component, readings, commands, backend, recorded, protection),
+    "controller": checks_of(component, controller),
+    "feature-set": checks_of(component, features),
+    "classifier": checks_of(component, classifier),
 }
 """The checks of each role, and of a distribution as a whole."""
 

@@ -21,14 +21,12 @@ from typing import Any, Final
 from urllib.parse import unquote, urlparse
 
 from graspsense.core.components.entries import ConformanceCheckEntry, ExperimentKindEntry, PipelineEntry
-from graspsense.core.components.experiment_kind import class_of_kind
 from graspsense.core.components.moved_names import new_form
 from graspsense.core.components.registry import SLOW_IMPORT_S, Resource
 from graspsense.core.pipeline.wiring import check as check_wiring
 from graspsense.core.settings.resolved import resolve
 from graspsense.core.values.errors import GraspsenseError
-from graspsense.testing import reader
-from graspsense.testing.checks import Check, CheckFailed, CheckSkipped, checks_of, demand, raises_nothing
+from graspsense.testing.checks import Check, CheckFailed, CheckSkipped, demand, raises_nothing
 from graspsense.testing.component import ADVICE_ON_IMPORTS
 from graspsense.testing.samples import a_trial, an_event
 from graspsense.testing.subject import Package
@@ -106,7 +104,7 @@ def everything_declared_loads(package: Package) -> None:
             resource.load(part)
         if isinstance(resource.entry, ExperimentKindEntry):
             for part in {"keys", "result"} & set(resource.targets):
-                class_of_kind(resource, part)
+                resource.class_of_kind(part)
 
 
 def names_are_unique(package: Package) -> None:
@@ -317,20 +315,6 @@ def _built(folder: Path, scratch: Path) -> Path:
     if ran.returncode or not wheels:
         raise CheckFailed(f"no wheel can be built of {folder.name}: {ran.stderr.strip()[-400:]}")
     return wheels[0]
-
-
-CHECKS: Final = checks_of(
-    plugins_load,
-    plugin_modules_are_light,
-    everything_declared_loads,
-    names_are_unique,
-    wheel_is_complete,
-    pipelines_fit_together,
-    observers_change_nothing,
-    probe_returns_in_time,
-    reader.readers_read_the_same_twice,
-    reader.reader_errors_name_file_and_column,
-)
 
 
 def contributed_checks(package: Package) -> tuple[Check, ...]:

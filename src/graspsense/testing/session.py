@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from math import ceil
 from typing import Any, Final
 from zlib import crc32
@@ -63,16 +64,44 @@ class Session:
         return images
 
 
+def description(info: Any) -> DeviceInfo:
+    """Return what `open` returned. Raises CheckFailed if that is no DeviceInfo."""
+    if not isinstance(info, DeviceInfo):
+        raise CheckFailed(f"open returned {info!r}: return graspsense.plugin_api.DeviceInfo")
+    return info
+
+
+def next_reading(backend: SensorBackend[Any]) -> Reading | None:
+    """Return the next reading, None if none came in time. Raises CheckFailed for what is no reading."""
+    reading = backend.read(TIMEOUT_S)
+    if reading is not None and not (
+        isinstance(reading, Reading) and isinstance(reading.frame, Frame) and isinstance(reading.pads, Pads)
+    ):
+        raise CheckFailed(
+            f"read returned {reading!r:.80}: return Reading(Frame(...), Pads(...), signals), with NO_PADS where "
+            "there are no cells and () where there are no further channels",
+            "read returned no Reading",
+        )
+    return reading
+
+
+@contextmanager
+def opened(subject: Any, seed: int = 0, **keys: Any) -> Iterator[tuple[Any, DeviceInfo]]:
+    """Open the gripper under check within this context, with these settings as well."""
+    backend = subject.create(**keys)
+    try:
+        yield backend, description(backend.open(seed))
+    finally:
+        backend.close()
+
+
 def readings_of(subject: Any) -> Session:
     """Open the gripper under check, use it for some seconds of its own clock, close it, and return the readings."""
     backend = subject.create()
     try:
         began = time.perf_counter()
-        info = backend.open(0)
-        opened_s = time.perf_counter() - began
-        if not isinstance(info, DeviceInfo):
-            raise CheckFailed(f"open returned {info!r}: return graspsense.plugin_api.DeviceInfo")
-        session = Session(info, opened_s)
+        info = description(backend.open(0))
+        session = Session(info, opened_s=time.perf_counter() - began)
         with suppress(RecordingEnded), no_collection():
             if info.opening is None:
                 use(session, backend, "recording", RECORDED_FRAMES, None)
@@ -131,7 +160,7 @@ def use(
     watcher, limits = GuardState(0, 0, 0), limits or limits_of(session.info)
     for _ in range(ticks):
         began = time.perf_counter()
-        reading = backend.read(TIMEOUT_S)
+        reading = next_reading(backend)
         session.longest_read_s = max(session.longest_read_s, time.perf_counter() - began)
         if reading is None:
             session.silent += 1

@@ -14,7 +14,7 @@ from typing import Any
 from attrs import asdict, define, field
 
 from graspsense.core.components.channels import as_json, from_json
-from graspsense.core.components.entries import ENTRY_OF_ROLE, Feature, Role
+from graspsense.core.components.entries import ROLES, Feature, Role
 from graspsense.core.components.registry import Component, Plugins, PluginStatus, Resource, canonical
 from graspsense.core.settings.selected import build
 from graspsense.testing.checks import CheckFailed
@@ -118,7 +118,7 @@ def answer(role: Role, entry: dict[str, Any], keys: Mapping[str, Any], what: Seq
         "features": lambda given: Feature(**given),
     }
     entry |= {name: tuple(map(made, entry[name])) for name, made in listed.items() if name in entry}
-    component = Component(ENTRY_OF_ROLE[role](**entry), "elsewhere", "0", role)
+    component = Component(ROLES[role].entry(**entry), "elsewhere", "0")
     text = getattr(import_module(what[0]), what[1])(Subject(component=component, keys=keys))
     sys.stdout.write("\n" + text)
 

@@ -186,7 +186,7 @@ def described(path: Path, what: str, cls: type[DescribedT]) -> DescribedT:
         return structured(dict(layer.values), cls, f"a {what} file")
     except ValidationFailed as misfit:
         said = [
-            f"{layer.where(problem.path)}: {'.'.join(map(str, problem.path)) or 'the file'}: {problem.text}"
+            f"{layer.where(problem.path)}: {'.'.join(map(str, problem.path)) or 'the file'}: {problem.words()}"
             for problem in misfit.problems
         ]
         raise ConfigError("\n".join(said)) from None

@@ -10,25 +10,18 @@ none of that; a field that is given here is for a class that does not declare it
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any, Final, Literal, NamedTuple
 
 from attrs import Attribute, field, frozen
-from attrs.validators import and_, deep_iterable, ge, in_, instance_of, matches_re, optional
+from attrs.validators import and_, deep_iterable, ge, in_, instance_of, optional
 
 from graspsense.core.values.channel import IS_NAME, Channel
 from graspsense.core.values.errors import suggestion
 from graspsense.core.values.signals import CommandKind
 
 Role = Literal["sensor-backend", "controller", "feature-set", "classifier"]
-
-TABLE_OF_ROLE: Final[dict[Role, str]] = {
-    "sensor-backend": "gripper",
-    "controller": "controller",
-    "feature-set": "features",
-    "classifier": "classifier",
-}
-"""The table of a pipeline file in which a component of each role is selected."""
 
 KINDS: Final = tuple(kind.name.lower() for kind in CommandKind)
 """The kinds of command as entries name them: effort, velocity, position, force."""
@@ -50,9 +43,19 @@ def _distinct_channels(entry: object, attribute: Attribute[Any], channels: tuple
             raise ValueError(f"'{attribute.name}' names channel {name!r} twice")
 
 
-_IS_TARGET: Final = [instance_of(str), matches_re(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")]
-_IS_TARGET_OR_EMPTY: Final = [instance_of(str), matches_re(r"([A-Za-z_][\w.]*:[A-Za-z_]\w*)?")]
-_IS_RESOURCE: Final = [instance_of(str), matches_re(r"[A-Za-z_][\w.]*:[^/:][^:]*")]
+def _written_as(pattern: str, example: str) -> Any:
+    """Return the validator of a text of this form, of which the error shows an example."""
+
+    def check(entry: object, attribute: Attribute[Any], text: object) -> None:
+        if not (isinstance(text, str) and re.fullmatch(pattern, text)):
+            raise ValueError(f"'{attribute.name}' is {text!r}: write it as in {example!r}")
+
+    return check
+
+
+_IS_TARGET: Final = _written_as(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*", "lab_hand.backend:LabHand")
+_IS_TARGET_OR_EMPTY: Final = _written_as(r"([A-Za-z_][\w.]*:[A-Za-z_]\w*)?", "lab_hand.backend:LabHand")
+_IS_RESOURCE: Final = _written_as(r"[A-Za-z_][\w.]*:[^/:][^:]*", "lab_hand:pipelines/lab.toml")
 _ARE_KINDS: Final = optional(and_(instance_of(tuple), _known_kinds))
 
 
@@ -405,17 +408,32 @@ RESOURCES: Final = (
 )
 KIND_OF_ENTRY: Final = {kind.entry: kind.words for kind in RESOURCES}
 
-ENTRY_OF_ROLE: dict[Role, type] = {
-    "sensor-backend": SensorBackendEntry,
-    "controller": ControllerEntry,
-    "feature-set": FeatureSetEntry,
-    "classifier": ClassifierEntry,
-}
 
-DECLARED: Final[Mapping[Role, tuple[str, ...]]] = {
-    "sensor-backend": ("channels", "accepts"),
-    "controller": ("requires", "commands", "alternatives"),
-    "feature-set": ("requires", "features"),
-    "classifier": (),
+class ComponentKind(NamedTuple):
+    """What belongs to a role: the hook whose entries declare components, and the type of these entries.
+
+    `table` is the table of a pipeline file in which a component is selected, `declared` what its class declares by
+    attributes, unless the entry has it. The base class of the role is named as the entry, without `Entry`.
+    """
+
+    hook: str
+    entry: type
+    table: str
+    declared: tuple[str, ...]
+
+
+ROLES: Final[Mapping[Role, ComponentKind]] = {
+    "sensor-backend": ComponentKind(
+        "graspsense_sensor_backends", SensorBackendEntry, "gripper", ("channels", "accepts")
+    ),
+    "controller": ComponentKind(
+        "graspsense_controllers", ControllerEntry, "controller", ("requires", "commands", "alternatives")
+    ),
+    "feature-set": ComponentKind(
+        "graspsense_feature_sets", FeatureSetEntry, "features", ("requires", "features")
+    ),
+    "classifier": ComponentKind("graspsense_classifiers", ClassifierEntry, "classifier", ()),
 }
-"""What the class of a component declares by attributes, unless the entry has it."""
+ROLE_OF_ENTRY: Final[Mapping[type, Role]] = {kind.entry: role for role, kind in ROLES.items()}
+TABLE_OF_ROLE: Final[Mapping[Role, str]] = {role: kind.table for role, kind in ROLES.items()}
+"""The table of a pipeline file in which a component of each role is selected."""

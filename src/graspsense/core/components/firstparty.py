@@ -20,25 +20,24 @@ class Shipped:
     """
 
     distribution: str
-    hint: str
+    source: str
+    """The extra of `graspsense` that brings it; of an example, its folder in a clone."""
     names: Mapping[str, tuple[str, ...]]
 
-
-def _plugin(distribution: str, extra: str, names: Mapping[str, tuple[str, ...]]) -> Shipped:
-    hint = f'in a clone: pip install -r requirements-all.txt     published: pip install "graspsense[{extra}]"'
-    return Shipped(distribution, hint, names)
-
-
-def _example(distribution: str, folder: str, names: Mapping[str, tuple[str, ...]]) -> Shipped:
-    return Shipped(distribution, f"in a clone: pip install -e ./examples/{folder}", names)
+    @property
+    def hint(self) -> str:
+        """How it is installed."""
+        if "/" in self.source:
+            return f"in a clone: pip install -e ./{self.source}"
+        return f'in a clone: pip install -r requirements-all.txt     published: pip install "graspsense[{self.source}]"'
 
 
 SHIPPED: Final = (
-    _plugin("graspsense-pr2-gripper", "pr2", {"sensor-backend": ("pr2",), "emulator": ("pr2",)}),
-    _plugin("graspsense-sim-gripper", "sim", {"sensor-backend": ("sim",), "model": ("best", "default")}),
-    _plugin("graspsense-c45", "c45", {"classifier": ("c45",)}),
-    _plugin("graspsense-mujoco-gripper", "mujoco", {"sensor-backend": ("mujoco",)}),
-    _plugin(
+    Shipped("graspsense-pr2-gripper", "pr2", {"sensor-backend": ("pr2",), "emulator": ("pr2",)}),
+    Shipped("graspsense-sim-gripper", "sim", {"sensor-backend": ("sim",), "model": ("best", "default")}),
+    Shipped("graspsense-c45", "c45", {"classifier": ("c45",)}),
+    Shipped("graspsense-mujoco-gripper", "mujoco", {"sensor-backend": ("mujoco",)}),
+    Shipped(
         "graspsense-franka-hand",
         "franka",
         {
@@ -48,23 +47,23 @@ SHIPPED: Final = (
             "emulator": ("franka",),
         },
     ),
-    _plugin(
+    Shipped(
         "graspsense-robotiq-2f",
         "robotiq",
         {"sensor-backend": ("robotiq",), "pipeline": ("robotiq",), "emulator": ("robotiq", "tsf85")},
     ),
-    _plugin(
+    Shipped(
         "graspsense-ros2",
         "ros2",
         {"sensor-backend": ("ros2",), "command": ("ros2",), "live observer": ("ros2",)},
     ),
-    _plugin(
+    Shipped(
         "graspsense-so101-gripper",
         "so101",
         {"sensor-backend": ("so101",), "pipeline": ("so101",), "emulator": ("so101",)},
     ),
-    _plugin("graspsense-lerobot", "lerobot", {"sensor-backend": ("lerobot",), "data set": ("lerobot",)}),
-    _plugin(
+    Shipped("graspsense-lerobot", "lerobot", {"sensor-backend": ("lerobot",), "data set": ("lerobot",)}),
+    Shipped(
         "graspsense-romano",
         "romano",
         {
@@ -81,7 +80,7 @@ SHIPPED: Final = (
             "kind of experiment": ("touch",),
         },
     ),
-    _plugin(
+    Shipped(
         "graspsense-paper",
         "paper",
         {
@@ -93,12 +92,14 @@ SHIPPED: Final = (
             "kind of experiment": ("grasp", "paper", "table"),
         },
     ),
-    _plugin("graspsense-identify", "identify", {"identifier of objects for gripper": ("sim",)}),
+    Shipped("graspsense-identify", "identify", {"identifier of objects for gripper": ("sim",)}),
 )
 """The distributions in `plugins`, for the hint if one is not installed."""
 
 EXAMPLES: Final = (
-    _example("graspsense-grasp-curve", "grasp_curve", {"feature-set": ("grasp-curve", "chitta-and-curve")}),
+    Shipped(
+        "graspsense-grasp-curve", "examples/grasp_curve", {"feature-set": ("grasp-curve", "chitta-and-curve")}
+    ),
 )
 """The distributions in `examples`, which are installed from a clone only."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from importlib import import_module
 from typing import Final
 
@@ -34,17 +33,15 @@ REPLACED: Final = {
 """Name that was public to what is used in its place."""
 
 
-def moved() -> Iterator[tuple[str, str]]:
-    """Yield each name that is in a special module now, with the import that brings it."""
-    for module in SPECIAL:
-        names = import_module(f"graspsense.{module}").PUBLIC.names
-        for name in MOVED_TO_EXPERIMENTS if module == "experiment_api" else names:
-            yield name, f"from graspsense.{module} import {name}"
-
-
 def new_form(name: str) -> str:
     """Return what replaces the import of a name from `graspsense.plugin_api`; empty if it never had this name."""
-    return REPLACED.get(name) or dict(moved()).get(name, "")
+    if name in REPLACED:
+        return REPLACED[name]
+    for module in SPECIAL:
+        names = import_module(f"graspsense.{module}").PUBLIC.names
+        if name in (MOVED_TO_EXPERIMENTS if module == "experiment_api" else names):
+            return f"from graspsense.{module} import {name}"
+    return ""
 
 
 def refuse_moved(name: str) -> None:

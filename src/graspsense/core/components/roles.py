@@ -545,7 +545,10 @@ class Classifier(ABC, Generic[ConfigT]):
 
     @abstractmethod
     def probabilities(self, table: FeatureTable) -> NDArray[np.float64]:
-        """Return the probability of each class for each trial, shape (trials, classes); each row sums to 1."""
+        """Return the probability of each class for each trial, shape (trials, classes); each row sums to 1.
+
+        The features may be in another order than in `fit`: `table.columns(names)` finds them by their names.
+        """
 
     def support(self, table: FeatureTable) -> NDArray[np.float64] | None:
         """Return the number of training trials that each answer rests on, as in the leaf of a tree, shape (trials,).

@@ -89,11 +89,6 @@ class InvalidValue:
     what: str
     known: tuple[str, ...] | None = None
 
-    @property
-    def text(self) -> str:
-        """The defect in words."""
-        return self.words()
-
     def words(self, elsewhere: Iterable[str] = ()) -> str:
         """Return the defect in words; an unknown key may mean one of the paths `elsewhere`."""
         if self.known is None:

@@ -13,7 +13,7 @@ from math import inf
 from typing import Any, NamedTuple
 
 from graspsense.core.control.contact import either_touches
-from graspsense.core.values.errors import FAILURES, named
+from graspsense.core.values.errors import FAILURES, named, place_of
 from graspsense.core.values.signals import EFFORT, FORCE, POSITION, VELOCITY, Command, Frame, Reading
 
 
@@ -132,12 +132,16 @@ def with_plain_commands(step: Step) -> Step:
                 and type(speed_limit) is float
             ):
                 return command, state
+            if not isinstance(kind, int) and not hasattr(kind, "__index__"):
+                raise TypeError(
+                    f"the kind of the command is {kind!r}; EFFORT, VELOCITY, POSITION, FORCE are numbers"
+                )
             plain = Command(_integer(kind), _number(value), _number(effort_limit), _number(speed_limit))
             return plain, state
         except FAILURES as error:
             raise StepFailed(
-                f"{name} of the controller failed: {named(error)}. It takes (params, state, reading) and returns "
-                "(Command, state)"
+                f"{name} of the controller failed: {named(error)}{place_of(error)}. It takes (params, state, "
+                "reading) and returns (Command, state)"
             ) from error
 
     return plain_step

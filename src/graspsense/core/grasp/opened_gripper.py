@@ -10,7 +10,7 @@ from graspsense.core.components.roles import Controller, SensorBackend
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.values.channel import Channel
 from graspsense.core.values.device import DeviceInfo
-from graspsense.core.values.errors import DeviceLost, GraspsenseError, named, place_of
+from graspsense.core.values.errors import ComponentFailed, DeviceLost, GraspsenseError, named, place_of
 from graspsense.core.values.fingers import fingers_in_words, fingers_of
 
 
@@ -27,7 +27,7 @@ def opened_gripper(backend: SensorBackend[Any], seed: int) -> DeviceInfo:
         error.add_note(f"`open` of the gripper {name} was running")
         raise
     if not isinstance(info, DeviceInfo):
-        raise TypeError(
+        raise ComponentFailed(
             f"`open` of the gripper {name} returned {info!r}: return graspsense.plugin_api.DeviceInfo"
         )
     return info

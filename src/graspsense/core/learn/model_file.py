@@ -169,7 +169,7 @@ def _settings_from(stored: StoredValues, component: Component) -> tuple[dict[str
         return settings, structured(settings, config_class, component.qualified)
     except ValidationFailed as misfit:
         problem = misfit.problems[0]
-        raise stored.refusal(".".join(map(str, ("settings", *problem.path))), problem.text) from None
+        raise stored.refusal(".".join(map(str, ("settings", *problem.path))), problem.words()) from None
 
 
 def classifier_from(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from textwrap import indent
 from typing import Any
@@ -12,7 +12,13 @@ from attrs import frozen
 from graspsense.core.components.caller import option
 from graspsense.core.components.entries import Role
 from graspsense.core.components.registry import Component, installed
-from graspsense.core.components.strict import ValidationFailed, implausible_values, plain, structured
+from graspsense.core.components.strict import (
+    InvalidValue,
+    ValidationFailed,
+    implausible_values,
+    plain,
+    structured,
+)
 from graspsense.core.settings.layers import dotted
 from graspsense.core.values.errors import ConfigError, PluginUnavailable, UnknownName
 
@@ -45,28 +51,23 @@ class SelectedComponent:
         return self.component.declared(self.config)
 
 
-def build(component: Component, values: Mapping[str, Any]) -> Any:
-    """Return the config of a component from plain values.
+def build(component: Component, values: Mapping[str, Any], *, force: bool = True) -> Any:
+    """Return the config of a component from plain values; without `force` they must be in their plausible ranges.
 
-    Raises ConfigError that lists all errors, and PluginUnavailable.
+    Raises ConfigError that lists all errors, of which ImplausibleSettings is one, and PluginUnavailable.
     """
+
+    def listed(problems: Iterable[InvalidValue]) -> str:
+        return listed_errors(
+            [f"{dotted((component.table, *each.path))}: {each.words()}" for each in problems]
+        )
+
     try:
-        return structured(values, component.config_class(), component.qualified)
+        config: Any = structured(values, component.config_class(), component.qualified)
     except ValidationFailed as misfit:
-        lines = [f"{dotted((component.table, *problem.path))}: {problem.text}" for problem in misfit.problems]
-        raise ConfigError(listed_errors(lines)) from None
-
-
-def build_plausible(component: Component, values: Mapping[str, Any], *, force: bool) -> Any:
-    """Return the config of a component like `build`, and refuse values out of their plausible ranges unless `force`.
-
-    Raises ConfigError, of which ImplausibleSettings is one, and PluginUnavailable.
-    """
-    config = build(component, values)
-    doubts = [] if force else implausible_values(config)
-    if doubts:
-        lines = [f"{dotted((component.table, *doubt.path))}: {doubt.text}" for doubt in doubts]
-        raise ImplausibleSettings(listed_errors(lines))
+        raise ConfigError(listed(misfit.problems)) from None
+    if not force and (doubts := implausible_values(config)):
+        raise ImplausibleSettings(listed(doubts))
     return config
 
 

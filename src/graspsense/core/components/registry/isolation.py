@@ -49,44 +49,31 @@ class PluginRefused(Exception):
 
 
 class HookCalls:
-    """Registers plugins with pluggy, and calls the hooks of one plugin at a time."""
+    """The hooks of one plugin, registered with a manager of pluggy of its own. Raises PluginRefused.
 
-    def __init__(self, trace: bool) -> None:
+    `hooks` has the names of those that it implements.
+    """
+
+    def __init__(self, plugin: object, source: PluginSource, trace: bool) -> None:
+        self.plugin, self.name = plugin, f"{source.distribution}:{source.entry_point}"
         self._manager = pluggy.PluginManager(hookspecs.PROJECT)
         self._manager.add_hookspecs(hookspecs)
-        self._warned: set[tuple[str, str]] = set()
+        self._warned: set[str] = set()
         if trace:
             self._trace_calls()
-
-    def register(self, plugin: object, source: PluginSource) -> tuple[str, ...]:
-        """Register a plugin and return the hooks that it implements. Raises PluginRefused.
-
-        A plugin that is refused is left registered; `unregister` removes it.
-        """
         try:
-            self._manager.register(plugin, name=f"{source.distribution}:{source.entry_point}")
+            self._manager.register(plugin, name=self.name)
         except pluggy.PluginValidationError as error:
             raise PluginRefused("; ".join(str(error).splitlines()[1:])) from error
-        return self._hooks_of(plugin)
+        self.hooks = self._checked_hooks()
 
-    def registered_as(self, plugin: object) -> str | None:
-        """Return the name under which this plugin is registered, or None."""
-        return self._manager.get_name(plugin) if self._manager.is_registered(plugin) else None
+    def call(self, hook: str, **arguments: Any) -> list[Any]:
+        """Call an implementation; return its result in a list, or an empty list for None."""
+        return cast("list[Any]", getattr(self._manager.hook, hook)(**arguments))
 
-    def unregister(self, plugin: object) -> None:
-        """Remove a plugin. Some versions of pluggy have not registered one that they refuse."""
-        if self._manager.is_registered(plugin):
-            self._manager.unregister(plugin)
-
-    def call(self, plugin: object, hook: str, **arguments: Any) -> list[Any]:
-        """Call the implementation of one plugin; return its result in a list, or an empty list for None."""
-        others = [other for other in self._manager.get_plugins() if other is not plugin]
-        caller = self._manager.subset_hook_caller(hook, remove_plugins=others)
-        return cast("list[Any]", caller(**arguments))
-
-    def entries(self, plugin: object, hook: str, kind: type, **arguments: Any) -> list[Any]:
-        """Return the entries that the hook of one plugin gives. Raises PluginRefused unless all are of `kind`."""
-        results = self.call(plugin, hook, **arguments)
+    def entries(self, hook: str, kind: type, **arguments: Any) -> list[Any]:
+        """Return the entries that a hook gives. Raises PluginRefused unless all are of `kind`."""
+        results = self.call(hook, **arguments)
         if not results:
             raise PluginRefused(f"{hook} returned None: return the entries, or yield them")
         if not isinstance(results[0], Iterable) or isinstance(results[0], str):
@@ -105,9 +92,8 @@ class HookCalls:
         try:
             yield
         except FAILURES as error:
-            key = (f"{status.distribution}:{status.entry_point}", hook)
-            if key not in self._warned:
-                self._warned.add(key)
+            if hook not in self._warned:
+                self._warned.add(hook)
                 _log.warning(
                     "%s %s failed in %s and is passed over: %s",
                     status.distribution,
@@ -116,13 +102,11 @@ class HookCalls:
                     printable(error_text(error)),
                 )
 
-    def _hooks_of(self, plugin: object) -> tuple[str, ...]:
+    def _checked_hooks(self) -> tuple[str, ...]:
         """Return the hooks that this plugin implements. Raises PluginRefused for one that would never be called."""
         names = []
-        for caller in self._manager.get_hookcallers(plugin) or ():
+        for caller in self._manager.get_hookcallers(self.plugin) or ():
             for implementation in caller.get_hookimpls():
-                if implementation.plugin is not plugin:
-                    continue
                 names.append(caller.name)
                 if not caller.has_spec() and not implementation.optionalhook:
                     raise PluginRefused(
@@ -140,7 +124,7 @@ class HookCalls:
                         f"{caller.name} is a wrapper: no hook may change what another plugin returns"
                     )
         for name in _SPECS:
-            if callable(getattr(plugin, name, None)) and name not in names:
+            if callable(getattr(self.plugin, name, None)) and name not in names:
                 raise PluginRefused(
                     f"{name} is not marked with @hookimpl, so it would never be called: write @hookimpl above it"
                 )

@@ -2,7 +2,7 @@
 
 The code behind a component or resource is imported when a method asks for it, not before. What a component declares is
 taken from its class where its entry does not say it: a class states its config by the parameter of its base class
-(`FeatureSet[PeakConfig]`) and the rest by attributes named in `entries.DECLARED`. `channels` of a gripper may be a
+(`FeatureSet[PeakConfig]`) and the rest by the attributes that `entries.ROLES` names. `channels` of a gripper may be a
 property of its settings, as for a hand whose fingers can be exchanged.
 """
 
@@ -21,9 +21,9 @@ import attrs
 from attrs import frozen
 
 from graspsense.core.components.entries import (
-    DECLARED,
     KIND_OF_ENTRY,
-    TABLE_OF_ROLE,
+    ROLE_OF_ENTRY,
+    ROLES,
     ComponentEntry,
     DatasetEntry,
     ExperimentEntry,
@@ -32,72 +32,13 @@ from graspsense.core.components.entries import (
     ResourceEntry,
     Role,
 )
-from graspsense.core.values.errors import FAILURES, ConfigError, PluginUnavailable
-
-
-class NotDeclared(Exception):
-    """A class that does not declare what its entry leaves out; the text says what to add."""
-
-
-def config_of(cls: type, base: type) -> type:
-    """Return the config class with which a component class parametrises the base class of its role.
-
-    Raises NotDeclared.
-    """
-    for ancestor in cls.__mro__:
-        # Not by getattr: a class without a parametrised base inherits the attribute of one that has it.
-        for parametrised in vars(ancestor).get("__orig_bases__", ()):
-            origin = get_origin(parametrised)
-            if isinstance(origin, type) and issubclass(origin, base):
-                config = get_args(parametrised)[0]
-                if isinstance(config, type):
-                    return config
-    raise NotDeclared(
-        f"{cls.__name__} does not say what its settings are: write class {cls.__name__}({base.__name__}[Config]), "
-        "where Config is an attrs class"
-    )
-
-
-def declared_by(cls: type, base: type, role: Role) -> tuple[str, ...]:
-    """Return the names of `DECLARED` that this class or one between it and the base class of its role declares."""
-    return tuple(
-        name
-        for name in DECLARED[role]
-        if getattr(cls, name, None) is not getattr(base, name, None) and hasattr(cls, name)
-    )
-
-
-def left_out(entry: ComponentEntry, role: Role) -> tuple[str, ...]:
-    """Return the names of `DECLARED` that the entry leaves to the class.
-
-    An entry that declares its commands leaves no alternatives to them to the class.
-    """
-    of_entry = {name for name in DECLARED[role] if getattr(entry, name) is not None}
-    if "commands" in of_entry:
-        of_entry.add("alternatives")
-    return tuple(name for name in DECLARED[role] if name not in of_entry)
-
-
-def completed(entry: ComponentEntry, role: Role, cls: type, base: type, part: Any) -> ComponentEntry:
-    """Return the entry with everything that it leaves out.
-
-    `part` is an instance of `cls`, or `cls` itself where nothing depends on the settings. Raises NotDeclared, and what
-    a property of the class raises.
-    """
-    of_class = declared_by(cls, base, role)
-    values: dict[str, Any] = {}
-    for name in left_out(entry, role):
-        if name not in of_class and name in _ADVICE:
-            raise NotDeclared(f"{cls.__name__} does not declare `{name}`: {_ADVICE[name]}")
-        value = getattr(part, name)
-        if isinstance(value, property):
-            raise NotDeclared(f"its {name} depend on its settings, and these have no defaults")
-        values[name] = value
-    try:
-        return attrs.evolve(entry, **values)
-    except (TypeError, ValueError) as error:
-        raise NotDeclared(f"{cls.__name__}: {error.args[0]}") from error
-
+from graspsense.core.values.errors import (
+    FAILURES,
+    ComponentFailed,
+    ConfigError,
+    PluginUnavailable,
+    suggestion,
+)
 
 _ADVICE = {
     "channels": 'write channels = (Channel("gap", "m", 100.0), ...) in the class, all that `read` delivers',
@@ -170,11 +111,15 @@ class Declared(ABC, Generic[EntryT]):
 
     def _import(self, target: str) -> Any:
         """Return what an import string names. Raises PluginUnavailable."""
-        module, _, name = target.partition(":")
+        path, _, name = target.partition(":")
         try:
-            return getattr(importlib.import_module(module), name)
+            module = importlib.import_module(path)
+            if hasattr(module, name):
+                return getattr(module, name)
         except FAILURES as error:  # the import of a third party's module can raise anything
             raise self._unavailable(f"{type(error).__name__}: {error}") from error
+        near = suggestion(name, dir(module))
+        raise self._unavailable(f"{path} has no {name!r}" + (near and f".{near}"))
 
     def _unavailable(self, why: str) -> PluginUnavailable:
         needs = getattr(self.entry, "needs", "")
@@ -188,7 +133,10 @@ class Declared(ABC, Generic[EntryT]):
 class Component(Declared[ComponentEntry]):
     """A component that a plugin declares."""
 
-    role: Role
+    @property
+    def role(self) -> Role:
+        """The role that its entry is for."""
+        return ROLE_OF_ENTRY[type(self.entry)]
 
     @property
     def kind(self) -> str:
@@ -198,7 +146,7 @@ class Component(Declared[ComponentEntry]):
     @property
     def table(self) -> str:
         """The table of a pipeline file in which it is selected."""
-        return TABLE_OF_ROLE[self.role]
+        return ROLES[self.role].table
 
     def config_class(self) -> type:
         """Import and return the attrs class of its config. Raises PluginUnavailable."""
@@ -206,11 +154,7 @@ class Component(Declared[ComponentEntry]):
         if self.entry.config:
             config_class, name = self._import(self.entry.config), self.entry.config
         else:
-            cls = self._any_class()
-            try:
-                config_class = config_of(cls, self._base())
-            except NotDeclared as error:
-                raise self._unavailable(str(error)) from error
+            config_class = self._config_of_class()
             name = f"{config_class.__module__}:{config_class.__qualname__}"
         if not (isinstance(config_class, type) and attrs.has(config_class)):
             raise self._unavailable(f"{name} is not an attrs class: write @attrs.frozen above it")
@@ -219,11 +163,11 @@ class Component(Declared[ComponentEntry]):
     def component_class(self) -> type:
         """Import and return its class, a concrete subclass of the base class of its role. Raises PluginUnavailable."""
         component_class: type[Any] = self._any_class()
-        base = self._base()
         if inspect.isabstract(component_class):
             lacking = ", ".join(sorted(component_class.__abstractmethods__))
             raise self._unavailable(
-                f"{self.entry.target} does not implement {lacking}, which {base.__name__} of plugin_api requires",
+                f"{self.entry.target} does not implement {lacking}, which {self._base().__name__} of plugin_api "
+                "requires"
             )
         return component_class
 
@@ -238,49 +182,89 @@ class Component(Declared[ComponentEntry]):
         property may depend on it. Raises PluginUnavailable if the class cannot be imported, or does not declare
         something, and ConfigError where the property refuses this config.
         """
-        if not left_out(self.entry, self.role):
+        left_out = self._left_out()
+        if not left_out:
             return self.entry
-        cls = self.component_class()
-        part: Any = cls
+        part: Any = self.component_class()
         chosen = config is not None
-        if any(self._varies(name) for name in left_out(self.entry, self.role)):
+        if any(map(self._varies, left_out)):
             if config is None:
                 with contextlib.suppress(TypeError, ValueError):
                     config = self.config_class()()
-            part = cls if config is None else cls(config)
+            part = part if config is None else part(config)
         try:
-            return completed(self.entry, self.role, cls, self._base(), part)
-        except NotDeclared as error:
-            raise self._unavailable(str(error)) from error
+            values = {name: self._value(part, name) for name in left_out}
+        except PluginUnavailable:
+            raise
         except FAILURES as error:
             if chosen and isinstance(error, ConfigError):
                 raise  # the settings are wrong, and the error says how
             raise self._unavailable(f"what it declares raised {type(error).__name__}: {error}") from error
+        try:
+            return attrs.evolve(self.entry, **values)
+        except (TypeError, ValueError) as error:
+            raise self._unavailable(f"{self.component_class().__name__}: {error.args[0]}") from error
 
     def channels_vary(self) -> bool:
         """Return whether its channels depend on its settings. Raises PluginUnavailable."""
-        if self.role != "sensor-backend" or getattr(self.entry, "channels", None) is not None:
-            return False
-        return self._varies("channels")
+        return "channels" in self._left_out() and self._varies("channels")
+
+    def declared_twice(self) -> tuple[str, ...]:
+        """Return what both its entry and its class declare. Raises PluginUnavailable."""
+        left_out = self._left_out()
+        return tuple(
+            name for name in ROLES[self.role].declared if name not in left_out and self._of_class(name)
+        )
+
+    def _left_out(self) -> tuple[str, ...]:
+        """Return what its entry leaves to the class; one that declares its commands leaves no alternatives to them."""
+        names = ROLES[self.role].declared
+        given = {name for name in names if getattr(self.entry, name) is not None}
+        if "commands" in given:
+            given.add("alternatives")
+        return tuple(name for name in names if name not in given)
+
+    def _of_class(self, name: str) -> bool:
+        """Return whether its class, or one between it and the base class of its role, declares this."""
+        declared = getattr(self.component_class(), name, None)
+        return declared is not None and declared is not getattr(self._base(), name, None)
 
     def _varies(self, name: str) -> bool:
         """Return whether the class declares this by a property, which may depend on its settings."""
         return isinstance(inspect.getattr_static(self.component_class(), name, None), property)
 
-    def declared_twice(self) -> tuple[str, ...]:
-        """Return what both its entry and its class declare. Raises PluginUnavailable."""
-        names = declared_by(self.component_class(), self._base(), self.role)
-        return tuple(name for name in names if getattr(self.entry, name) is not None)
+    def _value(self, part: Any, name: str) -> Any:
+        """Return what `part` declares: an instance of its class, or the class where nothing depends on the settings."""
+        if name in _ADVICE and not self._of_class(name):
+            raise self._unavailable(
+                f"{self.component_class().__name__} does not declare `{name}`: {_ADVICE[name]}"
+            )
+        value = getattr(part, name)
+        if isinstance(value, property):
+            raise self._unavailable(f"its {name} depend on its settings, and these have no defaults")
+        return value
+
+    def _config_of_class(self) -> type:
+        """Return the config class with which its class parametrises the base class of its role."""
+        cls, base = self._any_class(), self._base()
+        for ancestor in cls.__mro__:
+            # Not by getattr: a class without a parametrised base inherits the attribute of one that has it.
+            for parametrised in vars(ancestor).get("__orig_bases__", ()):
+                origin = get_origin(parametrised)
+                if isinstance(origin, type) and issubclass(origin, base):
+                    config = get_args(parametrised)[0]
+                    if isinstance(config, type):
+                        return config
+        raise self._unavailable(
+            f"{cls.__name__} does not say what its settings are: write class {cls.__name__}({base.__name__}[Config]), "
+            "where Config is an attrs class"
+        )
 
     def _base(self) -> type:
         from graspsense.core.components import roles
 
-        return {
-            "sensor-backend": roles.SensorBackend,
-            "controller": roles.Controller,
-            "feature-set": roles.FeatureSet,
-            "classifier": roles.Classifier,
-        }[self.role]
+        base: type = getattr(roles, type(self.entry).__name__.removesuffix("Entry"))
+        return base
 
     def _any_class(self) -> Any:
         """Import and return its class, which may lack methods."""
@@ -312,6 +296,25 @@ class Resource(Declared[EntryT]):
     def load(self, part: str = "target") -> Any:
         """Import and return what this field of an entry names. Raises PluginUnavailable."""
         return self._import(getattr(self.entry, part))
+
+    def class_of_kind(self, part: str) -> Any:
+        """Import and return the class that a kind of experiment names as its `keys` or its `result`.
+
+        Raises PluginUnavailable if it cannot be imported, ComponentFailed if values of it can be neither read nor
+        written.
+        """
+        cls = self.load(part)
+        target = f"{getattr(self.entry, part)}, `{part}` of the kind {self.qualified},"
+        if not (isinstance(cls, type) and attrs.has(cls)):
+            raise ComponentFailed(f"{target} is no class of attrs: decorate it with @frozen(kw_only=True)")
+        names = {*attrs.fields_dict(cls), *dir(cls)}
+        lacking = [name for name in ("source", "simulated") if part == "result" and name not in names]
+        if lacking:
+            raise ComponentFailed(
+                f"{target} has no {' and no '.join(lacking)}: give it `source: str`, where its trials are from, in "
+                "words, and `simulated: bool`, whether they are simulated"
+            )
+        return cls
 
     def recordings(self) -> Any:
         """Import and return the function of a data set that yields its recordings. Raises PluginUnavailable."""

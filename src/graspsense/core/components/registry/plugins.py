@@ -11,15 +11,16 @@ import os
 import sys
 import traceback
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from importlib.metadata import distributions
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
 
 from attrs import evolve
 
 from graspsense.core.components.entries import (
-    ENTRY_OF_ROLE,
     KIND_OF_ENTRY,
     RESOURCES,
+    ROLES,
     TABLE_OF_ROLE,
     ExperimentKindEntry,
     FeatureSetEntry,
@@ -28,6 +29,7 @@ from graspsense.core.components.entries import (
     Role,
 )
 from graspsense.core.components.firstparty import provider
+from graspsense.core.components.hookspecs import ENTRY_POINT_GROUP
 from graspsense.core.components.registry.discovery import (
     PluginSource,
     builtin_source,
@@ -63,13 +65,6 @@ if TYPE_CHECKING:
 STRICT_VARIABLE: Final = "GRASPSENSE_STRICT_PLUGINS"
 """If this environment variable is 1, the error of a plugin that cannot be loaded is raised."""
 
-COMPONENT_HOOKS: Final[dict[str, Role]] = {
-    "graspsense_sensor_backends": "sensor-backend",
-    "graspsense_controllers": "controller",
-    "graspsense_feature_sets": "feature-set",
-    "graspsense_classifiers": "classifier",
-}
-
 PartT = TypeVar("PartT", bound=Component | Resource[Any])
 
 
@@ -83,10 +78,10 @@ class Plugins:
     def __init__(
         self, sources: Iterable[PluginSource], environ: Mapping[str, str], disabled: Iterable[str] = ()
     ) -> None:
-        self._hooks = HookCalls(trace=environ.get(TRACE_VARIABLE) == "1")
+        self._trace = environ.get(TRACE_VARIABLE) == "1"
         self._strict = environ.get(STRICT_VARIABLE) == "1"
         self._statuses: list[PluginStatus] = []
-        self._loaded: list[tuple[PluginStatus, object]] = []
+        self._loaded: list[tuple[PluginStatus, HookCalls]] = []
         self._components: list[Component] = []
         self._resources: list[Resource[Any]] = []
         sources = list(sources)
@@ -115,7 +110,7 @@ class Plugins:
 
     def components(self, role: Role | None = None) -> tuple[Component, ...]:
         """Return the components of this role, or all, in the order of role and name."""
-        order = list(ENTRY_OF_ROLE)
+        order = list(ROLES)
         of_role = (part for part in self._components if role in (None, part.role))
         return tuple(sorted(of_role, key=lambda part: (order.index(part.role), part.name, part.distribution)))
 
@@ -161,6 +156,12 @@ class Plugins:
                 *(component.name for component in self._components),
             }
         )
+        if name and any(distributions(name=name)):
+            return UnknownName(
+                f"{name} is installed and has no plugin: name its module in its pyproject.toml, under "
+                f'[project.entry-points."{ENTRY_POINT_GROUP}"], as in lab-hand = "lab_hand.plugin", and install it '
+                "again"
+            )
         return UnknownName(
             f"no plugin or component named {name!r}. Known: {', '.join(known)}.{suggestion(name, known)}"
         )
@@ -183,9 +184,9 @@ class Plugins:
 
     def _answers(self, hook: str, kind: type[AnswerT], **arguments: Any) -> tuple[HookAnswer[AnswerT], ...]:
         answers: list[HookAnswer[AnswerT]] = []
-        for status, plugin in self._implementing(hook):
+        for status, calls in self._implementing(hook):
             try:
-                given = self._hooks.entries(plugin, hook, kind, **arguments)
+                given = calls.entries(hook, kind, **arguments)
                 answers.append(HookAnswer(status.distribution, tuple(given)))
             except FAILURES as error:
                 answers.append(HookAnswer(status.distribution, error=error_text(error)))
@@ -210,11 +211,9 @@ class Plugins:
         implementation raises is left out with a warning.
         """
         results: list[tuple[str, Any]] = []
-        for status, plugin in self._implementing(hook):
-            with self._hooks.isolated(status, hook):
-                results.extend(
-                    (status.distribution, result) for result in self._hooks.call(plugin, hook, **arguments)
-                )
+        for status, calls in self._implementing(hook):
+            with calls.isolated(status, hook):
+                results.extend((status.distribution, result) for result in calls.call(hook, **arguments))
         return tuple(results)
 
     def called(self, status: PluginStatus, hook: str, /, **arguments: Any) -> list[Any]:
@@ -222,8 +221,8 @@ class Plugins:
 
         Returns its result in a list, or an empty list for None.
         """
-        (plugin,) = [plugin for known, plugin in self._loaded if known is status]
-        return self._hooks.call(plugin, hook, **arguments)
+        (calls,) = [calls for known, calls in self._loaded if known is status]
+        return calls.call(hook, **arguments)
 
     def _load(self, source: PluginSource) -> None:
         try:
@@ -231,7 +230,7 @@ class Plugins:
             with contextlib.redirect_stdout(sys.stderr):
                 plugin, cost = imported(source)
                 check_api(plugin, source)
-                status, components, resources = self._registered(plugin, source)
+                calls, components, resources = self._registered(plugin, source)
         except FAILURES as error:
             if self._strict:
                 error.add_note(
@@ -241,47 +240,48 @@ class Plugins:
             broken = _status(source, "broken", error_text(error))
             self._statuses.append(evolve(broken, traceback="".join(traceback.format_exception(error))))
             return
-        status = evolve(status, import_s=cost.processor_s, advice=advice_on(source, cost))
+        status = evolve(
+            _status(source, "loaded"),
+            hooks=calls.hooks,
+            import_s=cost.processor_s,
+            advice=advice_on(source, cost),
+        )
         self._statuses.append(status)
-        self._loaded.append((status, plugin))
+        self._loaded.append((status, calls))
         self._components += components
         self._resources += resources
 
     def _registered(
         self, plugin: object, source: PluginSource
-    ) -> tuple[PluginStatus, list[Component], list[Resource[Any]]]:
-        """Register a plugin and return what it declares. Leaves nothing behind if it is refused."""
-        known_as = self._hooks.registered_as(plugin)
-        if known_as is not None:
-            raise PluginRefused(f"{source.module} is loaded already, as {known_as}")
-        try:
-            hooks = self._hooks.register(plugin, source)
-            components = [
-                Component(entry, source.distribution, source.version, role)
-                for hook, role in COMPONENT_HOOKS.items()
-                if hook in hooks
-                for entry in self._hooks.entries(plugin, hook, ENTRY_OF_ROLE[role])
-            ]
-            resources = [
-                Resource(entry, source.distribution, source.version)
-                for kind in RESOURCES
-                if kind.hook in hooks
-                for entry in self._hooks.entries(plugin, kind.hook, kind.entry)
-            ]
-            _check_distinct([*self._components, *components])
-            _check_distinct([*self._resources, *resources])
-        except BaseException:
-            self._hooks.unregister(plugin)
-            raise
-        return evolve(_status(source, "loaded"), hooks=hooks), components, resources
+    ) -> tuple[HookCalls, list[Component], list[Resource[Any]]]:
+        """Return the hooks of a plugin, and what it declares by them. Raises PluginRefused."""
+        for _, known in self._loaded:
+            if known.plugin is plugin:
+                raise PluginRefused(f"{source.module} is loaded already, as {known.name}")
+        calls = HookCalls(plugin, source, self._trace)
+        components = [
+            Component(entry, source.distribution, source.version)
+            for kind in ROLES.values()
+            if kind.hook in calls.hooks
+            for entry in calls.entries(kind.hook, kind.entry)
+        ]
+        resources = [
+            Resource(entry, source.distribution, source.version)
+            for kind in RESOURCES
+            if kind.hook in calls.hooks
+            for entry in calls.entries(kind.hook, kind.entry)
+        ]
+        _check_distinct([*self._components, *components])
+        _check_distinct([*self._resources, *resources])
+        return calls, components, resources
 
-    def _implementing(self, hook: str) -> Iterator[tuple[PluginStatus, object]]:
-        return ((status, plugin) for status, plugin in self._loaded if hook in status.hooks)
+    def _implementing(self, hook: str) -> Iterator[tuple[PluginStatus, HookCalls]]:
+        return ((status, calls) for status, calls in self._loaded if hook in calls.hooks)
 
     def _notify(self, hook: str, **arguments: Any) -> None:
-        for status, plugin in self._implementing(hook):
-            with self._hooks.isolated(status, hook):
-                self._hooks.call(plugin, hook, **arguments)
+        for status, calls in self._implementing(hook):
+            with calls.isolated(status, hook):
+                calls.call(hook, **arguments)
 
     def _only(
         self,
