@@ -13,8 +13,8 @@ from kept import keep
 from graspsense.core.components.registry import IsolatedPlugins, installed
 from graspsense.core.values.errors import ConfigError
 from graspsense.experiments.answer import answer
+from graspsense.experiments.executors.executor import Serial
 from graspsense.experiments.executors.processes import Processes
-from graspsense.experiments.executors.serial import Serial
 from graspsense.experiments.experiment_file import _located, read_experiment
 from graspsense.experiments.results import Results
 from graspsense.experiments.run import run_experiment

@@ -19,7 +19,7 @@ from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.values.errors import ConfigError, UnknownName
 from graspsense.evaluation.over_seeds import OverSeeds, mean_difference
 from graspsense.experiment_api import ExperimentEntry
-from graspsense.experiments.executors.serial import Serial
+from graspsense.experiments.executors.executor import Serial
 from graspsense.experiments.experiment_file import read_experiment, shipped
 from graspsense.experiments.results import Results
 from graspsense.experiments.run import run_experiment
@@ -375,6 +375,20 @@ def test_time_left_says_no_more_than_is_known():
     left.add(8.0)
     low, high = left.bounds_s
     assert low < 10.0 < high
+
+
+@pytest.mark.parametrize("name", ["../../escaped", "a/b", "", "nul\\u0000", "n" * 300, "plain ü"])
+def test_pipelines_of_any_name_stay_in_the_folder_and_are_found_again(file, tmp_path, name):
+    pipelines = f'pipelines = [{{ name = "{name}", pipeline = "default" }}]\n'
+    sweepless = EXPERIMENT.replace('[sweep]\n"judge.folds" = [2, 3]\n', "")
+    odd = file.with_name(os.fsdecode(b"a\xff\nb.toml"))
+    odd.write_text(pipelines + sweepless)
+    before = set(tmp_path.rglob("*"))
+    results = Results(tmp_path / "deep" / "er" / "out")
+    run_experiment(read_experiment(str(odd)), results, Serial, command=str(odd))
+    written = set(tmp_path.rglob("*")) - before
+    assert all(path.is_relative_to(results.folder) or path in results.folder.parents for path in written)
+    assert len(summarise(results.experiment(), results).results) == 2
 
 
 def test_train_here_test_there(file, tmp_path):

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from graspsense.core.components.setting import declared, setting
 from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.over_seeds import OverSeeds
-from graspsense.experiments.executors.serial import Serial
+from graspsense.experiments.executors.executor import Serial
 from graspsense.experiments.experiment_file import read_experiment, shipped
 from graspsense.experiments.page import experiment_page, findings_of
 from graspsense.experiments.results import EXPERIMENT, Results

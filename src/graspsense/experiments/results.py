@@ -11,10 +11,12 @@ OUT/report.html       the page
 from __future__ import annotations
 
 import fcntl
+import hashlib
 import json
 import os
+import re
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
@@ -23,7 +25,7 @@ from attrs import evolve, frozen
 
 from graspsense.core.components.caller import option
 from graspsense.core.components.strict import plain
-from graspsense.core.files.toml_text import toml_key, toml_value
+from graspsense.core.files.toml_text import toml_lines
 from graspsense.core.files.whole_file import SaveFailed, write_or_replace
 from graspsense.core.settings.resolved import without_followers
 from graspsense.core.settings.settings_file import to_toml
@@ -94,7 +96,7 @@ class Results:
         """Write the experiment, its pipelines and its provenance next to the results. Raises SaveFailed."""
         # Without the settings that follow another one, since a sweep may change that.
         texts = {
-            f"{name}.toml": to_toml(evolve(pipeline, values=without_followers(pipeline.values)))
+            file_of(name): to_toml(evolve(pipeline, values=without_followers(pipeline.values)))
             for name, pipeline in planned.pipelines.items()
         }
         for name, text in texts.items():
@@ -103,7 +105,7 @@ class Results:
         for part in planned.parts:
             for name, text in texts.items():
                 _write(self.folder / PARTS / PIPELINES / name, text)
-            _write(self.folder / PARTS / f"{part.name}.toml", resolved(part))
+            _write(self.folder / PARTS / file_of(part.name), resolved(part))
         provenance = {
             "experiment": planned.name,
             "command": command,
@@ -155,36 +157,27 @@ class Results:
             os.close(lock)
 
 
+def file_of(name: str) -> str:
+    """Return the name of the file of a pipeline or of a part, which lies in the folder whatever its own name is."""
+    plain = re.fullmatch(r"\w[\w .-]{0,99}", name)
+    return f"{name if plain else hashlib.sha256(name.encode(errors='surrogateescape')).hexdigest()[:16]}.toml"
+
+
 def resolved(planned: Planned) -> str:
     """Return the experiment as a file with all values."""
     values: dict[str, Any] = plain(planned.experiment)
     values["seeds"] = list(planned.seeds)
     if planned.parts:
-        values["parts"] = [f"{PARTS}/{part.name}.toml" for part in planned.parts]
+        values["parts"] = [f"{PARTS}/{file_of(part.name)}" for part in planned.parts]
     values["pipelines"] = [
-        plain(PipelineOf(name=name, pipeline=f"{PIPELINES}/{name}.toml")) for name in planned.pipelines
+        plain(PipelineOf(name=name, pipeline=f"{PIPELINES}/{file_of(name)}")) for name in planned.pipelines
     ]
     if not planned.experiment.classifiers and planned.cases and not planned.parts:
         values["classifiers"] = [
             {"name": case.name, "type": case.type, **case.config} for case in _unswept(planned)
         ]
-    lines = [
-        f"# {planned.name}, with everything filled in: `graspsense experiment FILE` gives the same again."
-    ]
-    tables = {key: value for key, value in values.items() if isinstance(value, Mapping)}
-    lines += [
-        f"{toml_key(key)} = {toml_value(value)}"
-        for key, value in values.items()
-        if key not in tables and value is not None
-    ]
-    for table, keys in tables.items():
-        if keys:
-            lines += [
-                "",
-                f"[{table}]",
-                *(f"{toml_key(k)} = {toml_value(value)}" for k, value in keys.items()),
-            ]
-    return "\n".join(lines) + "\n"
+    head = f"# {planned.name}, with everything filled in: `graspsense experiment FILE` gives the same again."
+    return "\n".join([head, *toml_lines(values)]) + "\n"
 
 
 def _unswept(planned: Planned) -> list[Any]:
@@ -195,4 +188,4 @@ def _unswept(planned: Planned) -> list[Any]:
 
 
 def _write(path: Path, text: str) -> None:
-    write_or_replace(path, text.encode(), make_folder=True)
+    write_or_replace(path, text.encode(errors="backslashreplace"), make_folder=True)

@@ -11,7 +11,7 @@ from graspsense.core.components.caller import option
 from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.grasp.interrupts import Interrupts
 from graspsense.core.values.errors import ConfigError, counted, listed
-from graspsense.experiments.executors.base import Executor, ExecutorLost
+from graspsense.experiments.executors.executor import Executor, ExecutorLost
 from graspsense.experiments.experiment import Planned
 from graspsense.experiments.results import Results
 from graspsense.experiments.task import Task, TaskResult

@@ -248,8 +248,8 @@ def _intact(store: Store, rows: _Rows, notes: list[str]) -> _Rows:
     for i, number in enumerate(rows.id):
         try:
             with readable(f"trial {number} of {store.folder}"):
-                _unpacked_table(str(store.folder), sets[rows.feature_set[i]], rows.values[i : i + 1])
-                _unpacked_table(str(store.folder), sets[rows.before_set[i]], rows.before_contact[i : i + 1])
+                unpacked_table(str(store.folder), sets[rows.feature_set[i]], rows.values[i : i + 1])
+                unpacked_table(str(store.folder), sets[rows.before_set[i]], rows.before_contact[i : i + 1])
                 for text in (rows.labels[i], rows.missing[i], rows.missing_before[i]):
                     decoded(store.folder, text)
                 datetime.fromisoformat(rows.made_at[i])
@@ -288,9 +288,9 @@ def _stored_tables(store: Store, folder: str, rows: _Rows, feature_set: int) -> 
         {i: decoded(folder, text) for i, text in enumerate(missing) if text != "{}"}
         for missing in (rows.missing, rows.missing_before)
     )
-    early = _unpacked_table(folder, sets[rows.before_set[0]], rows.before_contact) if same_before else None
+    early = unpacked_table(folder, sets[rows.before_set[0]], rows.before_contact) if same_before else None
     return _Tables(
-        features=evolve(_unpacked_table(folder, sets[feature_set], rows.values), reasons=reasons),
+        features=evolve(unpacked_table(folder, sets[feature_set], rows.values), reasons=reasons),
         before_contact=None if early is None else evolve(early, reasons=before_reasons),
     )
 
@@ -378,27 +378,7 @@ def _notes(recipes: int, simulated: int, used: int) -> list[str]:
     return notes
 
 
-def feature_table(
-    folder: str, wanted: Sequence[tuple[str, str]], sets: Sequence[str], values: Sequence[bytes]
-) -> FeatureTable:
-    """Return the table of these features for trials with different feature sets; a missing feature is NaN.
-
-    `sets` holds the feature names of each trial as JSON, `values` its packed values. Raises DataDamaged.
-    """
-    numbers = np.full((len(values), len(wanted)), np.nan)
-    set_of_trial = np.array(sets)
-    for names_text in dict.fromkeys(sets):
-        rows = np.flatnonzero(set_of_trial == names_text)
-        part = _unpacked_table(folder, names_text, [values[k] for k in rows.tolist()])
-        for k, pair in enumerate(zip(part.names, part.units, strict=True)):
-            if pair in wanted:
-                numbers[rows, wanted.index(pair)] = part.values[:, k]
-    return FeatureTable(
-        names=tuple(name for name, _ in wanted), units=tuple(unit for _, unit in wanted), values=numbers
-    )
-
-
-def _unpacked_table(folder: str, names_text: str, values: Sequence[bytes]) -> FeatureTable:
+def unpacked_table(folder: str, names_text: str, values: Sequence[bytes]) -> FeatureTable:
     """Return the table of packed values, one item per trial. Raises DataDamaged."""
     try:
         pairs = [(str(name), str(unit)) for name, unit in json.loads(names_text)]

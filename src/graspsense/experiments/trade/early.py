@@ -18,9 +18,9 @@ from graspsense.evaluation.crossval import cross_validate
 from graspsense.evaluation.folds import stratified, trials_by_class
 from graspsense.experiments.recognise import classifiers_of
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
-from graspsense.experiments.trade.costs import CostSettings
-from graspsense.experiments.trade.trade_task import (
+from graspsense.experiments.trade.costs import (
     FOLDS,
+    CostSettings,
     settings_of,
     simulated_result,
     target_labels,

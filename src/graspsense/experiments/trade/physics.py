@@ -13,8 +13,8 @@ from graspsense.core.settings.resolved import settings_from
 from graspsense.core.values.errors import ConfigError
 from graspsense.experiments.recognise import TEST_SEED_OFFSET, classifiers_of, true_and_predicted
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
-from graspsense.experiments.trade.costs import CostSettings
-from graspsense.experiments.trade.trade_task import (
+from graspsense.experiments.trade.costs import (
+    CostSettings,
     settings_of,
     simulated_result,
     trial_groups,

@@ -17,9 +17,10 @@ from graspsense.core.values.errors import ConfigError, counted
 from graspsense.evaluation.folds import INSTANCE_HELD_OUT, instance_held_out, trials_by_class
 from graspsense.experiments.recognise import classifiers_of
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult, TrialValues
-from graspsense.experiments.trade.costs import CostSettings, mean_seconds
-from graspsense.experiments.trade.trade_task import (
+from graspsense.experiments.trade.costs import (
     FOLDS,
+    CostSettings,
+    mean_seconds,
     settings_of,
     simulated_result,
     target_labels,
