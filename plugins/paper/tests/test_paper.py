@@ -30,7 +30,7 @@ from graspsense_paper.basis import basis
 from graspsense_paper.claims import HEADER as CLAIMS_HEADER
 from graspsense_paper.claims import Claim, _merged, claims, split_by
 from graspsense_paper.findings import _answer
-from graspsense_paper.grasp_result import GraspResult, GraspRow, grasp_results
+from graspsense_paper.grasping import GraspResult, GraspRow, grasp_results
 from graspsense_paper.published import published
 from graspsense_paper.rows import HEADER, RateComparison, rows
 from graspsense_paper.verdict import within

@@ -12,6 +12,7 @@ from typing import Any, Final
 from graspsense.core.components.registry import installed
 from graspsense.core.components.setting import worded
 from graspsense.core.components.strict import InvalidValue, ValidationFailed, plain, structured
+from graspsense.core.files.toml_text import KeyPath
 from graspsense.core.learn.copies import without_copies
 from graspsense.core.settings.layers import Layer, Merged, dotted
 from graspsense.core.settings.resolved import Settings, resolve
@@ -242,7 +243,11 @@ class CasePlan:
             text = (
                 f"{folds} folds of {counted(trials, 'trial')}: give at most as many folds as there are trials"
             )
-            self.complaints.append(self.layer.complain(InvalidValue(("judge", "folds"), text)))
+            self._complain(("judge", "folds"), text)
+
+    def _complain(self, path: KeyPath, text: str) -> None:
+        """Add an error in a key of the file."""
+        self.complaints.append(self.layer.complain(InvalidValue(path, text)))
 
     def _keys(self, values: Mapping[str, Any], cls: type, table: str) -> Any:
         try:
@@ -283,22 +288,17 @@ class CasePlan:
                 try:
                     component = installed().find("classifier", str(keys.pop("type")))
                     config = _fresh(build_plausible(component, keys, force=self.force))
-                except KeyError:
-                    self.complaints.append(
-                        self.layer.complain(
-                            InvalidValue(("classifiers", index), "a classifier needs a `type`")
-                        )
-                    )
-                    return
-                except GraspsenseError as error:
-                    self.complaints.append(
-                        self.layer.complain(InvalidValue(("classifiers", index), str(error)))
+                except (KeyError, GraspsenseError) as error:
+                    missing = isinstance(error, KeyError)
+                    self._complain(
+                        ("classifiers", index), "a classifier needs a `type`" if missing else str(error)
                     )
                     return
                 name = ", ".join([called, *(in_a_name(path[-1], value) for path, value in point)])
                 if name in seen:
-                    text = f"two classifiers are called {name!r}: give one a `name`"
-                    self.complaints.append(self.layer.complain(InvalidValue(("classifiers", index), text)))
+                    self._complain(
+                        ("classifiers", index), f"two classifiers are called {name!r}: give one a `name`"
+                    )
                 seen.add(name)
                 yield LearnerSpec(name=name, type=component.qualified, config=config)
 

@@ -58,34 +58,24 @@ class Results:
         """Store the result of a task; when this returns, it is on the disk. Raises SaveFailed."""
         _write(self.path(done.key), done.to_text() + "\n")
 
-    def get(self, key: str) -> TaskResult | None:
-        """Return the result of a task; None if there is none or its file cannot be read (see `problem`)."""
+    def read(self, key: str) -> tuple[TaskResult | None, str]:
+        """Return the result of a task, or None and why its file cannot be read; the reason is empty without a file."""
+        path = self.path(key)
         try:
-            return self._read(key)
-        except (OSError, ValueError, KeyError, TypeError):
-            return None
-
-    def problem(self, key: str) -> str:
-        """Return why the file of a result cannot be read; empty if it can be, or if there is no such file."""
-        try:
-            self._read(key)
+            done = TaskResult.from_text(path.read_text(encoding="utf-8"))
+            if done.key != key:
+                raise ValueError("it is the result of another task")
         except FileNotFoundError:
-            return ""
+            return None, ""
         except OSError as error:
-            return f"{self.path(key)}: {error.strerror}"
+            return None, f"{path}: {error.strerror}"
         except (ValueError, KeyError, TypeError) as error:
-            return f"{self.path(key)} is damaged: {named(error)}"
-        return ""
-
-    def _read(self, key: str) -> TaskResult:
-        done = TaskResult.from_text(self.path(key).read_text(encoding="utf-8"))
-        if done.key != key:
-            raise ValueError("it is the result of another task")
-        return done
+            return None, f"{path} is damaged: {named(error)}"
+        return done, ""
 
     def finished(self, keys: Sequence[str]) -> dict[str, TaskResult]:
         """Return the results of those of these tasks that have one, in their order."""
-        stored = ((key, self.get(key)) for key in keys)
+        stored = ((key, self.read(key)[0]) for key in keys)
         return {key: done for key, done in stored if done is not None}
 
     def any(self) -> bool:

@@ -235,9 +235,8 @@ def summarise(planned: Planned, results: Results) -> Summary:
     for case in planned.cases:
         for seed in planned.seeds:
             key = planned.task(case, seed).key
-            task_result = results.get(key)
+            task_result, problem = results.read(key)
             if task_result is None:
-                problem = results.problem(key)
                 unreadable += [problem] if problem else []
                 missing += not problem
                 continue
