@@ -186,10 +186,7 @@ class CasePlan:
             experiment=Layer(label=self.layer.label, values=over, lines=self.layer.lines),
             force=self.force,
         )
-        name = ", ".join(
-            str(value) if key in ("pipeline", "variant") else in_a_name(key, value)
-            for key, value in levels.items()
-        )
+        name = ", ".join(in_a_name(key, value) for key, value in levels.items())
         if any(source is not None and source.kind == SIMULATED for source in (data, test)):
             simulated_objects(settings)
         kind = kind_of(experiment.kind)
@@ -332,7 +329,9 @@ def number_of_trials(settings: Settings, data: TrialSource) -> int | None:
 
 
 def in_a_name(key: str, value: Any) -> str:
-    """Return a key with its value in words: `probing force 20 N`."""
+    """Return a key with its value in words: `probing force 20 N`; what has a name of its own by that alone."""
+    if key in ("part", "pipeline", "variant"):
+        return str(value)
     return " ".join(
         worded(key.rpartition(".")[2], shown(value) if isinstance(value, list | tuple) else value)
     )

@@ -12,6 +12,7 @@ from graspsense.core.components.setting import worded
 from graspsense.core.files.whole_file import write_or_replace
 from graspsense.core.values.errors import FAILURES, ComponentFailed, GraspsenseError, counted, named, place_of
 from graspsense.experiments.answer import answer, headline
+from graspsense.experiments.cases import in_a_name
 from graspsense.experiments.findings import MARKDOWN, Findings
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.results import EXPERIMENT, Results
@@ -176,7 +177,7 @@ def _picture(conditions: Sequence[ConditionResult], rows: Sequence[RateRow], cap
         return rates_picture(rows[:ROWS], caption + cut)
     series: dict[str, list[tuple[float, RateRow]]] = {}
     for condition, row in zip(conditions, rows, strict=True):
-        others = [str(value) for name, value in condition.case.levels.items() if name != key]
+        others = [in_a_name(name, value) for name, value in condition.case.levels.items() if name != key]
         series.setdefault(", ".join([*others, condition.classifier]), []).append(
             (float(condition.case.levels[key]), row)
         )

@@ -54,7 +54,7 @@ def plot(trace: Trace) -> tuple[Any, Any]:
         _draw_samples(trace, axes, name, signal)
     for axes, (name, images) in zip(others[len(fast) :], arrays.items(), strict=True):
         # Both fingertips are the channel `pads`.
-        unit = units.get(name, units.get("pads", ""))
+        unit = units.get("pads" if name.endswith("fingertip") else name, "")
         figure.colorbar(_draw_array(trace, axes, name, images), ax=axes, label=unit)
     show_literally(figure)
     return force, gap
