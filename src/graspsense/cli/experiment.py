@@ -87,7 +87,7 @@ def experiment(
         _list(shipped(), as_json)
         return
     from graspsense.experiments.answer import answer
-    from graspsense.experiments.executors.executor import chosen
+    from graspsense.experiments.executors.choose import chosen
     from graspsense.experiments.page import findings_of
     from graspsense.experiments.results import Results
     from graspsense.experiments.run import refuse_store

@@ -16,7 +16,7 @@ import json
 import os
 import re
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
@@ -30,6 +30,7 @@ from graspsense.core.files.whole_file import SaveFailed, write_or_replace
 from graspsense.core.settings.resolved import without_followers
 from graspsense.core.settings.settings_file import to_toml
 from graspsense.core.values.errors import ConfigError, named
+from graspsense.evaluation.json_codec import from_json
 from graspsense.experiments.experiment import PipelineOf, Planned
 from graspsense.experiments.experiment_file import read_experiment
 from graspsense.experiments.task import TaskResult
@@ -42,6 +43,12 @@ PARTS: Final = "parts"
 PROVENANCE: Final = "provenance.json"
 RESULTS: Final = "results"
 LOCK: Final = ".lock"
+_TABLES: Final[Mapping[str, Any]] = {
+    "inputs": dict[str, str] | None,
+    "versions": dict[str, str] | None,
+    "git": dict[str, dict[str, Any] | None] | None,
+}
+"""What is read of the provenance, and how it is made up."""
 
 
 @frozen
@@ -109,17 +116,17 @@ class Results:
     def provenance(self) -> dict[str, Any]:
         """Return the provenance that `begin` wrote; empty if it cannot be read."""
         try:
-            document = json.loads((self.folder / PROVENANCE).read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+            document: dict[str, Any] = json.loads((self.folder / PROVENANCE).read_text(encoding="utf-8"))
+            return {**document, **{key: from_json(document.get(key), kind) for key, kind in _TABLES.items()}}
+        except (OSError, ValueError, TypeError, AttributeError):  # it can be any JSON
             return {}
-        return document if isinstance(document, dict) else {}
 
     def experiment(self) -> Planned:
         """Return the experiment of the folder, under the name that it was run by. Raises ConfigError."""
         planned = read_experiment(str(self.folder / EXPERIMENT), force=True)
         provenance = self.provenance()
         # The results are those of the inputs that there were. Without them, an earlier version made the results.
-        inputs = provenance.get("inputs", {})
+        inputs = provenance.get("inputs") or {}
         return evolve(planned, name=str(provenance.get("experiment", planned.name)), inputs=inputs)
 
     @contextmanager

@@ -175,7 +175,7 @@ def _without_changed_inputs(task: Task, result: TaskResult) -> TaskResult:
 
 def _changed_inputs(results: Results, planned: Planned) -> list[str]:
     """Return a note on the inputs that differ from those of the results in the folder."""
-    earlier = results.provenance().get("inputs", {})
+    earlier = results.provenance().get("inputs") or {}
     names = [name for name, content in planned.inputs.items() if earlier.get(name, content) != content]
     if not names:
         return []

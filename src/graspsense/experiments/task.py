@@ -100,6 +100,8 @@ class TaskResult:
     def from_text(cls, text: str) -> TaskResult:
         """Return the result that `to_text` wrote. Raises ValueError, KeyError or TypeError for any other text."""
         values = json.loads(text)
+        if not isinstance(values, dict):
+            raise TypeError("it is no JSON object")
         if values.pop("sha256") != digest(values):
             raise ValueError("its sha256 does not match")
         if values["state"] not in ("done", "failed") or (values["result"] is None) != (

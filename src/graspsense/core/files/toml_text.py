@@ -233,7 +233,7 @@ def toml_value(value: Any) -> str:
 
 
 def toml_lines(values: Mapping[str, Any]) -> list[str]:
-    """Return values as the lines of a TOML file, the tables last; what is None, and tables without a key, are left out.
+    """Return values as the lines of a TOML file, the tables last; what is None is left out.
 
     >>> toml_lines({"run": {"seed": 3}, "title": "a"})
     ['title = "a"', '', '[run]', 'seed = 3']
@@ -241,7 +241,7 @@ def toml_lines(values: Mapping[str, Any]) -> list[str]:
     lines, tables = [], []
     for key, value in values.items():
         if isinstance(value, Mapping):
-            tables += ["", f"[{toml_key(key)}]", *_pairs(value)] if value else []
+            tables += ["", f"[{toml_key(key)}]", *_pairs(value)]
         else:
             lines += _pairs({key: value})
     return [*lines, *tables]
