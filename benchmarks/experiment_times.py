@@ -15,7 +15,7 @@ from statistics import median
 from arguments import parser_of
 
 from graspsense.experiments.cases import number_of_trials
-from graspsense.experiments.executors.serial import Serial
+from graspsense.experiments.executors.executor import Serial
 from graspsense.experiments.experiment_file import read_experiment, shipped
 from graspsense.experiments.versions import where_measured
 

@@ -24,7 +24,7 @@ from graspsense.evaluation.results import Evaluation as Evaluation
 
 # Experiments
 from graspsense.experiments.experiment_file import read_experiment as read_experiment
-from graspsense.experiments.executors.serial import Serial as Serial
+from graspsense.experiments.executors.executor import Serial as Serial
 from graspsense.experiments.results import Results as Results
 from graspsense.experiments.run import run_experiment as run_experiment
 from graspsense.experiments.summary import summarise as summarise

@@ -133,5 +133,5 @@ def test_a_result_that_cannot_be_read_is_told(experiment, tmp_path, monkeypatch)
 
 def test_a_missing_result_is_no_unreadable_one(experiment):
     results = Results(experiment)
-    assert results.problem("0" * 32) == ""
-    assert "damaged" in results.problem(sorted(experiment.glob("results/*.json"))[0].stem)
+    assert results.read("0" * 32) == (None, "")
+    assert "damaged" in results.read(sorted(experiment.glob("results/*.json"))[0].stem)[1]

@@ -31,6 +31,10 @@ def condition(name, *rates, n=100, simulated=True, target="both", cost=None):
     )
 
 
+def summary_of(*conditions):
+    return SimpleNamespace(conditions=conditions, of_first_target=conditions, alike=())
+
+
 @every_case(
     ("weak", "strong", "told", "above"),
     [
@@ -41,7 +45,7 @@ def condition(name, *rates, n=100, simulated=True, target="both", cost=None):
     ],
 )
 def test_an_answer_is_one_of_three_and_its_headline_agrees(weak, strong, told, above):
-    summary = SimpleNamespace(conditions=(condition("17 N", *weak, n=200), condition("20 N", *strong, n=200)))
+    summary = summary_of(condition("17 N", *weak, n=200), condition("20 N", *strong, n=200))
 
     assert told in answer(summary)
     assert above in headline(summary)
@@ -50,11 +54,16 @@ def test_an_answer_is_one_of_three_and_its_headline_agrees(weak, strong, told, a
         assert "best" not in text
 
 
+@every_case("rates", [(0.5,), (0.5, 0.6)])
+def test_an_answer_of_a_single_case_has_its_rate(rates):
+    summary = summary_of(condition("17 N", *rates))
+    for text in (answer(summary), headline(summary)):
+        assert f"{100 * sum(rates) / len(rates):.0f}" in text
+
+
 def test_equal_rates_of_few_grasps_are_not_said_to_agree():
     def told(*rates, n):
-        return answer(
-            SimpleNamespace(conditions=(condition("17 N", *rates, n=n), condition("20 N", *rates, n=n)))
-        )
+        return answer(summary_of(condition("17 N", *rates, n=n), condition("20 N", *rates, n=n)))
 
     assert "cannot be told" in told(0.5, n=4)
     assert "cannot be told" in told(0.5, 1.0, n=4)
@@ -69,7 +78,7 @@ def test_among_many_cases_that_are_guesses_the_best_is_hardly_ever_said_to_be_be
     for _ in range(40):
         rates = rng.binomial(60, 0.5, size=(20, seeds)) / 60
         cases = [condition(f"{k} N", *rate, n=60, simulated=simulated) for k, rate in enumerate(rates)]
-        claims += "is better than" in answer(SimpleNamespace(conditions=cases))
+        claims += "is better than" in answer(summary_of(*cases))
     assert claims <= 3
 
 

@@ -12,8 +12,9 @@ from kept import keep
 
 from graspsense.core.components.registry import IsolatedPlugins, installed
 from graspsense.core.values.errors import ConfigError
+from graspsense.experiments.answer import answer
+from graspsense.experiments.executors.executor import Serial
 from graspsense.experiments.executors.processes import Processes
-from graspsense.experiments.executors.serial import Serial
 from graspsense.experiments.experiment_file import _located, read_experiment
 from graspsense.experiments.results import Results
 from graspsense.experiments.run import run_experiment
@@ -370,6 +371,19 @@ def test_a_sweep_that_a_table_depends_on_is_planned(tmp_path, sweep, tasks):
     )
     planned = read_experiment(experiment(tmp_path, "t.csv", more=f"[sweep]\n{sweep}\n"))
     assert len({task.key for task in planned.tasks()}) == tasks
+
+
+@every_case(
+    ("sweep", "alike"),
+    [('"judge.grasps" = [0, 3]', [["grasps 0", "grasps 3"]]), ('"judge.folds" = [2, 3]', [])],
+)
+def test_a_sweep_that_changed_no_result_is_told(tmp_path, sweep, alike):
+    table(tmp_path / "t.csv", 1, 1.0)
+    planned = read_experiment(experiment(tmp_path, "t.csv", more=f"[sweep]\n{sweep}\n"))
+    run_experiment(planned, Results(tmp_path / "out"), Serial)
+    summary = summarise(planned, Results(tmp_path / "out"))
+    assert summary.alike == alike
+    assert ("changes nothing" in answer(summary)) is bool(alike)
 
 
 VARIANT = '[[variants]]\nname = "{}"\n[variants.controller]\nclosing_speed_m_s = {}\n'

@@ -19,8 +19,9 @@ from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.values.errors import ConfigError, UnknownName
 from graspsense.evaluation.over_seeds import OverSeeds, mean_difference
 from graspsense.experiment_api import ExperimentEntry
-from graspsense.experiments.executors.serial import Serial
+from graspsense.experiments.executors.executor import Serial
 from graspsense.experiments.experiment_file import read_experiment, shipped
+from graspsense.experiments.page import write_page
 from graspsense.experiments.results import Results
 from graspsense.experiments.run import run_experiment
 from graspsense.experiments.summary import summarise
@@ -375,6 +376,38 @@ def test_time_left_says_no_more_than_is_known():
     left.add(8.0)
     low, high = left.bounds_s
     assert low < 10.0 < high
+
+
+@pytest.mark.parametrize("name", ["../../escaped", "a/b", "", "nul\\u0000", "n" * 300, "plain ü"])
+def test_pipelines_of_any_name_stay_in_the_folder_and_are_found_again(file, tmp_path, name):
+    pipelines = f'pipelines = [{{ name = "{name}", pipeline = "default" }}]\n'
+    sweepless = EXPERIMENT.replace('[sweep]\n"judge.folds" = [2, 3]\n', "")
+    odd = file.with_name(os.fsdecode(b"a\xff\nb.toml"))
+    odd.write_text(pipelines + sweepless)
+    before = set(tmp_path.rglob("*"))
+    results = Results(tmp_path / "deep" / "er" / "out")
+    run_experiment(read_experiment(str(odd)), results, Serial, command=str(odd))
+    written = set(tmp_path.rglob("*")) - before
+    assert all(path.is_relative_to(results.folder) or path in results.folder.parents for path in written)
+    assert len(summarise(results.experiment(), results).results) == 2
+
+
+@every_case(
+    "content",
+    ["[]", "3", '{"inputs": 3}', '{"git": "x", "versions": 4}', '{"git": {"graspsense": 3}, "inputs": [1]}'],
+)
+def test_any_json_instead_of_provenance_or_of_a_result_is_told_in_words(whole, tmp_path, content):
+    results = Results(tmp_path / "out")
+    shutil.copytree(whole[0], results.folder)
+    planned = results.experiment()
+    (results.folder / "provenance.json").write_text(content)
+    assert results.provenance() == {}
+    task = planned.tasks()[0]
+    results.path(task.key).write_text(content)
+    assert "damaged" in results.read(task.key)[1]
+    write_page(summarise(planned, results), results)
+    account = run_experiment(planned, results, Serial, resume=True)
+    assert (account.kept, account.done) == (3, 1)
 
 
 def test_train_here_test_there(file, tmp_path):

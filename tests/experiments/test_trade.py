@@ -5,7 +5,7 @@ from cases import every_case
 from test_answer import condition
 
 from graspsense.evaluation.over_seeds import verdict_on
-from graspsense.experiments.executors.serial import Serial
+from graspsense.experiments.executors.executor import Serial
 from graspsense.experiments.experiment_file import read_experiment
 from graspsense.experiments.page import findings_of
 from graspsense.experiments.results import Results

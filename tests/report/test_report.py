@@ -18,7 +18,7 @@ from kept import keep
 from graspsense.core.components.registry import installed
 from graspsense.evaluation.intervals import Difference, RecognitionRate
 from graspsense.evaluation.results import Evaluation, Measurement, confusion
-from graspsense.experiments.executors.serial import Serial
+from graspsense.experiments.executors.executor import Serial
 from graspsense.experiments.experiment_file import read_experiment
 from graspsense.experiments.page import write_page
 from graspsense.experiments.results import Results

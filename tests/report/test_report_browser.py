@@ -7,7 +7,7 @@ import pytest
 from test_report_signals import CHANNELS, grasp
 
 from graspsense.evaluation.results import confusion
-from graspsense.experiments.executors.serial import Serial
+from graspsense.experiments.executors.executor import Serial
 from graspsense.experiments.experiment_file import read_experiment
 from graspsense.experiments.findings import FoundTable
 from graspsense.experiments.page import write_page

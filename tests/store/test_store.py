@@ -238,6 +238,16 @@ def test_a_row_that_was_changed_is_found_by_its_hash(tmp_path, column, value):
     assert problem.startswith(f"trial {number}: its row was changed")
 
 
+@every_case(
+    ("name", "error"),
+    [("t.csv", ConfigError), ("a", ConfigError), ("t.mcap", DataDamaged), ("a.mcap.part", DataDamaged)],
+)
+def test_a_file_of_another_kind_is_not_called_damaged(tmp_path, name, error):
+    (tmp_path / name).write_text("t,gap\n0,1\n")
+    with pytest.raises(error, match=name):
+        verify_file(tmp_path / name)
+
+
 def test_verify_finds_what_became_of_recordings(store):
     paths = [store.trial(keep(store)).recording for _ in range(4)]
     paths[0].unlink()

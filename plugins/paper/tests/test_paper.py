@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from graspsense.core.components.setting import declared, setting
 from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.over_seeds import OverSeeds
-from graspsense.experiments.executors.serial import Serial
+from graspsense.experiments.executors.executor import Serial
 from graspsense.experiments.experiment_file import read_experiment, shipped
 from graspsense.experiments.page import experiment_page, findings_of
 from graspsense.experiments.results import EXPERIMENT, Results
@@ -30,7 +30,7 @@ from graspsense_paper.basis import basis
 from graspsense_paper.claims import HEADER as CLAIMS_HEADER
 from graspsense_paper.claims import Claim, _merged, claims, split_by
 from graspsense_paper.findings import _answer
-from graspsense_paper.grasp_result import GraspResult, GraspRow, grasp_results
+from graspsense_paper.grasping import GraspResult, GraspRow, grasp_results
 from graspsense_paper.published import published
 from graspsense_paper.rows import HEADER, RateComparison, rows
 from graspsense_paper.verdict import within

@@ -15,7 +15,7 @@ from graspsense.cli.sources import is_csv, learner_of, trials_of
 from graspsense.cli.terminal import echo_as_it_is, echo_entries, echo_entry
 from graspsense.core.components.registry import Component, installed
 from graspsense.core.components.strict import keys_of, plain
-from graspsense.core.files.toml_text import toml_key, toml_value
+from graspsense.core.files.toml_text import toml_lines
 from graspsense.core.settings.layers import read_toml, refuse_other_kind
 from graspsense.core.settings.selected import SelectedComponent, build
 from graspsense.core.values.errors import ConfigError, GraspsenseError, PluginUnavailable, counted
@@ -238,13 +238,8 @@ def pipeline_text(chosen: Chosen, model: str) -> str:
     lines = [
         f"# Chosen by graspsense train --choose from {chosen.labelled.source}.".replace("\n", " "),
         f"# The rate of the whole procedure is {rate}.",
-        'extends = "default"',
+        *toml_lines({"extends": "default", **settings}),
     ]
-    for table, values in settings.items():
-        lines += ["", f"[{table}]"]
-        lines += [
-            f"{toml_key(key)} = {toml_value(value)}" for key, value in values.items() if value is not None
-        ]
     return "\n".join(lines) + "\n"
 
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from graspsense.experiments.duration import Effort
-    from graspsense.experiments.executors.base import Executor
+    from graspsense.experiments.executors.executor import Executor
     from graspsense.experiments.experiment import Planned
     from graspsense.experiments.findings import Findings
     from graspsense.experiments.results import Results
@@ -281,8 +281,11 @@ def _print_rates(summary: Summary) -> None:
 
 def _print_doubts(summary: Summary) -> None:
     """Print what the controls and the trials of the first seed say against the rates, each once."""
+    from graspsense.experiments.summary import alike_lines
+
     several = len(summary.conditions) > 1
-    warnings = [
+    warnings = alike_lines(summary)
+    warnings += [
         f"{condition.name}: {warning}" if several else warning
         for condition in summary.conditions
         for warning in condition.of_first_seed.warnings

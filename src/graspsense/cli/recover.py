@@ -87,7 +87,7 @@ def verify(source: str, as_json: bool) -> None:
         echo(counts, Style.BAD if verified.problems else Style.CAUTION if verified.unread else Style.GOOD)
         if verified.unread:
             echo(
-                "the disk could not be read: nothing is known of this data, which may be whole. Check the disk"
+                "nothing is known of what could not be read, which may be whole: check its permissions and the disk"
             )
         if verified.unfinished:
             echo("graspsense recover saves what is unfinished")

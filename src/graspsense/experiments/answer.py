@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from attrs import frozen
+
 from graspsense.evaluation.intervals import unpaired_difference
 from graspsense.evaluation.over_seeds import MARGIN, MeanDifference, Verdict, verdict_on
 from graspsense.experiments.summary import ConditionResult, Summary
@@ -19,95 +21,93 @@ def answer(summary: Summary) -> str:
                 "This kind of experiment measures no rates, and names no `findings` that report its results."
             )
         return "There is no answer yet: no task has a result."
-    target = summary.conditions[0].target
-    conditions = [condition for condition in summary.conditions if condition.target == target]
-    best = max(conditions, key=lambda condition: condition.rate.mean)
-    sample = _sample(best)
-    recognises = TARGETS[conditions[0].recognised]
+    ranked = _Ranked.of(summary.of_first_target)
+    conditions, best = ranked.conditions, ranked.best
+    rate = f"{TARGETS[conditions[0].recognised]} in {best.rate.words} of {_sample(best)}"
     if len(conditions) == 1:
-        return f"{_capitalised(best.name)} recognises {recognises} in {_rate(best)} of {sample}."
-    verdict = _verdict(conditions, best)
-    if len({condition.rate.mean for condition in conditions}) == 1:
-        doubt = "" if verdict == "agrees" else " Whether a case is better cannot be told."
-        return f"All {len(conditions)} cases recognise {recognises} in {_rate(best)} of {sample}.{doubt}"
+        return f"{_capitalised(best.name)} recognises {rate}."
+    if len(summary.alike) == 1 and len(summary.alike[0]) == len(summary.planned.cases):
+        return f"What differs between the {len(conditions)} cases changes nothing: all recognise {rate}."
+    if best.rate.mean == ranked.worst.rate.mean:
+        doubt = "" if ranked.verdict == "agrees" else " Whether a case is better cannot be told."
+        return f"All {len(conditions)} cases recognise {rate}.{doubt}"
     told = {
-        "differs": f"{_capitalised(best.name)} is better than {_worst(conditions).name}: it recognises",
+        "differs": f"{_capitalised(best.name)} is better than {ranked.worst.name}: it recognises",
         "agrees": f"All cases agree within {100 * MARGIN:g} points: {best.name} recognises",
         "cannot be told": f"Whether a case is better cannot be told. {_capitalised(best.name)} recognises",
-    }[verdict]
-    return f"{told} {recognises} in {_rate(best)} of {sample}. {_comparison(conditions, best)}"
+    }[ranked.verdict]
+    return f"{told} {rate}. {ranked.comparison}"
 
 
 def headline(summary: Summary) -> str:
     """Return the answer as a person would say it, without intervals; empty without a result."""
     if not summary.conditions:
         return ""
-    target = summary.conditions[0].target
-    conditions = [condition for condition in summary.conditions if condition.target == target]
-    best = max(conditions, key=lambda condition: condition.rate.mean)
-    worst = _worst(conditions)
-    recognises = TARGETS[best.recognised]
-    told = f"{recognises} recognised in {in_hundred(best.rate.mean)} grasps ({_sample(best)})"
-    if len(conditions) == 1:
-        return _capitalised(told)
-    if _verdict(conditions, best) == "differs":
-        name = _capitalised(best.name)
-        return f"{name} has the highest rate: {told}, against {in_hundred(worst.rate.mean)} with {worst.name}"
-    span = in_hundred(best.rate.mean)
-    if f"{100 * worst.rate.mean:.0f}" != f"{100 * best.rate.mean:.0f}":
-        span = f"{100 * worst.rate.mean:.0f} to {span}"
-    return (
-        f"No case is shown to be better than the others: {told.replace(in_hundred(best.rate.mean), span, 1)}"
-    )
+    ranked = _Ranked.of(summary.of_first_target)
+    best, worst = ranked.best, ranked.worst
+
+    def told(rate: str) -> str:
+        return f"{TARGETS[best.recognised]} recognised in {rate} grasps ({_sample(best)})"
+
+    rate = in_hundred(best.rate.mean)
+    if len(ranked.conditions) == 1:
+        return _capitalised(told(rate))
+    if ranked.verdict == "differs":
+        against = f"against {in_hundred(worst.rate.mean)} with {worst.name}"
+        return f"{_capitalised(best.name)} has the highest rate: {told(rate)}, {against}"
+    lowest = f"{100 * worst.rate.mean:.0f}"
+    span = rate if rate.startswith(f"{lowest} ") else f"{lowest} to {rate}"
+    return f"No case is shown to be better than the others: {told(span)}"
 
 
-def _worst(conditions: Sequence[ConditionResult]) -> ConditionResult:
-    return min(conditions, key=lambda condition: condition.rate.mean)
+@frozen
+class _Ranked:
+    """The conditions of one target, those with the highest and the lowest rate, and what is shown of these two.
 
-
-def _verdict(conditions: Sequence[ConditionResult], best: ConditionResult) -> Verdict:
-    """Return whether the highest and the lowest rate differ, corrected for the number of pairs of cases.
-
-    Two of many rates are the highest and the lowest by chance. Rates that are not paired by seed differ if their
-    intervals do not overlap, and if the interval of the difference says so too.
+    The verdict is corrected for the number of pairs: two of many rates are the highest and the lowest by chance. `gap`
+    is None if the rates are not paired by seed. Such rates differ if their intervals do not overlap, and if the
+    interval of the difference says so too.
     """
-    worst = _worst(conditions)
-    gap = best.minus(worst, comparisons=_pairs(conditions))
-    if gap is not None:
-        return verdict_on(gap.interval)
-    low, high = best.rate.interval, worst.rate.interval
-    if low is None or high is None or high[1] >= low[0]:
-        return "cannot be told"
-    unpaired = unpaired_difference(best.rate.mean, worst.rate.mean, (low, high), _pairs(conditions))
-    return "differs" if unpaired.is_positive else "cannot be told"
 
+    conditions: Sequence[ConditionResult]
+    best: ConditionResult
+    worst: ConditionResult
+    gap: MeanDifference | None
+    verdict: Verdict
 
-def _pairs(conditions: Sequence[ConditionResult]) -> int:
-    """Return the number of pairs of conditions, of which the highest and the lowest rate are one."""
-    return len(conditions) * (len(conditions) - 1) // 2
+    @classmethod
+    def of(cls, conditions: Sequence[ConditionResult]) -> _Ranked:
+        best = max(conditions, key=lambda condition: condition.rate.mean)
+        worst = min(conditions, key=lambda condition: condition.rate.mean)
+        pairs = max(len(conditions) * (len(conditions) - 1) // 2, 1)
+        gap = best.minus(worst, comparisons=pairs)
+        verdict: Verdict = "cannot be told"
+        low, high = best.rate.interval, worst.rate.interval
+        if gap is not None:
+            verdict = verdict_on(gap.interval)
+        elif low is not None and high is not None and high[1] < low[0]:
+            unpaired = unpaired_difference(best.rate.mean, worst.rate.mean, (low, high), pairs)
+            verdict = "differs" if unpaired.is_positive else "cannot be told"
+        return cls(conditions, best, worst, gap, verdict)
 
-
-def _comparison(conditions: Sequence[ConditionResult], best: ConditionResult) -> str:
-    """Return the sentence that compares the ends of a sweep, or else the best condition with the worst."""
-    ends = _ends_of_sweep(conditions)
-    change = None if ends is None else ends[1].minus(ends[0])
-    if ends is not None and change is not None:
-        return f"From {ends[0].name} to {ends[1].name} the rate changes by {_points(change)}."
-    worst = _worst(conditions)
-    gap = best.minus(worst, comparisons=_pairs(conditions))
-    name = _capitalised(worst.name)
-    if gap is not None:
-        return f"{name} has the lowest rate, {_rate(worst)}; the difference is {_points(gap)}."
-    low, high = best.rate.interval, worst.rate.interval
-    if low is None or high is None:
-        return f"{name} has the lowest rate, {_rate(worst)}; without intervals the difference may be chance."
-    if high[1] >= low[0]:
-        return f"{name} has the lowest rate, {_rate(worst)}; as the intervals overlap, the difference may be chance."
-    if _verdict(conditions, best) != "differs":
-        return (
-            f"{name} has the lowest rate, {_rate(worst)}; among {len(conditions)} cases this may be chance."
-        )
-    return f"{name} has the lowest rate, {_rate(worst)}."
+    @property
+    def comparison(self) -> str:
+        """The sentence that compares the ends of a sweep, or else the best condition with the worst."""
+        ends = _ends_of_sweep(self.conditions)
+        change = None if ends is None else ends[1].minus(ends[0])
+        if ends is not None and change is not None:
+            return f"From {ends[0].name} to {ends[1].name} the rate changes by {_points(change)}."
+        lowest = f"{_capitalised(self.worst.name)} has the lowest rate, {self.worst.rate.words}"
+        if self.gap is not None:
+            return f"{lowest}; the difference is {_points(self.gap)}."
+        low, high = self.best.rate.interval, self.worst.rate.interval
+        if low is None or high is None:
+            return f"{lowest}; without intervals the difference may be chance."
+        if high[1] >= low[0]:
+            return f"{lowest}; as the intervals overlap, the difference may be chance."
+        if self.verdict != "differs":
+            return f"{lowest}; among {len(self.conditions)} cases this may be chance."
+        return f"{lowest}."
 
 
 def _sample(condition: ConditionResult) -> str:
@@ -138,10 +138,3 @@ def _points(change: MeanDifference) -> str:
 def _capitalised(name: str) -> str:
     """Return a name as the start of a sentence."""
     return name[:1].upper() + name[1:] if " " in name else name
-
-
-def _rate(condition: ConditionResult) -> str:
-    interval = condition.rate.interval
-    if interval is None:
-        return f"{100 * condition.rate.mean:.1f} % (no interval)"
-    return f"{100 * condition.rate.mean:.1f} % (95 %: {100 * interval[0]:.1f} to {100 * interval[1]:.1f})"

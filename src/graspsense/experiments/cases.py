@@ -12,6 +12,7 @@ from typing import Any, Final
 from graspsense.core.components.registry import installed
 from graspsense.core.components.setting import worded
 from graspsense.core.components.strict import InvalidValue, ValidationFailed, plain, structured
+from graspsense.core.files.toml_text import KeyPath
 from graspsense.core.learn.copies import without_copies
 from graspsense.core.settings.layers import Layer, Merged, dotted
 from graspsense.core.settings.resolved import Settings, resolve
@@ -185,10 +186,7 @@ class CasePlan:
             experiment=Layer(label=self.layer.label, values=over, lines=self.layer.lines),
             force=self.force,
         )
-        name = ", ".join(
-            str(value) if key in ("pipeline", "variant") else in_a_name(key, value)
-            for key, value in levels.items()
-        )
+        name = ", ".join(in_a_name(key, value) for key, value in levels.items())
         if any(source is not None and source.kind == SIMULATED for source in (data, test)):
             simulated_objects(settings)
         kind = kind_of(experiment.kind)
@@ -242,7 +240,11 @@ class CasePlan:
             text = (
                 f"{folds} folds of {counted(trials, 'trial')}: give at most as many folds as there are trials"
             )
-            self.complaints.append(self.layer.complain(InvalidValue(("judge", "folds"), text)))
+            self._complain(("judge", "folds"), text)
+
+    def _complain(self, path: KeyPath, text: str) -> None:
+        """Add an error in a key of the file."""
+        self.complaints.append(self.layer.complain(InvalidValue(path, text)))
 
     def _keys(self, values: Mapping[str, Any], cls: type, table: str) -> Any:
         try:
@@ -283,22 +285,17 @@ class CasePlan:
                 try:
                     component = installed().find("classifier", str(keys.pop("type")))
                     config = _fresh(build(component, keys, force=self.force))
-                except KeyError:
-                    self.complaints.append(
-                        self.layer.complain(
-                            InvalidValue(("classifiers", index), "a classifier needs a `type`")
-                        )
-                    )
-                    return
-                except GraspsenseError as error:
-                    self.complaints.append(
-                        self.layer.complain(InvalidValue(("classifiers", index), str(error)))
+                except (KeyError, GraspsenseError) as error:
+                    missing = isinstance(error, KeyError)
+                    self._complain(
+                        ("classifiers", index), "a classifier needs a `type`" if missing else str(error)
                     )
                     return
                 name = ", ".join([called, *(in_a_name(path[-1], value) for path, value in point)])
                 if name in seen:
-                    text = f"two classifiers are called {name!r}: give one a `name`"
-                    self.complaints.append(self.layer.complain(InvalidValue(("classifiers", index), text)))
+                    self._complain(
+                        ("classifiers", index), f"two classifiers are called {name!r}: give one a `name`"
+                    )
                 seen.add(name)
                 yield LearnerSpec(name=name, type=component.qualified, config=config)
 
@@ -332,7 +329,9 @@ def number_of_trials(settings: Settings, data: TrialSource) -> int | None:
 
 
 def in_a_name(key: str, value: Any) -> str:
-    """Return a key with its value in words: `probing force 20 N`."""
+    """Return a key with its value in words: `probing force 20 N`; what has a name of its own by that alone."""
+    if key in ("part", "pipeline", "variant"):
+        return str(value)
     return " ".join(
         worded(key.rpartition(".")[2], shown(value) if isinstance(value, list | tuple) else value)
     )

@@ -290,19 +290,13 @@ def _matched(
     ]
     if pairs:
         return pairs
-    targets = list(dict.fromkeys(result.target for result in mine))
-    best = [
-        tuple(
-            max(
-                (condition for condition in side if condition.target == target),
-                key=lambda condition: condition.rate.mean,
-                default=None,
-            )
-            for side in (mine, theirs)
-        )
-        for target in targets
-    ]
-    return [(a, b) for a, b in best if a is not None and b is not None]
+    targets = dict.fromkeys(result.target for result in mine)
+    # Of several values of a key, a dictionary keeps the last: the highest rate of each target.
+    best, best_of_theirs = (
+        {condition.target: condition for condition in sorted(side, key=lambda each: each.rate.mean)}
+        for side in (mine, theirs)
+    )
+    return [(best[target], best_of_theirs[target]) for target in targets if target in best_of_theirs]
 
 
 def _difference(result: ConditionResult, other: ConditionResult, comparisons: int) -> tuple[Difference, str]:

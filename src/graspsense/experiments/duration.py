@@ -6,7 +6,6 @@ judging are included. `benchmarks/experiment_times.py` measures them.
 
 from __future__ import annotations
 
-import math
 from typing import Final
 
 from attrs import frozen
@@ -15,6 +14,7 @@ from graspsense.experiments.cases import number_of_trials
 from graspsense.experiments.experiment import Planned
 from graspsense.experiments.experiment_file import shipped
 from graspsense.experiments.kinds import kind_of
+from graspsense.experiments.timing import duration_in_words
 
 ESTIMATED_FROM: Final = "estimated from times measured on Intel(R) Xeon(R) Processor at 2.0 GHz on 2026-11-22"
 """What the estimates rest on: the processor on which the times were measured, and the date."""
@@ -44,7 +44,7 @@ class Effort:
         """Return the estimated time with this number of processes, in words."""
         if self.seconds is None:
             return "unknown"
-        return duration_in_words(self.seconds / min(workers, self.tasks))
+        return duration_in_words(max(self.seconds / min(workers, self.tasks), 1.0), step_s=5)
 
 
 def effort_of(planned: Planned) -> Effort:
@@ -75,12 +75,3 @@ def effort_of(planned: Planned) -> Effort:
         trainings=trainings * seeds,
         seconds=seconds * seeds if known and estimated else None,
     )
-
-
-def duration_in_words(seconds: float) -> str:
-    """Return a duration to one or two digits: `40 s`, `15 min`, `2.5 h`."""
-    if seconds < 100:
-        return f"{max(math.ceil(seconds / 5) * 5, 5)} s"
-    if seconds < 5400:
-        return f"{math.ceil(seconds / 60)} min"
-    return f"{seconds / 3600:.1f} h"

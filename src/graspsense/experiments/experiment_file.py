@@ -17,6 +17,7 @@ from graspsense.core.settings.layers import Layer, Merged, option_layers, read_t
 from graspsense.core.settings.resolved import Settings, default_paths
 from graspsense.core.values.errors import ConfigError, GraspsenseError, UnknownName
 from graspsense.core.values.limits import CASES
+from graspsense.core.values.printable import in_one_line
 from graspsense.experiments.cases import CasePlan
 from graspsense.experiments.experiment import PIPELINE_TABLES, Experiment, ExperimentCase, Planned
 from graspsense.experiments.kinds import kind_of
@@ -137,7 +138,7 @@ def _found(asked: str) -> tuple[Layer, Path | None, str]:
     """Return the content of the file of an experiment, the folder that its paths are relative to, and its name."""
     if asked.endswith(".toml"):
         path = Path(asked).expanduser()
-        return read_toml(path, asked, "experiment"), path.parent, path.stem
+        return read_toml(path, asked, "experiment"), path.parent, in_one_line(path.stem)
     try:
         resource = installed().resource(ExperimentEntry, asked)
     except UnknownName as error:

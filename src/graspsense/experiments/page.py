@@ -12,10 +12,11 @@ from graspsense.core.components.setting import worded
 from graspsense.core.files.whole_file import write_or_replace
 from graspsense.core.values.errors import FAILURES, ComponentFailed, GraspsenseError, counted, named, place_of
 from graspsense.experiments.answer import answer, headline
+from graspsense.experiments.cases import in_a_name
 from graspsense.experiments.findings import MARKDOWN, Findings
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.results import EXPERIMENT, Results
-from graspsense.experiments.summary import ConditionResult, Summary, unreadable_lines
+from graspsense.experiments.summary import ConditionResult, Summary, alike_lines, unreadable_lines
 from graspsense.experiments.task_results import RecognitionResult
 from graspsense.recording.provenance import commit_text
 from graspsense.report.evaluation_sections import confusion_section, controls_section, tree_section
@@ -80,7 +81,7 @@ def experiment_page(summary: Summary, results: Results) -> Page:
             beside=bullets(failure_lines(summary), "warning") + bullets([SIMULATED], "notes"),
             sections=(*findings.page_sections(), _made_of(summary, results)),
         )
-    best = best_condition(summary)
+    best = max(summary.of_first_target, key=lambda condition: condition.rate.mean, default=None)
     sections = [_rates(summary)] if summary.conditions else []
     if best is not None:
         sections += [*_evaluation_sections(summary, best), *measurement_sections(summary, best)]
@@ -94,14 +95,6 @@ def experiment_page(summary: Summary, results: Results) -> Page:
         beside=_beside(summary, best),
         sections=tuple(sections),
     )
-
-
-def best_condition(summary: Summary) -> ConditionResult | None:
-    """Return the condition with the highest rate for the first target, None if there is none."""
-    conditions = [
-        condition for condition in summary.conditions if condition.target == summary.conditions[0].target
-    ]
-    return max(conditions, key=lambda condition: condition.rate.mean) if conditions else None
 
 
 def rate_row(condition: ConditionResult, *, strong: bool = False) -> RateRow:
@@ -146,13 +139,13 @@ def _first_result(summary: Summary, condition: ConditionResult) -> RecognitionRe
 
 
 def failure_lines(summary: Summary) -> list[str]:
-    """Return a sentence each on tasks that failed, on results that cannot be read, and on tasks without a result."""
+    """Return a sentence each on what failed, is missing, cannot be read, or is the same in several cases."""
     lines = []
     if summary.failed:
         reasons = list(dict.fromkeys(task.reason for task in summary.failed))
         failed = counted(len(summary.failed), "task failed and is", "tasks failed and are")
         lines.append(f"{failed} not included: {'; '.join(reasons[:5])}")
-    lines += unreadable_lines(summary)
+    lines += [*unreadable_lines(summary), *alike_lines(summary)]
     if summary.missing:
         missing = counted(
             summary.missing, "task has no result yet and is", "tasks have no result yet and are"
@@ -184,7 +177,7 @@ def _picture(conditions: Sequence[ConditionResult], rows: Sequence[RateRow], cap
         return rates_picture(rows[:ROWS], caption + cut)
     series: dict[str, list[tuple[float, RateRow]]] = {}
     for condition, row in zip(conditions, rows, strict=True):
-        others = [str(value) for name, value in condition.case.levels.items() if name != key]
+        others = [in_a_name(name, value) for name, value in condition.case.levels.items() if name != key]
         series.setdefault(", ".join([*others, condition.classifier]), []).append(
             (float(condition.case.levels[key]), row)
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, Literal
 
 from attrs import field, frozen
@@ -63,8 +63,16 @@ def recognise(params: Mapping[str, Any], seed: int) -> RecognitionResult:
     """
     evaluation = structured(params["judge"], EvaluationSettings, "[judge]")
     settings = settings_from(params["settings"], "the settings of the task")
-    curves = _CurveCollector(evaluation.grasps if params["first"] else 0)
-    data = _trials(params["data"], settings, seed, curves)
+    curves: list[GraspCurve] = []
+    counts: Counter[str] = Counter()
+
+    def keep(number: int, label: str, trace: Trace) -> None:
+        """Keep the curves of the first few grasps of each label."""
+        counts[label] += 1
+        if counts[label] <= evaluation.grasps:
+            curves.append(grasp_curve(trace, label, number))
+
+    data = _trials(params["data"], settings, seed, keep if params["first"] and evaluation.grasps else None)
     test = None
     if params["test"]:
         test = apart_from(_trials(params["test"], settings, seed + TEST_SEED_OFFSET, None), data)
@@ -84,7 +92,7 @@ def recognise(params: Mapping[str, Any], seed: int) -> RecognitionResult:
         provenance=data.provenance,
         trials=TrialValues.from_trials(data),
         classifiers=tuple(results),
-        grasps=tuple(curves.curves),
+        grasps=tuple(curves),
     )
 
 
@@ -97,23 +105,11 @@ def classifiers_of(params: Mapping[str, Any]) -> dict[str, SelectedComponent]:
     return classifiers
 
 
-class _CurveCollector:
-    """Keeps the curves of the first few simulated grasps of each label."""
-
-    def __init__(self, per_label: int) -> None:
-        self.per_label = per_label
-        self.curves: list[GraspCurve] = []
-        self._counts: Counter[str] = Counter()
-
-    def add(self, number: int, label: str, trace: Trace) -> None:
-        """Add a grasp, unless there are enough of its label."""
-        self._counts[label] += 1
-        if self._counts[label] <= self.per_label:
-            self.curves.append(grasp_curve(trace, label, number))
-
-
 def _trials(
-    values: Mapping[str, Any], settings: Settings, seed: int, curves: _CurveCollector | None
+    values: Mapping[str, Any],
+    settings: Settings,
+    seed: int,
+    on_trace: Callable[[int, str, Trace], None] | None,
 ) -> Labelled:
     return without_copies(
         labelled_trials(
@@ -121,7 +117,7 @@ def _trials(
             settings=lambda: settings,
             features=settings.features.create,
             seed=seed,
-            on_trace=curves.add if curves is not None and curves.per_label else None,
+            on_trace=on_trace,
         )
     )
 

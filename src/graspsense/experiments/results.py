@@ -11,8 +11,10 @@ OUT/report.html       the page
 from __future__ import annotations
 
 import fcntl
+import hashlib
 import json
 import os
+import re
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -23,11 +25,12 @@ from attrs import evolve, frozen
 
 from graspsense.core.components.caller import option
 from graspsense.core.components.strict import plain
-from graspsense.core.files.toml_text import toml_key, toml_value
+from graspsense.core.files.toml_text import toml_lines
 from graspsense.core.files.whole_file import SaveFailed, write_or_replace
 from graspsense.core.settings.resolved import without_followers
 from graspsense.core.settings.settings_file import to_toml
 from graspsense.core.values.errors import ConfigError, named
+from graspsense.evaluation.json_codec import from_json
 from graspsense.experiments.experiment import PipelineOf, Planned
 from graspsense.experiments.experiment_file import read_experiment
 from graspsense.experiments.task import TaskResult
@@ -40,6 +43,12 @@ PARTS: Final = "parts"
 PROVENANCE: Final = "provenance.json"
 RESULTS: Final = "results"
 LOCK: Final = ".lock"
+_TABLES: Final[Mapping[str, Any]] = {
+    "inputs": dict[str, str] | None,
+    "versions": dict[str, str] | None,
+    "git": dict[str, dict[str, Any] | None] | None,
+}
+"""What is read of the provenance, and how it is made up."""
 
 
 @frozen
@@ -56,34 +65,24 @@ class Results:
         """Store the result of a task; when this returns, it is on the disk. Raises SaveFailed."""
         _write(self.path(done.key), done.to_text() + "\n")
 
-    def get(self, key: str) -> TaskResult | None:
-        """Return the result of a task; None if there is none or its file cannot be read (see `problem`)."""
+    def read(self, key: str) -> tuple[TaskResult | None, str]:
+        """Return the result of a task, or None and why its file cannot be read; the reason is empty without a file."""
+        path = self.path(key)
         try:
-            return self._read(key)
-        except (OSError, ValueError, KeyError, TypeError):
-            return None
-
-    def problem(self, key: str) -> str:
-        """Return why the file of a result cannot be read; empty if it can be, or if there is no such file."""
-        try:
-            self._read(key)
+            done = TaskResult.from_text(path.read_text(encoding="utf-8"))
+            if done.key != key:
+                raise ValueError("it is the result of another task")
         except FileNotFoundError:
-            return ""
+            return None, ""
         except OSError as error:
-            return f"{self.path(key)}: {error.strerror}"
+            return None, f"{path}: {error.strerror}"
         except (ValueError, KeyError, TypeError) as error:
-            return f"{self.path(key)} is damaged: {named(error)}"
-        return ""
-
-    def _read(self, key: str) -> TaskResult:
-        done = TaskResult.from_text(self.path(key).read_text(encoding="utf-8"))
-        if done.key != key:
-            raise ValueError("it is the result of another task")
-        return done
+            return None, f"{path} is damaged: {named(error)}"
+        return done, ""
 
     def finished(self, keys: Sequence[str]) -> dict[str, TaskResult]:
         """Return the results of those of these tasks that have one, in their order."""
-        stored = ((key, self.get(key)) for key in keys)
+        stored = ((key, self.read(key)[0]) for key in keys)
         return {key: done for key, done in stored if done is not None}
 
     def any(self) -> bool:
@@ -94,7 +93,7 @@ class Results:
         """Write the experiment, its pipelines and its provenance next to the results. Raises SaveFailed."""
         # Without the settings that follow another one, since a sweep may change that.
         texts = {
-            f"{name}.toml": to_toml(evolve(pipeline, values=without_followers(pipeline.values)))
+            file_of(name): to_toml(evolve(pipeline, values=without_followers(pipeline.values)))
             for name, pipeline in planned.pipelines.items()
         }
         for name, text in texts.items():
@@ -103,7 +102,7 @@ class Results:
         for part in planned.parts:
             for name, text in texts.items():
                 _write(self.folder / PARTS / PIPELINES / name, text)
-            _write(self.folder / PARTS / f"{part.name}.toml", resolved(part))
+            _write(self.folder / PARTS / file_of(part.name), resolved(part))
         provenance = {
             "experiment": planned.name,
             "command": command,
@@ -117,17 +116,17 @@ class Results:
     def provenance(self) -> dict[str, Any]:
         """Return the provenance that `begin` wrote; empty if it cannot be read."""
         try:
-            document = json.loads((self.folder / PROVENANCE).read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+            document: dict[str, Any] = json.loads((self.folder / PROVENANCE).read_text(encoding="utf-8"))
+            return {**document, **{key: from_json(document.get(key), kind) for key, kind in _TABLES.items()}}
+        except (OSError, ValueError, TypeError, AttributeError):  # it can be any JSON
             return {}
-        return document if isinstance(document, dict) else {}
 
     def experiment(self) -> Planned:
         """Return the experiment of the folder, under the name that it was run by. Raises ConfigError."""
         planned = read_experiment(str(self.folder / EXPERIMENT), force=True)
         provenance = self.provenance()
         # The results are those of the inputs that there were. Without them, an earlier version made the results.
-        inputs = provenance.get("inputs", {})
+        inputs = provenance.get("inputs") or {}
         return evolve(planned, name=str(provenance.get("experiment", planned.name)), inputs=inputs)
 
     @contextmanager
@@ -155,36 +154,27 @@ class Results:
             os.close(lock)
 
 
+def file_of(name: str) -> str:
+    """Return the name of the file of a pipeline or of a part, which lies in the folder whatever its own name is."""
+    plain = re.fullmatch(r"\w[\w .-]{0,99}", name)
+    return f"{name if plain else hashlib.sha256(name.encode(errors='surrogateescape')).hexdigest()[:16]}.toml"
+
+
 def resolved(planned: Planned) -> str:
     """Return the experiment as a file with all values."""
     values: dict[str, Any] = plain(planned.experiment)
     values["seeds"] = list(planned.seeds)
     if planned.parts:
-        values["parts"] = [f"{PARTS}/{part.name}.toml" for part in planned.parts]
+        values["parts"] = [f"{PARTS}/{file_of(part.name)}" for part in planned.parts]
     values["pipelines"] = [
-        plain(PipelineOf(name=name, pipeline=f"{PIPELINES}/{name}.toml")) for name in planned.pipelines
+        plain(PipelineOf(name=name, pipeline=f"{PIPELINES}/{file_of(name)}")) for name in planned.pipelines
     ]
     if not planned.experiment.classifiers and planned.cases and not planned.parts:
         values["classifiers"] = [
             {"name": case.name, "type": case.type, **case.config} for case in _unswept(planned)
         ]
-    lines = [
-        f"# {planned.name}, with everything filled in: `graspsense experiment FILE` gives the same again."
-    ]
-    tables = {key: value for key, value in values.items() if isinstance(value, Mapping)}
-    lines += [
-        f"{toml_key(key)} = {toml_value(value)}"
-        for key, value in values.items()
-        if key not in tables and value is not None
-    ]
-    for table, keys in tables.items():
-        if keys:
-            lines += [
-                "",
-                f"[{table}]",
-                *(f"{toml_key(k)} = {toml_value(value)}" for k, value in keys.items()),
-            ]
-    return "\n".join(lines) + "\n"
+    head = f"# {planned.name}, with everything filled in: `graspsense experiment FILE` gives the same again."
+    return "\n".join([head, *toml_lines(values)]) + "\n"
 
 
 def _unswept(planned: Planned) -> list[Any]:
@@ -195,4 +185,4 @@ def _unswept(planned: Planned) -> list[Any]:
 
 
 def _write(path: Path, text: str) -> None:
-    write_or_replace(path, text.encode(), make_folder=True)
+    write_or_replace(path, text.encode(errors="backslashreplace"), make_folder=True)

@@ -11,7 +11,7 @@ from graspsense.core.components.caller import option
 from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.grasp.interrupts import Interrupts
 from graspsense.core.values.errors import ConfigError, counted, listed
-from graspsense.experiments.executors.base import Executor, ExecutorLost
+from graspsense.experiments.executors.executor import Executor, ExecutorLost
 from graspsense.experiments.experiment import Planned
 from graspsense.experiments.results import Results
 from graspsense.experiments.task import Task, TaskResult
@@ -175,7 +175,7 @@ def _without_changed_inputs(task: Task, result: TaskResult) -> TaskResult:
 
 def _changed_inputs(results: Results, planned: Planned) -> list[str]:
     """Return a note on the inputs that differ from those of the results in the folder."""
-    earlier = results.provenance().get("inputs", {})
+    earlier = results.provenance().get("inputs") or {}
     names = [name for name, content in planned.inputs.items() if earlier.get(name, content) != content]
     if not names:
         return []

@@ -10,10 +10,10 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from attrs import asdict, evolve, frozen
+from attrs import asdict, evolve, field, frozen
 
 from graspsense.core.components.roles import BatchBackend, Grasped, SimulationVariant
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.errors import ConfigError, named
 from graspsense.evaluation.intervals import Difference, RecognitionRate, percent
 from graspsense.experiments.versions import measured_on
 
@@ -60,23 +60,12 @@ class VariantPoint:
     fidelity: str
     step: str
     role: str
-    seconds: float
-    setup_s: float
-    errors: Mapping[str, float]
+    seconds: float = math.nan
+    setup_s: float = math.nan
+    errors: Mapping[str, float] = field(factory=dict)
     failure: str = ""
     recognised: RecognitionRate | None = None
     behind: Difference | None = None
-
-    @classmethod
-    def measured(cls, variant: SimulationVariant, **figures: Any) -> VariantPoint:
-        """Return what was measured of a variant; `figures` has the other fields."""
-        return cls(
-            method=variant.method,
-            fidelity=variant.fidelity,
-            step=variant.step,
-            role=variant.role,
-            **figures,
-        )
 
 
 @frozen(kw_only=True)
@@ -142,6 +131,9 @@ def trade_simulation(
     points: list[VariantPoint] = []
     in_turn = sorted(variants, key=lambda variant: variant.role != "reference")
     for k, variant in enumerate(in_turn):
+        point = VariantPoint(
+            method=variant.method, fidelity=variant.fidelity, step=variant.step, role=variant.role
+        )
         what = f"{variant.method}, {variant.fidelity}, {variant.step}"
         tick = None if progress is None else partial(progress, what, k, len(in_turn))
         if tick is not None:
@@ -152,15 +144,13 @@ def trade_simulation(
             # The reference comes first, so an unknown scene is already reported there.
             if reference is None:
                 raise
-            why = f"{type(error).__name__}: {error}"
-            points.append(
-                VariantPoint.measured(variant, seconds=math.nan, setup_s=math.nan, errors={}, failure=why)
-            )
+            points.append(evolve(point, failure=named(error)))
             continue
         if reference is None:
             reference = felt
-            quantities = (*felt[0].features.names, PEAK, TRACE)
-        points.append(_point(variant, felt, reference, seconds, setup))
+            quantities = (*felt[0][0].names, PEAK, TRACE)
+        errors, failure = _errors(felt, reference)
+        points.append(evolve(point, seconds=seconds, setup_s=setup, errors=errors, failure=failure))
     return SimulationTrade(
         gripper=settings.gripper.component.qualified,
         scenes=tuple(scenes),
@@ -171,19 +161,8 @@ def trade_simulation(
     )
 
 
-@frozen(kw_only=True, eq=False)
-class _Measured:
-    features: Features
-    force: NDArray[np.float64]
-
-
-@frozen
-class _Extraction:
-    feature_set: Any
-
-    def __call__(self, trace: Trace) -> _Measured:
-        force = 0.5 * (trace.force_left_n + trace.force_right_n)
-        return _Measured(features=self.feature_set.extract(trace), force=force)
+_Measured = tuple["Features", "NDArray[np.float64]"]
+"""The features of a grasp, and the mean force of the pads over time."""
 
 
 def _measured(
@@ -198,7 +177,9 @@ def _measured(
     backend = settings.gripper.component.create(evolve(settings.gripper.config, **ideal, **variant.settings))
     controller, feature_set = settings.controller.create(), settings.features.create()
     backend.expect_features(feature_set)
-    extract = _Extraction(feature_set)
+
+    def extract(trace: Trace) -> _Measured:
+        return feature_set.extract(trace), 0.5 * (trace.force_left_n + trace.force_right_n)
 
     def run(which: slice) -> tuple[Sequence[Grasped], float]:
         began = time.process_time()
@@ -224,30 +205,25 @@ def _measured(
     return [grasp.extracted for grasp in done], least / len(scenes), max(cold_s - least, 0.0)
 
 
-def _point(
-    variant: SimulationVariant,
-    felt: Sequence[_Measured],
-    reference: Sequence[_Measured],
-    seconds: float,
-    setup: float,
-) -> VariantPoint:
+def _errors(felt: Sequence[_Measured], reference: Sequence[_Measured]) -> tuple[dict[str, float], str]:
+    """Return the largest error of each quantity, and why one of them is infinite."""
     worst: dict[str, float] = {}
     missing = ""
-    for measured, true in zip(felt, reference, strict=True):
-        features = true.features
-        for name, unit in zip(features.names, features.units, strict=True):
-            expected, value = features[name], measured.features[name]
+    for (measured, force), (true, true_force) in zip(felt, reference, strict=True):
+        for name, unit in zip(true.names, true.units, strict=True):
+            expected, value = true[name], measured[name]
             if math.isnan(expected):
                 continue
             error = abs(value - expected) / max(abs(expected), SCALES.get(unit, 1.0))
             if math.isnan(error):
-                missing, error = f"{name} is missing: {measured.features.reasons.get(name, '')}", math.inf
+                missing, error = f"{name} is missing: {measured.reasons.get(name, '')}", math.inf
             worst[name] = max(worst.get(name, 0.0), error)
-        n = min(len(measured.force), len(true.force))
-        peak = max(float(np.max(true.force, initial=0.0)), SCALES["N"])
-        reached = float(np.max(measured.force, initial=0.0))
-        off = float(np.sqrt(np.mean((measured.force[:n] - true.force[:n]) ** 2))) if n else math.inf
-        worst[PEAK] = max(worst.get(PEAK, 0.0), abs(reached - float(np.max(true.force, initial=0.0))) / peak)
+        n = min(len(force), len(true_force))
+        true_peak, reached = (float(np.max(curve, initial=0.0)) for curve in (true_force, force))
+        peak = max(true_peak, SCALES["N"])
+        off = float(np.sqrt(np.mean((force[:n] - true_force[:n]) ** 2))) if n else math.inf
+        worst[PEAK] = max(worst.get(PEAK, 0.0), abs(reached - true_peak) / peak)
         worst[TRACE] = max(worst.get(TRACE, 0.0), off / peak)
-    failure = missing or ("" if all(map(math.isfinite, worst.values())) else "no number in the force trace")
-    return VariantPoint.measured(variant, seconds=seconds, setup_s=setup, errors=worst, failure=failure)
+    return worst, missing or (
+        "" if all(map(math.isfinite, worst.values())) else "no number in the force trace"
+    )

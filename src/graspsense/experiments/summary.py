@@ -10,7 +10,7 @@ from attrs import evolve, field, frozen
 
 from graspsense.core.components.caller import option
 from graspsense.core.learn.labelled import Target, recognised
-from graspsense.core.values.errors import ConfigError, counted
+from graspsense.core.values.errors import ConfigError, counted, listed
 from graspsense.evaluation.intervals import RecognitionRate
 from graspsense.evaluation.over_seeds import MeanDifference, OverSeeds, mean_difference
 from graspsense.evaluation.results import Confusion
@@ -165,6 +165,33 @@ class Summary:
         result = self.results.get((case, seed))
         return result if isinstance(result, RecognitionResult) else None
 
+    @property
+    def of_first_target(self) -> list[ConditionResult]:
+        """The conditions of the first target."""
+        return [condition for condition in self.conditions if condition.target == self.conditions[0].target]
+
+    @property
+    def alike(self) -> list[list[str]]:
+        """The names of cases that have the same trials and the same answers to the last digit, for each such group.
+
+        What differs between them has no effect. Cases with a source of their own to test on are left out, as their
+        results do not hold those trials.
+        """
+        cases: dict[Any, list[str]] = {}
+        for case in self.planned.cases:
+            results = [self.recognition(case.name, seed) for seed in self.planned.seeds]
+            content = tuple(
+                (
+                    result.trials,
+                    *((each.classifier, each.target, each.confusion) for each in result.classifiers),
+                )
+                for result in results
+                if result is not None and result.trials is not None
+            )
+            if case.test is None and len(content) == len(results):
+                cases.setdefault(content, []).append(case.name)
+        return [names for names in cases.values() if len(names) > 1]
+
     def as_json(self) -> dict[str, Any]:
         """Return the JSON form that `graspsense experiment --json` prints."""
         return {
@@ -194,6 +221,7 @@ class Summary:
             "failed": [{"task": task.name, "reason": task.reason} for task in self.failed],
             "missing": self.missing,
             **({"unreadable": list(self.unreadable)} if self.unreadable else {}),
+            **({"alike": self.alike} if self.alike else {}),
             "seconds": self.seconds,
         }
 
@@ -207,9 +235,8 @@ def summarise(planned: Planned, results: Results) -> Summary:
     for case in planned.cases:
         for seed in planned.seeds:
             key = planned.task(case, seed).key
-            task_result = results.get(key)
+            task_result, problem = results.read(key)
             if task_result is None:
-                problem = results.problem(key)
                 unreadable += [problem] if problem else []
                 missing += not problem
                 continue
@@ -262,6 +289,15 @@ def summary_of(results: Results) -> Summary:
             f"another folder: graspsense experiment {results.folder / EXPERIMENT} --out FOLDER"
         )
     return summary
+
+
+def alike_lines(summary: Summary) -> list[str]:
+    """Return a sentence on each group of cases whose results are the same."""
+    return [
+        f"{listed(list(map(repr, names)))}: all trials and answers are the same, so that what differs between these "
+        "cases has no effect here"
+        for names in summary.alike
+    ]
 
 
 def unreadable_lines(summary: Summary) -> list[str]:

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from contextlib import redirect_stdout
 from typing import TYPE_CHECKING, Any, Literal
 
-from attrs import field, frozen
+from attrs import asdict, field, frozen
 
 from graspsense.core.learn.model_content import digest
 from graspsense.core.values.errors import FAILURES, DataDamaged, GraspsenseError, named, place_of
@@ -47,7 +47,7 @@ class Task:
 
     def to_text(self) -> str:
         """Return JSON in one line. Settings may be infinite, which Python's JSON can write and read."""
-        return _text({"kind": self.kind, "params": self.params, "seed": self.seed, "name": self.name})
+        return _text(asdict(self, recurse=False))
 
     @classmethod
     def from_text(cls, text: str) -> Task:
@@ -93,20 +93,15 @@ class TaskResult:
 
     def to_text(self) -> str:
         """Return JSON in one line, with the hash of its content."""
-        content: dict[str, Any] = {
-            "key": self.key,
-            "name": self.name,
-            "state": self.state,
-            "result": self.result,
-            "reason": self.reason,
-            "made": self.made,
-        }
+        content = asdict(self, recurse=False)
         return json_text({**content, "sha256": digest(json_ready(content))})
 
     @classmethod
     def from_text(cls, text: str) -> TaskResult:
         """Return the result that `to_text` wrote. Raises ValueError, KeyError or TypeError for any other text."""
         values = json.loads(text)
+        if not isinstance(values, dict):
+            raise TypeError("it is no JSON object")
         if values.pop("sha256") != digest(values):
             raise ValueError("its sha256 does not match")
         if values["state"] not in ("done", "failed") or (values["result"] is None) != (

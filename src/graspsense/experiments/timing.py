@@ -1,10 +1,19 @@
-"""An estimate of the remaining time, with its uncertainty."""
+"""Durations in words, and an estimate of the remaining time, with its uncertainty."""
 
 from __future__ import annotations
 
 import math
 import time
 from collections.abc import Callable
+
+
+def duration_in_words(seconds: float, step_s: int = 1) -> str:
+    """Return a duration to one or two digits, seconds in steps: `40 s`, `15 min`, `2.5 h`."""
+    if seconds < 100:
+        return f"{math.ceil(seconds / step_s) * step_s} s"
+    if seconds < 5400:
+        return f"{math.ceil(seconds / 60)} min"
+    return f"{seconds / 3600:.1f} h"
 
 
 class TimeLeft:
@@ -44,16 +53,8 @@ class TimeLeft:
         """The estimate in words."""
         bounds = self.bounds_s
         if bounds is None:
-            return f"time left not known yet ({_short(self._clock() - self._begun)} so far)"
-        low, high = map(_short, bounds)
+            return f"time left not known yet ({duration_in_words(self._clock() - self._begun)} so far)"
+        low, high = map(duration_in_words, bounds)
         if bounds[0] < bounds[1] / 10:
             return f"at most {high} left"
         return f"about {low} left" if low == high else f"{low} to {high} left"
-
-
-def _short(seconds: float) -> str:
-    if seconds < 60:
-        return f"{math.ceil(seconds)} s"
-    if seconds < 5400:
-        return f"{round(seconds / 60)} min"
-    return f"{seconds / 3600:.1f} h"

@@ -18,7 +18,8 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 
 from graspsense.recording.unpacked import Unpacked
 
-_MAGIC_BYTES: Final = 8
+MAGIC: Final = b"\x89MCAP0\r\n"
+"""How every MCAP file begins."""
 _SMALL: Final = 1 << 16
 """Bytes that can be allocated for nothing."""
 _RECORD: Final = struct.Struct("<BQ")
@@ -49,7 +50,7 @@ def records_of(
     """
     size = os.fstat(file.fileno()).st_size
     # Also of a file that claims to be empty: a disk that fails is not a damaged file.
-    file.read(_MAGIC_BYTES)
+    file.read(len(MAGIC))
     unpacked.expect(_bytes_in_chunks(file, size))
     file.seek(0)
     limit = size if largest is None else min(size, largest)
@@ -73,7 +74,7 @@ def records_in(chunk: Chunk, unpacked: Unpacked) -> Sequence[McapRecord]:
 
 def _bytes_in_chunks(file: BinaryIO, size: int) -> int:
     """Return how many bytes the compressed chunks of a file say that they unpack to."""
-    position, total = _MAGIC_BYTES, 0
+    position, total = len(MAGIC), 0
     while position + _RECORD.size <= size:
         file.seek(position)
         opcode, length = _RECORD.unpack(file.read(_RECORD.size))

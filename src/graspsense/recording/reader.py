@@ -35,7 +35,7 @@ from graspsense.recording.layout import (
     pads_topic_by_cell,
     shown_array,
 )
-from graspsense.recording.mcap_records import records_in, records_of
+from graspsense.recording.mcap_records import MAGIC, records_in, records_of
 from graspsense.recording.readable import readable, refuse_devices
 from graspsense.recording.recorded_grasp import TICK_ROW, RecordedGrasp, TopicRows, row_type
 from graspsense.recording.trial_record import DeviceRecord
@@ -54,7 +54,8 @@ def read_recorded(path: str | Path, *, salvage: bool = False) -> RecordedGrasp:
     """Return the grasp in a recording.
 
     With `salvage`, return what can be read of a file that is damaged or has no end. Without it, such a file raises
-    DataDamaged. Raises ConfigError if the file cannot be opened, TooLarge if it unpacks to more than is allowed.
+    DataDamaged. Raises ConfigError if the file cannot be opened or is of another kind, TooLarge if it unpacks to more
+    than is allowed.
     """
     path = Path(path).expanduser()
     reading = _PartialGrasp(path)
@@ -63,6 +64,10 @@ def read_recorded(path: str | Path, *, salvage: bool = False) -> RecordedGrasp:
         if not path.exists():
             raise _missing(path)
         with path.open("rb") as file:
+            if ".mcap" not in path.name and not file.peek(len(MAGIC)).startswith(MAGIC):
+                raise ConfigError(
+                    f"{path} is no recording (.mcap): neither its name nor its content is that of one"
+                )
             damage = reading.take_all(file, salvage)
     if not salvage:
         damage = damage or reading.shortfall()

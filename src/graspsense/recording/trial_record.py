@@ -18,7 +18,7 @@ from attrs import evolve, field, frozen
 
 from graspsense import __version__
 from graspsense.core.components.channels import as_json, from_json, further
-from graspsense.core.files.toml_text import toml_key, toml_value, toml_values
+from graspsense.core.files.toml_text import toml_lines, toml_values
 from graspsense.core.settings.resolved import Settings
 from graspsense.core.values.channel import Channel, TactileArray
 from graspsense.core.values.device import DeviceInfo
@@ -243,11 +243,8 @@ class TrialRecord:
     @property
     def settings_text(self) -> str:
         """The settings as a pipeline file in TOML."""
-        lines = [f"# Settings of a trial of {self.made_at}, written by graspsense {__version__}."]
-        for table, values in self.settings.items():
-            lines += ["", f"[{table}]"]
-            lines += [f"{toml_key(key)} = {toml_value(value)}" for key, value in values.items()]
-        return "\n".join(lines) + "\n"
+        head = f"# Settings of a trial of {self.made_at}, written by graspsense {__version__}."
+        return "\n".join([head, *toml_lines(self.settings)]) + "\n"
 
     def section(self, name: str) -> dict[str, str]:
         """Return the texts of one section: `START`, `DEVICE` or `RESULT`.

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from graspsense.core.values.channel import FLOATS, TactileArray
 from graspsense.core.values.trace import ImageTrace
+from graspsense.report.heat import GREYS, HeatScale
 from graspsense.report.html import figure
 from graspsense.report.moments import last_image
 from graspsense.report.svg import QUIET, Picture, number
@@ -46,18 +47,18 @@ def camera_figure(title: str, images: ImageTrace, shape: TactileArray, times: Ma
     )
     if shape.components > 1:
         words += f" of {shape.components} numbers"
+    scale = None
     # Colours and grey of a camera are shown as they are.
     if shape.dtype == "uint8" and shape.components != 2:
         caption = "As the camera saw them"
     else:
         pictures = {moment: _lengths(cells) for moment, cells in pictures.items()}
-        known = [cells[np.isfinite(cells)] for cells in pictures.values()]
-        every = np.concatenate(known) if known else np.empty(0)
-        low, high = (float(every.min()), float(every.max())) if len(every) else (0.0, 0.0)
-        pictures = {
-            moment: 255.0 * (cells - low) / ((high - low) or 1.0) for moment, cells in pictures.items()
-        }
-        caption = f"Black is {number(low)}, white {number(high)} {shape.unit}"
+        scale = HeatScale.over(
+            (value for cells in pictures.values() for value in cells.ravel().tolist()), shape.unit
+        )
+        span = scale.high - scale.low
+        pictures = {moment: 255.0 * (cells - scale.low) / span for moment, cells in pictures.items()}
+        caption = f"Black is {number(scale.low)}, white {number(scale.high)} {shape.unit}"
         caption += ", of the length of the numbers of a cell" if shape.components > 1 else ""
     picture = Picture(0.0)
     picture.text(2, 14, title, bold=True, size=13)
@@ -73,6 +74,9 @@ def camera_figure(title: str, images: ImageTrace, shape: TactileArray, times: Ma
             f'href="data:image/png;base64,{data}"><title>{escape(f"{title}, {moment}")}</title></image>'
         )
     picture.height = 44.0 + height + 4.0
+    if scale is not None:
+        scale.legend(picture, 0.0, picture.height + 6.0, 220.0, GREYS)
+        picture.height += 36.0
     caption = f"{words[0].upper()}{words[1:]}. {caption}. Each picture is the last image at that moment, made smaller."
     return figure(picture.svg(f"Pictures of {words}, at {', '.join(pictures) or 'no moment'}"), caption)
 

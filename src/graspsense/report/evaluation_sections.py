@@ -82,9 +82,7 @@ def _reliability_curve(reliability: Reliability) -> str:
     """Return the rate over the probability of the predicted label, beside the line on which they are equal."""
     picture = Picture(330)
     x, y = AxisScale(0.0, 100.0, 44.0, picture.width - 16), AxisScale(0.0, 100.0, 280.0, 24.0)
-    picture.x_axis(x, 24, 280, "probability of the predicted label, in %")
-    picture.y_axis(y, 44.0, picture.width - 16, "recognised, in %")
-    with picture.plot(x, y, 24, 280):
+    with picture.axes(x, y, "probability of the predicted label, in %", "recognised, in %"):
         picture.line([(x(0.0), y(0.0)), (x(100.0), y(100.0))], QUIET)
         for point in reliability.curve:
             place = x(100 * point.probability)

@@ -32,50 +32,35 @@ RANGE_DB: Final = 60.0
 def channel_figures(trace: Trace, channels: Sequence[Channel]) -> list[str]:
     """Return a figure of the forces of all fingers, one for each other number a tick, and one for each fast channel."""
     declared = {channel.name: channel for channel in channels}
-    contact = contact_time(trace)
-    zero = float(contact) if contact is not None else (float(trace.t_s[0]) if len(trace) else 0.0)
-    begin = float(trace.t_s[shown_from(trace)]) if len(trace) else 0.0
-    figures = []
+    drawn: list[tuple[Channel, Floats, Mapping[str, Floats], int]] = []
     fingers = {
         finger.name: finger
         for finger in fingers_of(channels)
         if isinstance(trace.signals.get(finger.name), np.ndarray)
     }
     if fingers:
-        shown = trace.t_s >= begin
-        lines = {
-            without_underscores(finger.finger): trace.signals[name][shown] for name, finger in fingers.items()
-        }
+        lines = {without_underscores(finger.finger): trace.signals[name] for name, finger in fingers.items()}
         channel = Channel("forces_of_the_fingers", next(iter(fingers.values())).unit)
-        figures.append(_figure(trace, channel, trace.t_s[shown] - zero, lines, contact is not None))
+        drawn.append((channel, trace.t_s, lines, 0))
     for name, signal in trace.signals.items():
-        if name in fingers:
-            continue
         channel = declared.get(name) or Channel(name, "unknown")
-        if isinstance(signal, np.ndarray):
-            shown = trace.t_s >= begin
-            lines = {"": signal[shown]}
-            figures.append(_figure(trace, channel, trace.t_s[shown] - zero, lines, contact is not None))
+        if isinstance(signal, np.ndarray) and name not in fingers:
+            drawn.append((channel, trace.t_s, {"": signal}, 0))
         elif isinstance(signal, SampleTrace) and len(signal.t_s):
             axes = channel.axes if isinstance(channel, FastChannel) else ()
             if len(axes) != signal.values.shape[1]:
                 axes = tuple(f"axis {k}" for k in range(signal.values.shape[1]))
-            shown = signal.t_s >= begin
-            lines = {axis: signal.values[shown, k] for k, axis in enumerate(axes)}
-            figures.append(
-                _figure(trace, channel, signal.t_s[shown] - zero, lines, contact is not None, signal.lost)
-            )
-    return [drawn for drawn in figures if drawn]
+            drawn.append((channel, signal.t_s, dict(zip(axes, signal.values.T, strict=True)), signal.lost))
+    figures = (_figure(trace, *channel_drawn) for channel_drawn in drawn)
+    return [figure_drawn for figure_drawn in figures if figure_drawn]
 
 
-def _figure(
-    trace: Trace,
-    channel: Channel,
-    t: Floats,
-    lines: Mapping[str, Floats],
-    touched: bool,
-    lost: int = 0,
-) -> str:
+def _figure(trace: Trace, channel: Channel, t: Floats, lines: Mapping[str, Floats], lost: int) -> str:
+    """Return curves over time from shortly before contact on; empty if there is nothing to draw."""
+    contact = contact_time(trace)
+    shown = t >= (trace.t_s[shown_from(trace)] if len(trace) else 0.0)
+    zero = contact if contact is not None else (trace.t_s[0] if len(trace) else 0.0)
+    t, lines = t[shown] - zero, {axis: line[shown] for axis, line in lines.items()}
     unit, factor = display_unit(channel.unit)
     time = "seconds" if trace.units["t"] == "s" else trace.units["t"]
     known = [factor * line[np.isfinite(line)] for line in lines.values()]
@@ -87,10 +72,8 @@ def _figure(
     picture.text(2, 14, title, bold=True, size=13)
     x_scale = AxisScale(float(t[0]), float(t[-1]), 42, picture.width - 10)
     y_scale = reaching([float(every.min()), float(every.max())], 150, 44)
-    when = f"{time} since the squeeze began" if touched else time
-    picture.x_axis(x_scale, 36, 150, when)
-    picture.y_axis(y_scale, 42, picture.width - 10, unit)
-    with picture.plot(x_scale, y_scale, 44.0, 150.0):
+    when = f"{time} since the squeeze began" if contact is not None else time
+    with picture.axes(x_scale, y_scale, when, unit):
         for k, (axis, line) in enumerate(lines.items()):
             points = [(x_scale(t_s), y_scale(factor * value)) for t_s, value in envelope(t, line)]
             picture.line(

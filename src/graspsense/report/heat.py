@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Final
 
 import numpy as np
@@ -15,6 +15,9 @@ LEVELS: Final = 8
 _FALLBACK: Final = ("#e6effa", "#cfe0f3", "#b3cfec", "#96bee1", "#2d69a0", "#215a8f", "#154b7e", "#083c6e")
 COLOURS: Final = tuple(f"var(--q{k + 1},{colour})" for k, colour in enumerate(_FALLBACK))
 """From the least level to the greatest; the fallback is for pictures without a page."""
+
+GREYS: Final = tuple(f"hsl(0,0%,{100 * k / (LEVELS - 1):.0f}%)" for k in range(LEVELS))
+"""From black to white, for arrays that are drawn as pictures."""
 
 
 @frozen
@@ -39,10 +42,17 @@ class HeatScale:
         share = (value - self.low) / (self.high - self.low)
         return min(max(int(share * LEVELS), 0), LEVELS - 1)
 
-    def legend(self, picture: Picture, left: float, y: float, width: float) -> None:
-        """Draw the eight colours side by side, with the values at which the scale begins, halves and ends."""
-        step = width / LEVELS
-        for k, colour in enumerate(COLOURS):
+    def legend(
+        self,
+        picture: Picture,
+        left: float,
+        y: float,
+        width: float,
+        colours: Sequence[str] = COLOURS,
+    ) -> None:
+        """Draw the colours side by side, with the values at which the scale begins, halves and ends."""
+        step = width / len(colours)
+        for k, colour in enumerate(colours):
             picture.box(left + k * step, y, step, 10, colour)
         for share, anchor in ((0.0, "start"), (0.5, "middle"), (1.0, "end")):
             value = self.low + share * (self.high - self.low)

@@ -126,14 +126,10 @@ def _fit_picture(fit: SqueezeFit) -> str:
     x = reaching(t.tolist(), LEFT, RIGHT)
     y = reaching([*fit.measured_n.tolist(), *fit.fitted_n.tolist()], 140.0, 22.0, zero=True)
     below = reaching([*residual.tolist(), 0.0], 215.0, 178.0)
-    with picture.plot(x, y, 22.0, 140.0):
-        picture.y_axis(y, LEFT, RIGHT, "force, N")
-        picture.x_axis(x, 22.0, 140.0, "")
+    with picture.axes(x, y, "", "force, N"):
         picture.dots(_points(x, y, t, fit.measured_n), INKS[0], "measured")
         picture.line(_points(x, y, t, fit.fitted_n), INKS[1], name="fitted")
-    with picture.plot(x, below, 178.0, 215.0):
-        picture.y_axis(below, LEFT, RIGHT, "measured − fitted, N")
-        picture.x_axis(x, 178.0, 215.0, "time, s")
+    with picture.axes(x, below, "time, s", "measured − fitted, N"):
         picture.dots(_points(x, below, t, residual), INKS[0], "residual")
     picture.text(RIGHT - 56.0, 262.0, "● measured", anchor="end", ink=INKS[0])
     picture.text(RIGHT, 262.0, "— fitted", anchor="end", ink=INKS[1])
@@ -158,9 +154,7 @@ def _pairs(result: Identification) -> str:
         picture = Picture(height=210.0)
         x = reaching(draws[:, a].tolist(), LEFT, RIGHT)
         y = reaching(draws[:, b].tolist(), 170.0, 22.0)
-        with picture.plot(x, y, 22.0, 170.0):
-            picture.x_axis(x, 22.0, 170.0, names[a])
-            picture.y_axis(y, LEFT, RIGHT, names[b])
+        with picture.axes(x, y, names[a], names[b]):
             picture.dots(_points(x, y, draws[:MAX_SHOWN, a], draws[:MAX_SHOWN, b]), INKS[0], "draw")
         words = f"{names[a]} and {names[b]}: correlation {correlation[a, b]:+.2f}"
         figures.append(figure(picture.svg(words), words))
@@ -194,9 +188,9 @@ def _histogram(check: PredictiveCheck) -> str:
     picture = Picture(height=170.0)
     x = reaching([*edges.tolist(), *check.recorded], LEFT, RIGHT)
     y = reaching([0.0, *counts.tolist()], 128.0, 22.0, zero=True)
-    with picture.plot(x, y, 22.0, 128.0):
-        picture.x_axis(x, 22.0, 128.0, f"{check.statistic}{f', {check.unit}' if check.unit else ''}")
-        picture.y_axis(y, LEFT, RIGHT, "simulated squeezes")
+    with picture.axes(
+        x, y, f"{check.statistic}{f', {check.unit}' if check.unit else ''}", "simulated squeezes"
+    ):
         for k, count in enumerate(counts.tolist()):
             left, right = x(float(edges[k])), x(float(edges[k + 1]))
             picture.box(left, y(count), right - left, y(0.0) - y(count), INKS[0], QUIET)

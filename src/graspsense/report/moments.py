@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
-from attrs import frozen
 from numpy.typing import NDArray
 
 from graspsense.core.values.signals import Phase
@@ -60,19 +59,13 @@ def moments(trace: Trace) -> dict[str, float]:
     return times
 
 
-@frozen
-class ImagesAtMoments:
-    """The images at the moments, and whether they are relative to the image before contact."""
-
-    values: dict[str, Floats]
-    relative: bool
-
-
-def images_at(images: ImageTrace, factor: float, times: Mapping[str, float]) -> ImagesAtMoments:
+def images_at(
+    images: ImageTrace, factor: float, times: Mapping[str, float]
+) -> tuple[dict[str, Floats], bool]:
     """Return the change of each cell since shortly before contact, times `factor`, at each of these times (s).
 
-    Where there is no image before contact, these are the values themselves. Of a cell with several components it is
-    their length.
+    Where there is no image before contact, these are the values themselves, and the second result is False. Of a cell
+    with several components it is their length.
     """
     last_free = (
         int(np.searchsorted(images.t_s, times["contact"], side="left")) - 1 if "contact" in times else -1
@@ -84,7 +77,7 @@ def images_at(images: ImageTrace, factor: float, times: Mapping[str, float]) -> 
     for moment, t in times.items():
         cells = last_image(images, t)
         values[moment] = number_of_each(images, factor * ((missing if cells is None else cells) - zero))
-    return ImagesAtMoments(values, last_free >= 0)
+    return values, last_free >= 0
 
 
 def last_image(images: ImageTrace, t_s: float) -> NDArray[Any] | None:

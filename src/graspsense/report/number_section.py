@@ -148,13 +148,8 @@ def _scatter(evaluation: RegressionEvaluation) -> str:
     values = [value for pair_ in evaluation.predictions for value in pair_]
     picture = Picture(330)
     x, y = reaching(values, 50.0, picture.width - 16), reaching(values, 280.0, 24.0)
-    picture.x_axis(
-        x, 24, 280, with_unit(f"true {evaluation.target_value}", evaluation.unit and f"in {evaluation.unit}")
-    )
-    picture.y_axis(
-        y, 50.0, picture.width - 16, with_unit("predicted", evaluation.unit and f"in {evaluation.unit}")
-    )
-    with picture.plot(x, y, 24, 280):
+    unit = evaluation.unit and f"in {evaluation.unit}"
+    with picture.axes(x, y, with_unit(f"true {evaluation.target_value}", unit), with_unit("predicted", unit)):
         picture.line([(x(end), y(end)) for end in (x.low, x.high)], QUIET)
         for truth, predicted in evaluation.predictions:
             words = f"{number(truth)}, predicted {number(predicted)}"

@@ -5,9 +5,7 @@ from __future__ import annotations
 import base64
 from collections import Counter
 from collections.abc import Callable, Sequence
-from typing import Final
-
-from attrs import frozen
+from typing import Any, Final
 
 from graspsense.core.learn.copies import without_copies
 from graspsense.core.learn.labelled import Target
@@ -58,16 +56,6 @@ LISTED: Final = 200
 Progress = Callable[[str, int, int], None]
 
 
-@frozen
-class _TrialCount:
-    """The number of trials with this label and outcome that are set aside, or that are not."""
-
-    label: str | None
-    outcome: str
-    set_aside: bool
-    trials: int
-
-
 def store_page(
     folder: str,
     *,
@@ -87,7 +75,10 @@ def store_page(
         if not listed:
             raise ConfigError(f"the store in {folder} has no trials yet: graspsense collect --save {folder}")
         trial = _newest_readable(store, listed) if grasp is None else store.trial(grasp)
-        counts = _trial_counts(store)
+        counts = store.query(
+            f"""SELECT coalesce(label, '{NO_LABEL}'), outcome, iif(set_aside IS NULL, 'counts', 'set aside'), count(*)
+            FROM trial GROUP BY label, outcome, set_aside IS NULL ORDER BY label, outcome, set_aside IS NOT NULL"""
+        )
         curves, unreadable = _curves(store)
         changes = history(store)
     learner = select_component("classifier", classifier)
@@ -119,7 +110,7 @@ def store_page(
         kind="Store of trials",
         title=f"Grasps in {folder}",
         question=f"Can a gripper recognise {TARGETS[target]} by touch?",
-        answer=_answer(evaluation, sum(count.trials for count in counts), problem),
+        answer=_answer(evaluation, sum(trials for *_, trials in counts), problem),
         headline="" if evaluation is None else headline(evaluation),
         beside="" if evaluation is None or labelled is None else beside(evaluation, labelled),
         sections=tuple(sections),
@@ -141,13 +132,6 @@ def _newest_readable(store: Store, listed: Sequence[TrialSummary]) -> StoredTria
             damage = damage or error
     assert damage is not None  # there is a trial
     raise damage
-
-
-def _trial_counts(store: Store) -> list[_TrialCount]:
-    rows = store.query(
-        "SELECT label, outcome, set_aside IS NOT NULL, count(*) FROM trial GROUP BY 1, 2, 3 ORDER BY 1, 2"
-    )
-    return [_TrialCount(label, outcome, bool(aside), n) for label, outcome, aside, n in rows]
 
 
 def _curves(store: Store) -> tuple[list[GraspCurve], list[UnreadableRecording]]:
@@ -242,10 +226,10 @@ def _provenance(
     folder: str,
     listed: Sequence[TrialSummary],
     trial: StoredTrial,
-    counts: Sequence[_TrialCount],
+    counts: Sequence[Sequence[Any]],
     changes: Sequence[Change],
 ) -> Section:
-    total = sum(count.trials for count in counts)
+    total = sum(trials for *_, trials in counts)
     made = trial.record.provenance
     pairs = [
         ("store", folder),
@@ -259,15 +243,7 @@ def _provenance(
             for name, component in (made.get("components") or {}).items()
         ),
     ]
-    by_label = [
-        (
-            count.label or "no label",
-            count.outcome,
-            "set aside" if count.set_aside else "counts",
-            str(count.trials),
-        )
-        for count in counts
-    ]
+    by_label = [tuple(map(str, count)) for count in counts]
     rows = [
         (
             str(summary.id),

@@ -199,6 +199,14 @@ class Picture:
         self.parts.append("</g>")
         self.text(2, min(scale.start, scale.end) - 8, title, ink=QUIET)
 
+    @contextmanager
+    def axes(self, x: AxisScale, y: AxisScale, x_title: str, y_title: str) -> Iterator[None]:
+        """Draw both axes where their scales lie, and put what is drawn within the context into their plot."""
+        self.x_axis(x, y.end, y.start, x_title)
+        self.y_axis(y, x.start, x.end, y_title)
+        with self.plot(x, y, y.end, y.start):
+            yield
+
     def break_mark(self, x: float, y: float, *, upright: bool) -> None:
         """Mark the end at which an axis is cut by two slashes across it."""
         for offset in (-2.5, 2.5):

@@ -102,13 +102,13 @@ def _figure(
 ) -> str:
     unit, factor = display_unit(shape.unit)
     shown = {side: images_at(image, factor, times) for side, image in images.items()}
-    relative = all(shown_images.relative for shown_images in shown.values())
+    relative = all(is_change for _, is_change in shown.values())
     facing = list(shape.facing) or [True] * shape.cells
     scale = HeatScale.over(
         (
             float(value)
-            for shown_images in shown.values()
-            for cells in shown_images.values.values()
+            for at_moments, _ in shown.values()
+            for cells in at_moments.values()
             for value, faces in zip(cells, facing, strict=True)
             if faces
         ),
@@ -122,8 +122,8 @@ def _figure(
     width = min(room, layout.columns * LARGEST_CELL, TALLEST / layout.height)
     top = 44.0
     said = []
-    for side, shown_images in shown.items():
-        for k, (moment, cells) in enumerate(shown_images.values.items()):
+    for side, (at_moments, _) in shown.items():
+        for k, (moment, cells) in enumerate(at_moments.items()):
             left = k * (room + GAP)
             words = f"{moment}, {side}" if side and len(shown) > 1 else moment
             picture.text(left, top - 6, words, ink=QUIET)

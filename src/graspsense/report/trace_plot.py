@@ -54,7 +54,7 @@ def plot(trace: Trace) -> tuple[Any, Any]:
         _draw_samples(trace, axes, name, signal)
     for axes, (name, images) in zip(others[len(fast) :], arrays.items(), strict=True):
         # Both fingertips are the channel `pads`.
-        unit = units.get(name, units.get("pads", ""))
+        unit = units.get("pads" if name.endswith("fingertip") else name, "")
         figure.colorbar(_draw_array(trace, axes, name, images), ax=axes, label=unit)
     show_literally(figure)
     return force, gap
@@ -73,16 +73,13 @@ def _draw_samples(trace: Trace, axes: Any, name: str, signal: SampleTrace) -> No
 
 def _draw_array(trace: Trace, axes: Any, name: str, images: ImageTrace) -> Any:
     """Draw the cells of an array at contact, peak and rest, a row each; return the picture for its colour bar."""
-    shown = images_at(images, 1.0, moments(trace))
-    values = (
-        np.array(list(shown.values.values()))
-        if shown.values
-        else number_of_each(images, images.cells[-1])[np.newaxis]
-    )
+    shown, relative = images_at(images, 1.0, moments(trace))
+    shown = shown or {"last": number_of_each(images, images.cells[-1])}
+    values = np.array(list(shown.values()))
     picture = axes.imshow(values, aspect="auto", interpolation="nearest", cmap="Blues")
     axes.xaxis.get_major_locator().set_params(integer=True)
-    axes.set_yticks(range(len(values)), list(shown.values) or ["last"])
-    change = "change since before contact, by cell" if shown.relative else "values, by cell"
+    axes.set_yticks(range(len(values)), list(shown))
+    change = "change since before contact, by cell" if relative else "values, by cell"
     axes.set_title(f"{name}: {change}", fontsize=8, loc="left")
     return picture
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Final
 
 import numpy as np
-from attrs import frozen
 
 from graspsense.core.components.registry import installed
 from graspsense.core.learn.labelled import class_of
@@ -30,6 +29,41 @@ PHASES: Final = {
 }
 OTHER_PHASE: Final = "var(--phase,#f3f3f3)"
 """Background colours of the phases of a grasp; each phase is also named."""
+FORCE, GAP = (168.0, 40.0), (300.0, 208.0)
+"""Lower and upper edge of the two plots in a picture of grasps."""
+BELOW: Final = 352.0
+"""Where a picture ends below its axes, or a legend begins."""
+
+
+def force_and_gap(
+    picture: Picture,
+    x: AxisScale,
+    curves: Sequence[GraspCurve],
+    drawn: Iterable[tuple[GraspCurve, Mapping[str, Any]]],
+) -> None:
+    """Draw the forces of grasps over time above their gaps, on axes that show all of `curves`.
+
+    With each curve that is drawn go arguments of `Picture.line`.
+    """
+    lines = list(drawn)
+    picture.x_axis(x, FORCE[1], GAP[0], f"{curves[0].time_words} since the squeeze began")
+    for column, what, unit, (bottom, top) in (
+        ("force_n", curves[0].force, "N", FORCE),
+        ("gap_mm", "gap", "mm", GAP),
+    ):
+        values = [value for curve in curves for _, value in curve.values(column, x.low, x.high)]
+        y = reaching(values, bottom, top, zero=column == "force_n")
+        picture.y_axis(y, x.start, x.end, f"{what}, {unit}")
+        with picture.plot(x, y, top, bottom):
+            for curve, how in lines:
+                points = [(x(t), y(value)) for t, value in curve.values(column, x.low, x.high)]
+                picture.line(points, **{**how, "name": f"{how['name']}, {unit}"})
+
+
+def time_scale(curves: Sequence[GraspCurve], start: float, end: float) -> AxisScale:
+    """Return the axis of the times from shortly before the contact on."""
+    times = [t for curve in curves for t in curve.shown_times]
+    return AxisScale(min(times, default=0.0), max(times, default=1.0), start, end)
 
 
 def traces_by_class(grasps: Sequence[GraspCurve]) -> str:
@@ -38,93 +72,47 @@ def traces_by_class(grasps: Sequence[GraspCurve]) -> str:
     classes: dict[str, list[GraspCurve]] = {}
     for grasp in grasps:
         classes.setdefault(class_of(grasp.label), []).append(grasp)
-    times = [t for grasp in grasps for t in grasp.shown_times]
-    if not times:
+    if not any(grasp.shown_times for grasp in grasps):
         return ""
-    axes = _Axes(
-        times=(min(times), max(times)),
-        forces=[force for grasp in grasps for force in grasp.force_n if force is not None],
-        gaps=[
-            gap for grasp in grasps for _, gap in grasp.values("gap_mm", min(grasp.shown_times, default=0.0))
-        ],
-    )
-    return panels([_traces(name, curves, axes) for name, curves in sorted(classes.items())])
+    return panels([_traces(name, curves, grasps) for name, curves in sorted(classes.items())])
 
 
-@frozen
-class _Axes:
-    """The ranges that the pictures of all classes share."""
-
-    times: tuple[float, float]
-    forces: Sequence[float]
-    gaps: Sequence[float]
-
-
-LEGEND_TOP: Final = 348.0
-
-
-def _traces(name: str, grasps: Sequence[GraspCurve], axes: _Axes) -> str:
+def _traces(name: str, grasps: Sequence[GraspCurve], all_grasps: Sequence[GraspCurve]) -> str:
+    """Return the figure of a class, on the axes of all classes."""
     states = list(dict.fromkeys(grasp.label for grasp in grasps))[:STATES]
-    picture = Picture(LEGEND_TOP + 15 * len(states) - 8)
-    x_scale = AxisScale(*axes.times, 36, picture.width - 10)
+    picture = Picture(BELOW + 15 * len(states))
     picture.text(2, 14, name, bold=True, size=13)
-    force = reaching(axes.forces, 172, 40, zero=True)
-    gap = reaching(axes.gaps, 300, 210)
-    picture.x_axis(x_scale, 40, 300, f"{grasps[0].time_words} since the squeeze began")
-    picture.y_axis(force, 36, picture.width - 10, f"{grasps[0].force}, N")
-    picture.y_axis(gap, 36, picture.width - 10, "gap, mm")
-    for column, unit, scale, top, bottom in (
-        ("force_n", "N", force, 40.0, 172.0),
-        ("gap_mm", "mm", gap, 210.0, 300.0),
-    ):
-        with picture.plot(x_scale, scale, top, bottom):
-            for grasp in grasps:
-                if grasp.label not in states:
-                    continue
-                k = states.index(grasp.label)
-                points = [(x_scale(t), scale(v)) for t, v in grasp.values(column, *axes.times)]
-                state = without_underscores(grasp.label.partition(":")[2] or grasp.label)
-                named = f"{state} (trial {grasp.trial}), {unit}"
-                picture.line(points, INKS[k], width=1.4, dash=DASHES[k], name=named)
-    peaks = _legend(picture, states, grasps)
+    peaks = []
+    drawn: list[tuple[GraspCurve, Mapping[str, Any]]] = []
+    for k, label in enumerate(states):
+        state, style = (
+            without_underscores(label.partition(":")[2] or label),
+            {"ink": INKS[k], "dash": DASHES[k]},
+        )
+        of_state = [grasp for grasp in grasps if grasp.label == label]
+        drawn += [
+            (grasp, {**style, "width": 1.4, "name": f"{state} (trial {grasp.trial})"}) for grasp in of_state
+        ]
+        y = BELOW + 8 + 15 * k
+        picture.line([(36, y - 4), (66, y - 4)], width=2, **style)
+        picture.text(72, y, state)
+        peaks.append(f"{state} {peak_in_words(of_state)}")
+    force_and_gap(picture, time_scale(all_grasps, 36, picture.width - 10), all_grasps, drawn)
     words = f"Force and gap over time for {counted(len(grasps), 'grasp')} of {name}: {', '.join(peaks)}"
     return figure(picture.svg(words, grasps[0].time_unit), f"{name}: one line per grasp.")
 
 
-def _legend(picture: Picture, states: Sequence[str], grasps: Sequence[GraspCurve]) -> list[str]:
-    """Draw the legend, and return the peak force of each state in words."""
-    peaks = []
-    for k, label in enumerate(states):
-        y = LEGEND_TOP + 15 * k
-        picture.line([(36, y - 4), (66, y - 4)], INKS[k], width=2, dash=DASHES[k])
-        state = without_underscores(label.partition(":")[2] or label)
-        picture.text(72, y, state)
-        peaks.append(f"{state} {peak_in_words(grasp for grasp in grasps if grasp.label == label)}")
-    return peaks
-
-
 def one_grasp(grasp: GraspCurve, caption: str) -> str:
-    """Return a figure of one grasp from its start: gap and force, with the phases behind them."""
+    """Return a figure of one grasp from its start: force and gap, with the phases behind them."""
     t = [time for time in grasp.t_s if time is not None]
     if not t:
         return ""
-    picture = Picture(334)
+    picture = Picture(BELOW)
     x_scale = AxisScale(t[0], t[-1], 36, picture.width - 10)
-    gap = reaching([v for v in grasp.gap_mm if v is not None], 140, 44)
-    force = reaching([v for v in grasp.force_n if v is not None], 280, 176, zero=True)
     durations = _phases(picture, grasp, t, x_scale)
-    picture.x_axis(x_scale, 24, 280, f"{grasp.time_words} since the squeeze began")
-    picture.y_axis(gap, 36, picture.width - 10, "gap, mm")
-    picture.y_axis(force, 36, picture.width - 10, f"{grasp.force}, N")
-    for column, scale, ink, named, top, bottom in (
-        ("gap_mm", gap, INKS[0], "gap, mm", 44.0, 140.0),
-        ("force_n", force, INKS[1], f"{grasp.force}, N", 176.0, 280.0),
-    ):
-        points = [(x_scale(time), scale(value)) for time, value in grasp.values(column)]
-        with picture.plot(x_scale, scale, top, bottom):
-            picture.line(points, ink, width=2, name=named)
+    force_and_gap(picture, x_scale, [grasp], [(grasp, {"ink": INKS[0], "width": 2, "name": grasp.label})])
     words = (
-        f"One grasp of {grasp.label} over time, gap above and force below. Phases: {', '.join(durations)} "
+        f"One grasp of {grasp.label} over time, force above and gap below. Phases: {', '.join(durations)} "
         f"{grasp.time_unit}"
     )
     return figure(picture.svg(words, grasp.time_unit), caption)
@@ -134,19 +122,19 @@ def _phases(picture: Picture, grasp: GraspCurve, t: Sequence[float], x_scale: Ax
     """Draw the phases behind the lines with their legend, and return the duration of each in words."""
     start, durations = 0, []
     phases = grasp.phase
-    with picture.plot(x_scale, None, 24, 280):
+    with picture.plot(x_scale, None, FORCE[1], GAP[0]):
         for k in range(1, len(phases) + 1):
             if k < len(phases) and phases[k] == phases[start]:
                 continue
             end = t[min(k, len(t) - 1)]
             colour = PHASES.get(phases[start], OTHER_PHASE)
-            picture.band(x_scale(t[start]), x_scale(end), 24, 280, colour)
+            picture.band(x_scale(t[start]), x_scale(end), FORCE[1], GAP[0], colour)
             durations.append(f"{phases[start]} for {end - t[start]:.2f}")
             start = k
     for k, phase in enumerate(dict.fromkeys(phases)):
         x = 36 + 80.0 * k
-        picture.box(x, 322, 12, 10, PHASES.get(phase, OTHER_PHASE), QUIET)
-        picture.text(x + 16, 331, phase)
+        picture.box(x, BELOW - 12, 12, 10, PHASES.get(phase, OTHER_PHASE), QUIET)
+        picture.text(x + 16, BELOW - 3, phase)
     return durations
 
 

@@ -9,7 +9,8 @@ from typing import Final
 from graspsense.core.values.errors import counted
 from graspsense.report.grasp_curve import GraspCurve, peak_in_words
 from graspsense.report.html import Section, figure, paragraph
-from graspsense.report.svg import DASHES, INKS, AxisScale, Picture, reaching
+from graspsense.report.svg import DASHES, INKS, Picture, reaching
+from graspsense.report.traces import BELOW, force_and_gap, time_scale
 
 FIRST_CHOSEN: Final = 6
 """Trials that are drawn over each other before anything is chosen: the newest of so many labels."""
@@ -35,27 +36,21 @@ def trial_curves(curves: Sequence[GraspCurve]) -> Section:
 
 def _over_each_other(curves: Sequence[GraspCurve], labels: Sequence[str], chosen: Sequence[int]) -> str:
     """Return the large picture with the force and the gap of every trial, of which the chosen ones are shown."""
-    picture = Picture(334)
-    x = _times(curves, 36, picture.width - 10)
-    force = reaching(_values(curves, "force_n"), 150, 30, zero=True)
-    gap = reaching(_values(curves, "gap_mm"), 296, 192)
-    picture.x_axis(x, 30, 296, f"{curves[0].time_words} since the squeeze began")
-    picture.y_axis(force, 36, picture.width - 10, f"{curves[0].force}, N")
-    picture.y_axis(gap, 36, picture.width - 10, "gap, mm")
-    for column, unit, scale, top, bottom in (
-        ("force_n", "N", force, 30.0, 150.0),
-        ("gap_mm", "mm", gap, 192.0, 296.0),
-    ):
-        with picture.plot(x, scale, top, bottom):
-            for k, curve in enumerate(curves):
-                picture.line(
-                    _points(curve, column, x, scale),
-                    INKS[k % len(INKS)],
-                    dash=DASHES[labels.index(curve.label) % len(DASHES)],
-                    name=f"trial {curve.trial}, {curve.label}, {unit}",
-                    more=f' data-trial="{curve.trial}"'
-                    + ("" if curve.trial in chosen else ' class="left-out"'),
-                )
+    picture = Picture(BELOW)
+    drawn = [
+        (
+            curve,
+            {
+                "ink": INKS[k % len(INKS)],
+                "dash": DASHES[labels.index(curve.label) % len(DASHES)],
+                "name": f"trial {curve.trial}, {curve.label}",
+                "more": f' data-trial="{curve.trial}"'
+                + ("" if curve.trial in chosen else ' class="left-out"'),
+            },
+        )
+        for k, curve in enumerate(curves)
+    ]
+    force_and_gap(picture, time_scale(curves, 36, picture.width - 10), curves, drawn)
     words = f"Force and gap over time of the chosen trials, of {len(curves)}"
     return figure(
         picture.svg(words, curves[0].time_unit), "The chosen trials over each other: force above, gap below."
@@ -69,26 +64,15 @@ def _small(curve: GraspCurve, k: int, label: int, chosen: bool) -> str:
     """
     width, height = SMALL
     picture = Picture(height, width)
-    x, y = _times([curve], 2, width - 2), reaching(_values([curve], "force_n"), height - 3, 3, zero=True)
-    picture.line(_points(curve, "force_n", x, y), INKS[k % len(INKS)], dash=DASHES[label % len(DASHES)])
+    x = time_scale([curve], 2, width - 2)
+    values = curve.values("force_n", x.low, x.high)
+    y = reaching([force for _, force in values], height - 3, 3, zero=True)
+    picture.line(
+        [(x(t), y(force)) for t, force in values], INKS[k % len(INKS)], dash=DASHES[label % len(DASHES)]
+    )
     name = f"{curve.trial} {curve.label}"
     checked, peak = " checked" if chosen else "", peak_in_words([curve])
     return (
         f'<label><input type="checkbox" value="{curve.trial}"{checked}> {escape(name)}'
         f"{picture.svg(f'trial {name}: {peak}')}<span>{peak}</span></label>"
     )
-
-
-def _times(curves: Sequence[GraspCurve], start: float, end: float) -> AxisScale:
-    times = [t for curve in curves for t in curve.shown_times]
-    return AxisScale(min(times, default=0.0), max(times, default=1.0), start, end)
-
-
-def _values(curves: Sequence[GraspCurve], column: str) -> list[float]:
-    return [
-        value for curve in curves for _, value in curve.values(column, min(curve.shown_times, default=0.0))
-    ]
-
-
-def _points(curve: GraspCurve, column: str, x: AxisScale, y: AxisScale) -> list[tuple[float, float]]:
-    return [(x(t), y(value)) for t, value in curve.values(column, x.low, x.high)]

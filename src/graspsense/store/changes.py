@@ -77,14 +77,7 @@ def set_aside(store: Store, numbers: Sequence[int], why: str) -> None:
 
     Raises ConfigError, before anything is changed, if a trial does not exist or is set aside already; SaveFailed.
     """
-
-    def change(connection: sqlite3.Connection, trial: TrialSummary) -> None:
-        if trial.set_aside is not None:
-            raise ConfigError(f"trial {trial.id} is set aside already: {trial.set_aside}")
-        connection.execute("UPDATE trial SET set_aside = ? WHERE id = ?", (why, trial.id))
-        _keep(connection, trial.id, "aside", None, None, why)
-
-    _for_each(store, numbers, change)
+    _set_state(store, numbers, "aside", why)
 
 
 def restore(store: Store, numbers: Sequence[int], why: str) -> None:
@@ -92,12 +85,18 @@ def restore(store: Store, numbers: Sequence[int], why: str) -> None:
 
     Raises ConfigError, before anything is changed, if a trial does not exist or is not set aside; SaveFailed.
     """
+    _set_state(store, numbers, "restore", why)
+
+
+def _set_state(store: Store, numbers: Sequence[int], action: Action, why: str) -> None:
+    aside = action == "aside"
 
     def change(connection: sqlite3.Connection, trial: TrialSummary) -> None:
-        if trial.set_aside is None:
-            raise ConfigError(f"trial {trial.id} is not set aside")
-        connection.execute("UPDATE trial SET set_aside = NULL WHERE id = ?", (trial.id,))
-        _keep(connection, trial.id, "restore", None, None, why)
+        if (trial.set_aside is not None) == aside:
+            state = f"is set aside already: {trial.set_aside}" if aside else "is not set aside"
+            raise ConfigError(f"trial {trial.id} {state}")
+        connection.execute("UPDATE trial SET set_aside = ? WHERE id = ?", (why if aside else None, trial.id))
+        _keep(connection, trial.id, action, None, None, why)
 
     _for_each(store, numbers, change)
 

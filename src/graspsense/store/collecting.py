@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Mapping, Sequence
-from typing import Final
+from typing import Final, TypeVar
 
 from attrs import define, field, frozen
 
@@ -29,6 +29,7 @@ from graspsense.store.record_grasp import RecordedTrial, record_grasp
 from graspsense.store.rows import StoredTrial
 from graspsense.store.store import Store
 
+T = TypeVar("T")
 HELP: Final = (
     "keys: Enter grasps it, u undoes the last trial, r repeats the last trial, s skips this object, q stops, ? shows "
     "this; Ctrl-C stops a grasp and the collection"
@@ -108,7 +109,7 @@ class Collection:
         gripper at the first grasp, SaveFailed if a trial could not be saved, and KeyboardInterrupt if the operator
         interrupts it; a grasp that was interrupted is stored as aborted, and no further one begins.
         """
-        self._check_settings()
+        self._check(check_settings, self.settings_for(self.wanted.words[0], self.wanted.seed))
         self.say(HELP)
         while (word := self.following()) is not None:
             answer = self.ask(
@@ -142,7 +143,7 @@ class Collection:
 
         def opened(device: DeviceInfo) -> None:
             check_label(settings, device)
-            self._check_device(device)
+            self._check(check_device, device)
 
         try:
             grasp = record_grasp(
@@ -199,16 +200,8 @@ class Collection:
         newest = self.store.page(set_aside=None, limit=1)
         return newest[0].id if newest else 0
 
-    def _before(self) -> StoredTrial | None:
-        return None if self.changed else newest_grasp(self.store)
-
-    def _check_settings(self) -> None:
-        earlier = self._before()
+    def _check(self, check: Callable[[Store, StoredTrial, T], None], now: T) -> None:
+        """Compare settings or gripper with those of the newest trial, if there is one and they may not differ."""
+        earlier = None if self.changed else newest_grasp(self.store)
         if earlier is not None:
-            settings = self.settings_for(self.wanted.words[0], self.wanted.seed)
-            check_settings(self.store, earlier, settings)
-
-    def _check_device(self, device: DeviceInfo) -> None:
-        earlier = self._before()
-        if earlier is not None:
-            check_device(self.store, earlier, device)
+            check(self.store, earlier, now)

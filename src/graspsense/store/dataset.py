@@ -24,13 +24,12 @@ from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.target_value import TargetValue, values_of_labels
 from graspsense.core.settings.layers import Flag
 from graspsense.core.values.errors import ConfigError, DataDamaged, counted
-from graspsense.core.values.features import FeatureTable
+from graspsense.core.values.features import FeatureTable, table_of
 from graspsense.recording.controls import Controls, controls, without_constant_gap
 from graspsense.recording.provenance import recipe
 from graspsense.recording.readable import note_on, readable
 from graspsense.recording.reader import read_recorded
 from graspsense.recording.replayable import curve_bytes, grasp_numbers
-from graspsense.recording.trial_record import FeatureValues
 from graspsense.store.changes import with_changed_numbers
 from graspsense.store.extract_again import ExtractedTrials, extract_again
 from graspsense.store.first_line import first_lines, imported_gaps
@@ -248,8 +247,8 @@ def _intact(store: Store, rows: _Rows, notes: list[str]) -> _Rows:
     for i, number in enumerate(rows.id):
         try:
             with readable(f"trial {number} of {store.folder}"):
-                _unpacked_table(str(store.folder), sets[rows.feature_set[i]], rows.values[i : i + 1])
-                _unpacked_table(str(store.folder), sets[rows.before_set[i]], rows.before_contact[i : i + 1])
+                unpacked_table(str(store.folder), sets[rows.feature_set[i]], rows.values[i : i + 1])
+                unpacked_table(str(store.folder), sets[rows.before_set[i]], rows.before_contact[i : i + 1])
                 for text in (rows.labels[i], rows.missing[i], rows.missing_before[i]):
                     decoded(store.folder, text)
                 datetime.fromisoformat(rows.made_at[i])
@@ -288,9 +287,9 @@ def _stored_tables(store: Store, folder: str, rows: _Rows, feature_set: int) -> 
         {i: decoded(folder, text) for i, text in enumerate(missing) if text != "{}"}
         for missing in (rows.missing, rows.missing_before)
     )
-    early = _unpacked_table(folder, sets[rows.before_set[0]], rows.before_contact) if same_before else None
+    early = unpacked_table(folder, sets[rows.before_set[0]], rows.before_contact) if same_before else None
     return _Tables(
-        features=evolve(_unpacked_table(folder, sets[feature_set], rows.values), reasons=reasons),
+        features=evolve(unpacked_table(folder, sets[feature_set], rows.values), reasons=reasons),
         before_contact=None if early is None else evolve(early, reasons=before_reasons),
     )
 
@@ -302,8 +301,8 @@ def _tables_again(
     notes += note_on(extracted.unreadable, len(rows))
     read, trials = set(extracted.numbers), extracted.trials
     rows = rows.picked([i for i, number in enumerate(rows.id) if number in read])
-    names = trials[-1].features.features
-    same = [i for i, trial in enumerate(trials) if trial.features.features == names]
+    headings = [(trial.features.names, trial.features.units) for trial in trials]
+    same = [i for i, heading in enumerate(headings) if heading == headings[-1]]
     if len(same) < len(trials):
         notes.append(
             f"{counted(len(trials) - len(same), 'trial')} left out: the features have other names or units than "
@@ -317,19 +316,12 @@ def _tables_again(
         words = ", ".join(f"{n} from {change}" for change, n in outcomes.most_common())
         notes.append(f"outcomes that change with these settings: {words}")
     kept = [trials[i] for i in same]
-    before_names = kept[-1].before_contact.features
-    same_before = all(trial.before_contact.features == before_names for trial in kept)
+    early = [trial.before_contact for trial in kept]
+    same_before = len({(features.names, features.units) for features in early}) == 1
     return rows.picked(same), _Tables(
-        features=_table([trial.features for trial in kept]),
-        before_contact=_table([trial.before_contact for trial in kept]) if same_before else None,
+        features=table_of(trial.features for trial in kept),
+        before_contact=table_of(early) if same_before else None,
     )
-
-
-def _table(trials: Sequence[FeatureValues]) -> FeatureTable:
-    names, units = zip(*trials[0].features, strict=True)
-    values = np.array([[np.nan if v is None else v for v in trial.values] for trial in trials], np.float64)
-    reasons = {i: trial.reasons for i, trial in enumerate(trials) if trial.reasons}
-    return FeatureTable(names=names, units=units, values=values, reasons=reasons)
 
 
 def _unused(store: Store) -> tuple[str, ...]:
@@ -378,27 +370,7 @@ def _notes(recipes: int, simulated: int, used: int) -> list[str]:
     return notes
 
 
-def feature_table(
-    folder: str, wanted: Sequence[tuple[str, str]], sets: Sequence[str], values: Sequence[bytes]
-) -> FeatureTable:
-    """Return the table of these features for trials with different feature sets; a missing feature is NaN.
-
-    `sets` holds the feature names of each trial as JSON, `values` its packed values. Raises DataDamaged.
-    """
-    numbers = np.full((len(values), len(wanted)), np.nan)
-    set_of_trial = np.array(sets)
-    for names_text in dict.fromkeys(sets):
-        rows = np.flatnonzero(set_of_trial == names_text)
-        part = _unpacked_table(folder, names_text, [values[k] for k in rows.tolist()])
-        for k, pair in enumerate(zip(part.names, part.units, strict=True)):
-            if pair in wanted:
-                numbers[rows, wanted.index(pair)] = part.values[:, k]
-    return FeatureTable(
-        names=tuple(name for name, _ in wanted), units=tuple(unit for _, unit in wanted), values=numbers
-    )
-
-
-def _unpacked_table(folder: str, names_text: str, values: Sequence[bytes]) -> FeatureTable:
+def unpacked_table(folder: str, names_text: str, values: Sequence[bytes]) -> FeatureTable:
     """Return the table of packed values, one item per trial. Raises DataDamaged."""
     try:
         pairs = [(str(name), str(unit)) for name, unit in json.loads(names_text)]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 from graspsense.core.files.csv_text import csv_text
 from graspsense.core.files.whole_file import write_new
@@ -20,7 +20,7 @@ from graspsense.core.values.features import FeatureTable
 from graspsense.core.values.printable import in_one_line
 from graspsense.recording.parquet import parquet
 from graspsense.store.changes import with_changed_numbers
-from graspsense.store.dataset import feature_table
+from graspsense.store.dataset import unpacked_table
 from graspsense.store.first_line import first_lines
 from graspsense.store.opening import decoded
 from graspsense.store.store import Store
@@ -112,11 +112,19 @@ def trial_table(folder: str | Path) -> TrialTable:
 def _unpacked(
     folder: str | Path, sets: Mapping[int, str], numbers: Sequence[int], values: Sequence[bytes]
 ) -> FeatureTable:
-    """Return packed values of several feature sets as a table of all their features."""
-    names: dict[tuple[str, str], None] = {}
+    """Return packed values of several feature sets as a table of all their features; a missing feature is NaN."""
+    columns: dict[tuple[str, str], NDArray[np.float64]] = {}
+    set_of_trial = np.array(numbers)
     for number in dict.fromkeys(numbers):
-        names.update(dict.fromkeys((str(name), str(unit)) for name, unit in json.loads(sets[number])))
-    return feature_table(str(folder), list(names), [sets[number] for number in numbers], values)
+        rows = np.flatnonzero(set_of_trial == number)
+        part = unpacked_table(str(folder), sets[number], [values[k] for k in rows.tolist()])
+        for k, pair in enumerate(zip(part.names, part.units, strict=True)):
+            columns.setdefault(pair, np.full(len(values), np.nan))[rows] = part.values[:, k]
+    return FeatureTable(
+        names=tuple(name for name, _ in columns),
+        units=tuple(unit for _, unit in columns),
+        values=np.stack(list(columns.values()), axis=1) if columns else np.empty((len(values), 0)),
+    )
 
 
 def _numbers_to_predict(labels: Sequence[Mapping[str, str]]) -> FeatureTable:

@@ -21,13 +21,13 @@ from graspsense.core.pipeline.wiring import check_recording
 from graspsense.core.settings.layers import Flag, Layer
 from graspsense.core.settings.resolved import NONE, Settings, default_paths, resolve, without_followers
 from graspsense.core.values.errors import ComponentFailed, ConfigError, DataDamaged, named
+from graspsense.core.values.features import Features
 from graspsense.recording.before_contact import before_contact, contact_force_of
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.recording.provenance import recipe
 from graspsense.recording.readable import error_of_all, readable
 from graspsense.recording.reader import read_recorded
 from graspsense.recording.recorded_grasp import with_phases_of
-from graspsense.recording.trial_record import FeatureValues
 from graspsense.store.rows import StoredTrial
 from graspsense.store.store import Store
 
@@ -40,8 +40,8 @@ class ExtractedAgain:
     """The outcome and the features of one trial under other settings."""
 
     outcome: str
-    features: FeatureValues
-    before_contact: FeatureValues
+    features: Features
+    before_contact: Features
 
 
 @frozen(kw_only=True)
@@ -157,16 +157,13 @@ def _extracted(
     if trial.record.origin == "import":
         trace = with_phases_of(read_recorded(trial.recording).trace(), trace)
     try:
-        feature_set = with_checkpoints(settings.features.create(), checkpoints_s)
-        features = feature_set.extract(trace)
+        features = with_checkpoints(settings.features.create(), checkpoints_s).extract(trace)
     except Exception as error:
         raise ComponentFailed(
             f"feature set {settings.features.component.qualified} failed on {recording}: {named(error)}"
         ) from error
     return ExtractedAgain(
         outcome=grasp.outcome.words,
-        features=FeatureValues.extracted(features),
-        before_contact=FeatureValues.extracted(
-            before_contact(grasp.trace, contact_force_of(settings.values))
-        ),
+        features=features,
+        before_contact=before_contact(grasp.trace, contact_force_of(settings.values)),
     )

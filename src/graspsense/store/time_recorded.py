@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Final
 
+import numpy as np
+
 from graspsense.core.values.errors import counted
 from graspsense.core.values.written_numbers import plain_number
 
@@ -52,10 +54,7 @@ def recorded_at(made_at: str, origin: str, labels: str) -> str | None:
 
 def _positions(values: Sequence[float]) -> tuple[int, ...]:
     """Return the rank of each value; equal ones keep their order."""
-    ranks = [0] * len(values)
-    for rank, row in enumerate(sorted(range(len(values)), key=lambda row: values[row])):
-        ranks[row] = rank
-    return tuple(ranks)
+    return tuple(np.argsort(np.argsort(values, kind="stable")).tolist())
 
 
 def _labels(text: str) -> Mapping[str, str]:

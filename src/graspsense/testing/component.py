@@ -12,7 +12,7 @@ import attrs
 
 from graspsense.core.components.setting import unit_of_name
 from graspsense.core.components.strict import keys_of, plain
-from graspsense.core.files.toml_text import toml_key, toml_value
+from graspsense.core.files.toml_text import toml_lines
 from graspsense.core.settings.selected import build
 from graspsense.core.values.errors import ConfigError, PluginUnavailable
 from graspsense.testing.checks import CheckFailed, demand
@@ -113,9 +113,7 @@ def defaults_are_what_their_types_say(subject: Subject) -> None:
 def settings_survive_a_file(subject: Subject) -> None:
     """Settings written as TOML and read again are the same settings."""
     config = subject.config()
-    values = {key: value for key, value in plain(config).items() if value is not None}
-    text = "\n".join(f"{toml_key(key)} = {toml_value(value)}" for key, value in values.items())
-    again = build(subject.component, tomllib.loads(text))
+    again = build(subject.component, tomllib.loads("\n".join(toml_lines(plain(config)))))
     demand(
         plain(again) == plain(config),
         f"{config_name(subject)} read back from its own TOML is another: {plain(config)} became {plain(again)}. A "

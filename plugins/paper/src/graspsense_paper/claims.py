@@ -29,7 +29,7 @@ from graspsense.experiment_api import (
 )
 from graspsense_paper.basis import Basis, basis
 from graspsense_paper.cases import PROTOCOLS, condition_result, is_of, of_protocol
-from graspsense_paper.grasp_result import GraspRow, grasp_results
+from graspsense_paper.grasping import GraspRow, grasp_results
 from graspsense_paper.published import published
 from graspsense_paper.rows import of_class, sample, with_interval
 from graspsense_paper.verdict import UNTOLD, Verdict, every, within

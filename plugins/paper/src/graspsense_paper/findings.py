@@ -34,7 +34,7 @@ from graspsense_paper import claims as claimed
 from graspsense_paper.basis import BASES
 from graspsense_paper.cases import PROTOCOLS, by_protocol
 from graspsense_paper.claims import Claim, claims, curve
-from graspsense_paper.grasp_result import grasp_results
+from graspsense_paper.grasping import grasp_results
 from graspsense_paper.published import Published, published
 from graspsense_paper.rows import (
     COUNTS,
@@ -59,7 +59,8 @@ def findings(summary: Summary) -> Findings:
     if controls is not None:
         tables.append(controls)
     tables += _people_tables(summary, paper)
-    tables += _matrix_tables(summary, paper)
+    matrices, drawn = _matrices(summary, paper)
+    tables += matrices
     if checked:
         tables.append(
             FoundTable(
@@ -81,6 +82,7 @@ def findings(summary: Summary) -> Findings:
         notes=_notes(paper, held)
         if whole
         else tuple(dict.fromkeys(row.published.note for row in held if row.published.note)),
+        drawn=drawn,
         sections=tuple(_sections(summary, paper)),
         values={
             "rows": [row.as_json() for row in held],
@@ -188,41 +190,56 @@ def _controls_table(summary: Summary, held: Sequence[RateComparison]) -> FoundTa
     )
 
 
-def _matrix_tables(summary: Summary, paper: Published) -> list[FoundTable]:
-    """Return the printed matrices of Tables II and V beside ours, which are means over the seeds."""
-    tables = []
+def _matrices(summary: Summary, paper: Published) -> tuple[list[FoundTable], dict[str, str]]:
+    """Return the printed matrices of Tables II and V beside ours, as tables and as the pictures above them.
+
+    Counts of ours in a table are means over the seeds, for the protocols that the matrix is of.
+    """
+    people = paper.matrix("table_6")
+    tables, drawn = [], {"people": confusion_table(people.confusion, f"People, {people.where}.")}
     for id_, target in (("table_2", "class"), ("table_5", "state")):
         theirs = paper.matrix(id_)
-        lines = [
-            ("printed", label.replace("_", " "), *map(str, row))
-            for label, row in zip(theirs.labels, theirs.confusion.counts, strict=True)
-        ]
-        ours = []
+        ours, pictures = [], []
         for protocol, condition in by_protocol(summary, id_, target).items():
             confusion, seeds = condition.confusion, len(condition.by_seed)
+            pictures.append(
+                confusion_table(
+                    confusion,
+                    f"Ours, each bottle in {PROTOCOLS[protocol]}, {confusion.n} predictions of {seeds} seeds.",
+                )
+            )
             place = {label.rpartition(":")[2]: k for k, label in enumerate(confusion.labels)}
             if condition.case.data.states_per_instance != protocol or set(place) != set(theirs.labels):
                 continue
-            ours += [
-                (
-                    f"ours, {PROTOCOLS[protocol]}",
-                    a.replace("_", " "),
-                    *(f"{confusion.counts[place[a]][place[b]] / seeds:.1f}" for b in theirs.labels),
-                )
-                for a in theirs.labels
+            mean = [
+                [confusion.counts[place[a]][place[b]] / seeds for b in theirs.labels] for a in theirs.labels
             ]
+            ours += _matrix_rows(f"ours, {PROTOCOLS[protocol]}", theirs.labels, mean, 1)
         if ours:
+            printed = confusion_table(
+                theirs.confusion, f"{theirs.where}, as printed: {theirs.confusion.n} trials."
+            )
+            drawn[f"matrix_{id_}"] = pair(printed, "".join(pictures))
             tables.append(
                 FoundTable(
                     id=f"matrix_{id_}",
                     title=f"Confusion matrix of {theirs.where}",
                     header=("matrix", "row", *(label.replace("_", " ") for label in theirs.labels)),
-                    rows=(*lines, *ours),
+                    rows=(*_matrix_rows("printed", theirs.labels, theirs.confusion.counts, 0), *ours),
                     note=f"{theirs.note} Ours: rows are true, counts are means over the seeds.",
                     numbers=2,
                 )
             )
-    return tables
+    return tables, drawn
+
+
+def _matrix_rows(
+    name: str, labels: Sequence[str], counts: Sequence[Sequence[float]], digits: int
+) -> list[tuple[str, ...]]:
+    return [
+        (name, label.replace("_", " "), *(f"{count:.{digits}f}" for count in row))
+        for label, row in zip(labels, counts, strict=True)
+    ]
 
 
 def _grasps_table(summary: Summary) -> FoundTable | None:
@@ -304,9 +321,6 @@ def _notes(paper: Published, held: Sequence[RateComparison]) -> tuple[str, ...]:
 
 def _sections(summary: Summary, paper: Published) -> list[Section]:
     sections = []
-    matrices = _matrices(summary, paper)
-    if matrices:
-        sections.append(Section(id="matrices", title="Confusion matrices, theirs and ours", body=matrices))
     drawn = [*_calibration(summary), *_courses(summary)]
     if drawn:
         body = paragraph(
@@ -319,30 +333,6 @@ def _sections(summary: Summary, paper: Published) -> list[Section]:
     return sections
 
 
-def _matrices(summary: Summary, paper: Published) -> str:
-    body = []
-    for id_, target in (("table_2", "class"), ("table_5", "state")):
-        theirs = paper.matrix(id_)
-        body += [
-            pair(
-                confusion_table(
-                    theirs.confusion, f"{theirs.where}, as printed: {theirs.confusion.n} trials."
-                ),
-                confusion_table(
-                    condition.confusion,
-                    f"Ours, each bottle in {PROTOCOLS[protocol]}, {condition.confusion.n} predictions of "
-                    f"{len(condition.by_seed)} seeds.",
-                ),
-            )
-            + paragraph(theirs.note)
-            for protocol, condition in by_protocol(summary, id_, target).items()
-        ]
-    if body:
-        theirs = paper.matrix("table_6")
-        body.append(confusion_table(theirs.confusion, f"People, {theirs.where}.") + paragraph(theirs.note))
-    return "".join(body)
-
-
 def _calibration(summary: Summary) -> list[str]:
     points = curve(summary)
     if not points:
@@ -350,12 +340,11 @@ def _calibration(summary: Summary) -> list[str]:
     picture = Picture(300)
     x = reaching([force for _, force, *_ in points], 40, picture.width - 12, zero=True)
     y = reaching([c / 1000 for _, _, *both in points for c in both], 230, 26, zero=True)
-    picture.x_axis(x, 26, 230, "force on a pad, N")
-    picture.y_axis(y, 40, picture.width - 12, "sum of the pad's cells, 1000 counts")
-    for k, side in enumerate(("left", "right")):
-        with picture.plot(x, y, 26, 230):
+    with picture.axes(x, y, "force on a pad, N", "sum of the pad's cells, 1000 counts"):
+        for k, side in enumerate(("left", "right")):
             dots = [(x(point[1]), y(point[2 + k] / 1000)) for point in points]
             picture.dots(dots, INKS[k], f"{side} fingertip, N and 1000 counts")
+    for k, side in enumerate(("left", "right")):
         picture.mark(40 + 120 * k, 286, INKS[k])
         picture.text(48 + 120 * k, 290, f"{side} fingertip")
     words = f"Raw sum of each pad's cells against the force on it, {len(points)} grasps of a wooden block"

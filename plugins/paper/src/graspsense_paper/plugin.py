@@ -27,7 +27,7 @@ def graspsense_experiment_kinds() -> Iterable[ExperimentKindEntry]:
         name="grasp",
         run="graspsense_paper.grasping:grasp",
         keys="graspsense_paper.grasping:GraspSettings",
-        result="graspsense_paper.grasp_result:GraspResult",
+        result="graspsense_paper.grasping:GraspResult",
         findings=_FINDINGS,
         simulates=True,
         seconds_per_trial=0.264,

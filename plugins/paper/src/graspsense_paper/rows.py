@@ -74,11 +74,6 @@ class RateComparison:
         return UNTOLD if interval[0] <= 0.0 <= interval[1] else DIFFERS
 
     @property
-    def n(self) -> str:
-        """The number of our trials."""
-        return sample(self.ours)
-
-    @property
     def cells(self) -> tuple[str, ...]:
         """The row of a table."""
         published = self.published
@@ -94,7 +89,7 @@ class RateComparison:
             else "counts not given",
             percent(self.ours.mean),
             span(self.ours.interval),
-            self.n,
+            sample(self.ours),
             f"{100 * self.difference:+.1f} ({100 * beyond[0]:+.1f} to {100 * beyond[1]:+.1f})"
             if beyond
             else "none",

@@ -226,13 +226,29 @@ def toml_value(value: Any) -> str:
     if isinstance(value, int | float):
         return repr(value)
     if isinstance(value, Mapping):
-        inner = (
-            f"{toml_key(key)} = {toml_value(member)}" for key, member in value.items() if member is not None
-        )
-        return "{ " + ", ".join(inner) + " }" if value else "{}"
+        return "{ " + ", ".join(_pairs(value)) + " }" if value else "{}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(toml_value(member) for member in value) + "]"
     raise TypeError(f"{value!r} is not a TOML value")
+
+
+def toml_lines(values: Mapping[str, Any]) -> list[str]:
+    """Return values as the lines of a TOML file, the tables last; what is None is left out.
+
+    >>> toml_lines({"run": {"seed": 3}, "title": "a"})
+    ['title = "a"', '', '[run]', 'seed = 3']
+    """
+    lines, tables = [], []
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            tables += ["", f"[{toml_key(key)}]", *_pairs(value)]
+        else:
+            lines += _pairs({key: value})
+    return [*lines, *tables]
+
+
+def _pairs(values: Mapping[str, Any]) -> list[str]:
+    return [f"{toml_key(key)} = {toml_value(value)}" for key, value in values.items() if value is not None]
 
 
 def _toml_text(text: str) -> str:

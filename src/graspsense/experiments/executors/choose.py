@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from graspsense.core.components.caller import option
 from graspsense.core.values.errors import ConfigError, suggestion
-from graspsense.experiments.executors.base import Executor
+from graspsense.experiments.executors.executor import Executor, Serial
 
 NAMES = ("serial", "processes", "dask:ADDRESS")
 
@@ -28,8 +28,6 @@ def chosen(asked: str | None, workers: int | None = None) -> Callable[[], Execut
             "dask:tcp://10.0.0.1:8786"
         )
     if name == "serial":
-        from graspsense.experiments.executors.serial import Serial
-
         return Serial
     if name == "processes":
         from graspsense.experiments.executors.processes import Processes

@@ -10,7 +10,7 @@ from importlib import import_module
 from typing import Any, Final, Literal
 
 from graspsense.core.values.errors import ConfigError, PluginUnavailable, named
-from graspsense.experiments.executors.base import ExecutorLost
+from graspsense.experiments.executors.executor import ExecutorLost
 from graspsense.experiments.task import Task, TaskResult, run_task
 from graspsense.experiments.versions import differences, versions
 

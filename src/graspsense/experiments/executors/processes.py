@@ -16,7 +16,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from typing import Final
 
-from graspsense.experiments.executors.base import ExecutorLost
+from graspsense.experiments.executors.executor import ExecutorLost
 from graspsense.experiments.task import Task, TaskResult
 from graspsense.experiments.versions import differences, versions
 

@@ -1,4 +1,4 @@
-"""The task `trade`: like `recognise`, with the cost of each case; and what the tasks of trade-offs share."""
+"""The task `trade`: like `recognise`, with the cost of each case; and what all trade-off tasks share."""
 
 from __future__ import annotations
 
@@ -17,28 +17,6 @@ from graspsense.sources.simulated import Group
 from graspsense.sources.trial_source import TrialSource, groups_of
 
 FOLDS: Final = 10
-
-
-def settings_of(params: Mapping[str, Any]) -> Settings:
-    """Return the settings of a task."""
-    return settings_from(params["settings"], "the settings of the task")
-
-
-def trial_groups(params: Mapping[str, Any]) -> tuple[Group, ...]:
-    """Return the groups of simulated trials of a task."""
-    return groups_of(structured(params["data"], TrialSource, "[data]"))
-
-
-def target_labels(labels: Sequence[str], target: Target) -> list[str]:
-    """Return the labels to recognise: whole labels, or classes. States stay whole: folds separate the classes."""
-    return [class_of(label) for label in labels] if target == "class" else list(labels)
-
-
-def simulated_result(data: Labelled, classifiers: Sequence[ClassifierResult]) -> RecognitionResult:
-    """Return the result of a task on simulated trials."""
-    return RecognitionResult(
-        source=data.source, simulated=True, notes=data.notes, classifiers=tuple(classifiers)
-    )
 
 
 @frozen(kw_only=True, slots=False)
@@ -110,3 +88,25 @@ def mean_seconds(settings: Mapping[str, Any], trials: TrialValues) -> float:
     if not durations:
         raise ConfigError("no grasp came to rest, so there is no duration")
     return sum(durations) / len(durations)
+
+
+def settings_of(params: Mapping[str, Any]) -> Settings:
+    """Return the settings of a task."""
+    return settings_from(params["settings"], "the settings of the task")
+
+
+def trial_groups(params: Mapping[str, Any]) -> tuple[Group, ...]:
+    """Return the groups of simulated trials of a task."""
+    return groups_of(structured(params["data"], TrialSource, "[data]"))
+
+
+def target_labels(labels: Sequence[str], target: Target) -> list[str]:
+    """Return the labels to recognise: whole labels, or classes. States stay whole: folds separate the classes."""
+    return [class_of(label) for label in labels] if target == "class" else list(labels)
+
+
+def simulated_result(data: Labelled, classifiers: Sequence[ClassifierResult]) -> RecognitionResult:
+    """Return the result of a task on simulated trials."""
+    return RecognitionResult(
+        source=data.source, simulated=True, notes=data.notes, classifiers=tuple(classifiers)
+    )

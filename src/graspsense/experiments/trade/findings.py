@@ -105,7 +105,7 @@ def findings(summary: Summary) -> Findings:
     """Return the findings of each trade-off in the experiment."""
     parts = {case.part or summary.planned.name: case for case in summary.planned.cases}
     titles = {part.name: part.experiment.title for part in summary.planned.parts}
-    reports: dict[str, Report] = {}
+    reports: dict[str, _Report] = {}
     for part, case in parts.items():
         title = titles.get(part, summary.planned.experiment.title)
         conditions = [
@@ -115,14 +115,14 @@ def findings(summary: Summary) -> Findings:
         ]
         if not conditions:
             continue
-        reports[part] = cost_report(part, title, conditions, case.judge)
+        reports[part] = _cost_report(part, title, conditions, case.judge)
     tables = [report.table for report in reports.values()]
     controls = _controls_table(summary, titles)
     if controls is not None:
         tables.append(controls)
     notes = [ONE_PROTOCOL]
     if "trade_force" in reports:
-        table, reasons = damage_table()
+        table, reasons = _damage_table()
         tables.append(table)
         notes += reasons
     advice = [piece for report in reports.values() for piece in report.advice]
@@ -164,7 +164,7 @@ def _controls_table(summary: Summary, titles: Mapping[str, str]) -> FoundTable |
     )
 
 
-def _answer(reports: dict[str, Report]) -> str:
+def _answer(reports: dict[str, _Report]) -> str:
     if not reports:
         return "There is no answer yet: no task has a result."
     if len(reports) == 1:
@@ -213,3 +213,77 @@ def _advice_table(advice: Sequence[Advice]) -> FoundTable:
         note=RULE,
         numbers=4,
     )
+
+
+@frozen(kw_only=True)
+class _Report:
+    """The findings of one part of an experiment."""
+
+    table: FoundTable
+    picture: str
+    advice: tuple[Advice, ...]
+
+    @property
+    def text(self) -> str:
+        """The recommendations in a few sentences."""
+        return " ".join(piece.text for piece in self.advice)
+
+
+def _cost_report(part: str, title: str, conditions: Sequence[ConditionResult], cost: Any) -> _Report:
+    """Return the rates against their cost; `cost` holds the keys of `Cost`."""
+    rows: list[tuple[str, ...]] = []
+    advice: list[Advice] = []
+    series: dict[str, Sequence[tuple[float, RateRow]]] = {}
+    for target in dict.fromkeys(condition.target for condition in conditions):
+        points = trade_points(
+            [result for result in conditions if result.target == target], cost.cheap == "low"
+        )
+        advice.append(advise(points, title, cost.axis, cost.caution))
+        rows += [
+            (
+                point.name,
+                advice[-1].recognises,
+                f"{point.cost:.3g}",
+                percent(point.condition.rate.mean),
+                span(point.condition.rate.interval),
+                point.on_front,
+            )
+            for point in points
+        ]
+        series[TARGETS[target]] = [(point.cost, _row(point)) for point in points]
+    table = FoundTable(
+        id=part,
+        title=title,
+        header=("case", "recognises", cost.axis, "recognised", "95 % of the mean", "on the Pareto front"),
+        rows=tuple(rows),
+        note=" ".join(piece.text for piece in advice),
+        numbers=2,
+    )
+    caption = (
+        f"{title}. Bars are 95 % intervals of the mean. Large marks, which are joined, may be on the Pareto front; "
+        "small ones are not."
+    )
+    return _Report(table=table, picture=rates_over(series, cost.axis, caption), advice=tuple(advice))
+
+
+def _damage_table() -> tuple[FoundTable, list[str]]:
+    """Return the forces that damage each container, and the reason for each."""
+    text = files("graspsense.experiments.trade").joinpath("damage.toml").read_text(encoding="utf-8")
+    known: Mapping[str, Mapping[str, Any]] = tomllib.loads(text)
+    table = FoundTable(
+        id="damage",
+        title="Force from which a container is damaged",
+        header=("container", "force on a pad, N", "probing force, N"),
+        rows=tuple(
+            (name, f"{row['force_n']:g}", f"{1.5 * row['force_n'] + 7:.0f}") for name, row in known.items()
+        ),
+        note="These are assumptions, not measurements. A probing force is an effort: the friction of the default "
+        "gripper takes 7 N of it, plus half of the force on the pads.",
+        numbers=1,
+    )
+    return table, [f"Damage, {name}: {row['reason']}" for name, row in known.items()]
+
+
+def _row(point: TradePoint) -> RateRow:
+    rate = point.condition.rate
+    return RateRow(name=point.name, rate=rate.mean, interval=rate.interval, joined=point.on_front != "no")

@@ -1,11 +1,11 @@
-"""The interface of executors."""
+"""The interface of executors, and the one that runs tasks in this process."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from typing import Protocol
 
-from graspsense.experiments.task import Task, TaskResult
+from graspsense.experiments.task import Task, TaskResult, run_task
 
 
 class ExecutorLost(Exception):
@@ -28,3 +28,17 @@ class Executor(Protocol):
 
     def close(self) -> None:
         """Stop the workers, whatever they are doing."""
+
+
+class Serial:
+    """Runs tasks one after another in this process. A debugger can follow them; a crash of one ends the run."""
+
+    workers = 1
+
+    def run(self, tasks: Sequence[Task]) -> Iterator[TaskResult]:
+        """Run the tasks in order."""
+        for task in tasks:
+            yield TaskResult.from_text(run_task(task.to_text()))
+
+    def close(self) -> None:
+        """Do nothing: there are no workers."""
