@@ -123,6 +123,9 @@ def grasp_with(effort):
         # Two newtons more or less to open than to close are no fault.
         (lambda effort_n, t: effort_n + 1.0, set()),
         (lambda effort_n, t: effort_n + 0.3 * (-1) ** round(t * RATE_HZ), set()),
+        # They open with all that they may, and do not reach their speed.
+        (lambda effort_n, t: effort_n if effort_n > 0.0 else -19.5, set()),
+        (lambda effort_n, t: effort_n if effort_n > 0.0 else -15.0, {"effort not as before"}),
         (lambda effort_n, t: -effort_n, {"effort has the wrong sign"}),
         (lambda effort_n, t: 0.0, {"effort stuck"}),
         (lambda effort_n, t: 60.0, {"effort stuck"}),

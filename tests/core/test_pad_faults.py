@@ -84,6 +84,18 @@ def test_sound_pads_are_not_accused(pads_hz):
     assert told(pads_hz=pads_hz) == set()
 
 
+@every_case(
+    ("right", "names"),
+    [
+        # What friction holds from the contact on is the same at each force; what a scale adds is not.
+        (lambda t, f: 0.25 * f + 0.6 * (CLOSING_S + 0.02 < t < RELEASE_S), set()),
+        (lambda t, f: 1.4 * 0.25 * f, {"pads disagree"}),
+    ],
+)
+def test_friction_in_a_light_squeeze_is_no_scale(right, names):
+    assert told(lambda t, f: 0.25 * f, right) == names
+
+
 def late(t_s, late_s):
     return force_n(max(t_s - late_s, 0.0))
 
