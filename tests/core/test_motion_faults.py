@@ -5,8 +5,8 @@ from math import inf, nan
 from cases import every_case
 
 from graspsense.core.grasp.protection.effort import ReportedEffort
-from graspsense.core.grasp.protection.kept_speed import KeptSpeed
 from graspsense.core.grasp.protection.reports import Repeats
+from graspsense.core.grasp.protection.speed import KeptSpeed
 from graspsense.core.values.signals import APPROACH, HOLD, POSITION, SQUEEZE, Command, Frame, Phase
 
 RATE_HZ = 100.0
