@@ -8,9 +8,9 @@ from cases import every_case
 from grippers import REST_S, Scripted, bottle, squeezing
 
 from graspsense.core.components.run_config import RunConfig
-from graspsense.core.grasp.protection.absence import GAP_ABSENT, Absence
 from graspsense.core.grasp.protection.motor import Motor
 from graspsense.core.grasp.protection.opening import Opening
+from graspsense.core.grasp.protection.reports import GAP_ABSENT, Absence
 from graspsense.core.grasp.protection.speed import GapJump
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.values.signals import (

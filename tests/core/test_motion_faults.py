@@ -5,8 +5,8 @@ from math import inf, nan
 from cases import every_case
 
 from graspsense.core.grasp.protection.effort import ReportedEffort
-from graspsense.core.grasp.protection.kept_speed import KeptSpeed
 from graspsense.core.grasp.protection.reports import Repeats
+from graspsense.core.grasp.protection.speed import KeptSpeed
 from graspsense.core.values.signals import APPROACH, HOLD, POSITION, SQUEEZE, Command, Frame, Phase
 
 RATE_HZ = 100.0
@@ -123,6 +123,9 @@ def grasp_with(effort):
         # Two newtons more or less to open than to close are no fault.
         (lambda effort_n, t: effort_n + 1.0, set()),
         (lambda effort_n, t: effort_n + 0.3 * (-1) ** round(t * RATE_HZ), set()),
+        # They open with all that they may, and do not reach their speed.
+        (lambda effort_n, t: effort_n if effort_n > 0.0 else -19.5, set()),
+        (lambda effort_n, t: effort_n if effort_n > 0.0 else -15.0, {"effort not as before"}),
         (lambda effort_n, t: -effort_n, {"effort has the wrong sign"}),
         (lambda effort_n, t: 0.0, {"effort stuck"}),
         (lambda effort_n, t: 60.0, {"effort stuck"}),

@@ -57,7 +57,7 @@ def sound(t_s, sound_n):
     return sound_n
 
 
-def told(left=sound, right=sound, noise_n=0.03, pads_hz=PADS_HZ):
+def told(left=sound, right=sound, noise_n=0.03, pads_hz=PADS_HZ, gap_late_s=0.0):
     """Return the names of the faults in a grasp whose pads give these forces, sampled at `pads_hz`."""
     curves, balance, drift = PadCurves(CONTACT_N, pads_hz), PadBalance(CONTACT_N), Drift(CONTACT_N)
     gauss, faults = Random(0).gauss, []
@@ -70,7 +70,7 @@ def told(left=sound, right=sound, noise_n=0.03, pads_hz=PADS_HZ):
             # Measured half a period ago.
             sound_n = force_n(max(t_s - 0.5 / pads_hz, 0.0))
             forces = tuple(pad(t_s, sound_n + gauss(0.0, noise_n)) for pad in (left, right))
-        frame = Frame(t_s, 0.001, gap_m(t_s), 0.0, 0.0, *forces, 0.0, 0.0, 0)
+        frame = Frame(t_s, 0.001, gap_m(t_s - gap_late_s), 0.0, 0.0, *forces, 0.0, 0.0, 0)
         phase, reading = phase_of(t_s), Reading(frame, NO_PADS)
         seen = [*curves.see(reading, phase), balance.see(frame, phase) if phase <= HOLD else None]
         if phase == APPROACH and max(forces) < CONTACT_N:
@@ -82,6 +82,24 @@ def told(left=sound, right=sound, noise_n=0.03, pads_hz=PADS_HZ):
 @every_case("pads_hz", [10.0, 25.0, 1000.0])
 def test_sound_pads_are_not_accused(pads_hz):
     assert told(pads_hz=pads_hz) == set()
+
+
+@every_case(
+    ("right", "names"),
+    [
+        # What friction holds from the contact on is the same at each force; what a scale adds is not.
+        (lambda t, f: 0.25 * f + 0.6 * (CLOSING_S + 0.02 < t < RELEASE_S), set()),
+        (lambda t, f: 1.4 * 0.25 * f, {"pads disagree"}),
+    ],
+)
+def test_friction_in_a_light_squeeze_is_no_scale(right, names):
+    assert told(lambda t, f: 0.25 * f, right) == names
+
+
+@every_case(("late_s", "is_told"), [(0.0, False), (0.05, False), (0.12, True)])
+def test_a_gap_that_stands_still_after_both_pads_have_let_go_is_late(late_s, is_told):
+    """The object follows the fingers by 3 mm, for 0.06 s: by so much, a gap can be late and not show it."""
+    assert ("gap late" in told(pads_hz=1000.0, gap_late_s=late_s)) == is_told
 
 
 def late(t_s, late_s):

@@ -20,10 +20,10 @@ from graspsense.plugin_api import NoDevice
 from graspsense_pr2_gripper import diagnosis, link, watching
 from graspsense_pr2_gripper.backend import device_numbers
 from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
+from graspsense_pr2_gripper.discovery import hidraw_rule
 from graspsense_pr2_gripper.emulator import reasons
 from graspsense_pr2_gripper.emulator.board import emulate
 from graspsense_pr2_gripper.protocol import EFFORT_KIND, OWN_LIMIT, OutputReport, encode_output
-from graspsense_pr2_gripper.udev import hidraw_rule
 
 
 @pytest.fixture

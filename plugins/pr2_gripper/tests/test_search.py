@@ -9,7 +9,8 @@ from cases import every_case
 from graspsense.plugin_api import DeviceLost, NoDevice, PluginUnavailable
 from graspsense_pr2_gripper.backend import Pr2Backend
 from graspsense_pr2_gripper.config import Pr2Config
-from graspsense_pr2_gripper.discovery import LIBRARY, found_devices, search
+from graspsense_pr2_gripper.diagnosis import found_devices
+from graspsense_pr2_gripper.discovery import LIBRARY, search
 
 # No machine that runs these tests has a device of this number: pid.codes gives it to nobody.
 NOBODYS = Pr2Config(vendor_id=0x1209, product_id=0xFFFF)
@@ -53,8 +54,8 @@ def test_two_grippers_and_no_serial_is_a_question_back():
 @pytest.mark.usefixtures("two_grippers_and_a_mouse")
 def test_device_that_may_not_be_opened_is_not_passed_off_as_ready():
     """The nodes of this listing do not exist, so nobody may open them."""
-    assert [(device.serial, device.ready) for device in found_devices()] == [("L7", False), ("R2", False)]
-    assert "/dev/hidraw0" in found_devices()[0].advice
+    assert [(device.serial, device.ready) for device in found_devices(1.0)] == [("L7", False), ("R2", False)]
+    assert "/dev/hidraw0" in found_devices(1.0)[0].advice
 
 
 def test_missing_library_is_told(monkeypatch):

@@ -11,36 +11,25 @@ from __future__ import annotations
 
 import asyncio
 import json
-import re
 import secrets
 import struct
 import sys
 from collections import deque
-from collections.abc import Sequence
 from contextlib import suppress
-from email.message import Message
-from http import HTTPStatus
-from http.client import HTTPException, parse_headers
-from io import BytesIO
 from threading import Lock
 from time import time_ns
 from typing import Any, Final, cast
-from urllib.parse import urlsplit
 
 import foxglove
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.asyncio.server import ServerConnection
+from websockets.exceptions import WebSocketException
+from websockets.http11 import Request, Response
+from websockets.typing import Subprotocol
 
-from graspsense.live.admission import (
-    FLUSH_S,
-    HISTORY_BYTES,
-    MOST_CONNECTIONS,
-    SHAKE_TIMEOUT_S,
-    Address,
-    Refusal,
-    say,
-    viewer_refusal,
-    why_not,
-)
+from graspsense.live.admission import FLUSH_S, HISTORY_BYTES, Address, viewer_refusal
 from graspsense.live.stream import buffers
+from graspsense.live.viewer_server import ViewerServer
 from graspsense.recording.layout import (
     CDR_HEADER,
     IS_SIGNAL,
@@ -60,17 +49,11 @@ MOST_SENT: Final = 1 << 20
 BACKLOG: Final = 1 << 20
 """Messages that the SDK keeps for a viewer; more than are in `WAITING_BYTES`, so that it never leaves one out."""
 HOST: Final = "127.0.0.1"
-LARGEST_HEAD: Final = 8192
-PUMP_BYTES: Final = 1 << 16
 CLOSE_S: Final = 0.5
-PROTOCOLS: Final = ("foxglove.sdk.v1", "foxglove.websocket.v1")
+PROTOCOLS: Final = [Subprotocol("foxglove.sdk.v1"), Subprotocol("foxglove.websocket.v1")]
 """Names of the protocol: of the SDK, and the older one of which it is an extension."""
 APP: Final = "https://app.foxglove.dev"
-_KEY: Final = re.compile(r"[A-Za-z0-9+/=]{24}")
 _T_S: Final = struct.Struct("<d")
-LOST: Final = (OSError, EOFError, ValueError, RuntimeError, asyncio.LimitOverrunError, HTTPException)
-"""How a connection ends that breaks off, is too slow or says something wrong. RuntimeError is the SDK's."""
-
 Logged = tuple[int, int, bytes]
 """A message: the number of its topic, the time at which it is logged, and its bytes in CDR."""
 
@@ -138,9 +121,7 @@ class FoxgloveViewer:
     def _log(self, message: Logged) -> None:
         number, log_ns, data = message
         self._channels[number].log(data, log_time=log_ns)
-        # As `sent`, with the head of the message and that of its WebSocket frame.
-        size = len(data) + 13
-        self.logged += size + (2 if size < 126 else 4 if size < 65536 else 10)
+        self.logged += len(data) + 13  # as `sent`, with the head of the message
 
     def drop(self) -> None:
         """End the connection at once."""
@@ -190,54 +171,48 @@ class RunningGrasp:
             viewer.take(message)
 
 
-class Gate:
-    """Lets viewers in who name the token, and passes bytes between them and their servers."""
+class Gate(ViewerServer[bytearray]):
+    """Lets viewers in who name the token, and passes messages between them and their servers."""
 
     def __init__(self) -> None:
-        self.address, self.grasp = Address("ws", HOST), RunningGrasp()
-        self._connected = 0
+        super().__init__(Address("ws", HOST))
+        self.grasp = RunningGrasp()
 
-    async def answer(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """Answer a connection until it ends."""
-        self._connected += 1
+    def answer(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Return why a request is refused; None if it is not."""
+        refusal = self.address.refusal(request.path.strip("/"), request.headers)
+        refusal = refusal or viewer_refusal(request.headers, _is_known_origin, len(self.grasp.viewers))
+        return None if refusal is None else connection.respond(*refusal)
+
+    async def show(self, connection: ServerConnection) -> None:
+        """Pass messages between a viewer and its server until one of them ends, or the viewer is dropped."""
+        connection.transport.set_write_buffer_limits(0)  # so that what was sent has left this process
+        viewer = FoxgloveViewer(self.grasp, connection.transport)
+        address = f"ws://{viewer.host}:{viewer.server.port}"
         try:
-            if self._connected <= MOST_CONNECTIONS:
-                await self._shake(reader, writer)
+            with suppress(OSError, WebSocketException):
+                async with connect(
+                    address, subprotocols=PROTOCOLS[:1], compression=None, max_size=None, ping_interval=None
+                ) as inner:
+                    tasks = [
+                        asyncio.create_task(_take_from(connection, inner)),
+                        asyncio.create_task(_send_to(viewer, inner, connection)),
+                    ]
+                    done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+                    if tasks[0] in done:  # it has left, or has sent too much
+                        viewer.drop()
+                    for task in tasks:
+                        task.cancel()
+                    await asyncio.gather(*tasks, return_exceptions=True)
         finally:
-            self._connected -= 1
-            writer.close()
+            with self.grasp.lock:
+                self.grasp.viewers.discard(viewer)
+            # It waits until its connection has ended, which this loop has to see.
+            await asyncio.to_thread(viewer.server.stop)
 
-    async def _shake(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        with suppress(*LOST):
-            async with asyncio.timeout(SHAKE_TIMEOUT_S):
-                request, headers = _head(await reader.readuntil(b"\r\n\r\n"))
-            refusal = self._refusal(request, headers)
-            if refusal is not None:
-                status, reason = refusal
-                text = f"HTTP/1.1 {status.value} {status.phrase}\r\nContent-Type: text/plain\r\n"
-                writer.write(
-                    f"{text}Content-Length: {len(reason)}\r\nConnection: close\r\n\r\n{reason}".encode()
-                )
-                return
-            writer.transport.set_write_buffer_limits(0)  # so that what was sent has left this process
-            viewer = FoxgloveViewer(self.grasp, writer.transport)
-            try:
-                await _served(viewer, headers, reader, writer)
-            finally:
-                with self.grasp.lock:
-                    self.grasp.viewers.discard(viewer)
-                # It waits until its connection has ended, which this loop has to see.
-                await asyncio.to_thread(viewer.server.stop)
-
-    def _refusal(self, request: Sequence[str], headers: Message) -> Refusal | None:
-        if len(request) != 3 or request[0] != "GET":
-            return HTTPStatus.BAD_REQUEST, "this is an address for Foxglove\n"
-        refusal = self.address.refusal(request[1].strip("/"), headers)
-        if refusal is not None:
-            return refusal
-        if _protocol(headers) is None or not _KEY.fullmatch(headers.get("Sec-WebSocket-Key", "")):
-            return HTTPStatus.BAD_REQUEST, "this is an address for Foxglove: open it there\n"
-        return viewer_refusal(headers, _is_known_origin, len(self.grasp.viewers))
+    def pass_on(self, part: bytearray) -> None:
+        """Pass on the complete messages of a buffer."""
+        self.grasp.take(part)
 
     async def end(self) -> None:
         """Let the viewers subscribe to new topics and take what is left, for a short time."""
@@ -257,91 +232,32 @@ class Gate:
             viewer.drop()
 
 
-def _head(data: bytes) -> tuple[list[str], Message]:
-    """Return the words of the first line of a head of HTTP, and its headers. Raises HTTPException for other data."""
-    line, _, header_lines = data.partition(b"\r\n")
-    return line.decode("latin-1").split(" "), parse_headers(BytesIO(header_lines))
-
-
-def _protocol(headers: Message) -> str | None:
-    """Return the protocol that a viewer is answered in: the newest that it asks for."""
-    asked = {word.strip() for word in headers.get("Sec-WebSocket-Protocol", "").split(",")}
-    return next((name for name in PROTOCOLS if name in asked), None)
-
-
 def _is_known_origin(origin: str) -> bool:
     """Return whether this may be Foxglove: its web page, or a program that is no page of the web."""
-    return origin == APP or urlsplit(origin).scheme not in ("", "http", "https")
+    scheme, _, _ = origin.partition(":")
+    return origin == APP or (":" in origin and scheme not in ("http", "https"))
 
 
-async def _served(
-    viewer: FoxgloveViewer, headers: Message, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
-) -> None:
-    """Pass bytes between a viewer and its server until one of them ends, or the viewer is dropped."""
-    inner_reader, inner_writer = await asyncio.open_connection(viewer.host, viewer.server.port)
-    try:
-        key = headers["Sec-WebSocket-Key"]
-        inner_writer.write(
-            f"GET / HTTP/1.1\r\nHost: {viewer.host}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-            f"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: {key}\r\n"
-            f"Sec-WebSocket-Protocol: {PROTOCOLS[0]}\r\n\r\n".encode()
-        )
-        _, answer = _head(await inner_reader.readuntil(b"\r\n\r\n"))
-        writer.write(
-            "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-            f"Sec-WebSocket-Accept: {answer['Sec-WebSocket-Accept']}\r\n"
-            f"Sec-WebSocket-Protocol: {_protocol(headers)}\r\n\r\n".encode()
-        )
-        tasks = [
-            asyncio.create_task(_take_from(reader, inner_writer)),
-            asyncio.create_task(_send_to(viewer, inner_reader, writer)),
-        ]
-        done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-        if tasks[0] in done:  # it has left, or has sent too much
-            viewer.drop()
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
-    finally:
-        inner_writer.transport.abort()
-
-
-async def _take_from(reader: asyncio.StreamReader, inner: asyncio.StreamWriter) -> None:
+async def _take_from(connection: ServerConnection, inner: ClientConnection) -> None:
     left = MOST_SENT
-    while left > 0 and (data := await reader.read(PUMP_BYTES)):
-        left -= len(data)
-        inner.write(data)
-        await inner.drain()
+    async for message in connection:
+        left -= len(message)
+        if left <= 0:
+            return
+        await inner.send(message)
 
 
-async def _send_to(viewer: FoxgloveViewer, inner: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-    while data := await inner.read(PUMP_BYTES):
-        writer.write(data)
-        await writer.drain()
-        viewer.sent += len(data)
-
-
-async def serve_foxglove(port: int) -> None:
-    """Serve until standard input ends. Prints one line of JSON: the address, or why there is none."""
-    gate, loop = Gate(), asyncio.get_running_loop()
-    try:
-        server = await asyncio.start_server(gate.answer, HOST, port, limit=LARGEST_HEAD)
-    except OSError as error:
-        say({"error": why_not("--foxglove", HOST, port, error)})
-        return
-    gate.address.port = server.sockets[0].getsockname()[1]
-    say({"address": gate.address.text})
-    incoming = buffers(0)
-    while (buffer := await loop.run_in_executor(None, next, incoming, None)) is not None:
-        gate.grasp.take(buffer)
-    server.close()
-    await gate.end()
+async def _send_to(viewer: FoxgloveViewer, inner: ClientConnection, connection: ServerConnection) -> None:
+    async for message in inner:
+        await connection.send(message)
+        viewer.sent += len(message)
 
 
 def main(port: str) -> int:
     """Serve viewers until the input ends."""
     leave_control_alone()
-    asyncio.run(serve_foxglove(int(port)))
+    settings = {"subprotocols": PROTOCOLS, "max_size": MOST_SENT, "ping_interval": None}
+    asyncio.run(Gate().serve("--foxglove", int(port), buffers(0), **settings))
     return 0
 
 

@@ -17,7 +17,7 @@ from http import HTTPStatus
 from importlib.resources import files
 from typing import Final
 
-from websockets.asyncio.server import ServerConnection, broadcast, serve
+from websockets.asyncio.server import ServerConnection, broadcast
 from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
@@ -26,15 +26,12 @@ from graspsense.core.values.json_values import json_ready
 from graspsense.live.admission import (
     FLUSH_S,
     HISTORY_BYTES,
-    MOST_CONNECTIONS,
     MOST_VIEWERS,
-    SHAKE_TIMEOUT_S,
     Address,
-    say,
     viewer_refusal,
-    why_not,
 )
 from graspsense.live.stream import Message, batches
+from graspsense.live.viewer_server import ViewerServer
 from graspsense.recording.layout import TICK_FIELDS
 from graspsense.recording.wire_messages import leave_control_alone
 
@@ -105,11 +102,11 @@ class History:
         return f"[{','.join([*head, *self._texts, *others])}]"
 
 
-class LivePage:
+class LivePage(ViewerServer[list[Message]]):
     """The page under its token, and the viewers that are connected to it."""
 
     def __init__(self, host: str) -> None:
-        self.address = Address("http", host)
+        super().__init__(Address("http", host))
         self.history = History()
         self.viewers: dict[ServerConnection, int] = {}
         """Each viewer, with the bytes that may wait for it."""
@@ -170,58 +167,12 @@ class LivePage:
             await asyncio.gather(*(viewer.close() for viewer in self.viewers))
 
 
-class _Limited(ServerConnection):  # type: ignore[misc, unused-ignore]
-    """A connection that is closed at once if there are too many."""
-
-    connected = 0
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        _Limited.connected += 1
-        super().connection_made(transport)
-        if _Limited.connected > MOST_CONNECTIONS:
-            self.transport.abort()
-
-    def connection_lost(self, exc: Exception | None) -> None:
-        _Limited.connected -= 1
-        super().connection_lost(exc)
-
-
-async def serve_page(host: str, port: int) -> None:
-    """Serve until standard input ends. Prints one line of JSON: the address, or why there is none."""
-    page, loop = LivePage(host), asyncio.get_running_loop()
-    try:
-        server = await serve(
-            page.show,
-            host,
-            port,
-            process_request=page.answer,
-            create_connection=_Limited,
-            compression=None,
-            server_header=None,
-            max_size=LARGEST_MESSAGE,
-            max_queue=1,
-            open_timeout=SHAKE_TIMEOUT_S,
-            close_timeout=FLUSH_S,
-            ping_interval=10,
-            ping_timeout=10,
-        )
-    except OSError as error:
-        say({"error": why_not("--live-address", host, port, error)})
-        return
-    async with server:
-        page.address.port = next(iter(server.sockets)).getsockname()[1]
-        say({"address": page.address.text})
-        incoming = batches(0)
-        while (messages := await loop.run_in_executor(None, next, incoming, None)) is not None:
-            page.pass_on(messages)
-        with suppress(TimeoutError):
-            await page.end()
-
-
 def main(host: str, port: str) -> int:
     """Serve the page until the input ends."""
     leave_control_alone()
-    asyncio.run(serve_page(host, int(port)))
+    page = LivePage(host)
+    settings = {"max_size": LARGEST_MESSAGE, "max_queue": 1, "ping_interval": 10, "ping_timeout": 10}
+    asyncio.run(page.serve("--live-address", int(port), batches(0), **settings))
     return 0
 
 

@@ -79,7 +79,6 @@ class FrankaBackend(BackendWithEmulator[FrankaConfig]):
     def __init__(self, config: FrankaConfig) -> None:
         super().__init__(config)
         self._link: LibfrankaLink | LockStepHand | None = None
-        self._emulated: LockStepHand | None = None
         self._waiting: Order | None = None
         self._table: LoadTable | None = None
         self._frames = self._sent = 0
@@ -158,14 +157,13 @@ class FrankaBackend(BackendWithEmulator[FrankaConfig]):
             with suppress(HandGone):
                 link.close()
 
-    def report(self) -> dict[str, float | int | str | bool]:
+    def report(self) -> Mapping[str, float | int | str | bool]:
         """Return the number of frames and of orders, with what the emulated body knows."""
-        body = {} if self._emulated is None else self._emulated.body_report
-        return {**body, "frames": self._frames, "orders": self._sent}
+        return {**super().report(), "frames": self._frames, "orders": self._sent}
 
-    def dry_run_backend(self) -> FrankaBackend:
-        """Return the emulated hand."""
-        return FrankaBackend(self.config if self.config.emulated else FrankaConfig(host="emulated"))
+    def emulation(self) -> Mapping[str, Any]:
+        """Return the settings of a dry run, without the calibrations of the real hand."""
+        return {**super().emulation(), "calibration": "none"}
 
     def _send(self, order: Order) -> None:
         assert self._link is not None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from graspsense.gripper_api import EmulatorEntry, Finding, FoundDevice
+from graspsense.gripper_api import EmulatorEntry, discovery_hooks
 from graspsense.plugin_api import FeatureSetEntry, PipelineEntry, SensorBackendEntry, hookimpl
 
 GRASPSENSE_API = (2, 0)
@@ -54,17 +54,4 @@ def graspsense_emulators() -> Iterable[EmulatorEntry]:
     )
 
 
-@hookimpl
-def graspsense_probe_devices(timeout_s: float) -> Iterable[FoundDevice]:
-    """Return the hand at the default address; it is greeted, and does not move."""
-    from graspsense_franka_hand.discovery import found_devices
-
-    return found_devices(timeout_s)
-
-
-@hookimpl
-def graspsense_diagnose(config: object, timeout_s: float) -> Iterable[Finding]:
-    """Examine the hand of these settings. Without settings there is no address to ask."""
-    from graspsense_franka_hand.discovery import diagnose
-
-    return diagnose(config, timeout_s)
+graspsense_probe_devices, graspsense_diagnose = discovery_hooks("graspsense_franka_hand.discovery")

@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from typing import Final, Literal, NamedTuple
 
 from attrs import evolve
 
-from graspsense.gripper_api import Finding, GraspsenseError, calibrations_of
+from graspsense.gripper_api import Finding, FoundDevice, GraspsenseError, calibrations_of
 from graspsense.plugin_api import DeviceLost
 from graspsense_pr2_gripper.backend import TEST_NUMBER, UNCALIBRATED, device_numbers
 from graspsense_pr2_gripper.config import Pr2Config
-from graspsense_pr2_gripper.discovery import Search, on_the_bus, search
+from graspsense_pr2_gripper.discovery import (
+    BACKEND,
+    RELOAD,
+    RULES_FILE,
+    Search,
+    hidraw_rule,
+    on_the_bus,
+    search,
+    usb_rule,
+)
 from graspsense_pr2_gripper.emulator.reasons import why_no_uhid, why_no_vhci
 from graspsense_pr2_gripper.opening import open_board
 from graspsense_pr2_gripper.protocol import Identity
-from graspsense_pr2_gripper.udev import RELOAD, RULES_FILE, hidraw_rule, usb_rule
 from graspsense_pr2_gripper.watching import Watched, share_of, watch_link
 
 TRANSPORTS: Final[tuple[Literal["hidraw", "pyusb"], ...]] = ("hidraw", "pyusb")
@@ -32,6 +40,22 @@ class _Tried(NamedTuple):
 
     identity: Identity
     watched: Watched
+
+
+def found_devices(timeout_s: float) -> Sequence[FoundDevice]:
+    """Return the devices with the default USB ids; a list of HID devices needs no time limit."""
+    return [
+        FoundDevice(
+            backend=BACKEND,
+            serial=device.serial,
+            where=device.path,
+            ready=device.readable,
+            advice=""
+            if device.readable
+            else f"no permission on {device.path}: `graspsense doctor` gives the udev rule",
+        )
+        for device in search(Pr2Config()).matching
+    ]
 
 
 def diagnose(config: object, timeout_s: float) -> Iterator[Finding]:

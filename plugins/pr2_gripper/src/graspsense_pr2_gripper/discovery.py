@@ -1,23 +1,30 @@
-"""Search for the gripper among the HID devices of this computer."""
+"""Search for the gripper among the HID devices of this computer, and the udev rules that give access to it.
+
+`uaccess` in a rule gives access to the user who is logged in at the machine.
+"""
 
 from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
 from glob import glob
 from importlib import import_module
 from pathlib import Path
+from typing import Final
 
 from attrs import frozen
 
-from graspsense.gripper_api import FoundDevice
 from graspsense.plugin_api import PluginUnavailable
 from graspsense_pr2_gripper.config import Pr2Config
 
 BACKEND = "pr2"
 # On Linux the module `hid` uses libusb, which detaches the kernel driver; `hidraw` does not.
 LIBRARY = "hidraw" if sys.platform == "linux" else "hid"
+RULES_FILE: Final = "/etc/udev/rules.d/70-graspsense.rules"
+"""Before 73-seat-late.rules, which is what gives `uaccess` its effect."""
+RELOAD: Final = "sudo udevadm control --reload && sudo udevadm trigger"
+UHID_RULE: Final = 'KERNEL=="uhid", SUBSYSTEM=="misc", TAG+="uaccess", OPTIONS+="static_node=uhid"'
+"""For `graspsense emulate pr2` without root."""
 
 
 @frozen
@@ -88,17 +95,16 @@ def on_the_bus(config: Pr2Config) -> list[str]:
     return sorted(places)
 
 
-def found_devices() -> Sequence[FoundDevice]:
-    """Return the devices with the default USB ids, for `graspsense devices`."""
-    return [
-        FoundDevice(
-            backend=BACKEND,
-            serial=device.serial,
-            where=device.path,
-            ready=device.readable,
-            advice=""
-            if device.readable
-            else f"no permission on {device.path}: `graspsense doctor` gives the udev rule",
-        )
-        for device in search(Pr2Config()).matching
-    ]
+def hidraw_rule(config: Pr2Config) -> str:
+    """Return the rule for transport hidraw, by the name of the HID device: one through uhid has no USB parent."""
+    return (
+        f'KERNEL=="hidraw*", KERNELS=="0003:{config.vendor_id:04X}:{config.product_id:04X}.*", TAG+="uaccess"'
+    )
+
+
+def usb_rule(config: Pr2Config) -> str:
+    """Return the rule for transport pyusb."""
+    return (
+        f'SUBSYSTEM=="usb", ATTR{{idVendor}}=="{config.vendor_id:04x}", ATTR{{idProduct}}=="{config.product_id:04x}", '
+        'TAG+="uaccess"'
+    )

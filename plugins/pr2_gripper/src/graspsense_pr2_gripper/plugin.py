@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from graspsense.gripper_api import EmulatorEntry, Finding, FoundDevice
+from graspsense.gripper_api import EmulatorEntry, discovery_hooks
 from graspsense.plugin_api import SensorBackendEntry, hookimpl
 
 GRASPSENSE_API = (2, 0)
@@ -34,17 +34,4 @@ def graspsense_emulators() -> Iterable[EmulatorEntry]:
     )
 
 
-@hookimpl
-def graspsense_probe_devices(timeout_s: float) -> Iterable[FoundDevice]:
-    """Search for the gripper under its default USB numbers; a list of HID devices needs no time limit."""
-    from graspsense_pr2_gripper.discovery import found_devices
-
-    return found_devices()
-
-
-@hookimpl
-def graspsense_diagnose(config: object, timeout_s: float) -> Iterable[Finding]:
-    """Examine the gripper of these settings, or the one under the default USB numbers."""
-    from graspsense_pr2_gripper.diagnosis import diagnose
-
-    return diagnose(config, timeout_s)
+graspsense_probe_devices, graspsense_diagnose = discovery_hooks("graspsense_pr2_gripper.diagnosis")

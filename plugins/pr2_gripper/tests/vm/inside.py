@@ -34,13 +34,12 @@ from graspsense.plugin_api import DeviceLost, NoDevice, create
 from graspsense.store.record_grasp import record_grasp
 from graspsense.store.store import Store
 from graspsense_pr2_gripper.config import Pr2Config
-from graspsense_pr2_gripper.discovery import on_the_bus
+from graspsense_pr2_gripper.discovery import UHID_RULE, hidraw_rule, on_the_bus, usb_rule
 from graspsense_pr2_gripper.emulator import board, uhid, vhci  # noqa: F401 (for those that are forked)
 from graspsense_pr2_gripper.opening import open_board
 from graspsense_pr2_gripper.protocol import RELEASE_KIND, OutputReport, encode_output
 from graspsense_pr2_gripper.transports.hidraw import HidrawTransport
 from graspsense_pr2_gripper.transports.pyusb import PyusbTransport
-from graspsense_pr2_gripper.udev import UHID_RULE, hidraw_rule, usb_rule
 
 # How long a program may take to start or answer. The guest's clock goes on while it waits for a file of the host, so
 # that starting a program took 28 s of it on one machine; only a program that hangs takes as long as this.

@@ -9,8 +9,6 @@ from math import inf, nan
 from types import MappingProxyType
 from typing import Any, Final, final
 
-from attrs import evolve
-
 from graspsense.gripper_api import (
     BackendWithEmulator,
     DeadManSwitch,
@@ -98,7 +96,6 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
         self.least_force_n = self._model.forces_n[0]
         self.least_step_m = self._model.step_m
         self._link: ModbusLink | UrCapLink | LockStepGripper | None = None
-        self._emulated: LockStepGripper | None = None
         self._switch: DeadManSwitch | None = None
         self._fingertips: TactileFingertips | None = None
         self._polling = Polling(RATE_HZ)
@@ -187,18 +184,14 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
         if fingertips is not None:
             fingertips.close()
 
-    def report(self) -> dict[str, float | int | str | bool]:
+    def report(self) -> Mapping[str, float | int | str | bool]:
         """Return the number of frames, and of repeated exchanges, with what the emulated body knows."""
-        body = {} if self._emulated is None else self._emulated.body_report
-        return {**body, **self._polling.report(), **self._clock_report}
+        return {**super().report(), **self._polling.report(), **self._clock_report}
 
-    def dry_run_backend(self) -> RobotiqBackend:
-        """Return the emulated gripper."""
-        config = self.config
-        emulated_tips = ",".join("emulated" for _ in config.tactile_ports)
-        return RobotiqBackend(
-            config if config.emulated else evolve(config, port="emulated", tactile_port=emulated_tips)
-        )
+    def emulation(self) -> Mapping[str, Any]:
+        """Return the settings of a dry run, with as many ports of fingertips."""
+        emulated_tips = ",".join("emulated" for _ in self.config.tactile_ports)
+        return {**super().emulation(), "tactile_port": emulated_tips}
 
     def _open_fingertips(self) -> None:
         ports = self.config.tactile_ports

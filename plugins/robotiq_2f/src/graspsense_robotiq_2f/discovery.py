@@ -15,8 +15,8 @@ CONVERTERS: Final = {(0x0403, 0x6001), (0x0403, 0x6015)}
 """USB numbers of the FTDI chips in RS-485 converters. Others have them too."""
 
 
-def found_devices() -> Sequence[FoundDevice]:
-    """Return the converters, for `graspsense devices`. What hangs on them is not known before it is asked."""
+def found_devices(timeout_s: float) -> Sequence[FoundDevice]:
+    """Return the converters, to which nothing is sent: what hangs on them is not known before it is asked."""
     from serial.tools.list_ports import comports
 
     return found_converters(
@@ -27,7 +27,7 @@ def found_devices() -> Sequence[FoundDevice]:
 def diagnose(config: object, timeout_s: float) -> Iterator[Finding]:
     """Return the findings about the gripper of these settings, by default about the converters. No finger moves."""
     if config is None:
-        yield from converter_findings(found_devices(), "robotiq", "a Robotiq gripper")
+        yield from converter_findings(found_devices(timeout_s), "robotiq", "a Robotiq gripper")
     elif isinstance(config, RobotiqConfig):
         yield from _asked(config, timeout_s)
 

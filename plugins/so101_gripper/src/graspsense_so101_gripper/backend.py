@@ -10,8 +10,6 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, TypeVar, final
 
-from attrs import evolve
-
 from graspsense.gripper_api import BackendWithEmulator, DeadManSwitch, Polling, calibrations_of, finger_target
 from graspsense.plugin_api import (
     NO_PADS,
@@ -91,7 +89,6 @@ class So101Backend(BackendWithEmulator[So101Config]):
         self.least_step_m = config.jaw_length_m * RADIANS_A_STEP
         self.least_speed_m_s = self.least_step_m
         self._bus: ServoBus | None = None
-        self._emulated: LockStepBus | None = None
         self._polling = Polling(RATE_HZ)
         self._switch: DeadManSwitch | None = None
         self._found: MotorRequest | None = None
@@ -172,17 +169,13 @@ class So101Backend(BackendWithEmulator[So101Config]):
             switch.release()
         self._found = self._asked = None
 
-    def report(self) -> dict[str, float | int | str | bool]:
+    def report(self) -> Mapping[str, float | int | str | bool]:
         """Return the number of frames, and of repeated exchanges, with what the emulated body knows."""
-        body = {} if self._emulated is None else self._emulated.arm.body_report
-        return {**body, **self._polling.report()}
+        return {**super().report(), **self._polling.report()}
 
-    def dry_run_backend(self) -> So101Backend:
-        """Return the emulated gripper."""
-        config = self.config
-        if config.emulated:
-            return So101Backend(config)
-        return So101Backend(evolve(config, port="emulated", arm_calibration="", calibration="none"))
+    def emulation(self) -> Mapping[str, Any]:
+        """Return the settings of a dry run, without the calibrations of the real arm."""
+        return {**super().emulation(), "arm_calibration": "", "calibration": "none"}
 
     def _asked_of(self, goal: int, speed_m_s: float, force_n: float) -> MotorRequest:
         # A speed of 0 is the highest one to this motor.

@@ -39,8 +39,8 @@ def serial_number(config: So101Config, port: str) -> str:
     return f"{board}-{config.motor}"
 
 
-def found_devices() -> Sequence[FoundDevice]:
-    """Return the converters, for `graspsense devices`. What hangs on them is not known before it is asked."""
+def found_devices(timeout_s: float) -> Sequence[FoundDevice]:
+    """Return the converters, to which nothing is sent: what hangs on them is not known before it is asked."""
     from serial.tools.list_ports import comports
 
     return found_converters(comports(), "so101", CONVERTERS, "a serial converter, perhaps of an SO-101 arm")
@@ -49,7 +49,7 @@ def found_devices() -> Sequence[FoundDevice]:
 def diagnose(config: object, timeout_s: float) -> Iterator[Finding]:
     """Return the findings about the gripper of these settings, by default about the converters. Nothing moves."""
     if config is None:
-        yield from converter_findings(found_devices(), "so101", "an SO-101 arm")
+        yield from converter_findings(found_devices(timeout_s), "so101", "an SO-101 arm")
     elif isinstance(config, So101Config):
         yield from _asked(config, timeout_s)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from graspsense.gripper_api import EmulatorEntry, Finding, FoundDevice
+from graspsense.gripper_api import EmulatorEntry, discovery_hooks
 from graspsense.plugin_api import PipelineEntry, SensorBackendEntry, hookimpl
 
 GRASPSENSE_API = (2, 0)
@@ -44,17 +44,4 @@ def graspsense_emulators() -> Iterable[EmulatorEntry]:
     )
 
 
-@hookimpl
-def graspsense_probe_devices(timeout_s: float) -> Iterable[FoundDevice]:
-    """Return the USB converters that such arms have; nothing is sent to them."""
-    from graspsense_so101_gripper.discovery import found_devices
-
-    return found_devices()
-
-
-@hookimpl
-def graspsense_diagnose(config: object, timeout_s: float) -> Iterable[Finding]:
-    """Examine the gripper of these settings, or the USB converters of this computer."""
-    from graspsense_so101_gripper.discovery import diagnose
-
-    return diagnose(config, timeout_s)
+graspsense_probe_devices, graspsense_diagnose = discovery_hooks("graspsense_so101_gripper.discovery")

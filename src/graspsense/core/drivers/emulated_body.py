@@ -97,6 +97,22 @@ EmulatorSettingsT = TypeVar("EmulatorSettingsT", bound=EmulatorSettings)
 class BackendWithEmulator(SensorBackend[EmulatorSettingsT]):
     """A backend whose gripper is real, or emulated, as `where` of its settings says."""
 
+    _emulated: Any = None
+    """The gripper that is emulated in this process, once it is open; it has a `body_report`."""
+
+    def report(self) -> Mapping[str, float | int | str | bool]:
+        """Return what the body of the emulated gripper knows; nothing for a real one."""
+        return {} if self._emulated is None else self._emulated.body_report
+
+    def emulation(self) -> Mapping[str, Any]:
+        """Return the settings with which a dry run emulates a real gripper."""
+        return {self.config.where: EMULATED}
+
+    def dry_run_backend(self) -> SensorBackend[EmulatorSettingsT]:
+        """Return the emulated gripper."""
+        config = self.config
+        return type(self)(config if config.emulated else evolve(config, **self.emulation()))
+
     def objects(self) -> Sequence[ObjectKind]:
         """Return what the body of the emulated gripper can hold; nothing for a real one."""
         config = self.config

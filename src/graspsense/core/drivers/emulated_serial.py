@@ -74,7 +74,10 @@ MOST_UNSENT: Final = 1 << 16
 class EmulatedPort:
     """A port on a `pty` or a `socket`; `heard(data)` is called with what arrives, and returns what is sent back.
 
-    `idle` is called at most every `period_s`, where that is given, and returns what is sent unasked.
+    `idle` is called at most every `period_s`, where that is given, and returns what is sent unasked. `listener` is the
+    socket that hosts connect to, if it is not any of this machine. A newer host replaces an older one, as on a
+    converter that has one connection; where `gone` is given, the older one keeps the port, and `gone` is called when
+    it has left.
     """
 
     def __init__(
@@ -83,8 +86,13 @@ class EmulatedPort:
         heard: Callable[[bytes], bytes],
         idle: Callable[[], bytes] | None = None,
         period_s: float | None = None,
+        *,
+        listener: socket.socket | None = None,
+        gone: Callable[[], None] | None = None,
     ) -> None:
-        self._heard, self._idle, self._period_s = heard, idle, period_s
+        self._heard, self._idle, self._period_s, self._gone = heard, idle, period_s, gone
+        self.refused = 0
+        """The number of hosts that were refused."""
         self._listener: socket.socket | None = None
         self._connection: socket.socket | None = None
         self._terminal: tuple[int, int] | None = None
@@ -96,8 +104,8 @@ class EmulatedPort:
             os.set_blocking(self._terminal[0], False)
             self.where = os.ttyname(self._terminal[1])
         else:
-            self._listener = socket.create_server(("127.0.0.1", 0))
-            self.where = f"socket:127.0.0.1:{self._listener.getsockname()[1]}"
+            self._listener = listener or socket.create_server(("127.0.0.1", 0))
+            self.where = "socket:{}:{}".format(*self._listener.getsockname())
         # Sockets: unlike the number of a pipe, a closed one cannot be another file by now.
         self._wake = socket.socketpair()
         self._closed = False
@@ -119,10 +127,12 @@ class EmulatedPort:
             while not self._closed:
                 sources = [self._wake[0].fileno(), *self._sources()]
                 ready, _, _ = select.select(sources, [], [], self._period_s)
-                if self._listener is not None and self._listener.fileno() in ready:
-                    self._accept()
-                elif set(ready) & set(self._sources()):
+                asked = self._listener is not None and self._listener.fileno() in ready
+                # First of the present host: it may have gone, and come back.
+                if set(ready) & set(self._sources()[asked:]):
                     self._receive()
+                if asked:
+                    self._accept()
                 unasked = b"" if self._idle is None else self._idle()
                 if unasked or self._unsent:
                     self._send(unasked)
@@ -137,10 +147,14 @@ class EmulatedPort:
 
     def _accept(self) -> None:
         assert self._listener is not None
-        # A newer host replaces an older one, as on a converter that has one connection.
+        connection = self._listener.accept()[0]
+        if self._connection is not None and self._gone is not None:
+            self.refused += 1
+            connection.close()
+            return
         if self._connection is not None:
             self._connection.close()
-        self._connection = self._listener.accept()[0]
+        self._connection = connection
         self._connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def _receive(self) -> None:
@@ -160,6 +174,8 @@ class EmulatedPort:
         elif self._connection is not None:
             self._connection.close()
             self._connection = None
+            if self._gone is not None:
+                self._gone()
 
     def _handle(self) -> int:
         assert self._terminal is not None
@@ -246,7 +262,7 @@ class EmulatedSerial(EmulatedDevice):
         "repeated": "send each reply twice",
     }
 
-    def __init__(self, wire: str, faults: SerialFaults) -> None:
+    def __init__(self, wire: str, faults: EmulatorFaults) -> None:
         self.wire = wire
         self._faults = faults
         self._lock = threading.Lock()
@@ -277,14 +293,15 @@ class EmulatedSerial(EmulatedDevice):
             return None
         reply = self.answer(data, now_s)
         self._requests += bool(reply)
-        mood = self._mood_at(now_s)
-        if mood == "silent":
-            reply = b""
-        elif mood == "damaged" and reply:
-            reply = reply[:-3] + bytes([reply[-3] ^ 1]) + reply[-2:]
-        return LateReply(
-            reply * 2 if mood == "repeated" else reply, self._faults.late_s if mood == "late" else 0.0
-        )
+        return self._as_sent(reply, now_s)
+
+    def unasked(self, now_s: float) -> bytes:
+        """Return what the device sends by itself at this time; `move` was called before."""
+        return b""
+
+    def opened_port(self) -> EmulatedPort:
+        """Return the port that it has when it is plugged in."""
+        return EmulatedPort(self.wire, self._heard, self._moved_on, KEEP_UP_S)
 
     @property
     def where(self) -> str:
@@ -295,7 +312,7 @@ class EmulatedSerial(EmulatedDevice):
         """Plug it in, as a new port, unless it is."""
         if self._port is None:
             self.answer(b"", self._now_s())
-            self._port = EmulatedPort(self.wire, self._heard, self._moved_on, KEEP_UP_S)
+            self._port = self.opened_port()
 
     def unplug(self) -> None:
         """Pull the plug, unless it is pulled."""
@@ -327,28 +344,37 @@ class EmulatedSerial(EmulatedDevice):
     def _mood_at(self, now_s: float) -> str:
         return self._told or self._faults.mood_at(self.active_s(now_s))
 
-    def _moved_on(self) -> bytes:
-        with self._lock:
-            try:
-                self.move(self._now_s())
-            except Exception as error:
-                self._fail(error)
-        return b""
-
-    def _fail(self, error: Exception) -> None:
-        self._failed = f"{type(error).__name__}: {error}"
-        self.unplug()
+    def _as_sent(self, data: bytes, now_s: float) -> LateReply:
+        """Return what becomes of this data on the line."""
+        mood = self._mood_at(now_s)
+        if mood == "silent":
+            data = b""
+        elif mood == "damaged" and data:
+            data = data[:-3] + bytes([data[-3] ^ 1]) + data[-2:]
+        return LateReply(
+            data * 2 if mood == "repeated" else data, self._faults.late_s if mood == "late" else 0.0
+        )
 
     def _heard(self, data: bytes) -> bytes:
+        return self._sent(lambda now_s: self.reply(data, now_s))
+
+    def _moved_on(self) -> bytes:
+        return self._sent(self._moved)
+
+    def _moved(self, now_s: float) -> LateReply:
+        self.move(now_s)
+        return self._as_sent(self.unasked(now_s), now_s)
+
+    def _sent(self, made: Callable[[float], LateReply | None]) -> bytes:
         with self._lock:
             try:
-                reply = self.reply(data, self._now_s())
+                reply = made(self._now_s())
             except Exception as error:
-                self._fail(error)
-                return b""
+                self._failed = f"{type(error).__name__}: {error}"
+                reply = None
         if reply is None:
             self.unplug()
             return b""
-        if reply.late_s:
+        if reply.late_s and reply.data:
             threading.Event().wait(reply.late_s)
         return reply.data

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Final
 
-from graspsense_pr2_gripper.udev import RELOAD, RULES_FILE, UHID_RULE
+from graspsense_pr2_gripper.discovery import RELOAD, RULES_FILE, UHID_RULE
 
 UHID_NODE: Final = "/dev/uhid"
 VHCI: Final = Path("/sys/devices/platform/vhci_hcd.0")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Final, final
 
 from graspsense_so101_gripper.config import So101Config
@@ -24,6 +25,11 @@ class LockStepBus:
         self._timeout_s = config.reply_timeout_s
         self._now_s = self._until_s = self._due_s = 0.0
         self._coming: list[tuple[float, bytes]] = []
+
+    @property
+    def body_report(self) -> Mapping[str, float | int | str | bool]:
+        """What the body knows."""
+        return self.arm.body_report
 
     def monotonic(self) -> float:
         """Return the time (s) of the arm."""

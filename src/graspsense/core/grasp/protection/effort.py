@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from graspsense.core.grasp.protection.effort_ceiling import asked_effort_n
 from graspsense.core.grasp.protection.motor import ALLOWED_N, MOVES_M_S, direction_of, lasting
 from graspsense.core.values.faults import Fault
 from graspsense.core.values.signals import APPROACH, EFFORT, Command, Frame, Phase
@@ -26,6 +27,9 @@ OPENS_FREELY: Final = 0.25
 """Share of the efforts that are below that of a free motion: fingers speed up first, and press or brake in the end."""
 AT_LIMIT: Final = 0.6
 """Share of the largest effort of an approach from which on it says nothing of a free motion."""
+SATURATED: Final = 0.05
+"""Share of the limit of a command by which an effort at this limit differs from it. Fingers that mostly open with as
+much as they may do not reach their speed, and do not tell what a free motion takes."""
 DIFFERS_N: Final = 3.0
 DIFFERS_SHARE: Final = 0.15
 """By how much free motions to both sides may differ, at least and as a share of the largest effort in the closing."""
@@ -38,7 +42,7 @@ class ReportedEffort:
     """Watches the effort of a gripper from the approach to the release."""
 
     def __init__(self) -> None:
-        self._direction = 0
+        self._direction, self._limit_n = 0, nan
         self._wrong_sign_s = 0.0
         self._effort_n = self._since_s = self._gap_m = nan
         self._changed = False
@@ -46,11 +50,14 @@ class ReportedEffort:
         self._most_n = self._most_approach_n = 0.0
         self._approach_n: list[float] = []
         self._release_n: list[float] = []
+        self._saturated = 0
+        """How many of those of the release are at the limit of their command."""
 
     def apply(self, frame: Frame, command: Command) -> None:
         """Take the command that is applied after this frame. The motor is compared with one of an effort elsewhere."""
         self._has_own_loop = command.kind != EFFORT
         self._direction = direction_of(command, frame.gap_m) if self._has_own_loop else 0
+        self._limit_n = asked_effort_n(command)
 
     def see(self, frame: Frame, phase: int) -> Fault | None:
         """Take the frame of a tick and return what its effort shows."""
@@ -61,6 +68,8 @@ class ReportedEffort:
             self._changed = self._changed or frame.effort_n != self._effort_n
             if moves:
                 self._release_n.append(frame.effort_n)
+                off_n = abs(abs(frame.effort_n) - self._limit_n)
+                self._saturated += off_n <= SATURATED * self._limit_n
             return None
         self._most_n = max(self._most_n, frame.effort_n)
         if phase == APPROACH:
@@ -118,7 +127,7 @@ class ReportedEffort:
         Its zero has drifted, or its scale has changed. An effort has a sign if it has been below zero in the release.
         """
         closing, opening = np.array(self._approach_n), np.array(self._release_n)
-        if min(len(closing), len(opening)) < FEWEST:
+        if min(len(closing), len(opening)) < FEWEST or 2 * self._saturated > len(opening):
             return None
         if np.min(opening) < -ALLOWED_N:
             opening = -opening

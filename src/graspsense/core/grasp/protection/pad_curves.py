@@ -15,7 +15,7 @@ import numpy as np
 from graspsense.core.grasp.protection.cells import DOUBT, FEWEST_IMAGES, MOST_NOISY, frozen
 from graspsense.core.grasp.protection.pad_forces import FREE_SHARE, HELD_S
 from graspsense.core.values.faults import Fault
-from graspsense.core.values.signals import APPROACH, HOLD, SQUEEZE, Phase, Reading
+from graspsense.core.values.signals import APPROACH, HOLD, SQUEEZE, Frame, Phase, Reading
 
 LATE_S: Final = 0.02
 LATE_PERIODS: Final = 1.25
@@ -33,9 +33,12 @@ MORE_S: Final = 0.02
 """So many samples in a row, over so long a time, show that it does."""
 OPENED_M: Final = 0.005
 """So much wider than at the contact, no object touches both fingers any more."""
+LET_GO_S: Final = 0.04
+"""Time, in which more than `FEWEST_LATE` frames have come, for which pads may be free before the gap opens."""
 FEWEST_OPEN: Final = 2
 OPEN_S: Final = 0.03
 """So many samples at the end of the release, and so long a time after the object, show the zero of a pad."""
+FEWEST_LATE: Final = 4
 ZERO_CONTACTS: Final = 0.5
 ZERO_SHARE: Final = 0.1
 """By how much the zero may have moved: a share of the contact force, or of the greatest force. The PR2's object
@@ -199,6 +202,39 @@ class Spikes:
         )
 
 
+class LateGap:
+    """Sees a gap that stands still after both pads have let go: the fingers have moved before it tells so.
+
+    Pads that are slow let go later than the fingers, and hide it.
+    """
+
+    def __init__(self, contact_n: float) -> None:
+        self._contact_n = contact_n
+        self._held = False
+        self._least_m = inf
+        self._free_t_s, self._frames = nan, 0
+
+    def see(self, frame: Frame, phase: int) -> Fault | None:
+        """Take the frame of a tick; return the fault in the release."""
+        forces = (frame.force_left_n, frame.force_right_n)
+        self._least_m = min(self._least_m, frame.gap_m)
+        if phase != Phase.RELEASE:
+            self._held = min(forces) >= self._contact_n
+        if phase != Phase.RELEASE or not max(forces) < FREE_SHARE * self._contact_n:
+            self._free_t_s, self._frames = frame.t_s, 0
+            return None
+        self._frames += 1
+        late_s = frame.t_s - self._free_t_s
+        stands = frame.gap_m - self._least_m <= SLACK_M
+        if not (self._held and stands and self._frames > FEWEST_LATE and late_s > LET_GO_S):
+            return None
+        return Fault(
+            "gap late",
+            f"both pads let go {late_s:.2f} s ago, and it has not changed yet: times and rates of the squeeze can be "
+            "off by that; check the connection",
+        )
+
+
 class PadCurves:
     """Both pads of a gripper with forces at this rate (Hz; 0: not known)."""
 
@@ -210,7 +246,7 @@ class PadCurves:
         self._gaps: deque[tuple[float, float]] = deque()
         self._counter, self._t_s = 0, nan
         self._least_gap_m = inf
-        self._spikes = Spikes(contact_n)
+        self._spikes, self._late_gap = Spikes(contact_n), LateGap(contact_n)
         self._pushed_n = self._pressed_n = 0.0
         """What the left pad felt more than the right one before both touched, and the greatest force of both (N)."""
         self._apart_samples = 0
@@ -225,8 +261,9 @@ class PadCurves:
         while len(gaps) > 1 and gaps[1][0] <= frame.t_s - self._late_s:
             gaps.popleft()
         closing = phase in (APPROACH, SQUEEZE, HOLD)
-        if not self._is_new(reading):
-            return []
+        late = self._late_gap.see(frame, phase)
+        if late is not None or not self._is_new(reading):
+            return [] if late is None else [late]
         earlier_gap_m = gaps[0][1]
         self._least_gap_m = min(self._least_gap_m, earlier_gap_m)
         forces = (frame.force_left_n, frame.force_right_n)

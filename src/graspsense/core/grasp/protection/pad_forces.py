@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import nan
+from math import inf, nan
 from typing import Final
 
 from graspsense.core.grasp.protection.motor import RecentMean, lasting
@@ -23,6 +23,8 @@ SCALED_CONTACTS: Final = 0.5
 SCALED_SHARE: Final = 0.2
 """Difference that is allowed if it has grown from the contact on, over the contact force, or as a share of the larger
 force: features of their mean are then 10 % off. Real pads are not calibrated better."""
+LIGHT_SHARE: Final = 0.5
+"""Share of the force below which both pads tell what friction held before: a wrong scale differs by less then."""
 STILL_S: Final = 0.25
 """Least time for which the force of a pad stands still."""
 RESTS_M: Final = 0.0003
@@ -51,12 +53,17 @@ class PadBalance:
         self._scaled_n, self._free_n = SCALED_CONTACTS * contact_n, FREE_SHARE * contact_n
         self._pushed_n = 0.0
         """What the left pad felt more than the right one before both touched (N)."""
+        self._light_n, self._held_n = inf, 0.0
+        """The least force since both touched, and what the left pad felt more than the right one then (N)."""
 
     def see(self, frame: Frame, phase: int) -> Fault | None:
         """Take the frame of a tick while the fingers close or hold; return what no friction or calibration explains."""
         if phase == Phase.APPROACH and min(frame.force_left_n, frame.force_right_n) < self._free_n:
             more_n = frame.force_left_n - frame.force_right_n
             self._pushed_n = more_n if more_n == more_n else self._pushed_n
+        elif self._free_n <= max(frame.force_left_n, frame.force_right_n) < self._light_n:
+            self._light_n = max(frame.force_left_n, frame.force_right_n)
+            self._held_n = frame.force_left_n - frame.force_right_n
         if phase != Phase.HOLD:
             return None
         self._left.add(frame.force_left_n, frame.dt_s)
@@ -65,7 +72,9 @@ class PadBalance:
         forces = {"left": self._left.value, "right": self._right.value}
         weak, strong = sorted(forces, key=lambda side: forces[side])
         difference_n = forces[strong] - forces[weak]
-        grown_n = difference_n - (self._pushed_n if strong == "left" else -self._pushed_n)
+        light = self._light_n < LIGHT_SHARE * forces[strong]
+        before_n = self._held_n if light else self._pushed_n
+        grown_n = difference_n - (before_n if strong == "left" else -before_n)
         far = difference_n > max(ALLOWED_N, ALLOWED_SHARE * forces[strong])
         scaled = min(difference_n, grown_n) > max(self._scaled_n, SCALED_SHARE * forces[strong])
         if not MEAN_S <= self._seen_s <= HELD_S or not (far or scaled):

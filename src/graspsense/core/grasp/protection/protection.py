@@ -15,19 +15,24 @@ from attrs import evolve
 
 from graspsense.core.components.roles import Controller
 from graspsense.core.components.run_config import RunConfig
-from graspsense.core.grasp.protection.absence import EFFORT_ABSENT, GAP_ABSENT, Absence
 from graspsense.core.grasp.protection.causes import causes, follows
 from graspsense.core.grasp.protection.cells import Fingertips
 from graspsense.core.grasp.protection.drift import Drift
 from graspsense.core.grasp.protection.effort import ReportedEffort
 from graspsense.core.grasp.protection.effort_ceiling import asked_effort_n, effort_ceiling_n, limited
-from graspsense.core.grasp.protection.kept_speed import KeptSpeed
 from graspsense.core.grasp.protection.motor import REVERSED, FeltForce, FreeEffort, Motor
 from graspsense.core.grasp.protection.opening import Opening
 from graspsense.core.grasp.protection.pad_curves import PadCurves
 from graspsense.core.grasp.protection.pad_forces import EmptyHold, PadBalance, StuckForce
-from graspsense.core.grasp.protection.reports import Repeats, Reports, StatusWatch
-from graspsense.core.grasp.protection.speed import GapJump, GapSpeed, Rush, Standstill
+from graspsense.core.grasp.protection.reports import (
+    EFFORT_ABSENT,
+    GAP_ABSENT,
+    Absence,
+    Repeats,
+    Reports,
+    StatusWatch,
+)
+from graspsense.core.grasp.protection.speed import GapJump, GapSpeed, KeptSpeed, Rush, Standstill
 from graspsense.core.grasp.protection.touch import CLOSED_M, Touch
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.faults import LIMITED, Fault
