@@ -34,7 +34,7 @@ from graspsense_lerobot.robot_config import LeRobotConfig
 
 SLOPE_FRAMES: Final = 4
 OPENING_M_S: Final = 0.05
-STOP: Final = "graspsense_lerobot.stopping:stop"
+STOP: Final = "graspsense_lerobot.robot:stop"
 
 
 @final

@@ -9,8 +9,7 @@ from math import prod
 from typing import Any, Final
 
 from graspsense_ros2.message_types import encode, message, packed
-from graspsense_ros2.middleware import open_node
-from graspsense_ros2.node import Node
+from graspsense_ros2.node import Node, open_node
 
 JOINT_STATE: Final = "sensor_msgs/msg/JointState"
 WRENCH: Final = "geometry_msgs/msg/WrenchStamped"
