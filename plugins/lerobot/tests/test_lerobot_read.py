@@ -347,6 +347,8 @@ def test_more_numbers_than_the_memory_should_hold_are_not_read(tmp_path):
     [
         *((query, NAMES) for query in ("fps=0", "fps=x", "speed=3", "repeated=often", "gap=none")),
         ("gap_m_per_unit=nan", NAMES),
+        # What moves is not what is felt.
+        ("force=gripper.pos", NAMES),
         # Nothing feels, and no option says what does.
         ("", NAMES[:2]),
     ],

@@ -58,7 +58,7 @@ class _Closing:
 
 def drafted(name: str, folder: Path) -> Draft:
     """Return a gripper file for a model, to be put into `folder`. Raises ConfigError where it has no fingers."""
-    path = model_path(name, Path.cwd() / "gripper.toml")
+    path = model_path(name, Path.cwd())
     model, radian = _model(path)
     closing = _closing(model)
     written = name if ":" in name else Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()

@@ -176,7 +176,7 @@ def read_gripper(name: str) -> tuple[GripperFile, Path]:
     if not name or name in SHIPPED:
         path = Path(str(files("graspsense_mujoco_gripper") / f"{name or 'parallel'}.toml"))
     gripper = described(path, "gripper", GripperFile)
-    return gripper, model_path(gripper.model, path)
+    return gripper, model_path(gripper.model, path.parent)
 
 
 def described(path: Path, what: str, cls: type[DescribedT]) -> DescribedT:
@@ -192,14 +192,17 @@ def described(path: Path, what: str, cls: type[DescribedT]) -> DescribedT:
         raise ConfigError("\n".join(said)) from None
 
 
-def model_path(name: str, beside: Path) -> Path:
-    """Return the path of a model: beside the gripper file, `package:PACKAGE:PATH`, or `menagerie:ROBOT[/ENTRY]`."""
+def model_path(name: str, folder: Path) -> Path:
+    """Return the path of a model: in the folder, `package:PACKAGE:PATH`, or `menagerie:ROBOT[/ENTRY]`.
+
+    Raises ConfigError.
+    """
     if name.startswith("menagerie:"):
         return _menagerie_path(*name.removeprefix("menagerie:").partition("/")[::2])
     if not name.startswith("package:"):
-        path = beside.parent / Path(name).expanduser()
+        path = folder / Path(name).expanduser()
         if not path.is_file():
-            raise ConfigError(f"gripper.file: {beside} names the model {name}, and there is no file {path}")
+            raise ConfigError(f"there is no file {path}: name a MuJoCo model (.xml), or package:NAME:PATH")
         return path
     package, _, resource = name.removeprefix("package:").partition(":")
     folder = _package_folder(package)
