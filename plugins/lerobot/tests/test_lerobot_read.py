@@ -77,6 +77,13 @@ def test_check_says_what_was_understood(tmp_path):
         assert word in told
 
 
+def test_what_differs_in_its_numbers_alone_is_told_once(tmp_path):
+    states = [np.repeat(episode(frames=frames), 2, axis=0) for frames in (40, 50, 60)]
+    told = printed("import", f"lerobot:{write_set(tmp_path / 'set', 3, states)}", "--save", tmp_path / "s")
+    (line,) = [line for line in told.splitlines() if "repeated=drop" in line]
+    assert "3 of 3 grasps" in line
+
+
 def changed(rows, column, value):
     """Return an episode with another value in these rows of a column; a function makes it of the old one."""
     state = episode()
