@@ -64,7 +64,7 @@ def understand(folder: Folder, options: PlaceOptions) -> Understood:
             f"lerobot:FOLDER?gap=NAME. There are {some(names, MOST_CHOICES)}"
         )
     touch = bool(meaning.arrays or images)
-    forces = meaning.forces or (() if touch else meaning.effort[:1])
+    forces = meaning.felt_by(has_arrays=touch)
     if not forces and not touch:
         raise ConfigError(
             f"{folder.place}: nothing tells whether an object was felt: there is no tactile array, and no force, load "

@@ -183,13 +183,9 @@ def described(path: Path, what: str, cls: type[DescribedT]) -> DescribedT:
     """Return what a TOML file describes. Raises ConfigError."""
     layer = read_toml(path, str(path), what)
     try:
-        return structured(dict(layer.values), cls, f"a {what} file")
+        return structured(layer.values, cls, f"a {what} file")
     except ValidationFailed as misfit:
-        said = [
-            f"{layer.where(problem.path)}: {'.'.join(map(str, problem.path)) or 'the file'}: {problem.text}"
-            for problem in misfit.problems
-        ]
-        raise ConfigError("\n".join(said)) from None
+        raise ConfigError("\n".join(layer.complain(problem) for problem in misfit.problems)) from None
 
 
 def model_path(name: str, folder: Path) -> Path:
@@ -205,13 +201,13 @@ def model_path(name: str, folder: Path) -> Path:
             raise ConfigError(f"there is no file {path}: name a MuJoCo model (.xml), or package:NAME:PATH")
         return path
     package, _, resource = name.removeprefix("package:").partition(":")
-    folder = _package_folder(package)
-    if folder is None:
+    installed = _package_folder(package)
+    if installed is None:
         raise ConfigError(
             f"gripper.file: the model {name} is part of the package {package}, which is not installed: "
             f"pip install {package}"
         )
-    path = folder / resource
+    path = installed / resource
     if ".." in Path(resource).parts or not path.is_file():
         raise ConfigError(f"gripper.file: the package {package} has no file {resource}")
     return path
