@@ -12,7 +12,7 @@ from graspsense.core.settings.selected import create
 from graspsense.core.values.errors import ConfigError, NoDevice
 from graspsense.gripper_api import MessageNumber, message_columns
 from graspsense_ros2.message_types import message
-from graspsense_ros2.node import open_node
+from graspsense_ros2.middleware import open_node
 
 DOCS = Path(__file__).parents[3] / "docs" / "ros2.md"
 

@@ -27,8 +27,9 @@ from graspsense.plugin_api import (
 from graspsense_ros2.action_client import MOST_FAILURES, GripperAction, Target
 from graspsense_ros2.config import Ros2Config
 from graspsense_ros2.message_types import is_known
+from graspsense_ros2.middleware import open_node
 from graspsense_ros2.newest_messages import NewestMessage
-from graspsense_ros2.node import Node, ServiceFailed, open_node
+from graspsense_ros2.node import Node, ServiceFailed
 
 GOAL_PERIOD_S: Final = 0.05
 """Time between two goals while the target moves."""

@@ -17,7 +17,8 @@ from graspsense.plugin_api import DeviceLost, Trial
 from graspsense_ros2.action_server import ActionServer, Goal
 from graspsense_ros2.held_gripper import HeldGripper
 from graspsense_ros2.message_types import decode, encode
-from graspsense_ros2.node import Node, Through, open_node
+from graspsense_ros2.middleware import Through, open_node
+from graspsense_ros2.node import Node
 
 GRASP: Final = "/graspsense/grasp"
 GRIPPER_COMMAND: Final = "/graspsense/gripper_cmd"

@@ -1,15 +1,13 @@
-"""A ROS 2 node as the parts of this package use it: messages are bytes in CDR, carried by rclpy or by zenoh."""
+"""A ROS 2 node as the parts of this package use it: messages are bytes in CDR, whoever carries them."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from importlib.util import find_spec
-from typing import Final, Literal, Protocol
+from typing import Final, Protocol
 
 from graspsense.plugin_api import ConfigError
 
-Through = Literal["auto", "rclpy", "zenoh"]
 MOST_DOMAIN: Final = 232
 MOST_REQUESTS: Final = 32
 """Requests that a node answers at a time; a further one is refused."""
@@ -39,19 +37,6 @@ class Node(Protocol):
 
     def close(self) -> None:
         """Leave the network."""
-
-
-def open_node(name: str, through: Through = "auto") -> Node:
-    """Return a new node: by rclpy where it can be imported, otherwise by zenoh. Raises ConfigError."""
-    if through == "rclpy" or (through == "auto" and find_spec("rclpy") is not None):
-        from graspsense_ros2.rclpy_node import RclpyNode
-
-        return RclpyNode(name)
-    if find_spec("zenoh") is None:
-        raise ConfigError('zenoh cannot be imported: pip install "graspsense[ros2]"')
-    from graspsense_ros2.zenoh_node import ZenohNode
-
-    return ZenohNode(name)
 
 
 def domain_from_environment() -> int:

@@ -11,7 +11,8 @@ from typing import Any, Final
 import numpy as np
 
 from graspsense_ros2.message_types import encode, message, packed
-from graspsense_ros2.node import Node, open_node
+from graspsense_ros2.middleware import open_node
+from graspsense_ros2.node import Node
 
 JOINT_STATE: Final = "sensor_msgs/msg/JointState"
 WRENCH: Final = "geometry_msgs/msg/WrenchStamped"

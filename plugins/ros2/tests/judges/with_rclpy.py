@@ -24,7 +24,7 @@ from test_msgs.action import Fibonacci
 
 from graspsense_ros2 import message_types
 from graspsense_ros2.action_server import ActionServer
-from graspsense_ros2.node import open_node
+from graspsense_ros2.middleware import open_node
 from graspsense_ros2.rclpy_node import RclpyNode
 
 PATIENCE_S = 60.0
