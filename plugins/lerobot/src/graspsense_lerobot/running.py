@@ -25,6 +25,7 @@ from graspsense.plugin_api import (
     Prediction,
     Reading,
 )
+from graspsense.simulator_api import CHANNELS
 from graspsense.testing_api import TraceRecorder
 from graspsense_lerobot.names import Meaning, meaning_of
 from graspsense_lerobot.place import PlaceOptions
@@ -32,7 +33,6 @@ from graspsense_lerobot.place import PlaceOptions
 EVENTS: Final = ("nothing", "contact", "rest", "end")
 """What the numbers of events mean."""
 KNOWN: Final = ("gap", "velocity", "force_left", "force_right")
-UNITS: Final = ("m", "m/s", "N", "N")
 WIDEST_M: Final = 0.5
 UNKNOWN: Final = Command(EFFORT, nan, inf, inf)
 """What the gripper is commanded, which another program does."""
@@ -219,7 +219,7 @@ def _observations(rate_hz: float) -> DeviceInfo:
         speed_limit_m_s=inf,
         opening=None,
         relaxed=Command(VELOCITY, 0.0, inf, inf),
-        channels=tuple(Channel(name, unit, rate_hz) for name, unit in zip(KNOWN, UNITS, strict=True)),
+        channels=tuple(Channel(name, CHANNELS[name], rate_hz) for name in KNOWN),
     )
 
 

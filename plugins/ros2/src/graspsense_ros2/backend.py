@@ -24,6 +24,7 @@ from graspsense.plugin_api import (
     Reading,
     SensorBackend,
 )
+from graspsense.simulator_api import CHANNELS
 from graspsense_ros2.action_client import MOST_FAILURES, GripperAction, Target
 from graspsense_ros2.config import Ros2Config
 from graspsense_ros2.message_types import is_known
@@ -56,7 +57,6 @@ STATUS_BITS: Final = (
     ),
 )
 _MUST_BE_NUMBERS: Final = frozenset({"gap", "force_left", "force_right"})
-_UNITS: Final = {"gap": "m", "velocity": "m/s", "effort": "N", "force_left": "N", "force_right": "N"}
 
 
 @final
@@ -86,7 +86,7 @@ class Ros2Backend(SensorBackend[Ros2Config]):
     def channels(self) -> tuple[Channel, ...]:
         """The gap, its rate, and what else the settings name."""
         names = dict.fromkeys(("gap", "velocity", *self._numbers))
-        return tuple(Channel(name, _UNITS[name], self.config.rate_hz) for name in names)
+        return tuple(Channel(name, CHANNELS[name], self.config.rate_hz) for name in names)
 
     def open(self, seed: int) -> DeviceInfo:
         """Subscribe to the topics and look for the action; no finger moves. Raises NoDevice."""
