@@ -12,7 +12,8 @@ import enum
 import inspect
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from importlib import import_module
 from importlib.resources import files
 from itertools import pairwise
@@ -70,12 +71,6 @@ BASES = {
     "controller": roles.Controller,
     "feature-set": roles.FeatureSet,
     "classifier": roles.Classifier,
-}
-HOOKS = {
-    "sensor-backend": "graspsense_sensor_backends",
-    "controller": "graspsense_controllers",
-    "feature-set": "graspsense_feature_sets",
-    "classifier": "graspsense_classifiers",
 }
 ROLE_OF_BASE = {base: role for role, base in BASES.items()}
 HELPERS = {
@@ -145,7 +140,7 @@ HEAD = "<!-- Written by docs/role_pages.py from the code: change that. -->\n"
 
 def _fields_section(cls: type) -> list[str]:
     """Return the section on a class of values: its fields and its meaning."""
-    return [f"## {cls.__name__}", "", f"    {_fields_signature(cls)}", "", _text(cls), ""]
+    return [f"## {cls.__name__}", "", f"    {_fields_of(cls)}", "", _text(cls), ""]
 
 
 def dataset_page() -> str:
@@ -201,6 +196,7 @@ def page(role: str) -> str:
     lines = [HEAD + f"# {TITLES[role]}", ""]
     if role != "distribution":
         base: Any = BASES[role]
+        hook = f"graspsense_{role.replace('-', '_')}s"
         table = TABLE_OF_ROLE[role]  # type: ignore[index]
         lines += [
             f"This page describes the role `{role}`. A component of this role is selected in the table `[{table}]` "
@@ -211,7 +207,7 @@ def page(role: str) -> str:
             "- [The tutorial](../tutorial.md) creates a package by hand.",
             "- [Values and units](signals.md) describes the values that pass between components.",
             "- [Helpers](helpers.md) describes the functions and constants that a component is written with.",
-            f"- The hook [{HOOKS[role]}](hooks.md#{HOOKS[role]}) declares components of this role.",
+            f"- The hook [{hook}](hooks.md#{hook}) declares components of this role.",
             *(FURTHER.get(role, ())),
             "",
             *_attributes(base),
@@ -320,7 +316,7 @@ def terms_page() -> str:
         "",
         "[A term of your own](../simulator.md#a-term-of-your-own) is declared by these fields.",
         "",
-        f"    {_fields_signature(Term)}",
+        f"    {_fields_of(Term)}",
         "",
         _text(Term),
         "",
@@ -472,11 +468,7 @@ def _methods(base: Any) -> list[str]:
         function = method.__func__ if isinstance(method, staticmethod) else method
         if name.startswith("_") or not callable(function):
             continue
-        signature = (
-            re.sub(r"'([^']+)'", r"\1", str(inspect.signature(function)))
-            .replace("self, ", "")
-            .replace("(self)", "()")
-        )
+        signature = _signature(function).replace("self, ", "").replace("(self)", "()")
         must = "" if getattr(method, "__isabstractmethod__", False) else " (optional)"
         must = " (ready to use)" if name in ("result", "undefined") else must
         lines += [f"### {name}{must}", "", f"    {name}{signature}", "", _text(function), ""]
@@ -510,15 +502,9 @@ def _faster(title: str, attribute: str, module: Any, classes: Sequence[Any]) -> 
     """Return the section on what a class may declare so that simulated grasps take less time."""
     lines = [f"## {title}", "", f"`{attribute}` is optional. {_text(module)}", ""]
     for cls in classes:
-        lines += [f"### {cls.__name__}", "", f"    {_fields_signature(cls)}", ""]
+        lines += [f"### {cls.__name__}", "", f"    {_fields_of(cls)}", ""]
         lines += [*_meaning(cls), *_documented_fields(cls), *_docstring_example(cls)]
     return lines
-
-
-def _fields_signature(cls: Any) -> str:
-    """Return the name of a class of attrs or a named tuple, with its fields."""
-    names = getattr(cls, "_fields", None) or tuple(field.name for field in attrs.fields(cls))
-    return f"{cls.__name__}({', '.join(names)})"
 
 
 def _meaning(thing: Any) -> list[str]:
@@ -575,16 +561,18 @@ def _cell(text: str) -> str:
     return text.replace("|", "\\|").replace("[", "\\[")
 
 
+def made_pages() -> dict[str, Callable[[], str]]:
+    """Return what gives the text of each page, by its name."""
+    further = {"signals": signals_page, "hooks": hooks_page, "terms": terms_page}
+    further |= {"helpers": helpers_page, "names": names_page}
+    return {**further, **{role: partial(page, role) for role in TITLES}}
+
+
 def main() -> None:
     """Write every page."""
     FOLDER.mkdir(exist_ok=True)
-    for role in TITLES:
-        (FOLDER / f"{role}.md").write_text(page(role), encoding="utf-8")
-    (FOLDER / "hooks.md").write_text(hooks_page(), encoding="utf-8")
-    (FOLDER / "helpers.md").write_text(helpers_page(), encoding="utf-8")
-    (FOLDER / "names.md").write_text(names_page(), encoding="utf-8")
-    (FOLDER / "signals.md").write_text(signals_page(), encoding="utf-8")
-    (FOLDER / "terms.md").write_text(terms_page(), encoding="utf-8")
+    for name, text in made_pages().items():
+        (FOLDER / f"{name}.md").write_text(text(), encoding="utf-8")
 
 
 if __name__ == "__main__":

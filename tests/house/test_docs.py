@@ -7,7 +7,6 @@ import re
 import shlex
 import subprocess
 import sys
-from functools import partial
 from graphlib import CycleError
 from pathlib import Path
 
@@ -26,14 +25,7 @@ PAGES = script_of_docs("role_pages")
 DRAWING = script_of_docs("package_drawing")
 
 
-MADE_PAGES = {
-    "signals": PAGES.signals_page,
-    "hooks": PAGES.hooks_page,
-    "terms": PAGES.terms_page,
-    "helpers": PAGES.helpers_page,
-    "names": PAGES.names_page,
-    **{role: partial(PAGES.page, role) for role in PAGES.TITLES},
-}
+MADE_PAGES = PAGES.made_pages()
 """Each page in docs/roles, and what gives its text."""
 
 
