@@ -2,9 +2,10 @@
 
     python docs/package_drawing.py
 
-A test compares the drawing with what this gives. An arrow points from a subpackage to one that it imports from. It is
-left out if it follows from others: if A imports from B and C, and B imports from C, there is no arrow from A to C.
-Imports for type checking only are not counted.
+A test compares the drawing with what this gives. It is a dependency structure matrix (D. V. Steward, IEEE Trans. Eng.
+Manage. EM-28 (1981) 71): a dot says that the subpackage of its row imports from that of its column. Each stands below
+those that it imports from, so a dot above the diagonal would be a circle. Imports for type checking only are not
+counted.
 """
 
 from __future__ import annotations
@@ -14,27 +15,20 @@ from collections.abc import Iterator
 from functools import cache
 from graphlib import TopologicalSorter
 from html import escape
-from itertools import pairwise
 from pathlib import Path
-
-from attrs import frozen
 
 ROOT = Path(__file__).parents[1]
 FILE = ROOT / "docs" / "architecture.svg"
 HOST = "graspsense"
 SIMULATOR = "graspsense_sim_gripper"
-WIDTH = 860
-ROW, BOX, GAP, MARGIN = 74, 30, 16, 20
-LETTER = 7.4
-"""Heights and distances, and the width of a letter, in pixels of the drawing."""
-BEND = 16
-"""How straight an arrow leaves and enters a box."""
+WIDTH, CELL, MARGIN = 860, 22, 20
+NAMES = 190
+"""The width of the names of the rows; all in pixels of the drawing."""
 
 PARTS = ("body", "handlers", "cases", "orelse", "finalbody")
 """Where a statement has others within it."""
 
 Graph = dict[str, set[str]]
-Place = tuple[float, float]
 
 
 def host_subpackages() -> Graph:
@@ -101,137 +95,55 @@ def _statements(node: ast.AST) -> Iterator[ast.AST]:
             yield from _statements(statement)
 
 
-def _in_order(graph: Graph) -> list[str]:
+def in_order(graph: Graph) -> list[str]:
     """Return the subpackages with those before each that it imports from. Raises CycleError, which tests exclude."""
-    return list(TopologicalSorter(graph).static_order())
-
-
-def reduced(graph: Graph) -> Graph:
-    """Return the graph without the arrows that follow from others."""
-    reached: Graph = {}
-    for subpackage in _in_order(graph):
-        reached[subpackage] = graph[subpackage].union(*(reached[used] for used in graph[subpackage]))
-    return {
-        subpackage: {used for used in targets if not any(used in reached[other] for other in targets)}
-        for subpackage, targets in graph.items()
-    }
-
-
-def levels(graph: Graph) -> dict[str, int]:
-    """Return the row of each subpackage, counted from the bottom: one above the highest that it imports from."""
-    row_of: dict[str, int] = {}
-    for subpackage in _in_order(graph):
-        row_of[subpackage] = 1 + max((row_of[used] for used in graph[subpackage]), default=-1)
-    return row_of
-
-
-@frozen
-class Panel:
-    """One graph as drawn: rows from the top, arrows through free places of the rows between."""
-
-    rows: tuple[tuple[str, ...], ...]
-    arrows: tuple[tuple[str, ...], ...]
-    """The places that an arrow goes through, from its subpackage to the one that it points to."""
-
-
-def panel(graph: Graph) -> Panel:
-    """Return where the subpackages of a graph are drawn."""
-    arrows, row_of = [], levels(graph)
-    rows: list[list[str]] = [[] for _ in range(max(row_of.values()) + 1)]
-    for subpackage in sorted(graph):
-        rows[row_of[subpackage]].append(subpackage)
-    for subpackage, targets in sorted(reduced(graph).items()):
-        for used in sorted(targets):
-            between = [f"{subpackage}>{used}>{k}" for k in range(row_of[subpackage] - 1, row_of[used], -1)]
-            for k, free in zip(range(row_of[subpackage] - 1, row_of[used], -1), between, strict=True):
-                rows[k].append(free)
-            arrows.append((subpackage, *between, used))
-    pairs = [pair for arrow in arrows for pair in pairwise(arrow)]
-    ordered = [tuple(row) for row in reversed(_ordered(rows, pairs))]
-    return Panel(tuple(ordered), tuple(arrows))
-
-
-def _ordered(rows: list[list[str]], pairs: list[tuple[str, str]]) -> list[list[str]]:
-    """Return the rows with each subpackage near the mean place of its neighbours, which avoids crossings."""
-    for sweep in range(24):
-        order = range(1, len(rows)) if sweep % 2 == 0 else range(len(rows) - 2, -1, -1)
-        for k in order:
-            beside = rows[k - 1] if sweep % 2 == 0 else rows[k + 1]
-            share = {name: (i + 0.5) / len(beside) for i, name in enumerate(beside)}
-            means = {}
-            for i, name in enumerate(rows[k]):
-                near = [share[b] for a, b in pairs if a == name and b in share]
-                near += [share[a] for a, b in pairs if b == name and a in share]
-                means[name] = sum(near) / len(near) if near else (i + 0.5) / len(rows[k])
-            rows[k] = sorted(rows[k], key=lambda name: (means[name], name))
-    return rows
+    sorter, ordered = TopologicalSorter(graph), []
+    sorter.prepare()
+    while sorter.is_active():
+        ready = sorted(sorter.get_ready())
+        ordered += ready
+        sorter.done(*ready)
+    return ordered
 
 
 def drawing() -> str:
     """Return the drawing of the host, of its core and sources, and of the simulator as SVG."""
     parts: list[str] = []
-    top = 0.0
+    top = 0
     for title, graph in (
         ("graspsense and the distributions beside it", host_subpackages()),
         ("graspsense.core", rooms_of("core")),
         ("graspsense.sources", rooms_of("sources")),
         ("graspsense-sim-gripper", simulator_subpackages()),
     ):
-        top = _draw(parts, panel(graph), title, top + 30)
-    arrow = (
-        '<marker id="tip" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="8" markerHeight="8" orient="auto">'
-        '<path d="M0,0 L8,4 L0,8 z" fill="#5c5c5c"/></marker>'
-    )
+        top = _draw(parts, graph, title, top + 30)
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {top:.0f}" width="{WIDTH}" '
-        f'height="{top:.0f}" role="img" font-family="sans-serif">\n'
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {top}" width="{WIDTH}" '
+        f'height="{top}" role="img" font-family="sans-serif" font-size="13">\n'
         "<title>Packages of the source, and which imports from which</title>\n"
-        f"<defs>{arrow}</defs>\n"
-        f'<rect width="{WIDTH}" height="{top:.0f}" fill="#ffffff"/>\n' + "\n".join(parts) + "\n</svg>\n"
+        f'<rect width="{WIDTH}" height="{top}" fill="#ffffff"/>\n' + "\n".join(parts) + "\n</svg>\n"
     )
 
 
-def _draw(parts: list[str], drawn: Panel, title: str, top: float) -> float:
-    """Add a panel below `top` to the parts; return where it ends."""
-    parts.append(f'<text x="{MARGIN}" y="{top:.0f}" font-size="15" font-weight="600">{escape(title)}</text>')
-    places: dict[str, Place] = {}
-    for k, row in enumerate(drawn.rows):
-        widths = [_width(name) for name in row]
-        spare = (WIDTH - 2 * MARGIN - sum(widths)) / len(row)
-        x = MARGIN + spare / 2
-        for name, width in zip(row, widths, strict=True):
-            places[name] = x + width / 2, top + 22 + k * ROW
-            x += width + spare
-    for arrow in drawn.arrows:
+def _draw(parts: list[str], graph: Graph, title: str, top: int) -> int:
+    """Add the matrix of a graph below `top` to the parts; return where it ends."""
+    parts.append(f'<text x="{MARGIN}" y="{top}" font-size="15" font-weight="600">{escape(title)}</text>')
+    names, left = in_order(graph), MARGIN + NAMES
+    for k, name in enumerate(names):
+        y = top + 14 + k * CELL
+        parts.append(f'<text x="{left - 8}" y="{y + 15}" text-anchor="end">{escape(name)}</text>')
+        for j, used in enumerate(names[: k + 1]):
+            x = left + j * CELL
+            fill = "#c9d6e4" if j == k else "#f4f6f8"
+            parts.append(f'<rect x="{x}" y="{y}" width="{CELL - 2}" height="{CELL - 2}" fill="{fill}"/>')
+            if used in graph[name]:
+                middle = CELL / 2 - 1
+                parts.append(f'<circle cx="{x + middle}" cy="{y + middle}" r="5" fill="#2f5d8a"/>')
+        # The name of the column stands on the diagonal.
         parts.append(
-            f'<path d="{_way([places[name] for name in arrow])}" fill="none" stroke="#5c5c5c" stroke-width="1.2" '
-            'marker-end="url(#tip)"/>'
+            f'<text x="{left + (k + 1) * CELL + 4}" y="{y + 15}" fill="#5c5c5c">{escape(name)}</text>'
         )
-    for name, (x, y) in places.items():
-        if ">" not in name:
-            width = _width(name)
-            fill = "#fdf0dd" if "/" in name else "#e9eff6"
-            parts.append(
-                f'<rect x="{x - width / 2:.1f}" y="{y:.1f}" width="{width:.1f}" height="{BOX}" rx="4" fill="{fill}" '
-                f'stroke="#5c5c5c"/><text x="{x:.1f}" y="{y + 20:.1f}" text-anchor="middle" '
-                f'font-size="13">{escape(name)}</text>'
-            )
-    return top + 22 + (len(drawn.rows) - 1) * ROW + BOX + MARGIN
-
-
-def _width(name: str) -> float:
-    return 14.0 if ">" in name else LETTER * len(name) + GAP
-
-
-def _way(places: list[Place]) -> str:
-    """Return the path of an arrow, out of the bottom of its subpackage and into the top of the last."""
-    (x0, y0), *between, (x1, y1) = places
-    way, x, y = f"M{x0:.1f},{y0 + BOX:.1f}", x0, y0 + BOX
-    for free_x, free_y in between:
-        way += f" C{x:.1f},{y + BEND:.1f} {free_x:.1f},{free_y - BEND:.1f} {free_x:.1f},{free_y:.1f}"
-        way += f" L{free_x:.1f},{free_y + BOX:.1f}"
-        x, y = free_x, free_y + BOX
-    return way + f" C{x:.1f},{y + BEND:.1f} {x1:.1f},{y1 - BEND:.1f} {x1:.1f},{y1:.1f}"
+    return top + 14 + len(names) * CELL + MARGIN
 
 
 def main() -> None:

@@ -133,6 +133,8 @@ def test_a_pipeline_for_the_gripper_is_named():
     with pytest.raises(WiringError, match="pipeline=robotiq") as refused:
         load_pipeline("default", options=["gripper.type=robotiq"])
     assert "pipeline=franka" not in str(refused.value)
+    # The default law sends velocities to this gripper, and efforts to the simulated one.
+    assert "graspsense-sim-gripper/sim" in str(refused.value)
 
 
 def test_every_misfit_is_told_at_once(misfit):

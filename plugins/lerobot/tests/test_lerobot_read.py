@@ -77,6 +77,13 @@ def test_check_says_what_was_understood(tmp_path):
         assert word in told
 
 
+def test_what_differs_in_its_numbers_alone_is_told_once(tmp_path):
+    states = [np.repeat(episode(frames=frames), 2, axis=0) for frames in (40, 50, 60)]
+    told = printed("import", f"lerobot:{write_set(tmp_path / 'set', 3, states)}", "--save", tmp_path / "s")
+    (line,) = [line for line in told.splitlines() if "repeated=drop" in line]
+    assert "3 of 3 grasps" in line
+
+
 def changed(rows, column, value):
     """Return an episode with another value in these rows of a column; a function makes it of the old one."""
     state = episode()
@@ -347,6 +354,8 @@ def test_more_numbers_than_the_memory_should_hold_are_not_read(tmp_path):
     [
         *((query, NAMES) for query in ("fps=0", "fps=x", "speed=3", "repeated=often", "gap=none")),
         ("gap_m_per_unit=nan", NAMES),
+        # What moves is not what is felt.
+        ("force=gripper.pos", NAMES),
         # Nothing feels, and no option says what does.
         ("", NAMES[:2]),
     ],

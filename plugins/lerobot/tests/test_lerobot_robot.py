@@ -25,7 +25,7 @@ from graspsense.plugin_api import (
 )
 from graspsense.testing_api import parametrize_checks
 from graspsense_lerobot import backend
-from graspsense_lerobot.stopping import stop
+from graspsense_lerobot.robot import stop
 
 KEYS = {"robot": "fake_arm", "load": "Present_Load"}
 

@@ -57,7 +57,8 @@ def test_a_grasp_by_topics_and_action(robot, kind):
 def test_a_fault_of_a_topic_ends_the_grasp_and_opens_the_fingers(robot, fault, words):
     faulty = robot()
 
-    trial = grasp(at_squeeze(lambda: faulty.fault(fault)))
+    # So long a hold that the grasp does not end before the fault is seen.
+    trial = grasp(at_squeeze(lambda: faulty.fault(fault)), "run.hold_s=5")
 
     assert trial.outcome == Outcome.DEVICE_LOST
     assert words in trial.reason

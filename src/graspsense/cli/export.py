@@ -47,8 +47,9 @@ def export(source: str, target: str, pictures: bool, as_json: bool) -> None:
     kind, _, place = target.partition(":")
     if place and (kind in datasets_to_write() or provider("data set", kind)):
         if not table or pictures:
+            wrong = "--pictures is for one grasp" if table else f"{source} is not a folder"
             raise ConfigError(
-                f"{target!r}: a data set is written from the folder of a store, without --pictures"
+                f"{target!r}: {wrong}. A data set is written from the folder of a store, without --pictures"
             )
         echo_written(target, write_dataset(kind, place, source), as_json)
         return

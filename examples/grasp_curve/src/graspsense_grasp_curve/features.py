@@ -17,6 +17,7 @@ A cell image is taken relative to the last one before contact, so that no zero o
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
@@ -39,14 +40,6 @@ from graspsense.plugin_api import (
 
 Floats = NDArray[np.float64]
 
-SIX: Final = (
-    Feature("p_first", "m", "gap at the first contact of both fingers", width=True),
-    Feature("p_steady", "m", "gap when the fingers have come to rest"),
-    Feature("f_steady", "N", "force on the pads when the fingers have come to rest"),
-    Feature("delta_t", "s", "time from the first contact to rest"),
-    Feature("dp_dt", "m/s", "mean rate of the gap from the first contact to rest"),
-    Feature("df_dt", "N/s", "mean rate of the pad force from the first contact to rest"),
-)
 CURVE: Final = (
     Feature("peak_force", "N", "largest mean force of the pads, from contact to the end of the hold"),
     Feature("gap_at_peak", "m", "gap at the largest force"),
@@ -102,23 +95,24 @@ class GraspCurveFeatures(FeatureSet[GraspCurveConfig]):
 
 
 class ChittaAndCurve(FeatureSet[GraspCurveConfig]):
-    """The six features of Table I, then the eight."""
+    """The six features of Table I, then the eight: a union with this threshold of contact."""
 
     requires = CHANNELS
-    features = (*SIX, *CURVE)
+
+    @property
+    def features(self) -> tuple[Feature, ...]:  # type: ignore[override]
+        """The fourteen features."""
+        return self._union.features
 
     def extract(self, trace: Trace) -> Features:
         """Return the fourteen features."""
-        six = create("feature-set", "graspsense/chitta", contact_force_n=self.config.contact_force_n).extract(
-            trace
-        )
-        more = GraspCurveFeatures(self.config).extract(trace)
-        return Features(
-            names=six.names + more.names,
-            values=six.values + more.values,
-            units=six.units + more.units,
-            reasons={**six.reasons, **more.reasons},
-        )
+        return self._union.extract(trace)
+
+    @cached_property
+    def _union(self) -> FeatureSet[Any]:
+        sets, contact_force_n = ("chitta", "grasp-curve"), self.config.contact_force_n
+        union: FeatureSet[Any] = create("feature-set", "union", sets=sets, contact_force_n=contact_force_n)
+        return union
 
 
 def _curve(trace: Trace, contact_force_n: float) -> tuple[dict[str, float], dict[str, str]]:

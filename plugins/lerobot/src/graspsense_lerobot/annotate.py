@@ -168,16 +168,10 @@ def _annotate_episodes(copy: Path, version: int, placed: Mapping[int, Sequence[P
     """Add what is known of the trials of each episode to its description."""
     if version == 2:
         rows = json_lines(copy, "meta/episodes.jsonl")
-        lines = [
-            json.dumps(
-                {
-                    **row,
-                    "graspsense": [about(squeeze.grasp) for squeeze in placed.get(row["episode_index"], ())],
-                }
-            )
-            for row in rows
-        ]
-        (copy / "meta" / "episodes.jsonl").write_text("\n".join(lines) + "\n", "utf-8")
+        for row in rows:
+            row["graspsense"] = [about(squeeze.grasp) for squeeze in placed.get(row["episode_index"], ())]
+        lines = [json.dumps(row) + "\n" for row in rows]
+        (copy / "meta" / "episodes.jsonl").write_text("".join(lines), "utf-8")
         return
     names = dict.fromkeys(
         name for some in placed.values() for squeeze in some for name in about(squeeze.grasp)

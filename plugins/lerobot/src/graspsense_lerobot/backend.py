@@ -34,7 +34,7 @@ from graspsense_lerobot.robot_config import LeRobotConfig
 
 SLOPE_FRAMES: Final = 4
 OPENING_M_S: Final = 0.05
-STOP: Final = "graspsense_lerobot.stopping:stop"
+STOP: Final = "graspsense_lerobot.robot:stop"
 
 
 @final
@@ -123,8 +123,8 @@ class LeRobotBackend(SensorBackend[LeRobotConfig]):
                 switch.release()
 
     def report(self) -> dict[str, float | int | str | bool]:
-        """Return the number of frames, and of questions that were repeated."""
-        return {"frames": self._polling.frames, "repeated": self._polling.repeated}
+        """Return the number of frames and of repeated questions, and how long the longest took."""
+        return {**self._polling.report()}
 
     def _send(self, motor: OneMotor, position: float) -> None:
         self._polling.tried(lambda: motor.send(position), NoAnswer)

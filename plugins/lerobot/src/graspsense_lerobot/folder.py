@@ -108,7 +108,7 @@ class Folder:
         self, row: Mapping[str, Any], held: dict[str, ColumnTable | GraspsenseError]
     ) -> tuple[Episode]:
         """Return an episode; `held` is what the data file that was read last gave."""
-        path = self._data_path(row)
+        path = self._filled("data_path", self._numbers(row, "data/"))
         if path not in held:
             held.clear()
             try:
@@ -162,9 +162,6 @@ class Folder:
             )[0]
             for k in range(len(table)):
                 yield {name: float(values[k]) for name, values in table.numbers.items() if values.ndim == 1}
-
-    def _data_path(self, row: Mapping[str, Any]) -> str:
-        return self._filled("data_path", self._numbers(row, "data/"))
 
     def _numbers(self, row: Mapping[str, Any], prefix: str) -> dict[str, int | str]:
         """Return the fields of the path of an episode's data, or of a video, whose columns begin with `prefix`."""
@@ -255,9 +252,7 @@ def read_folder(place: Path) -> Folder:
         )
     if not (place / INFO).is_file():
         raise ConfigError(f"{place} is not a LeRobot data set: it has no {INFO}")
-    info = _json(place, INFO)
-    if not isinstance(info, dict):
-        raise DataDamaged(f"{place}/{INFO} is not a table of keys")
+    info = _json(_text(place, INFO), f"{place}/{INFO}")
     named = str(info.get("codebase_version", ""))
     match = re.fullmatch(r"v?(?:2\.1|3\.0)", named)
     if match is None:
@@ -312,27 +307,21 @@ def _flat(names: Any) -> tuple[str, ...]:
     return ()
 
 
-def _json(place: Path, name: str) -> Any:
+def _json(text: str, where: str) -> dict[str, Any]:
+    """Return the table of keys that a text of this place is. Raises DataDamaged."""
     try:
-        return json.loads(_text(place, name))
+        values = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise DataDamaged(f"{place}/{name} is not JSON: {error}") from error
+        raise DataDamaged(f"{where} is not JSON: {error}") from error
+    if not isinstance(values, dict):
+        raise DataDamaged(f"{where} is not a table of keys")
+    return values
 
 
 def json_lines(place: Path, name: str) -> list[dict[str, Any]]:
     """Return the tables of a file with a JSON table in each line. Raises DataDamaged."""
-    rows = []
-    for number, line in enumerate(_text(place, name).splitlines(), 1):
-        if not line.strip():
-            continue
-        try:
-            row = json.loads(line)
-        except (ValueError, RecursionError) as error:
-            raise DataDamaged(f"{place}/{name}, line {number}, is not JSON: {error}") from error
-        if not isinstance(row, dict):
-            raise DataDamaged(f"{place}/{name}, line {number}, is not a table of keys")
-        rows.append(row)
-    return rows
+    lines = enumerate(_text(place, name).splitlines(), 1)
+    return [_json(line, f"{place}/{name}, line {number},") for number, line in lines if line.strip()]
 
 
 def _text(place: Path, name: str) -> str:

@@ -65,6 +65,10 @@ class Meaning:
     arrays: tuple[CellArray, ...] = ()
     others: tuple[str, ...] = field(default=())
 
+    def felt_by(self, *, has_arrays: bool) -> tuple[str, ...]:
+        """Return the names of the force of each side, by the load of the motor where nothing else feels."""
+        return self.forces or (() if has_arrays else self.effort[:1])
+
 
 def meaning_of(names: Iterable[str], gap: str = "", force: str = "") -> Meaning:
     """Return what these names mean; those of several candidates come first that tell more.

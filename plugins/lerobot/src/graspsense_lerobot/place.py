@@ -5,18 +5,20 @@ FOLDER?gap_m_per_unit=0.0008&fps=30&repeated=drop
 
 from __future__ import annotations
 
-import math
+from contextlib import suppress
+from math import inf
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 from urllib.parse import parse_qsl
 
-from attrs import fields_dict, frozen
+from attrs import field, frozen
+from attrs.validators import and_, gt, in_, lt, not_, optional
 
 from graspsense.plugin_api import ConfigError
-from graspsense.simulator_api import suggestion
+from graspsense.simulator_api import ValidationFailed, structured
 
-_WORDS: Final = {"repeated": ("keep", "drop"), "gaps": ("keep", "cut"), "split": ("force", "none")}
-_NAMES: Final = ("gap", "force", "annotate")
+_FINITE: Final = and_(gt(-inf), lt(inf))
+_FACTOR: Final = optional(and_(_FINITE, not_(in_((0.0,)), msg="a factor is not 0")))
 
 
 @frozen(kw_only=True)
@@ -27,22 +29,25 @@ class PlaceOptions:
     """The name of the number that is the opening."""
     force: str = ""
     """The name of the number, or of the two with a comma between, that are the force."""
-    gap_m_per_unit: float | None = None
+    gap_m_per_unit: float | None = field(default=None, validator=_FACTOR)
     """Metres of the opening for one unit of its number; negative if the number grows while the gripper closes."""
-    gap_zero: float = 0.0
+    gap_zero: float = field(default=0.0, validator=_FINITE)
     """The number at which the gripper is closed."""
-    force_n_per_unit: float | None = None
+    force_n_per_unit: float | None = field(default=None, validator=_FACTOR)
     """Newtons for one unit of the force."""
-    fps: float | None = None
+    fps: float | None = field(default=None, validator=optional(and_(gt(0.0), lt(inf))))
     """The true frames per second: times then are frame numbers divided by it."""
-    repeated: str = "keep"
+    repeated: Literal["keep", "drop"] = "keep"
     """`drop` leaves out frames that are equal to the one before."""
-    gaps: str = "keep"
+    gaps: Literal["keep", "cut"] = "keep"
     """`cut` divides an episode where frames are missing."""
     annotate: str = ""
     """Writing: the data set of which the trials were imported, and of which a copy is annotated."""
-    split: str = "force"
+    split: Literal["force", "none"] = "force"
     """`none` makes one trial of an episode; else each squeeze of it becomes one."""
+
+
+_NUMBERS: Final = ("gap_m_per_unit", "gap_zero", "force_n_per_unit", "fps")
 
 
 def folder_and_options(place: str) -> tuple[Path, PlaceOptions]:
@@ -51,28 +56,12 @@ def folder_and_options(place: str) -> tuple[Path, PlaceOptions]:
     folder, mark, query = place.partition("?")
     if not mark or whole.is_dir():
         return whole, PlaceOptions()
-    given: dict[str, Any] = {}
-    known = tuple(fields_dict(PlaceOptions))
-    for key, text in parse_qsl(query, keep_blank_values=True):
-        if key not in known:
-            raise ConfigError(
-                f"{key!r} is not an option of lerobot:FOLDER. Known: {', '.join(known)}.{suggestion(key, known)}"
-            )
-        given[key] = _value(key, text)
-    return Path(folder).expanduser(), PlaceOptions(**given)
-
-
-def _value(key: str, text: str) -> str | float:
-    if key in _NAMES:
-        return text
-    if key in _WORDS:
-        if text not in _WORDS[key]:
-            raise ConfigError(f"{key}={text!r}: write {' or '.join(_WORDS[key])}")
-        return text
+    given: dict[str, Any] = dict(parse_qsl(query, keep_blank_values=True))
+    for key in given.keys() & _NUMBERS:
+        with suppress(ValueError):
+            given[key] = float(given[key])
     try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number) or (key != "gap_zero" and number == 0.0) or (key == "fps" and number < 0.0):
-        raise ConfigError(f"{key}={text!r} is not a number that can be used there, such as 0.001")
-    return number
+        return Path(folder).expanduser(), structured(given, PlaceOptions, "lerobot:FOLDER")
+    except ValidationFailed as misfit:
+        said = [f"{'.'.join(map(str, problem.path))}: {problem.text}" for problem in misfit.problems]
+        raise ConfigError("\n".join(said)) from None

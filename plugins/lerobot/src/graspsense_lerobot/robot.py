@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import json
 import pkgutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -102,6 +103,15 @@ class OneMotor:
                 f"no {what} of {self._config.robot} has {key!r}; there are {known}. Set gripper.motor or "
                 "gripper.position"
             )
+
+
+def stop(settings: str) -> None:
+    """Let the gripper of these settings (JSON) stay where it is, and disconnect it. Raises NoAnswer, ConfigError.
+
+    It is for a robot whose program was killed: the motors of LeRobot press on towards their last target.
+    """
+    # What is connected is commanded to where it is.
+    OneMotor(LeRobotConfig(**json.loads(settings))).disconnect()
 
 
 def _made(config: LeRobotConfig) -> Any:

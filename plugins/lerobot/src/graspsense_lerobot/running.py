@@ -25,6 +25,7 @@ from graspsense.plugin_api import (
     Prediction,
     Reading,
 )
+from graspsense.simulator_api import CHANNELS
 from graspsense.testing_api import TraceRecorder
 from graspsense_lerobot.names import Meaning, meaning_of
 from graspsense_lerobot.place import PlaceOptions
@@ -32,7 +33,6 @@ from graspsense_lerobot.place import PlaceOptions
 EVENTS: Final = ("nothing", "contact", "rest", "end")
 """What the numbers of events mean."""
 KNOWN: Final = ("gap", "velocity", "force_left", "force_right")
-UNITS: Final = ("m", "m/s", "N", "N")
 WIDEST_M: Final = 0.5
 UNKNOWN: Final = Command(EFFORT, nan, inf, inf)
 """What the gripper is commanded, which another program does."""
@@ -171,7 +171,7 @@ class FollowedGrasp:
         ]
         try:
             gap = float(numbers[meaning.gap[0]])
-            forces = [sum(float(numbers[name]) for name in names) for names in sides]
+            forces = [abs(sum(float(numbers[name]) for name in names)) for names in sides]
         except KeyError:
             return None
         if not all(map(isfinite, (gap, *forces))):
@@ -182,8 +182,6 @@ class FollowedGrasp:
             raise ConfigError(
                 f"the gap {meaning.gap[0]} is {gap_m:g}, which is not in metres: give gap_m_per_unit, and gap_zero"
             )
-        if meaning.forces:
-            forces = [abs(force) for force in forces]
         left = scale * forces[0]
         right = scale * sum(forces[1:]) / (len(forces) - 1) if len(forces) > 1 else left
         dt_s = 0.0 if self._last is None else t_s - self._last.t_s
@@ -200,8 +198,7 @@ class FollowedGrasp:
     def _understood(self, numbers: Mapping[str, float]) -> Meaning:
         """Return the names of gap and forces, as the reader of data sets finds them. Raises ConfigError."""
         meaning = meaning_of(numbers, self._given.gap, self._given.force)
-        gap = meaning.gap[:1]
-        forces = meaning.forces or (() if meaning.arrays else meaning.effort[:1])
+        gap, forces = meaning.gap[:1], meaning.felt_by(has_arrays=bool(meaning.arrays))
         lacking = [name for name in (*gap, *forces) if name not in numbers]
         if not gap or lacking or not (forces or meaning.arrays):
             raise ConfigError(
@@ -222,7 +219,7 @@ def _observations(rate_hz: float) -> DeviceInfo:
         speed_limit_m_s=inf,
         opening=None,
         relaxed=Command(VELOCITY, 0.0, inf, inf),
-        channels=tuple(Channel(name, unit, rate_hz) for name, unit in zip(KNOWN, UNITS, strict=True)),
+        channels=tuple(Channel(name, CHANNELS[name], rate_hz) for name in KNOWN),
     )
 
 

@@ -22,6 +22,8 @@ METRES: Final = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 """The units of a gap that need no option."""
 GUESSES: Final = (("share", -0.05, 1.05), ("rad", -7.0, 7.0), ("%", -10.0, 110.0))
 """What a gap is taken as whose numbers are within these, where nothing names its unit."""
+MOST_CHOICES: Final = 60
+"""Names that are listed where one of them is to be chosen."""
 _OF_STATE: Final = ("velocity", "effort", "load", "current", "torque", "force")
 
 
@@ -59,14 +61,19 @@ def understand(folder: Folder, options: PlaceOptions) -> Understood:
     if not gap:
         raise ConfigError(
             f"{folder.place}: no name is known as the opening of a gripper (gripper.pos). Name it: "
-            f"lerobot:FOLDER?gap=NAME. There are {some(names)}"
+            f"lerobot:FOLDER?gap=NAME. There are {some(names, MOST_CHOICES)}"
         )
     touch = bool(meaning.arrays or images)
-    forces = meaning.forces or (() if touch else meaning.effort[:1])
+    forces = meaning.felt_by(has_arrays=touch)
     if not forces and not touch:
         raise ConfigError(
             f"{folder.place}: nothing tells whether an object was felt: there is no tactile array, and no force, load "
-            f"or current of the gripper. Name one: lerobot:FOLDER?force=NAME. There are {some(names)}"
+            "or current of the gripper. Without one, record the data again with the load of its motor. Else name it: "
+            f"lerobot:FOLDER?force=NAME. There are {some(names, MOST_CHOICES)}"
+        )
+    if gap in forces:
+        raise ConfigError(
+            f"{folder.place}: {gap} is the gap, so it is not the force too: ?gap=NAME&force=NAME"
         )
     metres, unit, notes = _unit_of_gap(folder, gap, options)
     notes += [f"gap: {gap}", f"force: {', '.join(forces) or 'the sum of the cells of each array along z'}"]
@@ -152,16 +159,16 @@ def units_of(folder: Folder) -> dict[str, str]:
 
 def _refuse_unknown(name: str, names: Sequence[str], what: str) -> None:
     if name and name not in names:
-        meant = suggestion(name, names)
         raise ConfigError(
-            f"{what}={name!r} is not a number of the observations. There are {some(names)}.{meant}"
+            f"{what}={name!r} is not a number of the observations. There are {some(names, MOST_CHOICES)}."
+            f"{suggestion(name, names)}"
         )
 
 
-def some(names: Sequence[str]) -> str:
+def some(names: Sequence[str], most: int = 12) -> str:
     """Return the first of these names in words, and how many more there are."""
-    shown = ", ".join(name[:60] for name in names[:12])
-    return f"{shown} and {len(names) - 12} more" if len(names) > 12 else shown or "none"
+    shown = ", ".join(name[:60] for name in names[:most])
+    return f"{shown} and {len(names) - most} more" if len(names) > most else shown or "none"
 
 
 def _unit_of_gap(folder: Folder, gap: str, options: PlaceOptions) -> tuple[float, str, list[str]]:

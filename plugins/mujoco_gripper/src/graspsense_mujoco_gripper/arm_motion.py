@@ -23,24 +23,20 @@ class ArmMotion:
         """`finger` is a geom of a finger, with which the height of the thing is compared; `edge` its edge sensor."""
         self._finger = finger
         self._scene, self._contact_s = scene, float("inf")
+        names = [model.actuator(k).name for k in range(model.nu)]
         self._servos, self._shakers = (
-            [k for k in range(model.nu) if _actuator(model, k).startswith(f"{kind}/")]
-            for kind in (ARM, SHAKE)
+            [k for k, name in enumerate(names) if name.startswith(f"{kind}/")] for kind in (ARM, SHAKE)
         )
-        things = [k for k in range(model.nbody) if is_thing(model, k)]
-        heaviest = model.body_mass[things] if things else np.zeros(0)
+        self._bodies = things = [k for k in range(model.nbody) if is_thing(model, k)]
+        self._masses = model.body_mass[things]
         self._body = things[0] if things else -1
-        self._bodies, self._masses = things, heaviest
-        self.moves = bool(things) and (
-            bool(scene.cord or scene.bump or scene.shake)
-            or bool(scene.arm or scene.table_height or scene.fill)
-        )
+        self.moves = bool(things) and (scene.is_disturbed or bool(scene.table_height))
         self._bumper = Bumper(model, scene.bump, edge, self._body) if things and scene.bump else None
         cord = () if scene.cord is None else scene.cord.force
         schedules = (scene.arm, scene.table_height, scene.fill, cord)
         self._model = model
         self._empty_kg = float(model.body_mass[self._body]) if things else 0.0
-        self._table_m = _table_height(model)
+        self._table_m = float(model.body(TABLE).pos[2]) if scene.table and things else 0.0
         ends_s = [rows[-1][0] for rows in schedules if rows]
         self._end_s = max([*ends_s, 0.0 if scene.shake is None else scene.shake.end_s])
         if scene.bump is not None:
@@ -52,15 +48,11 @@ class ArmMotion:
 
     def set(self, data: mujoco.MjData, t_s: float, *, touched: bool) -> None:
         """Set the servo of the arm and the force of the cord for the time after this tick."""
-        if not self.moves:
-            return
         if touched and not isfinite(self._contact_s):
             self._contact_s = t_s
             self._start_m = self._centre(data)
             self._above_finger_m = float(self._start_m[2] - data.geom_xpos[self._finger, 2])
-        if not isfinite(self._contact_s):
-            return
-        if self._ended:
+        if self._ended or not isfinite(self._contact_s):
             return
         # The last tick may lie behind the end, where everything has its last value.
         since_s = min(t_s - self._contact_s, self._end_s)
@@ -105,13 +97,3 @@ class ArmMotion:
         the thing came down in the fingers by then.
         """
         return {"highest_m": self._highest_m, "height_m": self._height_m, "slip_m": self._slip_m}
-
-
-def _table_height(model: mujoco.MjModel) -> float:
-    """Return the height (m) of the body of the table; 0 where there is none."""
-    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, TABLE)
-    return 0.0 if body < 0 else float(model.body_pos[body, 2])
-
-
-def _actuator(model: mujoco.MjModel, number: int) -> str:
-    return mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, number) or ""

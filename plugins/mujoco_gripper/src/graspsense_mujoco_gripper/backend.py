@@ -32,6 +32,7 @@ from graspsense.plugin_api import (
     signal_type,
 )
 from graspsense.simulator_api import (
+    CHANNELS,
     BatchBackend,
     BatchOptions,
     Grasped,
@@ -101,14 +102,8 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
 
     def _channels_of(self, gripper: GripperFile) -> tuple[Channel, ...]:
         rate = self.config.rate_hz
-        frame = [
-            ("gap", "m"),
-            ("velocity", "m/s"),
-            ("effort", "N"),
-            ("force_left", "N"),
-            ("force_right", "N"),
-        ]
-        channels = [Channel(name, unit, rate) for name, unit in frame]
+        frame = ("gap", "velocity", "effort", "force_left", "force_right")
+        channels = [Channel(name, CHANNELS[name], rate) for name in frame]
         if gripper.left.rows:
             left = gripper.left
             channels.append(TactileArray("pads", "N", rate, rows=left.rows, columns=left.columns))

@@ -6,10 +6,10 @@ The caller extracts the features. A grasp follows from its thing and its seed al
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+import threading
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager, suppress
-from queue import SimpleQueue
+from contextlib import ExitStack, suppress
 from typing import Final
 
 from graspsense.simulator_api import BatchOptions, Grasped, GraspProcess, HandedGrasp, NotHandedOver
@@ -32,31 +32,32 @@ def grasps(
     if len(things) != len(seeds):
         raise ValueError(f"{len(things)} scenes and {len(seeds)} seeds: give one seed a scene")
     workers = max(1, min(options.get("workers") or os.cpu_count() or 1, len(things) // WORTH_A_PROCESS))
-    progress = options.get("progress")
-    with _processes(there, workers) as free:
+    progress, own, done = options.get("progress"), threading.local(), list[Grasped]()
+    own.process = None
 
-        def grasp(k: int) -> Grasped:
-            process = free.get()
+    def begin() -> None:
+        own.process = None
+        with suppress(NotHandedOver):
+            own.process = started.enter_context(there())
+
+    def grasp(thing: str, seed: int) -> Grasped:
+        if own.process is not None:
             try:
-                if process is not None:
-                    return _grasped(process.grasp(things[k], seeds[k]), options)
+                return _grasped(own.process.grasp(thing, seed), options)
             except NotHandedOver:
-                process = None
-            finally:
-                free.put(process)
-            return _grasped(here(things[k], seeds[k]), options)
+                own.process = None
+        return _grasped(here(thing, seed), options)
 
-        done: list[Grasped] = []
-        numbers = range(len(things))
-        with ThreadPoolExecutor(max_workers=workers) as pool:
-            try:
-                for grasped in map(grasp, numbers) if workers == 1 else pool.map(grasp, numbers):
-                    done.append(grasped)
-                    if progress is not None:
-                        progress(len(done), len(things))
-            except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                raise
+    # A single worker is this thread, so that Ctrl-C ends its grasp.
+    with ExitStack() as started, ThreadPoolExecutor(workers, initializer=begin) as pool:
+        try:
+            for grasped in (map if workers == 1 else pool.map)(grasp, things, seeds):
+                done.append(grasped)
+                if progress is not None:
+                    progress(len(done), len(things))
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
     return done
 
 
@@ -70,17 +71,3 @@ def _grasped(handed: HandedGrasp, options: BatchOptions) -> Grasped:
         trace=trace if options.get("traces") else None,
         report=handed.further,
     )
-
-
-@contextmanager
-def _processes(there: Callable[[], GraspProcess], workers: int) -> Iterator[SimpleQueue[GraspProcess | None]]:
-    """Yield the processes that are free, and end them; None stands for this process."""
-    free: SimpleQueue[GraspProcess | None] = SimpleQueue()
-    with ExitStack() as started:
-        for _ in range(workers):
-            process = None
-            if workers > 1:
-                with suppress(NotHandedOver):
-                    process = started.enter_context(there())
-            free.put(process)
-        yield free

@@ -6,8 +6,8 @@ actuators that close them are those that change their distance.
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Iterable
 from itertools import product
 from pathlib import Path
 
@@ -58,7 +58,7 @@ class _Closing:
 
 def drafted(name: str, folder: Path) -> Draft:
     """Return a gripper file for a model, to be put into `folder`. Raises ConfigError where it has no fingers."""
-    path = model_path(name, Path.cwd() / "gripper.toml")
+    path = model_path(name, Path.cwd())
     model, radian = _model(path)
     closing = _closing(model)
     written = name if ":" in name else Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
@@ -66,7 +66,7 @@ def drafted(name: str, folder: Path) -> Draft:
     if radian:
         lines.append('angle = "radian"')
     lines += [
-        f"actuators = {_texts(closing.actuators)}",
+        f"actuators = {json.dumps(closing.actuators)}",
         f"open = {[round(value, 6) for value in closing.open]}",
         f"closed = {[round(value, 6) for value in closing.closed]}",
         "",
@@ -80,7 +80,7 @@ def drafted(name: str, folder: Path) -> Draft:
         ]
         lines.append(f"{side} = [{', '.join(places)}]")
     for side, bodies in zip(("left", "right"), closing.fingers, strict=True):
-        lines += ["", f"[{side}]", f"bodies = {_texts(model.body(k).name for k in bodies)}"]
+        lines += ["", f"[{side}]", f"bodies = {json.dumps([model.body(k).name for k in bodies])}"]
     sensors = [model.sensor(k).name for k in range(model.nsensor) if model.sensor_type[k] in FURTHER]
     lines += [f"# A sensor of the model: {sensor}" for sensor in sensors]
     left = ["speed_limit_m_s, where it is not 0.1 m/s"]
@@ -261,7 +261,3 @@ def _level_with(data: mujoco.MjData, geom: int, opposed: int, point: Floats) -> 
     if length < LEAST_CHANGE_M:
         return point
     return np.asarray(centre + axis * float((point - centre) @ axis) / length**2)
-
-
-def _texts(names: Iterable[str]) -> str:
-    return "[" + ", ".join(f'"{name}"' for name in names) + "]"

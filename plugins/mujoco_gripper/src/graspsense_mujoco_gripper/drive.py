@@ -96,7 +96,7 @@ def _moved(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None) -
     data.ctrl[ids] = gripper.open
     for _ in range(steps):
         mujoco.mj_step(model, data)
-    _check(model, data)
+    _check(data)
     axis = closing_axis(gripper, *faces(model, data, gripper))
     qpos_open = data.qpos.copy()
     measured_m = gap_reader(model, data, gripper.gap, axis)
@@ -110,7 +110,7 @@ def _moved(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None) -
             gaps.append(gap_m)
             lengths.append(data.actuator_length[ids].copy())
             states.append(data.qpos.copy())
-    _check(model, data)
+    _check(data)
     end_m = max(measured_m(), 0.0)
     if end_m > start_m - LEAST_TRAVEL_M:
         raise ConfigError(
@@ -214,7 +214,7 @@ def actuator_ids(model: mujoco.MjModel, gripper: GripperFile) -> list[int]:
     return ids
 
 
-def _check(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+def _check(data: mujoco.MjData) -> None:
     """Raise ConfigError where MuJoCo warned that the state is bad."""
     if problem := instability(data):
         raise ConfigError(
@@ -224,19 +224,14 @@ def _check(model: mujoco.MjModel, data: mujoco.MjData) -> None:
 
 def instability(data: mujoco.MjData) -> str:
     """Return what MuJoCo warned of; empty if the state is good."""
-    if not data.warning.number.any():
-        return ""
-    kinds = mujoco.mjtWarning
-    for kind, words in (
-        (kinds.mjWARN_BADQPOS, "positions are not finite or too large"),
-        (kinds.mjWARN_BADQVEL, "velocities are not finite or too large"),
-        (kinds.mjWARN_BADQACC, "accelerations are not finite or too large"),
-        (kinds.mjWARN_CONTACTFULL, "there are more contacts than the model has room for"),
-        (kinds.mjWARN_CNSTRFULL, "there are more constraints than the model has room for"),
-    ):
-        if data.warning[kind].number:
-            return f"MuJoCo warns: {words}"
-    return ""
+    counts, singular = data.warning.number, mujoco.mjtWarning.mjWARN_INERTIA
+    told = (
+        mujoco.mju_warningText(kind, data.warning[kind].lastinfo)
+        for kind, count in enumerate(counts)
+        if count and kind != singular
+    )
+    # The advice of MuJoCo follows its first sentence.
+    return next((f"MuJoCo warns: {text.partition('.')[0]}" for text in told), "")
 
 
 class ActuatorDrive:

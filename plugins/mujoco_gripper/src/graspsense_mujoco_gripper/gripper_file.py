@@ -176,39 +176,38 @@ def read_gripper(name: str) -> tuple[GripperFile, Path]:
     if not name or name in SHIPPED:
         path = Path(str(files("graspsense_mujoco_gripper") / f"{name or 'parallel'}.toml"))
     gripper = described(path, "gripper", GripperFile)
-    return gripper, model_path(gripper.model, path)
+    return gripper, model_path(gripper.model, path.parent)
 
 
 def described(path: Path, what: str, cls: type[DescribedT]) -> DescribedT:
     """Return what a TOML file describes. Raises ConfigError."""
     layer = read_toml(path, str(path), what)
     try:
-        return structured(dict(layer.values), cls, f"a {what} file")
+        return structured(layer.values, cls, f"a {what} file")
     except ValidationFailed as misfit:
-        said = [
-            f"{layer.where(problem.path)}: {'.'.join(map(str, problem.path)) or 'the file'}: {problem.words()}"
-            for problem in misfit.problems
-        ]
-        raise ConfigError("\n".join(said)) from None
+        raise ConfigError("\n".join(layer.complain(problem) for problem in misfit.problems)) from None
 
 
-def model_path(name: str, beside: Path) -> Path:
-    """Return the path of a model: beside the gripper file, `package:PACKAGE:PATH`, or `menagerie:ROBOT[/ENTRY]`."""
+def model_path(name: str, folder: Path) -> Path:
+    """Return the path of a model: in the folder, `package:PACKAGE:PATH`, or `menagerie:ROBOT[/ENTRY]`.
+
+    Raises ConfigError.
+    """
     if name.startswith("menagerie:"):
         return _menagerie_path(*name.removeprefix("menagerie:").partition("/")[::2])
     if not name.startswith("package:"):
-        path = beside.parent / Path(name).expanduser()
+        path = folder / Path(name).expanduser()
         if not path.is_file():
-            raise ConfigError(f"gripper.file: {beside} names the model {name}, and there is no file {path}")
+            raise ConfigError(f"there is no file {path}: name a MuJoCo model (.xml), or package:NAME:PATH")
         return path
     package, _, resource = name.removeprefix("package:").partition(":")
-    folder = _package_folder(package)
-    if folder is None:
+    installed = _package_folder(package)
+    if installed is None:
         raise ConfigError(
             f"gripper.file: the model {name} is part of the package {package}, which is not installed: "
             f"pip install {package}"
         )
-    path = folder / resource
+    path = installed / resource
     if ".." in Path(resource).parts or not path.is_file():
         raise ConfigError(f"gripper.file: the package {package} has no file {resource}")
     return path

@@ -144,16 +144,13 @@ def signs_of(role: int, other_role: int) -> tuple[float, float]:
     `role` and `other_role` are the roles of its geoms. The first row of the frame of a contact is the normal, from the
     first geom to the second; the force acts on the second.
     """
-    left = right = 0.0
-    if other_role & LEFT and role & (ALL - LEFT):
-        left = -1.0
-    elif role & LEFT and other_role & (ALL - LEFT):
-        left = 1.0
-    if other_role & RIGHT and role & (ALL - RIGHT):
-        right = 1.0
-    elif role & RIGHT and other_role & (ALL - RIGHT):
-        right = -1.0
-    return left, right
+
+    def acting(finger: int) -> float:
+        if other_role & finger and role & (ALL - finger):
+            return 1.0
+        return -1.0 if role & finger and other_role & (ALL - finger) else 0.0
+
+    return -acting(LEFT), acting(RIGHT)
 
 
 class SpringCells:

@@ -18,27 +18,8 @@ from graspsense_mujoco_gripper.gripper_file import GripperFile
 # MuJoCo would print each warning and write it to MUJOCO_LOG.TXT in the current folder; `instability` tells them.
 mujoco.set_mju_user_warning(lambda text: None)
 
-NUMBERS: Final = (
-    "qpos0",
-    "body_pos",
-    "body_quat",
-    "body_mass",
-    "body_inertia",
-    "geom_pos",
-    "geom_size",
-    "geom_friction",
-    "geom_solref",
-    "jnt_axis",
-    "jnt_stiffness",
-    "jnt_range",
-    "dof_damping",
-    "dof_armature",
-    "actuator_gainprm",
-    "actuator_biasprm",
-    "actuator_ctrlrange",
-    "actuator_forcerange",
-)
-"""Parts of a model that MuJoCo accepts with values that are not finite."""
+_OF_USERS: Final = re.compile(r"(?:numeric|tuple|key)_.*|.*_user")
+"""Numbers of a model that MuJoCo does not compute with, so that any value is allowed."""
 LARGEST_BYTES: Final = 8 * 1024 * 1024
 """Limit on the size of the text of a model."""
 _INCLUDE: Final = re.compile(r"""<(?:include|model)\b[^>]*?\bfile\s*=\s*(?:"([^"]*)"|'([^']*)')""")
@@ -126,7 +107,15 @@ def compiled(spec: mujoco.MjSpec, called: str) -> mujoco.MjModel:
         model = spec.compile()
     except (ValueError, OSError) as error:
         raise ConfigError(f"MuJoCo {mujoco.mj_versionString()} refuses {called}: {error}") from error
-    bad = [name for name in NUMBERS if not np.isfinite(getattr(model, name)).all()]
+    # MuJoCo accepts many of them.
+    bad = [
+        name
+        for name in dir(model)
+        if isinstance(values := getattr(model, name), np.ndarray)
+        and values.dtype.kind == "f"
+        and not np.isfinite(values).all()
+        and not _OF_USERS.fullmatch(name)
+    ]
     if bad:
         raise ConfigError(f"{called} has numbers that are not finite, in {', '.join(bad)}: correct the model")
     return model

@@ -119,10 +119,14 @@ class Scene:
             raise ValueError("fill is a mass (kg), at least 0")
 
     @property
+    def is_disturbed(self) -> bool:
+        """Whether something moves the thing or pulls at it, or fills it."""
+        return bool(self.arm or self.fill or self.cord or self.shake or self.bump)
+
+    @property
     def needs_friction(self) -> bool:
         """Whether the friction of the thing decides what happens."""
-        disturbed = self.arm or self.fill or self.cord or self.shake or self.bump
-        return self.table or bool(disturbed) or self.friction is not None
+        return self.table or self.is_disturbed or self.friction is not None
 
 
 @frozen(eq=False)

@@ -139,7 +139,7 @@ def _lowest(model: mujoco.MjModel) -> float:
 
 def is_thing(model: mujoco.MjModel, body: int) -> bool:
     """Return whether a body is part of the thing."""
-    return (mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, body) or "").startswith(PREFIX)
+    return bool(model.body(body).name.startswith(PREFIX))
 
 
 def turned(axis: Floats) -> Floats:

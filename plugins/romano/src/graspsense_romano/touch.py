@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -98,37 +99,29 @@ class TouchSettings:
 
     def toml(self) -> str:
         """Return the scene file."""
-        lines = [f'thing = "{self.thing}"', "table = true", f"friction = {self.friction}"]
-        lines += [f"mass_kg = {self.mass_kg}", f"roughness_m = {self.roughness_m}"]
+        begun_s, end_s = self.disturbed_s, self.disturbed_s + self.ramp_s
         arm = _moved(LIFT_S, 0.0, self.lift_m, self.lift_m / self.lift_s)
-        begun_s = self.disturbed_s
+        keys: dict[str, Any] = {"thing": self.thing, "table": True, "friction": self.friction}
+        keys |= {"mass_kg": self.mass_kg, "roughness_m": self.roughness_m}
         if self.lower_m_s:
             arm += _moved(begun_s, self.lift_m, 0.0, self.lower_m_s)
-        lines.append(f"arm = {arm}")
-        end_s = begun_s + self.ramp_s
+        keys["arm"] = arm
         if self.fill_kg:
-            lines.append(f"fill = [[{begun_s}, 0.0], [{end_s}, {self.fill_kg}]]")
+            keys["fill"] = [[begun_s, 0.0], [end_s, self.fill_kg]]
         if self.table_rise_m:
-            lines.append(f"table_height = [[{LIFT_S + self.lift_s}, 0.0], [{begun_s}, {self.table_rise_m}]]")
+            keys["table_height"] = [[LIFT_S + self.lift_s, 0.0], [begun_s, self.table_rise_m]]
         if self.tug_n:
-            lines.append(f"cord = {{ force = [[{begun_s}, 0.0], [{end_s}, {self.tug_n}]] }}")
+            keys["cord.force"] = [[begun_s, 0.0], [end_s, self.tug_n]]
         if self.bump_at:
-            lines += ["[bump]", f'at = "{self.bump_at}"', f"t_s = {self.bumped_s}"]
-            lines += [
-                f"mass_kg = {self.bump_kg}",
-                f"speed_m_s = {self.bump_m_s}",
-                f"touch_s = {self.bump_touch_s}",
-            ]
+            keys |= {"bump.at": self.bump_at, "bump.t_s": self.bumped_s, "bump.mass_kg": self.bump_kg}
+            keys |= {"bump.speed_m_s": self.bump_m_s, "bump.touch_s": self.bump_touch_s}
         if self.stiffness_n_m:
-            lines += ["[walls]", "width_m = 0.04", f"stiffness_n_m = {self.stiffness_n_m}"]
+            keys |= {"walls.width_m": 0.04, "walls.stiffness_n_m": self.stiffness_n_m}
             # Without the usual inertia of walls, which an impact feels.
-            lines += [
-                "armature_kg = 0.0",
-                "damping_n_s_m = 20.0",
-                f"mass_kg = {self.mass_kg}",
-                f"friction = {self.friction}",
-            ]
-        return "\n".join(lines) + "\n"
+            keys |= {"walls.armature_kg": 0.0, "walls.damping_n_s_m": 20.0}
+            keys |= {"walls.mass_kg": self.mass_kg, "walls.friction": self.friction}
+        # Numbers, texts and lists are the same in JSON and in TOML.
+        return "".join(f"{key} = {json.dumps(value)}\n" for key, value in keys.items())
 
 
 @frozen(kw_only=True)

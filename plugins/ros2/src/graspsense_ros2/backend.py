@@ -10,7 +10,7 @@ from math import inf, isfinite, nan
 from types import MappingProxyType
 from typing import Final, final
 
-from graspsense.gripper_api import Polling, StatusBit
+from graspsense.gripper_api import Polling, StatusBit, finger_target
 from graspsense.plugin_api import (
     FORCE,
     NO_PADS,
@@ -24,6 +24,7 @@ from graspsense.plugin_api import (
     Reading,
     SensorBackend,
 )
+from graspsense.simulator_api import CHANNELS
 from graspsense_ros2.action_client import MOST_FAILURES, GripperAction, Target
 from graspsense_ros2.config import Ros2Config
 from graspsense_ros2.message_types import is_known
@@ -56,7 +57,6 @@ STATUS_BITS: Final = (
     ),
 )
 _MUST_BE_NUMBERS: Final = frozenset({"gap", "force_left", "force_right"})
-_UNITS: Final = {"gap": "m", "velocity": "m/s", "effort": "N", "force_left": "N", "force_right": "N"}
 
 
 @final
@@ -86,7 +86,7 @@ class Ros2Backend(SensorBackend[Ros2Config]):
     def channels(self) -> tuple[Channel, ...]:
         """The gap, its rate, and what else the settings name."""
         names = dict.fromkeys(("gap", "velocity", *self._numbers))
-        return tuple(Channel(name, _UNITS[name], self.config.rate_hz) for name in names)
+        return tuple(Channel(name, CHANNELS[name], self.config.rate_hz) for name in names)
 
     def open(self, seed: int) -> DeviceInfo:
         """Subscribe to the topics and look for the action; no finger moves. Raises NoDevice."""
@@ -137,21 +137,16 @@ class Ros2Backend(SensorBackend[Ros2Config]):
     def apply(self, command: Command) -> None:
         """Send the goal that this command becomes, unless it was sent already."""
         assert self._action is not None
-        kind, value, effort_limit, speed_limit = command
         config = self.config
-        stops = kind not in (POSITION, FORCE) or (kind == FORCE and value <= 0.0)
-        goal = self._gap_m if stops else value if kind == POSITION else 0.0
-        effort = (
-            config.least_effort_n if stops else effort_limit if kind == POSITION else min(value, effort_limit)
-        )
-        speed = min(speed_limit, config.speed_limit_m_s)
+        goal, speed, effort = finger_target(command, self._gap_m, config.open_gap_m)
+        speed = min(speed, config.speed_limit_m_s)
         step = speed / config.rate_hz
         # Where the fingers turn, the target that is left from the other direction would still push or pull.
         ahead = (self._gap_m, inf) if goal > self._gap_m else (self._gap_m - AHEAD_M, self._gap_m)
         self._target_m = min(
             max(self._target_m + min(max(goal - self._target_m, -step), step), ahead[0]), ahead[1]
         )
-        if stops:
+        if effort <= 0.0:
             self._target_m = self._gap_m
         target = Target(
             position=self._position(self._target_m),

@@ -6,8 +6,9 @@ import json
 import queue
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from math import isfinite
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import click
 
@@ -23,6 +24,7 @@ GRASP: Final = "/graspsense/grasp"
 GRIPPER_COMMAND: Final = "/graspsense/gripper_cmd"
 TRIGGER: Final = "std_srvs/srv/Trigger"
 ACTION: Final = "control_msgs/action/GripperCommand"
+ResultT = TypeVar("ResultT")
 
 
 @click.command(short_help="Be a ROS 2 node that grasps when it is asked.")
@@ -79,7 +81,7 @@ class GripperServer:
     def __init__(self, pipeline: Pipeline) -> None:
         self._pipeline = pipeline
         self._held: HeldGripper | None = None
-        self._jobs: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._jobs: queue.SimpleQueue[tuple[Future[Any], Callable[[], Any]]] = queue.SimpleQueue()
         self._grasping = threading.Lock()
         self._feed: LiveFeed | None = None
         self._stop_moving: Callable[[], None] = lambda: None
@@ -99,17 +101,21 @@ class GripperServer:
     def serve(self) -> None:
         """Do what is asked for until KeyboardInterrupt."""
         while True:
+            ticking = self._held is not None and self._held.ticking
             try:
-                if self._held is not None and self._held.ticking:
-                    self._jobs.get_nowait()()
-                else:
-                    self._jobs.get()()
+                done, job = self._jobs.get(block=not ticking)
             except queue.Empty:
                 assert self._held is not None
                 try:
                     self._held.tick()
                 except DeviceLost as error:
                     click.echo(f"the gripper is lost: {error}", err=True)
+                continue
+            try:
+                done.set_result(job())
+            except BaseException:
+                done.set_exception(RuntimeError("the node was stopped"))
+                raise
 
     def end(self) -> None:
         """Open the gripper if it is held."""
@@ -154,8 +160,7 @@ class GripperServer:
         return all(isfinite(number) and number >= 0.0 for number in numbers) and not self._grasping.locked()
 
     def _execute(self, goal: Goal) -> tuple[bool, Mapping[str, Any]]:
-        result: tuple[bool, Mapping[str, Any]] = self._done(lambda: self._move(goal))
-        return result
+        return self._done(lambda: self._move(goal))
 
     def _move(self, goal: Goal) -> tuple[bool, Mapping[str, Any]]:
         assert self._held is not None
@@ -169,22 +174,11 @@ class GripperServer:
         # As in ros2_control, fingers that hold an object have done what was asked for.
         return (result.reached or result.stalled) and not goal.stop.is_set(), result.values()
 
-    def _done(self, job: Callable[[], Any]) -> Any:
+    def _done(self, job: Callable[[], ResultT]) -> ResultT:
         """Do a job in the thread of `serve`, and return its result. Raises RuntimeError if there is none."""
-        done: queue.SimpleQueue[Any] = queue.SimpleQueue()
-
-        def act() -> None:
-            result: Any = RuntimeError("the node was stopped")
-            try:
-                result = job()
-            finally:
-                done.put(result)
-
-        self._jobs.put(act)
-        result = done.get()
-        if isinstance(result, Exception):
-            raise result
-        return result
+        done: Future[ResultT] = Future()
+        self._jobs.put((done, job))
+        return done.result()
 
 
 def _told(trial: Trial) -> dict[str, Any]:

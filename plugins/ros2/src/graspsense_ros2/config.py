@@ -111,15 +111,14 @@ class Ros2Config:
 
     def numbers(self) -> dict[str, MessageNumber]:
         """Return what is measured, by the name of its channel. Raises ConfigError."""
-        numbers = {
-            "gap": MessageNumber(self.gap, "gap"),
-            **{f"force_{side}": MessageNumber(text, "force") for side, text in self._forces() if text},
+        texts: dict[str, tuple[str, Literal["gap", "force", "effort", "velocity"]]] = {
+            "gap": (self.gap, "gap"),
+            "force_left": (self.left, "force"),
+            "force_right": (self.right, "force"),
+            "effort": (self.effort, "effort"),
+            "velocity": (self.velocity, "velocity"),
         }
-        if self.effort:
-            numbers["effort"] = MessageNumber(self.effort, "effort")
-        if self.velocity:
-            numbers["velocity"] = MessageNumber(self.velocity, "velocity")
-        return numbers
-
-    def _forces(self) -> tuple[tuple[str, str], ...]:
-        return ("left", self.left), ("right", self.right)
+        # Without a gap there is no gripper: that text is refused where it is empty.
+        return {
+            name: MessageNumber(text, what) for name, (text, what) in texts.items() if text or name == "gap"
+        }

@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import prod
 from typing import Any, Final
 
+import numpy as np
+
 from graspsense_ros2.message_types import encode, message, packed
 from graspsense_ros2.middleware import open_node
 from graspsense_ros2.node import Node
@@ -97,7 +99,7 @@ class GraspTopics:
                     self._send(f"wrench/{wrench.header.frame_id}", WRENCH, packed(WRENCH, wrench))
 
     def _array(self, topic: str, values: Any, shape: Mapping[str, int]) -> None:
-        numbers = _flat(values)
+        numbers = np.ravel(values)
         sizes = list(shape.values())
         dimensions = [
             {"label": label, "size": size, "stride": prod(sizes[place:])}
@@ -116,18 +118,12 @@ _JOINT_FIELDS: Final = {"position": "gap_m", "velocity": "velocity_m_s", "effort
 """The fields of a joint state with the columns of ticks."""
 
 
-def _flat(values: Any) -> list[float]:
-    """Return the numbers in nested sequences, one after the other."""
-    return [
-        number for each in values for number in (_flat(each) if isinstance(each, list | tuple) else [each])
-    ]
-
-
 def _shape(channel: Mapping[str, Any], cells: Sequence[Any]) -> dict[str, int]:
     """Return the dimensions of an image: rows, columns and components where the channel declares them."""
     rows, columns = channel.get("rows", 0), channel.get("columns", 0)
     components = channel.get("components", 1)
-    if rows * columns * components != len(_flat(cells)):
-        return {"cells": len(_flat(cells))}
+    count = int(np.size(cells))
+    if rows * columns * components != count:
+        return {"cells": count}
     shape = {"rows": rows, "columns": columns}
     return shape if components == 1 else {**shape, "components": components}

@@ -26,7 +26,9 @@ def check(settings: Settings) -> None:
     Raises WiringError that lists every mismatch, with both components, what one provides and what the other requires,
     and PluginUnavailable if a component does not declare what it provides or requires.
     """
-    misfits = [*_misfits(settings.gripper, settings.controller, settings.features)]
+    users = (settings.controller, settings.features)
+    misfits = [misfit for user in users for misfit in _channel_misfits(settings.gripper, user)]
+    misfits += _command_misfits(settings.gripper, settings.controller)
     if misfits:
         head = (
             "the components do not fit together" if len(misfits) > 1 else "two components do not fit together"
@@ -119,17 +121,17 @@ def _fitting(settings: Settings) -> str:
 def _offers(gripper: Component, users: tuple[SelectedComponent, SelectedComponent]) -> bool:
     try:
         chosen = select_component("sensor-backend", gripper.qualified)
-        return not [*_misfits(chosen, *users)]
+        misfits = [misfit for user in users for misfit in _channel_misfits(chosen, user)]
     except GraspsenseError:
         return False  # it cannot be told without its driver or its settings
-
-
-def _misfits(
-    gripper: SelectedComponent, controller: SelectedComponent, features: SelectedComponent
-) -> Iterator[str]:
-    yield from _channel_misfits(gripper, controller)
-    yield from _channel_misfits(gripper, features)
-    yield from _command_misfits(gripper, controller)
+    law, accepted = users[0].declared, set(chosen.declared.accepts)
+    # What a law with alternatives sends follows from the gripper.
+    fits = (
+        bool(accepted & {*law.commands, *law.alternatives})
+        if law.alternatives
+        else accepted >= {*law.commands}
+    )
+    return fits and not misfits
 
 
 @frozen
