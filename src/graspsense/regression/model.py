@@ -6,7 +6,6 @@ loaded: nothing is imported, evaluated or unpickled. Its `sha256` is the hash of
 
 from __future__ import annotations
 
-import math
 import platform
 import warnings
 from collections.abc import Mapping
@@ -128,15 +127,13 @@ class RegressionModel:
             "version": VERSION,
             "estimator": self.estimator,
             "target_value": [self.target.name, self.target.unit],
-            "features": [list(column) for column in zip(self.table.names, self.table.units, strict=True)],
+            "features": list(zip(self.table.names, self.table.units, strict=True)),
             "provenance": json_ready(self.provenance),
             "interval": self.intervals.to_json(),
             "made_with": self.made_with,
             "seed": self.seed,
             "values": list(self.target.values),
-            "trials": [
-                [None if math.isnan(value) else value for value in row] for row in self.table.values.tolist()
-            ],
+            "trials": json_ready(self.table.values.tolist()),
         }
         return {**content, "sha256": digest(content)}
 

@@ -70,7 +70,7 @@ def as_json(model: Model) -> dict[str, Any]:
         "classifier": model.component,
         "settings": json_ready(model.settings),
         "target": model.target,
-        "features": [[name, unit] for name, unit in zip(model.names, model.units, strict=True)],
+        "features": list(zip(model.names, model.units, strict=True)),
         "provenance": json_ready(model.provenance),
         "unknown": model.novelty.to_json(),
         **({} if model.sets is None else {"sets": model.sets.to_json()}),

@@ -17,6 +17,7 @@ from attrs import frozen
 from graspsense.core.learn.stored_values import StoredValues
 from graspsense.core.values.errors import listed
 from graspsense.core.values.features import Features, FeatureTable
+from graspsense.core.values.json_values import json_ready
 from graspsense.core.values.reasons import FeatureValue, Reason
 from graspsense.core.values.units import in_words
 
@@ -137,10 +138,12 @@ class Novelty:
             "reach": REACH,
             "featureless": self.featureless,
             "complete": [name for name, complete in zip(self.names, self.complete, strict=True) if complete],
-            "spread": _plain(self.spread),
+            "spread": json_ready(self.spread.tolist()),
             "ranges": {
-                label: [_plain(self.lowest[k]), _plain(self.highest[k])]
-                for k, label in enumerate(self.classes)
+                label: json_ready([lowest, highest])
+                for label, lowest, highest in zip(
+                    self.classes, self.lowest.tolist(), self.highest.tolist(), strict=True
+                )
             },
         }
 
@@ -214,7 +217,3 @@ def _worst(outside: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the maximum along the last axis, ignoring NaN; infinite if all are NaN."""
     known = ~np.isnan(outside)
     return np.where(known.any(axis=-1), np.where(known, outside, -1.0).max(axis=-1), np.inf)
-
-
-def _plain(values: NDArray[np.float64]) -> list[float | None]:
-    return [None if math.isnan(v) else v for v in values.tolist()]
