@@ -26,6 +26,7 @@ trials. Below 1 they move apart. The order of the labels stays.
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
@@ -114,16 +115,38 @@ class Certainty:
         self, probability: NDArray[np.float64], support: NDArray[np.float64], labels: Sequence[str]
     ) -> NDArray[np.float64]:
         """Return the rate of right answers with this probability, support and label; NaN where it is not known."""
-        return self._rate(probability, support) * [of_label.share for of_label in self._of_labels(labels)]
+        return self.rate_of_all(probability, support) * [share.share for share in self._of_labels(labels)]
 
-    def _rate(self, probability: NDArray[np.float64], support: NDArray[np.float64]) -> NDArray[np.float64]:
+    def rate_of_all(
+        self, probability: NDArray[np.float64], support: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
         """Return the rate of right answers with this probability and support, of all labels together."""
-        chosen, steps = self._places(probability, support)
-        result = np.empty(len(probability))
-        for k, support_class in enumerate(self.classes):
-            rows = chosen == k
-            result[rows] = np.array(support_class.rates)[steps[rows]]
-        return result
+        return np.array([rate for rate, _ in self._steps(probability, support)])
+
+    def intervals(
+        self, probability: NDArray[np.float64], support: NDArray[np.float64], labels: Sequence[str]
+    ) -> list[tuple[float, float] | None]:
+        """Return the 95 % interval of the rate of each answer; None where it was not kept."""
+        steps = self._steps(probability, support)
+        return [
+            interval
+            and (
+                min(interval[0] * of_label.share, rate * of_label.low),
+                min(max(interval[1] * of_label.share, rate * of_label.high), 1.0),
+            )
+            for (rate, interval), of_label in zip(steps, self._of_labels(labels), strict=True)
+        ]
+
+    def _steps(
+        self, probability: NDArray[np.float64], support: NDArray[np.float64]
+    ) -> list[tuple[float, tuple[float, float] | None]]:
+        """Return the rate of each answer, of all labels together, and its interval, None where it was not kept."""
+        steps = []
+        for k, value in zip(self.class_of(support).tolist(), probability.tolist(), strict=True):
+            of_class = self.classes[k]
+            step = bisect_right(of_class.probabilities, value + _ROUNDING, lo=1) - 1
+            steps.append((of_class.rates[step], of_class.intervals[step] if of_class.intervals else None))
+        return steps
 
     def _of_labels(self, labels: Sequence[str]) -> list[LabelShare]:
         """Return the share of each of these labels; NaN for one that was too seldom the answer."""
@@ -131,37 +154,6 @@ class Certainty:
             return [LabelShare(share=1.0, low=1.0, high=1.0)] * len(labels)
         unknown = LabelShare(share=math.nan, low=math.nan, high=math.nan)
         return [self.of_label.get(label, unknown) for label in labels]
-
-    def intervals(
-        self, probability: NDArray[np.float64], support: NDArray[np.float64], labels: Sequence[str]
-    ) -> list[tuple[float, float] | None]:
-        """Return the 95 % interval of the rate of each answer; None where it was not kept."""
-        chosen, steps = self._places(probability, support)
-        kept = [
-            support_class.intervals or (None,) * len(support_class.rates) for support_class in self.classes
-        ]
-        intervals = [kept[k][step] for k, step in zip(chosen.tolist(), steps.tolist(), strict=True)]
-        rates = self._rate(probability, support).tolist()
-        return [
-            interval
-            and (
-                min(interval[0] * of_label.share, rate * of_label.low),
-                min(max(interval[1] * of_label.share, rate * of_label.high), 1.0),
-            )
-            for interval, rate, of_label in zip(intervals, rates, self._of_labels(labels), strict=True)
-        ]
-
-    def _places(
-        self, probability: NDArray[np.float64], support: NDArray[np.float64]
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return the class of support of each answer, and the place of its rate there."""
-        chosen = self.class_of(support)
-        steps = np.empty(len(probability), dtype=np.int64)
-        for k, support_class in enumerate(self.classes):
-            rows = chosen == k
-            begins = np.array(support_class.probabilities[1:]) - _ROUNDING
-            steps[rows] = np.searchsorted(begins, probability[rows], side="right")
-        return chosen, steps
 
     def to_json(self) -> list[dict[str, Any]]:
         """Return the rates as values that JSON represents exactly."""
@@ -257,7 +249,7 @@ def certainty_of(
             )
         )
     of_all = Certainty(classes=tuple(classes))
-    promised = of_all._rate(probability, support)
+    promised = of_all.rate_of_all(probability, support)
     return evolve(of_all, of_label=_shares(np.array(labels), answers, promised, weights / effect, effect))
 
 
@@ -386,6 +378,10 @@ def _drawn_together(
 ) -> NDArray[np.float64]:
     """Return the rates of rising levels, drawn towards their mean, and it towards guessing, by what chance spreads.
 
+    Of the distance of the mean from guessing remains what has the least squared error if it is as large as it seems:
+    s / (s + 1), where s is its square in variances. To take off what chance makes, as from the spread of the levels,
+    would leave nothing of 13 right answers of 20.
+
     Levels of `bins` equal rates have a sum of squares that is distributed as chi-bar-square: of their mean number
     1 + 1/2 + ... + 1/bins, one is the mean (Barlow et al., 1972, chapter 3). That it shrinks the rates as the share of
     the spread is empirical Bayes (C. N. Morris, J. Am. Stat. Assoc. 78 (1983) 47). Chance makes several levels with the
@@ -394,18 +390,14 @@ def _drawn_together(
     mean = float(right.sum() / units.sum())
     likely = (float(right.sum()) + 1.0) / (float(units.sum()) + 2.0)
     above = units.sum() * (mean - guessing) ** 2 / (likely * (1.0 - likely))
-    drawn = guessing + _beyond(above, 1.0) * (mean - guessing) if mean > guessing else mean
+    drawn = guessing + above / (above + 1.0) * (mean - guessing) if mean > guessing else mean
     rates = right / units
     if len(rates) == 1:
         return np.array([drawn])
     spread = float((units * (rates - mean) ** 2).sum()) / (mean * (1.0 - mean))
     by_chance = sum(1.0 / k for k in range(2, bins + 1)) / (1.0 - 1.0 / bins)
-    return np.asarray(drawn + _beyond(spread, by_chance) * (rates - mean))
-
-
-def _beyond(spread: float, by_chance: float) -> float:
-    """Return the share of a sum of squares that chance does not explain."""
-    return 1.0 - by_chance / spread if spread > by_chance else 0.0
+    remaining = 1.0 - by_chance / spread if spread > by_chance else 0.0
+    return np.asarray(drawn + remaining * (rates - mean))
 
 
 LEAST_PROBABILITY: Final = 1e-4

@@ -132,17 +132,16 @@ class Model:
         if misfit:
             because = (misfit,)
         else:
-            chosen = _chosen(features, self.names)
-            bounded = _bounded(chosen)
-            explained = self.classifier.explain(bounded)
+            table = table_of([features]).columns(self.names)
+            chosen, bounded = table.row(0), _bounded(table)
+            explained = self.classifier.explain(bounded.row(0))
             classes = self.classifier.classes()
             shares = np.array([[explained.probabilities.get(name, 0.0) for name in classes]])
             with self._usable():
                 refuse_improbable(shares, 1, len(classes))
             warnings = (*explained.warnings, *warnings)
             strange = self.novelty.unlike(chosen)
-            table = table_of([bounded])
-            (prediction,) = self._calibrated(table, [explained.label], shares, bool(differences))
+            (prediction,) = self._calibrated(bounded, [explained.label], shares, bool(differences))
             if strange is None:
                 return evolve(
                     prediction,
@@ -256,8 +255,7 @@ class Model:
         if misfit:
             raise ConfigError(misfit)
         chosen = table.columns(self.names)
-        bounded = evolve(chosen, values=np.clip(chosen.values, -LARGEST_VALUE, LARGEST_VALUE))
-        shares = self.classifier.probabilities(bounded)
+        shares = self.classifier.probabilities(_bounded(chosen))
         with self._usable():
             refuse_improbable(shares, len(table), len(self.classifier.classes()))
         unlike = self.novelty.unlike_rows(chosen).tolist()
@@ -429,21 +427,6 @@ def _not_compared(config_class: type) -> frozenset[str]:
     return unchanging | settings_marked(config_class, NAMES_INPUT) | {"type"}
 
 
-def _chosen(features: Features, names: Sequence[str]) -> Features:
-    if features.names == tuple(names):
-        return features
-    places = [features.names.index(name) for name in names]
-    return Features(
-        names=tuple(names),
-        values=tuple(features.values[i] for i in places),
-        units=tuple(features.units[i] for i in places),
-        reasons={name: why for name, why in features.reasons.items() if name in names},
-    )
-
-
-def _bounded(features: Features) -> Features:
+def _bounded(table: FeatureTable) -> FeatureTable:
     """Return the features for a classifier: one that is too large to compute with is as large as can be."""
-    if all(not abs(value) > LARGEST_VALUE for value in features.values):
-        return features
-    values = tuple(min(max(value, -LARGEST_VALUE), LARGEST_VALUE) for value in features.values)
-    return evolve(features, values=values)
+    return evolve(table, values=np.clip(table.values, -LARGEST_VALUE, LARGEST_VALUE))
