@@ -12,7 +12,7 @@ from attrs import evolve, frozen
 
 from graspsense.core.components.entries import TABLE_OF_ROLE
 from graspsense.core.components.setting import CHANGES_NO_RESULT, NAMES_INPUT, settings_marked, worded
-from graspsense.core.learn.certainty import LABEL_UNITS, Certainty, at_temperature, with_certainty
+from graspsense.core.learn.certainty import LABEL_UNITS, Certainty, with_certainty
 from graspsense.core.learn.conformal import Answers, PredictionSets, scores_of
 from graspsense.core.learn.novelty import Novelty
 from graspsense.core.values.errors import ConfigError, DataDamaged
@@ -64,8 +64,6 @@ class Model:
     """Calibrated prediction sets; None in a model that was never calibrated."""
     certainty: Certainty | None = None
     """How often its answers are right, by their support; None in a model that is not calibrated."""
-    temperature: float | None = None
-    """The temperature (`learn.certainty`) of the probabilities of the labels that are not predicted."""
     learned_from: tuple[str, ...] = ()
     """The hashes (`learn.copies`) of the recorded trials that it was trained on."""
     checkpoints: tuple[tuple[float, Model], ...] = ()
@@ -200,7 +198,7 @@ class Model:
             kept = self.certainty.intervals(share, support, answered)
             measured = np.array([not names for names in lacking])
             known &= measured
-            calibrated = with_certainty(at_temperature(shares, self.temperature), predicted, certainty)
+            calibrated = with_certainty(shares, predicted, certainty)
             probabilities = np.where(measured[:, np.newaxis], calibrated, shares)
             # No answer counts as less certain than chance, however seldom such answers were right.
             own = calibrated[np.arange(len(table)), predicted].tolist()

@@ -14,9 +14,9 @@ import numpy as np
 from attrs import evolve
 
 from graspsense.core.components.entries import ModelEntry
-from graspsense.core.learn.certainty import TEMPERATURES, Certainty, certainty_from
+from graspsense.core.learn.certainty import Certainty, certainty_from
 from graspsense.core.learn.conformal import COVERAGES, PredictionSets, sets_from
-from graspsense.core.learn.model import COMPARED_TABLES, EQUAL, Model, checkpoint_model, refuse_improbable
+from graspsense.core.learn.model import COMPARED_TABLES, Model, checkpoint_model, refuse_improbable
 from graspsense.core.learn.model_content import (
     REGRESSION_FORMAT,
     digest,
@@ -96,7 +96,6 @@ def _learned_as_json(model: Model) -> dict[str, Any]:
         "unknown": model.novelty.to_json(),
         "sets": None if model.sets is None else model.sets.to_json(),
         **_certainty_as_json(model.certainty),
-        "temperature": model.temperature,
         "model": model.classifier.to_json(),
     }
 
@@ -208,18 +207,14 @@ def _learned_from(
     novelty = novelty_from(names, units, stored.table("unknown"))
     if sorted(novelty.classes) != sorted(classifier.classes()):
         raise stored.refusal("unknown.ranges", "they are not those of the labels of the classifier")
-    certainty, temperature = None, None
+    certainty = None
     if stored.has("certainty"):
         of_label = stored.table("certainty_of_label") if "certainty_of_label" in stored else None
         certainty = certainty_from(stored.tables("certainty"), of_label)
-    if stored.has("temperature"):
-        least, most = TEMPERATURES
-        temperature = stored.number("temperature", least * (1.0 - EQUAL), most * (1.0 + EQUAL))
     return {
         "classifier": classifier,
         "novelty": novelty,
         "certainty": certainty,
-        "temperature": temperature,
         "sets": _sets_from(stored, classifier, certainty) if stored.has("sets") else None,
     }
 
