@@ -6,7 +6,6 @@ loaded: nothing is imported, evaluated or unpickled. Its `sha256` is the hash of
 
 from __future__ import annotations
 
-import platform
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,7 +14,6 @@ from typing import Any, Final
 import numpy as np
 from attrs import frozen
 
-from graspsense import __version__
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.model import differences_from
 from graspsense.core.learn.model_content import (
@@ -29,6 +27,7 @@ from graspsense.core.learn.model_content import (
 from graspsense.core.learn.novelty import Novelty, novelty_of
 from graspsense.core.learn.stored_values import LARGEST_SEED, StoredValues
 from graspsense.core.learn.target_value import TargetValue
+from graspsense.core.learn.training import training_provenance
 from graspsense.core.values.errors import ConfigError, DataDamaged, counted
 from graspsense.core.values.features import FeatureTable, misfit
 from graspsense.core.values.json_values import json_ready
@@ -170,18 +169,7 @@ def train_regression(
         novelty=_novelty(labelled.table),
         intervals=intervals,
         made_with=_sklearn(),
-        provenance={
-            "source": labelled.source,
-            "trials": len(labelled),
-            "seed": seed,
-            "versions": {
-                "graspsense": __version__,
-                "numpy": np.__version__,
-                "python": platform.python_version(),
-            },
-            **labelled.provenance,
-            **(provenance or {}),
-        },
+        provenance={**training_provenance(labelled, seed, {}), **(provenance or {})},
     )
 
 

@@ -240,16 +240,20 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
             "seed": fitted.seed,
             "features": list(zip(fitted.table.names, fitted.table.units, strict=True)),
         }
-        if getattr(self.config, "kept_as", "trials") == "skops":
-            from graspsense.plugins.classifiers.skops_text import as_text
-
+        if getattr(self.config, "kept_as", "trials") != "trials":
             ready = {name: getattr(fitted, name).tolist() for name in ("fill", "mean", "scale")}
-            return {**kept, **ready, "skops": as_text(fitted.estimator)}
+            return {**kept, **ready, **self.estimator_as_json(fitted.estimator)}
         return {
             **kept,
             "labels": list(fitted.labels),
             "trials": json_ready(fitted.table.values.tolist()),
         }
+
+    def estimator_as_json(self, estimator: Any) -> dict[str, Any]:
+        """Return the fitted estimator itself, as the setting `kept_as` asks for it."""
+        from graspsense.plugins.classifiers.skops_text import as_text
+
+        return {"skops": as_text(estimator)}
 
     def from_json(self, model: Mapping[str, Any]) -> None:
         """Restore the model. Raises DataDamaged or ValueError."""
