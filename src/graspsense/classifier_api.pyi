@@ -5,7 +5,6 @@ from graspsense.core.values.reasons import Reason as Reason
 from graspsense.core.values.reasons import FeatureValue as FeatureValue
 from graspsense.core.values.reasons import Contribution as Contribution
 from graspsense.core.values.reasons import contribution_reasons as contribution_reasons
-from graspsense.core.values.reasons import Scale as Scale
 from graspsense.core.values.reasons import feature_values as feature_values
 from graspsense.core.values.reasons import missing_feature as missing_feature
 from graspsense.core.values.units import in_words as in_words

@@ -333,11 +333,11 @@ def begins_of(
     """Return at which of these rising bounds a new band of values begins, so that each band has this weight."""
     order = np.argsort(values, kind="stable")
     below = np.concatenate([[0.0], np.cumsum(weights[order])])[np.searchsorted(values[order], bounds)]
-    begins, before, total = [], 0.0, float(weights.sum())
+    begins, banded, total = [], 0.0, float(weights.sum())
     for bound, weight in zip(bounds, below.tolist(), strict=True):
-        if min(weight - before, total - weight) >= least - _ROUNDING:
+        if min(weight - banded, total - weight) >= least - _ROUNDING:
             begins.append(bound)
-            before = weight
+            banded = weight
     return begins
 
 
@@ -367,7 +367,7 @@ def _steps(
     rates = (units * _drawn_together(right_in, units, len(all_of), guessing) + 1.0) / (units + 2.0)
     rates = np.maximum.accumulate(rates)
     ends = (betaincinv(rates * (units + 2.0), (1.0 - rates) * (units + 2.0), end) for end in (0.025, 0.975))
-    begins = (edges[first] for first in first_of.tolist())
+    begins = (edges[number] for number in first_of.tolist())
     return tuple(begins), tuple(rates.tolist()), tuple(zip(*(end.tolist() for end in ends), strict=True))
 
 

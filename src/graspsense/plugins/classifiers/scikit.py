@@ -22,7 +22,6 @@ from graspsense.classifier_api import (
     LARGEST_SEED,
     FeatureValue,
     Reason,
-    Scale,
     contribution_reasons,
     feature_values,
     in_words,
@@ -100,7 +99,11 @@ class ExplainedTrial:
         return next(iter(self.shares))
 
     def contributions(
-        self, parts: Sequence[float], start: float, scale: Scale = "probability", against: str = ""
+        self,
+        parts: Sequence[float],
+        start: float,
+        scale: Literal["probability", "log-odds"] = "probability",
+        against: str = "",
     ) -> tuple[Reason, ...]:
         """Return as reasons what each feature contributes to the label, beside what holds before any feature."""
         each = [((feature,), value) for feature, value in zip(self.given, parts, strict=True)]
