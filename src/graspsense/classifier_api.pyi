@@ -5,6 +5,7 @@ from graspsense.core.values.reasons import Reason as Reason
 from graspsense.core.values.reasons import FeatureValue as FeatureValue
 from graspsense.core.values.reasons import Contribution as Contribution
 from graspsense.core.values.reasons import contribution_reasons as contribution_reasons
+from graspsense.core.values.reasons import feature_values as feature_values
 from graspsense.core.values.reasons import missing_feature as missing_feature
 from graspsense.core.values.units import in_words as in_words
 
@@ -19,6 +20,8 @@ from graspsense.core.values.features import table_of as table_of
 from graspsense.core.values.nominal import CodedColumn as CodedColumn
 from graspsense.core.values.nominal import codes_of as codes_of
 from graspsense.core.values.nominal import with_codes as with_codes
+
+from graspsense.core.values.json_values import json_ready as json_ready
 
 # Linear algebra
 from graspsense.core.learn.one_thread import one_thread as one_thread

@@ -269,7 +269,7 @@ def test_an_unknown_trial_and_a_model_without_calibration_have_no_set(tmp_path):
     assert 0 <= model.sets.unknown < len(trials) / 5
 
     old = kept(evolve(model, sets=None), tmp_path)
-    assert "sets" not in json.loads((tmp_path / "m.json").read_text())
+    assert json.loads((tmp_path / "m.json").read_text())["sets"] is None
     assert old.predict(trials.table.row(0)).coverage is None
 
 
@@ -498,10 +498,12 @@ def test_rare_labels_whose_few_answers_were_all_right_are_hardly_surer_than_othe
 
 
 def test_answers_of_a_cross_validation_count_for_less():
-    # All n right answers with two labels: (n + 1) / (n + 2), and of that what is not drawn towards guessing.
-    for effect, rate in ((1.0, 21 / 22 * (1 - 2 / 22**2)), (2.0, 11 / 12 * (1 - 2 / 12**2))):
+    for effect, units in ((1.0, 20), (2.0, 10)):
         certainty = certainty_from([1.0] * 20, [True] * 20, effect=effect)
-        assert certainty.rate(*asked([1.0])) == pytest.approx([rate])
+        # All are right, of two labels: the square of the distance from guessing, 1/2, is so many variances.
+        variances = units * (units + 2) ** 2 / 4.0 / (units + 1)
+        right = units * (1.0 - 0.5 / (variances + 1.0))
+        assert certainty.rate(*asked([1.0])) == pytest.approx([(right + 1.0) / (units + 2.0)])
 
 
 def test_answers_for_one_object_count_for_more_than_one_where_the_objects_hardly_differ():

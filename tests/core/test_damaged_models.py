@@ -50,7 +50,7 @@ def labelled(n=5):
 
 @cache
 def trained(name, **config):
-    """A model with everything that a file can have: certainty, prediction sets, a temperature and a checkpoint."""
+    """A model with everything that a file can have: certainty, prediction sets and a checkpoint."""
     component = installed().find("classifier", name)
     settings = create("classifier", name, **{**SMALL.get(name, {}), **config}).config
     provenance = {"settings": {"controller": {"type": "hybrid", "probing_force_n": 20.0}}}
@@ -67,7 +67,7 @@ def trained(name, **config):
     low = SupportClass(least=0.0, probabilities=(0.4, 0.9), rates=(0.3, 0.7), units=30.0)
     of_label = dict.fromkeys(labels, LabelShare(share=0.9, low=0.7, high=1.1))
     certainty = Certainty(classes=(low, evolve(low, least=4.0)), of_label=of_label)
-    model = evolve(model, sets=sets, temperature=1.5, certainty=certainty)
+    model = evolve(model, sets=sets, certainty=certainty)
     return evolve(model, checkpoints=((0.2, checkpoint_model(model, 0.2, model)),))
 
 
@@ -170,7 +170,6 @@ def test_what_is_no_strict_json_is_refused(tmp_path, text, says):
         ("certainty_of_label.bottle:empty", [0.9, 1.2, 1.3]),
         ("checkpoints.0.certainty", [{}]),
         ("sets.unknown", 16),
-        ("temperature", 1e-300),
         ("unknown.spread", [1.0, 1.0]),
         ("unknown.spread", [1.0, -1.0, 1.0]),
         ("unknown.ranges.bottle:empty", [[1.0, 1.0, 1.0], [0.0, 2.0, 2.0]]),

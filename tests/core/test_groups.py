@@ -118,6 +118,28 @@ def test_windows_and_grasps_of_unnamed_objects_in_any_order_are_held_out_togethe
     assert told["single"] == told["inside and outside"] == 0
 
 
+def test_noisy_copies_of_every_trial_in_any_order_are_in_groups_of_about_as_many():
+    groups, whole = [], []
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        original = rng.permutation(np.repeat(np.arange(60), 3))
+        numbers = original % 3
+        values = rng.normal(size=(60, 4))[original] + numbers[:, np.newaxis]
+        noisy = values + 0.15 * rng.normal(size=values.shape)
+        trials = grouped(table_of(numbers, noisy), NO_COPIES)
+        groups.append(len(set(trials.instances or ())))
+        in_groups = {*zip(trials.instances or (), original.tolist(), strict=True)} if groups[-1] else ()
+        whole.append(len(in_groups))
+        # On a lattice, distances repeat: that is no sign of copies.
+        single = rng.normal(size=(150, 3))
+        for coarse in (single, single.round(1), single.round()):
+            alone = table_of(np.arange(150) % 2, coarse)
+            assert grouped(alone, NO_COPIES) is alone
+    assert min(groups) > 30
+    assert max(groups) <= 60
+    assert max(whole) < 1.5 * 60, "most copies of a trial are in one group"
+
+
 def test_neighbours_are_alike_or_not_also_where_rounded_features_are_equal_by_chance():
     rng = np.random.default_rng(1)
     numbers, values = by_object(rng)

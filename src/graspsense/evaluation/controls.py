@@ -32,27 +32,14 @@ class ControlMeasurements:
 
     def measure(self, protocols: Mapping[str, Measurement], permutations: int) -> dict[str, Measurement]:
         """Measure the controls, and warn if they show that the recording itself reveals the labels."""
-        trials = self.trials
-        opening = trials.first_line
         majority_correct, majority = self._majority()
         controls = {
-            "before_contact": self._other_features(
-                "before_contact",
-                trials.before_contact,
-                "features from before contact only",
-                trials.no_before_contact,
-            ),
-            **({} if opening is None else {"first_line": self._other_features("first_line", opening)}),
-            "width_only": self._other_features(
-                "width_only", trials.width, "the width alone", trials.no_width
-            ),
+            **{features[0]: self._other_features(*features) for features in self.trials.other_features()},
             self.evaluator.held_out_name: protocols[self.evaluator.held_out_name],
             "recording_order": self._in_order(),
             "majority_class": majority,
             "shuffled_labels": self._shuffled(permutations),
         }
-        for name, control in trials.variants.items():
-            controls[name] = self._other_features(name, control)
         self._warn_of_early_recognition(controls, majority_correct)
         self._warn_of_leaks(controls)
         self._warn_of_width(controls["width_only"])
@@ -74,11 +61,7 @@ class ControlMeasurements:
         return self.evaluator.against(what, blocks, plain, self.evaluator.stratified_name)
 
     def _other_features(
-        self,
-        name: str,
-        control: ControlFeatures | None,
-        default: str = "",
-        reason: str = "",
+        self, name: str, control: ControlFeatures | None, default: str, reason: str
     ) -> Measurement:
         """Measure the rate with other features on the folds of the headline, among the trials that have any of them.
 

@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 
 from graspsense.core.learn.certainty import (
     Certainty,
-    at_temperature,
     certainty_of,
-    temperature_of,
     with_certainty,
 )
 from graspsense.core.learn.conformal import (
@@ -90,15 +88,14 @@ class Reliability:
     calibration_error: float
     curve: tuple[ReliabilityBin, ...]
     uncalibrated_error: float | None = None
-    """The calibration error of the probabilities that the classifier itself gives, before temperature scaling."""
+    """The calibration error of the probabilities that the classifier itself gives, before calibration."""
 
 
 @frozen(kw_only=True, eq=False)
 class _Calibration:
-    """What held-out trials tell of later answers: their certainty, the temperature, and the prediction sets."""
+    """What held-out trials tell of later answers: their certainty, and the prediction sets."""
 
     certainty: Certainty
-    temperature: float | None
     sets: PredictionSets
 
     def answers(self, pooled: Pooled, rows: NDArray[np.int64]) -> Answers:
@@ -107,11 +104,8 @@ class _Calibration:
 
     def probabilities(self, pooled: Pooled, rows: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the calibrated probabilities of these trials."""
-        return with_certainty(
-            at_temperature(pooled.probabilities[rows], self.temperature),
-            pooled.columns[rows],
-            self.answers(pooled, rows).certainty,
-        )
+        certainty = self.answers(pooled, rows).certainty
+        return with_certainty(pooled.probabilities[rows], pooled.columns[rows], certainty)
 
 
 def calibrated(model: Model, learner: ClassifierFactory, labelled: Labelled, seed: int) -> Model:
@@ -163,7 +157,6 @@ def calibrated_with(model: Model, answers: Pooled, labelled: Labelled) -> Model:
     return evolve(
         model,
         certainty=calibration.certainty,
-        temperature=calibration.temperature,
         sets=evolve(
             calibration.sets,
             unit=_unit(instances, labelled.grouped, labelled.sessions),
@@ -207,7 +200,6 @@ def _calibration(
     truth = columns_of(labels, pooled.classes)[rows]
     return _Calibration(
         certainty=certainty,
-        temperature=temperature_of(pooled.probabilities[rows], truth),
         sets=sets_of(_answers(certainty, pooled, rows), truth, pooled.classes, own),
     )
 

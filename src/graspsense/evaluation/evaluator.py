@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any, Final
 
 import numpy as np
-from attrs import frozen
+from attrs import define, frozen
 
 from graspsense.core.learn.labelled import Labelled, Target, class_of
 from graspsense.core.values.features import FeatureTable
@@ -43,27 +43,25 @@ class Headline:
     assign: Callable[[Sequence[str]], list[Folds]]
 
 
+@define(eq=False, slots=False)
 class Evaluator:
     """The measurements of one evaluation. `notes` collects what a reader must know."""
 
-    def __init__(
-        self,
-        learner: ClassifierFactory,
-        trials: Labelled,
-        target: Target,
-        k: int,
-        seed: int,
-        progress: Progress | None,
-        notes: list[str],
-    ) -> None:
-        self.learner, self.trials, self.k, self.seed = learner, trials, k, seed
-        self.progress, self.notes = progress, notes
-        self.labels = trials.labels
-        self.rate_among = partial(rate_among, trials, folds=k)
-        self.groups = trials_by_class(self.labels, target)
-        self._featureless = np.isnan(trials.table.values).all(axis=1)
-        self.stratified_name = f"stratified_{k}_fold"
-        self.held_out_name = held_out_protocol(trials)
+    learner: ClassifierFactory
+    trials: Labelled
+    target: Target
+    k: int
+    seed: int
+    progress: Progress | None
+    notes: list[str]
+
+    def __attrs_post_init__(self) -> None:
+        self.labels = self.trials.labels
+        self.rate_among = partial(rate_among, self.trials, folds=self.k)
+        self.groups = trials_by_class(self.labels, self.target)
+        self._featureless = np.isnan(self.trials.table.values).all(axis=1)
+        self.stratified_name = f"stratified_{self.k}_fold"
+        self.held_out_name = held_out_protocol(self.trials)
         self.pooled_by_protocol: dict[str, Pooled] = {}
 
     def measure_protocols(self) -> tuple[Headline, dict[str, Measurement]]:

@@ -158,15 +158,11 @@ def evaluate_kind(
 
     def scores(factors: Sequence[float]) -> tuple[EventScore, EventScore, dict[str, tuple[int, int, int]]]:
         """Return the score with these factors, one for each row, that of chance, and the numbers of each group."""
-        told_s = [told(k, by).get(name, ()) for (k, _), by in zip(rows, factors, strict=True)]
-        results = [
-            recording.outcomes(name, t_s, tolerance_s)
-            for (_, recording), t_s in zip(rows, told_s, strict=True)
-        ]
-        moved = [
-            recording.outcomes(name, recording.moved(t_s), tolerance_s)
-            for (_, recording), t_s in zip(rows, told_s, strict=True)
-        ]
+        results, moved = [], []
+        for (k, recording), by in zip(rows, factors, strict=True):
+            t_s = told(k, by).get(name, ())
+            results.append(recording.outcomes(name, t_s, tolerance_s))
+            moved.append(recording.outcomes(name, recording.moved(t_s), tolerance_s))
         seconds = math.fsum(recording.seconds for _, recording in rows)
         return (
             _score(results, groups, seconds, seed),

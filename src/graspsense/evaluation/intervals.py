@@ -17,6 +17,7 @@ The variance of such a rate is multiplied by 1 + k / (k - 1) for k folds (C. Nad
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
@@ -310,10 +311,8 @@ def _newcombe(
     minuend: Sequence[bool], subtrahend: Sequence[bool], effect: float, quantile: float
 ) -> Interval:
     """Return the interval of a difference on independent trials, as if these were fewer by the design effect."""
-    n = len(minuend)
-    both = sum(1 for x, y in zip(minuend, subtrahend, strict=True) if x and y)
-    only_first = sum(1 for x, y in zip(minuend, subtrahend, strict=True) if x and not y)
-    only_second = sum(1 for x, y in zip(minuend, subtrahend, strict=True) if y and not x)
+    n, pairs = len(minuend), Counter(zip(minuend, subtrahend, strict=True))
+    both, only_first, only_second = pairs[True, True], pairs[True, False], pairs[False, True]
     neither = n - both - only_first - only_second
     right1, right2 = both + only_first, both + only_second
     p1, p2 = right1 / n, right2 / n

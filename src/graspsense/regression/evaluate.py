@@ -180,7 +180,7 @@ class _Evaluator:
 
     def measure_controls(self) -> None:
         """Measure what the number can be predicted from besides the squeeze."""
-        trials, folds = self.trials, self.headline.folds
+        folds = self.headline.folds
         mean = np.empty(len(self.values))
         for fold in np.unique(folds).tolist():
             mean[folds == fold] = self.values[folds != fold].mean()
@@ -188,15 +188,8 @@ class _Evaluator:
         self.controls["mean_only"] = self._against(
             "always the mean of the training trials", self.mean, self.headline
         )
-        self._other_features("width_only", trials.width, "the width alone", trials.no_width)
-        self._other_features(
-            "before_contact",
-            trials.before_contact,
-            "features from before contact only",
-            trials.no_before_contact,
-        )
-        if trials.first_line is not None:
-            self._other_features("first_line", trials.first_line, "", "")
+        for features in self.trials.other_features():
+            self._other_features(*features)
         held_out_name = held_out_protocol(self.trials)
         self.controls[held_out_name] = self.protocols[held_out_name]
         self._in_order()

@@ -6,8 +6,6 @@ loaded: nothing is imported, evaluated or unpickled. Its `sha256` is the hash of
 
 from __future__ import annotations
 
-import math
-import platform
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,7 +14,6 @@ from typing import Any, Final
 import numpy as np
 from attrs import frozen
 
-from graspsense import __version__
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.model import differences_from
 from graspsense.core.learn.model_content import (
@@ -30,6 +27,7 @@ from graspsense.core.learn.model_content import (
 from graspsense.core.learn.novelty import Novelty, novelty_of
 from graspsense.core.learn.stored_values import LARGEST_SEED, StoredValues
 from graspsense.core.learn.target_value import TargetValue
+from graspsense.core.learn.training import training_provenance
 from graspsense.core.values.errors import ConfigError, DataDamaged, counted
 from graspsense.core.values.features import FeatureTable, misfit
 from graspsense.core.values.json_values import json_ready
@@ -128,15 +126,13 @@ class RegressionModel:
             "version": VERSION,
             "estimator": self.estimator,
             "target_value": [self.target.name, self.target.unit],
-            "features": [list(column) for column in zip(self.table.names, self.table.units, strict=True)],
+            "features": list(zip(self.table.names, self.table.units, strict=True)),
             "provenance": json_ready(self.provenance),
             "interval": self.intervals.to_json(),
             "made_with": self.made_with,
             "seed": self.seed,
             "values": list(self.target.values),
-            "trials": [
-                [None if math.isnan(value) else value for value in row] for row in self.table.values.tolist()
-            ],
+            "trials": json_ready(self.table.values.tolist()),
         }
         return {**content, "sha256": digest(content)}
 
@@ -173,18 +169,7 @@ def train_regression(
         novelty=_novelty(labelled.table),
         intervals=intervals,
         made_with=_sklearn(),
-        provenance={
-            "source": labelled.source,
-            "trials": len(labelled),
-            "seed": seed,
-            "versions": {
-                "graspsense": __version__,
-                "numpy": np.__version__,
-                "python": platform.python_version(),
-            },
-            **labelled.provenance,
-            **(provenance or {}),
-        },
+        provenance={**training_provenance(labelled, seed, {}), **(provenance or {})},
     )
 
 

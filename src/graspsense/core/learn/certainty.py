@@ -15,17 +15,14 @@ Where labels are not equally frequent, answers with a rare one are right less of
 a rate is multiplied by how often the answers with its label were right, as a share of what their rates promise. Of few
 answers that share is partly luck: it is drawn towards that of all labels as rare, which is drawn towards a half.
 
-The probabilities of the other labels are calibrated by temperature scaling: p becomes p^(1/T), divided by the sum of
-these (C. Guo, G. Pleiss, Y. Sun and K. Q. Weinberger, On calibration of modern neural networks, ICML 2017, section
-4.2). The temperature T gives the smallest Brier score for trials that were predicted without their instance. (Their
-likelihood would be decided by the few whose true label got the probability 0, as trees and nearest neighbours give it.)
-Above 1 the probabilities move towards each other: the classifier was too sure, as a tree is whose leaves have few
-trials. Below 1 they move apart. The order of the labels stays.
+The other labels share what remains in proportion to their probabilities. A probability of 0, as trees and nearest
+neighbours give it, says that few training trials had the label, and not that it is impossible.
 """
 
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
@@ -60,6 +57,11 @@ FURTHER_UNITS: Final = 3.0
 """Units whose answers are all alike that count beside those that are known, for the variance between units."""
 AS_RARE: Final = 2.0
 """Labels with at most this many times the answers of a label are as rare."""
+UNSEEN: Final = 0.005
+"""What each other label has besides its probability.
+
+Over 900 simulated grasps of 15 labels, the Brier score is 0.478 for c45 and 0.445 for knn; without it, 0.481 and 0.451.
+"""
 SUPPORT_BOUNDS: Final = (5.0, 10.0, 20.0, 40.0, 80.0)
 """Numbers of training trials at which a class of support may begin."""
 _ROUNDING: Final = 1e-9
@@ -114,16 +116,38 @@ class Certainty:
         self, probability: NDArray[np.float64], support: NDArray[np.float64], labels: Sequence[str]
     ) -> NDArray[np.float64]:
         """Return the rate of right answers with this probability, support and label; NaN where it is not known."""
-        return self._rate(probability, support) * [of_label.share for of_label in self._of_labels(labels)]
+        return self.rate_of_all(probability, support) * [share.share for share in self._of_labels(labels)]
 
-    def _rate(self, probability: NDArray[np.float64], support: NDArray[np.float64]) -> NDArray[np.float64]:
+    def rate_of_all(
+        self, probability: NDArray[np.float64], support: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
         """Return the rate of right answers with this probability and support, of all labels together."""
-        chosen, steps = self._places(probability, support)
-        result = np.empty(len(probability))
-        for k, support_class in enumerate(self.classes):
-            rows = chosen == k
-            result[rows] = np.array(support_class.rates)[steps[rows]]
-        return result
+        return np.array([rate for rate, _ in self._steps(probability, support)])
+
+    def intervals(
+        self, probability: NDArray[np.float64], support: NDArray[np.float64], labels: Sequence[str]
+    ) -> list[tuple[float, float] | None]:
+        """Return the 95 % interval of the rate of each answer; None where it was not kept."""
+        steps = self._steps(probability, support)
+        return [
+            interval
+            and (
+                min(interval[0] * of_label.share, rate * of_label.low),
+                min(max(interval[1] * of_label.share, rate * of_label.high), 1.0),
+            )
+            for (rate, interval), of_label in zip(steps, self._of_labels(labels), strict=True)
+        ]
+
+    def _steps(
+        self, probability: NDArray[np.float64], support: NDArray[np.float64]
+    ) -> list[tuple[float, tuple[float, float] | None]]:
+        """Return the rate of each answer, of all labels together, and its interval, None where it was not kept."""
+        steps = []
+        for k, value in zip(self.class_of(support).tolist(), probability.tolist(), strict=True):
+            of_class = self.classes[k]
+            step = bisect_right(of_class.probabilities, value + _ROUNDING, lo=1) - 1
+            steps.append((of_class.rates[step], of_class.intervals[step] if of_class.intervals else None))
+        return steps
 
     def _of_labels(self, labels: Sequence[str]) -> list[LabelShare]:
         """Return the share of each of these labels; NaN for one that was too seldom the answer."""
@@ -131,37 +155,6 @@ class Certainty:
             return [LabelShare(share=1.0, low=1.0, high=1.0)] * len(labels)
         unknown = LabelShare(share=math.nan, low=math.nan, high=math.nan)
         return [self.of_label.get(label, unknown) for label in labels]
-
-    def intervals(
-        self, probability: NDArray[np.float64], support: NDArray[np.float64], labels: Sequence[str]
-    ) -> list[tuple[float, float] | None]:
-        """Return the 95 % interval of the rate of each answer; None where it was not kept."""
-        chosen, steps = self._places(probability, support)
-        kept = [
-            support_class.intervals or (None,) * len(support_class.rates) for support_class in self.classes
-        ]
-        intervals = [kept[k][step] for k, step in zip(chosen.tolist(), steps.tolist(), strict=True)]
-        rates = self._rate(probability, support).tolist()
-        return [
-            interval
-            and (
-                min(interval[0] * of_label.share, rate * of_label.low),
-                min(max(interval[1] * of_label.share, rate * of_label.high), 1.0),
-            )
-            for interval, rate, of_label in zip(intervals, rates, self._of_labels(labels), strict=True)
-        ]
-
-    def _places(
-        self, probability: NDArray[np.float64], support: NDArray[np.float64]
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return the class of support of each answer, and the place of its rate there."""
-        chosen = self.class_of(support)
-        steps = np.empty(len(probability), dtype=np.int64)
-        for k, support_class in enumerate(self.classes):
-            rows = chosen == k
-            begins = np.array(support_class.probabilities[1:]) - _ROUNDING
-            steps[rows] = np.searchsorted(begins, probability[rows], side="right")
-        return chosen, steps
 
     def to_json(self) -> list[dict[str, Any]]:
         """Return the rates as values that JSON represents exactly."""
@@ -238,9 +231,9 @@ def certainty_of(
     known = np.nan_to_num(support, nan=0.0)
     answers = np.array(right, dtype=np.float64)
     effect *= _alike(np.bincount(unit_of, weights * answers).astype(np.float64))
-    least_units = max(STEP_UNITS, STEP_SHARE * float(weights.sum())) - _ROUNDING
+    least_units = max(STEP_UNITS, STEP_SHARE * float(weights.sum()))
     guessing = 1.0 / max(len(set(labels)), 2)
-    edges = [0.0, *_bounds(known, weights), np.inf]
+    edges = [0.0, *begins_of(known, weights, SUPPORT_BOUNDS, CLASS_UNITS), np.inf]
     classes = []
     for least, end in pairwise(edges):
         rows = (known >= least) & (known < end)
@@ -257,7 +250,7 @@ def certainty_of(
             )
         )
     of_all = Certainty(classes=tuple(classes))
-    promised = of_all._rate(probability, support)
+    promised = of_all.rate_of_all(probability, support)
     return evolve(of_all, of_label=_shares(np.array(labels), answers, promised, weights / effect, effect))
 
 
@@ -311,8 +304,9 @@ def with_certainty(
 ) -> NDArray[np.float64]:
     """Return probabilities, shape (trials, classes), in which the predicted label has its certainty.
 
-    The other labels share what remains in their proportions, as far as none of them exceeds the predicted one. NaN
-    marks a label that is not possible; a trial whose certainty is NaN keeps its probabilities.
+    The other labels share what remains in proportion to their probabilities, each with `UNSEEN` more, as far as none of
+    them exceeds the predicted one. NaN marks a label that is not possible; a trial whose certainty is NaN keeps its
+    probabilities.
     """
     result = probabilities.copy()
     for i, (k, sure) in enumerate(zip(predicted.tolist(), certainty.tolist(), strict=True)):
@@ -324,8 +318,8 @@ def with_certainty(
             continue
         own = max(sure, 1.0 / (len(others) + 1))
         even = (1.0 - own) / len(others)
-        total = float(result[i, others].sum())
-        shares = (1.0 - own) * result[i, others] / total if total > 0.0 else np.full(len(others), even)
+        likely = result[i, others] + UNSEEN
+        shares = (1.0 - own) * likely / likely.sum()
         most = float(shares.max())
         if most > own + _ROUNDING:
             shares = even + (shares - even) * (own - even) / (most - even)
@@ -333,16 +327,18 @@ def with_certainty(
     return result
 
 
-def _bounds(support: NDArray[np.float64], weights: NDArray[np.float64]) -> list[float]:
-    """Return where the classes of support begin after the first, so that each has enough units."""
-    bounds: list[float] = []
-    begin = 0.0
-    for bound in SUPPORT_BOUNDS:
-        below = float(weights[(support >= begin) & (support < bound)].sum())
-        if min(below, float(weights[support >= bound].sum())) >= CLASS_UNITS - _ROUNDING:
-            bounds.append(bound)
-            begin = bound
-    return bounds
+def begins_of(
+    values: NDArray[np.float64], weights: NDArray[np.float64], bounds: Sequence[float], least: float
+) -> list[float]:
+    """Return at which of these rising bounds a new band of values begins, so that each band has this weight."""
+    order = np.argsort(values, kind="stable")
+    below = np.concatenate([[0.0], np.cumsum(weights[order])])[np.searchsorted(values[order], bounds)]
+    begins, banded, total = [], 0.0, float(weights.sum())
+    for bound, weight in zip(bounds, below.tolist(), strict=True):
+        if min(weight - banded, total - weight) >= least - _ROUNDING:
+            begins.append(bound)
+            banded = weight
+    return begins
 
 
 def _steps(
@@ -357,19 +353,13 @@ def _steps(
     from scipy.optimize import isotonic_regression
     from scipy.special import betaincinv
 
-    values, value_of = np.unique(np.round(probability, 9), return_inverse=True)
-    of_value = np.bincount(value_of, weights)
-    # Consecutive values are taken together until they have enough units; the last ones join those before.
-    bins, number, gathered, remaining = np.zeros(len(values), dtype=np.int64), 0, 0.0, float(weights.sum())
-    for i, weight in enumerate(of_value.tolist()):
-        bins[i] = number
-        gathered, remaining = gathered + weight, remaining - weight
-        if min(gathered, remaining) >= least_units:
-            number, gathered = number + 1, 0.0
-    all_of = np.bincount(bins[value_of], weights)
-    right_of = np.bincount(bins[value_of], weights * right)
+    probability = np.round(probability, 9)
+    values = np.unique(probability)
+    edges = [float(values[0]), *begins_of(probability, weights, values.tolist(), least_units)]
+    bins = np.searchsorted(edges[1:], probability, side="right")
+    all_of, right_of = np.bincount(bins, weights), np.bincount(bins, weights * right)
     rising = isotonic_regression(right_of / all_of, weights=all_of).x
-    level_of = np.unique(rising, return_inverse=True)[1]
+    _, first_of, level_of = np.unique(rising, return_index=True, return_inverse=True)
     # From here on, units are as many as independent ones that tell as much.
     right_in, units = (
         np.asarray(np.bincount(level_of, counts), dtype=np.float64) / effect for counts in (right_of, all_of)
@@ -377,7 +367,7 @@ def _steps(
     rates = (units * _drawn_together(right_in, units, len(all_of), guessing) + 1.0) / (units + 2.0)
     rates = np.maximum.accumulate(rates)
     ends = (betaincinv(rates * (units + 2.0), (1.0 - rates) * (units + 2.0), end) for end in (0.025, 0.975))
-    begins = [float(values[np.flatnonzero(level_of[bins] == level)[0]]) for level in range(len(rates))]
+    begins = (edges[number] for number in first_of.tolist())
     return tuple(begins), tuple(rates.tolist()), tuple(zip(*(end.tolist() for end in ends), strict=True))
 
 
@@ -385,6 +375,10 @@ def _drawn_together(
     right: NDArray[np.float64], units: NDArray[np.float64], bins: int, guessing: float
 ) -> NDArray[np.float64]:
     """Return the rates of rising levels, drawn towards their mean, and it towards guessing, by what chance spreads.
+
+    Of the distance of the mean from guessing remains what has the least squared error if it is as large as it seems:
+    s / (s + 1), where s is its square in variances. To take off what chance makes, as from the spread of the levels,
+    would leave nothing of 13 right answers of 20.
 
     Levels of `bins` equal rates have a sum of squares that is distributed as chi-bar-square: of their mean number
     1 + 1/2 + ... + 1/bins, one is the mean (Barlow et al., 1972, chapter 3). That it shrinks the rates as the share of
@@ -394,58 +388,11 @@ def _drawn_together(
     mean = float(right.sum() / units.sum())
     likely = (float(right.sum()) + 1.0) / (float(units.sum()) + 2.0)
     above = units.sum() * (mean - guessing) ** 2 / (likely * (1.0 - likely))
-    drawn = guessing + _beyond(above, 1.0) * (mean - guessing) if mean > guessing else mean
+    drawn = guessing + above / (above + 1.0) * (mean - guessing) if mean > guessing else mean
     rates = right / units
     if len(rates) == 1:
         return np.array([drawn])
     spread = float((units * (rates - mean) ** 2).sum()) / (mean * (1.0 - mean))
     by_chance = sum(1.0 / k for k in range(2, bins + 1)) / (1.0 - 1.0 / bins)
-    return np.asarray(drawn + _beyond(spread, by_chance) * (rates - mean))
-
-
-def _beyond(spread: float, by_chance: float) -> float:
-    """Return the share of a sum of squares that chance does not explain."""
-    return 1.0 - by_chance / spread if spread > by_chance else 0.0
-
-
-LEAST_PROBABILITY: Final = 1e-4
-"""Smaller probabilities count as this one."""
-TEMPERATURES: Final = (0.125, 8.0)
-"""The temperatures that are searched."""
-MIN_TRIALS: Final = 20
-"""With fewer trials, probabilities stay as they are."""
-
-
-def at_temperature(probabilities: NDArray[np.float64], temperature: float | None) -> NDArray[np.float64]:
-    """Return the probabilities, of shape (trials, classes), at this temperature; None returns them as they are.
-
-    NaN marks a label that is not possible, and stays.
-
-    >>> at_temperature(np.array([[0.9, 0.1]]), 2.0).round(2)
-    array([[0.75, 0.25]])
-    """
-    if temperature is None:
-        return probabilities
-    powers = np.clip(probabilities, LEAST_PROBABILITY, 1.0) ** (1.0 / temperature)
-    calibrated: NDArray[np.float64] = powers / np.nansum(powers, axis=1, keepdims=True)
-    return calibrated
-
-
-def temperature_of(probabilities: NDArray[np.float64], truth: NDArray[np.int64]) -> float | None:
-    """Return the temperature of the smallest Brier score; None for fewer than `MIN_TRIALS` trials.
-
-    `probabilities` has shape (trials, classes), `truth` the columns of the true labels.
-    """
-    from scipy.optimize import minimize_scalar
-
-    if len(truth) < MIN_TRIALS:
-        return None
-    right = np.eye(probabilities.shape[1])[truth]
-
-    def brier(log_temperature: float) -> float:
-        tempered = at_temperature(probabilities, math.exp(log_temperature))
-        return float(np.nansum((tempered - right) ** 2, axis=1).mean())
-
-    least, most = TEMPERATURES
-    optimum: Any = minimize_scalar(brier, bounds=(math.log(least), math.log(most)), method="bounded")
-    return math.exp(float(optimum.x))
+    remaining = 1.0 - by_chance / spread if spread > by_chance else 0.0
+    return np.asarray(drawn + remaining * (rates - mean))

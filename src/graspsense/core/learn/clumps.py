@@ -3,6 +3,10 @@
 Two signs together tell: the nearest trials have the same label far more often than others close by, and trials are
 closer to each other than to trials drawn from the spread around them. Each label is then held out in parts of trials
 close to each other, as in block cross-validation (D. R. Roberts et al., Ecography 40 (2017) 913).
+
+Noisy copies of each trial, and as many grasps of each object, are told by a gap: of trials drawn independently, the
+logarithm of the distances of the neighbours m + 1 and m has the mean 1 / (m dimension) at every m (E. Levina and P. J.
+Bickel, NIPS 17 (2005) 777). Behind the m others that are of the same one, it is larger than at other m.
 """
 
 from __future__ import annotations
@@ -34,6 +38,10 @@ _LESS_FAR: Final = 0.8
 """Share of the agreement of the labels, beyond chance, that is lost outside a clump."""
 PARTS: Final = 10
 """Parts of each label that are held out, if its trials are in clumps: ten folds."""
+_MOST_REPEATED: Final = 9
+"""Largest number of others that are of the same one as a trial: ten grasps of an object are usual."""
+_GAP: Final = 3.0
+"""Standard deviations by which the gap behind these is wider than gaps between other neighbours."""
 
 
 def distances_between(values: Values, others: Values) -> Values:
@@ -51,25 +59,47 @@ def parts_of_clumps(values: Values, labels: Sequence[str], copies: Numbers) -> N
     from scipy.cluster.hierarchy import fcluster, ward
 
     codes = np.unique(np.array(labels), return_inverse=True)[1]
-    if values.shape[1] < 2 or not _in_clumps(values, codes, copies):
+    if values.shape[1] < 2:
+        return None
+    apart = distances_between(values, values)
+    np.fill_diagonal(apart, np.inf)
+    apart[copies[0], copies[1]] = apart[copies[1], copies[0]] = np.inf
+    # A coarse feature puts trials on a lattice, and copies lie at equal distances from others: both make gaps.
+    fine = all(2 * len(np.unique(column)) > len(values) for column in values.T)
+    repeated = _repeated(apart) if fine and not copies.size else 0
+    if not repeated and not _in_clumps(values, codes, apart):
         return None
     part_of = np.zeros(len(codes), dtype=np.int64)
     for code, size in enumerate(np.bincount(codes).tolist()):
         rows = np.flatnonzero(codes == code)
-        part_of[rows] = fcluster(ward(values[rows]), PARTS, "maxclust") if size > PARTS else np.arange(size)
+        parts = max(size // (repeated + 1), 1) if repeated else PARTS
+        part_of[rows] = fcluster(ward(values[rows]), parts, "maxclust") if size > parts else np.arange(size)
     return codes * len(codes) + part_of
 
 
-def _in_clumps(values: Values, codes: Numbers, copies: Numbers) -> bool:
+def _repeated(apart: Values) -> int:
+    """Return how many others are of the same one as each trial, by the gap behind them; 0 if there is none."""
+    most = min(_MOST_REPEATED, len(apart) // _FEWEST_CLUMPED)
+    near = np.clip(np.sort(apart, axis=1)[:, : _MOST_REPEATED + 2], NEAREST, 1.0 / NEAREST)
+    places = np.arange(1, near.shape[1])
+    gaps = places * np.diff(np.log(near), axis=1)
+    # Two trials that are next to each other have about the same distances, so that they count as one.
+    wider = [
+        math.sqrt(len(gaps) / 2.0) * beyond.mean() / max(beyond.std(), NEAREST)
+        for beyond in (
+            gaps[:, m - 1] - np.delete(gaps, m - 1, axis=1).mean(axis=1) for m in range(1, most + 1)
+        )
+    ]
+    return int(np.argmax(wider)) + 1 if wider and max(wider) > _GAP else 0
+
+
+def _in_clumps(values: Values, codes: Numbers, apart: Values) -> bool:
     """Return whether near trials have the same label, and are close, more than smooth distributions make them.
 
     The first is M. F. Schilling's count of neighbours (J. Am. Stat. Assoc. 81 (1986) 799), of the two nearest and of
     others; the second compares distances as B. Hopkins and J. G. Skellam do (Ann. Bot. 18 (1954) 213), with points
     drawn from the normal distribution of the third of a label that is around a trial.
     """
-    apart = distances_between(values, values)
-    np.fill_diagonal(apart, np.inf)
-    apart[copies[0], copies[1]] = apart[copies[1], copies[0]] = np.inf
     sizes = np.bincount(codes)
     many = sizes >= _FEWEST_CLUMPED
     if many.sum() < 2:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import evolve
 
-from graspsense.core.learn.groups import cells_in_range, grouped, tail, with_sessions
+from graspsense.core.learn.groups import cells_in_range, grouped, joined, tail, with_sessions
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import ConfigError, counted
 from graspsense.core.values.features import misfit
@@ -142,17 +142,13 @@ def _originals(table: FeatureTable, content: Sequence[str] | None) -> tuple[NDAr
     """Return the trial that each one is a copy of (itself if of none), and how many are equal perhaps by chance."""
     values = with_codes(table)[1] + 0.0  # -0.0 and 0.0 are the same number
     known = ~np.isnan(values)
-    parents = list(range(len(table)))
-    if content is not None:
-        by_content: dict[str, int] = {}
-        parents = [by_content.setdefault(text, i) if text else i for i, text in enumerate(content)]
+    by_content: dict[str, int] = {}
+    same = [
+        by_content.setdefault(text, i) if text else i for i, text in enumerate(content or [""] * len(table))
+    ]
     by_row: dict[bytes, int] = {}
     equal = [by_row.setdefault(row.tobytes(), i) if known[i].any() else i for i, row in enumerate(values)]
-    repeated = [
-        i
-        for i, k in enumerate(equal)
-        if _root(parents, i) != _root(parents, k) and not _known_to_differ(content, i, k)
-    ]
+    repeated = [i for i, k in enumerate(equal) if same[i] != same[k] and not _known_to_differ(content, i, k)]
     sure: list[int] = []
     if repeated:
         distinct = values[np.unique(equal)]
@@ -161,9 +157,8 @@ def _originals(table: FeatureTable, content: Sequence[str] | None) -> tuple[NDAr
         sure = [i for i in repeated if (measured & known[i]).any()]
         if not sure and not _can_be_chance(distinct, len(repeated)):
             sure = repeated
-    for i in sure:
-        parents[_root(parents, i)] = _root(parents, equal[i])
-    families = [_root(parents, i) for i in range(len(parents))]
+    pairs = [*enumerate(same), *((i, equal[i]) for i in sure)]
+    families = joined(np.array(pairs, dtype=np.int64).T, len(table))
     return _best_of(families, known.sum(axis=1).tolist()), len(repeated) - len(sure)
 
 
@@ -200,13 +195,6 @@ def _edited_copies(values: NDArray[np.float64]) -> NDArray[np.int64]:
 def _known_to_differ(content: Sequence[str] | None, i: int, k: int) -> bool:
     """Return whether two recordings were compared and are different, so that equal features are chance."""
     return content is not None and content[i] != "" and content[k] != "" and content[i] != content[k]
-
-
-def _root(parents: list[int], i: int) -> int:
-    """Return the trial that stands for the family of trial `i`."""
-    while parents[i] != i:
-        parents[i] = i = parents[parents[i]]
-    return i
 
 
 def _best_of(families: Sequence[int], known: Sequence[int]) -> NDArray[np.int64]:

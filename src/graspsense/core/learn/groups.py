@@ -86,7 +86,7 @@ def grouped(labelled: Labelled, copies: Numbers) -> Labelled:
     named = labelled.instances or [f"group of trial {k + 1}" for k in range(len(labelled))]
     return evolve(
         labelled,
-        instances=tuple(named[k] for k in _joined(np.concatenate(links, axis=1), len(labelled))),
+        instances=tuple(named[k] for k in joined(np.concatenate(links, axis=1), len(labelled))),
         grouped=labelled.instances is None,
         notes=(*labelled.notes, *notes),
     )
@@ -162,13 +162,13 @@ def _to_the_first(group_of: Numbers) -> Numbers:
     return np.stack([np.arange(len(group_of)), begins[column]])
 
 
-def _joined(pairs: Numbers, n: int) -> list[int]:
+def joined(pairs: Numbers, n: int) -> list[int]:
     """Return for each of `n` trials the first one that these pairs join it to."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    joined = coo_array((np.ones(pairs.shape[1]), (pairs[0], pairs[1])), shape=(n, n))
-    _, component_of = connected_components(joined, directed=False)
+    links = coo_array((np.ones(pairs.shape[1]), (pairs[0], pairs[1])), shape=(n, n))
+    _, component_of = connected_components(links, directed=False)
     joined_to: list[int] = _to_the_first(component_of.astype(np.int64))[1].tolist()
     return joined_to
 

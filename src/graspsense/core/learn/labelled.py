@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import evolve, field, frozen
@@ -23,6 +23,19 @@ if TYPE_CHECKING:
 Target = Literal["both", "class", "state"]
 TARGETS: Final[tuple[Target, ...]] = ("both", "class", "state")
 """The part of a label `class:state` to predict: all of it, the class, or the state."""
+_OF_EACH_TRIAL: Final = (
+    "labels",
+    "instances",
+    "order",
+    "content",
+    "before_contact",
+    "first_line",
+    "width",
+    "value",
+    "recorded_with",
+    "variants",
+)
+"""The fields of `Labelled` that have a value for each trial, besides its table."""
 
 
 @frozen(kw_only=True, eq=False)
@@ -108,7 +121,7 @@ class Labelled:
                     f"{len(self.table)} trials and {len(column)} {name}: give one for each trial"
                 )
         _refuse_too_large(self.table, self.source)
-        for control in (self.before_contact, self.first_line, self.width, *self.variants.values()):
+        for _, control, _, _ in self.other_features():
             if control is not None:
                 _refuse_too_large(control.table, self.source)
         if self.value is not None:
@@ -133,28 +146,36 @@ class Labelled:
             why = f"every trial of {self.source} has the label {self.labels[0]!r}: there is nothing to tell apart"
             raise ConfigError("\n  ".join((why, *self.notes)))
 
+    def other_features(self) -> Iterator[tuple[str, ControlFeatures | None, str, str]]:
+        """Yield the tables that controls learn from: name, features if any, what they are, why there are none."""
+        yield (
+            "before_contact",
+            self.before_contact,
+            "features from before contact only",
+            self.no_before_contact,
+        )
+        if self.first_line is not None:
+            yield "first_line", self.first_line, "", ""
+        yield "width_only", self.width, "the width alone", self.no_width
+        for name, variant in self.variants.items():
+            yield name, variant, "", ""
+
     def rows(self, which: NDArray[np.int64]) -> Labelled:
         """Return these trials, in this order."""
         numbers = which.tolist()
-        return evolve(
-            self,
-            table=self.table.rows(which),
-            labels=_picked(self.labels, numbers),
-            instances=None if self.instances is None else _picked(self.instances, numbers),
-            order=None if self.order is None else _picked(self.order, numbers),
-            content=None if self.content is None else _picked(self.content, numbers),
-            before_contact=_control_rows(self.before_contact, which),
-            first_line=_control_rows(self.first_line, which),
-            value=None
-            if self.value is None
-            else evolve(self.value, values=_picked(self.value.values, numbers)),
-            width=_control_rows(self.width, which),
-            recorded_with={name: _picked(texts, numbers) for name, texts in self.recorded_with.items()},
-            variants={
-                name: evolve(variant, table=variant.table.rows(which))
-                for name, variant in self.variants.items()
-            },
-        )
+
+        def picked(column: Any) -> Any:
+            """Return the rows of what has one for each trial; None stays."""
+            if isinstance(column, Mapping):
+                return {name: picked(each) for name, each in column.items()}
+            if isinstance(column, ControlFeatures):
+                return evolve(column, table=column.table.rows(which))
+            if isinstance(column, TargetValue):
+                return evolve(column, values=picked(column.values))
+            return column and tuple(column[i] for i in numbers)
+
+        changed = {name: picked(getattr(self, name)) for name in _OF_EACH_TRIAL}
+        return evolve(self, table=self.table.rows(which), **changed)
 
     def of_class(self, name: str) -> Labelled:
         """Return the trials of one class. Raises ConfigError if there are none."""
@@ -222,11 +243,3 @@ def recognised(target: Target, labels: Sequence[str]) -> Target:
 def class_of(label: str) -> str:
     """Return the class of a label `class:state`."""
     return label.partition(":")[0]
-
-
-def _picked(column: Sequence[Any], numbers: Sequence[int]) -> tuple[Any, ...]:
-    return tuple(column[i] for i in numbers)
-
-
-def _control_rows(control: ControlFeatures | None, which: NDArray[np.int64]) -> ControlFeatures | None:
-    return None if control is None else evolve(control, table=control.table.rows(which))

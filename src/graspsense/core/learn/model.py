@@ -12,7 +12,7 @@ from attrs import evolve, frozen
 
 from graspsense.core.components.entries import TABLE_OF_ROLE
 from graspsense.core.components.setting import CHANGES_NO_RESULT, NAMES_INPUT, settings_marked, worded
-from graspsense.core.learn.certainty import LABEL_UNITS, Certainty, at_temperature, with_certainty
+from graspsense.core.learn.certainty import LABEL_UNITS, Certainty, with_certainty
 from graspsense.core.learn.conformal import Answers, PredictionSets, scores_of
 from graspsense.core.learn.novelty import Novelty
 from graspsense.core.values.errors import ConfigError, DataDamaged
@@ -64,8 +64,6 @@ class Model:
     """Calibrated prediction sets; None in a model that was never calibrated."""
     certainty: Certainty | None = None
     """How often its answers are right, by their support; None in a model that is not calibrated."""
-    temperature: float | None = None
-    """The temperature (`learn.certainty`) of the probabilities of the labels that are not predicted."""
     learned_from: tuple[str, ...] = ()
     """The hashes (`learn.copies`) of the recorded trials that it was trained on."""
     checkpoints: tuple[tuple[float, Model], ...] = ()
@@ -132,17 +130,16 @@ class Model:
         if misfit:
             because = (misfit,)
         else:
-            chosen = _chosen(features, self.names)
-            bounded = _bounded(chosen)
-            explained = self.classifier.explain(bounded)
+            table = table_of([features]).columns(self.names)
+            chosen, bounded = table.row(0), _bounded(table)
+            explained = self.classifier.explain(bounded.row(0))
             classes = self.classifier.classes()
             shares = np.array([[explained.probabilities.get(name, 0.0) for name in classes]])
             with self._usable():
                 refuse_improbable(shares, 1, len(classes))
             warnings = (*explained.warnings, *warnings)
             strange = self.novelty.unlike(chosen)
-            table = table_of([bounded])
-            (prediction,) = self._calibrated(table, [explained.label], shares, bool(differences))
+            (prediction,) = self._calibrated(bounded, [explained.label], shares, bool(differences))
             if strange is None:
                 return evolve(
                     prediction,
@@ -201,7 +198,7 @@ class Model:
             kept = self.certainty.intervals(share, support, answered)
             measured = np.array([not names for names in lacking])
             known &= measured
-            calibrated = with_certainty(at_temperature(shares, self.temperature), predicted, certainty)
+            calibrated = with_certainty(shares, predicted, certainty)
             probabilities = np.where(measured[:, np.newaxis], calibrated, shares)
             # No answer counts as less certain than chance, however seldom such answers were right.
             own = calibrated[np.arange(len(table)), predicted].tolist()
@@ -256,8 +253,7 @@ class Model:
         if misfit:
             raise ConfigError(misfit)
         chosen = table.columns(self.names)
-        bounded = evolve(chosen, values=np.clip(chosen.values, -LARGEST_VALUE, LARGEST_VALUE))
-        shares = self.classifier.probabilities(bounded)
+        shares = self.classifier.probabilities(_bounded(chosen))
         with self._usable():
             refuse_improbable(shares, len(table), len(self.classifier.classes()))
         unlike = self.novelty.unlike_rows(chosen).tolist()
@@ -429,21 +425,6 @@ def _not_compared(config_class: type) -> frozenset[str]:
     return unchanging | settings_marked(config_class, NAMES_INPUT) | {"type"}
 
 
-def _chosen(features: Features, names: Sequence[str]) -> Features:
-    if features.names == tuple(names):
-        return features
-    places = [features.names.index(name) for name in names]
-    return Features(
-        names=tuple(names),
-        values=tuple(features.values[i] for i in places),
-        units=tuple(features.units[i] for i in places),
-        reasons={name: why for name, why in features.reasons.items() if name in names},
-    )
-
-
-def _bounded(features: Features) -> Features:
+def _bounded(table: FeatureTable) -> FeatureTable:
     """Return the features for a classifier: one that is too large to compute with is as large as can be."""
-    if all(not abs(value) > LARGEST_VALUE for value in features.values):
-        return features
-    values = tuple(min(max(value, -LARGEST_VALUE), LARGEST_VALUE) for value in features.values)
-    return evolve(features, values=values)
+    return evolve(table, values=np.clip(table.values, -LARGEST_VALUE, LARGEST_VALUE))

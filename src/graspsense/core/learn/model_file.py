@@ -14,9 +14,9 @@ import numpy as np
 from attrs import evolve
 
 from graspsense.core.components.entries import ModelEntry
-from graspsense.core.learn.certainty import TEMPERATURES, Certainty, certainty_from
+from graspsense.core.learn.certainty import Certainty, certainty_from
 from graspsense.core.learn.conformal import COVERAGES, PredictionSets, sets_from
-from graspsense.core.learn.model import COMPARED_TABLES, EQUAL, Model, checkpoint_model, refuse_improbable
+from graspsense.core.learn.model import COMPARED_TABLES, Model, checkpoint_model, refuse_improbable
 from graspsense.core.learn.model_content import (
     REGRESSION_FORMAT,
     digest,
@@ -25,7 +25,7 @@ from graspsense.core.learn.model_content import (
     sealed_content,
     write_json_lines,
 )
-from graspsense.core.learn.novelty import Novelty, novelty_from
+from graspsense.core.learn.novelty import novelty_from
 from graspsense.core.learn.stored_values import StoredValueError, StoredValues
 from graspsense.core.values.errors import (
     ComponentFailed,
@@ -70,34 +70,33 @@ def as_json(model: Model) -> dict[str, Any]:
         "classifier": model.component,
         "settings": json_ready(model.settings),
         "target": model.target,
-        "features": [[name, unit] for name, unit in zip(model.names, model.units, strict=True)],
+        "features": list(zip(model.names, model.units, strict=True)),
         "provenance": json_ready(model.provenance),
-        "unknown": model.novelty.to_json(),
-        **({} if model.sets is None else {"sets": model.sets.to_json()}),
-        **_certainty_as_json(model.certainty),
-        **({} if model.temperature is None else {"temperature": model.temperature}),
-        "model": model.classifier.to_json(),
-        **({} if not model.learned_from else {"learned_from": list(model.learned_from)}),
-        **(
-            {}
-            if not model.checkpoints
-            else {"checkpoints": [_part_as_json(*checkpoint) for checkpoint in model.checkpoints]}
-        ),
+        **_learned_as_json(model),
+        **({"learned_from": list(model.learned_from)} if model.learned_from else {}),
+        **({"checkpoints": list(map(_part_as_json, model.checkpoints))} if model.checkpoints else {}),
     }
     return {**content, "sha256": digest(content)}
 
 
-def _part_as_json(after_s: float, part: Model) -> dict[str, Any]:
+def _part_as_json(checkpoint: tuple[float, Model]) -> dict[str, Any]:
     """Return what the model of a checkpoint has of its own; the rest is that of the model of whole grasps."""
+    after_s, part = checkpoint
     return {
         "after_contact_s": after_s,
         "trials": part.provenance["trials"],
         "by_label": json_ready(part.provenance["by_label"]),
-        "unknown": part.novelty.to_json(),
-        "sets": None if part.sets is None else part.sets.to_json(),
-        **_certainty_as_json(part.certainty),
-        "temperature": part.temperature,
-        "model": part.classifier.to_json(),
+        **_learned_as_json(part),
+    }
+
+
+def _learned_as_json(model: Model) -> dict[str, Any]:
+    """Return what was learned from trials, of whole grasps or up to a checkpoint."""
+    return {
+        "unknown": model.novelty.to_json(),
+        "sets": None if model.sets is None else model.sets.to_json(),
+        **_certainty_as_json(model.certainty),
+        "model": model.classifier.to_json(),
     }
 
 
@@ -137,21 +136,16 @@ def _restored(stored: StoredValues, name: str, plugins: Plugins, component: Comp
         )
     settings, config = _settings_from(stored, component)
     names, units = stored.features("features")
-    classifier = classifier_from(stored, component, config, names, units)
     model = Model(
         name=name,
         component=made_by,
         settings=settings,
-        classifier=classifier,
         names=names,
         units=units,
         target=stored.text("target"),
-        novelty=_novelty_from(stored, classifier, names, units),
         provenance=_provenance_from(stored),
-        sets=_sets_from(stored, classifier),
-        certainty=_certainty_from(stored),
-        temperature=_temperature_from(stored),
         learned_from=stored.texts("learned_from") if "learned_from" in stored else (),
+        **_learned_from(stored, component, config, names, units),
     )
     return evolve(model, checkpoints=_checkpoints_from(stored, model, component, config))
 
@@ -202,46 +196,40 @@ def classifier_from(
     return classifier
 
 
-def _novelty_from(
-    stored: StoredValues, classifier: Classifier[Any], names: tuple[str, ...], units: tuple[str, ...]
-) -> Novelty:
-    """Return the ranges of the training trials, which have the labels of the classifier. Raises DataDamaged."""
-    novelty = novelty_from(names, units, stored.value("unknown"), stored.field("unknown"))
+def _learned_from(
+    stored: StoredValues, component: Component, config: Any, names: tuple[str, ...], units: tuple[str, ...]
+) -> dict[str, Any]:
+    """Return what a model of these features learned, as its fields. Raises DataDamaged.
+
+    What it was not calibrated for is None, and so is what its version did not have.
+    """
+    classifier = classifier_from(stored, component, config, names, units)
+    novelty = novelty_from(names, units, stored.table("unknown"))
     if sorted(novelty.classes) != sorted(classifier.classes()):
         raise stored.refusal("unknown.ranges", "they are not those of the labels of the classifier")
-    return novelty
+    certainty = None
+    if stored.has("certainty"):
+        of_label = stored.table("certainty_of_label") if "certainty_of_label" in stored else None
+        certainty = certainty_from(stored.tables("certainty"), of_label)
+    return {
+        "classifier": classifier,
+        "novelty": novelty,
+        "certainty": certainty,
+        "sets": _sets_from(stored, classifier, certainty) if stored.has("sets") else None,
+    }
 
 
-def _certainty_from(stored: StoredValues) -> Certainty | None:
-    """Return the certainty; None in a model without calibration, or of an earlier version. Raises DataDamaged."""
-    if "certainty" not in stored or stored.value("certainty") is None:
-        return None
-    of_label = stored.table("certainty_of_label") if "certainty_of_label" in stored else None
-    return certainty_from(stored.tables("certainty"), of_label)
-
-
-def _sets_from(stored: StoredValues, classifier: Classifier[Any]) -> PredictionSets | None:
-    """Return the prediction sets, if there are any. Raises DataDamaged."""
-    if "sets" not in stored or stored.value("sets") is None:
-        return None
+def _sets_from(
+    stored: StoredValues, classifier: Classifier[Any], certainty: Certainty | None
+) -> PredictionSets:
+    """Return the prediction sets. Raises DataDamaged."""
+    kept = stored.table("sets")
     if "certainty" not in stored:
-        old = stored.table("sets")
         reason = "its file was written by an earlier version of graspsense: train it again"
         return PredictionSets(
-            coverage=old.number("coverage", *COVERAGES), unit=old.text("unit"), thresholds={}, reason=reason
+            coverage=kept.number("coverage", *COVERAGES), unit=kept.text("unit"), thresholds={}, reason=reason
         )
-    certainty = _certainty_from(stored)
-    return sets_from(
-        stored.table("sets"), classifier.classes(), 0 if certainty is None else len(certainty.classes)
-    )
-
-
-def _temperature_from(stored: StoredValues) -> float | None:
-    """Return the stored temperature; None in a model of an earlier version. Raises DataDamaged."""
-    if "temperature" not in stored or stored.value("temperature") is None:
-        return None
-    least, most = TEMPERATURES
-    return stored.number("temperature", least * (1.0 - EQUAL), most * (1.0 + EQUAL))
+    return sets_from(kept, classifier.classes(), 0 if certainty is None else len(certainty.classes))
 
 
 def _provenance_from(stored: StoredValues) -> dict[str, Any]:
@@ -274,24 +262,17 @@ def _checkpoints_from(
 
 def _part_from_json(whole: Model, component: Component, config: Any, kept: StoredValues) -> Model:
     """Return the model of a checkpoint. Raises DataDamaged."""
-    classifier = classifier_from(kept, component, config, whole.names, whole.units)
-    if others := sorted({*classifier.classes()} - {*whole.classifier.classes()}):
+    learned = _learned_from(kept, component, config, whole.names, whole.units)
+    if others := sorted({*learned["classifier"].classes()} - {*whole.classifier.classes()}):
         raise kept.refusal(
             "model", f"it knows labels that the model of whole grasps does not: {listed(others)}"
         )
     by_label = kept.table("by_label")
-    part = evolve(
-        whole,
-        classifier=classifier,
-        novelty=_novelty_from(kept, classifier, whole.names, whole.units),
-        sets=_sets_from(kept, classifier),
-        certainty=_certainty_from(kept),
-        temperature=_temperature_from(kept),
-        provenance={
-            "trials": kept.whole("trials"),
-            "by_label": {label: by_label.whole(label) for label in by_label},
-        },
-    )
+    own = {
+        "trials": kept.whole("trials"),
+        "by_label": {label: by_label.whole(label) for label in by_label},
+    }
+    part = evolve(whole, provenance=own, **learned)
     return checkpoint_model(whole, kept.number("after_contact_s", least=0.0), part)
 
 

@@ -8,7 +8,7 @@ over the classes). It is *unknown* if it is unlike every class, or has no featur
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -17,6 +17,7 @@ from attrs import frozen
 from graspsense.core.learn.stored_values import StoredValues
 from graspsense.core.values.errors import listed
 from graspsense.core.values.features import Features, FeatureTable
+from graspsense.core.values.json_values import json_ready
 from graspsense.core.values.reasons import FeatureValue, Reason
 from graspsense.core.values.units import in_words
 
@@ -30,6 +31,9 @@ _ROUNDING: Final = 1e-9
 _FARTHEST: Final = float(np.finfo(np.float64).max)
 """A distance that overflows counts as this one: infinite is that of a trial without any feature in common."""
 _ROWS_AT_ONCE: Final = 4096
+
+Distance = Callable[["NDArray[np.float64]"], "NDArray[np.float64]"]
+"""Returns the distance of each value from each class, in standard deviations."""
 
 
 @frozen(kw_only=True, eq=False)
@@ -87,13 +91,9 @@ class Novelty:
     def unlike_rows(self, table: FeatureTable) -> NDArray[np.bool_]:
         """Return for each trial of a table whether it is unlike every class."""
         values = table.columns(self.names).values
-        unlike = np.empty(len(values), dtype=np.bool_)
-        for start in range(0, len(values), _ROWS_AT_ONCE):
-            some = values[start : start + _ROWS_AT_ONCE]
-            outside = _worst(self._outside(some[:, np.newaxis, :]))
-            unlike[start : start + len(some)] = outside.min(axis=1) > REACH
+        unlike = self._worst_of(values, self._outside).min(axis=1) > REACH
         unlike[np.isnan(values).all(axis=1)] = not self.featureless
-        return unlike
+        return np.asarray(unlike)
 
     def closeness(self, table: FeatureTable, classes: Sequence[str]) -> NDArray[np.float64]:
         """Return how close each trial is to the middle of each of these classes, shape (trials, classes).
@@ -101,14 +101,16 @@ class Novelty:
         It is 1 / (1 + distance) of the feature that is farthest from the middle of the range, in standard deviations.
         Without a feature in common it is 0.
         """
-        values = table.columns(self.names).values
         columns = [self.classes.index(name) for name in classes]
-        result = np.empty((len(values), len(columns)))
+        away = self._worst_of(table.columns(self.names).values, self._from_middle)
+        return np.asarray(1.0 / (1.0 + away[:, columns]))
+
+    def _worst_of(self, values: NDArray[np.float64], distance: Distance) -> NDArray[np.float64]:
+        """Return the largest distance of a feature of each trial, shape (trials, classes), some trials at once."""
+        result = np.empty((len(values), len(self.classes)))
         for start in range(0, len(values), _ROWS_AT_ONCE):
             some = values[start : start + _ROWS_AT_ONCE]
-            result[start : start + len(some)] = 1.0 / (
-                1.0 + _worst(self._from_middle(some[:, np.newaxis, :]))[:, columns]
-            )
+            result[start : start + len(some)] = _worst(distance(some[:, np.newaxis, :]))
         return result
 
     def _outside(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -137,10 +139,12 @@ class Novelty:
             "reach": REACH,
             "featureless": self.featureless,
             "complete": [name for name, complete in zip(self.names, self.complete, strict=True) if complete],
-            "spread": _plain(self.spread),
+            "spread": json_ready(self.spread.tolist()),
             "ranges": {
-                label: [_plain(self.lowest[k]), _plain(self.highest[k])]
-                for k, label in enumerate(self.classes)
+                label: json_ready([lowest, highest])
+                for label, lowest, highest in zip(
+                    self.classes, self.lowest.tolist(), self.highest.tolist(), strict=True
+                )
             },
         }
 
@@ -179,11 +183,8 @@ def novelty_of(table: FeatureTable, labels: Sequence[str]) -> Novelty:
     )
 
 
-def novelty_from(
-    names: Sequence[str], units: Sequence[str], values: object, place: str = "unknown"
-) -> Novelty:
-    """Return the ranges that `to_json` described; `place` is their field in the file. Raises DataDamaged."""
-    kept = StoredValues(values, place)
+def novelty_from(names: Sequence[str], units: Sequence[str], kept: StoredValues) -> Novelty:
+    """Return the ranges that `to_json` described. Raises DataDamaged."""
     if kept.number("reach") != REACH:
         raise kept.refusal("reach", f"the rule for unknown trials has another one; this version has {REACH}")
     ranges = kept.table("ranges")
@@ -214,7 +215,3 @@ def _worst(outside: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the maximum along the last axis, ignoring NaN; infinite if all are NaN."""
     known = ~np.isnan(outside)
     return np.where(known.any(axis=-1), np.where(known, outside, -1.0).max(axis=-1), np.inf)
-
-
-def _plain(values: NDArray[np.float64]) -> list[float | None]:
-    return [None if math.isnan(v) else v for v in values.tolist()]

@@ -7,7 +7,7 @@ of it, and an error names the field: `model.terms.3.scores: expected a list of 1
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from graspsense.core.components.strict import shown
@@ -72,67 +72,50 @@ class StoredValues:
         """Return a list of tables."""
         return [StoredValues(item, f"{self.field(key)}.{i}") for i, item in enumerate(self.items(key))]
 
+    def has(self, key: str) -> bool:
+        """Return whether there is a value, and it is not null."""
+        return self._values.get(key) is not None
+
     def items(self, key: str) -> Sequence[Any]:
         """Return a list as it is."""
-        value = self.value(key)
-        if not isinstance(value, list | tuple):
-            raise self.refusal(key, f"expected a list, found {_shown(value)}")
-        return value
+        items: Sequence[Any] = self._expected(key, lambda value: isinstance(value, list | tuple), "a list")
+        return items
 
     def flag(self, key: str) -> bool:
         """Return true or false."""
-        value = self.value(key)
-        if not isinstance(value, bool):
-            raise self.refusal(key, f"expected true or false, found {_shown(value)}")
-        return value
+        return bool(self._expected(key, lambda value: isinstance(value, bool), "true or false"))
 
     def text(self, key: str) -> str:
         """Return a text."""
-        value = self.value(key)
-        if not isinstance(value, str):
-            raise self.refusal(key, f"expected text, found {_shown(value)}")
-        return value
+        return str(self._expected(key, _is_text, "text"))
 
     def choice(self, key: str, allowed: Sequence[str]) -> str:
         """Return one of these texts."""
-        value = self.text(key)
-        if value not in allowed:
-            raise self.refusal(key, f"expected one of {', '.join(allowed)}, found {_shown(value)}")
-        return value
+        return str(self._expected(key, lambda value: value in allowed, f"one of {', '.join(allowed)}"))
 
     def whole(self, key: str, most: int = _LARGEST_WHOLE) -> int:
         """Return a whole number from 0 to `most`."""
-        value = self.value(key)
-        if type(value) is not int or not 0 <= value <= most:
-            raise self.refusal(key, f"expected a whole number from 0 to {most}, found {_shown(value)}")
-        return value
+        what = f"a whole number from 0 to {most}"
+        return int(self._expected(key, lambda value: type(value) is int and 0 <= value <= most, what))
 
     def number(self, key: str, least: float = -LARGEST_VALUE, most: float = LARGEST_VALUE) -> float:
         """Return a finite number in this range."""
-        value = self.value(key)
-        if type(value) not in (int, float) or not least <= value <= most:
-            raise self.refusal(key, f"expected a number from {least:g} to {most:g}, found {_shown(value)}")
-        return float(value)
+        what = f"a number from {least:g} to {most:g}"
+        return float(
+            self._expected(key, lambda value: type(value) in (int, float) and least <= value <= most, what)
+        )
 
     def texts(self, key: str, *, distinct: bool = False) -> tuple[str, ...]:
         """Return a list of texts."""
-        given = self.items(key)
-        for i, value in enumerate(given):
-            if not isinstance(value, str):
-                raise self.refusal(f"{key}.{i}", f"expected text, found {_shown(value)}")
+        given = self._each(key, _is_text, "text")
         if distinct:
             self._refuse_repeated(key, given)
         return tuple(given)
 
     def wholes(self, key: str) -> list[int]:
         """Return a list of whole numbers, 0 or larger."""
-        given = self.items(key)
-        for i, value in enumerate(given):
-            if type(value) is not int or not 0 <= value <= _LARGEST_WHOLE:
-                raise self.refusal(
-                    f"{key}.{i}", f"expected a whole number of 0 or more, found {_shown(value)}"
-                )
-        return list(given)
+        what = "a whole number of 0 or more"
+        return list(self._each(key, lambda value: type(value) is int and 0 <= value <= _LARGEST_WHOLE, what))
 
     def numbers(
         self, key: str, shape: Sequence[int | None], *, missing: bool = False, least: float = -LARGEST_VALUE
@@ -164,17 +147,25 @@ class StoredValues:
 
     def features(self, key: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Return the names and the units of a list of pairs; at least one, and no name twice."""
-        given = self.items(key)
-        for i, pair in enumerate(given):
-            if not (
-                isinstance(pair, list | tuple) and len(pair) == 2 and all(isinstance(x, str) for x in pair)
-            ):
-                raise self.refusal(f"{key}.{i}", f"expected a name and a unit, found {_shown(pair)}")
+        given = self._each(key, _is_pair, "a name and a unit")
         if not given:
             raise self.refusal(key, "expected at least one feature, found none")
         names = [pair[0] for pair in given]
         self._refuse_repeated(key, names)
         return tuple(names), tuple(pair[1] for pair in given)
+
+    def _expected(self, key: str, fits: Callable[[Any], bool], what: str) -> Any:
+        """Return a value that fits; `what` says what it is."""
+        return self._fitting(key, self.value(key), fits, what)
+
+    def _each(self, key: str, fits: Callable[[Any], bool], what: str) -> Sequence[Any]:
+        """Return a list, each value of which fits."""
+        return [self._fitting(f"{key}.{i}", value, fits, what) for i, value in enumerate(self.items(key))]
+
+    def _fitting(self, key: str, value: Any, fits: Callable[[Any], bool], what: str) -> Any:
+        if not fits(value):
+            raise self.refusal(key, f"expected {what}, found {_shown(value)}")
+        return value
 
     def _refuse_repeated(self, key: str, given: Sequence[str]) -> None:
         if len(set(given)) < len(given):
@@ -195,6 +186,14 @@ class StoredValues:
         elif not set(map(type, given)) <= kinds:
             i = next(i for i, item in enumerate(given) if type(item) not in kinds)
             raise self.refusal(f"{key}.{i}", f"expected a number, found {_shown(given[i])}")
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str)
+
+
+def _is_pair(value: object) -> bool:
+    return isinstance(value, list | tuple) and len(value) == 2 and all(map(_is_text, value))
 
 
 def _shown(value: object) -> str:

@@ -53,17 +53,24 @@ def train(
         novelty=novelty_of(labelled.table, labelled.labels),
         learned_from=() if labelled.provenance.get("simulated") else row_hashes(labelled.table),
         provenance={
-            "source": labelled.source,
-            "trials": len(labelled),
+            **training_provenance(labelled, seed, {component.distribution: component.version}),
             "by_label": dict(sorted(Counter(labelled.labels).items())),
-            "seed": seed,
-            "versions": {
-                "graspsense": __version__,
-                component.distribution: component.version,
-                "numpy": np.__version__,
-                "python": platform.python_version(),
-            },
-            **labelled.provenance,
             **(provenance or {}),
         },
     )
+
+
+def training_provenance(labelled: Labelled, seed: int, versions: Mapping[str, str]) -> dict[str, Any]:
+    """Return what a model tells of its training on these trials; `versions` are those of what it was learned with."""
+    return {
+        "source": labelled.source,
+        "trials": len(labelled),
+        "seed": seed,
+        "versions": {
+            "graspsense": __version__,
+            **versions,
+            "numpy": np.__version__,
+            "python": platform.python_version(),
+        },
+        **labelled.provenance,
+    }

@@ -201,10 +201,17 @@ def grasp_with(
     """
     # The model is loaded first, because a missing model must be reported before the grasp.
     model = model_for(settings, plugins)
-    backend, controller = _gripper(settings, beside), settings.controller.create()
-    feature_set = settings.features.create()
+    backend: SensorBackend[Any] = settings.gripper.create()
+    if beside is not None:
+        backend = beside.gripper(backend)
+    controller, feature_set = settings.controller.create(), settings.features.create()
     anytime = anytime_of(model, feature_set, settings)
-    run = _run_info(settings, labels)
+    run = RunInfo(
+        components=settings.components,
+        settings=settings.values,
+        seed=settings.run.seed,
+        labels=dict(labels or {}),
+    )
 
     def tell(event: GraspEvent) -> None:
         plugins.grasp_event(run, event)
@@ -258,20 +265,6 @@ def _as_certain_as_the_gripper(
         None if prediction is None else prediction.without_certainty(why),
         tuple(evolve(early, prediction=early.prediction.without_certainty(why)) for early in checkpoints),
     )
-
-
-def _run_info(settings: Settings, labels: Mapping[str, str] | None) -> RunInfo:
-    return RunInfo(
-        components=settings.components,
-        settings=settings.values,
-        seed=settings.run.seed,
-        labels=dict(labels or {}),
-    )
-
-
-def _gripper(settings: Settings, beside: Member | None) -> SensorBackend[Any]:
-    backend: SensorBackend[Any] = settings.gripper.create()
-    return backend if beside is None else beside.gripper(backend)
 
 
 def _grasped(

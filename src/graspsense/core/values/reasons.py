@@ -39,6 +39,14 @@ class FeatureValue:
         )
 
 
+def feature_values(
+    names: Sequence[str], units: Sequence[str], values: Sequence[float]
+) -> tuple[FeatureValue, ...]:
+    """Return the features of a trial with these values, NaN for a missing one."""
+    known = (None if math.isnan(value) else value for value in values)
+    return tuple(map(FeatureValue, names, known, units))
+
+
 @frozen
 class Contribution:
     """How much a reason speaks for a label.

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from graspsense.classifier_api import FeatureValue, Reason, contribution_reasons
+from graspsense.classifier_api import Reason
 from graspsense.plugin_api import ClassifierConfig, setting
-from graspsense.plugins.classifiers.scikit import FittedEstimator, ScikitClassifier, most_likely
+from graspsense.plugins.classifiers.scikit import ExplainedTrial, FittedEstimator, ScikitClassifier
 from graspsense.plugins.classifiers.tree_contributions import means_from_leaves, path_contributions
 
 
@@ -54,29 +54,18 @@ class Boosted(ScikitClassifier[BoostedConfig]):
         trees = self.config.stages * (labels if labels > 2 else 1)
         return trees * (1e5 + trials * features * min(self.config.depth, math.log2(trials + 1.0)))
 
-    def reasons(
-        self,
-        fitted: FittedEstimator,
-        row: NDArray[np.float64],
-        given: Sequence[FeatureValue],
-        shares: Mapping[str, float],
-    ) -> Sequence[Reason]:
+    def reasons(self, trial: ExplainedTrial) -> Sequence[Reason]:
         """Return the contributions of the features to the odds of the label against the next most probable one."""
-        label, against = list(shares)[:2]
-        total, parts = 0.0, [0.0] * len(given)
+        fitted, row = trial.fitted, trial.row
+        label, against = list(trial.shares)[:2]
+        total, parts = 0.0, [0.0] * len(trial.given)
         for sign, name in ((1.0, label), (-1.0, against)):
             for k, value in enumerate(self._contributions(fitted, row, name)):
                 parts[k] += sign * value
             total += sign * self._raw(fitted, row, name)
         return (
-            *contribution_reasons(
-                [((feature,), value) for feature, value in zip(given, parts, strict=True)],
-                total - sum(parts),
-                scale="log-odds",
-                label=label,
-                against=against,
-            ),
-            most_likely(shares, f"sum of {len(fitted.estimator.estimators_)} trees of each label"),
+            *trial.contributions(parts, total - sum(parts), "log-odds", against),
+            trial.most_likely(f"sum of {len(fitted.estimator.estimators_)} trees of each label"),
         )
 
     def _contributions(self, fitted: FittedEstimator, row: NDArray[np.float64], label: str) -> list[float]:

@@ -17,7 +17,7 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from graspsense.classifier_api import FeatureValue, contribution_reasons, missing_feature
+from graspsense.classifier_api import contribution_reasons, feature_values, missing_feature
 from graspsense.plugin_api import (
     Classifier,
     ClassifierConfig,
@@ -166,10 +166,7 @@ class Ebm(Classifier[EbmConfig]):
         powers = np.exp(total - total.max())
         shares = dict(zip(model.labels, (powers / powers.sum()).tolist(), strict=True))
         likeliest, runner_up = np.argsort(-total, kind="stable")[:2].tolist()
-        given = [
-            FeatureValue(name, None if math.isnan(value) else value, unit)
-            for name, unit, value in zip(model.names, model.units, values, strict=True)
-        ]
+        given = feature_values(model.names, model.units, values)
         parts = []
         for term in model.terms:
             scores = term.scores_of(row)[0]
@@ -202,7 +199,7 @@ class Ebm(Classifier[EbmConfig]):
         """Return the bounds and the scores."""
         model = self._model()
         return {
-            "features": [list(name_and_unit) for name_and_unit in zip(model.names, model.units, strict=True)],
+            "features": list(zip(model.names, model.units, strict=True)),
             "labels": list(model.labels),
             "start": model.start.tolist(),
             "terms": [

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from attrs import frozen
-from numpy.typing import NDArray
 
-from graspsense.classifier_api import FeatureValue, Reason, contribution_reasons
+from graspsense.classifier_api import Reason
 from graspsense.plugin_api import setting
-from graspsense.plugins.classifiers.scikit import FittedEstimator, KeptConfig, ScikitClassifier, most_likely
+from graspsense.plugins.classifiers.scikit import ExplainedTrial, KeptConfig, ScikitClassifier
 from graspsense.plugins.classifiers.tree_contributions import path_contributions
 
 
@@ -41,31 +40,18 @@ class Forest(ScikitClassifier[ForestConfig]):
         """Return about how many steps of 10 ns the training takes."""
         return self.config.trees * (1e5 + trials * math.sqrt(features) * math.log2(trials + 1.0))
 
-    def reasons(
-        self,
-        fitted: FittedEstimator,
-        row: NDArray[np.float64],
-        given: Sequence[FeatureValue],
-        shares: Mapping[str, float],
-    ) -> Sequence[Reason]:
+    def reasons(self, trial: ExplainedTrial) -> Sequence[Reason]:
         """Return the contributions of the features to the probability, and the mean of the trees."""
-        label = next(iter(shares))
-        column = self.classes().index(label)
-        trees = fitted.estimator.estimators_
+        column, trees = self.classes().index(trial.label), trial.fitted.estimator.estimators_
         means = []
         for tree in trees:
             values = tree.tree_.value[:, 0, :]
             means.append(values[:, column] / values.sum(axis=1))
-        start, parts = path_contributions([tree.tree_ for tree in trees], means, row)
+        start, parts = path_contributions([tree.tree_ for tree in trees], means, trial.row)
         weights = np.array([start, *parts]) / len(trees)
         return (
-            *contribution_reasons(
-                [((feature,), value) for feature, value in zip(given, weights[1:].tolist(), strict=True)],
-                float(weights[0]),
-                scale="probability",
-                label=label,
-            ),
-            most_likely(shares, f"mean of {len(trees)} trees"),
+            *trial.contributions(weights[1:].tolist(), float(weights[0])),
+            trial.most_likely(f"mean of {len(trees)} trees"),
         )
 
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from graspsense.classifier_api import FeatureValue, Reason
+from graspsense.classifier_api import Reason
 from graspsense.plugin_api import ClassifierConfig, setting
-from graspsense.plugins.classifiers.scikit import FittedEstimator, ScikitClassifier
+from graspsense.plugins.classifiers.scikit import ExplainedTrial, FittedEstimator, ScikitClassifier
 
 
 @frozen(kw_only=True)
@@ -35,22 +35,15 @@ class Knn(ScikitClassifier[KnnConfig]):
 
         return KNeighborsClassifier(n_neighbors=min(self.config.neighbours, trials))
 
-    def reasons(
-        self,
-        fitted: FittedEstimator,
-        row: NDArray[np.float64],
-        given: Sequence[FeatureValue],
-        shares: Mapping[str, float],
-    ) -> Sequence[Reason]:
+    def reasons(self, trial: ExplainedTrial) -> Sequence[Reason]:
         """Return the contributions of the features to the share of votes, the votes, and the nearest distance."""
-        distances, rows = fitted.estimator.kneighbors(row)
-        votes = [fitted.labels[i] for i in rows[0].tolist()]
-        label = next(iter(shares))
+        distances, rows = trial.fitted.estimator.kneighbors(trial.row)
+        votes = [trial.fitted.labels[i] for i in rows[0].tolist()]
         words = (
-            f"{votes.count(label)} of the {len(votes)} nearest training trials are {label}; the nearest is "
+            f"{votes.count(trial.label)} of the {len(votes)} nearest training trials are {trial.label}; the nearest is "
             f"{distances[0, 0]:.2g} standard deviations away"
         )
-        return (*self.shapley_reasons(fitted, row, given, shares), Reason(words=words))
+        return (*self.shapley_reasons(trial), Reason(words=words))
 
     def counted(self, fitted: FittedEstimator, row: NDArray[np.float64]) -> tuple[float, float]:
         """Return the votes for the label, and all votes."""

@@ -66,18 +66,14 @@ class Mlp(ScikitClassifier[MlpConfig]):
         with np.errstate(over="ignore", invalid="ignore"):
             return super().shares(fitted, rows)
 
-    def to_json(self) -> dict[str, Any]:
+    def estimator_as_json(self, estimator: Any) -> dict[str, Any]:
         """Return the weights, or what the setting `kept_as` asks for."""
-        kept = super().to_json()
         if self.config.kept_as != "weights":
-            return kept
-        fitted = self._model()
+            return super().estimator_as_json(estimator)
         return {
-            **{key: kept[key] for key in ("made_with", "seed", "features")},
             "classes": list(self.classes()),
-            **{name: getattr(fitted, name).tolist() for name in ("fill", "mean", "scale")},
-            "weights": [layer.tolist() for layer in fitted.estimator.coefs_],
-            "offsets": [layer.tolist() for layer in fitted.estimator.intercepts_],
+            "weights": [layer.tolist() for layer in estimator.coefs_],
+            "offsets": [layer.tolist() for layer in estimator.intercepts_],
         }
 
     def from_json(self, model: Mapping[str, Any]) -> None:

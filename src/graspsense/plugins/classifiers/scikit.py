@@ -9,7 +9,6 @@ through skops: nothing is unpickled, and with the same version of scikit-learn i
 
 from __future__ import annotations
 
-import math
 import warnings
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
@@ -24,7 +23,9 @@ from graspsense.classifier_api import (
     FeatureValue,
     Reason,
     contribution_reasons,
+    feature_values,
     in_words,
+    json_ready,
     missing_feature,
     one_thread,
 )
@@ -79,6 +80,43 @@ class FittedEstimator:
         return np.clip(scaled, -MOST_SCALED, MOST_SCALED)
 
 
+@frozen(kw_only=True, eq=False)
+class ExplainedTrial:
+    """A trial whose answer is explained.
+
+    `row` is the preprocessed trial, of shape (1, features), `given` its features before that; `shares` are its
+    probabilities, the most probable label first.
+    """
+
+    fitted: FittedEstimator
+    row: NDArray[np.float64]
+    given: Sequence[FeatureValue]
+    shares: Mapping[str, float]
+
+    @property
+    def label(self) -> str:
+        """The most probable label."""
+        return next(iter(self.shares))
+
+    def contributions(
+        self,
+        parts: Sequence[float],
+        start: float,
+        scale: Literal["probability", "log-odds"] = "probability",
+        against: str = "",
+    ) -> tuple[Reason, ...]:
+        """Return as reasons what each feature contributes to the label, beside what holds before any feature."""
+        each = [((feature,), value) for feature, value in zip(self.given, parts, strict=True)]
+        return contribution_reasons(each, start, scale=scale, label=self.label, against=against)
+
+    def most_likely(self, what: str) -> Reason:
+        """Return the labels of the three largest shares; `what` says what the shares are.
+
+        The shares themselves say nothing of how often such an answer is right.
+        """
+        return Reason(words=f"{what}, the largest first: {', '.join(list(self.shares)[:3])}")
+
+
 class ScikitClassifier(Classifier[ScikitConfigT]):
     """A classifier of scikit-learn, which subclasses specify."""
 
@@ -95,45 +133,19 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         """Return about how many elementary steps of 10 ns a training takes; 0 where settings cannot make it long."""
         return 0.0
 
-    def reasons(
-        self,
-        fitted: FittedEstimator,
-        row: NDArray[np.float64],
-        given: Sequence[FeatureValue],
-        shares: Mapping[str, float],
-    ) -> Sequence[Reason]:
-        """Return the reasons for the most probable label of one trial: contributions of the features, largest labels.
+    def reasons(self, trial: ExplainedTrial) -> Sequence[Reason]:
+        """Return the reasons for the most probable label: contributions of the features, largest labels."""
+        return (*self.shapley_reasons(trial), trial.most_likely(self.shares_are))
 
-        `row` is the preprocessed trial, of shape (1, features), `given` its features before that; `shares` are its
-        probabilities, the most probable label first.
-        """
-        return (*self.shapley_reasons(fitted, row, given, shares), most_likely(shares, self.shares_are))
-
-    def shapley_reasons(
-        self,
-        fitted: FittedEstimator,
-        row: NDArray[np.float64],
-        given: Sequence[FeatureValue],
-        shares: Mapping[str, float],
-    ) -> tuple[Reason, ...]:
-        """Return the contributions of the features to the probability of the label, as Shapley values.
-
-        The arguments are those of `reasons`.
-        """
-
-        label = next(iter(shares))
-        column = self.classes().index(label)
+    def shapley_reasons(self, trial: ExplainedTrial) -> tuple[Reason, ...]:
+        """Return the contributions of the features to the probability of the label, as Shapley values."""
+        column, medians = self.classes().index(trial.label), np.full(len(trial.given), np.nan)
         start, parts = shapley_values(
-            lambda rows: self.shares(fitted, rows)[:, column],
-            row[0],
-            fitted.ready(np.full(len(given), np.nan)),
+            lambda rows: self.shares(trial.fitted, rows)[:, column],
+            trial.row[0],
+            trial.fitted.ready(medians),
         )
-        return contribution_reasons(
-            [((feature,), value) for feature, value in zip(given, parts, strict=True)],
-            start,
-            scale="probability",
-            label=label,
-        )
+        return trial.contributions(parts, start)
 
     def counted(self, fitted: FittedEstimator, row: NDArray[np.float64]) -> tuple[float, float] | None:
         """Return the training trials that the largest probability was counted from: with the label, and in all.
@@ -201,10 +213,8 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         probabilities = self.shares(fitted, row)[0].tolist()
         shares = dict(zip(self.classes(), probabilities, strict=True))
         ranked = dict(sorted(shares.items(), key=lambda item: -item[1]))
-        given = [
-            FeatureValue(name, None if math.isnan(value) else value, unit)
-            for name, unit, value in zip(fitted.table.names, fitted.table.units, values, strict=True)
-        ]
+        given = feature_values(fitted.table.names, fitted.table.units, values)
+        trial = ExplainedTrial(fitted=fitted, row=row, given=given, shares=ranked)
         filled = [
             missing_feature(
                 feature.name,
@@ -218,7 +228,7 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         return Prediction(
             label=self.classes()[int(np.argmax(probabilities))],
             probabilities=shares,
-            because=(*filled, *self.reasons(fitted, row, given, ranked)),
+            because=(*filled, *self.reasons(trial)),
             warnings=self._version_warnings(),
             support=self.counted(fitted, row),
         )
@@ -231,24 +241,22 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         kept: dict[str, Any] = {
             "made_with": self._made_with or f"scikit-learn {sklearn.__version__}",
             "seed": fitted.seed,
-            "features": [
-                list(name_and_unit)
-                for name_and_unit in zip(fitted.table.names, fitted.table.units, strict=True)
-            ],
+            "features": list(zip(fitted.table.names, fitted.table.units, strict=True)),
         }
-        if getattr(self.config, "kept_as", "trials") == "skops":
-            from graspsense.plugins.classifiers.skops_text import as_text
-
+        if getattr(self.config, "kept_as", "trials") != "trials":
             ready = {name: getattr(fitted, name).tolist() for name in ("fill", "mean", "scale")}
-            return {**kept, **ready, "skops": as_text(fitted.estimator)}
+            return {**kept, **ready, **self.estimator_as_json(fitted.estimator)}
         return {
             **kept,
             "labels": list(fitted.labels),
-            "trials": [
-                [None if math.isnan(value) else value for value in row]
-                for row in fitted.table.values.tolist()
-            ],
+            "trials": json_ready(fitted.table.values.tolist()),
         }
+
+    def estimator_as_json(self, estimator: Any) -> dict[str, Any]:
+        """Return the fitted estimator itself, as the setting `kept_as` asks for it."""
+        from graspsense.plugins.classifiers.skops_text import as_text
+
+        return {"skops": as_text(estimator)}
 
     def from_json(self, model: Mapping[str, Any]) -> None:
         """Restore the model. Raises DataDamaged or ValueError."""
@@ -324,11 +332,3 @@ def restored(
         mean=mean,
         scale=scale,
     )
-
-
-def most_likely(shares: Mapping[str, float], what: str) -> Reason:
-    """Return the labels of the three largest shares; `shares` has the largest first.
-
-    The shares themselves say nothing of how often such an answer is right.
-    """
-    return Reason(words=f"{what}, the largest first: {', '.join(list(shares)[:3])}")

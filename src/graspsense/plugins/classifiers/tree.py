@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from graspsense.classifier_api import FeatureValue, Reason, SplitTest, leaf_reason, path_reasons
+from graspsense.classifier_api import Reason, SplitTest, leaf_reason, path_reasons
 from graspsense.plugin_api import FeatureTable, setting
-from graspsense.plugins.classifiers.scikit import FittedEstimator, KeptConfig, ScikitClassifier
+from graspsense.plugins.classifiers.scikit import (
+    ExplainedTrial,
+    FittedEstimator,
+    KeptConfig,
+    ScikitClassifier,
+)
 
 
 @frozen(kw_only=True)
@@ -38,14 +43,9 @@ class Cart(ScikitClassifier[CartConfig]):
             criterion=self.config.criterion, min_samples_leaf=self.config.min_leaf, random_state=seed
         )
 
-    def reasons(
-        self,
-        fitted: FittedEstimator,
-        row: NDArray[np.float64],
-        given: Sequence[FeatureValue],
-        shares: Mapping[str, float],
-    ) -> Sequence[Reason]:
+    def reasons(self, trial: ExplainedTrial) -> Sequence[Reason]:
         """Return the path through the tree, with thresholds in the units of the features."""
+        fitted, row = trial.fitted, trial.row
         inner = fitted.estimator.tree_
         nodes = fitted.estimator.decision_path(row).indices.tolist()
         tests = []
@@ -60,7 +60,7 @@ class Cart(ScikitClassifier[CartConfig]):
                     above=bool(row[0, k] > inner.threshold[node]),
                 )
             )
-        return (*path_reasons(tests), leaf_reason(*self.counted(fitted, row), next(iter(shares))))
+        return (*path_reasons(tests), leaf_reason(*self.counted(fitted, row), trial.label))
 
     def support(self, table: FeatureTable) -> NDArray[np.float64]:
         """Return the training trials in the leaf of each trial."""
