@@ -158,5 +158,6 @@ def _controls(table: FeatureTable, early: Sequence[Features], facts: Sequence[La
         table_of(early),
         first_line=FeatureTable(names=NAMES, units=UNITS, values=opening),
     )
-    gaps = ([reading.frame.gap_m for reading in fact.recording.readings] for fact in facts)
-    return without_constant_gap(known_controls, gaps)
+    return without_constant_gap(
+        known_controls, (fact.recording.columns("gap_m")[0].tolist() for fact in facts)
+    )
