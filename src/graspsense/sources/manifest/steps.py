@@ -121,9 +121,12 @@ def _of_one_closing(gap: Numbers, runs: list[tuple[int, int]]) -> list[tuple[int
     joined: list[tuple[int, int]] = []
     for begin, end in runs:
         if joined:
-            earlier = joined[-1][1]
-            between = gap[earlier - 1 : begin + 1]
-            if between[0] - between[-1] > least and np.nanmax(between) < between[0] + least:
+            start, earlier = joined[-1]
+            between, narrowest = gap[earlier - 1 : begin + 1], np.nanmin(gap[start:earlier], initial=np.inf)
+            closes = between[0] - between[-1] > least and np.nanmax(between) < between[0] + least
+            if (
+                closes and between[0] < narrowest + least
+            ):  # in a squeeze with a force that stuck, they had opened
                 begin = joined.pop()[0]
         joined.append((begin, end))
     return joined
