@@ -59,14 +59,15 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
     available.update(scalars)
     available.update(arrays)
     gap = available.value("gap") or (np.zeros(len(table)), NO_GAP)
-    hand, each = _fingers(available, zero)
+    available.zero = zero
+    hand, each = _fingers(available)
     scalars |= each
     units |= {channel.name: channel.unit for channel in hand}
     if hand:
         left_n, right_n = finger_sides(hand, each)
         unit = "" if hand[0].unit == "N" else hand[0].unit
     else:
-        left_n, right_n, unit = _sides(available, zero)
+        left_n, right_n, unit = _sides(available)
     notes += _folds(manifest)
     effort, velocity = available.value("effort"), available.value("velocity")
     columns = GraspColumns(
@@ -97,7 +98,7 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
     return without_duplicates(whole) if keys.duplicates == "drop" else whole
 
 
-def _sides(columns: AvailableColumns, zero: int) -> tuple[Numbers, Numbers, str]:
+def _sides(columns: AvailableColumns) -> tuple[Numbers, Numbers, str]:
     """Return the forces of the two pads that a manifest names, and their unit. Raises ConfigError."""
     both = columns.value("force")
     left = both or columns.value("left")
@@ -109,15 +110,10 @@ def _sides(columns: AvailableColumns, zero: int) -> tuple[Numbers, Numbers, str]
         raise ConfigError(
             f"{columns.manifest.place}: left is in {left[1] or 'N'} and right in {right[1] or 'N'}: use one unit"
         )
-    return _zeroed(left[0], zero), _zeroed(right[0], zero), left[1]
+    return left[0], right[0], left[1]
 
 
-def _zeroed(force: Numbers, zero: int) -> Numbers:
-    zeroed: Numbers = force - np.nanmean(force[:zero]) if zero else force.copy()
-    return zeroed
-
-
-def _fingers(columns: AvailableColumns, zero: int) -> tuple[tuple[FingerForce, ...], dict[str, Numbers]]:
+def _fingers(columns: AvailableColumns) -> tuple[tuple[FingerForce, ...], dict[str, Numbers]]:
     """Return the fingers that a manifest names, and the force of each by its channel. Raises ConfigError."""
     manifest = columns.manifest
     forces: dict[str, Numbers] = {}
@@ -126,7 +122,7 @@ def _fingers(columns: AvailableColumns, zero: int) -> tuple[tuple[FingerForce, .
         key = f"{PREFIX}{name}"
         given = columns.value(key)
         assert given is not None  # each finger has an expression
-        forces[key], units[name] = _zeroed(given[0], zero), given[1] or "N"
+        forces[key], units[name] = given[0], given[1] or "N"
     if len(set(units.values())) > 1:
         words = listed([f"{name} in {unit}" for name, unit in units.items()])
         raise ConfigError(f"{manifest.place}: fingers: {words}: use one unit")
