@@ -330,6 +330,12 @@ def test_a_fault_in_one_squeeze_is_of_that_squeeze(tmp_path, spoilt, value, samp
     assert [recording.source for recording in squeezes] == [f"jar.csv, squeeze {k}" for k in range(1, 5)]
     bad = [k for k, recording in enumerate(squeezes, 1) if isinstance(recording, UnreadableRecording)]
     assert bad == ([] if np.isnan(value) else [3])  # samples without a number are left out
+    told = [
+        k
+        for k, grasp in enumerate(squeezes, 1)
+        if "without a number" in " ".join(getattr(grasp, "notices", ()))
+    ]
+    assert told == ([3] if np.isnan(value) and samples == 40 else [])
     good = [recording for k, recording in enumerate(squeezes, 1) if k != 3]
     assert all(column(squeeze, "force_left_n").max() == pytest.approx(20.0) for squeeze in good)
 

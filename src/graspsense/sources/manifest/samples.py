@@ -28,6 +28,8 @@ from graspsense.sources.units import GRAM_FORCE, TO_SI, WITHOUT_UNIT, known_unit
 
 EARLIEST_STAMP_S: Final = 1e6
 """A first time beyond this is a stamp of a clock, and times are counted from it."""
+MOSTLY: Final = 0.5
+"""Share of the samples with a number from which on gap and forces were measured together."""
 QUANTITIES: Final = ("time", "gap", "force")
 """The quantities whose units are not those of another one."""
 _NAME: Final = re.compile(r"[a-z][a-z0-9_]*")
@@ -94,7 +96,9 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
         lines=table.lines,
         events=events,
     )
-    whole = without_missing(columns)
+    # What is missing in one of several squeezes is of that squeeze.
+    measured = np.isfinite(t_s).all() and np.isfinite(columns.gap_m + columns.force_n).mean() > MOSTLY
+    whole = columns if keys.split == "force" and measured else without_missing(columns)
     return without_duplicates(whole) if keys.duplicates == "drop" else whole
 
 

@@ -94,7 +94,14 @@ def squeezes(columns: GraspColumns) -> list[GraspColumns]:
             "force. If fingers closed then, split by a column"
         )
     parts[0] = evolve(parts[0], warnings=(*parts[0].warnings, *missed))
-    return parts
+    return [_measured(part) for part in parts]
+
+
+def _measured(columns: GraspColumns) -> GraspColumns:
+    """Return the samples in which gap and forces have a number."""
+    known = ~np.isnan(columns.gap_m + columns.force_n)
+    place = columns.place(int(known.argmin()))
+    return columns if known.all() or not known.any() else only(columns, known, f"without a number ({place})")
 
 
 def _weak_runs(columns: GraspColumns, force: Numbers, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
