@@ -29,7 +29,7 @@ from graspsense.sources.units import GRAM_FORCE, TO_SI, WITHOUT_UNIT, known_unit
 EARLIEST_STAMP_S: Final = 1e6
 """A first time beyond this is a stamp of a clock, and times are counted from it."""
 MOSTLY: Final = 0.5
-"""Share of the samples with a number from which on gap and forces were measured together."""
+"""Share of the samples with gap and force from which on these were measured together."""
 QUANTITIES: Final = ("time", "gap", "force")
 """The quantities whose units are not those of another one."""
 _NAME: Final = re.compile(r"[a-z][a-z0-9_]*")
@@ -96,10 +96,14 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
         lines=table.lines,
         events=events,
     )
-    # What is missing in one of several squeezes is of that squeeze.
-    measured = np.isfinite(t_s).all() and np.isfinite(columns.gap_m + columns.force_n).mean() > MOSTLY
-    whole = columns if keys.split == "force" and measured else without_missing(columns)
+    whole = columns if keys.split == "force" and _is_mostly_known(columns) else without_missing(columns)
     return without_duplicates(whole) if keys.duplicates == "drop" else whole
+
+
+def _is_mostly_known(columns: GraspColumns) -> bool:
+    """Return whether gap and forces were measured together: what is missing in a squeeze is then of that squeeze."""
+    known = np.isfinite(columns.gap_m + columns.force_n)
+    return bool(np.isfinite(columns.t_s).all() and known.mean() > MOSTLY)
 
 
 def _sides(columns: AvailableColumns) -> tuple[Numbers, Numbers, str]:
