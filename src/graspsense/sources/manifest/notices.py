@@ -228,10 +228,10 @@ def _of_rate(t_s: Numbers, gap: Numbers) -> Iterator[str]:
     if len(t_s) < 4 * n:
         return
     ratio = np.log((t_s[2 * n :] - t_s[n:-n]) / (t_s[n:-n] - t_s[: -2 * n]))
-    before, after = gap[n:-n] - gap[: -2 * n], gap[2 * n :] - gap[n:-n]
+    earlier, later = gap[n:-n] - gap[: -2 * n], gap[2 * n :] - gap[n:-n]
     noise = NOISE * float(np.median(np.abs(np.diff(gap, 2))))
     k = int(np.abs(ratio).argmax())
-    if abs(ratio[k]) > FASTER and abs(after[k] - before[k]) + noise < SAME * abs(before[k]):
+    if abs(ratio[k]) > FASTER and abs(later[k] - earlier[k]) + noise < SAME * abs(earlier[k]):
         yield (
             f"from {t_s[k + n]:.4g} s on, samples are {math.exp(ratio[k]):.2g} times as far apart, and the fingers "
             "move as much from one to the next: did the clock go wrong? Then leave time out and write rate_hz"

@@ -58,8 +58,7 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
         for name, values in (*scalars.items(), *arrays.items()):
             if name not in manifest.fast and units.get(name, "") in ("N", "counts"):
                 values -= np.nanmean(values[:zero], axis=0)
-    available.update(scalars)
-    available.update(arrays)
+    available.update(scalars | arrays)
     gap = available.value("gap") or (np.zeros(len(table)), NO_GAP)
     available.zero = zero
     hand, each = _fingers(available)
