@@ -49,10 +49,7 @@ FEWEST: Final = 3
 def without_duplicates(columns: GraspColumns) -> GraspColumns:
     """Return the samples without those that have the time of the one before."""
     new = np.concatenate(([True], np.diff(columns.t_s) != 0.0))
-    dropped = len(new) - int(new.sum())
-    if not dropped:
-        return columns
-    return only(columns, new, "with the time of the one before")
+    return columns if new.all() else only(columns, new, "with the time of the one before")
 
 
 @np.errstate(all="ignore")

@@ -309,11 +309,6 @@ def _with_acceleration(
 def _forces(cells: Cells, zero: Cells) -> tuple[float, float]:
     """Return the pad force and the edge force of a tip; NaN if no cell has a value."""
     kept, bad = masked(cells, zero)
-    return (
-        (_NAN, _NAN)
-        if bad == CELLS
-        else (
-            pad_force(kept, zero, PAD_COUNTS_PER_N, FIRST_PAD_CELL),
-            edge_force(kept, zero, EDGE_COUNTS_PER_N),
-        )
-    )
+    if bad == CELLS:
+        return _NAN, _NAN
+    return pad_force(kept, zero, PAD_COUNTS_PER_N, FIRST_PAD_CELL), edge_force(kept, zero, EDGE_COUNTS_PER_N)
