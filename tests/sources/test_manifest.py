@@ -205,6 +205,8 @@ FOUR = (1.0, 1.0, 1.0, 1.0)
         (FOUR, lambda force, _: np.where(np.arange(2400) // 5 == 180, -999.0, force)),
         # A zero that changes in the second squeeze.
         (FOUR, lambda force, _: np.where(np.arange(2400) > 900, force + 8.0, force)),
+        # A sensor that says one value from the second squeeze on until the fingers are open.
+        (FOUR, lambda force, _: without(force, 800, 1190, force[800])),
     ],
 )
 def test_squeezes_of_any_force_are_found_with_drift_and_faults(factors, change, tmp_path):
@@ -246,6 +248,17 @@ def test_what_is_no_squeeze_or_none_of_its_own_is_told(factors, change, number, 
     assert len(squeezes) == number
     notices = [notice for squeeze in squeezes for notice in squeeze.notices]
     assert [notice for notice in notices if re.search(told, notice)] if told else not notices
+
+
+def test_a_pad_that_fails_at_the_narrowest_of_several_objects_is_not_turned(tmp_path):
+    """The others are held 30 mm wider, where the fingers are open for the first."""
+    gaps, force, time = repeated(1.0, 1.0, 1.0)
+    gaps = gaps + np.interp(time, [5.9, 6.1], [0.0, 0.03])
+    columns = {"t": time, "gap": gaps * 1e3, "L": np.where(time < 6.0, 0.0, force), "R": force}
+    pandas_csv(tmp_path / "jar.csv", columns)
+    text = 'files = "{label}.csv"\nsplit = "force"\ntime = "t"\ngap = "gap [mm]"\nleft = "L"\nright = "R"'
+    squeezes = recordings(tmp_path, text)
+    assert ["left pad" in " ".join(squeeze.notices) for squeeze in squeezes] == [True, False, False]
 
 
 def test_a_force_that_drops_out_while_the_gap_stays_is_told(tmp_path):
@@ -317,6 +330,12 @@ def test_a_fault_in_one_squeeze_is_of_that_squeeze(tmp_path, spoilt, value, samp
     assert [recording.source for recording in squeezes] == [f"jar.csv, squeeze {k}" for k in range(1, 5)]
     bad = [k for k, recording in enumerate(squeezes, 1) if isinstance(recording, UnreadableRecording)]
     assert bad == ([] if np.isnan(value) else [3])  # samples without a number are left out
+    told = [
+        k
+        for k, grasp in enumerate(squeezes, 1)
+        if "without a number" in " ".join(getattr(grasp, "notices", ()))
+    ]
+    assert told == ([3] if np.isnan(value) and samples == 40 else [])
     good = [recording for k, recording in enumerate(squeezes, 1) if k != 3]
     assert all(column(squeeze, "force_left_n").max() == pytest.approx(20.0) for squeeze in good)
 
@@ -366,6 +385,7 @@ def test_a_list_names_files_and_rows_with_their_facts(tmp_path):
 
 
 GAP_M, FORCE_N = squeezing()
+KEPT = {"time": T_S, "gap": GAP_M, "force": FORCE_N}
 
 
 @every_case(
@@ -387,6 +407,23 @@ GAP_M, FORCE_N = squeezing()
         ({"force": 5e-4 * FORCE_N}, r"reaches 0.01 N, which few.*\[kN\]"),
         # From 1 N of 20 N on: the contact force is 0.625 N.
         ({"force": FORCE_N[105::2], "gap": GAP_M[105::2], "time": T_S[105::2]}, "begins in contact"),
+        # A zero that was set at 1 N, before the force grew and after; and where the fingers open wider in the end.
+        (
+            {"force": (FORCE_N - FORCE_N[105])[105:], "gap": GAP_M[105:], "time": T_S[105:]},
+            "begins in contact",
+        ),
+        (
+            {
+                "force": np.concatenate((FORCE_N[115:], FORCE_N[::-1])) - FORCE_N[115],
+                "gap": np.concatenate((GAP_M[115:], GAP_M[::-1])),
+                "time": np.arange(485) / RATE_HZ,
+            },
+            "begins in contact",
+        ),
+        # A clock that loses every other sample from the middle of the approach on.
+        ({"time": np.where(T_S < 0.5, T_S, 0.5 + 2.0 * (T_S - 0.5))}, "from 0.5 s on, .* 2 times"),
+        # Every second sample from there on: the fingers are as fast as before.
+        ({name: values[(T_S < 0.5) | (np.arange(300) % 2 == 0)] for name, values in KEPT.items()}, None),
         # Three seconds in ms that are called us, in hours, and as the number of the row; a sample a second is none.
         ({"time": np.round(T_S * 1e-3, 9)}, "lasts 3 ms only"),
         ({"time": np.round(T_S / 3600, 9)}, "lasts 0.83 ms only"),

@@ -45,19 +45,13 @@ def controls(
     `width_meaning` says what the width means in these data. The width is the feature that an installed feature set
     declares as such, unless the gap does not change.
     """
-    name = width_feature(table.names)
     width, no_width = None, "none of the features is declared to be the width"
-    if (
-        name is not None
-        and before_contact is not None
-        and _is_gap_at_start(table.columns([name]), before_contact)
-    ):
-        no_width = (
-            f"{name} is the gap at the start in every trial: the gap does not change, so it tells no width"
-        )
-    elif name is not None:
+    if (name := width_feature(table.names)) is not None:
         what = f"{name} alone" + (f": {width_meaning}" if width_meaning else "")
-        width = ControlFeatures(table=table.columns([name]), what=what)
+        width, no_width = ControlFeatures(table=table.columns([name]), what=what), ""
+        if before_contact is not None and _is_gap_at_start(width.table, before_contact):
+            width = None
+            no_width = f"{name} is the gap at the start in every trial: the gap does not change, so it tells no width"
     return Controls(
         before_contact=None
         if before_contact is None
@@ -65,7 +59,7 @@ def controls(
         no_before_contact=no_before if before_contact is None else "",
         first_line=None if first_line is None else ControlFeatures(table=first_line, what=FIRST_LINE),
         width=width,
-        no_width="" if width is not None else no_width,
+        no_width=no_width,
     )
 
 

@@ -24,6 +24,10 @@ from graspsense.recording.recorded_grasp import RecordedGrasp
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+Rows = Sequence[tuple[Any, ...]]
+Names = tuple[str, ...]
+"""The rows of a table, and the names of their columns."""
+
 
 def write_csv(path: Path, grasp: RecordedGrasp) -> None:
     """Write one line per tick, with an empty cell for a missing channel.
@@ -33,11 +37,7 @@ def write_csv(path: Path, grasp: RecordedGrasp) -> None:
     `NAME-CHANNEL.csv.npz`, with the arrays `t_s`, `counter` and `cells`. `FILE.json` has the channels, units and
     rate of the gripper, so that `import csv:FILE` reads the grasp back.
     """
-    tables = dict(_tables(grasp))
-    for name, (rows, fields) in tables.items():
-        write_new(beside(path, name), _csv(rows, fields))
-    _write_declared(path, grasp, [*tables, *_write_cameras(path, grasp)])
-    write_new(path, _csv(grasp.ticks.tolist(), TICK_FIELDS))
+    _write_tables(path, grasp, _csv)
 
 
 def write_npz(path: Path, grasp: RecordedGrasp) -> None:
@@ -66,15 +66,7 @@ def write_npz(path: Path, grasp: RecordedGrasp) -> None:
 
 def write_parquet(path: Path, grasp: RecordedGrasp) -> None:
     """Write one row per tick, and the other topics as `write_csv` does. Raises PluginUnavailable without pyarrow."""
-    ticks = parquet({name: (grasp.ticks[name], "") for name in TICK_FIELDS})
-    tables = dict(_tables(grasp))
-    for name, (rows, fields) in tables.items():
-        columns = zip(*rows, strict=True)
-        write_new(
-            beside(path, name), parquet({n: (np.array(c), "") for n, c in zip(fields, columns, strict=True)})
-        )
-    _write_declared(path, grasp, [*tables, *_write_cameras(path, grasp)])
-    write_new(path, ticks)
+    _write_tables(path, grasp, _parquet)
 
 
 def write_mcap(path: Path, grasp: RecordedGrasp) -> None:
@@ -92,8 +84,6 @@ def write_toml(path: Path, grasp: RecordedGrasp) -> None:
     write_new(path, grasp.record().settings_text.encode())
 
 
-Table = tuple[list[tuple[Any, ...]], tuple[str, ...]]
-"""Rows, and the names of their columns."""
 WRITERS: Final[Mapping[str, Callable[[Path, RecordedGrasp], None]]] = {
     ".csv": write_csv,
     ".npz": write_npz,
@@ -104,7 +94,17 @@ WRITERS: Final[Mapping[str, Callable[[Path, RecordedGrasp], None]]] = {
 """File extension to the function that writes it."""
 
 
-def _tables(grasp: RecordedGrasp) -> Iterator[tuple[str, Table]]:
+def _write_tables(path: Path, grasp: RecordedGrasp, encoded: Callable[[Rows, Names], bytes]) -> None:
+    """Write ticks and other topics as tables, and what the gripper declared; nothing if one cannot be encoded."""
+    ticks = encoded(grasp.ticks.tolist(), TICK_FIELDS)
+    tables = {name: encoded(rows, fields) for name, (rows, fields) in _tables(grasp)}
+    for name, table in tables.items():
+        write_new(beside(path, name), table)
+    _write_declared(path, grasp, [*tables, *_write_cameras(path, grasp)])
+    write_new(path, ticks)
+
+
+def _tables(grasp: RecordedGrasp) -> Iterator[tuple[str, tuple[Rows, Names]]]:
     """Yield each topic beside the ticks and the cameras, with its rows and the names of their columns."""
     cameras = _cameras(grasp)
     fast = {
@@ -140,7 +140,7 @@ def _write_cameras(path: Path, grasp: RecordedGrasp) -> list[str]:
     return list(cameras)
 
 
-def _flat(rows: NDArray[np.void]) -> Table:
+def _flat(rows: NDArray[np.void]) -> tuple[Rows, Names]:
     """Return the rows of a topic with a number a column, and the names of these: those of an array are numbered."""
     fields: list[str] = []
     columns: list[list[Any]] = []
@@ -155,8 +155,13 @@ def _flat(rows: NDArray[np.void]) -> Table:
     return list(zip(*columns, strict=True)), tuple(fields)
 
 
-def _csv(rows: Sequence[tuple[Any, ...]], fields: tuple[str, ...]) -> bytes:
+def _csv(rows: Rows, fields: Names) -> bytes:
     return csv_text([fields, *rows]).encode()
+
+
+def _parquet(rows: Rows, fields: Names) -> bytes:
+    columns = zip(fields, zip(*rows, strict=True), strict=True)
+    return parquet({name: (np.array(column), "") for name, column in columns})
 
 
 def _declared(grasp: RecordedGrasp) -> dict[str, Any]:

@@ -38,6 +38,7 @@ from graspsense.recording.layout import (
 from graspsense.recording.mcap_records import MAGIC, records_in, records_of
 from graspsense.recording.readable import readable, refuse_devices
 from graspsense.recording.recorded_grasp import TICK_ROW, RecordedGrasp, TopicRows, row_type
+from graspsense.recording.replayable import Recording
 from graspsense.recording.trial_record import DeviceRecord
 from graspsense.recording.unpacked import Unpacked
 
@@ -77,6 +78,11 @@ def read_recorded(path: str | Path, *, salvage: bool = False) -> RecordedGrasp:
     if not salvage:
         grasp.told_events()
     return grasp
+
+
+def read_recording(path: str) -> Recording:
+    """Return the grasp in a complete recording, as a gripper can replay it. Raises as `read_recorded`."""
+    return read_recorded(path).recording()
 
 
 def read_first_frame(path: Path) -> Frame | None:

@@ -258,31 +258,27 @@ class RecordedGrasp:
 
     def _column(self, channel: DeclaredChannel, nothing: Any) -> list[Any]:
         """Return the value of a further channel in each tick, `nothing` before the first one."""
-        scalar = not isinstance(channel, TactileArray | FastChannel)
-        topic = self.topics[SCALARS_TOPIC if scalar else SIGNAL_TOPIC + channel.name]
-        values: list[Any] = [nothing] * len(self.ticks)
-        names = topic.rows.dtype.names or ()
-        last = nothing
-        for tick, row in zip(topic.next_tick, topic.rows, strict=True):
-            if tick >= len(values):
-                break
-            if scalar:
-                last = float(row[names.index(channel.name)])
-            elif isinstance(channel, TactileArray):
-                last = Image(float(row["t_s"]), int(row["counter"]), cells_of(channel, row["cells"]))
-            else:
-                rows = row["values"].reshape(declared_shape(channel)).tolist()
-                new = min(max(int(row["new"]), 0), len(rows))
-                last = Samples(float(row["t_s"]), int(row["counter"]), new, tuple(map(tuple, rows)))
-            values[tick] = last
-        # An image stays until the next one; samples are new in one tick only.
-        for k in range(1, len(values)):
-            if values[k] is nothing and values[k - 1] is not nothing:
-                value = values[k - 1]
-                if isinstance(value, Samples):
-                    value = Samples(value.t_s, value.counter, 0, nothing.values)
-                values[k] = value
-        return values
+        own = isinstance(channel, TactileArray | FastChannel)
+        topic = self.topics[SIGNAL_TOPIC + channel.name if own else SCALARS_TOPIC]
+        values: list[Any]
+        last = np.searchsorted(topic.next_tick, np.arange(len(self.ticks)), side="right") - 1
+        if isinstance(channel, TactileArray):
+            values = [
+                Image(float(row["t_s"]), int(row["counter"]), cells_of(channel, row["cells"]))
+                for row in topic.rows
+            ]
+        elif own:
+            shape = declared_shape(channel)
+            values = [_samples(row, row["values"].reshape(shape).tolist()) for row in topic.rows]
+        else:
+            values = topic.rows[channel.name].tolist()
+        column = [values[k] if k >= 0 else nothing for k in last.tolist()]
+        if isinstance(
+            channel, FastChannel
+        ):  # an image stays until the next one, and samples are new in one tick only
+            for k in np.flatnonzero((np.diff(last) == 0) & (last[1:] >= 0)) + 1:
+                column[k] = column[k]._replace(new=0, values=nothing.values)
+        return column
 
     def _rate_of_ticks(self) -> float:
         """Return the number of ticks per unit of time, from their times; 1000 where these do not increase."""
@@ -311,6 +307,12 @@ class RecordedGrasp:
             mounting=self.device.mounting,
             events=self.labelled_events(),
         )
+
+
+def _samples(row: Any, values: list[list[float]]) -> Samples:
+    """Return the samples of a message, given its values."""
+    new = min(max(int(row["new"]), 0), len(values))
+    return Samples(float(row["t_s"]), int(row["counter"]), new, tuple(map(tuple, values)))
 
 
 def with_phases_of(whole: Trace, replayed: Trace) -> Trace:

@@ -9,9 +9,12 @@ import hashlib
 import math
 import struct
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
 from typing import Final
 
+import numpy as np
 from attrs import field, frozen
+from numpy.typing import NDArray
 
 from graspsense.core.components.channels import dtype_of
 from graspsense.core.components.delivered import Delivered
@@ -50,6 +53,16 @@ class Recording:
     events: Mapping[str, tuple[GraspEvent, ...]] = field(factory=dict)
     """The events that others labelled in it, by their names; one without events was looked for and did not happen."""
 
+    @cached_property
+    def frames(self) -> NDArray[np.float64]:
+        """The numbers of its frames: shape (readings, fields of `Frame`)."""
+        rows = [reading.frame for reading in self.readings]
+        return np.array(rows, dtype=np.float64).reshape(-1, len(Frame._fields))
+
+    def columns(self, *names: str) -> NDArray[np.float64]:
+        """Return these fields of its frames: shape (fields, readings)."""
+        return self.frames[:, [Frame._fields.index(name) for name in names]].T
+
 
 def check_recording(recording: Recording) -> None:
     """Raise DataDamaged if a recording has nothing to replay, or what no gripper can have measured."""
@@ -59,7 +72,7 @@ def check_recording(recording: Recording) -> None:
     for k, reading in enumerate(recording.readings, 1):
         if problem := delivered.problem(reading):
             raise DataDamaged(f"{recording.name}: frame {k}: {problem}")
-    if not all(math.isfinite(reading.frame.t_s) for reading in recording.readings):
+    if not np.isfinite(recording.columns("t_s")).all():
         raise DataDamaged(f"{recording.name}: the time of a frame is not a number")
     if not 0.0 < recording.rate_hz < math.inf:
         raise DataDamaged(f"{recording.name}: its rate is {recording.rate_hz} frames a unit of time")
@@ -82,8 +95,7 @@ def _has(recording: Recording, name: str) -> bool:
         return True
     if name == "pads":
         return any(reading.pads.counter for reading in recording.readings)
-    place = Frame._fields.index(f"{name}_n")
-    return not all(math.isnan(reading.frame[place]) for reading in recording.readings)
+    return not bool(np.isnan(recording.columns(f"{name}_n")).all())
 
 
 def _rate_hz(recording: Recording, channel: str) -> float:

@@ -63,5 +63,5 @@ def folder_and_options(place: str) -> tuple[Path, PlaceOptions]:
     try:
         return Path(folder).expanduser(), structured(given, PlaceOptions, "lerobot:FOLDER")
     except ValidationFailed as misfit:
-        said = [f"{'.'.join(map(str, problem.path))}: {problem.text}" for problem in misfit.problems]
+        said = [f"{'.'.join(map(str, problem.path))}: {problem.words()}" for problem in misfit.problems]
         raise ConfigError("\n".join(said)) from None

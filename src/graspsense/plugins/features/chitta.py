@@ -77,6 +77,14 @@ BOTH_TOO_LATE: Final = 5.0
 CONTACT: Final = 6.0
 REST: Final = 7.0
 """How far a grasp came (`Measured.reached`); up to BOTH_TOO_LATE without a contact of both pads."""
+_WHY_NO_CONTACT: Final = {
+    NO_TICKS: "the trace is empty",
+    NO_PAD: "no pad felt {} while the fingers closed",
+    LEFT_ONLY: "only the left pad felt {} while the fingers closed",
+    RIGHT_ONLY: "only the right pad felt {} while the fingers closed",
+    NEVER_BOTH: "the pads never felt {} at the same time while the fingers closed",
+    BOTH_TOO_LATE: "the pads felt {} at the same time only when the grasp had ended",
+}
 
 
 class ChittaParams(NamedTuple):
@@ -266,7 +274,8 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
         reached, p_first, after_contact, p_steady, delta_t, f_first, f_steady, window_s, blind_s = measured
         t = units_of["t"]
         if reached < CONTACT:
-            return self.undefined(self._why_no_contact(reached), units_of)
+            why = _WHY_NO_CONTACT[reached].format(f"{self.config.contact_force_n:g} N")
+            return self.undefined(why, units_of)
         if reached == CONTACT:
             why = f"not at rest within the {after_contact:.3g} {t} after contact"
             if blind_s > 0.0:
@@ -308,16 +317,3 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
         )
 
     compiled = CompiledFeatures(measure, _params, _features, reads_release=False)
-
-    def _why_no_contact(self, reached: float) -> str:
-        tau_1 = self.config.contact_force_n
-        if reached == NO_TICKS:
-            return "the trace is empty"
-        if reached == BOTH_TOO_LATE:
-            return f"the pads felt {tau_1:g} N at the same time only when the grasp had ended"
-        if reached == NEVER_BOTH:
-            return f"the pads never felt {tau_1:g} N at the same time while the fingers closed"
-        if reached in (LEFT_ONLY, RIGHT_ONLY):
-            which = "left" if reached == LEFT_ONLY else "right"
-            return f"only the {which} pad felt {tau_1:g} N while the fingers closed"
-        return f"no pad felt {tau_1:g} N while the fingers closed"

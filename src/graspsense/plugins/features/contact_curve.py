@@ -8,15 +8,14 @@ numbers and reach the contact force; where only one pad does, it is the force of
 from __future__ import annotations
 
 from collections.abc import Collection
-from math import nan
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import frozen
 from numpy.typing import NDArray
 
 from graspsense.gripper_api import NO_GAP
-from graspsense.plugin_api import APPROACH, HOLD, RELEASE, Features, Trace, missing
+from graspsense.plugin_api import APPROACH, HOLD, RELEASE, Features, FeatureSet, Trace
 
 Floats = NDArray[np.float64]
 
@@ -34,15 +33,19 @@ STILL_CLOSED: Final = 0.02
 """Share of the compression by which the fingers may open before such a release begins."""
 
 
-def without_gap(trace: Trace, features: Features, names: Collection[str]) -> Features:
-    """Return the features; those with these names are missing if the trace has no gap."""
-    if trace.units.get("gap") != NO_GAP:
-        return features
-    values = tuple(
-        nan if name in names else value for name, value in zip(features.names, features.values, strict=True)
-    )
-    reasons = {**missing(names, "no gap was recorded"), **features.reasons}
-    return evolve(features, values=values, reasons=reasons)
+Known = dict[str, float | str]
+"""The value of each feature, or why it has none."""
+
+
+def features_of(
+    features: FeatureSet[Any], known: Known, trace: Trace, of_gap: Collection[str] = ()
+) -> Features:
+    """Return what is known of a trace as the features of a set; those `of_gap` are missing where it has no gap."""
+    if trace.units.get("gap") == NO_GAP:
+        known = known | {name: "no gap was recorded" for name in of_gap if not isinstance(known[name], str)}
+    values = {name: value for name, value in known.items() if not isinstance(value, str)}
+    reasons = {name: why for name, why in known.items() if isinstance(why, str)}
+    return features.result(values, reasons, trace.units)
 
 
 @frozen(kw_only=True, eq=False)

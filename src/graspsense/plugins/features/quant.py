@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from graspsense.gripper_api import NO_GAP
 from graspsense.plugin_api import APPROACH, Channel, Feature, Features, FeatureSet, Trace
-from graspsense.plugins.features.contact_curve import increasing
+from graspsense.plugins.features.contact_curve import Known, features_of, increasing
 
 Floats = NDArray[np.float64]
 
@@ -115,30 +115,21 @@ class QuantFeatures(FeatureSet[QuantConfig]):
         names = tuple(feature.name for feature in _FEATURES)
         t_s, columns = _samples(trace)
         duration = float(t_s[-1] - t_s[0]) if len(t_s) >= LEAST_SAMPLES else math.nan
-        values = [duration]
-        reasons = {} if duration == duration else {"duration": "fewer than three samples"}
+        known: Known = {"duration": duration if duration == duration else "fewer than three samples"}
         for k, column in enumerate(columns):
-            known = np.isfinite(column)
+            measured = np.isfinite(column)
             own = names[1 + k * A_CHANNEL : 1 + (k + 1) * A_CHANNEL]
             if k == 0 and trace.units.get("gap") == NO_GAP:
-                quantiles, why = np.full(A_CHANNEL, np.nan), "no gap was recorded"
-            elif np.count_nonzero(known) < LEAST_SAMPLES:
-                quantiles, why = (
-                    np.full(A_CHANNEL, np.nan),
-                    f"fewer than three samples of the {CHANNELS[k][2]}",
-                )
+                known |= dict.fromkeys(own, "no gap was recorded")
+            elif np.count_nonzero(measured) < LEAST_SAMPLES:
+                known |= dict.fromkeys(own, f"fewer than three samples of the {CHANNELS[k][2]}")
             else:
                 grid_s = np.linspace(0.0, duration, POINTS)
-                series = np.interp(grid_s, t_s[known] - t_s[0], column[known])
-                quantiles, why = (
-                    interval_quantiles(series[np.newaxis], grid_s[1])[0],
-                    "its numbers are too large",
-                )
-            lost = ~np.isfinite(quantiles)
-            quantiles[lost] = np.nan
-            reasons |= {own[i]: why for i in np.flatnonzero(lost).tolist()}
-            values += quantiles.tolist()
-        return self.result(dict(zip(names, values, strict=True)), reasons, trace.units)
+                series = np.interp(grid_s, t_s[measured] - t_s[0], column[measured])
+                quantiles = interval_quantiles(series[np.newaxis], grid_s[1])[0].tolist()
+                for name, value in zip(own, quantiles, strict=True):
+                    known[name] = value if math.isfinite(value) else "its numbers are too large"
+        return features_of(self, known, trace)
 
 
 def interval_quantiles(series: Floats, step_s: float = 1.0) -> Floats:

@@ -15,13 +15,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, Trace, missing
+from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, Trace
 from graspsense.plugins.features.contact_curve import (
     CurveSamples,
     contact_curve,
+    features_of,
     first_crossing,
     samples_of,
-    without_gap,
 )
 from graspsense.plugins.features.contact_threshold import ContactThreshold
 
@@ -76,23 +76,22 @@ class QuantileFeatures(FeatureSet[ContactThreshold]):
 
     def extract(self, trace: Trace) -> Features:
         """Return the quantiles over the contact; all are missing without one."""
+        names = [feature.name for feature in self.features]
         samples = samples_of(trace, self.config.contact_force_n)
         contact = samples if isinstance(samples, str) else _contact(samples, self.config.contact_force_n)
-        values: list[float] = []
-        reasons: dict[str, str] = {}
         if isinstance(samples, str) or isinstance(contact, str):
-            reasons = missing([feature.name for feature in self.features], str(contact))
+            return features_of(self, dict.fromkeys(names, str(contact)), trace)
+        start_s, end_s = contact
+        values: list[float | str] = [
+            float(np.interp(start_s, samples.t_s, samples.gap_m)),
+            end_s - start_s,
+        ]
+        inside = (samples.t_s >= start_s) & (samples.t_s <= end_s)
+        if np.count_nonzero(inside) < LEAST_SAMPLES:
+            values += ["fewer than three samples in the contact"] * len(_QUANTILES)
         else:
-            start_s, end_s = contact
-            values = [float(np.interp(start_s, samples.t_s, samples.gap_m)), end_s - start_s]
-            inside = (samples.t_s >= start_s) & (samples.t_s <= end_s)
-            if np.count_nonzero(inside) < LEAST_SAMPLES:
-                why = "fewer than three samples in the contact"
-                reasons = missing([feature.name for feature in _QUANTILES], why)
-            else:
-                values += _quantiles(samples, start_s, end_s).tolist()
-        named = {feature.name: value for feature, value in zip(self.features, values, strict=False)}
-        return without_gap(trace, self.result(named, reasons, trace.units), _OF_GAP)
+            values += _quantiles(samples, start_s, end_s).tolist()
+        return features_of(self, dict(zip(names, values, strict=True)), trace, _OF_GAP)
 
 
 def _contact(samples: CurveSamples, contact_force_n: float) -> tuple[float, float] | str:

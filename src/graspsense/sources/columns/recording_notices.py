@@ -136,9 +136,7 @@ def signal_notices(recording: Recording) -> Iterator[str]:
     A force has no number, one value all along, or a value that stays; a glitch; or a zero that drifts. The gap jumps,
     or stays while the force changes.
     """
-    frames = [reading.frame for reading in recording.readings]
-    signals = [(f.t_s, f.gap_m, f.force_left_n, f.force_right_n) for f in frames]
-    t, gap, left, right = columns = np.array(signals, dtype=np.float64).reshape(-1, 4).T
+    t, gap, left, right = columns = recording.columns("t_s", "gap_m", "force_left_n", "force_right_n")
     columns[~np.isfinite(columns)] = np.nan
     measured = [np.isfinite(signal) for signal in (gap, left, right)]
     known = np.logical_and.reduce([finite for finite in measured if finite.any()] or measured)

@@ -82,8 +82,7 @@ def presses_on(features: Features, recording: Recording) -> bool:
     """
     known = dict(zip(features.names, features.values, strict=True))
     p_first, p_steady, f_steady = (known.get(name, math.nan) for name in ("p_first", "p_steady", "f_steady"))
-    frames = [reading.frame for reading in recording.readings]
-    gap, left, right = np.array([(each.gap_m, each.force_left_n, each.force_right_n) for each in frames]).T
+    gap, left, right = recording.columns("gap_m", "force_left_n", "force_right_n")
     later, both = gap <= p_steady, (left + right) / 2.0
     if not later.any():  # also without a rest, or without a gap
         return False
@@ -116,10 +115,10 @@ def refuse_useless(
 
 def _refuse_below_zero(recordings: Sequence[ImportedRecording]) -> None:
     """Raise ConfigError if the forces of most recordings are below zero throughout."""
-    below = 0
-    for recording in recordings:
-        frames = (reading.frame for reading in recording.labelled.recording.readings)
-        below += max((min(each.force_left_n, each.force_right_n) for each in frames), default=0.0) < 0.0
+    forces = (
+        recording.labelled.recording.columns("force_left_n", "force_right_n") for recording in recordings
+    )
+    below = sum(bool(pads.min(axis=0).max(initial=-np.inf) < 0.0) for pads in forces)
     if len(recordings) < FEWEST or 2 * below <= len(recordings):
         return
     raise ConfigError(

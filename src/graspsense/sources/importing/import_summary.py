@@ -11,7 +11,7 @@ from attrs import frozen
 
 from graspsense.core.components.channels import dtype_of, further
 from graspsense.core.values.channel import FLOATS
-from graspsense.core.values.signals import Frame, Image, Samples
+from graspsense.core.values.signals import Image, Samples
 from graspsense.core.values.trace import SI_UNITS
 from graspsense.recording.labelled_recording import LabelledRecording
 from graspsense.recording.replayable import Recording
@@ -92,7 +92,7 @@ def _measured(recordings: Sequence[Recording]) -> tuple[ChannelFacts, ...]:
             **recording.units,
             **{channel.name: channel.unit for channel in recording.channels},
         }
-        t_s = np.array([reading.frame.t_s for reading in recording.readings])
+        (t_s,) = recording.columns("t_s")
         for name, values, new in _series(recording):
             facts = channel_facts(name, units.get(name, "1"), values, t_s[new])
             parts.setdefault(name, []).append(facts)
@@ -102,11 +102,9 @@ def _measured(recordings: Sequence[Recording]) -> tuple[ChannelFacts, ...]:
 def _series(recording: Recording) -> Iterator[tuple[str, Numbers, Any]]:
     """Yield the values of each channel that the recording has, and their ticks: of the frame, numbers, and images."""
     every = slice(None)
-    frames = np.array([reading.frame for reading in recording.readings], dtype=np.float64)
-    for k, field in enumerate(Frame._fields):
-        name = CHANNEL_OF.get(field)
-        if name is not None and np.isfinite(frames[:, k]).any():
-            yield name, frames[:, k], every
+    for name, values in zip(CHANNEL_OF.values(), recording.columns(*CHANNEL_OF), strict=True):
+        if np.isfinite(values).any():
+            yield name, values, every
     for channel in further(recording.channels):
         values = [getattr(reading.signals, channel.name) for reading in recording.readings]
         if isinstance(values[0], Image) and dtype_of(values[0]) != FLOATS:
@@ -122,22 +120,17 @@ def _series(recording: Recording) -> Iterator[tuple[str, Numbers, Any]]:
 
 def _label(label: str, recordings: Sequence[LabelledRecording]) -> LabelSummary:
     instances = {recording.instance for recording in recordings}
-    frames = np.array(
-        [
-            (frame.gap_m, frame.force_left_n, frame.force_right_n)
-            for recording in recordings
-            for frame, *_ in recording.recording.readings
-        ]
-    )
+    fields = ("gap_m", "force_left_n", "force_right_n")
+    gap, left, right = np.hstack([recording.recording.columns(*fields) for recording in recordings])
     return LabelSummary(
         label=label,
         grasps=len(recordings),
         instances=None if "" in instances else len(instances),
         samples=_range([len(recording.recording.readings) for recording in recordings]),
         rate_hz=_range([recording.recording.rate_hz for recording in recordings]),
-        gap=_range(frames[:, 0]),
-        left=_range(frames[:, 1]),
-        right=_range(frames[:, 2]),
+        gap=_range(gap),
+        left=_range(left),
+        right=_range(right),
     )
 
 

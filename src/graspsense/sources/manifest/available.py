@@ -24,7 +24,7 @@ class AvailableColumns(dict[str, Any]):
 
     def __init__(self, manifest: ReadManifest, table: ColumnTable) -> None:
         super().__init__(table.numbers)
-        self.manifest, self.table = manifest, table
+        self.manifest, self.table, self.zero = manifest, table, 0
         for name, text in table.fields.items():
             if name not in self and (number := number_in(text)) is not None:
                 self[name] = np.full(len(table), number)
@@ -37,12 +37,17 @@ class AvailableColumns(dict[str, Any]):
                 self[f"{name}.{values[0]}"] = np.where(rows, table.numbers[values[0]], np.nan)
 
     def value(self, key: str) -> tuple[Numbers, str] | None:
-        """Return what the manifest gives for a key and its unit, None if it gives nothing."""
+        """Return what the manifest gives for a key and its unit, None if it gives nothing.
+
+        A force is less the mean of the first `zero` samples.
+        """
         chosen, quantity = self.chosen(key), quantity_of(key)
         if chosen is None:
             return None
         place = f"fingers.{key.removeprefix(PREFIX)}" if key.startswith(PREFIX) else key
         values = self.computed(place, lambda: chosen.numbers(self, len(self.table)))
+        if quantity == "force" and self.zero:
+            values -= np.nanmean(values[: self.zero])
         return self._in_si(place, values, self.unit(chosen, quantity), quantity)
 
     def chosen(self, key: str) -> Expression | None:

@@ -29,24 +29,21 @@ LARGEST: Final = 1e300
 LONGEST: Final = 2000
 """Limit on the characters of an expression."""
 
-Values = Any
-"""A float array of shape (n,) for one column, (n, k) for several."""
-
-FOLDS: Final[Mapping[str, Callable[[Any], Any]]] = {
-    "sum": lambda a: a.sum(axis=1),
-    "mean": lambda a: a.mean(axis=1),
-    "max": lambda a: a.max(axis=1),
-    "min": lambda a: a.min(axis=1),
-    "norm": lambda a: np.sqrt((a * a).sum(axis=1)),
+FOLDS: Final[Mapping[str, Callable[[Numbers], Numbers]]] = {
+    "sum": lambda a: a.sum(axis=1, keepdims=True),
+    "mean": lambda a: a.mean(axis=1, keepdims=True),
+    "max": lambda a: a.max(axis=1, keepdims=True),
+    "min": lambda a: a.min(axis=1, keepdims=True),
+    "norm": lambda a: np.sqrt((a * a).sum(axis=1, keepdims=True)),
 }
 """Functions that fold several columns into one, row by row."""
-OVER_TIME: Final[Mapping[str, Callable[[Any], Any]]] = {
+OVER_TIME: Final[dict[str, Callable[[Numbers], Numbers]]] = {
     "first": lambda a: a[:1],
     "last": lambda a: a[-1:],
     "peak": lambda a: np.fmax.reduce(a, axis=0, keepdims=True),
 }
 """Functions of one column over the whole grasp: its first value, its last one, its largest one."""
-PLAIN: Final[Mapping[str, Callable[[Any], Any]]] = {"abs": np.abs, "sqrt": np.sqrt}
+PLAIN: Final[dict[str, Callable[[Numbers], Numbers]]] = {"abs": np.abs, "sqrt": np.sqrt}
 NORM3: Final = "norm3"
 """Function of several columns, three successive ones of which are the components of a vector: their lengths."""
 FUNCTIONS: Final = (*FOLDS, *OVER_TIME, *PLAIN, NORM3)
@@ -94,8 +91,8 @@ class Expression:
         """
         with np.errstate(all="ignore"):
             value = self._value(self.tree, columns)
-        shape = (rows, *value.shape[1:]) if value.ndim else (rows,)
-        return np.array(np.broadcast_to(value, shape), dtype=np.float64)
+        values = np.array(np.broadcast_to(value, (rows, value.shape[1])), dtype=np.float64)
+        return values if values.shape[1] > 1 else values[:, 0]
 
     def numbers(self, columns: Mapping[str, Numbers], rows: int) -> Numbers:
         """Return its value in each of the rows as one column. Raises ExpressionError if it stands for several."""
@@ -106,58 +103,47 @@ class Expression:
             )
         return values
 
-    def _value(self, node: ast.expr, columns: Mapping[str, Values]) -> Values:
+    def _value(self, node: ast.expr, columns: Mapping[str, Numbers]) -> Numbers:
+        """Return a value with a row for each sample, or one row for all, and a column for each of its columns."""
         if isinstance(node, ast.Constant) and not isinstance(node.value, str):
-            return np.float64(node.value)  # type: ignore[arg-type] # checked by `parse`
+            return np.full((1, 1), node.value, dtype=np.float64)
         if isinstance(node, ast.Name | ast.Constant):
             matching = [columns[name] for name in self._matching(node, tuple(columns))]
-            return matching[0] if len(matching) == 1 else np.column_stack(matching)
+            parts = [column if column.ndim == 2 else column[:, np.newaxis] for column in matching]
+            return parts[0] if len(parts) == 1 else np.hstack(parts)
         if isinstance(node, ast.UnaryOp):
             value = self._value(node.operand, columns)
             return -value if isinstance(node.op, ast.USub) else value
         if isinstance(node, ast.BinOp):
             left, right = self._value(node.left, columns), self._value(node.right, columns)
-            left, right = _aligned(left, right)
-            if left.ndim == right.ndim == 2 and left.shape[1] != right.shape[1]:
-                self._refuse(
-                    node, f"{left.shape[1]} columns and {right.shape[1]} columns do not fit together"
-                )
-            return _OPERATORS[type(node.op)](left, right)
+            if 1 not in (widths := (left.shape[1], right.shape[1])) and widths[0] != widths[1]:
+                self._refuse(node, f"{widths[0]} columns and {widths[1]} columns do not fit together")
+            result: Numbers = _OPERATORS[type(node.op)](left, right)
+            return result
         if isinstance(node, ast.Subscript):
             return self._component(node, self._value(node.value, columns))
         assert isinstance(node, ast.Call)
         assert isinstance(node.func, ast.Name)
-        arguments: list[Values] = []
+        arguments: list[Numbers] = []
         for argument in node.args:
             arguments.append(self._value(argument, columns))
             if too_many := CELLS.exceeded(sum(value.size for value in arguments)):
                 self._refuse(node, too_many)
         return self._called(node, node.func.id, arguments)
 
-    def _component(self, node: ast.Subscript, value: Values) -> Values:
+    def _component(self, node: ast.Subscript, value: Numbers) -> Numbers:
         """Return the component with this index, or every so many components from there on."""
-        several = isinstance(node.slice, ast.Slice)
+        several, components = isinstance(node.slice, ast.Slice), value.shape[1]
         index = int((node.slice.lower if several else node.slice).value)  # type: ignore[attr-defined, union-attr]
-        components = value.shape[1] if value.ndim == 2 else 1
         if index >= components:
             self._refuse(node, f"there is no component {index}: it has {components}, counted from 0")
-        if value.ndim < 2:
-            return value
-        if not several:
-            return value[:, index]
-        chosen = value[:, index :: int(node.slice.step.value)]  # type: ignore[attr-defined]
-        return chosen if chosen.shape[1] > 1 else chosen[:, 0]
+        step = int(node.slice.step.value) if several else components  # type: ignore[attr-defined]
+        return value[:, index::step]
 
-    def _called(self, node: ast.Call, name: str, arguments: list[Values]) -> Values:
+    def _called(self, node: ast.Call, name: str, arguments: list[Numbers]) -> Numbers:
         if name in FOLDS:
-            rows = max((len(values) for values in arguments if values.ndim), default=1)
-            parts = [
-                np.broadcast_to(cells, (rows, cells.shape[1]))
-                for cells in (
-                    values if values.ndim == 2 else np.reshape(values, (-1, 1)) for values in arguments
-                )
-            ]
-            together = np.column_stack(parts)
+            rows = max(map(len, arguments))
+            together = np.hstack([np.broadcast_to(cells, (rows, cells.shape[1])) for cells in arguments])
             if together.shape[1] < 2:
                 self._refuse(
                     node,
@@ -167,19 +153,17 @@ class Expression:
             return FOLDS[name](together)
         (argument,) = arguments
         if name == NORM3:
-            width = argument.shape[1] if argument.ndim == 2 else argument.ndim
-            if width < 2 or width % 3:
-                self._refuse(
-                    node,
-                    f"norm3 takes the three components of each of several cells, and here are {width} columns",
+            width = argument.shape[1]
+            if width % 3:
+                why = (
+                    f"norm3 takes the three components of each of several cells, and here are {width} columns"
                 )
-            lengths = np.sqrt((argument.reshape(len(argument), -1, 3) ** 2).sum(axis=2))
-            return lengths if lengths.shape[1] > 1 else lengths[:, 0]
-        if name in OVER_TIME:
-            if not argument.ndim:
-                self._refuse(node, f"{name} needs a column")
-            return OVER_TIME[name](argument)
-        return PLAIN[name](argument)
+                self._refuse(node, why)
+            lengths: Numbers = np.sqrt((argument.reshape(len(argument), -1, 3) ** 2).sum(axis=2))
+            return lengths
+        if name in OVER_TIME and not any(_names(node.args[0])):
+            self._refuse(node, f"{name} needs a column")
+        return (OVER_TIME | PLAIN)[name](argument)
 
     def _matching(self, node: ast.expr, known: Sequence[str]) -> tuple[str, ...]:
         name = _name_in(node)
@@ -310,15 +294,6 @@ def _names(node: ast.AST) -> Iterator[ast.expr]:
 
 def _name_in(node: ast.expr) -> str:
     return node.id if isinstance(node, ast.Name) else str(node.value)  # type: ignore[attr-defined]
-
-
-def _aligned(left: Values, right: Values) -> tuple[Values, Values]:
-    """Return both with a second axis where one of them has several columns."""
-    if left.ndim == 1 and right.ndim == 2:
-        left = left[:, None]
-    elif right.ndim == 1 and left.ndim == 2:
-        right = right[:, None]
-    return left, right
 
 
 def _error(text: str, offset: int, why: str) -> ExpressionError:

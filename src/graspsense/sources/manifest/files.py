@@ -12,7 +12,7 @@ from attrs import frozen
 from graspsense.core.values.errors import ConfigError, listed
 from graspsense.core.values.label_text import is_missing_label
 from graspsense.sources.formats.csv_columns import CsvColumns
-from graspsense.sources.formats.patterns import FileTemplate, PatternError, file_template
+from graspsense.sources.formats.patterns import PatternError, file_template
 from graspsense.sources.manifest.description import ReadManifest, texts_of
 
 
@@ -68,24 +68,17 @@ def left_out(manifest: ReadManifest) -> Iterator[str]:
 
 
 def _matching(manifest: ReadManifest, patterns: Sequence[str]) -> Iterator[NamedFile]:
-    templates = _templates(manifest, patterns)
-    for name, path in tree_below(manifest.base):
-        if path.name == manifest.place.name and path.resolve() == manifest.place.resolve():
-            continue
-        try:
+    """Yield the files that a pattern matches. Raises ConfigError."""
+    try:
+        templates = [file_template(pattern) for pattern in patterns]
+        for name, path in tree_below(manifest.base):
+            if path.name == manifest.place.name and path.resolve() == manifest.place.resolve():
+                continue
             spelled = (name, name.removesuffix(path.suffix) + path.suffix.lower())  # such as .CSV
             matches = (template.fields(text) for text in spelled for template in templates)
             fields = next((match for match in matches if match is not None), None)
-        except PatternError as error:
-            raise ConfigError(f"{manifest.place}: files: {error}") from None
-        if fields is not None:
-            yield NamedFile(path=path, name=name, fields=fields)
-
-
-def _templates(manifest: ReadManifest, patterns: Sequence[str]) -> list[FileTemplate]:
-    """Return the patterns of the files. Raises ConfigError."""
-    try:
-        return [file_template(pattern) for pattern in patterns]
+            if fields is not None:
+                yield NamedFile(path=path, name=name, fields=fields)
     except PatternError as error:
         raise ConfigError(f"{manifest.place}: files: {error}") from None
 

@@ -30,6 +30,13 @@ HOLE_FORCE: Final = 0.2
 """A step of so many usual ones, and so long, is a hole under this share of the force, or where the force changes so."""
 SHORTEST_S: Final = 0.1
 """No grasp is shorter (s)."""
+FASTER: Final = 0.4
+SAME: Final = 0.15
+"""Logarithm of the rates of a clock that are different, and share by which fingers that go on move otherwise."""
+RISES: Final = 0.1
+FEWEST_RISING: Final = 8
+"""Share of its first rise that a force makes in the second quarter of the time of that, also one of a soft object, and
+fewest samples that show it."""
 OFFSET: Final = 0.05
 """Share of the range of a pad that its force may have without contact."""
 WEAK_N: Final = 0.02
@@ -77,12 +84,14 @@ def falls_on_closing(columns: GraspColumns) -> str:
     known = np.isfinite(gap) & np.isfinite(columns.force_n)
     low, high = usual_range(gap[known]) if known.any() else (0.0, 0.0)
     closed, free = known & (gap < low + CLOSED * (high - low)), known & (gap > low + OPEN * (high - low))
+    # Of several objects, the widest may be held where the fingers are open for the others.
+    widest = free & (gap >= np.quantile(gap[known], 1.0 - NO_GLITCH)) if free.any() else free
     for name, pad in force_of_pads(columns.left_n, columns.right_n).items():
         if not known.any() or not _is_felt(pad[known]):
             continue
         least, most = usual_range(pad[known])
         if min(closed.mean(), free.mean()) > NO_GLITCH:
-            turned = float(np.median(pad[closed]) - np.median(pad[free])) < -TURNED * (most - least)
+            turned = float(np.median(pad[closed]) - np.median(pad[widest])) < -TURNED * (most - least)
         else:
             turned = least < -2.0 * abs(most) and 2.0 * abs(float(pad[known][:ZERO_SAMPLES].mean())) < -least
         if turned:
@@ -153,7 +162,10 @@ def _of_zero(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
     felt = _is_felt(force)
     steady, begins = _is_steady(force), (float(columns.left_n[0]), float(columns.right_n[0]))
     touched = not columns.units.get("force") and both_touch(*begins, CONTACT_FORCE_N)
-    if felt and (force[0] - low > BEGINS_LOADED * (high - low) or (touched and not steady)):
+    wider = columns.gap_m > columns.gap_m[0] + PART * np.ptp(columns.gap_m)
+    free, least = (float(np.median(force[wider])), PART) if wider.any() else (low, BEGINS_LOADED)
+    loaded = force[0] - free > least * (high - low) or (touched and not steady)
+    if felt and (loaded or _rises_at_first(force)):
         if zeroed:
             yield (
                 "the recording begins in contact, so the zero of its first samples removes a part of the force: leave "
@@ -162,7 +174,9 @@ def _of_zero(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
         else:
             yield (
                 "the recording begins in contact: there is no approach, so features from before the contact are "
-                "missing." + _OFFSET * steady
+                "missing, and a zero that was set there takes a part of all forces."
+                + _OFFSET
+                * (loaded and steady)
             )
     elif not zeroed:
         for name, pad in force_of_pads(columns.left_n, columns.right_n).items():
@@ -170,6 +184,20 @@ def _of_zero(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
             offset = abs(float(pad[:ZERO_SAMPLES].mean()))
             if _is_felt(pad) and _is_steady(pad) and offset > OFFSET * (most - least):
                 yield f'{name} does not begin at zero: if the fingers were free then, write zero = "10 samples"'
+
+
+def _rises_at_first(force: Numbers) -> bool:
+    """Return whether a force rises from the first sample on, so that none is of free fingers.
+
+    It rises already in the first quarters of the time until it reaches a `PART` of its range.
+    """
+    low, high = usual_range(force)
+    reached = int((force > low + PART * (high - low)).argmax())
+    if reached < FEWEST_RISING:
+        return False
+    begin, later = (float(part.mean()) for part in np.array_split(force[:reached], 4)[:2])
+    noise = float(np.median(np.abs(np.diff(force, 2)))) * math.sqrt(4.0 / reached)
+    return later - begin > max(NOISE * noise, RISES * PART * (high - low))
 
 
 def _of_time(columns: GraspColumns, *, divided: bool) -> Iterator[str]:
@@ -181,6 +209,8 @@ def _of_time(columns: GraspColumns, *, divided: bool) -> Iterator[str]:
             f"the recording lasts {lasts_s * 1e3:.2g} ms only: if the time is not in s, write its unit behind it, or a "
             "factor that makes it seconds"
         )
+    if not any(columns.units.get(name) for name in ("t", "gap")):
+        yield from _of_rate(columns.t_s, columns.gap_m)
     several = not divided and _is_felt(columns.force_n) and _has_several_squeezes(columns)
     if float(steps.max()) > JUMP * usual > 0.0:
         yield (
@@ -190,6 +220,22 @@ def _of_time(columns: GraspColumns, *, divided: bool) -> Iterator[str]:
         )
     elif several:
         yield f"there are several squeezes, and the features are of the first: {_FOUND}one grasp each"
+
+
+def _of_rate(t_s: Numbers, gap: Numbers) -> Iterator[str]:
+    """Yield that a clock goes on at another rate: fingers that go on as before, by the samples, change their speed."""
+    n = ZERO_SAMPLES
+    if len(t_s) < 4 * n:
+        return
+    ratio = np.log((t_s[2 * n :] - t_s[n:-n]) / (t_s[n:-n] - t_s[: -2 * n]))
+    earlier, later = gap[n:-n] - gap[: -2 * n], gap[2 * n :] - gap[n:-n]
+    noise = NOISE * float(np.median(np.abs(np.diff(gap, 2))))
+    k = int(np.abs(ratio).argmax())
+    if abs(ratio[k]) > FASTER and abs(later[k] - earlier[k]) + noise < SAME * abs(earlier[k]):
+        yield (
+            f"from {t_s[k + n]:.4g} s on, samples are {math.exp(ratio[k]):.2g} times as far apart, and the fingers "
+            "move as much from one to the next: did the clock go wrong? Then leave time out and write rate_hz"
+        )
 
 
 def _of_holes(columns: GraspColumns) -> Iterator[str]:

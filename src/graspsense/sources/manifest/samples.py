@@ -28,6 +28,8 @@ from graspsense.sources.units import GRAM_FORCE, TO_SI, WITHOUT_UNIT, known_unit
 
 EARLIEST_STAMP_S: Final = 1e6
 """A first time beyond this is a stamp of a clock, and times are counted from it."""
+MOSTLY: Final = 0.5
+"""Share of the samples with gap and force from which on these were measured together."""
 QUANTITIES: Final = ("time", "gap", "force")
 """The quantities whose units are not those of another one."""
 _NAME: Final = re.compile(r"[a-z][a-z0-9_]*")
@@ -56,17 +58,17 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
         for name, values in (*scalars.items(), *arrays.items()):
             if name not in manifest.fast and units.get(name, "") in ("N", "counts"):
                 values -= np.nanmean(values[:zero], axis=0)
-    available.update(scalars)
-    available.update(arrays)
+    available.update(scalars | arrays)
     gap = available.value("gap") or (np.zeros(len(table)), NO_GAP)
-    hand, each = _fingers(available, zero)
+    available.zero = zero
+    hand, each = _fingers(available)
     scalars |= each
     units |= {channel.name: channel.unit for channel in hand}
     if hand:
         left_n, right_n = finger_sides(hand, each)
         unit = "" if hand[0].unit == "N" else hand[0].unit
     else:
-        left_n, right_n, unit = _sides(available, zero)
+        left_n, right_n, unit = _sides(available)
     notes += _folds(manifest)
     effort, velocity = available.value("effort"), available.value("velocity")
     columns = GraspColumns(
@@ -93,11 +95,17 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
         lines=table.lines,
         events=events,
     )
-    whole = without_missing(columns)
+    whole = columns if keys.split == "force" and _is_mostly_known(columns) else without_missing(columns)
     return without_duplicates(whole) if keys.duplicates == "drop" else whole
 
 
-def _sides(columns: AvailableColumns, zero: int) -> tuple[Numbers, Numbers, str]:
+def _is_mostly_known(columns: GraspColumns) -> bool:
+    """Return whether gap and forces were measured together: what is missing in a squeeze is then of that squeeze."""
+    known = np.isfinite(columns.gap_m + columns.force_n)
+    return bool(np.isfinite(columns.t_s).all() and known.mean() > MOSTLY)
+
+
+def _sides(columns: AvailableColumns) -> tuple[Numbers, Numbers, str]:
     """Return the forces of the two pads that a manifest names, and their unit. Raises ConfigError."""
     both = columns.value("force")
     left = both or columns.value("left")
@@ -109,15 +117,10 @@ def _sides(columns: AvailableColumns, zero: int) -> tuple[Numbers, Numbers, str]
         raise ConfigError(
             f"{columns.manifest.place}: left is in {left[1] or 'N'} and right in {right[1] or 'N'}: use one unit"
         )
-    return _zeroed(left[0], zero), _zeroed(right[0], zero), left[1]
+    return left[0], right[0], left[1]
 
 
-def _zeroed(force: Numbers, zero: int) -> Numbers:
-    zeroed: Numbers = force - np.nanmean(force[:zero]) if zero else force.copy()
-    return zeroed
-
-
-def _fingers(columns: AvailableColumns, zero: int) -> tuple[tuple[FingerForce, ...], dict[str, Numbers]]:
+def _fingers(columns: AvailableColumns) -> tuple[tuple[FingerForce, ...], dict[str, Numbers]]:
     """Return the fingers that a manifest names, and the force of each by its channel. Raises ConfigError."""
     manifest = columns.manifest
     forces: dict[str, Numbers] = {}
@@ -126,7 +129,7 @@ def _fingers(columns: AvailableColumns, zero: int) -> tuple[tuple[FingerForce, .
         key = f"{PREFIX}{name}"
         given = columns.value(key)
         assert given is not None  # each finger has an expression
-        forces[key], units[name] = _zeroed(given[0], zero), given[1] or "N"
+        forces[key], units[name] = given[0], given[1] or "N"
     if len(set(units.values())) > 1:
         words = listed([f"{name} in {unit}" for name, unit in units.items()])
         raise ConfigError(f"{manifest.place}: fingers: {words}: use one unit")

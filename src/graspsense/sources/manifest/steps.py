@@ -49,10 +49,7 @@ FEWEST: Final = 3
 def without_duplicates(columns: GraspColumns) -> GraspColumns:
     """Return the samples without those that have the time of the one before."""
     new = np.concatenate(([True], np.diff(columns.t_s) != 0.0))
-    dropped = len(new) - int(new.sum())
-    if not dropped:
-        return columns
-    return only(columns, new, "with the time of the one before")
+    return columns if new.all() else only(columns, new, "with the time of the one before")
 
 
 @np.errstate(all="ignore")
@@ -94,7 +91,14 @@ def squeezes(columns: GraspColumns) -> list[GraspColumns]:
             "force. If fingers closed then, split by a column"
         )
     parts[0] = evolve(parts[0], warnings=(*parts[0].warnings, *missed))
-    return parts
+    return [_measured(part) for part in parts]
+
+
+def _measured(columns: GraspColumns) -> GraspColumns:
+    """Return the samples in which gap and forces have a number."""
+    known = ~np.isnan(columns.gap_m + columns.force_n)
+    place = columns.place(int(known.argmin()))
+    return columns if known.all() or not known.any() else only(columns, known, f"without a number ({place})")
 
 
 def _weak_runs(columns: GraspColumns, force: Numbers, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
@@ -121,9 +125,12 @@ def _of_one_closing(gap: Numbers, runs: list[tuple[int, int]]) -> list[tuple[int
     joined: list[tuple[int, int]] = []
     for begin, end in runs:
         if joined:
-            earlier = joined[-1][1]
-            between = gap[earlier - 1 : begin + 1]
-            if between[0] - between[-1] > least and np.nanmax(between) < between[0] + least:
+            start, earlier = joined[-1]
+            between, narrowest = gap[earlier - 1 : begin + 1], np.nanmin(gap[start:earlier], initial=np.inf)
+            closes = between[0] - between[-1] > least and np.nanmax(between) < between[0] + least
+            if (
+                closes and between[0] < narrowest + least
+            ):  # in a squeeze with a force that stuck, they had opened
                 begin = joined.pop()[0]
         joined.append((begin, end))
     return joined

@@ -22,21 +22,18 @@ from graspsense.core.values.printable import in_one_line
 from graspsense.core.values.written_numbers import is_number
 from graspsense.recording.readable import readable
 from graspsense.sources.columns.column_guess import Guess, guesses
-from graspsense.sources.formats.array_format import (
-    ARRAY_SUFFIXES,
-    COLUMN,
-    GRASP,
-    TIME,
-    arrays_in,
-)
+from graspsense.sources.formats.array_format import ARRAY_SUFFIXES, COLUMN, GRASP, TIME, arrays_in
 from graspsense.sources.formats.raw_tables import READ_SUFFIXES, TEXT_SUFFIXES, raw_tables
 from graspsense.sources.formats.table import ColumnTable, TableRules
 from graspsense.sources.formats.text_table import read_lines, text_suffix
 from graspsense.sources.manifest.files import tree_below
 
 _DOCUMENTS: Final = frozenset({"readme", "license", "licence", "requirements", "changelog", "citation"})
-_STAMP: Final = re.compile(r"(?P<text>.*?)(?P<gap>[-_ ]?)(?P<stamp>\d{8}[T_-]?\d{6})(?P<end>)")
-_NUMBER: Final = re.compile(r"(?P<text>.*?)(?P<gap>[-_ ]?)(?P<number>\d+)(?P<end>)")
+_AT_END: Final = {
+    "stamp": re.compile(r"(.*?)([-_ ]?)(\d{8}[T_-]?\d{6})"),
+    "number": re.compile(r"(.*?)([-_ ]?)(\d+)"),
+}
+"""What a part of a path can end with, behind a text and a sign."""
 _OF_A_SET: Final = re.compile("train|test|valid")
 _LABELS: Final = frozenset(["label", "class", "object", "material", "kind", "fruit", "target", "item"])
 _PARTS: Final = frozenset({
@@ -127,13 +124,10 @@ def _pattern(names: Sequence[str]) -> tuple[str, set[str], str]:
         wanted = {"text": "part", "number": "order", "stamp": "recorded"}[what]
         if values is label:
             wanted = "label"
-        elif what == "number" and label is None and "object" not in taken and _repeats(values):
-            wanted = "object"  # folders that have several files each
-        elif (
-            what == "number"
-            and label is not None
-            and len(set(zip(label, values, strict=True))) == len(set(label))
-        ):
+        elif what == "number" and label is None:
+            if "object" not in taken and _repeats(values):
+                wanted = "object"  # folders that have several files each
+        elif what == "number" and len(set(zip(label or (), values, strict=True))) == len(set(label or ())):
             wanted = "object"
         name = wanted if wanted not in taken else f"{wanted}{len(taken)}"
         taken.add(name)
@@ -162,14 +156,11 @@ def _pieces(values: Sequence[str]) -> list[tuple[str, Sequence[str]]]:
         return [("same", values)]
     if all(value.isdecimal() for value in values):
         return [("number", list(values))]
-    for what, pattern in (("stamp", _STAMP), ("number", _NUMBER)):
-        matches = [match for value in values if (match := pattern.fullmatch(value)) is not None]
-        if len(matches) == len(values) and len({(match["gap"], match["end"]) for match in matches}) == 1:
-            texts = [match["text"] for match in matches]
-            middle = [match[what] for match in matches]
-            pieces: list[tuple[str, Sequence[str]]] = [*_pieces(texts), ("same", [matches[0]["gap"]])]
-            pieces.append(("same", middle) if len(set(middle)) == 1 else (what, middle))
-            return [*pieces, ("same", [matches[0]["end"]])]
+    for what, pattern in _AT_END.items():
+        matches = [match.groups() for value in values if (match := pattern.fullmatch(value)) is not None]
+        if len(matches) == len(values) and len({sign for _, sign, _ in matches}) == 1:
+            texts, signs, ends = zip(*matches, strict=True)
+            return [*_pieces(texts), ("same", signs), ("same" if len(set(ends)) == 1 else what, ends)]
     ending = _common_ending(values)
     if ending:
         return [*_pieces([value.removesuffix(ending) for value in values]), ("same", [ending])]
@@ -187,14 +178,11 @@ def _common_ending(values: Sequence[str]) -> str:
 
 def _table_of(path: Path) -> tuple[ColumnTable, list[Guess]]:
     """Return a table of a file, and the lines that say how the file is divided. Raises ConfigError, DataDamaged."""
-    if path.is_file() and text_suffix(path) in TEXT_SUFFIXES:
-        start = _start(path)
-        if start:
-            check = (
-                f"{start[1]} lines begin a grasp; the names of the fields are those of the words before them"
-            )
-            table = raw_tables(path, TableRules(start=start[0]))[0]
-            return table, [Guess(key="start", value=start[0], check=check)]
+    if path.is_file() and text_suffix(path) in TEXT_SUFFIXES and (start := _start(path)) is not None:
+        pattern, count = start
+        check = f"{count} lines begin a grasp; the names of the fields are those of the words before them"
+        guess = Guess(key="start", value=pattern, check=check)
+        return raw_tables(path, TableRules(start=pattern))[0], [guess]
     if path.suffix.lower() in ARRAY_SUFFIXES:
         pattern, shape = _array_pattern(path)
         if pattern:
@@ -346,11 +334,8 @@ def _text(folder: Path, lines: Sequence[Guess], table: ColumnTable, left_out: Se
     ]
     body = []
     for guess in lines:
-        value = (
-            guess.value
-            if guess.key in ("rate_hz", "channels")
-            else json.dumps(guess.value, ensure_ascii=False)
-        )
+        is_toml = guess.key in ("rate_hz", "channels")
+        value = guess.value if is_toml else json.dumps(guess.value, ensure_ascii=False)
         line = f"{guess.key} = {value}" if guess.value else f'# {guess.key} = "COLUMN [N]"'
         body.append(f"{line}   # check: {guess.check}" if guess.check else line)
     if all(guess.key != "gap" for guess in lines) and not any(guess.value == "rows" for guess in lines):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from itertools import islice
 from typing import Final
 
@@ -18,7 +19,7 @@ from graspsense.core.values.errors import (
     named,
 )
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
-from graspsense.recording.readable import is_mistake, readable
+from graspsense.recording.readable import each_readable, is_mistake, readable
 from graspsense.recording.replayable import Recording, check_recording
 from graspsense.sources.columns.recording_notices import with_notices
 from graspsense.store.stored_grasps import stored_grasps
@@ -74,7 +75,10 @@ def recordings_of(
                         f"{type(recording).__name__}, not LabelledRecording"
                     )
                 number += 1
-                yield _checked(recording)
+                if isinstance(recording, UnreadableRecording):
+                    yield recording
+                else:
+                    yield from each_readable(recording.source, partial(_noticed, recording))
     except PluginUnavailable:
         raise
     except GraspsenseError as error:
@@ -83,16 +87,10 @@ def recordings_of(
         yield UnreadableRecording(source=f"{kind}:{place}, behind recording {number}", error=error)
 
 
-def _checked(recording: LabelledRecording | UnreadableRecording) -> LabelledRecording | UnreadableRecording:
-    """Return the recording with all that looks wrong in it, or why it cannot be used."""
-    if isinstance(recording, UnreadableRecording):
-        return recording
-    try:
-        with readable(recording.source):
-            check_recording(recording.recording)
-            return with_notices(recording)
-    except GraspsenseError as error:
-        return UnreadableRecording(source=str(recording.source), error=error)
+def _noticed(recording: LabelledRecording) -> tuple[LabelledRecording]:
+    """Return the recording with all that looks wrong in it. Raises DataDamaged."""
+    check_recording(recording.recording)
+    return (with_notices(recording),)
 
 
 @contextmanager

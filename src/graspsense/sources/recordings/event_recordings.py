@@ -184,7 +184,6 @@ def threshold_factor(recordings: tuple[Recording, ...]) -> float:
     """
     if not any("force_left" in recording.units for recording in recordings):
         return 1.0
-    forces = ([reading.frame.force_left_n for reading in recording.readings] for recording in recordings)
-    ranges = sorted(max(force) - min(force) for force in forces)
+    ranges = sorted(float(np.ptp(recording.columns("force_left_n"))) for recording in recordings)
     middle = ranges[len(ranges) // 2]
     return float(10.0 ** (round(math.log10(middle)) - 1)) if middle > 0.0 else 1.0

@@ -15,6 +15,7 @@ from typing import Final
 from urllib.parse import parse_qsl, urlencode
 
 from graspsense.core.values.errors import ConfigError, DataDamaged, suggestion
+from graspsense.recording.export_trace import declared_beside
 from graspsense.recording.replayable import Recording
 from graspsense.sources.columns.grasp_columns import checked_recording
 from graspsense.sources.formats.table import ColumnTable
@@ -23,7 +24,7 @@ from graspsense.sources.manifest.description import QUANTITIES as MAPPED
 from graspsense.sources.manifest.description import Manifest, ReadManifest
 from graspsense.sources.manifest.expression import Expression, ExpressionError, parse
 from graspsense.sources.manifest.samples import samples
-from graspsense.sources.recordings.exported_grasp import refuse_table_of_store
+from graspsense.sources.recordings.exported_grasp import read_exported, refuse_table_of_store
 
 REQUIRED: Final = ("time", "gap", "force")
 QUANTITIES: Final = (*REQUIRED, "effort", "velocity")
@@ -33,6 +34,13 @@ def named(path: str, columns: Mapping[str, Sequence[str]]) -> str:
     """Return the file and its columns as one name, in the form that `read_squeeze` reads."""
     pairs = [(quantity, column) for quantity, names in columns.items() for column in names]
     return f"{path}?{urlencode(pairs, safe='*')}"
+
+
+def read_csv(name: str) -> Recording:
+    """Return the grasp of a CSV file whose columns the name lists, or that was exported and declares its own."""
+    file, _, columns = name.partition("?")
+    exported = not columns and declared_beside(Path(file).expanduser()).exists()
+    return read_exported(file) if exported else read_squeeze(name)
 
 
 def read_squeeze(name: str) -> Recording:

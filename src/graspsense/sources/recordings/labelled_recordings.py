@@ -113,18 +113,13 @@ def _features_of(recording: LabelledRecording, features: FeatureSet[Any]) -> tup
 
 def trace_of_recording(recording: Recording) -> Trace:
     """Return the trace of a recording, all in the phase `approach`."""
-    readings, images = recording.readings, []
-    counter = 0
-    for reading in readings:
-        if reading.pads.counter != counter:
-            counter = reading.pads.counter
-            images.append(reading.pads)
-    n = len(readings)
+    readings, n = recording.readings, len(recording.readings)
+    images = {reading.pads.counter: reading.pads for reading in readings if reading.pads.counter}
     return trace_of(
         [reading.frame for reading in readings],
         [APPROACH] * n,
         [0.0] * n,
-        images,
+        list(images.values()),
         {**SI_UNITS, **recording.units},
         [reading.signals for reading in readings] if recording.channels else (),
     )
@@ -158,5 +153,6 @@ def _controls(table: FeatureTable, early: Sequence[Features], facts: Sequence[La
         table_of(early),
         first_line=FeatureTable(names=NAMES, units=UNITS, values=opening),
     )
-    gaps = ([reading.frame.gap_m for reading in fact.recording.readings] for fact in facts)
-    return without_constant_gap(known_controls, gaps)
+    return without_constant_gap(
+        known_controls, (fact.recording.columns("gap_m")[0].tolist() for fact in facts)
+    )

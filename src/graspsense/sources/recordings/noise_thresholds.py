@@ -163,10 +163,7 @@ class _Noise:
     @classmethod
     def measured_in(cls, recording: Recording, scale: _Scale) -> _Noise:
         """Return what there is to measure in a recording."""
-        frames = [reading.frame for reading in recording.readings]
-        times, gap, left, right = np.array(
-            [(frame.t_s, frame.gap_m, frame.force_left_n, frame.force_right_n) for frame in frames]
-        ).T
+        times, gap, left, right = recording.columns("t_s", "gap_m", "force_left_n", "force_right_n")
         return cls(times, gap, (left, right), 0.0 if scale.force == "N" else _baseline(np.fmin(left, right)))
 
     @cached_property
@@ -396,9 +393,7 @@ def _timeouts(
     recordings: Sequence[Recording], timeouts_s: Mapping[str, float], scale: _Scale
 ) -> tuple[dict[str, float], str]:
     """Return the time-outs that are shorter than a recording, extended to the longest one, and why."""
-    longest = max(
-        recording.readings[-1].frame.t_s - recording.readings[0].frame.t_s for recording in recordings
-    )
+    longest = max(float(np.ptp(recording.frames[[0, -1], 0])) for recording in recordings)
     limit = min(_rounded(longest), _MOST_TIMEOUT_S) if scale.t == "s" else _rounded(longest)
     chosen = {f"controller.{key}": limit for key, value in timeouts_s.items() if value < longest}
     if not chosen:

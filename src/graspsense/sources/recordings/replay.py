@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from importlib import import_module
 from math import inf
-from pathlib import Path
 from typing import Final, final
 
 from attrs import Attribute, frozen
@@ -29,55 +29,18 @@ from graspsense.sources.recordings.dataset_recordings import (
     is_recording_number,
     numbered_recording,
 )
-from graspsense.sources.recordings.icub import read_recording
 from graspsense.store.opening import as_source
 
-
-def _mcap(name: str) -> Recording:
-    from graspsense.recording.reader import read_recorded
-
-    return read_recorded(name).recording()
-
-
-def _stored(name: str) -> Recording:
-    from graspsense.store.stored_grasps import stored_recording
-
-    return stored_recording(name)
-
-
-def _csv(name: str) -> Recording:
-    """Read a CSV file: with columns that the name lists, or an exported grasp, which declares its own."""
-    from graspsense.recording.export_trace import declared_beside
-    from graspsense.sources.recordings.grasp_csv import read_squeeze
-
-    file, _, columns = name.partition("?")
-    if not columns and declared_beside(Path(file).expanduser()).exists():
-        return _exported(file)
-    return read_squeeze(name)
-
-
-def _bag(name: str) -> Recording:
-    from graspsense.sources.recordings.rosbag import read_bag
-
-    return read_bag(name)
-
-
-def _exported(name: str) -> Recording:
-    from graspsense.sources.recordings.exported_grasp import read_exported
-
-    return read_exported(name)
-
-
-KINDS: Final[Mapping[str, Callable[[str], Recording]]] = {
-    "csv": _csv,
-    "icub": read_recording,
-    "mcap": _mcap,
-    "npz": _exported,
-    "parquet": _exported,
-    "rosbag": _bag,
-    "store": _stored,
+KINDS: Final = {
+    "csv": "graspsense.sources.recordings.grasp_csv:read_csv",
+    "icub": "graspsense.sources.recordings.icub:read_recording",
+    "mcap": "graspsense.recording.reader:read_recording",
+    "npz": "graspsense.sources.recordings.exported_grasp:read_exported",
+    "parquet": "graspsense.sources.recordings.exported_grasp:read_exported",
+    "rosbag": "graspsense.sources.recordings.rosbag:read_bag",
+    "store": "graspsense.store.stored_grasps:stored_recording",
 }
-"""What can stand before the colon of the name of a recording, and the reader of that kind.
+"""What can stand before the colon of the name of a recording, and the reader of that kind, imported when it is needed.
 
 The data sets that have recordings can stand there as well, with the number of a recording: `manifest:FILE.toml#3`.
 """
@@ -94,8 +57,9 @@ def read_named(kind: str, name: str) -> Recording:
     if handed is not None:
         return handed
     if kind in KINDS and not is_recording_number(kind, name):
+        module, _, reader = KINDS[kind].partition(":")
         with readable(f"{kind}:{name}"):
-            recording = KINDS[kind](name)
+            recording: Recording = getattr(import_module(module), reader)(name)
             check_recording(recording)
             return recording
     return numbered_recording(kind, name).recording
@@ -120,7 +84,7 @@ def how_to_get(kind: str) -> str:
 
 def _known_kind(_config: object, _attribute: Attribute[str], value: str) -> None:
     kind, name = kind_and_name(value)
-    kinds = KINDS if kind in KINDS else known_kinds()
+    kinds = tuple(KINDS) if kind in KINDS else known_kinds()
     known = ", ".join(f"{k}:" for k in kinds)
     if not kind:
         raise ValueError(

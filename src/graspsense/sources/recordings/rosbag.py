@@ -20,11 +20,12 @@ GripperAccelerometer). In ROS a positive effort opens the gripper; here it squee
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from attrs import evolve
 
 from graspsense.core.components.channels import signal_type
 from graspsense.core.grasp.calibration import Cells, edge_force, masked, pad_force, tare, zero_of
@@ -149,27 +150,20 @@ def _recording(path: Path, messages: _Messages) -> Recording:
         sampled = clock.topics[messages.acceleration]
         timed = [(t_ns, samples[k]) for t_ns, k in zip(sampled.ns.tolist(), sampled.order, strict=True)]
         channels, readings = _with_acceleration(readings, int(ns[0]), timed)
-    later_ns = clock.delays_ns.get(pressure), clock.delays_ns.get(source)
-    return Recording(
+    recording = Recording(
         name=f"{path.name}, {gripper}",
         readings=readings,
         channels=channels,
         rate_hz=(len(ns) - 1) / duration_s,
         notes=tuple(notes),
-        notices=(*clock.notices, *_doubts(readings, *later_ns)),
+        notices=clock.notices,
     )
-
-
-def _doubts(readings: Sequence[Reading], pads_ns: int | None, gap_ns: int | None) -> Iterator[str]:
-    """Yield a sentence if pads and gap may be apart in time; given are the delays of their messages, where known."""
-    if pads_ns is not None and gap_ns is not None:
-        columns = [
-            (frame.t_s, frame.gap_m, 0.5 * (frame.force_left_n + frame.force_right_n))
-            for frame in (reading.frame for reading in readings)
-        ]
-        t_s, gap, force = np.array(columns).T
-        if told := doubtful_delay(t_s, gap, force, (pads_ns - gap_ns) * 1e-9):
-            yield told
+    if not {pressure, source} <= clock.delays_ns.keys():
+        return recording
+    t_s, gap, left, right = recording.columns("t_s", "gap_m", "force_left_n", "force_right_n")
+    later_s = (clock.delays_ns[pressure] - clock.delays_ns[source]) * 1e-9
+    apart = doubtful_delay(t_s, gap, 0.5 * (left + right), later_s)
+    return evolve(recording, notices=(*recording.notices, *filter(None, [apart])))
 
 
 def _side(path: Path, side: str, topics: Collection[str]) -> str:
@@ -315,11 +309,6 @@ def _with_acceleration(
 def _forces(cells: Cells, zero: Cells) -> tuple[float, float]:
     """Return the pad force and the edge force of a tip; NaN if no cell has a value."""
     kept, bad = masked(cells, zero)
-    return (
-        (_NAN, _NAN)
-        if bad == CELLS
-        else (
-            pad_force(kept, zero, PAD_COUNTS_PER_N, FIRST_PAD_CELL),
-            edge_force(kept, zero, EDGE_COUNTS_PER_N),
-        )
-    )
+    if bad == CELLS:
+        return _NAN, _NAN
+    return pad_force(kept, zero, PAD_COUNTS_PER_N, FIRST_PAD_CELL), edge_force(kept, zero, EDGE_COUNTS_PER_N)
