@@ -187,7 +187,17 @@ def labelled_trials(
             checkpoints_s=source.checkpoints_s,
         )
     elif source.kind == "CSV":
-        trials = _csv(source)
+        from graspsense.sources.trial_table.features_csv import read_labelled
+
+        trials = read_labelled(
+            Path(source.source),
+            source.label,
+            instance=source.instance,
+            order=source.order,
+            features=source.columns,
+            known_before=source.known_before,
+            value=source.value,
+        )
     elif source.source.startswith(STORE) and (changed or source.value is not None or source.checkpoints_s):
         from graspsense.store.dataset import labelled_store
 
@@ -223,20 +233,6 @@ def groups_of(source: TrialSource) -> tuple[Group, ...]:
     if source.states_per_instance == "all":
         return groups
     return tuple(evolve(group, states_per_instance=source.states_per_instance) for group in groups)
-
-
-def _csv(source: TrialSource) -> Labelled:
-    from graspsense.sources.trial_table.features_csv import read_labelled
-
-    return read_labelled(
-        Path(source.source),
-        source.label,
-        instance=source.instance,
-        order=source.order,
-        features=source.columns,
-        known_before=source.known_before,
-        value=source.value,
-    )
 
 
 def _data_set(source: TrialSource, features: FeatureSet[Any]) -> Labelled:

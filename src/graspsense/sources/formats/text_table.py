@@ -55,15 +55,6 @@ SPREADSHEETS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"PAR1", b"ARROW1")
 """The first bytes of a ZIP file, as which spreadsheets are saved, of those of old programs, and of Apache's tables."""
 _CODE_PAGES: Final = ("cp1252", "cp1250", "iso8859-1", "iso8859-15")
 """They agree on degrees, micro and the letters of several languages."""
-_ZEROS: Final = (
-    ([False, False, True, True], "utf-32"),
-    ([True, True, False, False], "utf-32"),
-    ([False, True, True, True], "utf-32-le"),
-    ([True, True, True, False], "utf-32-be"),
-    ([False, True, False, True], "utf-16-le"),
-    ([True, False, True, False], "utf-16-be"),
-)
-"""Which of the first bytes are zero in an encoding with as many bytes for each letter, and letters of English first."""
 _WITH_UNIT: Final = re.compile(r"(.*[0-9.])\s*([^\s0-9]+)")
 _SAMPLED: Final = 400
 """Lines from which the separator and the kinds of the columns are found."""
@@ -648,11 +639,8 @@ def _decoded(path: Path, data: bytes) -> str:
 
     Raises DataDamaged.
     """
-    start = [byte == 0 for byte in data[:4]]
-    unicode = next((encoding for zeros, encoding in _ZEROS if zeros == start[: len(zeros)]), "")
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")) and unicode != "utf-32":
-        unicode = "utf-16"
-    if unicode:
+    unicode = json.detect_encoding(data)
+    if not unicode.startswith("utf-8"):
         try:
             return data.decode(unicode)
         except UnicodeDecodeError as error:

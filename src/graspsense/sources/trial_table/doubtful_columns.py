@@ -41,22 +41,12 @@ if TYPE_CHECKING:
 
     Numbers = NDArray[np.float64]
 
-_TIME_NAMES: Final = frozenset(
-    {"t", "time", "elapsed", "clock", "hour", "hours", "minute", "minutes", "timestamp"}
-)
+_TIME_NAMES: Final = frozenset({
+    "t", "time", "elapsed", "clock", "hour", "hours", "minute", "minutes", "timestamp"
+})  # fmt: skip
 _OF_TIMES: Final = TIMES | {
-    "rec",
-    "recorded",
-    "recording",
-    "start",
-    "begin",
-    "end",
-    "at",
-    "of",
-    "day",
-    "since",
-    "total",
-}
+    "rec", "recorded", "recording", "start", "begin", "end", "at", "of", "day", "since", "total",
+}  # fmt: skip
 _OF_A_SESSION: Final = frozenset({
     "temperature", "temp", "humidity", "battery", "batt", "vbat", "baseline", "zero", "initial", "start", "before"
 })  # fmt: skip
