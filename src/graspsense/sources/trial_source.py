@@ -123,7 +123,7 @@ def load_trials(
     )
 
 
-NOT_READ: Final = (".npz", ".parquet", ".json", ".jsonl", ".ndjson")
+NOT_READ: Final = (".npz", ".parquet", ".json")
 """Endings of files that can hold a table, which is not read as trials."""
 OF_RECORDINGS: Final = (".mcap", ".bag", ".db3", ".npy", ".mat", ".h5")
 """Endings of files of recordings, which are imported before there is anything to learn from."""

@@ -34,7 +34,7 @@ class ArffColumns(CsvColumns):
         self.path = path
         self.names, self.units, self.levels = [], {}, {}
         self.lines, self.notes, self.index = [], (), ""
-        self._numbers = None
+        self._numbers, self._decimal_commas = None, False
         self._rows: list[list[str]] = []
         self.weighted = False
         in_data = False
