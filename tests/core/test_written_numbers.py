@@ -78,6 +78,7 @@ def test_the_other_columns_decide_what_a_column_alone_does_not():
     assert numbers("1.500", "2.000", other=["49,5", "1"]).tolist() == [1500, 2000]
     assert numbers("1.500", "2.000").tolist() == [1.5, 2.0]
     assert isinstance(numbers("975", "1.000", other=["0.01", "1"]), NotNumbers)
+    assert numbers("-999", "1.203", other=["0.01", "1"]).tolist() == [-999, 1.203]
     assert isinstance(numbers("50", "1.203"), NotNumbers)
     assert numbers("50", "1.203", other=["0.01", "1"]).tolist() == [50, 1.203]
     assert numbers("6,002", "999.9").tolist() == [6002, 999.9]

@@ -262,7 +262,8 @@ def _nearer(cells: Sequence[str], of_points: bool) -> int:
     plain = max((size for cell, size in sizes if "." not in cell), default=0.0)
     if plain == 0.0 or not with_point:
         return POINT
-    if len({cell for cell, _ in sizes if "." not in cell}) == 1 and of_points:
+    others = {cell for cell, _ in sizes if "." not in cell}
+    if of_points and len(others) == 1 and (min(others) < "0" or len(sizes) - len(with_point) > 1):
         return POINT  # -999 beside 1.203, which stands for a missing value
     ones, thousands = (
         min(abs(math.log(factor * size / plain)) for size in with_point) for factor in (1.0, _THOUSAND)

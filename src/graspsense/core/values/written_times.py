@@ -85,8 +85,10 @@ def _time(match: re.Match[str], *, month_first: bool) -> datetime:
         if not 1 <= hour <= 12:
             raise ValueError(hour)
         hour = hour % 12 + 12 * (match["half"] in "pP")
-    second = match["second"].replace(":", ".")
-    text = f"{year}-{int(month):02}-{int(day):02}T{hour:02}:{match['minute']}:{second}{match['zone'].upper()}"
+    seconds = match["second"].replace(":", ".")
+    text = (
+        f"{year}-{int(month):02}-{int(day):02}T{hour:02}:{match['minute']}:{seconds}{match['zone'].upper()}"
+    )
     return datetime.fromisoformat(text)
 
 

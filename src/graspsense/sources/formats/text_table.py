@@ -380,13 +380,17 @@ class _Layout:
 
     def _without_texts(self, rows: list[Row], width: int) -> list[Row]:
         """Return the rows without lines of text, as a device prints one between its numbers, or several behind them."""
-        numeric = _numeric_columns([row for _, row in rows], width)
-        behind = takewhile(lambda row: _is_text_behind(row[1], width, numeric), reversed(rows))
-        texts = [number for number, row in rows if len(row) == 1 < width and not is_number(row[0])]
-        texts = sorted({*texts, *(number for number, _ in behind)})
+        sample = _sample([row for _, row in rows])
+        numeric = _numeric_columns(sample, width)
+        begins = [row[0] for row in sample if is_number(row[0])]
+        # Times and the numbers of rows differ, and labels repeat.
+        rises = 0 in numeric and len(set(begins)) == len(begins)
+        behind = takewhile(lambda row: _is_text_behind(row[1], width, numeric, rises=rises), reversed(rows))
+        texts = {number for number, row in rows if len(row) == 1 < width and not is_number(row[0])}
+        texts |= {number for number, _ in behind}
         if not 0 < len(texts) <= max(_FEW_BEFORE, _MOST_BEFORE * len(rows)):
             return rows
-        self.notes.append(_lines_words(texts, "lines of text"))
+        self.notes.append(_lines_words(sorted(texts), "lines of text"))
         return [row for row in rows if row[0] not in texts]
 
     def _without_blank_end(self, names: list[str], rows: list[Row]) -> tuple[list[str], list[Row]]:
@@ -585,11 +589,11 @@ def _is_data(row: Sequence[str], width: int, numeric: frozenset[int]) -> bool:
     return bool(there) and all(map(is_number, there))
 
 
-def _is_text_behind(row: Sequence[str], width: int, numeric: frozenset[int]) -> bool:
-    """Return whether a row has a text in place of its first number, or texts alone where numbers are expected."""
+def _is_text_behind(row: Sequence[str], width: int, numeric: frozenset[int], *, rises: bool) -> bool:
+    """Return whether a row has words in place of a time, or several where numbers are expected, and no number there."""
     there = [row[k] for k in numeric if k < len(row) and not is_missing(row[k])]
-    first = 0 in numeric and not (is_missing(row[0]) or re.search(r"\d", row[0]))
-    return first or (len(row) == width and bool(there) and not any(map(is_number, there)))
+    words = rises and not (is_missing(row[0]) or re.search(r"\d", row[0]))
+    return words or (len(row) == width and len(there) > 1 and not any(map(is_number, there)))
 
 
 def _can_be_names(row: Sequence[str], width: int, texts: Sequence[set[str]]) -> bool:
@@ -701,9 +705,10 @@ def _decoded(path: Path, data: bytes) -> str:
         try:
             return data.decode(unicode)
         except UnicodeDecodeError as error:
-            raise DataDamaged(
-                f"{path} begins as {unicode.upper()}, and is none: {error.reason}. Save it as UTF-8"
-            ) from None
+            if unicode in ("utf-16", "utf-32"):  # without a mark, it only looked so
+                raise DataDamaged(
+                    f"{path} begins as {unicode.upper()}, and is none: {error.reason}. Save it as UTF-8"
+                ) from None
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
