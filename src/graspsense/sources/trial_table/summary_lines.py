@@ -102,7 +102,8 @@ def _is_mean_or_sum(lines: Numbers, line: Numbers) -> bool:
     used = ~np.isnan(line) & ~np.isnan(lines).any(axis=0)
     used &= lines.max(axis=0) > lines.min(axis=0)
     lines, line = lines[:, used], line[used]
-    digits = [Decimal(repr(number)).normalize().as_tuple().exponent for number in line.tolist()]
+    # The zeros at the end of a whole number are written, and not rounded.
+    digits = [min(0, int(Decimal(repr(number)).normalize().as_tuple().exponent)) for number in line.tolist()]
     errors = np.maximum(_ROUNDING * np.abs(line), 0.5 * 10.0 ** np.array(digits, dtype=np.float64))
     if not any(
         (np.abs(line - statistic(lines, axis=0)) <= 1.001 * errors).all() for statistic in (np.mean, np.sum)
