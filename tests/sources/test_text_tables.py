@@ -14,6 +14,7 @@ from graspsense.sources.columns.column_guess import guesses
 from graspsense.sources.formats.text_format import read_text
 from graspsense.sources.manifest.reader import read_recordings
 from graspsense.sources.recordings.grasp_csv import named, read_squeeze
+from graspsense.sources.trial_source import load_trials
 from graspsense.sources.trial_table.features_csv import read_labelled
 from graspsense.store.labels import labels_of
 
@@ -445,6 +446,14 @@ def test_columns_of_one_name_or_none_are_told_apart(tmp_path, lines, names):
     labelled = trials(tmp_path, lines)
     assert (labelled.table.names, labelled.labels) == (names, ("a", "b") * 6)
     assert any(names[1] in note for note in labelled.notes) == (names[1] != "q")
+
+
+def test_json_lines_are_trials(tmp_path):
+    path = tmp_path / "trials.jsonl"
+    objects = [{"what": "ab"[k % 2], "pads": {"peak": 0.5 * k * k}} for k in range(12)]
+    path.write_text("\n".join(map(json.dumps, objects)))
+    labelled = load_trials(str(path), label="what")
+    assert (labelled.labels, labelled.table.names) == (("a", "b") * 6, ("pads.peak",))
 
 
 def test_the_last_trials_are_kept_whatever_their_label_is(tmp_path):

@@ -49,6 +49,13 @@ class CsvColumns:
     `names` and `units` describe the columns, `cells` holds their text by name, `lines` the line number of each row.
     """
 
+    default_label: str | None = None
+    """The column of the label where the file says it; a CSV file does not."""
+    index = ""
+    """The name of the index that pandas wrote, empty if there is none."""
+    _decimal_commas = False
+    _numbers: dict[str, Numbers | NotNumbers] | None = None
+
     def __init__(self, path: Path) -> None:
         self.path = path
         lines, ended = read_lines(path)
@@ -61,8 +68,6 @@ class CsvColumns:
         self.lines: list[int] = list(table.lines)
         self.units: dict[str, str] = {}
         self.names: list[str] = []
-        self.index = ""
-        """The name of the index that pandas wrote, empty if there is none."""
         self.cells: dict[str, list[str]] = {}
         headings = [name_and_unit(text_of_cell(heading)) for heading in table.names]
         called = distinct_names([name for name, _ in headings])
@@ -92,13 +97,7 @@ class CsvColumns:
                 "thousands, leave it out of the numbers",
             )
         self._decimal_commas = table.separator == ";"
-        self._numbers: dict[str, Numbers | NotNumbers] | None = None
         self.levels: dict[str, tuple[str, ...]] = {}
-
-    @property
-    def default_label(self) -> str | None:
-        """The column of the label where the file says it; a CSV file does not."""
-        return None
 
     def __len__(self) -> int:
         """Return the number of rows."""

@@ -11,7 +11,7 @@ import csv
 import json
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain, takewhile
 from operator import itemgetter
 from pathlib import Path
@@ -158,9 +158,8 @@ class _Layout:
                 raise DataDamaged(
                     f"{self.path}, line {number}: {len(row)} values, but there are {len(names)} columns"
                 )
-        later = [number for number, _ in self.comments if rows and number > rows[0][0]]
-        if later:
-            self.notes.append(_lines_words(later, "comments"))
+        if later := [number for number, _ in self.comments if rows and number > rows[0][0]]:
+            self._tell(later, "comments")
         return TextTable(
             names=tuple(names),
             units=tuple((units or [""] * len(names))[: len(names)]),
@@ -220,7 +219,7 @@ class _Layout:
             if all(is_number(cell) or is_missing(cell) for cell in top):
                 ordinals = [*map(str, range(width))]
                 if numbered := width > 2 and top in (ordinals, ["", *ordinals[:-1]]):
-                    self.notes.append(_lines_words([self.rows[0][0]], "lines that number the columns"))
+                    self._tell([self.rows[0][0]], "lines that number the columns")
                 return [f"c{k}" for k in range(1, width + 1)], None, int(numbered), 0
             return top, None, 1, self.rows[0][0]
         return self._later_header(data, width, numeric)
@@ -230,8 +229,7 @@ class _Layout:
         for k in range(1, data or 0):
             kinds = {cell for c, cell in enumerate(self.rows[k][1]) if c in numeric}
             if kinds <= _KINDS and ("continuous" in kinds or ("c" in kinds and self.rows[k + 1 : data])):
-                told = [number for number, _ in self.rows[k:data]]
-                self.notes.append(_lines_words(told, "lines on the kinds of columns"))
+                self._tell([number for number, _ in self.rows[k:data]], "lines on the kinds of columns")
                 del self.rows[k:data]
                 return k
         return data
@@ -367,16 +365,19 @@ class _Layout:
                 return cells
         return _words(text, " ") if self.separator == " " else text.split(self.separator)
 
+    def _tell(self, numbers: Iterable[int], what: str) -> None:
+        """Note that these lines are left out."""
+        self.notes.append(_lines_words(sorted(numbers), what))
+
     def _without_repeats(
         self, rows: list[Row], names: Sequence[str], units: Sequence[str] | None
     ) -> list[Row]:
         """Return the rows that are not the header again."""
-        header = list(names)
-        again = [number for number, row in rows if row == header]
-        if not again or all(map(is_number, header)):
+        again = {number for number, row in rows if row == [*names]}
+        if not again or all(map(is_number, names)):
             return rows
-        self.notes.append(_lines_words(again, "repeated headers"))
-        return [row for row in rows if row[1] != header and _without_brackets(row[1]) != units]
+        self._tell(again, "repeated headers")
+        return [row for row in rows if row[0] not in again and _without_brackets(row[1]) != units]
 
     def _without_texts(self, rows: list[Row], width: int) -> list[Row]:
         """Return the rows without lines of text, as a device prints one between its numbers, or several behind them."""
@@ -390,7 +391,7 @@ class _Layout:
         texts |= {number for number, _ in behind}
         if not 0 < len(texts) <= max(_FEW_BEFORE, _MOST_BEFORE * len(rows)):
             return rows
-        self.notes.append(_lines_words(sorted(texts), "lines of text"))
+        self._tell(texts, "lines of text")
         return [row for row in rows if row[0] not in texts]
 
     def _without_blank_end(self, names: list[str], rows: list[Row]) -> tuple[list[str], list[Row]]:
