@@ -44,7 +44,8 @@ _MISSING: Final = re.compile(
 _LONGEST_MISSING: Final = 20
 
 _LOGICAL: Final = {"True": 1.0, "False": 0.0}
-_SIGN, _EXPONENT = "[-+\u2212]?", "(?:[eEdD][-+]?[0-9]+)?"
+_SIGN, _EXPONENT = "[-+\u2212\u2013]?", "(?:[eEdD][-+]?[0-9]+)?"
+"""Word processors turn a minus into a dash."""
 _WITH_POINT: Final = re.compile(rf"{_SIGN}(?:(?P<whole>[0-9]+)(?:\.[0-9]*)?|\.[0-9]+){_EXPONENT}")
 _WITH_COMMA: Final = re.compile(rf"{_SIGN}[0-9]*,[0-9]+{_EXPONENT}")
 _COMMA_GROUPS: Final = re.compile(
@@ -59,7 +60,7 @@ _GROUP_SIGNS: Final = re.compile("[ '\u2019\u00a0\u2007\u2009\u202f]")
 _HEXADECIMAL: Final = re.compile("0[xX][0-9a-fA-F]{1,16}")
 _INFINITE: Final = re.compile("[-+]?inf(?:inity)?", re.IGNORECASE)
 _PLAIN: Final = re.compile(r"[0-9+\-.eE]*")
-_TO_PYTHON: Final = str.maketrans("dD\u2212", "ee-")
+_TO_PYTHON: Final = str.maketrans("dD\u2212\u2013", "ee--")
 
 
 @frozen
@@ -279,7 +280,7 @@ def _tells_thousands(cells: Sequence[str]) -> bool:
     plain = [cell for cell in cells if "," not in cell and not is_missing(cell)]
     return bool(plain) and (
         any(cell.endswith("0") for cell in cells if "," in cell)
-        or any(len(cell.lstrip("+-\u2212")) == 3 for cell in plain)
+        or any(len(cell.lstrip("+-\u2212\u2013")) == 3 for cell in plain)
     )
 
 
