@@ -32,7 +32,7 @@ def numbers(*cells, **others):
         (["0,500", "1,250"], [0.5, 1.25]),
         (["1000", "1,250"], [1000, 1.25]),
         (["1 234.5", "1'000", "12\u202f000"], [1234.5, 1000, 12000]),
-        (["1.5D-03", "\u22122", "+3e2"], [0.0015, -2, 300]),
+        (["1.5D-03", "\u22122", "+3e2", "\u20130.5"], [0.0015, -2, 300, -0.5]),
         (["1", "", "NA", "--", "#N/A", "#DIV/0!", "NaN"], [1] + [math.nan] * 6),
         (["1", "#WERT!", "#NV", "#\u00a1VALOR!", "Err:502"], [1] + [math.nan] * 4),
         (["1", "-nan", "-nan(ind)", "1.#QNAN0"], [1] + [math.nan] * 3),
@@ -78,6 +78,7 @@ def test_the_other_columns_decide_what_a_column_alone_does_not():
     assert numbers("1.500", "2.000", other=["49,5", "1"]).tolist() == [1500, 2000]
     assert numbers("1.500", "2.000").tolist() == [1.5, 2.0]
     assert isinstance(numbers("975", "1.000", other=["0.01", "1"]), NotNumbers)
+    assert numbers("-999", "1.203", other=["0.01", "1"]).tolist() == [-999, 1.203]
     assert isinstance(numbers("50", "1.203"), NotNumbers)
     assert numbers("50", "1.203", other=["0.01", "1"]).tolist() == [50, 1.203]
     assert numbers("6,002", "999.9").tolist() == [6002, 999.9]

@@ -303,6 +303,20 @@ def test_minutes_of_the_day_are_told_where_the_labels_are_in_blocks(n, tmp_path)
     assert not notes_on(tmp_path / "t.csv", "x", [*minutes[:3], *minutes[:-3]], mixed, range(n))
 
 
+@given(seed=st.integers(0, 10_000))
+def test_numbers_that_stay_for_a_few_lines_each_are_told(tmp_path_factory, seed):
+    """As those of sessions of any length; measured on a grid as coarse, they are not."""
+    rng = np.random.default_rng(seed)
+    sessions = np.searchsorted(
+        np.sort(rng.choice(np.arange(1, N), N // 5, replace=False)), range(N), side="right"
+    )
+    path = tmp_path_factory.mktemp("sessions") / "t.csv"
+    assert notes_on(path, "x", rng.permutation(N)[sessions], order=range(N))
+    assert not [
+        note for note in notes_on(path, "x", rng.integers(0, 12, N), order=range(N)) if "consecutive" in note
+    ]
+
+
 @given(
     seed=st.integers(0, 10_000), objects=st.sampled_from([1, 3, 6]), spread=st.sampled_from([0.05, 0.3, 1.0])
 )

@@ -14,6 +14,7 @@ from graspsense.sources.columns.column_guess import guesses
 from graspsense.sources.formats.text_format import read_text
 from graspsense.sources.manifest.reader import read_recordings
 from graspsense.sources.recordings.grasp_csv import named, read_squeeze
+from graspsense.sources.trial_source import load_trials
 from graspsense.sources.trial_table.features_csv import read_labelled
 from graspsense.store.labels import labels_of
 
@@ -25,6 +26,7 @@ ROWS = [
     f"{t:.3f},{gap:.4f},{force:.4f},{1.02 * force:.4f}"
     for t, gap, force in zip(T_S, GAP_MM, FORCE_N, strict=True)
 ]
+TRIPLES = [row.rpartition(",")[0] for row in ROWS]
 HEADER = "t,pos,f1,f2"
 
 
@@ -100,6 +102,18 @@ VARIANTS = {
     "a British date": stamped(lambda k: noon(k, 12).strftime("%d/%m/%Y %H:%M:%S.%f")),
     "a German date": stamped(lambda k: noon(k).strftime("%d.%m.%Y %H:%M:%S.%f")),
     "minutes over the hour": stamped(lambda k: noon(k).strftime("%M:%S.%f")),
+    "pandas' timedelta": stamped(lambda k: f"0 days 00:00:{0.01 * k:09.6f}"),
+    "a Chinese date": stamped(lambda k: noon(k).strftime("%Y/3/3 %H:%M:%S.%f")),
+    "a colon before the milliseconds": stamped(lambda k: noon(k).strftime("%H:%M:%S:%f")[:-3]),
+    "words in as many cells behind": [HEADER, *ROWS, "", "Operator: Ann,lab 3,desk 2,room 4"],
+    "statistics behind": [HEADER, *ROWS, "Mean,55.1,3.4,3.5", "Max,80.0,9.0,9.2"],
+    "a second table behind": [HEADER, *ROWS, "", "name,value,unit", "peak,9.0,N"],
+    "events in few rows": [f"{HEADER},event", *ROWS[:30], f"{ROWS[30]},start", *ROWS[31:]],
+    "names in a comment before another one": [f"# {HEADER}", "# recorded in room 4", *ROWS],
+    "two cells before, units behind": ["Key Word,Value", 'Units,"N","mm"', HEADER, "sec,mm,N,N", *ROWS],
+    "Orange": [HEADER, "continuous,continuous,c,c", ",,class,", *ROWS],
+    "texts of a spreadsheet": [re.sub("[^,]+", r'="\g<0>"', line) for line in [HEADER, *ROWS]],
+    "lists of one number": [HEADER, *(re.sub(r"(?<=,)([^,]+)", r"[\1]", row) for row in ROWS)],
     "milliseconds": stamped(lambda k: 1774749599000 + 10 * k),
     "nanoseconds": stamped(lambda k: 1774749599000000000 + 10_000_000 * k),
 }  # fmt: skip
@@ -114,6 +128,24 @@ def test_a_recording_is_read_as_instruments_write_it(lines, tmp_path):
     frames = [reading.frame for reading in recording.readings]
     assert [frame.gap_m for frame in frames] == pytest.approx(GAP_MM * 1e-3, abs=1e-7)
     assert [frame.force_left_n for frame in frames] == pytest.approx(FORCE_N, abs=1e-3)
+
+
+def test_names_of_several_words_stand_apart_by_two_spaces(tmp_path):
+    path = tmp_path / "jar.txt"
+    path.write_text(
+        "\n".join(["Time (s)   Jaw travel (mm)   Load (N)", *(row.replace(",", "  ") for row in TRIPLES), ""])
+    )
+    (table,) = read_text(path)
+    assert list(table.numbers) == ["Time (s)", "Jaw travel (mm)", "Load (N)"]
+    assert table.numbers["Jaw travel (mm)"] == pytest.approx(GAP_MM, abs=1e-4)
+
+
+def test_a_row_whose_time_is_missing_is_left_out_and_midnight_is_still_seen(tmp_path):
+    path = tmp_path / "jar.csv"
+    lines = stamped(late)
+    lines[51] = lines[51].partition(",")[1] + lines[51].partition(",")[2]
+    path.write_text("\n".join(lines) + "\n")
+    assert times(read(path)) == pytest.approx(np.delete(T_S, 50), abs=1e-6)
 
 
 def test_a_line_that_numbers_the_columns_is_no_row(tmp_path):
@@ -398,6 +430,44 @@ def test_names_in_several_lines_are_joined(lines, tmp_path):
     labelled = trials(tmp_path, lines)
     assert [name.rpartition("_")[2] for name in labelled.table.names] == ["p", "q"]
     assert labelled.labels == ("a", "b") * 6
+
+
+@every_case(
+    ("lines", "names"),
+    [
+        (["what,p,p", *TRIALS], ("p", "p.1")),
+        (["what,p [mm],p [N]", *TRIALS], ("p", "p.1")),
+        (["what,p,", *TRIALS], ("p", "c3")),
+        (["what,p,q", "d,c,c", "class,,", *TRIALS], ("p", "q")),
+        (["what,p,q", "discrete,continuous,continuous", "class,,", *TRIALS], ("p", "q")),
+    ],
+)
+def test_columns_of_one_name_or_none_are_told_apart(tmp_path, lines, names):
+    labelled = trials(tmp_path, lines)
+    assert (labelled.table.names, labelled.labels) == (names, ("a", "b") * 6)
+    assert any(names[1] in note for note in labelled.notes) == (names[1] != "q")
+
+
+def test_json_lines_are_trials(tmp_path):
+    path = tmp_path / "trials.jsonl"
+    objects = [{"what": "ab"[k % 2], "pads": {"peak": 0.5 * k * k}} for k in range(12)]
+    path.write_text("\n".join(map(json.dumps, objects)))
+    labelled = load_trials(str(path), label="what")
+    assert (labelled.labels, labelled.table.names) == (("a", "b") * 6, ("pads.peak",))
+
+
+def test_the_last_trials_are_kept_whatever_their_label_is(tmp_path):
+    lines = [f"{k % 2},{k % 5}.25,{(7 * k) % 11}.5" for k in range(10)]
+    assert trials(tmp_path, ["what,p,q", *lines, "big,0.5,1.5", "big,0.25,2"]).labels[-2:] == ("big", "big")
+
+
+def test_a_comma_before_three_digits_is_of_decimals_between_semicolons_and_told(tmp_path):
+    lines = [f"{'ab'[k % 2]};{1 + k % 5},{107 * k % 900 + 100}" for k in range(12)]
+    labelled = trials(tmp_path, ["what;p", *lines])
+    assert labelled.table.values[1].tolist() == [2.207]
+    assert any("thousands" in note for note in labelled.notes)
+    with pytest.raises(DataDamaged):
+        trials(tmp_path, ["what\tp", *(line.replace(";", "\t") for line in lines)])
 
 
 def test_a_first_trial_without_numbers_has_no_names(tmp_path):

@@ -266,15 +266,14 @@ def _hash_of_file(path: str) -> str:
         if not os.path.isfile(path):
             return "no file"
         state = os.stat(path)
-        return _read_hash(path, state.st_size, state.st_ctime_ns, state.st_ino)
+        return _read_hash(path, (state.st_size, state.st_ctime_ns, state.st_ino))
     except OSError as error:
         return str(error.strerror)
 
 
 @cache
-def _read_hash(path: str, size: int, changed_ns: int, inode: int) -> str:
-    """Return the hash of a file in this state, which is read once."""
-    del size, changed_ns, inode
+def _read_hash(path: str, _state: tuple[int, int, int]) -> str:
+    """Return the hash of a file with this size, time of its last change (ns) and number, which is read once."""
     with Path(path).open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

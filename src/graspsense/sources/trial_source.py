@@ -123,7 +123,7 @@ def load_trials(
     )
 
 
-NOT_READ: Final = (".npz", ".parquet", ".json", ".jsonl", ".ndjson")
+NOT_READ: Final = (".npz", ".parquet", ".json")
 """Endings of files that can hold a table, which is not read as trials."""
 OF_RECORDINGS: Final = (".mcap", ".bag", ".db3", ".npy", ".mat", ".h5")
 """Endings of files of recordings, which are imported before there is anything to learn from."""
@@ -187,7 +187,17 @@ def labelled_trials(
             checkpoints_s=source.checkpoints_s,
         )
     elif source.kind == "CSV":
-        trials = _csv(source)
+        from graspsense.sources.trial_table.features_csv import read_labelled
+
+        trials = read_labelled(
+            Path(source.source),
+            source.label,
+            instance=source.instance,
+            order=source.order,
+            features=source.columns,
+            known_before=source.known_before,
+            value=source.value,
+        )
     elif source.source.startswith(STORE) and (changed or source.value is not None or source.checkpoints_s):
         from graspsense.store.dataset import labelled_store
 
@@ -223,20 +233,6 @@ def groups_of(source: TrialSource) -> tuple[Group, ...]:
     if source.states_per_instance == "all":
         return groups
     return tuple(evolve(group, states_per_instance=source.states_per_instance) for group in groups)
-
-
-def _csv(source: TrialSource) -> Labelled:
-    from graspsense.sources.trial_table.features_csv import read_labelled
-
-    return read_labelled(
-        Path(source.source),
-        source.label,
-        instance=source.instance,
-        order=source.order,
-        features=source.columns,
-        known_before=source.known_before,
-        value=source.value,
-    )
 
 
 def _data_set(source: TrialSource, features: FeatureSet[Any]) -> Labelled:

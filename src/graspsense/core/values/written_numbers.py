@@ -44,7 +44,8 @@ _MISSING: Final = re.compile(
 _LONGEST_MISSING: Final = 20
 
 _LOGICAL: Final = {"True": 1.0, "False": 0.0}
-_SIGN, _EXPONENT = "[-+\u2212]?", "(?:[eEdD][-+]?[0-9]+)?"
+_SIGN, _EXPONENT = "[-+\u2212\u2013]?", "(?:[eEdD][-+]?[0-9]+)?"
+"""Word processors turn a minus into a dash."""
 _WITH_POINT: Final = re.compile(rf"{_SIGN}(?:(?P<whole>[0-9]+)(?:\.[0-9]*)?|\.[0-9]+){_EXPONENT}")
 _WITH_COMMA: Final = re.compile(rf"{_SIGN}[0-9]*,[0-9]+{_EXPONENT}")
 _COMMA_GROUPS: Final = re.compile(
@@ -53,13 +54,13 @@ _COMMA_GROUPS: Final = re.compile(
 """Thousands between commas, also with those of India between them: 1,00,000."""
 _POINT_GROUPS: Final = re.compile(rf"{_SIGN}[1-9][0-9]{{0,2}}(?:\.[0-9]{{3}})+(?:,[0-9]*)?{_EXPONENT}")
 _OTHER_GROUPS: Final = re.compile(
-    rf"{_SIGN}[1-9][0-9]{{0,2}}(?:[ '\u2019\u00a0\u2009\u202f][0-9]{{3}})+(?:[.,][0-9]*)?{_EXPONENT}"
+    rf"{_SIGN}[1-9][0-9]{{0,2}}(?:[ '\u2019\u00a0\u2007\u2009\u202f][0-9]{{3}})+(?:[.,][0-9]*)?{_EXPONENT}"
 )
-_GROUP_SIGNS: Final = re.compile("[ '\u2019\u00a0\u2009\u202f]")
+_GROUP_SIGNS: Final = re.compile("[ '\u2019\u00a0\u2007\u2009\u202f]")
 _HEXADECIMAL: Final = re.compile("0[xX][0-9a-fA-F]{1,16}")
 _INFINITE: Final = re.compile("[-+]?inf(?:inity)?", re.IGNORECASE)
 _PLAIN: Final = re.compile(r"[0-9+\-.eE]*")
-_TO_PYTHON: Final = str.maketrans("dD\u2212", "ee-")
+_TO_PYTHON: Final = str.maketrans("dD\u2212\u2013", "ee--")
 
 
 @frozen
@@ -137,8 +138,13 @@ def rows_of_lists(cells: Sequence[str]) -> Numbers | None:
     return np.array(rows, dtype=np.float64) if rows else None
 
 
-def columns_of_numbers(columns: Mapping[str, Sequence[str]]) -> dict[str, Numbers | NotNumbers]:
+def columns_of_numbers(
+    columns: Mapping[str, Sequence[str]], *, decimal_commas: bool = False
+) -> dict[str, Numbers | NotNumbers]:
     """Return the numbers of each column of a file, NaN where missing, or why it has none.
+
+    With `decimal_commas`, a comma before three digits is that of decimals where nothing else tells: a file whose cells
+    are separated by semicolons is from such a program.
 
     >>> {name: found.tolist() for name, found in columns_of_numbers({"N": ["0", "1,5"], "mm": ["2", "1.000"]}).items()}
     {'N': [0.0, 1.5], 'mm': [2.0, 1000.0]}
@@ -149,13 +155,15 @@ def columns_of_numbers(columns: Mapping[str, Sequence[str]]) -> dict[str, Number
     commas = any(notations == COMMA for notations in certain)
     of_file = (COMMA if commas else 0) | (THOUSANDS if points else 0)
     return {
-        name: fit if isinstance(fit, NotNumbers) else _read(columns[name], fit, of_file)
+        name: fit
+        if isinstance(fit, NotNumbers)
+        else _read(columns[name], fit, of_file, decimal_commas=decimal_commas)
         for name, fit in fits.items()
     }
 
 
 def with_three_decimals(columns: Mapping[str, Sequence[str]]) -> list[str]:
-    """Return the columns that can have points between thousands, if no number of the file has other decimals.
+    """Return the columns of decimals that can be thousands, if no number of the file has other decimals.
 
     >>> with_three_decimals({"N": ["12.008", "9.500"], "mm": ["4", "5"]}), with_three_decimals({"N": ["12.008", "0.5"]})
     (['N'], [])
@@ -163,7 +171,8 @@ def with_three_decimals(columns: Mapping[str, Sequence[str]]) -> list[str]:
     names = []
     for name, cells in columns.items():
         with_mark = [cell for cell in cells if ("." in cell or "," in cell) and is_number(cell)]
-        if not all(map(_POINT_GROUPS.fullmatch, with_mark)):
+        commas = with_mark and all(map(_COMMA_GROUPS.fullmatch, with_mark)) and not _tells_thousands(cells)
+        if not (commas or all(map(_POINT_GROUPS.fullmatch, with_mark))):
             return []
         names += [name] if with_mark else []
     return names
@@ -212,13 +221,13 @@ def _mixed(cells: Sequence[str]) -> NotNumbers:
     return NotNumbers(row, cells[row], f"which is not a number ({advice})")
 
 
-def _read(cells: Sequence[str], fit: _Fit, of_file: int) -> Numbers | NotNumbers:
+def _read(cells: Sequence[str], fit: _Fit, of_file: int, *, decimal_commas: bool) -> Numbers | NotNumbers:
     """Return the numbers; `of_file` holds COMMA and THOUSANDS where other columns prove decimal commas or points."""
     common = fit.notations
     if common & POINT:
         # `1.500` is 1500 where all other columns have decimal commas, and beside 975 and 1.000.
         grouped = common & COMMA and any("." in cell for cell in cells)
-        likely = _nearer(cells) | (of_file & COMMA) if grouped else POINT
+        likely = _nearer(cells, of_file == THOUSANDS) | (of_file & COMMA) if grouped else POINT
         if likely == POINT or (likely == POINT | COMMA and of_file == THOUSANDS):
             return _values(cells, POINT) if fit.values is None else fit.values
         if not of_file & THOUSANDS and (likely == COMMA or of_file):
@@ -230,6 +239,8 @@ def _read(cells: Sequence[str], fit: _Fit, of_file: int) -> Numbers | NotNumbers
             return _values(cells, COMMA)
         if of_file == THOUSANDS or _tells_thousands(cells):
             return _values(cells, THOUSANDS)
+        if decimal_commas and not of_file:
+            return _values(cells, COMMA)
     else:
         return _values(cells, common)
     mark = "," if common & POINT == 0 else "."
@@ -241,7 +252,7 @@ def _read(cells: Sequence[str], fit: _Fit, of_file: int) -> Numbers | NotNumbers
     )
 
 
-def _nearer(cells: Sequence[str]) -> int:
+def _nearer(cells: Sequence[str], of_points: bool) -> int:
     """Return POINT, COMMA or both: in which the largest number without a mark is much nearer to one with a point.
 
     A program that writes three decimals writes them in every cell, so that 950 beside 1.203 is hardly 950.000.
@@ -252,6 +263,9 @@ def _nearer(cells: Sequence[str]) -> int:
     plain = max((size for cell, size in sizes if "." not in cell), default=0.0)
     if plain == 0.0 or not with_point:
         return POINT
+    others = {cell for cell, _ in sizes if "." not in cell}
+    if of_points and len(others) == 1 and (min(others) < "0" or len(sizes) - len(with_point) > 1):
+        return POINT  # -999 beside 1.203, which stands for a missing value
     ones, thousands = (
         min(abs(math.log(factor * size / plain)) for size in with_point) for factor in (1.0, _THOUSAND)
     )
@@ -266,7 +280,7 @@ def _tells_thousands(cells: Sequence[str]) -> bool:
     plain = [cell for cell in cells if "," not in cell and not is_missing(cell)]
     return bool(plain) and (
         any(cell.endswith("0") for cell in cells if "," in cell)
-        or any(len(cell.lstrip("+-\u2212")) == 3 for cell in plain)
+        or any(len(cell.lstrip("+-\u2212\u2013")) == 3 for cell in plain)
     )
 
 

@@ -10,12 +10,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from graspsense.core.values.written_numbers import is_missing
+
 Numbers = NDArray[np.float64]
 
 _TIME: Final = re.compile(
-    r"(?:(?P<year>[0-9]{4})[-/]?(?P<month>[0-9]{2})[-/]?(?P<day>[0-9]{2})[T ]"
-    r"|(?P<a>[0-9]{1,2})(?P<mark>[./-])(?P<b>[0-9]{1,2})(?P=mark)(?P<c>[0-9]{4}),? )?"
-    r"(?P<hour>[0-9]{1,2}):?(?P<minute>[0-9]{2}):?(?P<second>[0-9]{2}(?:[.,][0-9]{1,9})?)"
+    r"(?:(?P<year>[0-9]{4})[-/]?(?P<month>[0-9]{2}|(?<=[-/])[0-9])[-/]?(?P<day>[0-9]{2}|(?<=[-/])[0-9])[T ]"
+    r"|(?P<a>[0-9]{1,2})(?P<mark>[./-])(?P<b>[0-9]{1,2})(?P=mark)(?P<c>[0-9]{4}),? |[0-9]+ days?,? )?"
+    r"(?P<hour>[0-9]{1,2}):?(?P<minute>[0-9]{2}):?(?P<second>[0-9]{2}(?:[.,][0-9]{1,9}|:[0-9]{3,9})?)"
     r"(?: ?(?P<half>[AP])\.?M\.?)? ?(?P<zone>Z|[-+][0-9]{2}:?[0-9]{2}|)",
     re.IGNORECASE,
 )
@@ -34,8 +36,13 @@ def seconds_since_first(cells: Sequence[str]) -> Numbers | None:
 
     Times with a zone are compared as instants; those without one are all taken to be of the same zone. A time of the
     day that is earlier by more than half a day than the one before is of the next day, and so with minutes and hours.
-    Of the day and the month in `3/4/2026`, the first is what makes the column shorter.
+    Of the day and the month in `3/4/2026`, the first is what makes the column shorter. A missing one is NaN.
     """
+    given = [k for k, cell in enumerate(cells) if not is_missing(cell)]
+    if 0 < len(given) < len(cells):
+        known, times = seconds_since_first([cells[k] for k in given]), np.full(len(cells), np.nan)
+        times[given] = np.nan if known is None else known
+        return None if known is None else times
     if cells and all(map(_MINUTES.fullmatch, cells)):
         parts = [cell.replace(",", ".").split(":") for cell in cells]
         return _unwound(
@@ -78,7 +85,10 @@ def _time(match: re.Match[str], *, month_first: bool) -> datetime:
         if not 1 <= hour <= 12:
             raise ValueError(hour)
         hour = hour % 12 + 12 * (match["half"] in "pP")
-    text = f"{year}-{int(month):02}-{int(day):02}T{hour:02}:{match['minute']}:{match['second']}{match['zone'].upper()}"
+    seconds = match["second"].replace(":", ".")
+    text = (
+        f"{year}-{int(month):02}-{int(day):02}T{hour:02}:{match['minute']}:{seconds}{match['zone'].upper()}"
+    )
     return datetime.fromisoformat(text)
 
 

@@ -13,6 +13,9 @@ from graspsense.sources.formats.table import Numbers
 _ROUNDING: Final = 1e-9
 """Share of the range of a channel below which the step between two values is one of rounding."""
 
+GLITCHES: Final = 0.01
+"""Share of the samples that can be glitches, at each end of the range."""
+
 
 @frozen(kw_only=True)
 class ChannelFacts:
@@ -79,6 +82,13 @@ def resolution(known: Numbers) -> float | None:
     steps = np.diff(np.unique(known))
     steps = steps[steps > _ROUNDING * max(float(np.ptp(known)), 1e-300)] if len(steps) else steps
     return float(steps.min()) if len(steps) else None
+
+
+def usual_range(values: Numbers) -> tuple[float, float]:
+    """Return the least and the largest value, apart from one sample in a hundred at each end, which may be a glitch."""
+    low = np.quantile(values, GLITCHES, method="higher")
+    high = np.quantile(values, 1.0 - GLITCHES, method="lower")
+    return float(low), float(high)
 
 
 def _age_s(values: Numbers, t_s: Numbers | None, end_s: float | None) -> float:

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from graspsense.sources.columns.usual_range import usual_range
+from graspsense.sources.columns.channel_facts import usual_range
 from graspsense.sources.formats.table import Numbers
 
 LEAST_S: Final = 0.015

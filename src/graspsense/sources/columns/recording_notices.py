@@ -19,8 +19,7 @@ from graspsense.core.control.contact import CONTACT_FORCE_N
 from graspsense.core.values.fingers import FingerForce
 from graspsense.recording.labelled_recording import LabelledRecording
 from graspsense.recording.replayable import Recording
-from graspsense.sources.columns.channel_facts import resolution
-from graspsense.sources.columns.usual_range import usual_range
+from graspsense.sources.columns.channel_facts import resolution, usual_range
 from graspsense.sources.formats.table import Numbers
 
 FEWEST: Final = 20

@@ -33,8 +33,7 @@ class ArffColumns(CsvColumns):
     def __init__(self, path: Path) -> None:
         self.path = path
         self.names, self.units, self.levels = [], {}, {}
-        self.lines, self.notes, self.index = [], (), ""
-        self._numbers = None
+        self.lines, self.notes = [], ()
         self._rows: list[list[str]] = []
         self.weighted = False
         in_data = False
@@ -57,11 +56,7 @@ class ArffColumns(CsvColumns):
         if not in_data or not self._rows or not self.names:
             raise DataDamaged(f"{path} has no rows of attributes: it needs @attribute lines, @data and rows")
         self.cells = {name: [row[k] for row in self._rows] for k, name in enumerate(self.names)}
-
-    @property
-    def default_label(self) -> str | None:
-        """The class attribute: the last one, if it is nominal."""
-        return self.names[-1] if self.names[-1] in self.levels else None
+        self.default_label = self.names[-1] if self.names[-1] in self.levels else None  # the class attribute
 
     def without_label(self, label: str | None) -> list[str]:
         """Leave out the rows whose class is missing, as Weka does, and return notes on what is not used."""

@@ -8,7 +8,7 @@ confirm that, unless another array that the manifest uses has a number for each 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -26,12 +26,6 @@ from graspsense.sources.formats.table import ColumnTable, Numbers, TableRules
 
 Arrays = Mapping[str, NDArray[Any]]
 
-READERS: Final = {
-    ".npz": npz_arrays,
-    ".mat": mat_variables,
-    **dict.fromkeys((".h5", ".hdf5", ".hdf"), hdf5_arrays),
-}
-ARRAY_SUFFIXES: Final = (".npy", *READERS)
 COLUMN: Final = "column"
 """The field of `arrays` that names the column which an array is."""
 GRASP: Final = "grasp"
@@ -49,23 +43,7 @@ def arrays_in(path: Path) -> dict[str, NDArray[Any]]:
 
     Raises PluginUnavailable, ConfigError, TooLarge, DataDamaged.
     """
-    suffix = path.suffix.lower()
-    return dict(_npy(path) if suffix == ".npy" else READERS[suffix](path))
-
-
-_NO_RULES: Final = TableRules()
-
-
-def read_arrays(path: Path, rules: TableRules = _NO_RULES) -> list[ColumnTable]:
-    """Return the tables in a file of arrays: each array is a column, or several.
-
-    Raises PluginUnavailable, ConfigError, TooLarge, DataDamaged.
-    """
-    return [
-        table.with_fields(fields)
-        for fields, group in _groups(path, arrays_in(path), rules.arrays)
-        for table in _grasps(path, group, rules)
-    ]
+    return dict(_READERS[path.suffix.lower()](path))
 
 
 def _npy(path: Path) -> Arrays:
@@ -79,6 +57,28 @@ def _npy(path: Path) -> Arrays:
     if array.ndim not in (1, 2, 3):
         raise DataDamaged(f"{path}: an array of {array.ndim} dimensions is not a table")
     return {_ALONE: array}
+
+
+_READERS: Final[Mapping[str, Callable[[Path], Arrays]]] = {
+    ".npy": _npy,
+    ".npz": npz_arrays,
+    ".mat": mat_variables,
+    **dict.fromkeys((".h5", ".hdf5", ".hdf"), hdf5_arrays),
+}
+ARRAY_SUFFIXES: Final = tuple(_READERS)
+_NO_RULES: Final = TableRules()
+
+
+def read_arrays(path: Path, rules: TableRules = _NO_RULES) -> list[ColumnTable]:
+    """Return the tables in a file of arrays: each array is a column, or several.
+
+    Raises PluginUnavailable, ConfigError, TooLarge, DataDamaged.
+    """
+    return [
+        table.with_fields(fields)
+        for fields, group in _groups(path, arrays_in(path), rules.arrays)
+        for table in _grasps(path, group, rules)
+    ]
 
 
 def _groups(path: Path, arrays: Arrays, pattern: str) -> Iterator[tuple[dict[str, str], Arrays]]:

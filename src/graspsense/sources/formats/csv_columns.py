@@ -28,13 +28,17 @@ from graspsense.core.values.written_numbers import (
     with_three_decimals,
 )
 from graspsense.core.values.written_times import seconds_since_first
-from graspsense.sources.formats.text_table import numbers_with_unit, read_lines, table_of
+from graspsense.sources.formats.text_table import (
+    INDEX,
+    distinct_names,
+    numbers_with_unit,
+    read_lines,
+    table_of,
+)
 
 if TYPE_CHECKING:
     from graspsense.core.values.written_numbers import Numbers
 
-INDEX: Final = "index"
-"""Name of a first column without a name."""
 _INDEXES: Final = (INDEX, "Unnamed: 0")
 """The second is the name that pandas gives such a column when it reads it again."""
 
@@ -44,6 +48,13 @@ class CsvColumns:
 
     `names` and `units` describe the columns, `cells` holds their text by name, `lines` the line number of each row.
     """
+
+    default_label: str | None = None
+    """The column of the label where the file says it; a CSV file does not."""
+    index = ""
+    """The name of the index that pandas wrote, empty if there is none."""
+    _decimal_commas = False
+    _numbers: dict[str, Numbers | NotNumbers] | None = None
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -57,38 +68,36 @@ class CsvColumns:
         self.lines: list[int] = list(table.lines)
         self.units: dict[str, str] = {}
         self.names: list[str] = []
-        self.index = ""
-        """The name of the index that pandas wrote, empty if there is none."""
         self.cells: dict[str, list[str]] = {}
-        for number, (heading, unit_of_line, column) in enumerate(
-            zip(table.names, table.units, table.columns, strict=True), 1
+        headings = [name_and_unit(text_of_cell(heading)) for heading in table.names]
+        called = distinct_names([name for name, _ in headings])
+        renamed: list[str] = []
+        for name, (given, unit), unit_of_line, column in zip(
+            called, headings, table.units, table.columns, strict=True
         ):
-            name, unit = name_and_unit(text_of_cell(heading))
-            if not name and not any(column):
+            if not given and not any(column):
                 continue
-            if not name and not self.names:
-                name = INDEX
-            if not name:
-                raise DataDamaged(f"{path}: column {number} has no name in the header")
-            if name in self.units:
-                raise DataDamaged(f"{path}: two columns are named {name!r}: rename one")
-            if not self.names and (not heading or name in _INDEXES[1:]):
+            if not self.names and (not given or name in _INDEXES[1:]):
                 self.index = name
+            elif name != given:
+                renamed.append(name)
             self.names.append(name)
             self.cells[name] = [text_of_cell(cell) for cell in column]
             self.units[name] = unit or unit_of_line or numbers_with_unit(self.cells[name])[1]
+        if 2 * len(renamed) > len(self.names):
+            raise DataDamaged(
+                f"{path}: most columns have the name of another one, or none, in line {table.named_in}: a table of "
+                "trials has a line for each trial, and a column for each feature"
+            )
+        if renamed:
+            self.notes += (f"named here, as columns of one name or of none: {listed(renamed)}",)
         if table.separator == ";" and (doubtful := with_three_decimals(self.cells)):
             self.notes += (
-                f"the point in {listed(doubtful)} is taken for that of decimals. If it separates thousands, leave it "
-                "out of the numbers",
+                f"the sign before three digits in {listed(doubtful)} is taken for that of decimals. If it separates "
+                "thousands, leave it out of the numbers",
             )
-        self._numbers: dict[str, Numbers | NotNumbers] | None = None
+        self._decimal_commas = table.separator == ";"
         self.levels: dict[str, tuple[str, ...]] = {}
-
-    @property
-    def default_label(self) -> str | None:
-        """The column of the label where the file says it; a CSV file does not."""
-        return None
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -131,7 +140,8 @@ class CsvColumns:
 
     def _read_numbers(self) -> dict[str, Numbers | NotNumbers]:
         if self._numbers is None:
-            self._numbers = columns_of_numbers({name: self._without_unit(name) for name in self.cells})
+            cells = {name: self._without_unit(name) for name in self.cells}
+            self._numbers = columns_of_numbers(cells, decimal_commas=self._decimal_commas)
         return self._numbers
 
     def take_words_as_missing(self, names: Iterable[str]) -> None:

@@ -41,14 +41,8 @@ def hdf5_arrays(path: Path, advice: str = "") -> dict[str, NDArray[Any]]:
     refuse_devices(path)
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / path.with_suffix(".npz").name
-        command = [
-            sys.executable,
-            "-P",
-            str(_CHILD),
-            str(path.absolute()),
-            str(copy),
-            str(UNPACKED_MB.most * 1_000_000),
-        ]
+        most_bytes = UNPACKED_MB.most * 1_000_000
+        command = [sys.executable, "-P", str(_CHILD), str(path.absolute()), str(copy), str(most_bytes)]
         # Filters of the file that are not part of the library would be loaded from a folder of the system.
         environment = {**os.environ, "HDF5_PLUGIN_PRELOAD": "::"}
         try:

@@ -59,13 +59,11 @@ def npz_arrays(path: Path) -> dict[str, NDArray[Any]]:
 def _array(file: IO[bytes], size: int, source: str, unpacked: Unpacked) -> NDArray[Any]:
     """Return the array in a file of so many bytes, or in a member of an archive."""
     version = npy.read_magic(file)
-    if version == (1, 0):
-        shape, _, dtype = npy.read_array_header_1_0(file)
-    elif version in ((2, 0), (3, 0)):
-        # Version 3 differs in the encoding of the names of fields only, and numbers have none.
-        shape, _, dtype = npy.read_array_header_2_0(file)
-    else:
+    if version not in ((1, 0), (2, 0), (3, 0)):
         raise DataDamaged(f"{source} has version {version} of the NPY format, which is not known")
+    # Version 3 differs from 2 in the encoding of the names of fields only, and numbers have none.
+    read_header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+    shape, _, dtype = read_header(file)
     if dtype.hasobject:
         raise DataDamaged(
             f"{source} is not an array of numbers. Python objects in it are not loaded, because that can run any code: "

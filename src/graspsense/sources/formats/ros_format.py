@@ -74,28 +74,26 @@ def _collected(
     A topic whose messages name different things is one topic for each, such as `/joint_states.finger`. Raises
     DataDamaged.
     """
-    columns: dict[str, dict[str, list[dict[str, Any]]]] = {}
     topics = {name.partition(".")[0] for name in used if re.match(r"/[^.*?]+\.", name)}
-    came: dict[tuple[str, str], Messages] = {}
+    parts: dict[str, dict[str, tuple[Messages, list[dict[str, Any]]]]] = {}
     kept = Unpacked(path)
     for topic, recorded_ns, message in _messages(path, topics):
         numbers, names = dict(numbers_in(message, "")), _names_in(message)
         kept.add(sum(_NUMBER_BYTES + 8 * np.size(column) for column in numbers.values()))
-        columns.setdefault(topic, {}).setdefault(names, []).append(numbers)
-        came.setdefault((topic, names), Messages()).add(recorded_ns, stamp_ns(message))
+        came, rows = parts.setdefault(topic, {}).setdefault(names, (Messages(), []))
+        came.add(recorded_ns, stamp_ns(message))
+        rows.append(numbers)
     values: dict[str, list[dict[str, Any]]] = {}
     times: dict[str, Messages] = {}
-    for topic, by_names in columns.items():
+    for topic, by_names in parts.items():
         # A driver can send a first message without names.
         divided = 1 < sum(map(bool, by_names)) <= MOST_NAMES
-        for names, rows in by_names.items():
+        for names, (came, rows) in by_names.items():
             part = f"{topic}.{names}" if divided and names else topic
-            values.setdefault(part, []).extend(
-                {f"{part}{k}": number for k, number in row.items()} for row in rows
-            )
+            values.setdefault(part, []).extend({f"{part}{k}": row[k] for k in row} for row in rows)
             of_part = times.setdefault(part, Messages())
-            of_part.recorded_ns.extend(came[topic, names].recorded_ns)
-            of_part.stamped_ns.extend(came[topic, names].stamped_ns)
+            of_part.recorded_ns.extend(came.recorded_ns)
+            of_part.stamped_ns.extend(came.stamped_ns)
     values = {topic: value for topic, value in values.items() if value[0]}
     wanted = [topic for topic in values if any(name.startswith(f"{topic}.") for name in used)]
     values = {topic: values[topic] for topic in wanted or values}

@@ -23,13 +23,13 @@ from graspsense.core.values.written_numbers import (
     truths,
 )
 from graspsense.core.values.written_times import seconds_since_first
-from graspsense.sources.formats.csv_columns import INDEX
 from graspsense.sources.formats.patterns import regular_expression
 from graspsense.sources.formats.table import ColumnTable, Numbers
 from graspsense.sources.formats.text_table import (
     UNITS,
     Line,
     TextTable,
+    distinct_names,
     numbers_with_unit,
     read_lines,
     table_of,
@@ -89,7 +89,7 @@ def _columns(path: Path, fields: dict[str, str], table: TextTable, *, several: b
         raise DataDamaged(
             f"{path} names its columns in line {table.named_in}, and has no line of numbers after it"
         )
-    cells = dict(zip(_names(table.names), table.columns, strict=True))
+    cells = dict(zip(distinct_names(table.names), table.columns, strict=True))
     numbers: dict[str, Numbers] = {}
     texts: dict[str, Sequence[str]] = {}
     not_numbers: dict[str, str] = {}
@@ -109,7 +109,7 @@ def _columns(path: Path, fields: dict[str, str], table: TextTable, *, several: b
             continue
         lists = _lists(path, name, cells[name])
         if lists is not None:
-            numbers[name] = lists
+            numbers[name] = lists[:, 0] if lists.shape[1] == 1 else lists
             continue
         texts[name] = cells[name]
         times, logical = seconds_since_first(cells[name]), truths(cells[name])
@@ -151,17 +151,3 @@ def _unit_in(heading: str) -> str:
     if not unit and heading.endswith(")"):
         unit = heading[:-1].rpartition("(")[2].strip()
     return unit if unit.lower() in UNITS else ""
-
-
-def _names(names: Sequence[str]) -> list[str]:
-    """Return a name for each column: a second one of the same name gets `.1` behind it, as pandas writes it."""
-    ordered: dict[str, None] = {}
-    repeats: dict[str, int] = {}
-    for k, given in enumerate(names):
-        name = given or (INDEX if k == 0 else f"c{k + 1}")
-        again = repeats.get(name, 0)
-        while (name if not again else f"{name}.{again}") in ordered:
-            again += 1
-        repeats[name] = again
-        ordered[f"{name}.{again}" if again else name] = None
-    return list(ordered)

@@ -11,8 +11,9 @@ import csv
 import json
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from itertools import chain
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain, takewhile
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, Final
 
@@ -29,6 +30,8 @@ LONGEST_NAME: Final = 500
 JSON_LINES: Final = (".jsonl", ".ndjson")
 """Endings of files with one JSON object a line."""
 GZIP: Final = ".gz"
+INDEX: Final = "index"
+"""Name of a first column without a name."""
 UNITS: Final = frozenset((
     "s", "sec", "secs", "seconds", "ms", "msec", "us", "\u00b5s", "\u03bcs", "ns", "min", "m", "cm", "mm",
     "um", "\u00b5m", "\u03bcm", "in", "inch", "n", "mn", "kn", "g", "gram", "grams", "kg", "gf", "kgf", "lb",
@@ -44,26 +47,21 @@ _SINGLE_UNITS: Final = frozenset("smgNVACK%\u00b0")
 """Units of one sign behind a number: in the other case, or as `12-`, it can be a factor or a sign of its own."""
 _LINE_ENDS: Final = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
 """The characters at which `str.splitlines` divides a text."""
-_SEPARATORS: Final = (";", "\t", ",", "|", " ")
+_SEPARATORS: Final = (";", "\t", ",", "|", " ", "  ")
+"""The last ones stand for any number of spaces, and for two or more, where names have spaces."""
 _COMMENTS: Final = ("#", "%")
 _RULE: Final = re.compile(r"(?=.*[-_=]{3})[-_=+|:\s]+")
 """A line of signs below the names, or around a table."""
 _REMARKS: Final = frozenset({"comment", "comments", "remark", "remarks", "note", "notes"})
-"""Names of a last column whose cells a program leaves out, with the separator, where it has nothing to say."""
+"""Names of a last column that can be without any cell."""
+_KINDS: Final = frozenset(("continuous", "c", "discrete", "d", "string", "s", "time", "t"))
+"""What Orange calls the kinds of columns, in a line below their names."""
 _SEPARATOR_LINE: Final = re.compile(r'"?sep=([;,\t|])"?\s*')
 SPREADSHEETS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"PAR1", b"ARROW1")
 """The first bytes of a ZIP file, as which spreadsheets are saved, of those of old programs, and of Apache's tables."""
 _CODE_PAGES: Final = ("cp1252", "cp1250", "iso8859-1", "iso8859-15")
 """They agree on degrees, micro and the letters of several languages."""
-_ZEROS: Final = (
-    ([False, False, True, True], "utf-32"),
-    ([True, True, False, False], "utf-32"),
-    ([False, True, True, True], "utf-32-le"),
-    ([True, True, True, False], "utf-32-be"),
-    ([False, True, False, True], "utf-16-le"),
-    ([True, False, True, False], "utf-16-be"),
-)
-"""Which of the first bytes are zero in an encoding with as many bytes for each letter, and letters of English first."""
+_SHOWN_AS_IT_IS: Final = re.compile(r'(^|[;,\t])="')
 _WITH_UNIT: Final = re.compile(r"(.*[0-9.])\s*([^\s0-9]+)")
 _SAMPLED: Final = 400
 """Lines from which the separator and the kinds of the columns are found."""
@@ -134,6 +132,8 @@ class _Layout:
         given = _SEPARATOR_LINE.fullmatch(written[0][1]) if written else None
         if given:
             written = written[1:]
+        # A cell that a spreadsheet shall show as it is: ="0.5"
+        written = [(number, _SHOWN_AS_IT_IS.sub(r'\1"', line)) for number, line in written]
         self.comments, plain = _comments_and_others(written)
         if all(re.fullmatch(r"\s*\|.*\|\s*", line) for _, line in plain):
             plain = [(number, line.strip()[1:-1]) for number, line in plain]
@@ -158,9 +158,8 @@ class _Layout:
                 raise DataDamaged(
                     f"{self.path}, line {number}: {len(row)} values, but there are {len(names)} columns"
                 )
-        later = [number for number, _ in self.comments if rows and number > rows[0][0]]
-        if later:
-            self.notes.append(_lines_words(later, "comments"))
+        if later := [number for number, _ in self.comments if rows and number > rows[0][0]]:
+            self._tell(later, "comments")
         return TextTable(
             names=tuple(names),
             units=tuple((units or [""] * len(names))[: len(names)]),
@@ -173,9 +172,9 @@ class _Layout:
 
     def _rows(self, lines: Sequence[Line]) -> Iterator[Row]:
         """Yield the cells of each line; a cell in quotes may go over several lines. Raises DataDamaged."""
-        if self.separator == " ":
+        if self.separator in (" ", "  "):
             for number, line in lines:
-                yield number, _words(line)
+                yield number, _words(line, self.separator)
             return
         reader = csv.reader((line + "\n" for _, line in lines), delimiter=self.separator, strict=True)
         try:
@@ -207,6 +206,7 @@ class _Layout:
         sample = sample[: max(2, _SAMPLED_CELLS // width)]
         numeric = _numeric_columns(sample, width)
         data = next((k for k, (_, row) in enumerate(self.rows) if _is_data(row, width, numeric)), None)
+        data = self._without_kinds(data, numeric)
         top = self.rows[0][1]
         if data is not None and (names := self._second_names(data, width, numeric)):
             return self._later_header(names + 1, width, numeric)
@@ -219,10 +219,20 @@ class _Layout:
             if all(is_number(cell) or is_missing(cell) for cell in top):
                 ordinals = [*map(str, range(width))]
                 if numbered := width > 2 and top in (ordinals, ["", *ordinals[:-1]]):
-                    self.notes.append(_lines_words([self.rows[0][0]], "lines that number the columns"))
+                    self._tell([self.rows[0][0]], "lines that number the columns")
                 return [f"c{k}" for k in range(1, width + 1)], None, int(numbered), 0
             return top, None, 1, self.rows[0][0]
         return self._later_header(data, width, numeric)
+
+    def _without_kinds(self, data: int | None, numeric: frozenset[int]) -> int | None:
+        """Return the first row of numbers, after leaving out those in which Orange says what the columns are."""
+        for k in range(1, data or 0):
+            kinds = {cell for c, cell in enumerate(self.rows[k][1]) if c in numeric}
+            if kinds <= _KINDS and ("continuous" in kinds or ("c" in kinds and self.rows[k + 1 : data])):
+                self._tell([number for number, _ in self.rows[k:data]], "lines on the kinds of columns")
+                del self.rows[k:data]
+                return k
+        return data
 
     def _second_names(self, data: int, width: int, numeric: frozenset[int]) -> int | None:
         """Return the last row of names behind a few rows of numbers, as those of a summary; None if there is none."""
@@ -266,9 +276,12 @@ class _Layout:
         with_units = [
             k
             for k in able
-            if k + 1 < data and _are_units(self.rows[k + 1][1]) and {*range(k + 2, data)} <= {*able}
+            if k + 1 < data
+            and _are_units(self.rows[k + 1][1])
+            and not _are_units(self.rows[k][1])
+            and {*range(k + 2, data)} <= {*able}
         ]
-        names = (with_units or able[-1:])[0]
+        names = (with_units or able)[-1]
         units = _without_brackets(self.rows[names + 1][1]) if with_units else None
         if names:
             self._refuse_numbers_before(names)
@@ -325,9 +338,9 @@ class _Layout:
             )
 
     def _names_in_comment(self, width: int) -> tuple[int, list[str], list[str] | None] | None:
-        """Return the line, the names and the units that the last comments before the first row have.
+        """Return the line, the names and the units that comments before the first row have; None if none has names.
 
-        Units stand in the comment behind the names. None if the last comment, but for units, has no names.
+        Units stand in the last comment.
         """
         above = [
             (number, self._cells(line, width)) for number, line in self.comments if number < self.rows[0][0]
@@ -335,41 +348,51 @@ class _Layout:
         units = None
         if len(above) > 1 and len(above[-1][1]) == width and _are_units(above[-1][1]):
             units = _without_brackets(above.pop()[1])
-        if not above:
-            return None
-        number, cells = above[-1]
-        named = len(cells) == width and len(set(cells)) == width and not any(map(is_number, cells))
-        return (number, cells, units) if named and all(cells) else None
+        # As many words as columns can be a remark.
+        for number, cells in above[-1:] if self.separator == " " else reversed(above):
+            if len(cells) == width == len(set(cells)) and all(cells) and not any(map(is_number, cells)):
+                return number, cells, units
+        return None
 
     def _cells(self, comment: str, width: int) -> list[str]:
         """Return the names in a text, which may separate so many words by another sign than the rows do."""
         text = comment.strip().lstrip("#% ")
-        for separator in _SEPARATORS[:-1]:
+        for separator in _SEPARATORS[:-2]:
             cells = [cell.strip() for cell in text.split(separator)]
             if len(cells) == width and (
                 separator == self.separator or not any(" " in cell for cell in cells)
             ):
                 return cells
-        return _words(text) if self.separator == " " else text.split(self.separator)
+        return _words(text, " ") if self.separator == " " else text.split(self.separator)
+
+    def _tell(self, numbers: Iterable[int], what: str) -> None:
+        """Note that these lines are left out."""
+        self.notes.append(_lines_words(sorted(numbers), what))
 
     def _without_repeats(
         self, rows: list[Row], names: Sequence[str], units: Sequence[str] | None
     ) -> list[Row]:
         """Return the rows that are not the header again."""
-        header = list(names)
-        again = [number for number, row in rows if row == header]
-        if not again or all(map(is_number, header)):
+        again = {number for number, row in rows if row == [*names]}
+        if not again or all(map(is_number, names)):
             return rows
-        self.notes.append(_lines_words(again, "repeated headers"))
-        return [row for row in rows if row[1] != header and _without_brackets(row[1]) != units]
+        self._tell(again, "repeated headers")
+        return [row for row in rows if row[0] not in again and _without_brackets(row[1]) != units]
 
     def _without_texts(self, rows: list[Row], width: int) -> list[Row]:
-        """Return the rows without lines that are one text, as a device prints them between its numbers."""
-        texts = [number for number, row in rows if len(row) == 1 < width and not is_number(row[0])]
-        if not 0 < len(texts) <= max(1, _MOST_BEFORE * len(rows)):
+        """Return the rows without lines of text, as a device prints one between its numbers, or several behind them."""
+        sample = _sample([row for _, row in rows])
+        numeric = _numeric_columns(sample, width)
+        begins = [row[0] for row in sample if is_number(row[0])]
+        # Times and the numbers of rows differ, and labels repeat.
+        rises = 0 in numeric and len(set(begins)) == len(begins)
+        behind = takewhile(lambda row: _is_text_behind(row[1], width, numeric, rises=rises), reversed(rows))
+        texts = {number for number, row in rows if len(row) == 1 < width and not is_number(row[0])}
+        texts |= {number for number, _ in behind}
+        if not 0 < len(texts) <= max(_FEW_BEFORE, _MOST_BEFORE * len(rows)):
             return rows
-        self.notes.append(_lines_words(texts, "lines of text"))
-        return [row for row in rows if len(row[1]) > 1 or is_number(row[1][0])]
+        self._tell(texts, "lines of text")
+        return [row for row in rows if row[0] not in texts]
 
     def _without_blank_end(self, names: list[str], rows: list[Row]) -> tuple[list[str], list[Row]]:
         """Return names and rows without a last column that a separator at the end of the lines makes."""
@@ -413,9 +436,15 @@ def _comments_and_others(lines: Sequence[Line]) -> tuple[list[Line], list[Line]]
 
 
 def _with_remarks(rows: list[Row]) -> list[Row]:
-    """Return the rows with the last cell, if most of them lack it because only a column of remarks has it."""
-    width = next((len(row) for _, row in rows if len(row) > 1 and row[-1].lower() in _REMARKS), 0)
-    if 2 * sum(len(row) == width - 1 for _, row in rows) <= len(rows):
+    """Return the rows with the last cell, if most of them lack it, with the separator, as they have no remark.
+
+    The last column then has a name, and texts in some rows, or none if its name says that they are remarks.
+    """
+    width = 1 + max(Counter(len(row) for _, row in rows).items(), key=itemgetter(1), default=(0, 0))[0]
+    wide = [row for _, row in rows if len(row) == width > 2 and row[-1]]
+    names = [row for row in wide if all(row) and not any(map(is_number, row))]
+    noted = not any(is_number(row[-1]) for row in wide) and any(any(map(is_number, row)) for row in wide)
+    if not names or not (noted or names[-1][-1].lower() in _REMARKS):
         return rows
     return [(number, [*row, ""] if len(row) == width - 1 else row) for number, row in rows]
 
@@ -513,8 +542,10 @@ def _separator(lines: Sequence[str]) -> str:
     return next(iter(fitting or able), "\x1f")
 
 
-def _words(line: str) -> list[str]:
-    """Return the words between spaces; spaces within quotes are of their word."""
+def _words(line: str, separator: str) -> list[str]:
+    """Return the words between one or two spaces at least; spaces within quotes are of their word."""
+    if separator == "  ":
+        return re.split(r"\s{2,}", line.strip())
     if '"' not in line:
         return line.split()
     return [quoted or word for quoted, word in re.findall(r'"([^"]*)"(?!\S)|(\S+)', line)]
@@ -531,7 +562,8 @@ def _width(lines: Sequence[str], separator: str) -> tuple[int, int]:
     widths: Counter[int] = Counter()
     for line in lines:
         try:
-            cells = _words(line) if separator == " " else next(csv.reader([line], delimiter=separator), [])
+            spaces = separator in (" ", "  ")
+            cells = _words(line, separator) if spaces else next(csv.reader([line], delimiter=separator), [])
         except (csv.Error, ValueError):
             continue
         widths[len(cells)] += 1
@@ -556,6 +588,13 @@ def _is_data(row: Sequence[str], width: int, numeric: frozenset[int]) -> bool:
         return False
     there = [row[k] for k in numeric if not is_missing(row[k])]
     return bool(there) and all(map(is_number, there))
+
+
+def _is_text_behind(row: Sequence[str], width: int, numeric: frozenset[int], *, rises: bool) -> bool:
+    """Return whether a row has words in place of a time, or several where numbers are expected, and no number there."""
+    there = [row[k] for k in numeric if k < len(row) and not is_missing(row[k])]
+    words = rises and not (is_missing(row[0]) or re.search(r"\d", row[0]))
+    return words or (len(row) == width and len(there) > 1 and not any(map(is_number, there)))
 
 
 def _can_be_names(row: Sequence[str], width: int, texts: Sequence[set[str]]) -> bool:
@@ -592,6 +631,20 @@ def _are_units(row: Sequence[str]) -> bool:
 def _decimals(cell: str) -> int:
     """Return the digits behind the decimal point of a number, -1 for another text."""
     return len(cell.partition(".")[2]) if is_number(cell) and "e" not in cell.lower() else -1
+
+
+def distinct_names(names: Sequence[str]) -> list[str]:
+    """Return a name for each column: a second one of the same name gets `.1` behind it, as pandas writes it."""
+    ordered: dict[str, None] = {}
+    repeats: dict[str, int] = {}
+    for k, given in enumerate(names):
+        name = given or (INDEX if k == 0 else f"c{k + 1}")
+        again = repeats.get(name, 0)
+        while (name if not again else f"{name}.{again}") in ordered:
+            again += 1
+        repeats[name] = again
+        ordered[f"{name}.{again}" if again else name] = None
+    return list(ordered)
 
 
 def _lines_words(numbers: Sequence[int], what: str) -> str:
@@ -648,17 +701,15 @@ def _decoded(path: Path, data: bytes) -> str:
 
     Raises DataDamaged.
     """
-    start = [byte == 0 for byte in data[:4]]
-    unicode = next((encoding for zeros, encoding in _ZEROS if zeros == start[: len(zeros)]), "")
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")) and unicode != "utf-32":
-        unicode = "utf-16"
-    if unicode:
+    unicode = json.detect_encoding(data)
+    if not unicode.startswith("utf-8"):
         try:
             return data.decode(unicode)
         except UnicodeDecodeError as error:
-            raise DataDamaged(
-                f"{path} begins as {unicode.upper()}, and is none: {error.reason}. Save it as UTF-8"
-            ) from None
+            if unicode in ("utf-16", "utf-32"):  # without a mark, it only looked so
+                raise DataDamaged(
+                    f"{path} begins as {unicode.upper()}, and is none: {error.reason}. Save it as UTF-8"
+                ) from None
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

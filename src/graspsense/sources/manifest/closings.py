@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 from graspsense.core.values.errors import counted
+from graspsense.sources.columns.channel_facts import usual_range
 from graspsense.sources.columns.grasp_columns import GraspColumns
-from graspsense.sources.columns.usual_range import usual_range
 from graspsense.sources.formats.table import Numbers
 
 CLOSED: Final = 0.4

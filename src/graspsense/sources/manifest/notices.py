@@ -10,9 +10,9 @@ import numpy as np
 
 from graspsense.core.control.contact import CONTACT_FORCE_N, both_touch
 from graspsense.core.values.errors import DataDamaged
+from graspsense.sources.columns.channel_facts import usual_range
 from graspsense.sources.columns.grasp_columns import GraspColumns
 from graspsense.sources.columns.recording_notices import FEWEST, PART, ZERO_SAMPLES, force_of_pads
-from graspsense.sources.columns.usual_range import usual_range
 from graspsense.sources.manifest.closings import CLOSED, OPEN
 from graspsense.sources.manifest.steps import NOISE, squeezes
 

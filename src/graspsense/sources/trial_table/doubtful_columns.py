@@ -6,6 +6,7 @@ all.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from decimal import Decimal
@@ -41,22 +42,12 @@ if TYPE_CHECKING:
 
     Numbers = NDArray[np.float64]
 
-_TIME_NAMES: Final = frozenset(
-    {"t", "time", "elapsed", "clock", "hour", "hours", "minute", "minutes", "timestamp"}
-)
+_TIME_NAMES: Final = frozenset({
+    "t", "time", "elapsed", "clock", "hour", "hours", "minute", "minutes", "timestamp"
+})  # fmt: skip
 _OF_TIMES: Final = TIMES | {
-    "rec",
-    "recorded",
-    "recording",
-    "start",
-    "begin",
-    "end",
-    "at",
-    "of",
-    "day",
-    "since",
-    "total",
-}
+    "rec", "recorded", "recording", "start", "begin", "end", "at", "of", "day", "since", "total",
+}  # fmt: skip
 _OF_A_SESSION: Final = frozenset({
     "temperature", "temp", "humidity", "battery", "batt", "vbat", "baseline", "zero", "initial", "start", "before"
 })  # fmt: skip
@@ -66,6 +57,8 @@ _OFTEN: Final = 3
 """Lines with the same value from which on it may stand for something else than a measurement."""
 _LONE: Final = 100.0
 """How many times the span of all others a single value is away from them, if it is no measurement."""
+_BY_CHANCE: Final = 1e-4
+"""Probability of an order of lines below which it is no chance."""
 _FEW: Final = 0.1
 """Share of the lines of a label that may differ from the others in whether they have a value."""
 _ROUNDED: Final = 6
@@ -322,11 +315,17 @@ def values_have_one_label(values: Sequence[str] | Sequence[float], labels: Seque
 
 
 def in_one_block_each(values: Sequence[str], labels: Sequence[str]) -> bool:
-    """Return whether the lines of each value, which are several, come one after the other, and tell of the label."""
-    blocks = [len(list(lines)) for _, lines in groupby(values)]
-    different = len(set(values))
-    told = len(set(zip(values, labels, strict=True))) < different * len(set(labels))
-    return 1 < different == len(blocks) and min(blocks) >= LEAST_LINES and told
+    """Return whether the lines of each value come one after the other, and tell of the label.
+
+    They are several, or it is no chance that those of a label are so, if all orders of its lines are equally likely.
+    """
+    lines, pairs = Counter(values), Counter(zip(values, labels, strict=True))
+    if not 1 < len(lines) == sum(1 for _ in groupby(values)) or len(pairs) == len(lines) * len(set(labels)):
+        return False
+    orders = sum(math.lgamma(n + 1) for n in Counter(labels).values())
+    in_blocks = sum(math.lgamma(n + 1) for n in Counter(label for _, label in pairs).values())
+    in_blocks += sum(math.lgamma(n + 1) for n in pairs.values())
+    return min(lines.values()) >= LEAST_LINES or in_blocks - orders < math.log(_BY_CHANCE)
 
 
 def passes_without_a_gap(values: Numbers, labels: Sequence[str]) -> bool:

@@ -316,14 +316,12 @@ def _correlation(ranks: NDArray[np.float64], places: NDArray[np.float64]) -> flo
 
 def _ranks(values: NDArray[np.float64], codes: NDArray[np.int64]) -> NDArray[np.float64]:
     """Return the rank of each value in its group, from the middle of the group; equal ones have their mean rank."""
-    counts = np.bincount(codes)
     order = np.lexsort((values, codes))
-    inside = np.arange(len(values)) - (np.cumsum(counts) - counts)[codes[order]]
     changes = (np.diff(codes[order]) != 0) | (np.diff(values[order]) != 0.0)
     tie = np.concatenate([[0], np.cumsum(changes)])
     ranks = np.empty(len(values))
-    ranks[order] = (np.bincount(tie, weights=inside) / np.bincount(tie))[tie]
-    return ranks - (counts[codes] - 1) / 2.0
+    ranks[order] = (np.bincount(tie, weights=np.arange(len(values))) / np.bincount(tie))[tie]
+    return ranks - (np.bincount(codes, weights=ranks) / np.bincount(codes))[codes]
 
 
 def _is_regular(values: NDArray[np.float64], most: float = _IRREGULAR) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Container
@@ -13,6 +14,7 @@ import numpy as np
 
 from graspsense.core.learn.confounding import LEAST_LINES
 from graspsense.core.values.errors import listed
+from graspsense.sources.columns.channel_facts import resolution
 from graspsense.sources.formats.text_table import numbers_with_unit
 
 if TYPE_CHECKING:
@@ -100,7 +102,8 @@ def _is_mean_or_sum(lines: Numbers, line: Numbers) -> bool:
     used = ~np.isnan(line) & ~np.isnan(lines).any(axis=0)
     used &= lines.max(axis=0) > lines.min(axis=0)
     lines, line = lines[:, used], line[used]
-    digits = [Decimal(repr(number)).normalize().as_tuple().exponent for number in line.tolist()]
+    # The zeros at the end of a whole number are written, and not rounded.
+    digits = [min(0, int(Decimal(repr(number)).normalize().as_tuple().exponent)) for number in line.tolist()]
     errors = np.maximum(_ROUNDING * np.abs(line), 0.5 * 10.0 ** np.array(digits, dtype=np.float64))
     if not any(
         (np.abs(line - statistic(lines, axis=0)) <= 1.001 * errors).all() for statistic in (np.mean, np.sum)
@@ -108,11 +111,11 @@ def _is_mean_or_sum(lines: Numbers, line: Numbers) -> bool:
         return False
     chance = 1.0
     for number, error, values in zip(line.tolist(), errors.tolist(), lines.T, strict=True):
-        step = float(np.diff(np.unique(values)).min())
+        step, span = resolution(values) or math.inf, float(np.ptp(values))
         place = (number - float(values[0])) / step
         # A mean has more digits than the trials, and a sum is larger. Another number may be equal to a trial's.
         alike = abs(place - round(place)) < _ON_GRID and values.min() <= number <= values.max()
-        chance *= min(1.0, (step if alike else 2.0 * error) / float(np.std(values)))
+        chance *= min(1.0, (step if alike else 2.0 * error) / span / float(np.std(values / span)))
     return chance < _BY_CHANCE
 
 
