@@ -88,22 +88,16 @@ def _ourselves(plugins: Plugins) -> tuple[Finding, ...]:
         except PackageNotFoundError:
             findings.append(Finding(f"library {name}", "note", "not installed"))
     for status in plugins.statuses:
-        subject = f"plugin {status.distribution}"
-        numbers = {"version": status.version, "state": status.state}
-        if status.state == "broken":
-            findings.append(
-                Finding(subject, "problem", f"{status.version} does not load: {status.reason}",
-                        f"graspsense plugins show {status.distribution}", numbers)
-            )  # fmt: skip
-        else:
-            findings.append(
-                Finding(
-                    subject,
-                    "ok" if status.state == "loaded" else "note",
-                    f"{status.version} {status.reason}".rstrip(),
-                    numbers=numbers,
-                )
+        broken = status.state == "broken"
+        findings.append(
+            Finding(
+                f"plugin {status.distribution}",
+                "problem" if broken else "ok" if status.state == "loaded" else "note",
+                f"{status.version} {'does not load: ' if broken else ''}{status.reason}".rstrip(),
+                f"graspsense plugins show {status.distribution}" if broken else "",
+                {"version": status.version, "state": status.state},
             )
+        )
     return tuple(findings)
 
 

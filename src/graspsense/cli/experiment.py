@@ -107,7 +107,9 @@ def experiment(
         more = findings_of(summary)
         shown.told("progress", {"text": answer(summary) if more is None else more.answer})
     if as_json:
-        _print_json(summary, more, page, _counts(account, problem))
+        findings = {} if more is None else {"answer": more.answer, "findings": dict(more.values)}
+        place = None if page is None else str(page)
+        echo_json({**summary.as_json(), **findings, "page": place, **_counts(account, problem)})
     else:
         _print(summary, more, account, f"none: {problem}" if problem else str(page))
     if account.stopped == "interrupted":
@@ -226,13 +228,6 @@ def _plan(planned: Planned, results: Results, workers: int, as_json: bool) -> No
         "results", f"in {results.folder}" + (", where there are some already" if results.any() else "")
     )
     echo("nothing was run")
-
-
-def _print_json(
-    summary: Summary, more: Findings | None, page: Path | None, counts: dict[str, object]
-) -> None:
-    findings = {} if more is None else {"answer": more.answer, "findings": dict(more.values)}
-    echo_json({**summary.as_json(), **findings, "page": None if page is None else str(page), **counts})
 
 
 def _print(summary: Summary, more: Findings | None, account: Account, page: str) -> None:

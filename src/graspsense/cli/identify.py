@@ -98,7 +98,9 @@ def identify(
     if not refused:
         write_or_replace(Path(out), result.scene.encode())
     if page:
-        _write_page(Path(page), result, Path(out).name)
+        from graspsense.report.identification import identification_page
+
+        write_html(Path(page), identification_page(result, Path(out).name))
     for note in result.notes:
         talk(f"note: {note}")
     if as_json:
@@ -113,12 +115,6 @@ def identify(
     if refused:
         reasons = "".join(f"\n  {reason}" for reason in refused)
         raise ConfigError(f"{out} is not written:{reasons}\n  --force writes it all the same")
-
-
-def _write_page(page: Path, result: Identification, scene: str) -> None:
-    from graspsense.report.identification import identification_page
-
-    write_html(page, identification_page(result, scene))
 
 
 def _print(result: Identification) -> None:

@@ -84,11 +84,11 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
                 "model": asked.in_a_line,
                 "n": len(predictions),
                 "predictions": [
-                    _as_json(prediction, None if labels is None else labels[i])
+                    {**prediction.as_json(), **({} if labels is None else {"truth": labels[i]})}
                     for i, prediction in enumerate(predictions)
                 ],
                 "rate": None if rate is None else to_json(rate),
-                "unknown": sum(not _known(prediction) for prediction in predictions),
+                "unknown": sum(prediction.label == UNKNOWN for prediction in predictions),
                 "warnings": warnings,
                 "notes": list(notes),
             },
@@ -147,12 +147,3 @@ def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) ->
     for reason, count in reasons.items():
         trials = "" if count == len(predictions) else f" for {count} of {len(predictions)} trials"
         echo_entry("certainty", f"none{trials}: {reason}")
-
-
-def _known(prediction: Prediction) -> bool:
-    return prediction.label != UNKNOWN
-
-
-def _as_json(prediction: Prediction, truth: str | None) -> dict[str, Any]:
-    document = prediction.as_json()
-    return document if truth is None else {**document, "truth": truth}

@@ -15,7 +15,7 @@ from graspsense.cli.terminal import echo, echo_table
 from graspsense.core.learn.target_value import value_label
 from graspsense.core.settings.resolved import settings_from
 from graspsense.core.values.errors import ConfigError, GraspsenseError
-from graspsense.store.changes import Change, history
+from graspsense.store.changes import history
 from graspsense.store.labels import agrees, labels_of
 
 if TYPE_CHECKING:
@@ -158,12 +158,11 @@ def show_history(source: str, as_json: bool) -> None:
         return
     if not changes:
         echo("nothing was changed after recording")
-    echo_table(("TRIAL", "WHEN", "CHANGE", "WHY"), [_row(change) for change in changes])
-
-
-def _row(change: Change) -> tuple[str, str, str, str]:
-    when = change.made_at[:19].replace("T", " ") or "unknown"
-    return str(change.trial), when, change.words, change.why
+    rows = [
+        (str(change.trial), change.made_at[:19].replace("T", " ") or "unknown", change.words, change.why)
+        for change in changes
+    ]
+    echo_table(("TRIAL", "WHEN", "CHANGE", "WHY"), rows)
 
 
 def _change(refs: Sequence[str], change: Callable[[Store, Sequence[int]], None], as_json: bool) -> None:

@@ -61,9 +61,6 @@ def settings_have_types(subject: Subject) -> None:
     """Every key of the config class has a type, so that values from files can be checked."""
     cls: Any = subject.component.config_class()
     bare = [field.alias for field in attrs.fields(cls) if field.init and field.type is None]
-    # A value that is not annotated is none of the keys.
-    values = {name: value for name, value in vars(cls).items() if name.islower() and not name.startswith("_")}
-    bare += [name for name, value in values.items() if isinstance(value, bool | int | float | str)]
     demand(
         not bare,
         f"{config_name(subject)} has keys without a type: {', '.join(bare)}. Annotate them, as in "

@@ -60,11 +60,6 @@ def _all(subject: Subject) -> dict[str, Trace]:
     return {"a whole grasp": _whole(subject), **unusual}
 
 
-def _own(subject: Subject) -> Trace:
-    """Return a whole grasp of a gripper that has only the channels in `requires`."""
-    return with_channels(_whole(subject), {require.name for require in subject.entry.requires})
-
-
 def _same(a: Features, b: Features) -> bool:
     same = (a.names, a.units, a.reasons) == (b.names, b.units, b.reasons)
     return same and repr(a.as_dict()) == repr(b.as_dict())
@@ -187,8 +182,9 @@ def does_not_change_the_trace(subject: Subject) -> None:
 
 def requires_what_it_reads(subject: Subject) -> None:
     """The channels in `requires` suffice: without the others, the features are the same."""
-    full, own = _features(subject, _whole(subject)), _features(subject, _own(subject), "a grasp")
     required = {require.name for require in subject.entry.requires}
+    full = _features(subject, _whole(subject))
+    own = _features(subject, with_channels(_whole(subject), required), "a grasp")
     others = [name for name in COLUMNS_OF_CHANNEL if name not in required]
     demand(
         _same(full, own),

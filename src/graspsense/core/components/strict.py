@@ -317,10 +317,6 @@ def _str(value: object, _: object) -> str:
     return value
 
 
-def _path(value: object, _: object) -> Path:
-    return Path(_str(value, str))
-
-
 def _none(value: object, _: object) -> None:
     if value is not None:
         raise _expected("nothing", value)
@@ -429,7 +425,7 @@ _plain_rules: dict[Any, Callable[[Any, Any], Any]] = {
     int: _int,
     float: _float,
     str: _str,
-    Path: _path,
+    Path: lambda value, _: Path(_str(value, str)),
     type(None): _none,
 }
 for _kind, _rule in _plain_rules.items():

@@ -34,12 +34,13 @@ def to_toml(settings: Settings, origins: bool = False) -> str:
             )
             notes = [f"version {versions[table]}"] if key == "type" else []
             if origins:
-                inside = {
-                    path: origin
-                    for path, origin in settings.origins.items()
-                    if _within(path, f"{table}.{key}")
-                }
-                notes += list(dict.fromkeys(inside.values()))
+                path = f"{table}.{key}"
+                inside = (
+                    origin
+                    for name, origin in settings.origins.items()
+                    if name == path or name.startswith(f"{path}.")
+                )
+                notes += list(dict.fromkeys(inside))
             lines.append(f"{line:<40}  # {', '.join(notes)}" if notes else line)
     return "\n".join(lines) + "\n"
 
@@ -67,7 +68,3 @@ def key_facts(declaration: Mapping[str, Any]) -> list[str]:
         default = declaration["default"]
         facts.append("not set by default" if default is None else f"default {toml_value(default)}")
     return [fact for fact in facts if fact]
-
-
-def _within(path: str, key: str) -> bool:
-    return path == key or path.startswith(f"{key}.")
