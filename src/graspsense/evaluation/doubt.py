@@ -91,21 +91,8 @@ class Reliability:
     """The calibration error of the probabilities that the classifier itself gives, before calibration."""
 
 
-@frozen(kw_only=True, eq=False)
-class _Calibration:
-    """What held-out trials tell of later answers: their certainty, and the prediction sets."""
-
-    certainty: Certainty
-    sets: PredictionSets
-
-    def answers(self, pooled: Pooled, rows: NDArray[np.int64]) -> Answers:
-        """Return what the sets of these trials are made of."""
-        return _answers(self.certainty, pooled, rows)
-
-    def probabilities(self, pooled: Pooled, rows: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Return the calibrated probabilities of these trials."""
-        certainty = self.answers(pooled, rows).certainty
-        return with_certainty(pooled.probabilities[rows], pooled.columns[rows], certainty)
+_Calibration = tuple[Certainty, PredictionSets]
+"""What held-out trials tell of later answers."""
 
 
 def calibrated(model: Model, learner: ClassifierFactory, labelled: Labelled, seed: int) -> Model:
@@ -154,11 +141,12 @@ def calibrated_with(model: Model, answers: Pooled, labelled: Labelled) -> Model:
     calibration = confounded(labelled) or _calibration(answers, labelled.labels, instances, np.arange(trials))
     if isinstance(calibration, str):
         return evolve(model, sets=_no_sets(labelled, calibration))
+    certainty, sets = calibration
     return evolve(
         model,
-        certainty=calibration.certainty,
+        certainty=certainty,
         sets=evolve(
-            calibration.sets,
+            sets,
             unit=_unit(instances, labelled.grouped, labelled.sessions),
             unknown=int(answers.unlike.sum()),
             trials=trials,
@@ -180,7 +168,7 @@ def _unit(instances: Sequence[str] | None, grouped: bool = False, sessions: bool
 def _calibration(
     pooled: Pooled, labels: Sequence[str], instances: Sequence[str] | None, rows: NDArray[np.int64]
 ) -> _Calibration | str:
-    """Return what these held-out trials tell; if they have too few units for anything, that as the reason."""
+    """Return what these held-out trials tell, or the reason why they have too few units for anything."""
     numbers = rows.tolist()
     own = None if instances is None else [instances[i] for i in numbers]
     # An instance may have several labels, such as a bottle in each of its states: these are answers of their own.
@@ -198,10 +186,7 @@ def _calibration(
         effect_of(pooled.folds),
     )
     truth = columns_of(labels, pooled.classes)[rows]
-    return _Calibration(
-        certainty=certainty,
-        sets=sets_of(_answers(certainty, pooled, rows), truth, pooled.classes, own),
-    )
+    return certainty, sets_of(_answers(certainty, pooled, rows), truth, pooled.classes, own)
 
 
 def _answers(certainty: Certainty, pooled: Pooled, rows: NDArray[np.int64]) -> Answers:
@@ -244,11 +229,12 @@ class HeldOut:
         """Return which labels belong to the set of each trial, shape (trials, classes), or why there are no sets."""
         inside = np.zeros(self.pooled.scores.shape, dtype=np.bool_)
         for test, calibration in self._calibrations():
-            if isinstance(calibration, str) or not calibration.sets.thresholds:
-                return calibration if isinstance(calibration, str) else calibration.sets.reason
-            inside[test] = calibration.sets.members(
-                calibration.answers(self.pooled, test), self.pooled.classes
-            )
+            if isinstance(calibration, str):
+                return calibration
+            certainty, sets = calibration
+            if not sets.thresholds:
+                return sets.reason
+            inside[test] = sets.members(_answers(certainty, self.pooled, test), self.pooled.classes)
         return inside
 
     def set_coverage(self, rate_of: RateOf) -> SetCoverage:
@@ -282,7 +268,8 @@ class HeldOut:
         probabilities = pooled.probabilities.copy()
         for test, calibration in self._calibrations():
             if not isinstance(calibration, str):
-                probabilities[test] = calibration.probabilities(pooled, test)
+                certainty = _answers(calibration[0], pooled, test).certainty
+                probabilities[test] = with_certainty(probabilities[test], pooled.columns[test], certainty)
         given = np.nan_to_num(probabilities, nan=0.0)
         truth = np.array(self.labels)[:, np.newaxis] == np.array(pooled.classes)
         right = pooled.right(self.labels)

@@ -206,12 +206,7 @@ def grasp_with(
         backend = beside.gripper(backend)
     controller, feature_set = settings.controller.create(), settings.features.create()
     anytime = anytime_of(model, feature_set, settings)
-    run = RunInfo(
-        components=settings.components,
-        settings=settings.values,
-        seed=settings.run.seed,
-        labels=dict(labels or {}),
-    )
+    run = _run_info(settings, labels)
 
     def tell(event: GraspEvent) -> None:
         plugins.grasp_event(run, event)
@@ -264,6 +259,15 @@ def _as_certain_as_the_gripper(
     return (
         None if prediction is None else prediction.without_certainty(why),
         tuple(evolve(early, prediction=early.prediction.without_certainty(why)) for early in checkpoints),
+    )
+
+
+def _run_info(settings: Settings, labels: Mapping[str, str] | None) -> RunInfo:
+    return RunInfo(
+        components=settings.components,
+        settings=settings.values,
+        seed=settings.run.seed,
+        labels=dict(labels or {}),
     )
 
 
