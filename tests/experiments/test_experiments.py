@@ -384,10 +384,10 @@ def test_pipelines_of_any_name_stay_in_the_folder_and_are_found_again(file, tmp_
     sweepless = EXPERIMENT.replace('[sweep]\n"judge.folds" = [2, 3]\n', "")
     odd = file.with_name(os.fsdecode(b"a\xff\nb.toml"))
     odd.write_text(pipelines + sweepless)
-    before = set(tmp_path.rglob("*"))
+    known = set(tmp_path.rglob("*"))
     results = Results(tmp_path / "deep" / "er" / "out")
     run_experiment(read_experiment(str(odd)), results, Serial, command=str(odd))
-    written = set(tmp_path.rglob("*")) - before
+    written = set(tmp_path.rglob("*")) - known
     assert all(path.is_relative_to(results.folder) or path in results.folder.parents for path in written)
     assert len(summarise(results.experiment(), results).results) == 2
 

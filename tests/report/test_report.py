@@ -123,7 +123,7 @@ def test_a_page_answers_first_and_says_what_it_rests_on(page):
         < text.index("Recognition rates")
     )
     assert re.search(
-        r"in \d+\.\d % \(95 %: \d+\.\d to \d+\.\d\) of 4 simulated grasps per seed, over 2 seeds", text
+        r"in \d+\.\d % \(95 %: \d+\.\d to \d+\.\d %\) of 4 simulated grasps per seed, over 2 seeds", text
     )
     assert "real objects" in text
     for part in (

@@ -217,7 +217,7 @@ def test_values_are_read_out_under_the_pointer(browser, pages):
     browser.show(pages["experiment"], 1280)
     browser.mouse("mouseMoved", *place_in(browser, "#grasp svg", 0.75, 0.7))
     (told,) = browser.run(TIP)
-    time, gap, force = told.split("\n")
+    time, force, gap = told.split("\n")
 
     assert re.fullmatch(r"−?[\d.]+ s", time)
     assert 40 < float(re.fullmatch(r"gap, mm: ([\d.]+)", gap)[1]) < 90

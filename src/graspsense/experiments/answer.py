@@ -21,7 +21,7 @@ def answer(summary: Summary) -> str:
                 "This kind of experiment measures no rates, and names no `findings` that report its results."
             )
         return "There is no answer yet: no task has a result."
-    ranked = _Ranked.of(summary.of_first_target)
+    ranked = _Ranked.from_conditions(summary.of_first_target)
     conditions, best = ranked.conditions, ranked.best
     rate = f"{TARGETS[conditions[0].recognised]} in {best.rate.words} of {_sample(best)}"
     if len(conditions) == 1:
@@ -43,7 +43,7 @@ def headline(summary: Summary) -> str:
     """Return the answer as a person would say it, without intervals; empty without a result."""
     if not summary.conditions:
         return ""
-    ranked = _Ranked.of(summary.of_first_target)
+    ranked = _Ranked.from_conditions(summary.of_first_target)
     best, worst = ranked.best, ranked.worst
 
     def told(rate: str) -> str:
@@ -76,7 +76,7 @@ class _Ranked:
     verdict: Verdict
 
     @classmethod
-    def of(cls, conditions: Sequence[ConditionResult]) -> _Ranked:
+    def from_conditions(cls, conditions: Sequence[ConditionResult]) -> _Ranked:
         best = max(conditions, key=lambda condition: condition.rate.mean)
         worst = min(conditions, key=lambda condition: condition.rate.mean)
         pairs = max(len(conditions) * (len(conditions) - 1) // 2, 1)

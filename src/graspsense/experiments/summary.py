@@ -15,7 +15,7 @@ from graspsense.evaluation.intervals import RecognitionRate
 from graspsense.evaluation.over_seeds import MeanDifference, OverSeeds, mean_difference
 from graspsense.evaluation.results import Confusion
 from graspsense.experiments.experiment import ExperimentCase, Planned
-from graspsense.experiments.results import EXPERIMENT, PIPELINES, Results
+from graspsense.experiments.results import EXPERIMENT, PIPELINES, PROVENANCE, Results
 from graspsense.experiments.task import TaskResult
 from graspsense.experiments.task_results import (
     AnyTaskResult,
@@ -284,9 +284,9 @@ def summary_of(results: Results) -> Summary:
     summary = summarise(results.experiment(), results)
     if not summary.results and not summary.failed and not summary.unreadable and results.any():
         raise ConfigError(
-            f"{results.folder} has results, but none for the settings that it has now: {EXPERIMENT}, {PIPELINES}/ or "
-            "graspsense itself was changed after the run. Restore the files, or run the changed experiment into "
-            f"another folder: graspsense experiment {results.folder / EXPERIMENT} --out FOLDER"
+            f"{results.folder} has results, but none for the settings that it has now: {EXPERIMENT}, {PIPELINES}/, "
+            f"{PROVENANCE} or graspsense itself was changed after the run. Restore the files, or run the changed "
+            f"experiment into another folder: graspsense experiment {results.folder / EXPERIMENT} --out FOLDER"
         )
     return summary
 

@@ -8,7 +8,7 @@ from typing import Final
 
 from attrs import frozen
 
-from graspsense.evaluation.intervals import span
+from graspsense.evaluation.intervals import percent, span
 from graspsense.report.html import facts, figure, table
 from graspsense.report.svg import (
     DASHES,
@@ -40,12 +40,7 @@ class RateRow:
     @property
     def words(self) -> str:
         """The rate in per cent with its interval."""
-        return f"{100 * self.rate:.1f} % ({self.interval_text})"
-
-    @property
-    def interval_text(self) -> str:
-        """The interval in per cent."""
-        return span(self.interval)
+        return f"{percent(self.rate)} ({span(self.interval)})"
 
 
 ROW: Final = 34
@@ -161,7 +156,7 @@ def rates_over(
 
 def rates_table(caption: str, rows: Sequence[RateRow], heading: str = "recognised") -> str:
     """Return the rates as a table; `heading` says what they are the rates of."""
-    cells = [(row.name, f"{100 * row.rate:.1f} %", row.interval_text) for row in rows]
+    cells = [(row.name, percent(row.rate), span(row.interval)) for row in rows]
     return table(caption, ("case", heading, "95 % interval, %"), cells, 1)
 
 

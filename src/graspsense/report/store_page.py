@@ -122,16 +122,8 @@ def _newest_readable(store: Store, listed: Sequence[TrialSummary]) -> StoredTria
 
     Raises DataDamaged if none can be read.
     """
-    damage: DataDamaged | None = None
-    for summary in sorted(
-        listed, key=lambda listed_trial: not (listed_trial.complete and listed_trial.set_aside is None)
-    ):
-        try:
-            return store.trial(summary.id)
-        except DataDamaged as error:
-            damage = damage or error
-    assert damage is not None  # there is a trial
-    raise damage
+    newest = sorted(listed, key=lambda summary: not summary.complete or summary.set_aside is not None)
+    return store.first_readable(summary.id for summary in newest)
 
 
 def _curves(store: Store) -> tuple[list[GraspCurve], list[UnreadableRecording]]:

@@ -43,7 +43,7 @@ def force_and_gap(
 ) -> None:
     """Draw the forces of grasps over time above their gaps, on axes that show all of `curves`.
 
-    With each curve that is drawn go arguments of `Picture.line`.
+    With each curve that is drawn go arguments of `Picture.line`; without a name, force and gap are read out as such.
     """
     lines = list(drawn)
     picture.x_axis(x, FORCE[1], GAP[0], f"{curves[0].time_words} since the squeeze began")
@@ -57,7 +57,7 @@ def force_and_gap(
         with picture.plot(x, y, top, bottom):
             for curve, how in lines:
                 points = [(x(t), y(value)) for t, value in curve.values(column, x.low, x.high)]
-                picture.line(points, **{**how, "name": f"{how['name']}, {unit}"})
+                picture.line(points, **{**how, "name": f"{how.get('name', what)}, {unit}"})
 
 
 def time_scale(curves: Sequence[GraspCurve], start: float, end: float) -> AxisScale:
@@ -110,7 +110,7 @@ def one_grasp(grasp: GraspCurve, caption: str) -> str:
     picture = Picture(BELOW)
     x_scale = AxisScale(t[0], t[-1], 36, picture.width - 10)
     durations = _phases(picture, grasp, t, x_scale)
-    force_and_gap(picture, x_scale, [grasp], [(grasp, {"ink": INKS[0], "width": 2, "name": grasp.label})])
+    force_and_gap(picture, x_scale, [grasp], [(grasp, {"ink": INKS[0], "width": 2})])
     words = (
         f"One grasp of {grasp.label} over time, force above and gap below. Phases: {', '.join(durations)} "
         f"{grasp.time_unit}"

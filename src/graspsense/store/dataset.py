@@ -193,18 +193,14 @@ def _newest(store: Store, wanted: str) -> tuple[StoredTrial, int]:
 
     Raises ConfigError if there is none, DataDamaged if none can be read.
     """
-    damage = None
-    for number, feature_set in store.query(
-        f"SELECT id, feature_set FROM trial WHERE {wanted} ORDER BY id DESC"
-    ):
-        try:
-            return store.trial(number), int(feature_set)
-        except DataDamaged as error:
-            damage = damage or error
-    raise damage or ConfigError(
-        f"the store in {store.folder} has no labelled trial that ended by itself. Record some with `graspsense "
-        f"collect --save {store.folder} --labels ...`"
-    )
+    feature_sets = dict(store.query(f"SELECT id, feature_set FROM trial WHERE {wanted} ORDER BY id DESC"))
+    if not feature_sets:
+        raise ConfigError(
+            f"the store in {store.folder} has no labelled trial that ended by itself. Record some with `graspsense "
+            f"collect --save {store.folder} --labels ...`"
+        )
+    newest = store.first_readable(feature_sets)
+    return newest, int(feature_sets[newest.summary.id])
 
 
 @frozen(kw_only=True)

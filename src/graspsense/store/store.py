@@ -13,7 +13,7 @@ import re
 import secrets
 import shutil
 import sqlite3
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final
@@ -196,6 +196,17 @@ class Store:
             raise
         except Exception as error:  # a row can hold any value in any place
             raise damaged(self.folder, f"trial {number} cannot be read ({named(error)})") from error
+
+    def first_readable(self, numbers: Iterable[int]) -> StoredTrial:
+        """Return the first of these trials that can be read; there is one. Raises DataDamaged if none can be."""
+        damage = None
+        for number in numbers:
+            try:
+                return self.trial(number)
+            except DataDamaged as error:
+                damage = damage or error
+        assert damage is not None
+        raise damage
 
     def encoded_row(self, number: int) -> tuple[str, EncodedRow]:
         """Return the stored hash and the columns of a trial. Raises DataDamaged if there are not all of them."""
