@@ -459,6 +459,8 @@ def test_json_lines_are_trials(tmp_path):
 def test_the_last_trials_are_kept_whatever_their_label_is(tmp_path):
     lines = [f"{k % 2},{k % 5}.25,{(7 * k) % 11}.5" for k in range(10)]
     assert trials(tmp_path, ["what,p,q", *lines, "big,0.5,1.5", "big,0.25,2"]).labels[-2:] == ("big", "big")
+    lines = [f"{k * k % 11}.5,{'ab'[k % 2]},{k}" for k in range(10)]
+    assert len(trials(tmp_path, ["p,what,q", *lines, "OL,a,1", "OL,b,2"]).labels) == 12
 
 
 def test_a_comma_before_three_digits_is_of_decimals_between_semicolons_and_told(tmp_path):

@@ -123,26 +123,33 @@ def load_trials(
     )
 
 
-NOT_READ: Final = (".npz", ".parquet", ".json")
-"""Endings of files that can hold a table, which is not read as trials."""
-OF_RECORDINGS: Final = (".mcap", ".bag", ".db3", ".npy", ".mat", ".h5")
-"""Endings of files of recordings, which are imported before there is anything to learn from."""
+_NO_SOURCES: Final = {
+    (
+        ".npz",
+        ".parquet",
+        ".json",
+    ): "is not read as a table of trials: write the table as FILE.csv. If it is of a "
+    "store, name the store as store:DIR",
+    (
+        ".mcap",
+        ".bag",
+        ".db3",
+        ".npy",
+        ".mat",
+        ".h5",
+    ): "is a recording, not a source of labelled trials: graspsense "
+    "import {source} --save DIR --label CLASS:STATE makes a trial of it",
+}
+"""Endings of files that are no source of trials, and what to do with them."""
 
 
 def kind_of(source: str) -> Kind:
     """Return the kind of source that this text names. Raises ConfigError if it names none."""
     if source == SIMULATED or source.startswith(IDENTIFIED):
         return "simulated"
-    if source.lower().endswith(NOT_READ) and Path(source).is_file():
-        raise ConfigError(
-            f"{source} is not read as a table of trials: write the table as FILE.csv. If it is of a store, name the "
-            "store as store:DIR"
-        )
-    if source.lower().endswith(OF_RECORDINGS) and Path(source).is_file():
-        raise ConfigError(
-            f"{source} is a recording, not a source of labelled trials: graspsense import {source} --save DIR --label "
-            "CLASS:STATE makes a trial of it"
-        )
+    for endings, why in _NO_SOURCES.items():
+        if source.lower().endswith(endings) and Path(source).is_file():
+            raise ConfigError(f"{source} {why.format(source=source)}")
     if source.lower().endswith(".toml") and Path(source).is_file():
         kind = toml_kind(read_toml(Path(source), source, "TOML").values)
         called = KINDS[kind].called if kind else "a TOML file"

@@ -54,7 +54,7 @@ def channel_facts(
         resolution=resolution(known),
         rate_hz=None if gaps is None or not np.median(gaps) > 0.0 else 1.0 / float(np.median(gaps)),
         longest_gap_s=None if gaps is None else float(gaps.max()),
-        age_s=None if gaps is None else _age_s(values, t_s, end_s),
+        age_s=None if gaps is None or t_s is None else _age_s(values, t_s, end_s),
     )
 
 
@@ -91,8 +91,7 @@ def usual_range(values: Numbers) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _age_s(values: Numbers, t_s: Numbers | None, end_s: float | None) -> float:
-    assert t_s is not None
+def _age_s(values: Numbers, t_s: Numbers, end_s: float | None) -> float:
     rows = values.reshape(len(values), -1)
     changed = (rows[1:] != rows[:-1]).any(axis=1)
     times = np.concatenate((t_s[:1], t_s[1:][changed], [t_s[-1] if end_s is None else max(end_s, t_s[-1])]))

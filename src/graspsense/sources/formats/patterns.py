@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from itertools import product
 from typing import Final
 
 import re2
@@ -97,37 +98,24 @@ class FileTemplate:
         match = self.whole.fullmatch(readable)
         if match is None:
             return None
-        names = self._names()
-        if len(set(names)) == len(names):
-            return {name: match.groupdict()[name] for name in names}
-        if len(readable) > LONGEST_PATH:
+        names = [name for name, _ in self.pieces if name]
+        again = [name for name in dict.fromkeys(names) if names.count(name) > 1]
+        if again and len(readable) > LONGEST_PATH:
             raise PatternError(
                 f"{self.text!r} names a field twice: a path has at most {LONGEST_PATH} characters then, and "
                 f"{path[:80]!r}... has {len(path)}"
             )
-        return self._solved(readable, {}, [MOST_TRIES])
-
-    def _solved(self, path: str, known: Mapping[str, str], tries: list[int]) -> dict[str, str] | None:
-        """Return the fields if those in `known` have these values; `tries` holds how many are left."""
-        tries[0] -= 1
-        if tries[0] < 0:
-            raise PatternError(f"{self.text!r} names a field twice, and {path[:80]!r} fits in too many ways")
-        match = _compiled(_joined(self.pieces, known)).fullmatch(path)
-        if match is None:
-            return None
-        fields = match.groupdict()
-        names = self._names()
-        open_name = next((name for name in names if names.count(name) > 1 and name not in known), None)
-        if open_name is None:
-            return {name: known[name] if name in known else fields[name] for name in dict.fromkeys(names)}
-        for value in (fields[open_name], *_repeated(path, names.count(open_name))):
-            solved = self._solved(path, {**known, open_name: value}, tries)
-            if solved is not None:
-                return solved
+        values = [[match[name], *_repeated(readable, names.count(name))] for name in again]
+        for tries, chosen in enumerate(product(*values)):
+            if tries == MOST_TRIES:
+                raise PatternError(
+                    f"{self.text!r} names a field twice, and {path[:80]!r} fits in too many ways"
+                )
+            known = dict(zip(again, chosen, strict=True))
+            expression = _compiled(_joined(self.pieces, known)) if known else self.whole
+            if match := expression.fullmatch(readable):
+                return {name: known.get(name) or match[name] for name in names}
         return None
-
-    def _names(self) -> list[str]:
-        return [name for name, _ in self.pieces if name]
 
 
 def file_template(text: str) -> FileTemplate:

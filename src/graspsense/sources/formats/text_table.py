@@ -13,7 +13,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain, takewhile
-from operator import itemgetter
+from operator import itemgetter, lt
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,7 +21,7 @@ from attrs import frozen
 
 from graspsense.core.values.errors import ConfigError, DataDamaged, listed
 from graspsense.core.values.limits import CELLS, COLUMNS, LINE_CHARACTERS, TEXT_BYTES
-from graspsense.core.values.written_numbers import is_missing, is_number
+from graspsense.core.values.written_numbers import NotNumbers, columns_of_numbers, is_missing, is_number
 from graspsense.recording.readable import not_opened, readable, refuse_devices
 from graspsense.recording.unpacked import Unpacked
 
@@ -133,7 +133,8 @@ class _Layout:
         if given:
             written = written[1:]
         # A cell that a spreadsheet shall show as it is: ="0.5"
-        written = [(number, _SHOWN_AS_IT_IS.sub(r'\1"', line)) for number, line in written]
+        if any('="' in line for _, line in written):
+            written = [(number, _SHOWN_AS_IT_IS.sub(r'\1"', line)) for number, line in written]
         self.comments, plain = _comments_and_others(written)
         if all(re.fullmatch(r"\s*\|.*\|\s*", line) for _, line in plain):
             plain = [(number, line.strip()[1:-1]) for number, line in plain]
@@ -383,9 +384,7 @@ class _Layout:
         """Return the rows without lines of text, as a device prints one between its numbers, or several behind them."""
         sample = _sample([row for _, row in rows])
         numeric = _numeric_columns(sample, width)
-        begins = [row[0] for row in sample if is_number(row[0])]
-        # Times and the numbers of rows differ, and labels repeat.
-        rises = 0 in numeric and len(set(begins)) == len(begins)
+        rises = 0 in numeric and _rise([row[0] for row in sample if is_number(row[0])])
         behind = takewhile(lambda row: _is_text_behind(row[1], width, numeric, rises=rises), reversed(rows))
         texts = {number for number, row in rows if len(row) == 1 < width and not is_number(row[0])}
         texts |= {number for number, _ in behind}
@@ -588,6 +587,16 @@ def _is_data(row: Sequence[str], width: int, numeric: frozenset[int]) -> bool:
         return False
     there = [row[k] for k in numeric if not is_missing(row[k])]
     return bool(there) and all(map(is_number, there))
+
+
+def _rise(cells: Sequence[str]) -> bool:
+    """Return whether numbers rise from row to row, as times and the numbers of rows do, and labels and features not."""
+    numbers = columns_of_numbers({"": cells})[""]
+    return (
+        len(cells) > _FEW_BEFORE
+        and not isinstance(numbers, NotNumbers)
+        and all(map(lt, numbers, numbers[1:]))
+    )
 
 
 def _is_text_behind(row: Sequence[str], width: int, numeric: frozenset[int], *, rises: bool) -> bool:
