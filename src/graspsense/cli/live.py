@@ -19,8 +19,12 @@ if TYPE_CHECKING:
     from graspsense.live.feeds import LiveFeed
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
-EXTRAS: Final = {"--live": "websockets", "--foxglove": "foxglove", "--rerun": "rerun"}
-"""The module that each option needs; the extra has the name of the option."""
+EXTRAS: Final = {
+    "--live": ("websockets",),
+    "--foxglove": ("foxglove", "websockets"),
+    "--rerun": ("rerun",),
+}
+"""The modules that each option needs; the extra has the name of the option."""
 RERUN_VIEWER: Final = "rerun+http://127.0.0.1:9876/proxy"
 """Where a viewer of Rerun listens that was started by `rerun`."""
 ROWS: Final = 12
@@ -152,7 +156,7 @@ def _started(option: str, name: str, *arguments: str) -> LiveFeed:
     from graspsense.live.feeds import END_TIMEOUT_S, FILE_TIMEOUT_S, LiveFeed
 
     extra = option.removeprefix("--")
-    if find_spec(EXTRAS[option]) is None:
+    if any(find_spec(module) is None for module in EXTRAS[option]):
         raise PluginUnavailable(f"{option} needs a further package: pip install 'graspsense[{extra}]'")
     timeout_s = FILE_TIMEOUT_S if arguments[0].endswith(".rrd") else END_TIMEOUT_S
     feed = LiveFeed(f"graspsense.live.{name}_process", arguments, timeout_s)

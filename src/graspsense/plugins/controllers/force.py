@@ -123,7 +123,7 @@ class ForceState(NamedTuple):
 def step(params: Any, state: ForceState, reading: Reading) -> tuple[Command, ForceState]:
     """Close with the probing effort; from contact on, control the force if the loop is closed."""
     frame = reading.frame
-    progress = supervise(params, state.progress, frame)
+    progress = supervise(params, state.progress, frame, state.progress.still)
     effort = params.probing_force_n
     if progress.phase != APPROACH:
         effort = squeezing_effort(params, state.effort_n, frame)

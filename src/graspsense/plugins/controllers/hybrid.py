@@ -20,6 +20,7 @@ from graspsense.plugin_api import (
     Command,
     Controller,
     Reading,
+    RestState,
     at_rest,
     setting,
 )
@@ -43,7 +44,6 @@ from graspsense.plugins.controllers.supervision import (
     SupervisionConfig,
     events_of,
     not_begun,
-    not_resting,
     supervise,
 )
 from graspsense.plugins.controllers.velocity import (
@@ -89,11 +89,11 @@ class HybridState(NamedTuple):
 def step(params: Any, state: HybridState, reading: Reading) -> tuple[Command, HybridState]:
     """Control the velocity until both pads touch, then the force."""
     frame = reading.frame
-    progress_so_far = state.progress
+    still = state.progress.still
     sent = state.sent
     if params.sends == POSITION and rises(sent, params.probing_force_n):
-        progress_so_far = not_resting(progress_so_far, frame)
-    progress = supervise(params, progress_so_far, frame)
+        still = RestState(frame.t_s, frame.gap_m)
+    progress = supervise(params, state.progress, frame, still)
     _, _, _, integral, force_effort, approach_effort, contact_t, _, _ = state
     if progress.phase == APPROACH:
         effort, integral = closing_effort(params, integral, frame.velocity_m_s, frame.dt_s)

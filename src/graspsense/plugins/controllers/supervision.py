@@ -188,33 +188,17 @@ def not_begun() -> GraspProgress:
     )
 
 
-def not_resting(now: GraspProgress, frame: Frame) -> GraspProgress:
-    """Return the progress with the rest begun anew in this frame."""
-    phase, outcome, begun, start_gap, deadline, _, peak_force, peak_gap, felt_t = now
-    still = RestState(frame.t_s, frame.gap_m)
-    return GraspProgress(
-        phase=phase,
-        outcome=outcome,
-        begun=begun,
-        start_gap_m=start_gap,
-        deadline_s=deadline,
-        still=still,
-        peak_force_n=peak_force,
-        peak_gap_m=peak_gap,
-        felt_t_s=felt_t,
-    )
-
-
-def supervise(params: Any, now: GraspProgress, frame: Frame) -> GraspProgress:
+def supervise(params: Any, now: GraspProgress, frame: Frame, still: RestState) -> GraspProgress:
     """Return the progress after this frame; the same object if nothing has changed.
 
-    `params` has the numbers of `SupervisionConfig`, and those of `law_numbers`.
+    `params` has the numbers of `SupervisionConfig`, and those of `law_numbers`. `still` is the rest so far: that of
+    the progress, unless the law begins it anew.
     """
     if now.outcome != RUNNING:
         return now
     if now.phase == APPROACH:
         return _approaching(params, now, frame)
-    return _squeezing(params, now, frame)
+    return _squeezing(params, now, frame, still)
 
 
 def free_limits(params: Any, now: GraspProgress) -> FreeLimits:
@@ -262,10 +246,10 @@ def _approaching(params: Any, now: GraspProgress, frame: Frame) -> GraspProgress
     )
 
 
-def _squeezing(params: Any, now: GraspProgress, frame: Frame) -> GraspProgress:
+def _squeezing(params: Any, now: GraspProgress, frame: Frame, still: RestState) -> GraspProgress:
     t, gap, left, right = frame.t_s, frame.gap_m, frame.force_left_n, frame.force_right_n
     force = 0.5 * (left + right)
-    still = update_rest(now.still, t, gap, params.rest_speed_m_s, params.rest_window_s)
+    still = update_rest(still, t, gap, params.rest_speed_m_s, params.rest_window_s)
     peak_force, peak_gap, felt_t = now.peak_force_n, now.peak_gap_m, now.felt_t_s
     if force > peak_force:
         peak_force, peak_gap = force, gap

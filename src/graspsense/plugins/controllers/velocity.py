@@ -105,7 +105,7 @@ class VelocityState(NamedTuple):
 def step(params: Any, state: VelocityState, reading: Reading) -> tuple[Command, VelocityState]:
     """Close at the given speed against any resistance."""
     frame = reading.frame
-    progress = supervise(params, state.progress, frame)
+    progress = supervise(params, state.progress, frame, state.progress.still)
     value, integral = closing_effort(params, state.integral_n, frame.velocity_m_s, frame.dt_s)
     speed = inf
     if params.sends == VELOCITY:
