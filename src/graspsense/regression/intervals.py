@@ -15,7 +15,6 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from graspsense.core.learn.certainty import begins_of
 from graspsense.core.learn.conformal import COVERAGE, calibrated_threshold, units_needed
 from graspsense.core.learn.stored_values import StoredValues
 
@@ -63,20 +62,18 @@ def intervals_of(
     """
     unit = "trials" if instances is None else "instances"
     units = np.array([str(i) for i in range(len(errors))] if instances is None else instances)
-    _, unit_of, trials_of_unit = np.unique(units, return_inverse=True, return_counts=True)
-    count, needed = len(trials_of_unit), units_needed(COVERAGE)
+    count, needed = len(np.unique(units)), units_needed(COVERAGE)
     if count < needed:
         return PredictionIntervals(
             reason=f"{count} calibration {unit}, {100 * COVERAGE:.0f} % needs {needed}"
         )
-    least = max(BAND_UNITS, BAND_SHARE * count)
-    begins = begins_of(predicted, 1.0 / trials_of_unit[unit_of], np.unique(predicted).tolist(), least)
+    begins = _begins(predicted, units, max(BAND_UNITS, BAND_SHARE * count))
     bands = np.searchsorted(np.array(begins), predicted, side="right")
     widths = [
         -calibrated_threshold(-np.abs(errors[rows]), units[rows], COVERAGE)
         for rows in (bands == band for band in range(len(begins) + 1))
     ]
-    return PredictionIntervals(begins=tuple(begins), half_widths=tuple(widths))
+    return PredictionIntervals(begins=begins, half_widths=tuple(widths))
 
 
 def intervals_from(kept: StoredValues) -> PredictionIntervals:
@@ -90,3 +87,15 @@ def intervals_from(kept: StoredValues) -> PredictionIntervals:
     return PredictionIntervals(
         begins=tuple(begins.tolist()), half_widths=tuple(widths.tolist()), reason=kept.text("reason")
     )
+
+
+def _begins(predicted: NDArray[np.float64], units: NDArray[np.str_], least: float) -> tuple[float, ...]:
+    """Return where the bands begin after the first, so that each has enough units."""
+    begins: list[float] = []
+    low = -np.inf
+    for value in np.unique(predicted).tolist():
+        below = units[(predicted >= low) & (predicted < value)]
+        if min(len(np.unique(below)), len(np.unique(units[predicted >= value]))) >= least:
+            begins.append(value)
+            low = value
+    return tuple(begins)
