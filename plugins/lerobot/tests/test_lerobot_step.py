@@ -95,9 +95,9 @@ def test_a_certainty_that_was_measured_comes_with_its_interval(end_of_grasp):
 
     assert step.grasp.classes[int(end["graspsense.prediction"]) - 1] == "jar"
     low, certainty, high = (end[f"graspsense.certainty{bound}"] for bound in ("_low", "", "_high"))
-    # All 40 held-out answers are right. Since ten folds share training trials, they count as 40 / (1 + 10 / 9) units. The
-    # distance of their rate from guessing one of two labels, 1/2, has a square of so many variances. The interval is
-    # that of the 20 answers with this label.
+    # All 40 held-out answers are right. Since ten folds share training trials, they count as 40 / (1 + 10 / 9) units.
+    # The distance of their rate from guessing one of two labels, 1/2, has a square of so many variances. The interval
+    # is that of the 20 answers with this label.
     units = 40.0 / (1.0 + 10.0 / 9.0)
     variances = units * (units + 2.0) ** 2 / 4.0 / (units + 1.0)
     right = units * (1.0 - 0.5 / (variances + 1.0))
