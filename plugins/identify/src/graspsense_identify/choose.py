@@ -37,6 +37,10 @@ MANY: Final = 4
 """Candidates that are usually judged, for the progress."""
 MANY_EVALUATIONS: Final = 400
 """Of the chosen fit, so that it converges in a flat valley, too."""
+BRANCH_TIME: Final = "maxwell.tau_s"
+AS_A_DAMPER: Final = 2.0
+"""A branch that relaxes within this multiple of the shortest time of the range, which is less than the time between two
+measurements, is shown as a damper only."""
 LEAST_GAIN: Final = 0.03
 """A term more has to reduce the error on held-out data by at least this share."""
 
@@ -99,6 +103,8 @@ def choose(
     kept = _kept(rough)
     joined = [laws[k].joined(memory).starting_at(rough[k].by_label) for k in kept for memory in with_memory]
     fits = [alone[k] for k in kept] + in_threads(lambda law: fit(model, law, squeezes), joined, done)
+    dampers = [fitted for fitted in fits if _is_damped_by_branch(fitted)]
+    fits = [fitted for fitted in fits if fitted not in dampers]
     least = min(fitted.error for fitted in fits)
     worth = [
         fitted for fitted in fits if fitted.rms <= WORTH_TRYING * least and not _adds_nothing(fitted, fits)
@@ -106,7 +112,7 @@ def choose(
     judged = in_threads(lambda fitted: _Judged(fitted=fitted, errors=_held_out(fitted)), worth, done)
     best = _simplest(judged)
     dropped = [fitted for k, fitted in enumerate(rough) if k not in kept]
-    scores = [_score(fitted, best, judged, fits) for fitted in [*fits, *dropped]]
+    scores = [_score(fitted, best, judged, fits) for fitted in [*fits, *dampers, *dropped]]
     return Choice(
         fitted=best.fitted.refitted(max_evaluations=MANY_EVALUATIONS).part(given),
         refined=tuple(fitted.part(given) for fitted in fits if fitted.rms <= WORTH_KEEPING * least),
@@ -119,6 +125,12 @@ def _kept(rough: Sequence[Fitted]) -> list[int]:
     order = np.argsort([fitted.rms for fitted in rough], kind="stable").tolist()
     # The simplest law stays among the candidates, so that the table shows what it costs to leave the others out.
     return sorted({0, *order[:STATIC_KEPT]})
+
+
+def _is_damped_by_branch(fitted: Fitted) -> bool:
+    """Return whether its branch relaxes between two measurements, as a damper does: `loss` says so by one number."""
+    shortest_s = {parameter.label: parameter.low for parameter in fitted.candidate.free}
+    return fitted.by_label.get(BRANCH_TIME, math.inf) <= AS_A_DAMPER * shortest_s.get(BRANCH_TIME, 0.0)
 
 
 def _adds_nothing(fitted: Fitted, fits: Sequence[Fitted]) -> bool:
@@ -178,6 +190,8 @@ def _score(
     elif own is not None:
         more = "more parameters, " if len(fitted.values) > len(best.fitted.values) else ""
         verdict = f"{more}error {100.0 * (own.error / best.error - 1.0):+.0f} %"
+    elif _is_damped_by_branch(fitted):
+        verdict = "its branch relaxes between two measurements: a loss"
     elif fitted not in fits:
         verdict = f"not among the {STATIC_KEPT} laws that fit best"
     elif _adds_nothing(fitted, fits):

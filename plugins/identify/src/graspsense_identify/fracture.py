@@ -15,6 +15,7 @@ from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
+from attrs import evolve
 from numpy.typing import NDArray
 
 from graspsense.simulator_api import IdentifiedParameter, Undetermined
@@ -96,7 +97,7 @@ def _undetermined(squeezes: Sequence[Squeeze], broken: int) -> Iterator[Undeterm
             reason=f"{broken} squeezes broke the object",
             remedy=f"break {LEAST_BROKEN} objects or more",
         )
-    unseen = broken - sum(bears_again(squeezes, i) is False for i in range(len(squeezes)))
+    unseen = broken - sum(squeeze.breaks_for_good for squeeze in squeezes)
     if unseen > 0:
         yield Undetermined(
             what="whether the objects broke",
@@ -115,6 +116,36 @@ def not_broken(squeezes: Sequence[Squeeze]) -> list[int]:
     if True not in again:
         return []
     return [i for i, squeeze in enumerate(squeezes) if squeeze.broken_n is not None and again[i] is not False]
+
+
+def of_whole_objects(squeezes: Sequence[Squeeze]) -> dict[int, Squeeze]:
+    """Return the squeezes, by their places, of objects that had not broken before, with what later ones say of a break.
+
+    What is left of an object has another stiffness: it would pass for that of another object.
+    """
+    kept, broken = dict[int, Squeeze](), set[str]()
+    for i, squeeze in enumerate(squeezes):
+        if squeeze.instance in broken:
+            continue
+        breaks = bears_again(squeezes, i) is False
+        kept[i] = evolve(squeeze, breaks_for_good=breaks)
+        if breaks:
+            broken.add(squeeze.instance)
+    return kept
+
+
+def explained_falls(fitted: Fitted) -> set[str]:
+    """Return the names of the squeezes whose force falls as that of the fitted, unbroken object does.
+
+    A damped object loses a part of its force when the fingers stop, and no object explains a single wrong measurement
+    before the fall.
+    """
+    return {
+        squeeze.name
+        for i, squeeze in enumerate(fitted.squeezes)
+        if squeeze.broken_n is not None
+        and squeeze.broken_n > (1.0 - BREAK_SHARE) * float(_whole(fitted, i)["force_n"][-1])
+    }
 
 
 def bears_again(squeezes: Sequence[Squeeze], i: int) -> bool | None:

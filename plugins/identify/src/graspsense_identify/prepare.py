@@ -33,6 +33,8 @@ NOISE_FACTOR: Final = 5.0
 """Multiple of the noise above which the object counts as touched."""
 SCATTER: Final = 1.4826 / math.sqrt(2.0)
 """Standard deviation of white noise over the median difference of two neighbouring samples."""
+BENT: Final = 1.4826 / math.sqrt(6.0)
+"""The same over the median second difference, to which a steady rise adds nothing."""
 BEFORE_S: Final = 0.05
 """The path begins at least this long before the force exceeds the threshold."""
 BEFORE_SHARE: Final = 0.8
@@ -91,6 +93,8 @@ class Squeeze:
     """The largest difference of the forces on both pads, over the largest mean force; 0 with a single pad."""
     broken_n: float | None = None
     """The force at the last node, right after the object broke, where the squeeze is cut; None if it did not break."""
+    breaks_for_good: bool = False
+    """Whether a later squeeze of the object, which is left out, shows that it broke."""
     course: tuple[Floats, Floats]
     """Times and gaps of the recording from `MAX_LAG_S` before the first node on."""
 
@@ -232,6 +236,9 @@ def _contact(name: str, forces: Floats, peak: float) -> tuple[float, NDArray[np.
     scatter = SCATTER * float(np.median(np.abs(np.diff(forces)))) if len(forces) > MIN_SAMPLES else 0.0
     onset = int(np.argmax(forces > CONTACT_SHARE * peak))
     noise = float(np.std(forces[: max(onset - 2, 0)])) if onset > 6 else 0.0
+    if onset <= 6 and len(forces) > MIN_SAMPLES:
+        # Noise beyond the share of the peak is no contact, and hides where the recording begins.
+        noise = BENT * float(np.median(np.abs(np.diff(forces, 2))))
     threshold = max(CONTACT_SHARE * peak, NOISE_FACTOR * noise)
     touching = np.flatnonzero(forces > threshold)
     if peak <= NOISE_FACTOR * scatter or not len(touching):

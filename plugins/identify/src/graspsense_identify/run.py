@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter, defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from typing import Any, Final
 
@@ -19,7 +19,7 @@ from graspsense_identify.choose import choose
 from graspsense_identify.delay import Delay, Lag, Timed, delay_of, lag_of, with_delay
 from graspsense_identify.fit import Fitted
 from graspsense_identify.forward import ForwardModel, path_forces
-from graspsense_identify.fracture import fracture_of, not_broken
+from graspsense_identify.fracture import explained_falls, fracture_of, not_broken, of_whole_objects
 from graspsense_identify.held_out import held_out_errors, predictive_checks
 from graspsense_identify.interval import identified, identified_mean
 from graspsense_identify.laws import scale_of
@@ -66,10 +66,16 @@ def identify(
     notes += _looks_wrong(recorded)
 
     def timed(lag: Lag) -> Timed:
-        ready, shares = _ready(config, recorded, [] if lag.lag_s else notes, has_cells, lag.lag_s)
-        choice = choose(
-            model, ready, scale_of(ready), shows_memory(ready), partial(progress, "fitting candidates")
-        )
+        whole, explained, said = set[str](), {""}, list[str]()
+        while explained:
+            said.clear()
+            ready, shares = _ready(config, recorded, said, has_cells, lag.lag_s, whole)
+            choice = choose(
+                model, ready, scale_of(ready), shows_memory(ready), partial(progress, "fitting candidates")
+            )
+            explained = explained_falls(choice.fitted)
+            whole |= explained
+        notes.extend(() if lag.lag_s else said)
         return Timed(shares, choice, lag)
 
     def shown(used: Timed) -> Delay:
@@ -142,19 +148,20 @@ def _ready(
     notes: list[str],
     has_cells: bool,
     lag_s: float = 0.0,
+    whole: Collection[str] = (),
 ) -> tuple[list[Squeeze], Shares]:
-    """Return the squeezes with contact and enough measurements, with their whole forces, and the shares that cells
-    measure.
+    """Return the squeezes with contact and enough measurements, of objects that had not broken before, with their whole
+    forces, and the shares that cells measure.
 
-    A note names each other squeeze. `lag_s`: by how much the force lags beyond the delay of the settings. Raises
-    NoSqueeze if there is none.
+    A note names each other squeeze. `lag_s`: by how much the force lags beyond the delay of the settings. `whole`: the
+    names of squeezes in which the object does not break, however its force falls. Raises NoSqueeze if there is none.
     """
     ready: dict[int, Squeeze] = {}
     refused: list[NoSqueeze] = []
     prepare = partial(prepared, delay_s=config.force_delay_s, lag_s=lag_s, squeezes=len(squeezes))
     for i, squeeze in enumerate(squeezes):
         try:
-            ready[i] = prepare(squeeze)
+            ready[i] = prepare(squeeze, may_break=squeeze.name not in whole)
         except NoSqueeze as refusal:
             refused.append(refusal)
     if not ready:
@@ -162,6 +169,14 @@ def _ready(
     kept = list(ready)
     for k in not_broken(list(ready.values())):
         ready[kept[k]] = prepare(squeezes[kept[k]], may_break=False)
+    unbroken = of_whole_objects(list(ready.values()))
+    notes += [
+        f"left out: {ready[i].name}: its object broke in a squeeze before"
+        for k, i in enumerate(kept)
+        if k not in unbroken
+    ]
+    ready = {kept[k]: squeeze for k, squeeze in unbroken.items()}
+    kept = list(ready)
     notes += [f"left out: {refusal}" for refusal in refused]
     apart = max(squeeze.pad_difference for squeeze in ready.values())
     if apart > PADS_DIFFER:
