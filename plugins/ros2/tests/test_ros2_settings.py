@@ -11,8 +11,9 @@ from graspsense.core.pipeline.pipeline import load_pipeline
 from graspsense.core.settings.selected import create
 from graspsense.core.values.errors import ConfigError, NoDevice
 from graspsense.gripper_api import MessageNumber, message_columns
-from graspsense_ros2.message_types import message
+from graspsense_ros2.message_types import encode, message
 from graspsense_ros2.middleware import open_node
+from graspsense_ros2.newest_messages import NewestMessage
 
 DOCS = Path(__file__).parents[3] / "docs" / "ros2.md"
 
@@ -64,6 +65,36 @@ def test_a_number_is_computed_of_the_newest_messages():
     assert gap.value(columns) == pytest.approx(0.04)
     with pytest.raises(ConfigError):
         gap.value({name: np.zeros(1) for name in columns})
+
+
+def joint_state(stamp_s, **positions):
+    values = {"name": list(positions), "position": list(positions.values())}
+    return encode("sensor_msgs/msg/JointState", {"header": {"stamp": {"sec": stamp_s}}, **values})
+
+
+@every_case(
+    ("gap", "expected", "ambiguous"),
+    [
+        # The arm has a publisher of its own on the same topic; its driver may name the joints in another order.
+        ("'/joint_states.position.finger'", [None, 0.04, 0.04, 0.03, 0.02], 0),
+        ("'/joint_states.position'[0]", [1.5, 1.5, 1.6, 1.6, 1.6], 3),
+    ],
+)
+def test_a_joint_that_is_named_is_found_and_a_place_among_other_joints_is_told(gap, expected, ambiguous):
+    number = MessageNumber(gap, "gap")
+    newest = NewestMessage("/joint_states", "sensor_msgs/msg/JointState", number.names)
+    told = []
+    for data in (
+        joint_state(9, shoulder=1.5),
+        joint_state(2, finger=0.04),
+        joint_state(10, shoulder=1.6),
+        joint_state(3, finger=0.03, thumb=0.5),
+        joint_state(4, thumb=0.5, finger=0.02),
+    ):
+        newest.take(data)
+        told.append(number.value(newest.columns) if newest.came else None)
+    assert told == expected
+    assert (newest.ambiguous, newest.late) == (ambiguous, 0)
 
 
 def test_without_a_robot_there_is_no_device(router):

@@ -98,7 +98,7 @@ class Ros2Backend(SensorBackend[Ros2Config]):
             topics = sorted({topic for number in self._numbers.values() for topic in number.topics})
             self._topics = {topic: self._subscribed(topic, until) for topic in topics}
             for newest in self._topics.values():
-                if not newest.wait(max(0.0, until - time.monotonic())):
+                if not newest.wait(max(0.0, until - time.monotonic())) and not newest.columns:
                     raise NoDevice(f"no message on {newest.topic}, although it is announced{_damage(newest)}")
             self._action = self._answering(until)
             self._polling = Polling(self.config.rate_hz)
@@ -208,10 +208,15 @@ class Ros2Backend(SensorBackend[Ros2Config]):
         config, now_s = self.config, time.monotonic()
         columns: dict[str, object] = {}
         for newest in self._topics.values():
-            if newest.age_s() > config.silent_s:
+            if newest.age_s() > config.silent_s and (newest.came or not newest.columns):
                 raise DeviceLost(
                     f"no message on {newest.topic} for {config.silent_s:g} s{_damage(newest)}: look at the node that "
                     "publishes it (gripper.silent_s)"
+                )
+            if newest.ambiguous:
+                raise DeviceLost(
+                    f"{newest.topic} has messages of other joints too, so a place in their arrays can be that of "
+                    f"another joint: name the joint, as in '{newest.topic}.position.JOINT'"
                 )
             columns |= newest.columns
         numbers = {}
@@ -244,7 +249,10 @@ class Ros2Backend(SensorBackend[Ros2Config]):
                 f"{topic} has the type {', '.join(types)}: it has to be one, of the common interfaces of ROS, such as "
                 "sensor_msgs/msg/JointState, geometry_msgs/msg/WrenchStamped or std_msgs/msg/Float64MultiArray"
             )
-        newest = NewestMessage(topic, types[0])
+        names = frozenset[str]().union(*(number.names for number in self._numbers.values()))
+        newest = NewestMessage(
+            topic, types[0], frozenset(name for name in names if name.startswith(f"{topic}."))
+        )
         self._node.subscribe(topic, types[0], newest.take)
         return newest
 

@@ -47,9 +47,14 @@ class MessageNumber:
         return expression
 
     @property
+    def names(self) -> frozenset[str]:
+        """The fields that it needs, each `/topic.field`."""
+        return frozenset(self._expression.names)
+
+    @property
     def topics(self) -> frozenset[str]:
         """The topics that it needs."""
-        return frozenset(name.partition(".")[0] for name in self._expression.names)
+        return frozenset(name.partition(".")[0] for name in self.names)
 
     def value(self, columns: Mapping[str, NDArray[np.float64]]) -> float:
         """Return the number in SI units, given the `message_columns` of its topics. Raises ConfigError."""
@@ -58,8 +63,13 @@ class MessageNumber:
 
 
 def message_columns(message: Any, topic: str) -> dict[str, NDArray[np.float64]]:
-    """Return the numbers in a message as columns with a single row: shape (1,), or (1, k) for an array of k numbers."""
-    return {
-        name: np.reshape(value, (1, -1) if np.size(value) > 1 else 1)
-        for name, value in numbers_in(message, topic)
-    }
+    """Return the numbers in a message as columns with a single row: shape (1,), or (1, k) for an array of k numbers.
+
+    Where a message names the joints of its arrays, as JointState does, each number is also `/topic.field.JOINT`.
+    """
+    columns, joints = {}, getattr(message, "name", ())
+    for name, value in numbers_in(message, topic):
+        columns[name] = np.reshape(value, (1, -1) if np.size(value) > 1 else 1)
+        if isinstance(joints, list) and np.size(value) == len(joints):
+            columns |= {f"{name}.{joint}": np.reshape(value, (-1, 1))[k] for k, joint in enumerate(joints)}
+    return columns
