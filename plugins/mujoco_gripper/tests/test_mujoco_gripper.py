@@ -158,6 +158,7 @@ AT = '{ body = "%s", at = [0, 0, 0] }'
         ({"left": '{ geoms = ["left_pad"], sensor = "nosuch" }'}, ("sensor", "nosuch")),
         ({"open": "[20.0]", "closed": "[-20.0]"}, ("do not close",)),
         ({"open": "[1.0, 2.0]"}, ("open has 2 values",)),
+        ({"gap": '{ joint = "left", scale = -1.0, offset_m = 0.09 }'}, ("scale", "16.1 mm", "32.2 mm")),
         ({"gap": "{ }"}, ("one of sites, geoms and joint",)),
         ({"actuator": '["close"]'}, ("actuator", "actuators")),
         ({"channels": '{ palm = { sensor = "nosuch", unit = "m/s2" } }'}, ("sensor", "nosuch")),
@@ -235,6 +236,18 @@ def test_an_unstable_simulation_ends_with_its_reason_and_writes_nothing(tmp_path
     with pytest.raises(DeviceLost, match="unstable"):
         [backend.apply(Command(EFFORT, 0.0, 1.0, 1.0)) for _ in range(100) if backend.read(0.1)]
     assert [path.name for path in tmp_path.iterdir()] == ["wild.xml"]
+
+
+@every_case(("left", "right"), [("left_finger", "right_finger"), ("right_pad", "left_pad")])
+def test_a_thing_that_is_squeezed_beside_what_measures_ends_the_grasp(grasped, tmp_path, left, right):
+    fingers = {"left": f'{{ geoms = ["{left}"] }}', "right": f'{{ geoms = ["{right}"] }}'}
+    trial = grasped(f"gripper.file={gripper_file(tmp_path, **fingers)}")
+    assert "no finger feels it" in trial.reason
+
+
+def test_contacts_that_a_model_switches_off_are_there_in_a_grasp(grasped, tmp_path):
+    switched = replaced(('"implicitfast"/>', '"implicitfast"><flag contact="disable"/></option>'))
+    assert grasped(f"gripper.file={gripper_with(tmp_path, switched)}").outcome.words == "steady"
 
 
 @pytest.mark.slow

@@ -76,6 +76,8 @@ DEEPEST_M: Final = 1e-3
 """A thing that begins deeper in a finger is refused."""
 TOUCH_N: Final = 0.1
 """Force on both fingers from which on the motion of the scene begins: less may be the palm that swings."""
+UNFELT_N: Final = 1.0
+"""A thing that is squeezed by more, while both fingers feel less than `TOUCH_N`, is touched beside what measures."""
 MANY: Final = 256
 """Errors of the forces that are drawn at once."""
 MOST_KNOWN: Final = 16
@@ -337,6 +339,8 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         velocity = (measured_m - self._measured_m) / tick_s
         self._measured_m = measured_m
         left, right = self._forces.forces_n()
+        if data.ncon and max(left, right) < TOUCH_N:
+            self._check_felt()
         self._greatest_n = max(self._greatest_n, left, right)
         t_s = self._ticks * tick_s
         if self._motion.moves:
@@ -367,6 +371,15 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             shake = () if self._scene.shake is None else (self._motion.shaken_m(data),)
             signals = self._signals(*(self._values[k] for k in self._sensors), *palm, *shake)
         return Reading(frame, pads, signals)
+
+    def _check_felt(self) -> None:
+        """Raise DeviceLost where the thing is squeezed, and no finger feels it."""
+        squeeze_n = self._forces.squeeze_n() if isinstance(self._forces, ForceGauge) else 0.0
+        if squeeze_n > UNFELT_N:
+            raise DeviceLost(
+                f"the gripper squeezes {self.config.object} with {squeeze_n:.3g} N, and no finger feels it. Look at "
+                "the geoms, bodies and sensors of left and right in gripper.file: do they touch, and on which side?"
+            )
 
     def _break_shell(self, data: mujoco.MjData) -> None:
         if max(self._forces.forces_n()) > self._thing.breaks_at_n:

@@ -28,6 +28,8 @@ MOST_TRAVELS = 64
 _TRAVELS: dict[tuple[bytes, str, float | None], Travel] = {}
 LEAST_TRAVEL_M = 1e-3
 LEAST_TURN_RAD = 0.1
+OTHER_TRAVEL = 1.6
+"""By more than this factor, the travel by a joint is not that of the fingers; of those that turn it is not exactly."""
 CLEARANCE_M = 0.004
 """A thing is put where the fingers have this much more room than it needs, so that one that stands still is clear."""
 MASS_S2 = 1e-6
@@ -122,7 +124,12 @@ def _moved(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None) -
     mujoco.mj_kinematics(model, data)
     left, right = faces(model, data, gripper)
     axis = closing_axis(gripper, left, right)
-    _check_opposed(model, gripper, axis, (states[0], states[-1]))
+    travel_m = _opposed_travel_m(model, gripper, axis, (states[0], states[-1]))
+    if gripper.gap.joint and not 1.0 / OTHER_TRAVEL < (gaps[0] - min(gaps)) / travel_m < OTHER_TRAVEL:
+        raise ConfigError(
+            f"gripper.file: by the joint {gripper.gap.joint!r} the gap closes by {(gaps[0] - min(gaps)) * 1e3:.3g} mm, "
+            f"and the fingers by {travel_m * 1e3:.3g} mm: look at scale, in metres of the gap for a unit of the joint"
+        )
     if gripper.gap.sites or gripper.gap.left:
         # The gap depends on the closing direction.
         measured_m = gap_reader(model, data, gripper.gap, axis)
@@ -158,10 +165,10 @@ def widest_hinge_rad(model: mujoco.MjModel) -> float:
     return float(np.ptp(model.jnt_range[hinges], axis=1).max(initial=0.0))
 
 
-def _check_opposed(
+def _opposed_travel_m(
     model: mujoco.MjModel, gripper: GripperFile, axis: Floats, states: tuple[Floats, Floats]
-) -> None:
-    """Raise ConfigError where the faces of the fingers do not come nearer to each other."""
+) -> float:
+    """Return by how much the faces of the fingers come nearer to each other. Raises ConfigError where they do not."""
     data, apart = mujoco.MjData(model), []
     for state in states:
         data.qpos[:] = state
@@ -173,6 +180,7 @@ def _check_opposed(
             f"gripper.file: the left and the right finger are {apart[0] * 1e3:.1f} mm apart while open, and "
             f"{apart[1] * 1e3:.1f} mm while closed: they are not opposed. Look at left, right and gap"
         )
+    return apart[0] - apart[1]
 
 
 def _mass(model: mujoco.MjModel, gripper: GripperFile, qpos: Floats, axis: Floats, slopes: Floats) -> float:

@@ -128,6 +128,18 @@ class ForceGauge:
             right += signs[1] * along
         return left, right
 
+    def squeeze_n(self) -> float:
+        """Return the force that squeezes a thing along the closing direction, by whatever parts of the gripper."""
+        model, data, roles, force = self._model, self._data, self._roles, self._force
+        rows, closing, opening = self._along_axis(data.contact.frame), 0.0, 0.0
+        for k, (first, second) in enumerate(data.contact.geom.tolist()):
+            on_first, on_second = roles[first] & THING, roles[second] & THING
+            if on_first != on_second:
+                mujoco.mj_contactForce(model, data, k, self._wrench)
+                along = sum(rows[3 * k + j] * force[j] for j in range(3)) * (1.0 if on_second else -1.0)
+                closing, opening = closing + max(along, 0.0), opening + max(-along, 0.0)
+        return min(closing, opening)
+
     def _along_axis(self, frames: Floats) -> list[float]:
         """Return the component along the closing direction of each row of the frames of the contacts."""
         axis, rows = self._axis, frames.reshape(-1, 3)

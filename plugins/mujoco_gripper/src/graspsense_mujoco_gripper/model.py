@@ -36,6 +36,12 @@ def read_spec(path: Path) -> mujoco.MjSpec:
     return spec
 
 
+NEEDED: Final = (
+    mujoco.mjtDisableBit.mjDSBL_CONTACT
+    | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    | mujoco.mjtDisableBit.mjDSBL_SENSOR
+)
+"""What a model may switch off to be looked at, and a grasp needs."""
 POINT: Final = "graspsense/"
 """Before the names of the sites that stand for the points of a gripper file."""
 
@@ -47,6 +53,7 @@ def gripper_spec(path: Path, gripper: GripperFile, timestep_s: float) -> mujoco.
     """
     spec = read_spec(path)
     spec.option.timestep = timestep_s
+    spec.option.disableflags &= ~NEEDED
     if gripper.angle:
         spec.compiler.degree = gripper.angle == "degree"
     if gripper.impratio:
