@@ -16,8 +16,7 @@ from graspsense.simulator_api import event_name
 from graspsense_sim_gripper.plant.fingertip import CELL_OFFSET, CELLS
 from graspsense_sim_gripper.plant.sensing import PadBuffers
 from graspsense_sim_gripper.run.drawing import image_noise
-from graspsense_sim_gripper.run.loop import COLUMNS, EVENT_SHIFT, Buffers, Ending
-from graspsense_sim_gripper.run.problem import IMAGES_PER_BLOCK
+from graspsense_sim_gripper.run.loop import COLUMNS, EVENT_SHIFT, Buffers
 from graspsense_sim_gripper.scene.random_numbers import Word
 
 TICKS: Final = 8200
@@ -61,34 +60,17 @@ def begin_images(buffers: Buffers) -> None:
     buffers.pads.left_zero[:] = buffers.pads.right_zero[:] = CELL_OFFSET[0]
 
 
-def longer(buffers: Buffers, ending: Ending, key: Word | None) -> Buffers:
-    """Return arrays for more images or ticks, whichever the loop has used up; they begin with the same values.
+def longer(buffers: Buffers, key: Word | None) -> Buffers:
+    """Return arrays for twice as many ticks and images, which begin with the same values.
 
     `key`: that of the seed, whose noise is in them; None: the sensors are ideal.
     """
-    if key is not None and ending.images == len(buffers.pads.images):
-        return _with_more_images(buffers, key)
-    columns, phases = np.asarray(buffers.columns), np.asarray(buffers.phases)
-    pads = PadBuffers(*map(np.asarray, buffers.pads))
-    if key is not None:
-        # The loop draws it on the way, and does not know any more how far it had come.
-        pads.noise[:] = image_noise(key, 0, len(pads.noise))
+    left_zero, right_zero, _, images = (np.asarray(array) for array in buffers.pads)
+    # The loop draws noise on the way, and does not know any more how far it had come.
+    noise = np.zeros((2 * len(images), 2 * CELLS)) if key is None else image_noise(key, 0, 2 * len(images))
     return Buffers(
-        pads,
-        np.asarray(buffers.image_times),
-        np.concatenate([columns, np.zeros_like(columns)], axis=1),
-        np.concatenate([phases, np.zeros_like(phases)]),
-    )
-
-
-def _with_more_images(buffers: Buffers, key: Word) -> Buffers:
-    noise = image_noise(key, len(buffers.pads.images), IMAGES_PER_BLOCK)
-    left_zero, right_zero, drawn, images = (np.asarray(array) for array in buffers.pads)
-    images = np.concatenate([images, np.zeros((len(noise), 2, CELLS))])
-    images[-1] = math.nan
-    return buffers._replace(
-        pads=PadBuffers(left_zero, right_zero, np.concatenate([drawn, noise]), images),
-        image_times=np.concatenate([np.asarray(buffers.image_times), np.zeros(len(noise))]),
+        PadBuffers(left_zero, right_zero, noise, np.concatenate([images, np.full_like(images, math.nan)])),
+        *(np.concatenate([array, np.zeros_like(array)], axis=-1) for array in map(np.asarray, buffers[1:])),
     )
 
 

@@ -126,7 +126,7 @@ def _run(
     begin_images(buffers)
     end = loop.run_from(start, buffers, NO_NOISE if key is None else CellNoise(1, key))
     while end.ending.ended == 0 and end.ending.failed == 0 and end.ending.ticks < max_ticks:
-        buffers = longer(buffers, end.ending, key)
+        buffers = longer(buffers, key)
         start = start.after(end)
         end = loop.run_from(start, buffers)
     return end, buffers

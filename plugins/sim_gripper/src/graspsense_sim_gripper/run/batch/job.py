@@ -164,7 +164,7 @@ def grasp_plain(job: Job, setup: GraspSetup, model: GraspModel = NO_MODEL) -> Fi
         end = ending(state)
         if end.failed == 1 or end.ended == 1 or end.ticks >= params.max_ticks:
             break
-        buffers = as_lists(longer(buffers, end, key))
+        buffers = as_lists(longer(buffers, key))
     plant = state.plant
     outcome, reason = ended_as(job, end)
     if end.failed == 1:
