@@ -28,7 +28,6 @@ from graspsense.plugin_api import create
 from graspsense.sources.simulated import BATCH_WITHOUT_TRACES
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.backend import SimBackend
-from graspsense_sim_gripper.run.batch import run_many
 from graspsense_sim_gripper.scene.library import catalogue
 
 SENSORS: Final = ("ideal", "pads")
@@ -88,11 +87,12 @@ def seconds_of_batch(sensor: str, n: int, workers: int) -> float:
 def compile_catalogue() -> dict[str, float]:
     """Compile for every object of the catalogue, or load that; return seconds on the clock and of processor."""
     law, names = create("controller", "hybrid"), sorted(catalogue())
+    gripper = SimBackend(SimConfig(compile="always"))
     began, spent = time.perf_counter(), time.process_time()
-    run_many(SimConfig(), law, names, range(len(names)), traces=False, compiled=True, workers=1)
+    gripper.run_many(law, names, range(len(names)), workers=1)
     wall, cpu = time.perf_counter() - began, time.process_time() - spent
     began, again = time.perf_counter(), time.process_time()
-    run_many(SimConfig(), law, names, range(len(names)), traces=False, compiled=True, workers=1)
+    gripper.run_many(law, names, range(len(names)), workers=1)
     # The grasps themselves are no part of it.
     return {
         "wall": wall - (time.perf_counter() - began),

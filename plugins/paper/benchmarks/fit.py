@@ -47,7 +47,7 @@ from graspsense.plugin_api import Classifier, Features, create
 from graspsense.sources.simulated import OBJECTS_PER_SEED, TRIALS_PER_SEED, Group
 from graspsense_paper.published import published
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.run.batch import run_many
+from graspsense_sim_gripper.run.backend import SimBackend
 from graspsense_sim_gripper.scene.library import catalogue, object_kinds
 from graspsense_sim_gripper.scene.spec import ObjectSpec
 
@@ -262,8 +262,8 @@ def _run(
         scenes += [f"{trial.object_name}#{OBJECTS_PER_SEED * seed + trial.instance}" for trial in dealt]
         numbers += [TRIALS_PER_SEED * seed + offset + k for k in range(len(dealt))]
     controller = create("controller", "hybrid", probing_force_n=force_n)
-    config = SimConfig(fidelity="scene")
-    done = run_many(config, controller, scenes, numbers, extract=extract, traces=False, compiled=True)
+    gripper = SimBackend(SimConfig(fidelity="scene", compile="always"))
+    done = gripper.run_many(controller, scenes, numbers, extract=extract)
     extracted = [trial.extracted for trial in done]
     n = len(dealt)
     return [trial.label for trial in dealt], [extracted[n * i : n * (i + 1)] for i in range(len(seeds))]

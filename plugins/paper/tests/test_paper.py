@@ -39,7 +39,7 @@ pytest.importorskip("graspsense_sim_gripper", reason="the paper is done again in
 pytest.importorskip("graspsense_c45", reason="the paper's classifier")
 from cases import every_case
 
-from graspsense_sim_gripper.run.batch import run_many
+from graspsense_sim_gripper.run.backend import SimBackend
 
 
 def summary_of(planned, results=None):
@@ -142,7 +142,8 @@ def test_without_the_figures_that_give_them_the_claims_do_not_hold():
 
     def closed(**friction):
         gripper = evolve(ours, coulomb_spread_n=0.0, **friction)
-        (done,) = run_many(gripper, create("controller", "force", probing_force_n=7.5), ["block"], [0])
+        law = create("controller", "force", probing_force_n=7.5)
+        (done,) = SimBackend(gripper).run_many(law, ["block"], [0], traces=True)
         return float(np.ptp(done.trace.gap_m))
 
     assert closed() == 0.0
@@ -151,7 +152,7 @@ def test_without_the_figures_that_give_them_the_claims_do_not_hold():
     def lead_s(offset_m):
         gripper = evolve(ours, spread=False, sensor="ideal")
         scene = f"width_m = 0.05\noffset_m = {offset_m}\n[[terms]]\ntype = 'elastic'\nk1_n_m = 2000.0\n"
-        (done,) = run_many(gripper, create("controller", "hybrid"), [scene], [0])
+        (done,) = SimBackend(gripper).run_many(create("controller", "hybrid"), [scene], [0], traces=True)
         forces = np.array([done.trace.force_left_n, done.trace.force_right_n])
         return np.ptp((forces > 0.1).argmax(axis=1)) * 0.001
 

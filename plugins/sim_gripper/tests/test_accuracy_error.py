@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 from attrs import evolve
+from batches import run_many
 from cases import every_case
 from random_scenes import record_of
 
 from graspsense.plugin_api import REST_WINDOW_S, STEADY, create
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.error import GraspRecord, deviation
-from graspsense_sim_gripper.run.batch import run_many
 
 SPEED, TAU, STIFFNESS = 0.01, 0.05, 2000.0
 

@@ -4,10 +4,10 @@ from functools import partial
 
 import numpy as np
 import pytest
+from batches import run_many
 
 from graspsense.plugin_api import APPROACH, create
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.run.batch import run_many
 
 slow = partial(pytest.param, marks=pytest.mark.slow)
 TICK_BY_TICK = {"fidelity": "fixed"}

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from attrs import evolve, fields
+from batches import run_many
 from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
@@ -44,7 +45,7 @@ from graspsense_sim_gripper.run.backend import SimBackend
 from graspsense_sim_gripper.run.batch import threads
 from graspsense_sim_gripper.run.batch.job import Job, grasp_plain
 from graspsense_sim_gripper.run.batch.scenes import Scenes, draw_numbers
-from graspsense_sim_gripper.run.batch.threads import SLICE, run_many, slices_of
+from graspsense_sim_gripper.run.batch.threads import SLICE, slices_of
 from graspsense_sim_gripper.run.batch.worker import PlainProcess
 from graspsense_sim_gripper.run.compiled import loop_code
 from graspsense_sim_gripper.run.model_report import model_report

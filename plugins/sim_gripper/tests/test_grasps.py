@@ -4,6 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from batches import run_many
 
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
@@ -11,7 +12,6 @@ from graspsense.gripper_api import Outcome, Phase
 from graspsense.plugin_api import create
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.backend import SimBackend
-from graspsense_sim_gripper.run.batch import run_many
 
 FEATURES = create("feature-set", "chitta")
 slow = partial(pytest.param, marks=pytest.mark.slow)

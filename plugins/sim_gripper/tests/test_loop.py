@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from attrs import evolve, fields
+from batches import run_many
 
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
@@ -10,7 +11,6 @@ from graspsense.plugin_api import Trace, create
 from graspsense.simulator_api import bind
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.backend import SimBackend
-from graspsense_sim_gripper.run.batch import run_many
 from graspsense_sim_gripper.run.compiled.compose import sum_of
 from graspsense_sim_gripper.run.compiled.jit import compile_part
 from graspsense_sim_gripper.scene.library import catalogue

@@ -5,6 +5,7 @@ from math import inf
 
 import numpy as np
 import pytest
+from batches import run_many
 from cases import every_case
 from unverified import unverified_setup
 
@@ -13,7 +14,6 @@ from graspsense.gripper_api import gap_and_rate, revolutions_at
 from graspsense.plugin_api import EFFORT, RELEASE, Command, create
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.state import Contact, Motion
-from graspsense_sim_gripper.run.batch import run_many
 from graspsense_sim_gripper.run.binding import bind_reachable
 from graspsense_sim_gripper.run.compiled.compose import composition, plant_move, step_parts, uncompressed
 from graspsense_sim_gripper.scene.terms.registry import laws_of

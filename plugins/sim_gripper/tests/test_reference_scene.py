@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from batches import run_many
 from peer_scenes import CONFIG, KC, LIGHT, TICK, TICKS, X0, B, C, K, Law, M, closed_law
 
 from graspsense.simulator_api import RunConfig
-from graspsense_sim_gripper.run.batch import run_many
 
 
 def rates(state, u):

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from batches import run_many
 from cases import every_case
 from click.testing import CliRunner
 from unverified import sample, unverified_setup
@@ -17,7 +18,6 @@ from graspsense.core.grasp.runner import run_grasp
 from graspsense.plugin_api import ConfigError, UnknownName, create, hookimpl
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.backend import SimBackend
-from graspsense_sim_gripper.run.batch import run_many
 from graspsense_sim_gripper.run.compiled.compose import plant_move
 from graspsense_sim_gripper.scene.library import find, shipped_scenes, split_number
 from graspsense_sim_gripper.scene.terms import Term, registry

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from batches import run_many
 from cases import every_case
 from click.testing import CliRunner
 from unverified import unverified_setup
@@ -17,7 +18,6 @@ from unverified import unverified_setup
 from graspsense.cli.main import cli
 from graspsense.plugin_api import create
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.run.batch import run_many
 from graspsense_sim_gripper.run.compiled.compose import composed_move, composition, contact_solver, grasp_loop
 from graspsense_sim_gripper.scene.spec import ObjectSpec
 from graspsense_sim_gripper.scene.terms import Term

@@ -95,7 +95,7 @@ class FinishedGrasp:
     def trace(self) -> Trace:
         """The trace. Raises ValueError if traces are not kept."""
         if self.kept is None:
-            raise ValueError("no traces were asked for: run_many(..., traces=True) keeps them")
+            raise ValueError("no traces were asked for: the option `traces` keeps them")
         return self.kept
 
 

@@ -17,7 +17,7 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack
 from functools import partial
 from operator import index
-from typing import Any, Final, Unpack
+from typing import Any, Final
 
 from attrs import define, field
 
@@ -77,29 +77,6 @@ _interpreted_around: Final[Counter[Hashable]] = Counter()
 """Number of compiled grasps of this process for which a part around the loop was not worth compiling, by the part."""
 
 
-def run_many(
-    config: SimConfig,
-    controller: Controller[Any],
-    scenes: Sequence[str],
-    seeds: Sequence[int],
-    *,
-    compiled: bool | None = None,
-    **options: Unpack[BatchOptions],
-) -> list[FinishedGrasp]:
-    """Simulate a grasp of each scene with its seed, and return the results in that order.
-
-    The results are the same for any number of workers. Traces are kept unless the options say otherwise. `compiled`:
-    True compiles every loop, False none; None compiles where so many grasps have the same kinds of terms that it saves
-    time. If numba is missing, or a controller or term cannot be compiled, the loop runs in the interpreter, and a
-    warning gives the reason.
-
-    Raises TypeError for an unknown option, ValueError if there are not as many seeds as scenes, UnknownName for an
-    unknown object, and ConfigError if the object cannot be read or no model reaches the accuracy.
-    """
-    options = {"traces": True, **options}
-    return list(grasps(job_of(config, controller, options), scenes, seeds, compiled, options))
-
-
 def job_of(
     config: SimConfig,
     controller: Controller[Any],
@@ -127,7 +104,15 @@ def job_of(
 def grasps(
     job: Job, scenes: Sequence[str], seeds: Sequence[int], compiled: bool | None, options: BatchOptions
 ) -> Iterator[FinishedGrasp]:
-    """Yield the results of `run_many` one by one, in order. Raises as `run_many` does."""
+    """Simulate a grasp of each scene with its seed, and yield the results one by one, in that order.
+
+    The results are the same for any number of workers. `compiled`: True compiles every loop, False none; None compiles
+    where so many grasps have the same kinds of terms that it saves time. If numba is missing, or a controller or term
+    cannot be compiled, the loop runs in the interpreter, and a warning gives the reason.
+
+    Raises ValueError if there are not as many seeds as scenes, UnknownName for an unknown object, and ConfigError if
+    the object cannot be read or no model reaches the accuracy.
+    """
     if len(scenes) != len(seeds):
         raise ValueError(f"{len(scenes)} scenes and {len(seeds)} seeds: give one seed a scene")
     workers = options.get("workers") or os.cpu_count() or 1
