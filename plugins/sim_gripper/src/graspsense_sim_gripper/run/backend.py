@@ -258,7 +258,7 @@ class SimBackend(BatchBackend[SimConfig]):
                 outcome=grasp.outcome,
                 reason=grasp.reason,
                 extracted=grasp.extracted,
-                trace=grasp.kept,
+                trace=grasp.trace,
                 report=grasp.report(),
             )
             for grasp in done

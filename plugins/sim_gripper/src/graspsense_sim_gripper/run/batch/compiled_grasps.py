@@ -112,7 +112,7 @@ def grasp_compiled(
         reason=reason,
         end=plant,
         extracted=extracted,
-        kept=kept,
+        trace=kept,
         model=prepared.model,
         terms=prepared.terms,
     )

@@ -67,8 +67,8 @@ class FinishedGrasp:
     """Returns the plant at the end of the grasp, as its loop returned it."""
     extracted: Extracted
     """What `Job.extract` returned for the trace; None if there is no `Job.extract`."""
-    kept: Trace | None
-    """The trace; None if traces are not kept."""
+    trace: Trace | None
+    """None if traces are not kept."""
     model: GraspModel = NO_MODEL
     """The model in which it was simulated."""
     terms: tuple[int, ...] | None = None
@@ -90,13 +90,6 @@ class FinishedGrasp:
         if chosen is not None:
             report |= accuracy_report(report, chosen, unstable_loop)
         return report
-
-    @property
-    def trace(self) -> Trace:
-        """The trace. Raises ValueError if traces are not kept."""
-        if self.kept is None:
-            raise ValueError("no traces were asked for: the option `traces` keeps them")
-        return self.kept
 
 
 @frozen(kw_only=True, eq=False, slots=False)
@@ -176,7 +169,7 @@ def grasp_plain(job: Job, setup: GraspSetup, model: GraspModel = NO_MODEL) -> Fi
         reason=reason,
         end=lambda: plant,
         extracted=extracted,
-        kept=kept,
+        trace=kept,
         model=model,
     )
 

@@ -47,7 +47,7 @@ class PlainProcess(GraspProcess):
                 np.array(handed.further["state"], float),
             ),
             extracted=None if job.extract is None or trace is None else job.extract(trace),
-            kept=trace if job.traces else None,
+            trace=trace if job.traces else None,
             model=self._scenes.find(scene).model,
         )
 
@@ -73,6 +73,6 @@ def grasps_of(
     def grasp(scene: str, seed: int) -> HandedGrasp:
         done, state = grasp_plain(job, scenes.setup(scene, seed)), list[float]()
         append(done.state, state, [])
-        return HandedGrasp(done.outcome, done.reason, done.kept, {"state": state})
+        return HandedGrasp(done.outcome, done.reason, done.trace, {"state": state})
 
     return grasp
