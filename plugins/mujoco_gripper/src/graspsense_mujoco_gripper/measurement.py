@@ -132,11 +132,11 @@ class ForceGauge:
         """Return the force that squeezes a thing along the closing direction, by whatever parts of the gripper."""
         model, data, roles, force = self._model, self._data, self._roles, self._force
         rows, closing, opening = self._along_axis(data.contact.frame), 0.0, 0.0
-        for k, (first, second) in enumerate(data.contact.geom.tolist()):
-            on_first, on_second = roles[first] & THING, roles[second] & THING
-            if on_first != on_second:
+        for k, pair in enumerate(data.contact.geom.tolist()):
+            pressing, pressed = (roles[geom] & THING for geom in pair)
+            if pressing != pressed:
                 mujoco.mj_contactForce(model, data, k, self._wrench)
-                along = sum(rows[3 * k + j] * force[j] for j in range(3)) * (1.0 if on_second else -1.0)
+                along = sum(rows[3 * k + j] * force[j] for j in range(3)) * (1.0 if pressed else -1.0)
                 closing, opening = closing + max(along, 0.0), opening + max(-along, 0.0)
         return min(closing, opening)
 
