@@ -125,6 +125,9 @@ def test_mixed_columns():
         C45Classifier(nominal=[True, False]).fit(np.array([["r", "big"], ["g", "small"]], object), ["a", "b"])
     with pytest.raises(ValueError, match=r"\['shape'\]"):
         C45Classifier(nominal=["shape"]).fit(frame, y)
+    for nominal in ([2], [-1], [True], [True, False, False]):
+        with pytest.raises(ValueError, match=r"columns 0\.\.1"):
+            C45Classifier(nominal=nominal).fit(frame, y)
 
 
 def test_hold_out_by_rows_by_folds_and_shuffled():

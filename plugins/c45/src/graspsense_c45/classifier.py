@@ -282,8 +282,9 @@ def _nominal_columns(X: Any, nominal: Sequence[Any] | None) -> set[int]:
         if names is None:
             return set()
         return {i for i, kind in enumerate(X.dtypes) if str(kind) == "category"}
-    asked = list(nominal)
-    if asked and all(isinstance(item, bool | np.bool_) for item in asked):
+    asked, n_columns = list(nominal), np.shape(X)[-1]
+    is_mask = bool(asked) and all(isinstance(item, bool | np.bool_) for item in asked)
+    if is_mask and len(asked) == n_columns:
         return {i for i, item in enumerate(asked) if item}
     if asked and all(isinstance(item, str) for item in asked):
         missing = [item for item in asked if names is None or item not in names]
@@ -292,7 +293,12 @@ def _nominal_columns(X: Any, nominal: Sequence[Any] | None) -> set[int]:
                 f"nominal names no columns: {missing}; the columns are {names or 'without names'}"
             )
         return {names.index(item) for item in asked}
-    return {int(item) for item in asked}
+    chosen = {int(item) for item in asked}
+    if is_mask or not chosen <= set(range(n_columns)):
+        raise ValueError(
+            f"nominal is {asked}: name some of the columns 0..{n_columns - 1}, or give a mask of {n_columns} booleans"
+        )
+    return chosen
 
 
 def _columns(X: Any) -> list[Any]:
