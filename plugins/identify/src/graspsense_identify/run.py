@@ -62,21 +62,13 @@ def identify(
     model = ForwardModel(pads=drive_and_pads(config)[1])
     # Compiled before several threads call it.
     path_forces()
-    recorded, has_cells = _used(_distinct(squeezes, notes), notes), _has_cells(config, squeezes)
+    recorded = _used(_distinct(squeezes, notes), notes)
     notes += _looks_wrong(recorded)
 
     def timed(lag: Lag) -> Timed:
-        whole, explained, said = set[str](), {""}, list[str]()
-        while explained:
-            said.clear()
-            ready, shares = _ready(config, recorded, said, has_cells, lag.lag_s, whole)
-            choice = choose(
-                model, ready, scale_of(ready), shows_memory(ready), partial(progress, "fitting candidates")
-            )
-            explained = explained_falls(choice.fitted)
-            whole |= explained
+        used, said = _timed(config, model, recorded, lag, progress)
         notes.extend(() if lag.lag_s else said)
-        return Timed(shares, choice, lag)
+        return used
 
     def shown(used: Timed) -> Delay:
         return delay_of(used.choice.fitted, config.force_delay_s, used.lag)
@@ -106,6 +98,31 @@ def identify(
     )
     scene = scene_text(result, fitted, values, _fingertips(config), delay)
     return evolve(result, scene=scene, seconds=time.monotonic() - begin)
+
+
+def _timed(
+    config: SimConfig,
+    model: ForwardModel,
+    recorded: Sequence[RecordedSqueeze],
+    lag: Lag,
+    progress: Progress,
+) -> tuple[Timed, list[str]]:
+    """Return the choice for squeezes whose force lags like this, and notes on them.
+
+    It is made again with the whole squeezes where the chosen object explains a fall of the force that looked like a
+    break.
+    """
+    whole, has_cells = set[str](), _has_cells(config, recorded)
+    while True:
+        notes: list[str] = []
+        ready, shares = _ready(config, recorded, notes, has_cells, lag.lag_s, whole)
+        choice = choose(
+            model, ready, scale_of(ready), shows_memory(ready), partial(progress, "fitting candidates")
+        )
+        explained = explained_falls(choice.fitted)
+        if not explained:
+            return Timed(shares, choice, lag), notes
+        whole |= explained
 
 
 def _distinct(squeezes: Sequence[RecordedSqueeze], notes: list[str]) -> list[RecordedSqueeze]:
