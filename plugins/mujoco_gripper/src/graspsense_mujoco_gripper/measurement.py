@@ -129,16 +129,22 @@ class ForceGauge:
         return left, right
 
     def squeeze_n(self) -> float:
-        """Return the force that squeezes a thing along the closing direction, by whatever parts of the gripper."""
+        """Return the force that squeezes a thing along the closing direction, by whatever parts of the gripper move."""
         model, data, roles, force = self._model, self._data, self._roles, self._force
         rows, closing, opening = self._along_axis(data.contact.frame), 0.0, 0.0
         for k, pair in enumerate(data.contact.geom.tolist()):
-            pressing, pressed = (roles[geom] & THING for geom in pair)
-            if pressing != pressed:
-                mujoco.mj_contactForce(model, data, k, self._wrench)
-                along = sum(rows[3 * k + j] * force[j] for j in range(3)) * (1.0 if pressed else -1.0)
-                closing, opening = closing + max(along, 0.0), opening + max(-along, 0.0)
+            for part, thing, sign in ((*pair, 1.0), (*pair[::-1], -1.0)):
+                if roles[thing] & THING and self._moves(part):
+                    mujoco.mj_contactForce(model, data, k, self._wrench)
+                    along = sign * sum(rows[3 * k + j] * force[j] for j in range(3))
+                    closing, opening = closing + max(along, 0.0), opening + max(-along, 0.0)
         return min(closing, opening)
+
+    def _moves(self, geom: int) -> bool:
+        """Return whether a geom is a part of the gripper that moves against the palm."""
+        body = self._model.body_weldid[self._model.geom_bodyid[geom]]
+        moving = self._model.body_dofnum[body] > 0 and self._model.body_parentid[body] != 0
+        return bool(moving and not self._roles[geom] & THING)
 
     def _along_axis(self, frames: Floats) -> list[float]:
         """Return the component along the closing direction of each row of the frames of the contacts."""
