@@ -250,10 +250,14 @@ def _meanings(case: ExperimentCase) -> dict[str, str]:
 
 
 def _circumstances(experiment: FinishedExperiment) -> dict[str, str]:
-    """Return what else a result may depend on: the versions, and the commit of the code."""
+    """Return what else a result may depend on: the content of inputs, the versions, and the commit of the code."""
     made = experiment.results.provenance()
-    versions = {f"version of {name}": str(version) for name, version in (made.get("versions") or {}).items()}
-    return {**versions, "commit": _commit(made)}
+    circumstances = {
+        f"{kind} of {name}": str(value)[:12] if kind == "content" else str(value)
+        for kind, table in (("content", "inputs"), ("version", "versions"))
+        for name, value in (made.get(table) or {}).items()
+    }
+    return {**circumstances, "commit": _commit(made)}
 
 
 def _commit(made: Mapping[str, Any]) -> str:

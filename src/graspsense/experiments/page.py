@@ -16,7 +16,7 @@ from graspsense.experiments.cases import in_a_name
 from graspsense.experiments.findings import MARKDOWN, Findings
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.results import EXPERIMENT, Results
-from graspsense.experiments.summary import ConditionResult, Summary, alike_lines, unreadable_lines
+from graspsense.experiments.summary import ConditionResult, Summary
 from graspsense.experiments.task_results import RecognitionResult
 from graspsense.recording.provenance import commit_text
 from graspsense.report.evaluation_sections import confusion_section, controls_section, tree_section
@@ -78,7 +78,7 @@ def experiment_page(summary: Summary, results: Results) -> Page:
             question=experiment.question,
             answer=findings.answer,
             headline=findings.headline,
-            beside=bullets(failure_lines(summary), "warning") + bullets([SIMULATED], "notes"),
+            beside=bullets([*summary.left_out, *summary.doubts], "warning") + bullets([SIMULATED], "notes"),
             sections=(*findings.page_sections(), _made_of(summary, results)),
         )
     best = max(summary.of_first_target, key=lambda condition: condition.rate.mean, default=None)
@@ -111,7 +111,7 @@ def rate_row(condition: ConditionResult, *, strong: bool = False) -> RateRow:
 def _beside(summary: Summary, best: ConditionResult | None) -> str:
     """Return what must be read with the answer: how it was measured, and what casts doubt on it."""
     if best is None:
-        return bullets(failure_lines(summary), "warning")
+        return bullets(summary.left_out, "warning")
     result = _first_result(summary, best)
     seeds = len(best.by_seed)
     features = [name for name, _ in result.trials.features] if result and result.trials else []
@@ -128,7 +128,7 @@ def _beside(summary: Summary, best: ConditionResult | None) -> str:
     )
     warnings = list(dict.fromkeys(best.of_first_seed.warnings))
     notes = [SIMULATED] if best.simulated else []
-    doubts = [*failure_lines(summary), *warnings]
+    doubts = [*summary.left_out, *summary.doubts, *warnings]
     return paragraph(text) + bullets(doubts, "warning") + bullets(notes, "notes")
 
 
@@ -136,22 +136,6 @@ def _first_result(summary: Summary, condition: ConditionResult) -> RecognitionRe
     """Return the result of the first seed of a condition."""
     seed = next((seed for seed in summary.planned.seeds if seed in condition.by_seed), None)
     return None if seed is None else summary.recognition(condition.case.name, seed)
-
-
-def failure_lines(summary: Summary) -> list[str]:
-    """Return a sentence each on what failed, is missing, cannot be read, or is the same in several cases."""
-    lines = []
-    if summary.failed:
-        reasons = list(dict.fromkeys(task.reason for task in summary.failed))
-        failed = counted(len(summary.failed), "task failed and is", "tasks failed and are")
-        lines.append(f"{failed} not included: {'; '.join(reasons[:5])}")
-    lines += [*unreadable_lines(summary), *alike_lines(summary)]
-    if summary.missing:
-        missing = counted(
-            summary.missing, "task has no result yet and is", "tasks have no result yet and are"
-        )
-        lines.append(f"{missing} not included")
-    return lines
 
 
 def _rates(summary: Summary) -> Section:

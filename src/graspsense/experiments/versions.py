@@ -44,7 +44,7 @@ def versions() -> Mapping[str, str]:
 
 
 def _required_by(distribution: str) -> set[str]:
-    """Return the distributions that a plugin needs, such as a simulator; those of graspsense itself are `_LIBRARIES`."""
+    """Return the distributions that a plugin needs; those of graspsense itself are `_LIBRARIES`."""
     if distribution == "graspsense":
         return set()
     with suppress(PackageNotFoundError):

@@ -30,6 +30,7 @@ from graspsense.store.opening import STORE, as_source, place_and_number
 FRAMEWORK: Final = "graspsense"
 _OWN_PLUGINS: Final = "graspsense.plugins"
 _CALIBRATION: Final = "calibration"
+_OF_TRIALS: Final = 'id, sha256, label, instance, set_aside, hex("values")'
 _QUOTED: Final = re.compile(r"\"[^\"\n]{1,1000}\"|'[^'\n]{1,1000}'")
 
 
@@ -190,7 +191,7 @@ def _hash_of_store(folder: str) -> str:
 
     try:
         with Store.read(folder) as store:
-            trials = store.query("SELECT id, sha256, label, instance, set_aside FROM trial ORDER BY id")
+            trials = store.query(f"SELECT {_OF_TRIALS} FROM trial ORDER BY id")
             changes = store.query('SELECT trial, "action", "before", "after" FROM change ORDER BY id')
             recordings = store.query("SELECT id, recording FROM trial ORDER BY id")
             lost = [[number] for number, name in recordings if not store.recording_path(name).is_file()]
