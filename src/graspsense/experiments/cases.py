@@ -227,9 +227,12 @@ class CasePlan:
         return next(iter(variants.values()), {})
 
     def _check_folds(self, settings: Settings, data: TrialSource, judge: Any) -> None:
-        """Add an error if there are more folds than trials, because every task of the case would fail."""
+        """Add an error if there are more folds than trials, because every task of the case would fail.
+
+        Forced, the data are not read: results are shown also where their data are not.
+        """
         folds = getattr(judge, "folds", None)
-        if folds is None:
+        if folds is None or self.force:
             return
         try:
             trials = number_of_trials(settings, data)
