@@ -111,7 +111,14 @@ def test_whatever_a_task_does_the_others_are_kept(lab, executor, request):
     assert summary["stopped"] is None
     assert summary["missing"] == 0
     done = {name: result is not None for name, result in lab.results("out").items()}
-    expected = {"fine": True, "kills once": True, "prints": True, "kills": False, "raises": False, "exits": False}
+    expected = {
+        "fine": True,
+        "kills once": True,
+        "prints": True,
+        "kills": False,
+        "raises": False,
+        "exits": False,
+    }
     assert done == {f"{name}, seed 0": whether for name, whether in expected.items()}
     reasons = {failure["task"]: failure["reason"] for failure in summary["failed"]}
     assert "Unpicklable" in reasons["raises, seed 0"]
