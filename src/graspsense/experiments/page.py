@@ -112,7 +112,7 @@ def _beside(summary: Summary, best: ConditionResult | None) -> str:
     """Return what must be read with the answer: how it was measured, and what casts doubt on it."""
     if best is None:
         return bullets(summary.left_out, "warning")
-    result = _first_result(summary, best)
+    result = summary.recognition(best.case.name, best.first_seed)
     seeds = len(best.by_seed)
     features = [name for name, _ in result.trials.features] if result and result.trials else []
     origin = "simulated" if best.simulated else "recorded"
@@ -130,12 +130,6 @@ def _beside(summary: Summary, best: ConditionResult | None) -> str:
     notes = [SIMULATED] if best.simulated else []
     doubts = [*summary.left_out, *summary.doubts, *warnings]
     return paragraph(text) + bullets(doubts, "warning") + bullets(notes, "notes")
-
-
-def _first_result(summary: Summary, condition: ConditionResult) -> RecognitionResult | None:
-    """Return the result of the first seed of a condition."""
-    seed = next((seed for seed in summary.planned.seeds if seed in condition.by_seed), None)
-    return None if seed is None else summary.recognition(condition.case.name, seed)
 
 
 def _rates(summary: Summary) -> Section:
@@ -226,10 +220,10 @@ def _control_rows(best: ConditionResult) -> tuple[list[RateRow], list[str]]:
 
 def measurement_sections(summary: Summary, best: ConditionResult) -> list[Section]:
     """Return the grasps and features of the first seed that has a result."""
-    result = _first_result(summary, best)
+    seed = best.first_seed
+    result = summary.recognition(best.case.name, seed)
     if result is None:
         return []
-    seed = next(seed for seed in summary.planned.seeds if seed in best.by_seed)
     where = f" Case: {best.case.name}." if best.case.name else ""
     sections = []
     if result.grasps:

@@ -53,9 +53,14 @@ class ConditionResult:
         return ", ".join(part for part in (self.case.name, classifier) if part)
 
     @property
+    def first_seed(self) -> int:
+        """The first seed that has a result."""
+        return next(iter(self.by_seed))
+
+    @property
     def of_first_seed(self) -> ClassifierResult:
         """The result of the first seed."""
-        return next(iter(self.by_seed.values()))
+        return self.by_seed[self.first_seed]
 
     @property
     def protocol(self) -> str:
@@ -328,9 +333,11 @@ def summary_of(results: Results) -> Summary:
     """
     summary = summarise(results.experiment(), results)
     if not summary.results and not summary.failed and not summary.unreadable and results.any():
+        made = results.provenance()
+        again = f" ({made['command']})" if made.get("command") else ""
         raise ConfigError(
             f"{results.folder} has results, but none for the settings that it has now: {EXPERIMENT}, {PIPELINES}/, "
-            f"{PROVENANCE} or graspsense itself was changed after the run. Restore the files, or run the changed "
+            f"{PROVENANCE} or graspsense itself was changed after the run{again}. Restore the files, or run the changed "
             f"experiment into another folder: graspsense experiment {results.folder / EXPERIMENT} --out FOLDER"
         )
     return summary
