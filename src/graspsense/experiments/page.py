@@ -71,29 +71,23 @@ def experiment_page(summary: Summary, results: Results) -> Page:
     """Return the page."""
     experiment = summary.planned.experiment
     findings = findings_of(summary)
-    if findings is not None:
-        return Page(
-            kind="Experiment",
-            title=experiment.title,
-            question=experiment.question,
-            answer=findings.answer,
-            headline=findings.headline,
-            beside=bullets([*summary.left_out, *summary.doubts], "warning") + bullets([SIMULATED], "notes"),
-            sections=(*findings.page_sections(), _made_of(summary, results)),
-        )
-    best = max(summary.of_first_target, key=lambda condition: condition.rate.mean, default=None)
-    sections = [_rates(summary)] if summary.conditions else []
-    if best is not None:
-        sections += [*_evaluation_sections(summary, best), *measurement_sections(summary, best)]
-    sections.append(_made_of(summary, results))
+    beside = bullets([*summary.left_out, *summary.doubts], "warning") + bullets([SIMULATED], "notes")
+    if findings is None:
+        best = max(summary.of_first_target, key=lambda condition: condition.rate.mean, default=None)
+        sections, beside = [], bullets(summary.left_out, "warning")
+        if best is not None:
+            sections = [_rates(summary), *_evaluation_sections(summary, best)]
+            sections += measurement_sections(summary, best)
+            beside = _beside(summary, best)
+        findings = Findings(answer=answer(summary), headline=headline(summary), sections=tuple(sections))
     return Page(
         kind="Experiment",
         title=experiment.title,
         question=experiment.question,
-        answer=answer(summary),
-        headline=headline(summary),
-        beside=_beside(summary, best),
-        sections=tuple(sections),
+        answer=findings.answer,
+        headline=findings.headline,
+        beside=beside,
+        sections=(*findings.page_sections(), _made_of(summary, results)),
     )
 
 
@@ -108,10 +102,8 @@ def rate_row(condition: ConditionResult, *, strong: bool = False) -> RateRow:
     )
 
 
-def _beside(summary: Summary, best: ConditionResult | None) -> str:
+def _beside(summary: Summary, best: ConditionResult) -> str:
     """Return what must be read with the answer: how it was measured, and what casts doubt on it."""
-    if best is None:
-        return bullets(summary.left_out, "warning")
     result = summary.recognition(best.case.name, best.first_seed)
     seeds = len(best.by_seed)
     features = [name for name, _ in result.trials.features] if result and result.trials else []

@@ -106,7 +106,7 @@ def run_experiment(
         done=sum(result.result is not None for result in new),
         failed=tuple(result for result in new if result.result is None),
         stopped=stopped,
-        notes=tuple(changed),
+        notes=changed,
     )
 
 
@@ -168,13 +168,11 @@ def _without_changed_inputs(task: Task, result: TaskResult) -> TaskResult:
     )
 
 
-def _changed_inputs(results: Results, planned: Planned) -> list[str]:
+def _changed_inputs(results: Results, planned: Planned) -> tuple[str, ...]:
     """Return a note on the inputs that differ from those of the results in the folder."""
     earlier = results.provenance().get("inputs") or {}
     names = [name for name, content in planned.inputs.items() if earlier.get(name, content) != content]
-    if not names:
-        return []
-    return [
-        "changed since the folder of results was last used, so that only results of the present content count: "
-        f"{listed(names)}"
-    ]
+    told = (
+        "changed since the folder of results was last used, so that only results of the present content count"
+    )
+    return (f"{told}: {listed(names)}",) if names else ()

@@ -337,7 +337,7 @@ def summary_of(results: Results) -> Summary:
         again = f" ({made['command']})" if made.get("command") else ""
         raise ConfigError(
             f"{results.folder} has results, but none for the settings that it has now: {EXPERIMENT}, {PIPELINES}/, "
-            f"{PROVENANCE} or graspsense itself was changed after the run{again}. Restore the files, or run the changed "
-            f"experiment into another folder: graspsense experiment {results.folder / EXPERIMENT} --out FOLDER"
+            f"{PROVENANCE} or graspsense itself was changed after the run{again}. Restore the files, or run the "
+            f"changed experiment into another folder: graspsense experiment {results.folder / EXPERIMENT} --out FOLDER"
         )
     return summary

@@ -13,7 +13,7 @@ from importlib.metadata import PackageNotFoundError, requires, version
 from typing import Final
 
 from graspsense.core.components.registry import installed
-from graspsense.sources.input_content import developed_code
+from graspsense.sources.input_content import FRAMEWORK, developed_code
 
 _LIBRARIES: Final = ("numpy", "scipy", "scikit-learn", "numba")
 _REQUIREMENT: Final = re.compile(r"([\w.-]+)(?!.*\bextra\b)")
@@ -30,11 +30,11 @@ def versions() -> Mapping[str, str]:
     for status in installed().statuses:
         code = developed_code(status.module)[:8]
         words = f"{status.version}+{code}" if code else status.version
-        if status.state == "loaded":
+        if status.state == "loaded" and status.distribution != FRAMEWORK:
             libraries |= _required_by(status.distribution)
-        else:
-            words = f"{words} ({status.state})"
-        versions_here[status.distribution] = words
+        versions_here[status.distribution] = (
+            words if status.state == "loaded" else f"{words} ({status.state})"
+        )
     for name in sorted(libraries - versions_here.keys()):
         try:
             versions_here[name] = version(name)
@@ -45,12 +45,10 @@ def versions() -> Mapping[str, str]:
 
 def _required_by(distribution: str) -> set[str]:
     """Return the distributions that a plugin needs; those of graspsense itself are `_LIBRARIES`."""
-    if distribution == "graspsense":
-        return set()
+    needed: list[str] = []
     with suppress(PackageNotFoundError):
-        needed = map(_REQUIREMENT.match, requires(distribution) or ())
-        return {re.sub(r"[-_.]+", "-", name[1]).lower() for name in needed if name}
-    return set()
+        needed = requires(distribution) or []
+    return {re.sub(r"[-_.]+", "-", name[1]).lower() for name in map(_REQUIREMENT.match, needed) if name}
 
 
 def measured_on() -> dict[str, str]:

@@ -30,7 +30,7 @@ from graspsense.store.opening import STORE, as_source, place_and_number
 FRAMEWORK: Final = "graspsense"
 _OWN_PLUGINS: Final = "graspsense.plugins"
 _CALIBRATION: Final = "calibration"
-_OF_TRIALS: Final = 'id, sha256, label, instance, set_aside, hex("values")'
+_OF_TRIALS: Final = 'id, recording, sha256, label, instance, set_aside, hex("values")'
 _QUOTED: Final = re.compile(r"\"[^\"\n]{1,1000}\"|'[^'\n]{1,1000}'")
 
 
@@ -193,8 +193,7 @@ def _hash_of_store(folder: str) -> str:
         with Store.read(folder) as store:
             trials = store.query(f"SELECT {_OF_TRIALS} FROM trial ORDER BY id")
             changes = store.query('SELECT trial, "action", "before", "after" FROM change ORDER BY id')
-            recordings = store.query("SELECT id, recording FROM trial ORDER BY id")
-            lost = [[number] for number, name in recordings if not store.recording_path(name).is_file()]
+            lost = [[number] for number, name, *_ in trials if not store.recording_path(name).is_file()]
     except GraspsenseError as error:
         return _hash([str(error)])  # the task tells it
     return _hash([json_text([list(row) for row in (*trials, *changes, *lost)])])
