@@ -194,16 +194,11 @@ def _settings(summary: Summary) -> dict[str, str]:
     planned = summary.planned
     values: dict[str, dict[str, None]] = {}
     for case in planned.cases:
-        settings = case.settings.values
-        tables: dict[str, Any] = {
-            "experiment": {"kind": case.kind},
-            **{table: settings.get(table) or {} for table in PIPELINE_TABLES},
-            "data": plain(case.data),
-            "test": {} if case.test is None else plain(case.test),
-            "judge": plain(case.judge),
-        }
-        for learner in case.learners:
-            tables[f"classifier {learner.name}"] = {"type": learner.type, **learner.config}
+        params = case.params
+        tables = {"experiment": {"kind": case.kind}, **params.pop("settings")}
+        for learner in params.pop("learners"):
+            tables[f"classifier {learner['name']}"] = {"type": learner["type"], **learner["config"]}
+        tables |= params
         for key, value in _flat(tables).items():
             values.setdefault(key, {})[value] = None
     seeds = {"experiment.seeds": ", ".join(map(str, planned.seeds))}

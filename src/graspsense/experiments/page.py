@@ -274,13 +274,7 @@ def _made_of(summary: Summary, results: Results) -> Section:
         text = (results.folder / EXPERIMENT).read_text(encoding="utf-8")
     except OSError:
         text = ""
-    settings = {}
-    if summary.planned.cases:
-        settings = {
-            table: {key: value for key, value in keys.items() if value is not None}
-            for table, keys in summary.planned.cases[0].settings.values.items()
-            if table != "classifier"
-        }
+    settings = summary.planned.cases[0].params["settings"] if summary.planned.cases else {}
     body = (
         facts(pairs)
         + bullets(notes)
