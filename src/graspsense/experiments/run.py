@@ -16,7 +16,6 @@ from graspsense.experiments.experiment import Planned
 from graspsense.experiments.results import Results
 from graspsense.experiments.task import Task, TaskResult
 from graspsense.experiments.timing import TimeLeft
-from graspsense.sources.input_content import contents_of
 
 STORE_FILE = "store.sqlite"
 """A folder with this file is a store of trials. This package may not import the store itself."""
@@ -131,10 +130,8 @@ def _run_tasks(
             running = executor()
             left.workers = running.workers
             of_key = {task.key: task for task in todo}
-            for returned in running.run(todo):
-                task = of_key[returned.key]
-                result = _without_changed_inputs(task, returned)
-                ended.append(task)
+            for result in running.run(todo):
+                ended.append(of_key[result.key])
                 results.add(result)
                 left.add(result.made.seconds)
                 if result.result is None:
@@ -152,20 +149,6 @@ def _run_tasks(
         if running is not None:
             running.close()
     return ended, ""
-
-
-def _without_changed_inputs(task: Task, result: TaskResult) -> TaskResult:
-    """Return the result, or a failure if an input of its task has another content than when the experiment was read."""
-    planned = task.params.get("inputs", {})
-    params = {key: value for key, value in task.params.items() if key != "inputs"}
-    present = contents_of([task.kind, params]) if planned else {}
-    changed = [name for name, content in planned.items() if present.get(name) != content]
-    if result.result is None or not changed:
-        return result
-    return task.failed(
-        f"changed while the experiment ran: {listed(changed)}. Run it again with "
-        f"{option('resume', python='resume=True')}"
-    )
 
 
 def _changed_inputs(results: Results, planned: Planned) -> tuple[str, ...]:

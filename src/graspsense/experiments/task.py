@@ -16,11 +16,12 @@ from typing import TYPE_CHECKING, Any, Final
 from attrs import asdict, field, frozen
 
 from graspsense.core.learn.model_content import digest
-from graspsense.core.values.errors import FAILURES, GraspsenseError, named, place_of
+from graspsense.core.values.errors import FAILURES, ConfigError, GraspsenseError, listed, named, place_of
 from graspsense.core.values.json_values import json_text
 from graspsense.evaluation.json_codec import from_json, to_json
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.versions import versions
+from graspsense.sources.input_content import contents_of
 
 if TYPE_CHECKING:
     from graspsense.experiments.task_results import AnyTaskResult
@@ -122,8 +123,9 @@ def run_task(text: str) -> str:
             kind = kind_of(task.kind)
             # Encoded here, so that a value of a plugin that JSON cannot hold fails this task alone, and at once.
             result = kind.encoded(kind.function()(task.params, task.seed))
+        _refuse_other_inputs(task)
     except GraspsenseError as error:
-        reason = str(error)
+        result, reason = None, str(error)
     except FAILURES as error:
         reason, where = named(error) + place_of(error), "".join(traceback.format_exception(error)[-6:])
     made = Made(
@@ -135,6 +137,19 @@ def run_task(text: str) -> str:
         traceback=where,
     )
     return TaskResult(key=task.key, name=task.name, result=result, reason=reason, made=made).to_text()
+
+
+def _refuse_other_inputs(task: Task) -> None:
+    """Raise ConfigError if inputs of a task have another content here than where and when the experiment was read."""
+    planned = task.params.get("inputs", {})
+    params = {key: value for key, value in task.params.items() if key != "inputs"}
+    present = contents_of([task.kind, params]) if planned else {}
+    changed = [name for name, content in planned.items() if present.get(name, content) != content]
+    if changed:
+        raise ConfigError(
+            f"changed while the experiment ran, or other files on {platform.node()}: {listed(changed)}. Resume the "
+            "experiment"
+        )
 
 
 def _by_content(value: Any, inputs: Mapping[str, str]) -> Any:
