@@ -68,7 +68,7 @@ class Task:
 class Made:
     """Where, when, how long and with which versions a task ran; it is not part of the result. Zeros are not known."""
 
-    at: str = ""
+    begun_at: str = ""
     seconds: float = 0.0
     cpu_seconds: float = 0.0
     host: str = ""
@@ -129,7 +129,7 @@ def run_task(text: str) -> str:
     except FAILURES as error:
         reason, where = named(error) + place_of(error), "".join(traceback.format_exception(error)[-6:])
     made = Made(
-        at=time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(begun)),
+        begun_at=time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(begun)),
         seconds=round(time.monotonic() - clock, 3),
         cpu_seconds=round(time.process_time() - cpu, 3),
         host=platform.node(),

@@ -176,13 +176,13 @@ def _rise(
     `case` is the experiment and its setting. In `words` stand `{points}` for the rise, `{first}` and `{second}` for the
     rates.
     """
-    first, second = (condition_result(summary, case[0], "state", {case[1]: value}) for value in values)
-    gap = None if first is None or second is None else second.minus(first)
-    if first is None or second is None or gap is None:
+    weak, strong = (condition_result(summary, case[0], "state", {case[1]: value}) for value in values)
+    gap = None if weak is None or strong is None else strong.minus(weak)
+    if weak is None or strong is None or gap is None:
         return None
-    rates = {"first": percent(first.rate.mean), "second": percent(second.rate.mean)}
+    rates = {"first": percent(weak.rate.mean), "second": percent(strong.rate.mean)}
     number = words.format(points=_points(gap.value, gap.interval), **rates)
-    return ClaimFigure(within(gap.interval, **limits), number, sample(first.rate))
+    return ClaimFigure(within(gap.interval, **limits), number, sample(weak.rate))
 
 
 def _points(value: float, interval: tuple[float, float]) -> str:
