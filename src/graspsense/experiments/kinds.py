@@ -39,6 +39,10 @@ class TaskKind:
 
     def result_class(self) -> type:
         """Return the class of the result."""
+        if not self.declared.entry.result:
+            from graspsense.experiments.task_results import RecognitionResult
+
+            return RecognitionResult
         cls: type = self.declared.class_of_kind("result")
         return cls
 

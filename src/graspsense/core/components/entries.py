@@ -310,9 +310,9 @@ class ExperimentKindEntry:
     """The import string of the function `run(params, seed)`."""
     keys: str = field(default="", validator=_IS_TARGET_OR_EMPTY)
     """The import string of the class of the keys under `[judge]`."""
-    result: str = field(default="graspsense.experiments.task_results:RecognitionResult", validator=_IS_TARGET)
+    result: str = field(default="", validator=_IS_TARGET_OR_EMPTY)
     """The import string of the attrs class of the result, which has `source: str` (where its trials are from, in words)
-    and `simulated: bool`; by default that of recognition rates."""
+    and `simulated: bool`; empty for recognition rates."""
     findings: str = field(default="", validator=_IS_TARGET_OR_EMPTY)
     """The import string of a function from a `Summary` to `Findings`; empty if the rates are the whole report."""
     simulates: bool = False
