@@ -29,10 +29,10 @@ def seconds_per_trial(name: str) -> tuple[str, float]:
     case = planned.cases[-1]
     for task in (planned.task(planned.cases[0], planned.seeds[0]), planned.task(case, planned.seeds[1])):
         (done,) = Serial().run([task])
-        assert done.state == "done", done
+        assert done.result is not None, done
     sources = [source for source in (case.data, case.test) if source is not None]
     trials = sum(number_of_trials(case.settings, source) or 0 for source in sources)
-    return planned.experiment.kind, done.cpu_seconds / trials
+    return planned.experiment.kind, done.made.cpu_seconds / trials
 
 
 def main() -> None:

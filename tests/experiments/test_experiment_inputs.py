@@ -2,6 +2,7 @@
 
 import os
 from functools import partial
+from html import escape
 
 import numpy as np
 import pytest
@@ -13,9 +14,11 @@ from kept import keep
 from graspsense.core.components.registry import IsolatedPlugins, installed
 from graspsense.core.values.errors import ConfigError
 from graspsense.experiments.answer import answer
+from graspsense.experiments.comparison import compare_experiments
 from graspsense.experiments.executors.executor import Serial
 from graspsense.experiments.executors.processes import Processes
 from graspsense.experiments.experiment_file import _located, read_experiment
+from graspsense.experiments.page import write_page
 from graspsense.experiments.results import Results
 from graspsense.experiments.run import run_experiment
 from graspsense.experiments.summary import summarise
@@ -79,6 +82,78 @@ def test_the_page_of_results_is_that_of_the_content_that_they_were_made_from(tmp
     assert rate_of(results.experiment(), results) == (1.0, 40)
 
 
+def test_results_keep_their_task_where_data_move_and_are_shown_where_data_are_not(tmp_path, monkeypatch):
+    here, there = tmp_path / "here", tmp_path / "there"
+    here.mkdir()
+    table(here / "t.csv", 1, 50.0)
+    run_experiment(read_experiment(experiment(here, "t.csv")), Results(here / "out"), Serial)
+    here.rename(there)
+    results = Results(there / "out")
+    assert rate_of(results.experiment(), results) == (1.0, 40)
+    account = run_experiment(read_experiment(str(there / "e.toml")), results, Serial, resume=True)
+    assert (account.kept, account.done) == (1, 0)
+    (there / "t.csv").unlink()
+    assert rate_of(results.experiment(), results) == (1.0, 40)
+
+    table(there / "u.csv", 2, 50.0)
+    monkeypatch.chdir(there)
+    options = read_experiment("e.toml", ["data.source=u.csv"])
+    assert options.cases[0].data.source == str(there / "u.csv")
+
+
+def test_two_tables_that_are_exchanged_are_another_task(tmp_path):
+    for seed, name in enumerate(("a", "b")):
+        (tmp_path / name).mkdir()
+        table(tmp_path / name / "t.csv", seed, 50.0)
+    file = experiment(tmp_path, "a/t.csv", more='[test]\nsource = "b/t.csv"\nlabel = "what"\n')
+    (task,) = read_experiment(file).tasks()
+    (exchanged,) = read_experiment(
+        file, [f'{key}.source="{tmp_path / name}/t.csv"' for key, name in (("data", "b"), ("test", "a"))]
+    ).tasks()
+    assert task.key != exchanged.key
+
+
+def test_results_of_other_versions_are_told_wherever_they_are_shown(tmp_path):
+    table(tmp_path / "t.csv", 1, 50.0)
+    planned = read_experiment(experiment(tmp_path, "t.csv"), ["seeds=2"])
+    results = Results(tmp_path / "out")
+    run_experiment(planned, results, Serial)
+    assert summarise(planned, results).other_versions == {}
+    done, _ = results.read(planned.tasks()[0])
+    results.add(evolve(done, made=evolve(done.made, versions={**done.made.versions, "numpy": "0.9"})))
+    run_experiment(planned, results, Serial, resume=True)
+    summary = summarise(planned, results)
+    ((how, number),) = summary.other_versions.items()
+    assert "numpy" in how
+    assert "0.9" in how
+    assert number == 1
+    assert how in summary.as_json()["other_versions"]
+    assert escape(how) in write_page(summary, results).read_text()
+
+
+def test_a_result_of_an_older_form_is_computed_again(tmp_path):
+    table(tmp_path / "t.csv", 1, 50.0)
+    planned = read_experiment(experiment(tmp_path, "t.csv"))
+    results = Results(tmp_path / "out")
+    run_experiment(planned, results, Serial)
+    done, _ = results.read(planned.tasks()[0])
+    results.add(evolve(done, result={key: value for key, value in done.result.items() if key != "simulated"}))
+    assert len(summarise(planned, results).unreadable) == 1
+    account = run_experiment(planned, results, Serial, resume=True)
+    assert (account.kept, account.done) == (0, 1)
+    assert rate_of(planned, results) == (1.0, 40)
+
+
+def test_a_comparison_names_the_inputs_whose_content_differs(tmp_path):
+    file = experiment(tmp_path, "t.csv")
+    for seed, name in enumerate(("a", "b", "c")):
+        table(tmp_path / "t.csv", min(seed, 1), 50.0)
+        run_experiment(read_experiment(file), Results(tmp_path / name), Serial)
+    (other,) = compare_experiments([str(tmp_path / "a"), str(tmp_path / "b")]).settings
+    assert str(tmp_path / "t.csv") in other.key
+    assert compare_experiments([str(tmp_path / "b"), str(tmp_path / "c")]).settings == ()
+
+
 def grasps(store, numbers):
     for k in numbers:
         label = ("can:full_open", "can:empty_open")[k % 2]
@@ -118,6 +193,11 @@ def test_a_store_that_grew_or_was_corrected_is_another_input(tmp_path):
         set_aside(store, [3], "slipped")
         assert run_experiment(read_experiment(file), results, Serial, resume=True).done == 1
         assert rate_of(read_experiment(file), results)[1] == 23
+
+        names = [f"store:{tmp_path}/s", f"store:{tmp_path}/s#3"]  # the store, and one of its trials
+        known = contents_of(names)
+        next(store.recordings.glob("*.mcap")).unlink()
+        assert all(contents_of(names)[name] != known[name] for name in names)
 
 
 def assert_counts(path, params):
@@ -206,6 +286,10 @@ def test_files_that_a_manifest_describes_count_wherever_they_are(tmp_path):
     there = tmp_path / "there"
     (there / "can.csv").write_text("t,gap,F\n0,0.1,0\n")
     assert_counts(there / "can.csv", [f"manifest:{manifest}"])
+    known = contents_of([f"manifest:{manifest}"])
+    (there / "can.csv").rename(there / "jar.csv")  # a label is in the name
+    assert contents_of([f"manifest:{manifest}"]) != known
+    (there / "jar.csv").rename(there / "can.csv")
     manifest.write_text(
         manifest.read_text() + 'beside = "labels.csv"\nvalues = { mass = "mass_{label}.txt" }\n'
     )
@@ -248,6 +332,10 @@ def test_the_code_of_a_plugin_and_its_version_count(tmp_path, monkeypatch):
         changed.write_text("a = 22")
         assert content("1.0") not in known
         known.append(content("1.0"))
+    developed = input_content.developed_code("my_plugin.law")
+    law.write_text("a = 333")
+    assert input_content.developed_code("my_plugin.law") not in ("", developed)
+    assert input_content.developed_code("attrs.anything") == ""
 
 
 def test_the_components_of_a_task_are_inputs(tmp_path):

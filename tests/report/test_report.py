@@ -314,7 +314,7 @@ def test_evaluate_writes_a_page_and_replaces_none_of_a_store(folder, tmp_path):
     command = ("evaluate", folder, "--folds", "2", "--report")
     written = graspsense(*command, tmp_path / "page")
     assert written.returncode == 0
-    assert "report.html" in written.stderr
+    assert "report.html" in written.stdout
     reader = Reader((tmp_path / "page" / "report.html").read_text())
 
     refused(*command, folder)

@@ -166,6 +166,27 @@ def test_another_gripper_is_refused_before_it_moves(tmp_path):
         assert collection.counts() == {"jar:full": 2}
 
 
+def test_what_somebody_else_collects_meanwhile_is_not_collected_again(tmp_path):
+    settings = settings_with(lambda: Scripted(squeezing, bottle))
+    with Store.open(tmp_path / "t") as store:
+
+        def ask(question):
+            keep(store, label="jar:full")  # by another program, while this one waits for its operator
+            return ""
+
+        collection = Collection(
+            store=store,
+            wanted=Wanted(words=("jar:full",), each=1),
+            plugins=installed(),
+            settings_for=lambda word, seed: settings,
+            ask=ask,
+            say=lambda text: None,
+        )
+        collection.run()
+        assert collection.counts() == {"jar:full": 1}
+        assert collection.collected == {}
+
+
 @pytest.mark.slow
 def test_without_a_folder_it_is_trials_and_what_is_there_is_printed(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

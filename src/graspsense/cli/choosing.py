@@ -246,12 +246,9 @@ def pipeline_text(chosen: Chosen, model: str) -> str:
 def say_chosen(chosen: Chosen, pipeline: str | None) -> None:
     """Print what was chosen, the rate of the procedure, what is as good, and how to use it."""
     choice = chosen.choice
-    folds = sum(choice.chosen_in.values())
-    echo_entry(
-        "chosen",
-        f"{choice.best.name}, of {len(choice.ranking.candidates)} candidates; also in "
-        f"{choice.chosen_in.get(choice.best.name, 0)} of {folds} folds",
-    )
+    folds, same = sum(choice.chosen_in.values()), choice.chosen_in.get(choice.best.name, 0)
+    stable = f"also in {same} of {folds} folds" if same else f"in each of {folds} folds another one"
+    echo_entry("chosen", f"{choice.best.name}, of {len(choice.ranking.candidates)} candidates; {stable}")
     echo_entry(
         "rate",
         f"{choice.rate.words}, of the whole procedure by {choice.ranking.protocol}: no trial takes part in the choice "

@@ -168,7 +168,8 @@ def _print_counts(save: str, collection: Collection, as_json: bool) -> None:
         )
         return
     for word, n in counts.items():
-        echo_entry(word, f"{n:>4} of {each}", Style.GOOD if n >= each else None, width=24)
+        more_than_asked = ", more than asked for" if n > each else ""
+        echo_entry(word, f"{n:>4} of {each}{more_than_asked}", Style.GOOD if n >= each else None, width=24)
     more = [f"{label} {n}" for label, n in lacking.items() if n]
     if more:
         words = f"needed for prediction sets of {100 * COVERAGE:.0f} %: {', '.join(more)}"

@@ -115,12 +115,15 @@ def evaluate(
     if page is not None:
         _write_page(page, evaluation, learner, labelled)
     if as_json:
-        values = to_json(evaluation)
-        echo_json(values if early is None else {**values, "early": to_json(early)})
-    else:
-        _print(evaluation)
-        if early is not None:
-            _print_early(early)
+        more = {} if early is None else {"early": to_json(early)}
+        more |= {} if page is None else {"page": str(page)}
+        echo_json({**to_json(evaluation), **more})
+        return
+    _print(evaluation)
+    if early is not None:
+        _print_early(early)
+    if page is not None:
+        echo_entry("page", str(page))
 
 
 def _measured(
@@ -158,7 +161,6 @@ def _write_page(path: Path, evaluation: Evaluation, learner: SelectedComponent, 
 
     command = command_line(("report", "as_json", "png", "keep", "overwrite"))
     write_html(path, evaluation_page(evaluation, learner, labelled, command))
-    talk(f"page in {path}")
 
 
 def _parts(

@@ -158,6 +158,7 @@ def _counts(account: Account, problem: str) -> dict[str, object]:
         "done": account.done,
         "complete": account.complete,
         "stopped": account.stopped or problem or None,
+        "changed": list(account.notes),
     }
 
 
@@ -242,6 +243,8 @@ def _print(summary: Summary, more: Findings | None, account: Account, page: str)
             echo(table.title, Style.HEADING)
             echo_found(table)
             echo()
+    for line in summary.doubts:
+        echo_entry("WARNING", line, Style.CAUTION)
     for note in account.notes:
         echo(f"note: {note}", Style.CAUTION, indent=2)
     echo(account.words, Style.GOOD if account.complete else Style.CAUTION)
@@ -276,11 +279,8 @@ def _print_rates(summary: Summary) -> None:
 
 def _print_doubts(summary: Summary) -> None:
     """Print what the controls and the trials of the first seed say against the rates, each once."""
-    from graspsense.experiments.summary import alike_lines
-
     several = len(summary.conditions) > 1
-    warnings = alike_lines(summary)
-    warnings += [
+    warnings = [
         f"{condition.name}: {warning}" if several else warning
         for condition in summary.conditions
         for warning in condition.of_first_seed.warnings

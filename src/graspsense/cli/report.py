@@ -56,13 +56,13 @@ def report(
 
     path = Path(out or folder) / NAME
     if (Path(folder) / EXPERIMENT).is_file():
-        from graspsense.experiments.summary import summary_of, unreadable_lines
+        from graspsense.experiments.summary import summary_of
 
         if values:
             raise click.UsageError("--target-value is for the page of a store; this folder has an experiment")
         results = Results(Path(folder))
         summary = summary_of(results)
-        for line in unreadable_lines(summary):
+        for line in (*summary.left_out, *summary.doubts):
             warn(line)
         page = experiment_page(summary, results)
     else:

@@ -227,9 +227,12 @@ class CasePlan:
         return next(iter(variants.values()), {})
 
     def _check_folds(self, settings: Settings, data: TrialSource, judge: Any) -> None:
-        """Add an error if there are more folds than trials, because every task of the case would fail."""
+        """Add an error if there are more folds than trials, because every task of the case would fail.
+
+        Forced, the data are not read: results are shown also where their data are not.
+        """
         folds = getattr(judge, "folds", None)
-        if folds is None:
+        if folds is None or self.force:
             return
         try:
             trials = number_of_trials(settings, data)
@@ -307,15 +310,13 @@ def _without_effect(source: TrialSource) -> list[str]:
 
 def _what_matters(case: ExperimentCase, inert: set[str]) -> str:
     """Return everything that the result of a case depends on, as text."""
-    tables = {table: dict(case.settings.values[table]) for table in PIPELINE_TABLES if table not in inert}
-    tables.get("run", {}).pop("seed", None)  # a task has the seed of the experiment
-    sources = [
-        {key: value for key, value in plain(source).items() if f"data.{key}" not in inert}
-        for source in (case.data, case.test)
-        if source is not None
-    ]
-    learners = [(learner.name, learner.type, dict(learner.config)) for learner in case.learners]
-    return repr((tables, sources, learners, plain(case.judge)))
+    params = case.params
+    params["settings"]["run"].pop("seed", None)  # a task has the seed of the experiment
+    params["settings"] = {table: keys for table, keys in params["settings"].items() if table not in inert}
+    for name in ("data", "test"):
+        keys = params[name] or {}
+        params[name] = {key: value for key, value in keys.items() if f"data.{key}" not in inert}
+    return repr(params)
 
 
 def number_of_trials(settings: Settings, data: TrialSource) -> int | None:

@@ -9,14 +9,13 @@ from typing import Any, Final
 
 from attrs import frozen
 
-from graspsense import __version__
 from graspsense.core.components.strict import plain
-from graspsense.core.values.errors import ConfigError, DataDamaged, counted
+from graspsense.core.values.errors import ConfigError, counted
 from graspsense.evaluation.intervals import Difference, unpaired_difference
 from graspsense.experiments.cases import shown
 from graspsense.experiments.experiment import PIPELINE_TABLES, ExperimentCase
 from graspsense.experiments.results import EXPERIMENT, RESULTS, Results
-from graspsense.experiments.summary import ConditionResult, Summary, summarise
+from graspsense.experiments.summary import ConditionResult, Summary, summary_of
 from graspsense.report.wording import TARGETS
 
 ABSENT: Final = "not set"
@@ -132,7 +131,7 @@ def compare_experiments(paths: Sequence[str]) -> ExperimentComparison:
     """Read the experiments in these folders, and compare each with the first.
 
     A path is the folder that `graspsense experiment` wrote, or a file in it. Raises ConfigError if there are fewer than
-    two, if one is given twice, is no experiment, is of another version, or has no recognition rates.
+    two, if one is given twice, is no experiment, was changed after its run, or has no recognition rates.
     """
     folders = [_folder(path) for path in paths]
     if len(folders) < 2:
@@ -168,26 +167,10 @@ def _folder(path: str) -> Path:
 
 def _read(name: str, folder: Path) -> FinishedExperiment:
     results = Results(folder)
-    try:
-        summary = summarise(results.experiment(), results)
-    except (ConfigError, DataDamaged) as error:
-        sentence, *further = str(error).splitlines()
-        reason = further[0].strip() if further and sentence.endswith(":") else sentence
-        raise ConfigError(_of_another_version(results, reason)) from error
-    if not summary.results and not summary.failed and results.any():
-        raise ConfigError(_of_another_version(results, "its results do not belong to its settings here"))
+    summary = summary_of(results)
     if not summary.conditions:
         raise ConfigError(f"{folder} has no recognition rates to compare")
     return FinishedExperiment(name=name, results=results, summary=summary)
-
-
-def _of_another_version(results: Results, reason: str) -> str:
-    made = results.provenance()
-    again = f". Run it again: {made['command']}" if made.get("command") else ""
-    return (
-        f"{results.folder} is of another version (graspsense {made.get('graspsense', '?')}, commit {_commit(made)}) "
-        f"and cannot be read by this one ({__version__}): {reason}{again}"
-    )
 
 
 def _setting_differences(experiments: Sequence[FinishedExperiment]) -> list[SettingDifference]:
@@ -211,16 +194,11 @@ def _settings(summary: Summary) -> dict[str, str]:
     planned = summary.planned
     values: dict[str, dict[str, None]] = {}
     for case in planned.cases:
-        settings = case.settings.values
-        tables: dict[str, Any] = {
-            "experiment": {"kind": case.kind},
-            **{table: settings.get(table) or {} for table in PIPELINE_TABLES},
-            "data": plain(case.data),
-            "test": {} if case.test is None else plain(case.test),
-            "judge": plain(case.judge),
-        }
-        for learner in case.learners:
-            tables[f"classifier {learner.name}"] = {"type": learner.type, **learner.config}
+        params = case.params
+        tables = {"experiment": {"kind": case.kind}, **params.pop("settings")}
+        for learner in params.pop("learners"):
+            tables[f"classifier {learner['name']}"] = {"type": learner["type"], **learner["config"]}
+        tables |= params
         for key, value in _flat(tables).items():
             values.setdefault(key, {})[value] = None
     seeds = {"experiment.seeds": ", ".join(map(str, planned.seeds))}
@@ -250,10 +228,14 @@ def _meanings(case: ExperimentCase) -> dict[str, str]:
 
 
 def _circumstances(experiment: FinishedExperiment) -> dict[str, str]:
-    """Return what else a result may depend on: the versions, and the commit of the code."""
+    """Return what else a result may depend on: the content of inputs, the versions, and the commit of the code."""
     made = experiment.results.provenance()
-    versions = {f"version of {name}": str(version) for name, version in (made.get("versions") or {}).items()}
-    return {**versions, "commit": _commit(made)}
+    circumstances = {
+        f"{kind} of {name}": str(value)[:12] if kind == "content" else str(value)
+        for kind, table in (("content", "inputs"), ("version", "versions"))
+        for name, value in (made.get(table) or {}).items()
+    }
+    return {**circumstances, "commit": _commit(made)}
 
 
 def _commit(made: Mapping[str, Any]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from graspsense.evaluation.intervals import span
 from graspsense.experiments.comparison import ConditionDifference, ExperimentComparison, condition_name
-from graspsense.experiments.page import SIMULATED, failure_lines
+from graspsense.experiments.page import SIMULATED
 from graspsense.report.found_table import FoundTable
 from graspsense.report.html import Page, bullets, paragraph
 from graspsense.report.wording import TARGETS
@@ -35,8 +35,12 @@ def comparison_page(comparison: ExperimentComparison) -> Page:
 
 
 def doubts(comparison: ExperimentComparison) -> list[str]:
-    """Return a sentence for each experiment of which tasks failed, are missing or cannot be read."""
-    return [f"{each.name}: {line}" for each in comparison.experiments for line in failure_lines(each.summary)]
+    """Return what the results of each experiment lack, and what casts doubt on them, a sentence each."""
+    return [
+        f"{each.name}: {line}"
+        for each in comparison.experiments
+        for line in (*each.summary.left_out, *each.summary.doubts)
+    ]
 
 
 def comparison_tables(comparison: ExperimentComparison) -> tuple[FoundTable, FoundTable, FoundTable]:

@@ -119,6 +119,20 @@ class ExperimentCase:
     part: str = ""
     """Name of the part of the experiment that the case belongs to, if the experiment has parts."""
 
+    @property
+    def params(self) -> dict[str, Any]:
+        """All that defines its tasks but their seeds, as JSON values, without settings that are not set."""
+        return {
+            "settings": {
+                table: {key: value for key, value in self.settings.values[table].items() if value is not None}
+                for table in PIPELINE_TABLES
+            },
+            "data": plain(self.data),
+            "test": None if self.test is None else plain(self.test),
+            "learners": [plain(learner) for learner in self.learners],
+            "judge": plain(self.judge),
+        }
+
 
 @frozen(kw_only=True, eq=False)
 class Planned:
@@ -142,28 +156,11 @@ class Planned:
 
     def task(self, case: ExperimentCase, seed: int) -> Task:
         """Return the task for a case and a seed."""
-        params = self._params(case, is_first=seed == self.seeds[0])
+        params = {**case.params, "first": seed == self.seeds[0]}
         own = {text: self.inputs[text] for text in input_names([case.kind, params]) if text in self.inputs}
         params = {**params, "inputs": own} if own else params
         return Task(kind=case.kind, params=params, seed=seed, name=f"{case.name}, seed {seed}".lstrip(", "))
 
     def with_inputs(self) -> Planned:
         """Return the experiment with the present content of its inputs."""
-        named = [[case.kind, self._params(case, is_first=True)] for case in self.cases]
-        return evolve(self, inputs=contents_of(named))
-
-    def _params(self, case: ExperimentCase, *, is_first: bool) -> dict[str, Any]:
-        return {
-            "settings": {
-                table: {key: value for key, value in case.settings.values[table].items() if value is not None}
-                for table in PIPELINE_TABLES
-            },
-            "data": plain(case.data),
-            "test": None if case.test is None else plain(case.test),
-            "learners": [
-                {"name": learner.name, "type": learner.type, "config": dict(learner.config)}
-                for learner in case.learners
-            ],
-            "judge": plain(case.judge),
-            "first": is_first,
-        }
+        return evolve(self, inputs=contents_of([[case.kind, case.params] for case in self.cases]))

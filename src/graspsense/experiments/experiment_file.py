@@ -59,7 +59,7 @@ def read_experiment(
     merged = Merged()
     merged.add((), _located(layer.values, base), layer)
     for option in layers:
-        merged.add((), option.values, option)
+        merged.add((), _located(option.values, Path()), option)
     values = merged.values
     try:
         experiment = structured(values, Experiment, "an experiment")

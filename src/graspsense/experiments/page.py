@@ -16,7 +16,7 @@ from graspsense.experiments.cases import in_a_name
 from graspsense.experiments.findings import MARKDOWN, Findings
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.results import EXPERIMENT, Results
-from graspsense.experiments.summary import ConditionResult, Summary, alike_lines, unreadable_lines
+from graspsense.experiments.summary import ConditionResult, Summary
 from graspsense.experiments.task_results import RecognitionResult
 from graspsense.recording.provenance import commit_text
 from graspsense.report.evaluation_sections import confusion_section, controls_section, tree_section
@@ -71,29 +71,23 @@ def experiment_page(summary: Summary, results: Results) -> Page:
     """Return the page."""
     experiment = summary.planned.experiment
     findings = findings_of(summary)
-    if findings is not None:
-        return Page(
-            kind="Experiment",
-            title=experiment.title,
-            question=experiment.question,
-            answer=findings.answer,
-            headline=findings.headline,
-            beside=bullets(failure_lines(summary), "warning") + bullets([SIMULATED], "notes"),
-            sections=(*findings.page_sections(), _made_of(summary, results)),
-        )
-    best = max(summary.of_first_target, key=lambda condition: condition.rate.mean, default=None)
-    sections = [_rates(summary)] if summary.conditions else []
-    if best is not None:
-        sections += [*_evaluation_sections(summary, best), *measurement_sections(summary, best)]
-    sections.append(_made_of(summary, results))
+    beside = bullets([*summary.left_out, *summary.doubts], "warning") + bullets([SIMULATED], "notes")
+    if findings is None:
+        best = max(summary.of_first_target, key=lambda condition: condition.rate.mean, default=None)
+        sections, beside = [], bullets(summary.left_out, "warning")
+        if best is not None:
+            sections = [_rates(summary), *_evaluation_sections(summary, best)]
+            sections += measurement_sections(summary, best)
+            beside = _beside(summary, best)
+        findings = Findings(answer=answer(summary), headline=headline(summary), sections=tuple(sections))
     return Page(
         kind="Experiment",
         title=experiment.title,
         question=experiment.question,
-        answer=answer(summary),
-        headline=headline(summary),
-        beside=_beside(summary, best),
-        sections=tuple(sections),
+        answer=findings.answer,
+        headline=findings.headline,
+        beside=beside,
+        sections=(*findings.page_sections(), _made_of(summary, results)),
     )
 
 
@@ -108,11 +102,9 @@ def rate_row(condition: ConditionResult, *, strong: bool = False) -> RateRow:
     )
 
 
-def _beside(summary: Summary, best: ConditionResult | None) -> str:
+def _beside(summary: Summary, best: ConditionResult) -> str:
     """Return what must be read with the answer: how it was measured, and what casts doubt on it."""
-    if best is None:
-        return bullets(failure_lines(summary), "warning")
-    result = _first_result(summary, best)
+    result = summary.recognition(best.case.name, best.first_seed)
     seeds = len(best.by_seed)
     features = [name for name, _ in result.trials.features] if result and result.trials else []
     origin = "simulated" if best.simulated else "recorded"
@@ -128,30 +120,8 @@ def _beside(summary: Summary, best: ConditionResult | None) -> str:
     )
     warnings = list(dict.fromkeys(best.of_first_seed.warnings))
     notes = [SIMULATED] if best.simulated else []
-    doubts = [*failure_lines(summary), *warnings]
+    doubts = [*summary.left_out, *summary.doubts, *warnings]
     return paragraph(text) + bullets(doubts, "warning") + bullets(notes, "notes")
-
-
-def _first_result(summary: Summary, condition: ConditionResult) -> RecognitionResult | None:
-    """Return the result of the first seed of a condition."""
-    seed = next((seed for seed in summary.planned.seeds if seed in condition.by_seed), None)
-    return None if seed is None else summary.recognition(condition.case.name, seed)
-
-
-def failure_lines(summary: Summary) -> list[str]:
-    """Return a sentence each on what failed, is missing, cannot be read, or is the same in several cases."""
-    lines = []
-    if summary.failed:
-        reasons = list(dict.fromkeys(task.reason for task in summary.failed))
-        failed = counted(len(summary.failed), "task failed and is", "tasks failed and are")
-        lines.append(f"{failed} not included: {'; '.join(reasons[:5])}")
-    lines += [*unreadable_lines(summary), *alike_lines(summary)]
-    if summary.missing:
-        missing = counted(
-            summary.missing, "task has no result yet and is", "tasks have no result yet and are"
-        )
-        lines.append(f"{missing} not included")
-    return lines
 
 
 def _rates(summary: Summary) -> Section:
@@ -242,10 +212,10 @@ def _control_rows(best: ConditionResult) -> tuple[list[RateRow], list[str]]:
 
 def measurement_sections(summary: Summary, best: ConditionResult) -> list[Section]:
     """Return the grasps and features of the first seed that has a result."""
-    result = _first_result(summary, best)
+    seed = best.first_seed
+    result = summary.recognition(best.case.name, seed)
     if result is None:
         return []
-    seed = next(seed for seed in summary.planned.seeds if seed in best.by_seed)
     where = f" Case: {best.case.name}." if best.case.name else ""
     sections = []
     if result.grasps:
@@ -304,13 +274,7 @@ def _made_of(summary: Summary, results: Results) -> Section:
         text = (results.folder / EXPERIMENT).read_text(encoding="utf-8")
     except OSError:
         text = ""
-    settings = {}
-    if summary.planned.cases:
-        settings = {
-            table: {key: value for key, value in keys.items() if value is not None}
-            for table, keys in summary.planned.cases[0].settings.values.items()
-            if table != "classifier"
-        }
+    settings = summary.planned.cases[0].params["settings"] if summary.planned.cases else {}
     body = (
         facts(pairs)
         + bullets(notes)

@@ -16,7 +16,7 @@ import json
 import os
 import re
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
@@ -33,7 +33,7 @@ from graspsense.core.values.errors import ConfigError, named
 from graspsense.evaluation.json_codec import from_json
 from graspsense.experiments.experiment import PipelineOf, Planned
 from graspsense.experiments.experiment_file import read_experiment
-from graspsense.experiments.task import TaskResult
+from graspsense.experiments.task import Task, TaskResult
 from graspsense.experiments.versions import versions
 from graspsense.recording.provenance import process_provenance
 
@@ -65,25 +65,25 @@ class Results:
         """Store the result of a task; when this returns, it is on the disk. Raises SaveFailed."""
         _write(self.path(done.key), done.to_text() + "\n")
 
-    def read(self, key: str) -> tuple[TaskResult | None, str]:
+    def read(self, task: Task) -> tuple[TaskResult | None, str]:
         """Return the result of a task, or None and why its file cannot be read; the reason is empty without a file."""
-        path = self.path(key)
+        path = self.path(task.key)
         try:
             done = TaskResult.from_text(path.read_text(encoding="utf-8"))
-            if done.key != key:
+            if done.key != task.key:
                 raise ValueError("it is the result of another task")
+            done.decoded(task.kind)
         except FileNotFoundError:
             return None, ""
         except OSError as error:
             return None, f"{path}: {error.strerror}"
-        except (ValueError, KeyError, TypeError) as error:
-            return None, f"{path} is damaged: {named(error)}"
+        except ValueError as error:
+            return None, f"{path} is damaged, or of another version: {named(error)}"
         return done, ""
 
-    def finished(self, keys: Sequence[str]) -> dict[str, TaskResult]:
+    def finished(self, tasks: Iterable[Task]) -> list[TaskResult]:
         """Return the results of those of these tasks that have one, in their order."""
-        stored = ((key, self.read(key)[0]) for key in keys)
-        return {key: done for key, done in stored if done is not None}
+        return [done for done, _ in map(self.read, tasks) if done is not None]
 
     def any(self) -> bool:
         """Whether the folder has results."""

@@ -16,8 +16,6 @@ from graspsense.experiments.experiment import Planned
 from graspsense.experiments.results import Results
 from graspsense.experiments.task import Task, TaskResult
 from graspsense.experiments.timing import TimeLeft
-from graspsense.experiments.versions import differences, versions
-from graspsense.sources.input_content import contents_of
 
 STORE_FILE = "store.sqlite"
 """A folder with this file is a store of trials. This package may not import the store itself."""
@@ -94,24 +92,20 @@ def run_experiment(
                 f"what is missing there; "
                 f"another folder ({option('out', python='Results')}) begins anew"
             )
-        known = {
-            key: result
-            for key, result in results.finished([task.key for task in tasks]).items()
-            if result.state == "done"
-        }
+        known = {done.key for done in results.finished(tasks) if done.result is not None}
         changed = _changed_inputs(results, planned)
         results.begin(planned, command)
         todo = [task for task in tasks if task.key not in known]
-        keys, stopped = _run_tasks(todo, len(tasks), results, executor, progress, said) if todo else ([], "")
+        ended, stopped = _run_tasks(todo, len(tasks), results, executor, progress, said) if todo else ([], "")
         # Counted on the disk: an interrupt can come while a result is being written.
-        new = results.finished(keys).values()
+        new = results.finished(ended)
     return Account(
         total=len(tasks),
         kept=len(known),
-        done=sum(result.state == "done" for result in new),
-        failed=tuple(result for result in new if result.state == "failed"),
+        done=sum(result.result is not None for result in new),
+        failed=tuple(result for result in new if result.result is None),
         stopped=stopped,
-        notes=(*changed, *_notes(list(known.values()))),
+        notes=changed,
     )
 
 
@@ -122,75 +116,46 @@ def _run_tasks(
     executor: Callable[[], Executor],
     progress: Callable[[str, int, int], None] | None,
     said: Callable[[str], None] | None,
-) -> tuple[list[str], str]:
+) -> tuple[list[Task], str]:
     """Run these of `total` tasks and add each result.
 
-    Return the keys of the tasks that ended, and the reason if the run ended early.
+    Return the tasks that ended, and the reason if the run ended early.
     """
     running: Executor | None = None
     left = TimeLeft(len(todo))
-    keys: list[str] = []
+    ended: list[Task] = []
     failures = 0
     try:
         with Interrupts():
             running = executor()
             left.workers = running.workers
             of_key = {task.key: task for task in todo}
-            for returned in running.run(todo):
-                result = _without_changed_inputs(of_key[returned.key], returned)
-                keys.append(result.key)
+            for result in running.run(todo):
+                ended.append(of_key[result.key])
                 results.add(result)
-                left.add(result.seconds)
-                if result.state == "failed":
+                left.add(result.made.seconds)
+                if result.result is None:
                     failures += 1
                     if said is not None:
                         said(f"{result.name} failed: {result.reason}")
                 if progress is not None:
                     what = f"tasks, {left.words}" + (f", {failures} failed" if failures else "")
-                    progress(what, total - len(todo) + len(keys), total)
+                    progress(what, total - len(todo) + len(ended), total)
     except KeyboardInterrupt:
-        return keys, "interrupted"
+        return ended, "interrupted"
     except (ExecutorLost, SaveFailed) as lost:
-        return keys, str(lost)
+        return ended, str(lost)
     finally:
         if running is not None:
             running.close()
-    return keys, ""
+    return ended, ""
 
 
-def _without_changed_inputs(task: Task, result: TaskResult) -> TaskResult:
-    """Return the result, or a failure if an input of its task has another content than when the experiment was read."""
-    planned = task.params.get("inputs", {})
-    params = {key: value for key, value in task.params.items() if key != "inputs"}
-    present = contents_of([task.kind, params]) if planned else {}
-    changed = [name for name, content in planned.items() if present.get(name) != content]
-    if result.state == "failed" or not changed:
-        return result
-    return TaskResult.failed(
-        task,
-        f"changed while the experiment ran: {listed(changed)}. Run it again with "
-        f"{option('resume', python='resume=True')}",
-    )
-
-
-def _changed_inputs(results: Results, planned: Planned) -> list[str]:
+def _changed_inputs(results: Results, planned: Planned) -> tuple[str, ...]:
     """Return a note on the inputs that differ from those of the results in the folder."""
     earlier = results.provenance().get("inputs") or {}
     names = [name for name, content in planned.inputs.items() if earlier.get(name, content) != content]
-    if not names:
-        return []
-    return [
-        "changed since the folder of results was last used, so that only results of the present content count: "
-        f"{listed(names)}"
-    ]
-
-
-def _notes(known: Sequence[TaskResult]) -> list[str]:
-    """Return the differences between the versions of the existing results and those of this process."""
-    notes: list[str] = []
-    for result in known:
-        for line in differences(versions(), result.made.get("versions", {})):
-            text = f"results from before were made with other versions: {line}"
-            if text not in notes:
-                notes.append(text)
-    return notes
+    told = (
+        "changed since the folder of results was last used, so that only results of the present content count"
+    )
+    return (f"{told}: {listed(names)}",) if names else ()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
@@ -22,6 +23,7 @@ from graspsense.experiments.task_results import (
     ClassifierResult,
     RecognitionResult,
 )
+from graspsense.experiments.versions import differences
 
 
 @frozen(kw_only=True)
@@ -51,9 +53,14 @@ class ConditionResult:
         return ", ".join(part for part in (self.case.name, classifier) if part)
 
     @property
+    def first_seed(self) -> int:
+        """The first seed that has a result."""
+        return next(iter(self.by_seed))
+
+    @property
     def of_first_seed(self) -> ClassifierResult:
         """The result of the first seed."""
-        return next(iter(self.by_seed.values()))
+        return self.by_seed[self.first_seed]
 
     @property
     def protocol(self) -> str:
@@ -142,6 +149,8 @@ class Summary:
     """Tasks without a result."""
     unreadable: tuple[str, ...] = field(default=())
     """The files of results that cannot be read, each with the reason."""
+    other_versions: Mapping[str, int] = field(factory=dict)
+    """How the versions of results differ from those of the last run, each with the number of the results."""
     seconds: float
     """Total time of all tasks."""
     cpu_seconds: float = 0.0
@@ -192,6 +201,42 @@ class Summary:
                 cases.setdefault(content, []).append(case.name)
         return [names for names in cases.values() if len(names) > 1]
 
+    @property
+    def doubts(self) -> list[str]:
+        """A sentence each on results of other versions, and on cases whose results are the same."""
+        return [
+            *(
+                f"{counted(number, 'result was', 'results were')} made with other versions than the last run has: {how}"
+                for how, number in self.other_versions.items()
+            ),
+            *(
+                f"{listed(list(map(repr, names)))}: all trials and answers are the same, so that what differs between "
+                "these cases has no effect here"
+                for names in self.alike
+            ),
+        ]
+
+    @property
+    def left_out(self) -> list[str]:
+        """A sentence each on the tasks that failed, whose results cannot be read, or that have none yet."""
+        lines = []
+        if self.failed:
+            reasons = list(dict.fromkeys(task.reason for task in self.failed))
+            failed = counted(len(self.failed), "task failed and is", "tasks failed and are")
+            lines.append(f"{failed} not included: {'; '.join(reasons[:5])}")
+        if self.unreadable:
+            lines.append(
+                f"{counted(len(self.unreadable), 'result')} cannot be read, and not included: "
+                f"{'; '.join(self.unreadable[:5])}. The same experiment with "
+                f"{option('resume', python='resume=True')} computes them again"
+            )
+        if self.missing:
+            missing = counted(
+                self.missing, "task has no result yet and is", "tasks have no result yet and are"
+            )
+            lines.append(f"{missing} not included")
+        return lines
+
     def as_json(self) -> dict[str, Any]:
         """Return the JSON form that `graspsense experiment --json` prints."""
         return {
@@ -222,26 +267,31 @@ class Summary:
             "missing": self.missing,
             **({"unreadable": list(self.unreadable)} if self.unreadable else {}),
             **({"alike": self.alike} if self.alike else {}),
+            **({"other_versions": dict(self.other_versions)} if self.other_versions else {}),
             "seconds": self.seconds,
         }
 
 
 def summarise(planned: Planned, results: Results) -> Summary:
-    """Return the summary of the results in a folder. Raises DataDamaged if a result cannot be read."""
+    """Return the summary of the results in a folder."""
     by_condition: dict[tuple[str, str, Target], dict[int, ClassifierResult]] = {}
     simulated: dict[str, bool] = {}
     decoded: dict[tuple[str, int], AnyTaskResult] = {}
     failed, unreadable, missing, seconds, cpu_seconds = [], [], 0, 0.0, 0.0
+    of_last_run = results.provenance().get("versions")
+    other_versions: Counter[str] = Counter()
     for case in planned.cases:
         for seed in planned.seeds:
-            key = planned.task(case, seed).key
-            task_result, problem = results.read(key)
+            task_result, problem = results.read(planned.task(case, seed))
             if task_result is None:
                 unreadable += [problem] if problem else []
                 missing += not problem
                 continue
-            seconds += task_result.seconds
-            cpu_seconds += task_result.cpu_seconds
+            made = task_result.made
+            seconds += made.seconds
+            cpu_seconds += made.cpu_seconds
+            if of_last_run and made.versions and (differ := differences(of_last_run, made.versions)):
+                other_versions["; ".join(differ)] += 1
             result = task_result.decoded(case.kind)
             if result is None:
                 failed.append(task_result)
@@ -270,6 +320,7 @@ def summarise(planned: Planned, results: Results) -> Summary:
         failed=tuple(failed),
         missing=missing,
         unreadable=tuple(unreadable),
+        other_versions=other_versions,
         seconds=seconds,
         cpu_seconds=cpu_seconds,
     )
@@ -278,34 +329,15 @@ def summarise(planned: Planned, results: Results) -> Summary:
 def summary_of(results: Results) -> Summary:
     """Return the summary of a folder by the experiment that lies in it.
 
-    Raises ConfigError if the folder has results and none of them is of its experiment, which was changed after the run;
-    DataDamaged if a result cannot be read.
+    Raises ConfigError if the folder has results and none of them is of its experiment, which was changed after the run.
     """
     summary = summarise(results.experiment(), results)
     if not summary.results and not summary.failed and not summary.unreadable and results.any():
+        made = results.provenance()
+        again = f" ({made['command']})" if made.get("command") else ""
         raise ConfigError(
             f"{results.folder} has results, but none for the settings that it has now: {EXPERIMENT}, {PIPELINES}/, "
-            f"{PROVENANCE} or graspsense itself was changed after the run. Restore the files, or run the changed "
-            f"experiment into another folder: graspsense experiment {results.folder / EXPERIMENT} --out FOLDER"
+            f"{PROVENANCE} or graspsense itself was changed after the run{again}. Restore the files, or run the "
+            f"changed experiment into another folder: graspsense experiment {results.folder / EXPERIMENT} --out FOLDER"
         )
     return summary
-
-
-def alike_lines(summary: Summary) -> list[str]:
-    """Return a sentence on each group of cases whose results are the same."""
-    return [
-        f"{listed(list(map(repr, names)))}: all trials and answers are the same, so that what differs between these "
-        "cases has no effect here"
-        for names in summary.alike
-    ]
-
-
-def unreadable_lines(summary: Summary) -> list[str]:
-    """Return a sentence on the results that cannot be read, which is empty if all can be."""
-    if not summary.unreadable:
-        return []
-    shown = "; ".join(summary.unreadable[:5])
-    return [
-        f"{counted(len(summary.unreadable), 'result')} cannot be read, and not included: {shown}. The "
-        f"same experiment with {option('resume', python='resume=True')} computes them again"
-    ]

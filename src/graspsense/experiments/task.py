@@ -5,26 +5,29 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
+import re
 import sys
 import time
 import traceback
 from collections.abc import Mapping
 from contextlib import redirect_stdout
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Final
 
 from attrs import asdict, field, frozen
 
 from graspsense.core.learn.model_content import digest
-from graspsense.core.values.errors import FAILURES, DataDamaged, GraspsenseError, named, place_of
-from graspsense.core.values.json_values import json_ready, json_text
-from graspsense.evaluation.json_codec import from_json
+from graspsense.core.values.errors import FAILURES, ConfigError, GraspsenseError, listed, named, place_of
+from graspsense.core.values.json_values import json_text
+from graspsense.evaluation.json_codec import from_json, to_json
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.versions import versions
+from graspsense.sources.input_content import contents_of
 
 if TYPE_CHECKING:
     from graspsense.experiments.task_results import AnyTaskResult
 
-State = Literal["done", "failed"]
+_FOLDERS: Final = re.compile(r"[^:,]*/")
+"""The folders before the name of a file, also behind a colon or a comma."""
 
 
 @frozen(kw_only=True)
@@ -41,13 +44,19 @@ class Task:
 
     @property
     def key(self) -> str:
-        """The hash of everything that determines the result."""
-        text = _text({"kind": self.kind, "params": self.params, "seed": self.seed})
+        """The hash of everything that determines the result: of an input name and content, wherever it lies."""
+        inputs = self.params.get("inputs", {})
+        params = _by_content({**self.params, "inputs": sorted(inputs.values())}, inputs)
+        text = _text({"kind": self.kind, "params": params, "seed": self.seed})
         return hashlib.sha256(text.encode()).hexdigest()[:32]
 
     def to_text(self) -> str:
         """Return JSON in one line. Settings may be infinite, which Python's JSON can write and read."""
         return _text(asdict(self, recurse=False))
+
+    def failed(self, reason: str) -> TaskResult:
+        """Return the result of the task if it failed outside of its own function."""
+        return TaskResult(key=self.key, name=self.name, reason=reason)
 
     @classmethod
     def from_text(cls, text: str) -> Task:
@@ -56,64 +65,46 @@ class Task:
 
 
 @frozen(kw_only=True)
-class TaskResult:
-    """The result of a task as JSON values, or the `reason` why there is none.
+class Made:
+    """Where, when, how long and with which versions a task ran; it is not part of the result. Zeros are not known."""
 
-    `made` records where, when and with which versions the task ran; it is not part of the result.
-    """
+    begun_at: str = ""
+    seconds: float = 0.0
+    cpu_seconds: float = 0.0
+    host: str = ""
+    versions: Mapping[str, str] = field(factory=dict)
+    traceback: str = ""
+
+
+@frozen(kw_only=True)
+class TaskResult:
+    """The result of a task as JSON values, or the `reason` why there is none: the task failed."""
 
     key: str
     name: str
-    state: State
     result: Mapping[str, Any] | None = None
     reason: str = ""
-    made: Mapping[str, Any] = field(factory=dict)
-
-    @property
-    def seconds(self) -> float:
-        """The duration of the task, 0 if it is not known."""
-        return float(self.made.get("seconds", 0.0))
-
-    @property
-    def cpu_seconds(self) -> float:
-        """The processor time of the task, 0 if it is not known."""
-        return float(self.made.get("cpu_seconds", 0.0))
+    made: Made = field(factory=Made)
 
     def decoded(self, kind: str) -> AnyTaskResult | None:
-        """Return the result with its type, None if the task failed. Raises DataDamaged if it cannot be read."""
+        """Return the result with its type, None if the task failed. Raises ValueError if it is of another form."""
         if self.result is None:
             return None
-        try:
-            decoded: AnyTaskResult = from_json(self.result, kind_of(kind).result_class())
-        except Exception as error:
-            raise DataDamaged(
-                f"the result of {self.name or self.key} cannot be read: {named(error)}"
-            ) from error
+        decoded: AnyTaskResult = from_json(self.result, kind_of(kind).result_class())
         return decoded
 
     def to_text(self) -> str:
         """Return JSON in one line, with the hash of its content."""
-        content = asdict(self, recurse=False)
-        return json_text({**content, "sha256": digest(json_ready(content))})
+        content = to_json(self)
+        return json_text({**content, "sha256": digest(content)})
 
     @classmethod
     def from_text(cls, text: str) -> TaskResult:
-        """Return the result that `to_text` wrote. Raises ValueError, KeyError or TypeError for any other text."""
+        """Return the result that `to_text` wrote. Raises ValueError for any other text."""
         values = json.loads(text)
-        if not isinstance(values, dict):
-            raise TypeError("it is no JSON object")
-        if values.pop("sha256") != digest(values):
+        if not isinstance(values, dict) or values.pop("sha256", None) != digest(values):
             raise ValueError("its sha256 does not match")
-        if values["state"] not in ("done", "failed") or (values["result"] is None) != (
-            values["state"] == "failed"
-        ):
-            raise ValueError("it is neither done nor failed")
-        return cls(**values)
-
-    @classmethod
-    def failed(cls, task: Task, reason: str) -> TaskResult:
-        """Return the result of a task that failed outside of its own function."""
-        return cls(key=task.key, name=task.name, state="failed", reason=reason)
+        return from_json(values, cls)
 
 
 def run_task(text: str) -> str:
@@ -132,22 +123,44 @@ def run_task(text: str) -> str:
             kind = kind_of(task.kind)
             # Encoded here, so that a value of a plugin that JSON cannot hold fails this task alone, and at once.
             result = kind.encoded(kind.function()(task.params, task.seed))
+        _refuse_other_inputs(task)
     except GraspsenseError as error:
-        reason = str(error)
+        result, reason = None, str(error)
     except FAILURES as error:
         reason, where = named(error) + place_of(error), "".join(traceback.format_exception(error)[-6:])
-    made = {
-        "at": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(begun)),
-        "seconds": round(time.monotonic() - clock, 3),
-        "cpu_seconds": round(time.process_time() - cpu, 3),
-        "host": platform.node(),
-        "versions": versions(),
-        **({"traceback": where} if where else {}),
-    }
-    state: State = "failed" if result is None else "done"
-    return TaskResult(
-        key=task.key, name=task.name, state=state, result=result, reason=reason, made=made
-    ).to_text()
+    made = Made(
+        begun_at=time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(begun)),
+        seconds=round(time.monotonic() - clock, 3),
+        cpu_seconds=round(time.process_time() - cpu, 3),
+        host=platform.node(),
+        versions=versions(),
+        traceback=where,
+    )
+    return TaskResult(key=task.key, name=task.name, result=result, reason=reason, made=made).to_text()
+
+
+def _refuse_other_inputs(task: Task) -> None:
+    """Raise ConfigError if inputs of a task have another content here than where and when the experiment was read."""
+    planned = task.params.get("inputs", {})
+    params = {key: value for key, value in task.params.items() if key != "inputs"}
+    present = contents_of([task.kind, params]) if planned else {}
+    changed = [name for name, content in planned.items() if present.get(name, content) != content]
+    if changed:
+        raise ConfigError(
+            f"changed while the experiment ran, or other files on {platform.node()}: {listed(changed)}. Resume the "
+            "experiment"
+        )
+
+
+def _by_content(value: Any, inputs: Mapping[str, str]) -> Any:
+    """Return parameters with the name and the content of each input in place of the text that names it."""
+    if isinstance(value, str):
+        return f"{_FOLDERS.sub('', value)} {inputs[value]}" if value in inputs else value
+    if isinstance(value, Mapping):
+        return {key: _by_content(inner, inputs) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_by_content(inner, inputs) for inner in value]
+    return value
 
 
 def _text(values: Mapping[str, Any]) -> str:

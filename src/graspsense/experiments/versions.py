@@ -4,36 +4,51 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 from collections.abc import Mapping
+from contextlib import suppress
 from datetime import date
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError, requires, version
 from typing import Final
 
-from graspsense import __version__
 from graspsense.core.components.registry import installed
+from graspsense.sources.input_content import FRAMEWORK, developed_code
 
 _LIBRARIES: Final = ("numpy", "scipy", "scikit-learn", "numba")
+_REQUIREMENT: Final = re.compile(r"([\w.-]+)(?!.*\bextra\b)")
 
 
 @cache
 def versions() -> Mapping[str, str]:
-    """Return the versions that a result may depend on: Python, libraries, plugins, processor."""
-    versions_here = {
-        "python": platform.python_version(),
-        "graspsense": __version__,
-        "machine": platform.machine(),
-    }
-    for name in _LIBRARIES:
+    """Return the versions that a result may depend on: Python, libraries, plugins and what these need, processor.
+
+    To the version of a distribution that is developed here, a hash of its code is added: `0.1.0+1f3a9c0e`.
+    """
+    versions_here = {"python": platform.python_version(), "machine": platform.machine()}
+    libraries = set(_LIBRARIES)
+    for status in installed().statuses:
+        code = developed_code(status.module)[:8]
+        words = f"{status.version}+{code}" if code else status.version
+        if status.state == "loaded" and status.distribution != FRAMEWORK:
+            libraries |= _required_by(status.distribution)
+        versions_here[status.distribution] = (
+            words if status.state == "loaded" else f"{words} ({status.state})"
+        )
+    for name in sorted(libraries - versions_here.keys()):
         try:
             versions_here[name] = version(name)
         except PackageNotFoundError:
             versions_here[name] = "not installed"
-    for status in installed().statuses:
-        versions_here[status.distribution] = (
-            status.version if status.state == "loaded" else f"{status.version} ({status.state})"
-        )
     return versions_here
+
+
+def _required_by(distribution: str) -> set[str]:
+    """Return the distributions that a plugin needs; those of graspsense itself are `_LIBRARIES`."""
+    needed: list[str] = []
+    with suppress(PackageNotFoundError):
+        needed = requires(distribution) or []
+    return {re.sub(r"[-_.]+", "-", name[1]).lower() for name in map(_REQUIREMENT.match, needed) if name}
 
 
 def measured_on() -> dict[str, str]:

@@ -30,6 +30,7 @@ from graspsense.store.opening import STORE, as_source, place_and_number
 FRAMEWORK: Final = "graspsense"
 _OWN_PLUGINS: Final = "graspsense.plugins"
 _CALIBRATION: Final = "calibration"
+_OF_TRIALS: Final = 'id, recording, sha256, label, instance, set_aside, hex("values")'
 _QUOTED: Final = re.compile(r"\"[^\"\n]{1,1000}\"|'[^'\n]{1,1000}'")
 
 
@@ -75,7 +76,7 @@ def _content(text: str, codes: Mapping[str, list[tuple[str, str]]]) -> str | Non
     if text in codes:
         return _hash(_hash_of_code(*code) for code in codes[text])
     if text.startswith(STORE):
-        return _hash_of_store(text.removeprefix(STORE))
+        return _hash_of_store(place_and_number(text.removeprefix(STORE))[0])
     kind, paths = _named_places(text)
     if not paths:
         return None
@@ -150,35 +151,52 @@ def _hash_of_code(version: str, module: str) -> str:
     package = _OWN_PLUGINS if module.startswith(f"{_OWN_PLUGINS}.") else module.partition(".")[0]
     if package == FRAMEWORK:
         return version
-    spec = find_spec(package)
-    places = [] if spec is None else list(spec.submodule_search_locations or [spec.origin or ""])
+    places = _places_of_package(package)
     places += [beside for place in places for beside in _developed_beside(place)]
-    return _hash([version, *(_hash_of_tree(place) for place in places if os.path.exists(place))])
+    return _hash([version, *map(_hash_of_tree, places)])
+
+
+def developed_code(module: str) -> str:
+    """Return a hash of the package of a module that is not installed but developed; empty for an installed one.
+
+    The version of a developed package says nothing of its content.
+    """
+    places = _places_of_package(module.partition(".")[0])
+    return _hash(map(_hash_of_tree, places)) if all(map(_is_developed, places)) else ""
+
+
+def _places_of_package(package: str) -> list[str]:
+    """Return the folders of a package, or the file of a module."""
+    spec = find_spec(package)
+    places = [] if spec is None else spec.submodule_search_locations or [spec.origin or ""]
+    return [place for place in places if os.path.exists(place)]
+
+
+def _is_developed(place: str) -> bool:
+    return os.path.basename(os.path.dirname(place)) not in ("site-packages", "dist-packages")
 
 
 def _developed_beside(place: str) -> list[str]:
-    """Return the other modules and packages in the folder of a package that is not installed there but developed.
-
-    The package may import them, and their versions say nothing of their content.
-    """
-    folder = os.path.dirname(place)
-    if os.path.basename(folder) in ("site-packages", "dist-packages"):
+    """Return the other modules and packages in the folder of a package that is developed, which may import them."""
+    if not _is_developed(place):
         return []
+    folder = os.path.dirname(place)
     others = {*glob(f"{escape(folder)}/*.py"), *map(os.path.dirname, glob(f"{escape(folder)}/*/__init__.py"))}
     return sorted(others - {place})
 
 
 def _hash_of_store(folder: str) -> str:
-    """Return a hash of the trials of a store, of their labels, and of all changes of them."""
+    """Return a hash of the trials of a store, of their labels, of all changes of them, and of lost recordings."""
     from graspsense.store.store import Store
 
     try:
         with Store.read(folder) as store:
-            trials = store.query("SELECT id, sha256, label, instance, set_aside FROM trial ORDER BY id")
+            trials = store.query(f"SELECT {_OF_TRIALS} FROM trial ORDER BY id")
             changes = store.query('SELECT trial, "action", "before", "after" FROM change ORDER BY id')
+            lost = [[number] for number, name, *_ in trials if not store.recording_path(name).is_file()]
     except GraspsenseError as error:
         return _hash([str(error)])  # the task tells it
-    return _hash([json_text([list(row) for row in (*trials, *changes)])])
+    return _hash([json_text([list(row) for row in (*trials, *changes, *lost)])])
 
 
 def _hash_of_files(path: str, kind: str) -> str:
@@ -196,7 +214,8 @@ def _hash_of_files(path: str, kind: str) -> str:
         files = manifest_files(path)
     except GraspsenseError:
         files = []  # the task tells it
-    return _hash(_hash_of_tree(str(file)) for file in (path, *files))
+    names = (os.path.relpath(file, os.path.dirname(path)) for file in files)  # which can hold labels
+    return _hash([_hash_of_tree(path), *names, *map(_hash_of_tree, map(str, files))])
 
 
 def _named_files(path: str, folders: tuple[str, ...], known: set[str]) -> set[str]:
@@ -234,8 +253,7 @@ def _places_in_package(text: str) -> Iterator[str]:
     """Yield where the file of an installed package can be that `package:NAME:PATH` names."""
     scheme, package, resource = (*text.split(":", 2), "", "")[:3]
     if scheme == "package" and package.isidentifier() and resource:
-        spec = find_spec(package)
-        for folder in (spec and spec.submodule_search_locations) or ():
+        for folder in _places_of_package(package):
             yield os.path.join(folder, resource)
 
 

@@ -118,7 +118,10 @@ class Collection:
             if answer is None or answer == "q":
                 break
             if answer == "":
-                self._grasp(word)
+                if self.following() == word:
+                    self._grasp(word)
+                else:
+                    self.say(f"somebody else has collected {word} meanwhile")
             elif answer == "u":
                 self._undo(UNDONE)
             elif answer == "r":

@@ -84,20 +84,20 @@ class TrialTable:
 def trial_table(folder: str | Path) -> TrialTable:
     """Return all trials of a store that are not set aside. Raises ConfigError if there is none, DataDamaged."""
     with Store.read(folder) as store:
+        ((set_aside,),) = store.query("SELECT count(*) FROM trial WHERE set_aside IS NOT NULL")
         rows = store.query(
             """SELECT id, made_at, detail.labels, label, instance, outcome, complete, origin, trial.device, simulated,
             recording, feature_set, "values", before_set, before_contact FROM trial
             JOIN detail ON detail.trial = trial.id WHERE set_aside IS NULL ORDER BY id"""
         )
+        if not rows:
+            aside = f" that is not set aside ({set_aside} are)" if set_aside else ""
+            raise ConfigError(f"the store in {folder} has no trial to export{aside}")
         sets = dict(store.query("SELECT id, features FROM feature_set"))
-        columns = dict(zip(_SELECTED, zip(*rows, strict=True), strict=True)) if rows else {}
-        first_line = first_lines(store, columns["recording"], columns["origin"]) if rows else None
-        ((set_aside,),) = store.query("SELECT count(*) FROM trial WHERE set_aside IS NOT NULL")
-        labels = [decoded(folder, text) for text in columns["labels"]] if rows else []
-        numbers = with_changed_numbers(store, columns["trial"], labels) if rows else []
-    if not rows:
-        aside = f" that is not set aside ({set_aside} are)" if set_aside else ""
-        raise ConfigError(f"the store in {folder} has no trial to export{aside}")
+        columns = dict(zip(_SELECTED, zip(*rows, strict=True), strict=True))
+        first_line = first_lines(store, columns["recording"], columns["origin"])
+        labels = [decoded(folder, text) for text in columns["labels"]]
+        numbers = with_changed_numbers(store, columns["trial"], labels)
     columns |= {name: tuple(label.get(name) for label in labels) for name in (RECORDED_AT, ORDER)}
     opening = _unpacked(folder, sets, columns["before_set"], columns["before_contact"])
     parts = [(BEFORE, opening), (FIRST, first_line), (VALUE, _numbers_to_predict(numbers))]

@@ -16,7 +16,6 @@ from typing import Any, Final, NamedTuple
 from attrs import evolve, frozen
 
 from graspsense.experiment_api import (
-    ConditionResult,
     MeanDifference,
     OverSeeds,
     RecognitionResult,
@@ -170,12 +169,20 @@ def _merged(claims: Sequence[Claim | None]) -> Claim | None:
 
 
 def _rise(
-    summary: Summary, experiment: str, key: str, values: tuple[Any, Any]
-) -> tuple[MeanDifference, ConditionResult, ConditionResult] | None:
-    """Return by how much the rate of states rises from one value of a swept setting to the other, and both results."""
-    low, high = (condition_result(summary, experiment, "state", {key: value}) for value in values)
-    gap = None if low is None or high is None else high.minus(low)
-    return None if low is None or high is None or gap is None else (gap, low, high)
+    summary: Summary, case: tuple[str, str], values: tuple[Any, Any], words: str, **limits: float
+) -> ClaimFigure | None:
+    """Return whether the rate of states rises within these limits from one value of a swept setting to the other.
+
+    `case` is the experiment and its setting. In `words` stand `{points}` for the rise, `{first}` and `{second}` for the
+    rates.
+    """
+    weak, strong = (condition_result(summary, case[0], "state", {case[1]: value}) for value in values)
+    gap = None if weak is None or strong is None else strong.minus(weak)
+    if weak is None or strong is None or gap is None:
+        return None
+    rates = {"first": percent(weak.rate.mean), "second": percent(strong.rate.mean)}
+    number = words.format(points=_points(gap.value, gap.interval), **rates)
+    return ClaimFigure(within(gap.interval, **limits), number, sample(weak.rate))
 
 
 def _points(value: float, interval: tuple[float, float]) -> str:
@@ -190,11 +197,8 @@ def _points(value: float, interval: tuple[float, float]) -> str:
     "approach_speed",
 )
 def _approach_velocity(summary: Summary) -> ClaimFigure | None:
-    if (rise := _rise(summary, "approach_speed", SPEED, (0.005, 0.02))) is None:
-        return None
-    gap, slow, _ = rise
-    number = f"20 mm/s minus 5 mm/s: {_points(gap.value, gap.interval)}"
-    return ClaimFigure(within(gap.interval, -COUNTS, COUNTS), number, sample(slow.rate))
+    words = "20 mm/s minus 5 mm/s: {points}"
+    return _rise(summary, ("approach_speed", SPEED), (0.005, 0.02), words, low=-COUNTS, high=COUNTS)
 
 
 @_claim(
@@ -206,11 +210,8 @@ def _approach_velocity(summary: Summary) -> ClaimFigure | None:
     follows_from=("table_4_17", "table_4_23"),
 )
 def _probing_force(summary: Summary) -> ClaimFigure | None:
-    if (rise := _rise(summary, "table_4", FORCE, (17.0, PROBING_N))) is None:
-        return None
-    gap, weak, _ = rise
-    number = f"23 N minus 17 N: {_points(gap.value, gap.interval)}; printed: {_printed_rise()}"
-    return ClaimFigure(within(gap.interval, low=COUNTS), number, sample(weak.rate))
+    words = f"23 N minus 17 N: {{points}}; printed: {_printed_rise()}"
+    return _rise(summary, ("table_4", FORCE), (17.0, PROBING_N), words, low=COUNTS)
 
 
 def _printed_rise() -> str:
@@ -235,14 +236,8 @@ def _printed_rise() -> str:
 )
 def _worn(summary: Summary) -> ClaimFigure | None:
     wears = ("other worn bottles", "other new bottles")
-    if (rise := _rise(summary, "worn_bottles", VARIANT, wears)) is None:
-        return None
-    gap, worn, new = rise
-    number = (
-        f"new {percent(new.rate.mean)}, worn {percent(worn.rate.mean)}, new minus worn: "
-        f"{_points(gap.value, gap.interval)}"
-    )
-    return ClaimFigure(within(gap.interval, low=COUNTS), number, sample(new.rate))
+    words = "new {second}, worn {first}, new minus worn: {points}"
+    return _rise(summary, ("worn_bottles", VARIANT), wears, words, low=COUNTS)
 
 
 @_claim(

@@ -64,7 +64,7 @@ class DaskCluster:
         # Alone, so that no other task can be the cause if the worker dies again.
         for task, text in self._answers(victims, "alone"):
             reason = "it ended its worker, also when it was tried again alone"
-            yield TaskResult.failed(task, reason) if text is None else _done(task, text)
+            yield task.failed(reason) if text is None else _done(task, text)
 
     def _answers(
         self, tasks: Sequence[Task], turn: Literal["first", "alone"]
@@ -177,7 +177,7 @@ class DaskCluster:
 def _done(task: Task, answer: str | Exception) -> TaskResult:
     """Return the result of a task, from its answer or from the exception that prevented it."""
     if isinstance(answer, Exception):
-        return TaskResult.failed(task, f"the worker failed: {named(answer)}")
+        return task.failed(f"the worker failed: {named(answer)}")
     return TaskResult.from_text(answer)
 
 

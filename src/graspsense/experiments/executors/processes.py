@@ -65,7 +65,7 @@ class Processes:
                             # Tried again last, in case it ends further workers.
                             waiting.append(task)
                         else:
-                            yield TaskResult.failed(task, f"it ended its worker {ATTEMPTS} times ({how})")
+                            yield task.failed(f"it ended its worker {ATTEMPTS} times ({how})")
                     elif not worker.ready:
                         starts_lost += 1
                         if starts_lost > self.workers:
