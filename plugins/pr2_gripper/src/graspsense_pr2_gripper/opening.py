@@ -48,7 +48,7 @@ def open_board(config: Pr2Config, seed: int, wait_s: float) -> Opened:
     except TransportGone as error:
         close_within(transport, JOIN_S)
         raise _no_answer(config, error) from error
-    return Opened(ThreadedLink(transport, 1.0 / identity.report_rate_hz), identity, None)
+    return Opened(ThreadedLink(transport), identity, None)
 
 
 def _identified(config: Pr2Config, transport: Transport) -> Identity:
