@@ -81,8 +81,9 @@ def _emulated(config: Pr2Config, seed: int) -> Opened:
     except NoDevice:
         transport.close()
         raise
-    kind = LockStepLink if config.pace == "lock-step" else ThreadedLink
-    return Opened(kind(transport, 1.0 / identity.report_rate_hz), identity, emulation)
+    if config.pace != "lock-step":
+        return Opened(ThreadedLink(transport), identity, emulation)
+    return Opened(LockStepLink(transport, 1.0 / identity.report_rate_hz), identity, emulation)
 
 
 def _open_transport(config: Pr2Config, wait_s: float) -> Transport:
