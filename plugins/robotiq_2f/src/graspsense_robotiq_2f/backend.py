@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from math import inf, nan
 from types import MappingProxyType
@@ -171,15 +171,10 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
     def close(self) -> None:
         """Stop the fingers if the gripper still responds, if need be over a new connection, and close it."""
         link, self._link = self._link, None
-        if link is not None:
-            try:
-                self._stop(link)
-            except OSError:
-                with suppress(OSError, ValueError):
-                    self._stop(self._opened_link())
+        stopped = link is None or self._stopped(lambda: link) or self._stopped(self._opened_link)
         switch, self._switch = self._switch, None
         if switch is not None:
-            switch.release()
+            switch.release(stopped=stopped)
         fingertips, self._fingertips = self._fingertips, None
         if fingertips is not None:
             fingertips.close()
@@ -294,6 +289,14 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
 
     def _opened_link(self) -> ModbusLink | UrCapLink:
         return opened_link(self.config.port, self.config.address, self.config.reply_timeout_s)
+
+    def _stopped(self, opened: Callable[[], ModbusLink | UrCapLink | LockStepGripper]) -> bool:
+        """Tell the gripper to stop, and close this connection; return whether it was not lost."""
+        try:
+            self._stop(opened())
+        except (OSError, ValueError):
+            return False
+        return True
 
     def _stop(self, link: ModbusLink | UrCapLink | LockStepGripper) -> None:
         """Tell the gripper to stop, and close the connection. Raises OSError if the connection was lost."""
