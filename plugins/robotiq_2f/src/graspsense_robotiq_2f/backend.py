@@ -169,7 +169,7 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
             self._zero = tare(images, self.config.pad_counts_per_newton, 0)
 
     def close(self) -> None:
-        """Stop the fingers if the gripper still responds, and close it. One that is lost is told to open, if it can be."""
+        """Stop the fingers if the gripper still responds, and close it. A lost one is told to open, if it can be."""
         link, self._link = self._link, None
         stopped = link is None or self._stopped(link)
         switch, self._switch = self._switch, None
