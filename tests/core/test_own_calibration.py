@@ -42,6 +42,14 @@ class Counting(Hand, SensorBackend[CountingConfig]):
         return super().read(timeout_s)._replace(signals=())
 
 
+class Stopped(Counting):
+    """Its clock stands still."""
+
+    def read(self, timeout_s):
+        reading = super().read(timeout_s)
+        return reading._replace(frame=reading.frame._replace(t_s=0.0, dt_s=0.0))
+
+
 class Keyless(Hand):
     channels = Counting.channels
     accepts = ("effort",)
@@ -49,6 +57,7 @@ class Keyless(Hand):
 
 PLUGIN = offering(
     SensorBackendEntry("counting", f"{__name__}:Counting", "a hand"),
+    SensorBackendEntry("stopped", f"{__name__}:Stopped", "a hand"),
     SensorBackendEntry("keyless", f"{__name__}:Keyless", "a hand", config="parts:HandConfig"),
 )
 
@@ -62,7 +71,7 @@ def calibrate(monkeypatch, tmp_path):
         readings, folder = tmp_path / "readings.csv", f"gripper.calibration={tmp_path}"
         readings.write_text(text or "")
         given = [kind, *([] if text is None else [readings])]
-        folder = ["-o", folder] if gripper == "counting" else []
+        folder = [] if gripper == "keyless" else ["-o", folder]
         with IsolatedPlugins(PLUGIN):
             done = graspsense("calibrate", *given, *folder, "--gripper", gripper, *NO_MODEL)
         return done.returncode, done.stderr
@@ -122,3 +131,9 @@ def test_readings_that_give_no_gain_are_refused(calibrate, tmp_path, text, said)
 def test_a_gripper_without_the_setting_is_told_what_it_takes(calibrate):
     code, said = calibrate("tare", gripper="keyless")
     assert (code, "no key 'calibration'" in said, "calibrations_of" in said) == (2, True, True)
+
+
+def test_a_clock_that_stands_still_ends_the_calibration(calibrate, tmp_path):
+    """The time limits of its motions are those of this clock."""
+    code, said = calibrate("tare", gripper="stopped")
+    assert (code, "clock stands still" in said, (tmp_path / "H7").exists()) == (4, True, False), said

@@ -6,6 +6,7 @@ import time
 from functools import partial
 from itertools import groupby
 from math import inf, nan
+from threading import Event
 from types import SimpleNamespace
 
 import pytest
@@ -14,7 +15,7 @@ from cases import every_case
 from grippers import CONTACT_S, REST_S, Scripted, bottle, law, squeezing
 
 from graspsense.core.components.run_config import RunConfig
-from graspsense.core.grasp import runner
+from graspsense.core.grasp import interrupts, runner
 from graspsense.core.grasp.runner import MAY_BE_CLOSED, run_grasp
 from graspsense.core.values.errors import ComponentFailed, NoDevice, RecordingEnded, TareRefused
 from graspsense.core.values.signals import EFFORT, VELOCITY, Command, Outcome, Phase, Reading
@@ -197,6 +198,25 @@ def test_whatever_stops_the_loop_the_fingers_are_opened(error, reason, after):
     grasp = run_grasp(gripper, law(partial(fail, error=error), after), RUN)
     assert (grasp.outcome, reason in grasp.reason) == (Outcome.ABORTED, True)
     assert (let_go(gripper), gripper.closed) == (True, 1)
+
+
+def spin(*values):
+    while True:
+        pass
+
+
+@every_case("hangs", [lambda *values: Event().wait(), spin])
+@every_case("after", [900, 1100])
+def test_a_step_that_never_ends_is_ended_and_the_fingers_are_opened(monkeypatch, hangs, after):
+    monkeypatch.setattr(interrupts, "STUCK_S", 0.1)
+    gripper = Scripted(squeezing, bottle)
+    grasp = run_grasp(gripper, law(hangs, after), RUN)
+    assert (grasp.outcome, "did not end" in grasp.reason, grasp.interrupted) == (
+        Outcome.ABORTED,
+        True,
+        False,
+    )
+    assert (let_go(gripper), gripper.closed, len(grasp.trace) > 500) == (True, 1, True)
 
 
 @every_case(("tick", "outcome"), [(1200, Outcome.ABORTED), (1700, Outcome.ABORTED), (1850, Outcome.STEADY)])

@@ -36,7 +36,7 @@ def host(monkeypatch):
 def test_reader_counts_what_was_too_old_and_hands_on_the_fresh_one(host, fed):
     """After a stall of 300 ms the buffer holds the 64 reports that came first."""
     wire = fed(report(1, 10_000_000))
-    with closing(ThreadedLink(wire, 0.001)) as link:
+    with closing(ThreadedLink(wire)) as link:
         assert link.next(60.0) is not None
         host[0] += 0.3
         for i in range(1, 65):
@@ -53,7 +53,7 @@ def test_reader_counts_what_was_too_old_and_hands_on_the_fresh_one(host, fed):
 def test_clock_that_falls_behind_the_hosts_is_told(host, fed, old, expected):
     """64 old reports can come from a buffer; the 65th cannot. The board is slow in all it does, reports too."""
     wire = fed(report(0, 0))
-    with closing(ThreadedLink(wire, 0.001)) as link:
+    with closing(ThreadedLink(wire)) as link:
         assert link.next(60.0) is not None
         host[0] += 0.2
         for i in range(1, old + 1):
@@ -66,7 +66,7 @@ def test_clock_that_falls_behind_the_hosts_is_told(host, fed, old, expected):
 
 @pytest.mark.usefixtures("host")
 def test_newest_report_replaces_the_one_nobody_asked_for(fed):
-    with closing(ThreadedLink(fed(*(report(i, 1000 * i) for i in range(6))), 0.001)) as link:
+    with closing(ThreadedLink(fed(*(report(i, 1000 * i) for i in range(6))))) as link:
         drained(link, 6)
         while link.next(60.0).report.sequence < 5:
             pass
@@ -76,7 +76,7 @@ def test_newest_report_replaces_the_one_nobody_asked_for(fed):
 
 def test_loss_is_told_with_its_reason(fed):
     wire = fed()
-    link = ThreadedLink(wire, 0.001)
+    link = ThreadedLink(wire)
     wire.reports.put(TransportGone("read error"))
     with pytest.raises(DeviceLost, match=r"read error.*graspsense devices"):
         link.next(60.0)
@@ -97,7 +97,7 @@ def test_closing_is_bounded_where_the_library_hangs(monkeypatch, where, fed):
     monkeypatch.setattr(links, "JOIN_S", 0.3)
     wire = fed()
     setattr(wire, where, True)
-    link = ThreadedLink(wire, 0.001)
+    link = ThreadedLink(wire)
     if where == "stuck_in_close":
         # The reader has ended already, so that what is waited for in vain is the device alone.
         assert link._reader.close(60.0)

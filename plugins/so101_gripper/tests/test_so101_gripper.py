@@ -1,6 +1,7 @@
 """The driver of the gripper's motor against the emulated arm."""
 
 import json
+import time
 from contextlib import nullcontext
 
 import pytest
@@ -186,6 +187,27 @@ def test_a_program_that_is_killed_leaves_no_gripper_that_presses(emulated):
     arm = emulated()
     settings = {"port": arm.where, "reply_timeout_s": 10.0, "calibration": "none"}
     assert_a_killed_program_lets_go("so101", lambda: arm.state()["torque"], 8.0, **settings)
+
+
+def test_a_gripper_whose_cable_is_plugged_in_again_no_longer_presses(emulated, tmp_path):
+    """A port that is found by its number, as in /dev/serial/by-id, has its name again."""
+    arm, port = emulated(), tmp_path / "port"
+    port.symlink_to(arm.where)
+    driver = opened(arm, port=str(port))
+    driver.read(0.1)
+    driver.apply(Command(VELOCITY, -0.03, 8.0, 0.15))
+    arm.tell("unplug")
+    with pytest.raises(DeviceLost):
+        driver.read(0.1)
+    driver.close()
+    assert arm.state()["torque"]
+    port.unlink()
+    arm.tell("plug")
+    port.symlink_to(arm.where)
+    until_s = time.monotonic() + PATIENT_S
+    while arm.state()["torque"] and time.monotonic() < until_s:
+        time.sleep(0.01)
+    assert not arm.state()["torque"]
 
 
 def test_a_second_host_is_refused_the_port(emulated):

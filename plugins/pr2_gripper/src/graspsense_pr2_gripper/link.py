@@ -15,7 +15,6 @@ from typing import Final, NamedTuple, final
 
 from graspsense.gripper_api import DeviceClock, ReadingThread
 from graspsense.plugin_api import DeviceLost
-from graspsense_pr2_gripper.device_time import ClockFault, CountedTime, HostTime, PassingTime
 from graspsense_pr2_gripper.protocol import MAX_SAMPLES, InputReport
 from graspsense_pr2_gripper.stream import RawImage, Restarted, Stream
 from graspsense_pr2_gripper.transports.interface import Transport, TransportGone
@@ -45,20 +44,18 @@ class Arrival(NamedTuple):
 
 
 class Link(ABC):
-    """An open device as the driver sees it, which sends a report each `period_s`; `numbers_all`: of `CountedTime`."""
+    """An open device as the driver sees it."""
 
-    def __init__(self, transport: Transport, period_s: float, numbers_all: bool) -> None:
+    def __init__(self, transport: Transport) -> None:
         self.transport = transport
         self.stream = Stream()
         self.clock = DeviceClock()
-        self._passing = PassingTime()
-        self._counted = CountedTime(round(period_s * 1e6), numbers_all)
         self.discarded = 0
         """Number of reports that were too old."""
         self.gone = ""
         """The reason why the device counts as lost; empty while it does not."""
         self.reachable = True
-        """Whether commands are still sent: a device that restarted, or whose clock is wrong, can let go."""
+        """Whether commands are still sent: a device that restarted, or whose reports are old, can let go."""
 
     @property
     def skipped(self) -> int:
@@ -73,13 +70,6 @@ class Link(ABC):
             words=report.samples,
             sampled=self.stream.sampled,
         )
-
-    def _passes(self, report: InputReport) -> bool:
-        """Return whether a report of the stream has a later time than those before. Raises ClockFault."""
-        if not self._passing.passes(report.time_us):
-            return False
-        self._counted.check(report.sequence, report.time_us)
-        return True
 
     @abstractmethod
     def next(self, timeout_s: float) -> Arrival | None:
@@ -100,10 +90,10 @@ class Link(ABC):
             self._lose(gone)
             raise DeviceLost(self.gone) from gone
 
-    def _lose(self, why: TransportGone | Restarted | ClockFault) -> None:
+    def _lose(self, why: TransportGone | Restarted) -> None:
         """Set why the device counts as lost."""
         self.reachable = self.reachable and not isinstance(why, TransportGone)
-        self.gone = _lost(why)
+        self.gone = f"the PR2 gripper is gone ({why}): check its cable and power, then `graspsense devices`"
 
 
 @final
@@ -111,7 +101,7 @@ class LockStepLink(Link):
     """Reads on demand; each read without a waiting report advances the device time by `period_s`."""
 
     def __init__(self, transport: Transport, period_s: float) -> None:
-        super().__init__(transport, period_s, numbers_all=True)
+        super().__init__(transport)
         self._period_s = period_s
 
     def next(self, timeout_s: float) -> Arrival | None:
@@ -123,13 +113,13 @@ class LockStepLink(Link):
                 data = read(self._period_s)
                 while data:
                     report = take(data)
-                    if report is not None and self._passes(report):
+                    if report is not None:
                         arrival = self._arrival(report, time.monotonic())
                         newest = arrival if newest is None else joined(newest, arrival)
                     data = read(0.0)
                 if newest is not None:
                     return newest
-        except (TransportGone, Restarted, ClockFault) as gone:
+        except (TransportGone, Restarted) as gone:
             self._lose(gone)
             raise DeviceLost(self.gone) from gone
         return None
@@ -144,10 +134,9 @@ class LockStepLink(Link):
 class ThreadedLink(Link):
     """Reads in a thread that starts at construction."""
 
-    def __init__(self, transport: Transport, period_s: float) -> None:
-        super().__init__(transport, period_s, numbers_all=False)
+    def __init__(self, transport: Transport) -> None:
+        super().__init__(transport)
         self._closed = False
-        self._host = HostTime()
         self._old = 0
         """Number of consecutive reports that were too old."""
         self._reader = ReadingThread(self._read, name="PR2 reader", joined=joined)
@@ -161,11 +150,10 @@ class ThreadedLink(Link):
         """Wait for a report newer than the last one returned."""
         arrival = self._reader.newest(timeout_s)
         if arrival is None and self._old > BUFFERED:
-            self._lose(
-                ClockFault(
-                    "its clock falls behind that of this computer, or this computer does not keep up: the last "
-                    f"{self._old} reports were more than {OLDEST_S:g} s old"
-                )
+            self.gone = (
+                "the times of the PR2 gripper cannot be trusted (its clock falls behind that of this computer, or this "
+                f"computer does not keep up: the last {self._old} reports were more than {OLDEST_S:g} s old): power "
+                "the board off and on, then `graspsense doctor`"
             )
             raise DeviceLost(self.gone)
         return arrival
@@ -188,17 +176,13 @@ class ThreadedLink(Link):
             if report is None or not self._in_time(report, host_s):
                 return None
             return self._arrival(report, host_s)
-        except (TransportGone, Restarted, ClockFault) as gone:
+        except (TransportGone, Restarted) as gone:
             self._lose(gone)
             raise DeviceLost(self.gone) from gone
 
     def _in_time(self, report: InputReport, host_s: float) -> bool:
-        """Return whether a report is new enough to be acted on. Raises ClockFault."""
-        if not self._passes(report):
-            return False
-        device_s = report.time_us * 1e-6
-        self._host.check(device_s, host_s)
-        if self.clock.age_s(device_s, host_s) <= OLDEST_S:
+        """Return whether a report is new enough to be acted on."""
+        if self.clock.age_s(report.time_us * 1e-6, host_s) <= OLDEST_S:
             self._old = 0
             return True
         self.discarded += 1
@@ -219,12 +203,3 @@ def close_within(transport: Transport, time_s: float) -> bool:
     closer.start()
     closer.join(time_s)
     return not closer.is_alive()
-
-
-def _lost(why: Exception) -> str:
-    if isinstance(why, ClockFault):
-        return (
-            f"the times of the PR2 gripper cannot be trusted ({why}): power the board off and on, then "
-            "`graspsense doctor`"
-        )
-    return f"the PR2 gripper is gone ({why}): check its cable and power, then `graspsense devices`"

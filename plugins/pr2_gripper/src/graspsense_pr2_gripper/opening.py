@@ -48,7 +48,7 @@ def open_board(config: Pr2Config, seed: int, wait_s: float) -> Opened:
     except TransportGone as error:
         close_within(transport, JOIN_S)
         raise _no_answer(config, error) from error
-    return Opened(ThreadedLink(transport, 1.0 / identity.report_rate_hz), identity, None)
+    return Opened(ThreadedLink(transport), identity, None)
 
 
 def _identified(config: Pr2Config, transport: Transport) -> Identity:
@@ -81,8 +81,9 @@ def _emulated(config: Pr2Config, seed: int) -> Opened:
     except NoDevice:
         transport.close()
         raise
-    kind = LockStepLink if config.pace == "lock-step" else ThreadedLink
-    return Opened(kind(transport, 1.0 / identity.report_rate_hz), identity, emulation)
+    if config.pace != "lock-step":
+        return Opened(ThreadedLink(transport), identity, emulation)
+    return Opened(LockStepLink(transport, 1.0 / identity.report_rate_hz), identity, emulation)
 
 
 def _open_transport(config: Pr2Config, wait_s: float) -> Transport:

@@ -119,7 +119,7 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
         self._asked = Request(active=True, go=False, position=0, speed=0, force=0)
         try:
             self._emulated = LockStepGripper(config, seed) if config.emulated else None
-            self._link = self._emulated or self._opened_link()
+            self._link = self._emulated or opened_link(config.port, config.address, config.reply_timeout_s)
             if self._emulated is None:
                 self._switch = DeadManSwitch(LET_GO, config.port, config.address, config.reply_timeout_s)
             self._polling = Polling(RATE_HZ, self._emulated or time)
@@ -169,17 +169,12 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
             self._zero = tare(images, self.config.pad_counts_per_newton, 0)
 
     def close(self) -> None:
-        """Stop the fingers if the gripper still responds, if need be over a new connection, and close it."""
+        """Stop the fingers if the gripper still responds, and close it. A lost one is told to open, if it can be."""
         link, self._link = self._link, None
-        if link is not None:
-            try:
-                self._stop(link)
-            except OSError:
-                with suppress(OSError, ValueError):
-                    self._stop(self._opened_link())
+        stopped = link is None or self._stopped(link)
         switch, self._switch = self._switch, None
         if switch is not None:
-            switch.release()
+            switch.release(stopped=stopped)
         fingertips, self._fingertips = self._fingertips, None
         if fingertips is not None:
             fingertips.close()
@@ -292,11 +287,8 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
             # A target that is left from closing is still within the object.
             self._target_m = max(self._target_m, min(self._gap_m + self._model.step_m, goal_m))
 
-    def _opened_link(self) -> ModbusLink | UrCapLink:
-        return opened_link(self.config.port, self.config.address, self.config.reply_timeout_s)
-
-    def _stop(self, link: ModbusLink | UrCapLink | LockStepGripper) -> None:
-        """Tell the gripper to stop, and close the connection. Raises OSError if the connection was lost."""
+    def _stopped(self, link: ModbusLink | UrCapLink | LockStepGripper) -> bool:
+        """Tell the gripper to stop, and close the connection; return whether this was not lost."""
         stop = self._asked._replace(go=False).registers()
 
         def told() -> None:
@@ -307,9 +299,12 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
         try:
             with suppress(NoReply):
                 self._polling.tried(told, NoReply)
+        except OSError:
+            return False
         finally:
             with suppress(OSError):
                 link.close()
+        return True
 
     def _exchange(self, request: Request) -> Status:
         link = self._link

@@ -160,13 +160,14 @@ class So101Backend(BackendWithEmulator[So101Config]):
     def close(self) -> None:
         """Stop the jaw if the motor still responds, give it back as it was found, and close the bus."""
         bus, self._bus = self._bus, None
+        given_back = True
         if bus is not None:
             if self._found is not None:
-                self._give_back(bus, self._found)
+                given_back = self._give_back(bus, self._found)
             bus.close()
         switch, self._switch = self._switch, None
         if switch is not None:
-            switch.release()
+            switch.release(stopped=given_back)
         self._found = self._asked = None
 
     def report(self) -> Mapping[str, float | int | str | bool]:
@@ -195,14 +196,21 @@ class So101Backend(BackendWithEmulator[So101Config]):
             self._kept(lambda: self._tried(lambda bus: bus.write(self.config.motor, STATE[0], data)))
             self._asked = asked
 
-    def _give_back(self, bus: ServoBus, request: MotorRequest) -> None:
-        """Let the motor stay where it is, with the torque and the limits that it had before, also if it only hears."""
+    def _give_back(self, bus: ServoBus, request: MotorRequest) -> bool:
+        """Let the motor stay where it is, with the torque and the limits that it had before, also if it only hears.
+
+        Return whether the port was not lost.
+        """
         motor, position = self.config.motor, self._position
         with suppress(NoStatusPacket, OSError):
             position = motor_state(bus.read(motor, *STATE)).position
         stop = request.staying_at(position).written()
-        with suppress(NoStatusPacket, OSError):
-            self._polling.tried(lambda: bus.write(motor, STATE[0], stop), NoStatusPacket, OSError)
+        try:
+            with suppress(NoStatusPacket):
+                self._polling.tried(lambda: bus.write(motor, STATE[0], stop), NoStatusPacket, OSError)
+        except OSError:
+            return False
+        return True
 
     def _state(self) -> MotorState:
         return motor_state(self._tried(lambda bus: bus.read(self.config.motor, *STATE)))

@@ -12,12 +12,14 @@ import sys
 import time
 from contextlib import suppress
 from importlib import import_module
+from threading import Thread
 from typing import Final, final
 
 from graspsense.core.grasp.interrupts import ENDING
 from graspsense.core.values.errors import FAILURES
 
-ATTEMPTS: Final = 3
+TRIES_S: Final = 10.0
+"""Time for which it is tried: a cable that was pulled may be plugged in again."""
 PAUSE_S: Final = 0.2
 """Time between attempts: the system may need a moment to give the port of a killed program free."""
 
@@ -39,10 +41,16 @@ class DeadManSwitch:
             start_new_session=True,
         )
 
-    def release(self) -> None:
-        """End the process, which calls nothing; can be called twice."""
-        self._process.kill()
-        self._process.wait()
+    def release(self, *, stopped: bool = True) -> None:
+        """End the process, which calls nothing; can be called twice.
+
+        With `stopped` False, the gripper could not be told to stop: the target is called, also after this program.
+        """
+        if stopped:
+            self._process.kill()
+            self._process.wait()
+        else:
+            Thread(target=self._process.wait, daemon=True).start()
         assert self._process.stdin is not None
         self._process.stdin.close()
 
@@ -53,7 +61,8 @@ def main(target: str, arguments: str) -> None:
         signal.signal(number, signal.SIG_IGN)
     sys.stdin.buffer.read()
     module, _, name = target.partition(":")
-    for _ in range(ATTEMPTS):
+    until_s = time.monotonic() + TRIES_S
+    while time.monotonic() < until_s:
         with suppress(*FAILURES):
             getattr(import_module(module), name)(*json.loads(arguments))
             return

@@ -14,9 +14,10 @@ from graspsense.core.control.contact import CONTACT_FORCE_N, RestState, at_rest,
 from graspsense.core.control.guard import GuardParams, GuardState, guard
 from graspsense.core.control.tick import OPEN_SPEED_M_S, OPEN_WINDOW_S
 from graspsense.core.grasp.opened_gripper import frame_timeout_s, no_frame
+from graspsense.core.grasp.protection.reports import Reports
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import DeviceLost, ExitCode, GraspsenseError
-from graspsense.core.values.signals import EFFORT, Command, Pads, Reading
+from graspsense.core.values.signals import EFFORT, Command, Pads, Phase, Reading
 
 RAMP_N_S: Final = 2.0
 """Rate at which the effort rises; the authors' stiction test used 1 N/s."""
@@ -53,6 +54,7 @@ class Rig:
             contact_force_n=float("inf"),
         )
         self._last: Reading | None = None
+        self._reports = Reports(info.rate_hz, 0.0)
 
     def tick(self, command: Command) -> Reading:
         """Apply a limited command, and return the next reading. Raises DeviceLost, CalibrationFailed."""
@@ -93,6 +95,10 @@ class Rig:
         reading = self._backend.read(frame_timeout_s(self._run, self._info))
         if reading is None:
             raise DeviceLost(no_frame(self._run, self._info))
+        # The time limits of a motion are those of the gripper's clock.
+        fault = self._reports.see(reading, Phase.OPENING)
+        if fault is not None:
+            raise CalibrationFailed(fault.told)
         return reading
 
 

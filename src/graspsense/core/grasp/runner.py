@@ -36,7 +36,7 @@ from graspsense.core.control.tick import (
     stopped,
     tick,
 )
-from graspsense.core.grasp.interrupts import Interrupts
+from graspsense.core.grasp.interrupts import STUCK_S, Interrupts
 from graspsense.core.grasp.losses import Losses, lost_in_words
 from graspsense.core.grasp.opened_gripper import (
     described,
@@ -157,6 +157,9 @@ def run_grasp(
             if on_open is not None:
                 on_open(info)
             grasp = _Grasp(backend, controller, run, info, sinks, on_event, interrupts)
+            # A program in a debugger stands still too, so only where there is something to hurt.
+            if not info.simulated and not info.harmless:
+                interrupts.watch()
             if watcher is not None:
                 grasp.watch_with(watcher)
             with no_collection():
@@ -235,6 +238,10 @@ UNHEARD_S: Final = 1.0
 OPENED: Final = "opened to"
 """How the event begins that tells that the fingers are known to be open."""
 MAY_BE_CLOSED: Final = "the fingers may still be closed: look at them, and open them by hand"
+STUCK: Final = (
+    f"a tick did not end in {STUCK_S:g} s: the controller, or what watches or records the grasp, hangs, or this "
+    "program was stopped; look at its loops and at what it waits for"
+)
 _PHASES: Final = frozenset(Phase)
 
 
@@ -314,13 +321,13 @@ class _Grasp:
         except (TareRefused, _Overdue, _NotDelivered, StepFailed) as error:
             ending = Outcome.ABORTED, str(error)
         except KeyboardInterrupt:
-            self.interrupted = True
-            ending = Outcome.ABORTED, "interrupted"
+            self.interrupted = not self.interrupts.stuck
+            ending = Outcome.ABORTED, "interrupted" if self.interrupted else STUCK
         except FAILURES as error:
             # A controller can raise anything; the gripper must still be released and the trace kept.
             ending = Outcome.ABORTED, f"{named(error)}{place_of(error)}"
         finally:
-            self.interrupts.deferred = True
+            self.interrupts.deferred, self.interrupts.tick_began_s = True, inf
             fault = self._fault()
             self._let_go(opens=not (self.state.done or (fault is not None and fault.relaxes)))
         if ending is None and fault is not None and self.protection is not None:
@@ -369,10 +376,12 @@ class _Grasp:
         state, phase, watcher = self.state, self.state.phase, self.state.guard
         images: list[Pads] = []
         newest = n_ticks = 0
-        most_ticks, losses = self._most_ticks(), self.losses
+        most_ticks, losses, interrupts = self._most_ticks(), self.losses, self.interrupts
         while n_ticks < most_ticks:
             n_ticks += 1
+            interrupts.tick_began_s = inf
             reading = self._checked(read(timeout_s))
+            interrupts.tick_began_s = time.monotonic()
             frame, pads, _ = reading
             self.last = frame
             if self.first_t_s is None:

@@ -109,8 +109,12 @@ class Protection:
         first_m_s = run.first_speed_m_s if info.clock == "device" else inf
         self._standstill, self._jump = Standstill(), GapJump(info.speed_limit_m_s)
         self._kept_speed, self._repeats = KeptSpeed(info.rate_hz), Repeats()
+        opening = info.opening
+        if opening is not None:
+            # What the guard leaves of it, where no pad has felt anything.
+            opening = opening._replace(speed_limit_m_s=min(opening.speed_limit_m_s, first_m_s))
         self.opening = Opening(
-            info.rate_hz, command_delay_s, info.opening, "gap" in rates, info.friction_n, info.open_gap_m
+            info.rate_hz, command_delay_s, opening, "gap" in rates, info.friction_n, info.open_gap_m
         )
         self._rush = Rush(min(first_m_s, info.speed_limit_m_s), info.rate_hz)
         self._reports = Reports(info.rate_hz, rates.get("pads", 0.0))
