@@ -78,6 +78,9 @@ class Interrupts:
     def _take(self, number: int, frame: FrameType | None) -> None:
         if self.stuck and not self._raised:
             self._raised = True
+            if self.deferred:
+                # The tick has ended meanwhile, and so has the grasp.
+                return
             raise KeyboardInterrupt
         self.count += 1
         previous = self._previous[number]
