@@ -12,7 +12,8 @@ of one unit, such as grasps of an object, count as one, or as more where units d
 Kish, Survey Sampling, 1965).
 
 Where labels are not equally frequent, answers with a rare one are right less often than others that are as probable. So
-a rate is multiplied by how often the answers with its label were right, as a share of what their rates promise. Of few
+a rate is multiplied by how often the answers with its label were right, as a share of what their rates promise. Where
+they were right more often than that, it is the wrong ones that are divided, so that no answer becomes certain. Of few
 answers that share is partly luck: it is drawn towards that of all labels as rare, which is drawn towards a half.
 
 The other labels share what remains in proportion to their probabilities. A probability of 0, as trees and nearest
@@ -85,14 +86,25 @@ class SupportClass:
 
 @frozen(kw_only=True)
 class LabelShare:
-    """How often answers with a label are right, as a share of what their rates promise, at most 1.
+    """How often answers with a label are right, as a share of what their rates promise.
 
-    `low` and `high` are the ends of its 95 % interval.
+    A share above 1 is that of the wrong answers that are promised to those that there are. `low` and `high` are the
+    ends of its 95 % interval.
     """
 
     share: float
     low: float
     high: float
+
+
+def _applied(rate: float, share: float) -> float:
+    """Return the rate of a label with this share, of that of all labels."""
+    return 1.0 - (1.0 - rate) / share if share > 1.0 else rate * share
+
+
+def _share_of(rate: float, promised: float) -> float:
+    """Return the share that makes this rate of the promised one."""
+    return (1.0 - promised) / (1.0 - rate) if rate > promised else rate / promised
 
 
 @frozen(kw_only=True)
@@ -116,7 +128,9 @@ class Certainty:
         self, probability: NDArray[np.float64], support: NDArray[np.float64], labels: Sequence[str]
     ) -> NDArray[np.float64]:
         """Return the rate of right answers with this probability, support and label; NaN where it is not known."""
-        return self.rate_of_all(probability, support) * [share.share for share in self._of_labels(labels)]
+        rates = self.rate_of_all(probability, support).tolist()
+        shares = self._of_labels(labels)
+        return np.array([_applied(rate, own.share) for rate, own in zip(rates, shares, strict=True)])
 
     def rate_of_all(
         self, probability: NDArray[np.float64], support: NDArray[np.float64]
@@ -132,8 +146,8 @@ class Certainty:
         return [
             interval
             and (
-                min(interval[0] * of_label.share, rate * of_label.low),
-                min(max(interval[1] * of_label.share, rate * of_label.high), 1.0),
+                min(_applied(interval[0], of_label.share), _applied(rate, of_label.low)),
+                max(_applied(interval[1], of_label.share), _applied(rate, of_label.high)),
             )
             for (rate, interval), of_label in zip(steps, self._of_labels(labels), strict=True)
         ]
@@ -207,8 +221,8 @@ def _shares_from(kept: StoredValues) -> dict[str, LabelShare]:
     shares = {}
     for label in kept:
         low, share, high = kept.numbers(label, (3,), least=0.0).tolist()
-        if not low <= share <= min(high, 1.0):
-            raise kept.refusal(label, "its interval does not hold its share, or the share is above 1")
+        if not low <= share <= high:
+            raise kept.refusal(label, "its interval does not hold its share")
         shares[label] = LabelShare(share=share, low=low, high=high)
     return shares
 
@@ -287,15 +301,13 @@ def _shares(
         if not as_rare.all():
             promised_as_rare = float(promised_in[as_rare].sum())
             usual = (float(right_in[as_rare].sum()) + LABEL_WEIGHT / 2.0) / (promised_as_rare + LABEL_WEIGHT)
-        share = min((right_in[k] + LABEL_WEIGHT * usual) / (promised_in[k] + LABEL_WEIGHT), 1.0)
-        mean = promised_in[k] / units[k]
+        mean = float(promised_in[k] / units[k])
+        rate = mean * (right_in[k] + LABEL_WEIGHT * usual) / (promised_in[k] + LABEL_WEIGHT)
         low, high = (
-            betaincinv(share * mean * (units[k] + 2.0), (1.0 - share * mean) * (units[k] + 2.0), end) / mean
-            for end in (0.025, 0.975)
+            betaincinv(rate * (units[k] + 2.0), (1.0 - rate) * (units[k] + 2.0), end) for end in (0.025, 0.975)
         )
-        shares[str(names[k])] = LabelShare(
-            share=float(share), low=float(min(low, share)), high=float(max(high, share))
-        )
+        low, share, high = (_share_of(float(end), mean) for end in (min(low, rate), rate, max(high, rate)))
+        shares[str(names[k])] = LabelShare(share=share, low=low, high=high)
     return shares
 
 
