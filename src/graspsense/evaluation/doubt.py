@@ -18,6 +18,7 @@ from graspsense.core.learn.conformal import (
     COVERAGE,
     Answers,
     PredictionSets,
+    calibrated_threshold,
     scores_of,
     sets_of,
     units_needed,
@@ -26,7 +27,6 @@ from graspsense.core.learn.confounding import confounded
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.model import Model
 from graspsense.core.values.errors import ConfigError
-from graspsense.core.values.features import UNKNOWN
 from graspsense.evaluation.crossval import (
     ClassifierFactory,
     FitRefused,
@@ -39,6 +39,8 @@ from graspsense.evaluation.folds import Folds, held_out
 from graspsense.evaluation.intervals import RecognitionRate, effect_of
 
 FOLDS: Final = 10
+WITHIN_REACH: Final = 0.98
+"""Share of held-out trials for whose like the certainty is told: of the others, too few show how often they are right."""
 BINS: Final = 10
 """Number of bins of equal width in which probabilities are compared with rates."""
 
@@ -117,7 +119,7 @@ def calibrated_by(model: Model, labelled: Labelled) -> Model:
     """
     classes = model.classifier.classes()
     known = labelled.rows(np.flatnonzero([label in classes for label in labelled.labels]))
-    answers, shares = model.answers(known.table)
+    _, shares = model.answers(known.table)
     table = known.table.columns(model.names)
     pooled = Pooled(
         predicted=tuple(classes[k] for k in shares.argmax(axis=1).tolist()),
@@ -125,7 +127,7 @@ def calibrated_by(model: Model, labelled: Labelled) -> Model:
         probabilities=shares,
         scores=scores_of(shares, model.novelty.closeness(table, classes)),
         support=model.support(table),
-        unlike=np.array([answer == UNKNOWN for answer in answers]),
+        outside=model.novelty.outside(table),
         trained_on=float(model.provenance.get("trials", 0)),
         folds=0,
     )
@@ -185,6 +187,8 @@ def _calibration(
         units,
         effect_of(pooled.folds),
     )
+    reach = -calibrated_threshold(-pooled.outside[rows], np.array(units), WITHIN_REACH)
+    certainty = evolve(certainty, reach=reach)
     truth = columns_of(labels, pooled.classes)[rows]
     return certainty, sets_of(_answers(certainty, pooled, rows), truth, pooled.classes, own)
 

@@ -112,11 +112,13 @@ class Certainty:
     """The rates of right answers by support and probability; the classes of support begin with the smallest.
 
     Labels that were too seldom the answer are not in `of_label`: their certainty is not known. None is a model that was
-    measured before these were kept.
+    measured before these were kept. The rates hold for trials that are outside of the training trials by no more than
+    `reach` (`learn.novelty`).
     """
 
     classes: tuple[SupportClass, ...]
     of_label: Mapping[str, LabelShare] | None = None
+    reach: float = math.inf
 
     def class_of(self, support: NDArray[np.float64]) -> NDArray[np.int64]:
         """Return the number of the class of support of each answer. NaN is an answer without support."""
@@ -184,8 +186,10 @@ class Certainty:
         ]
 
 
-def certainty_from(kept: Sequence[StoredValues], of_label: StoredValues | None) -> Certainty:
-    """Return the certainty of a stored model from its classes of support and its labels. Raises DataDamaged."""
+def certainty_from(
+    kept: Sequence[StoredValues], of_label: StoredValues | None, reach: float = math.inf
+) -> Certainty:
+    """Return the certainty of a stored model: classes of support, labels, and reach. Raises DataDamaged."""
     classes: list[SupportClass] = []
     for values in kept:
         rates = values.numbers("rates", (None,), least=0.0)
@@ -213,7 +217,8 @@ def certainty_from(kept: Sequence[StoredValues], of_label: StoredValues | None) 
                 intervals=tuple((low, high) for low, high in intervals.tolist()),
             )
         )
-    return Certainty(classes=tuple(classes), of_label=None if of_label is None else _shares_from(of_label))
+    shares = None if of_label is None else _shares_from(of_label)
+    return Certainty(classes=tuple(classes), of_label=shares, reach=reach)
 
 
 def _shares_from(kept: StoredValues) -> dict[str, LabelShare]:
@@ -294,6 +299,8 @@ def _shares(
     units, right_in, promised_in = (
         np.bincount(column, weights * counts) for counts in (np.ones(len(labels)), right, promised)
     )
+    # Of all labels together, the rates promise enough: what they were drawn towards guessing is no share of a label.
+    right_in /= max(float(right_in.sum() / promised_in.sum()), 1.0)
     shares = {}
     for k in np.flatnonzero(units * effect >= LABEL_UNITS - _ROUNDING).tolist():
         as_rare = units <= AS_RARE * units[k]

@@ -6,6 +6,7 @@ imported, evaluated or unpickled. Its `sha256` is the hash of the other content,
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -105,7 +106,8 @@ def _certainty_as_json(certainty: Certainty | None) -> dict[str, Any]:
     if certainty is None or certainty.of_label is None:
         return {"certainty": None if certainty is None else certainty.to_json()}
     of_label = {name: [share.low, share.share, share.high] for name, share in certainty.of_label.items()}
-    return {"certainty": certainty.to_json(), "certainty_of_label": of_label}
+    reach = {"certainty_reach": certainty.reach} if math.isfinite(certainty.reach) else {}
+    return {"certainty": certainty.to_json(), "certainty_of_label": of_label, **reach}
 
 
 def load_model(name: str, plugins: Plugins) -> Model:
@@ -210,7 +212,8 @@ def _learned_from(
     certainty = None
     if stored.has("certainty"):
         of_label = stored.table("certainty_of_label") if "certainty_of_label" in stored else None
-        certainty = certainty_from(stored.tables("certainty"), of_label)
+        reach = stored.number("certainty_reach", least=0.0) if "certainty_reach" in stored else math.inf
+        certainty = certainty_from(stored.tables("certainty"), of_label, reach)
     return {
         "classifier": classifier,
         "novelty": novelty,
