@@ -30,7 +30,9 @@ def test_a_label_without_a_training_trial_close_by_is_less_likely_and_one_that_i
 
 
 def test_evaluate_measures_the_calibrated_probabilities_and_those_before():
-    judgements = [judged(bottles(20, spread=spread), "tree", controls=False) for spread in (0.9, 1.2, 1.5, 2.0)]
+    judgements = [
+        judged(bottles(20, spread=spread), "tree", controls=False) for spread in (0.9, 1.2, 1.5, 2.0)
+    ]
     before = np.mean([evaluation.reliability.uncalibrated_error for evaluation in judgements])
 
     # A full-grown tree gives 100 % to every prediction, and a third of them are wrong. One set of trials has luck.

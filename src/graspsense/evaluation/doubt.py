@@ -18,7 +18,7 @@ from graspsense.core.learn.conformal import (
     COVERAGE,
     Answers,
     PredictionSets,
-    calibrated_threshold,
+    reach_of,
     scores_of,
     sets_of,
     units_needed,
@@ -39,8 +39,6 @@ from graspsense.evaluation.folds import Folds, held_out
 from graspsense.evaluation.intervals import RecognitionRate, effect_of
 
 FOLDS: Final = 10
-WITHIN_REACH: Final = 0.98
-"""Share of held-out trials for whose like the certainty is told: of the others, too few show how often they are right."""
 BINS: Final = 10
 """Number of bins of equal width in which probabilities are compared with rates."""
 
@@ -187,8 +185,7 @@ def _calibration(
         units,
         effect_of(pooled.folds),
     )
-    reach = -calibrated_threshold(-pooled.outside[rows], np.array(units), WITHIN_REACH)
-    certainty = evolve(certainty, reach=reach)
+    certainty = evolve(certainty, reach=reach_of(pooled.outside[rows], np.array(units)))
     truth = columns_of(labels, pooled.classes)[rows]
     return certainty, sets_of(_answers(certainty, pooled, rows), truth, pooled.classes, own)
 

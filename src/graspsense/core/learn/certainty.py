@@ -300,7 +300,7 @@ def _shares(
         np.bincount(column, weights * counts) for counts in (np.ones(len(labels)), right, promised)
     )
     # Of all labels together, the rates promise enough: what they were drawn towards guessing is no share of a label.
-    right_in /= max(float(right_in.sum() / promised_in.sum()), 1.0)
+    right_in = right_in / max(float(right_in.sum() / promised_in.sum()), 1.0)
     shares = {}
     for k in np.flatnonzero(units * effect >= LABEL_UNITS - _ROUNDING).tolist():
         as_rare = units <= AS_RARE * units[k]
@@ -311,7 +311,8 @@ def _shares(
         mean = float(promised_in[k] / units[k])
         rate = mean * (right_in[k] + LABEL_WEIGHT * usual) / (promised_in[k] + LABEL_WEIGHT)
         low, high = (
-            betaincinv(rate * (units[k] + 2.0), (1.0 - rate) * (units[k] + 2.0), end) for end in (0.025, 0.975)
+            betaincinv(rate * (units[k] + 2.0), (1.0 - rate) * (units[k] + 2.0), end)
+            for end in (0.025, 0.975)
         )
         low, share, high = (_share_of(float(end), mean) for end in (min(low, rate), rate, max(high, rate)))
         shares[str(names[k])] = LabelShare(share=share, low=low, high=high)

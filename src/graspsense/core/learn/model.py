@@ -180,14 +180,16 @@ class Model:
         """Return predictions with certainty and sets, without reasons; those of unknown trials have no set.
 
         `shares` are the probabilities that the classifier gives. With `elsewhere`, the trials are not of the kind that
-        the model was measured on, and nothing is calibrated; nor is a trial of which `_unmeasured` says why.
+        the model was measured on, and nothing is calibrated; nor is a trial for which that does not hold.
         """
         classes = self.classifier.classes()
         known = np.array([label != UNKNOWN for label in labels])
         predicted = shares.argmax(axis=1)
         predicted[known] = [classes.index(label) for label in labels if label != UNKNOWN]
         no_certainty = "it was not measured under these settings" if elsewhere else self.no_certainty
-        unmeasured = self._unmeasured(table)
+        unmeasured = self.novelty.unmeasured(
+            table, math.inf if self.certainty is None else self.certainty.reach
+        )
         probabilities, members = shares, np.zeros(shares.shape, dtype=np.bool_)
         intervals: Sequence[tuple[float, float] | None] = [None] * len(table)
         if self.certainty is not None and not no_certainty:
@@ -232,16 +234,6 @@ class Model:
                 )
             )
         return made
-
-    def _unmeasured(self, table: FeatureTable) -> list[str]:
-        """Return for each trial of a table why what was measured does not hold for it; empty if it does."""
-        lacking = self.novelty.lacking(table)
-        unmeasured = [f"it was measured with trials that have {names}" if names else "" for names in lacking]
-        if self.certainty is not None:
-            for i in np.flatnonzero(self.novelty.outside(table) > self.certainty.reach).tolist():
-                strange = self.novelty.unlike(table.row(i), self.certainty.reach)
-                unmeasured[i] = f"the trials that it was measured with were closer to those learned from: {strange}"
-        return unmeasured
 
     def _why_uncertain(self, label: str) -> str:
         """Return why the certainty of answers with this label is not known; empty if it is."""

@@ -57,13 +57,23 @@ class Novelty:
     complete: NDArray[np.bool_]
     """Whether each training trial had the feature, shape (features,); False where it is not known."""
 
-    def lacking(self, table: FeatureTable) -> list[str]:
-        """Return for each trial of a table the features that it lacks, in words, although each training trial had them.
+    def unmeasured(self, table: FeatureTable, reach: float) -> list[str]:
+        """Return for each trial of a table why what held-out trials told does not hold for it; empty if it does.
 
-        What was measured with the training trials says nothing of such a trial.
+        It does not if the trial lacks a feature that each training trial had, or is outside by more than `reach`.
         """
-        missing = np.isnan(table.columns(self.names).values) & self.complete
-        return [listed([self.names[f] for f in np.flatnonzero(row)]) if row.any() else "" for row in missing]
+        table = table.columns(self.names)
+        lacking = np.isnan(table.values) & self.complete
+        far = self.outside(table) > reach
+        why = [""] * len(table)
+        for i in np.flatnonzero(lacking.any(axis=1) | far).tolist():
+            if lacking[i].any():
+                names = listed([self.names[f] for f in np.flatnonzero(lacking[i])])
+                why[i] = f"it was measured with trials that have {names}"
+            else:
+                strange = self.unlike(table.row(i), reach)
+                why[i] = f"the trials that it was measured with were closer to those learned from: {strange}"
+        return why
 
     def unlike(self, features: Features, reach: float = REACH) -> Reason | None:
         """Return why this trial is outside of every class by more than `reach`, or None if it is not."""
