@@ -297,7 +297,8 @@ def _shares(
 
     names, column = np.unique(labels, return_inverse=True)
     units, right_in, promised_in = (
-        np.bincount(column, weights * counts) for counts in (np.ones(len(labels)), right, promised)
+        np.bincount(column, weights * counts).astype(np.float64)
+        for counts in (np.ones(len(labels)), right, promised)
     )
     # Of all labels together, the rates promise enough: what they were drawn towards guessing is no share of a label.
     right_in = right_in / max(float(right_in.sum() / promised_in.sum()), 1.0)
