@@ -33,11 +33,13 @@ def test_evaluate_measures_the_calibrated_probabilities_and_those_before():
     judgements = [
         judged(bottles(20, spread=spread), "tree", controls=False) for spread in (0.9, 1.2, 1.5, 2.0)
     ]
-    before = np.mean([evaluation.reliability.uncalibrated_error for evaluation in judgements])
+    uncalibrated = np.mean([evaluation.reliability.uncalibrated_error for evaluation in judgements])
 
     # A full-grown tree gives 100 % to every prediction, and a third of them are wrong. One set of trials has luck.
-    assert before > 0.1
-    assert np.mean([evaluation.reliability.calibration_error for evaluation in judgements]) < 0.6 * before
+    assert uncalibrated > 0.1
+    assert (
+        np.mean([evaluation.reliability.calibration_error for evaluation in judgements]) < 0.6 * uncalibrated
+    )
 
 
 def test_a_model_in_a_file_gives_calibrated_probabilities(tmp_path):
