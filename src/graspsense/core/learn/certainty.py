@@ -130,15 +130,8 @@ class Certainty:
         self, probability: NDArray[np.float64], support: NDArray[np.float64], labels: Sequence[str]
     ) -> NDArray[np.float64]:
         """Return the rate of right answers with this probability, support and label; NaN where it is not known."""
-        rates = self.rate_of_all(probability, support).tolist()
-        shares = self._of_labels(labels)
-        return np.array([_applied(rate, own.share) for rate, own in zip(rates, shares, strict=True)])
-
-    def rate_of_all(
-        self, probability: NDArray[np.float64], support: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """Return the rate of right answers with this probability and support, of all labels together."""
-        return np.array([rate for rate, _ in self._steps(probability, support)])
+        steps, shares = self._steps(probability, support), self._of_labels(labels)
+        return np.array([_applied(rate, own.share) for (rate, _), own in zip(steps, shares, strict=True)])
 
     def intervals(
         self, probability: NDArray[np.float64], support: NDArray[np.float64], labels: Sequence[str]
@@ -172,9 +165,9 @@ class Certainty:
         unknown = LabelShare(share=math.nan, low=math.nan, high=math.nan)
         return [self.of_label.get(label, unknown) for label in labels]
 
-    def to_json(self) -> list[dict[str, Any]]:
-        """Return the rates as values that JSON represents exactly."""
-        return [
+    def to_json(self) -> dict[str, Any]:
+        """Return its entries in the file of a model, as values that JSON represents exactly."""
+        classes = [
             {
                 "support": support_class.least,
                 "units": support_class.units,
@@ -184,14 +177,19 @@ class Certainty:
             }
             for support_class in self.classes
         ]
+        entries: dict[str, Any] = {"certainty": classes}
+        if self.of_label is not None:
+            shares = {name: [own.low, own.share, own.high] for name, own in self.of_label.items()}
+            entries["certainty_of_label"] = shares
+        return entries | ({"certainty_reach": self.reach} if math.isfinite(self.reach) else {})
 
 
-def certainty_from(
-    kept: Sequence[StoredValues], of_label: StoredValues | None, reach: float = math.inf
-) -> Certainty:
-    """Return the certainty of a stored model: classes of support, labels, and reach. Raises DataDamaged."""
+def certainty_from(stored: StoredValues) -> Certainty | None:
+    """Return the certainty of a stored model, None if it has none. Raises DataDamaged."""
+    if not stored.has("certainty"):
+        return None
     classes: list[SupportClass] = []
-    for values in kept:
+    for values in stored.tables("certainty"):
         rates = values.numbers("rates", (None,), least=0.0)
         probabilities = values.numbers("probabilities", (len(rates),), least=0.0)
         if not len(rates) or (rates > 1.0).any():
@@ -217,8 +215,11 @@ def certainty_from(
                 intervals=tuple((low, high) for low, high in intervals.tolist()),
             )
         )
-    shares = None if of_label is None else _shares_from(of_label)
-    return Certainty(classes=tuple(classes), of_label=shares, reach=reach)
+    return Certainty(
+        classes=tuple(classes),
+        of_label=_shares_from(stored.table("certainty_of_label")) if "certainty_of_label" in stored else None,
+        reach=stored.number("certainty_reach", least=0.0) if "certainty_reach" in stored else math.inf,
+    )
 
 
 def _shares_from(kept: StoredValues) -> dict[str, LabelShare]:
@@ -269,7 +270,7 @@ def certainty_of(
             )
         )
     of_all = Certainty(classes=tuple(classes))
-    promised = of_all.rate_of_all(probability, support)
+    promised = of_all.rate(probability, support, labels)
     return evolve(of_all, of_label=_shares(np.array(labels), answers, promised, weights / effect, effect))
 
 

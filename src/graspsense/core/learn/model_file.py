@@ -6,7 +6,6 @@ imported, evaluated or unpickled. Its `sha256` is the hash of the other content,
 
 from __future__ import annotations
 
-import math
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -96,18 +95,9 @@ def _learned_as_json(model: Model) -> dict[str, Any]:
     return {
         "unknown": model.novelty.to_json(),
         "sets": None if model.sets is None else model.sets.to_json(),
-        **_certainty_as_json(model.certainty),
+        **({"certainty": None} if model.certainty is None else model.certainty.to_json()),
         "model": model.classifier.to_json(),
     }
-
-
-def _certainty_as_json(certainty: Certainty | None) -> dict[str, Any]:
-    """Return the entries of a certainty in the file of a model."""
-    if certainty is None or certainty.of_label is None:
-        return {"certainty": None if certainty is None else certainty.to_json()}
-    of_label = {name: [share.low, share.share, share.high] for name, share in certainty.of_label.items()}
-    reach = {"certainty_reach": certainty.reach} if math.isfinite(certainty.reach) else {}
-    return {"certainty": certainty.to_json(), "certainty_of_label": of_label, **reach}
 
 
 def load_model(name: str, plugins: Plugins) -> Model:
@@ -209,11 +199,7 @@ def _learned_from(
     novelty = novelty_from(names, units, stored.table("unknown"))
     if sorted(novelty.classes) != sorted(classifier.classes()):
         raise stored.refusal("unknown.ranges", "they are not those of the labels of the classifier")
-    certainty = None
-    if stored.has("certainty"):
-        of_label = stored.table("certainty_of_label") if "certainty_of_label" in stored else None
-        reach = stored.number("certainty_reach", least=0.0) if "certainty_reach" in stored else math.inf
-        certainty = certainty_from(stored.tables("certainty"), of_label, reach)
+    certainty = certainty_from(stored)
     return {
         "classifier": classifier,
         "novelty": novelty,
