@@ -30,11 +30,16 @@ def test_a_label_without_a_training_trial_close_by_is_less_likely_and_one_that_i
 
 
 def test_evaluate_measures_the_calibrated_probabilities_and_those_before():
-    evaluation = judged(bottles(20, spread=1.2), "tree", controls=False)
+    judgements = [
+        judged(bottles(20, spread=spread), "tree", controls=False) for spread in (0.9, 1.2, 1.5, 2.0)
+    ]
+    uncalibrated = np.mean([evaluation.reliability.uncalibrated_error for evaluation in judgements])
 
-    # A full-grown tree gives 100 % to every prediction, and a third of them are wrong.
-    assert evaluation.reliability.uncalibrated_error > 0.1
-    assert evaluation.reliability.calibration_error < 0.6 * evaluation.reliability.uncalibrated_error
+    # A full-grown tree gives 100 % to every prediction, and a third of them are wrong. One set of trials has luck.
+    assert uncalibrated > 0.1
+    assert (
+        np.mean([evaluation.reliability.calibration_error for evaluation in judgements]) < 0.6 * uncalibrated
+    )
 
 
 def test_a_model_in_a_file_gives_calibrated_probabilities(tmp_path):

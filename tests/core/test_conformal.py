@@ -387,6 +387,32 @@ def test_the_interval_of_a_certainty_holds_for_new_answers_and_its_highest_is_no
     assert np.mean(highest) < rate_of(np.ones(1))[0] + 0.03
 
 
+def test_objects_that_differ_more_than_held_out_trials_did_have_no_certainty_and_others_keep_it(tmp_path):
+    rng = np.random.default_rng(3)
+    kinds = np.repeat(np.arange(3), 40)
+    means = np.diag([0.0, 4.0, 4.0, 4.0])
+    trials = labelled([f"thing {k}" for k in kinds], *(means[kinds] + rng.normal(size=(120, 4))).T)
+    model = model_of(trials, "svm")
+    other, same = (
+        labelled(["?"] * 300, *(means[which] + rng.normal(size=(300, 4))).T)
+        for which in (np.full(300, 3), rng.integers(0, 3, 300))
+    )
+    for known in (model, kept(model, tmp_path)):
+        told_of_other, told_of_same = (
+            [prediction.certainty is not None for prediction in known.predictions(asked_about.table)]
+            for asked_about in (other, same)
+        )
+        assert np.mean(told_of_other) < 0.4
+        assert np.mean(told_of_same) > 0.95
+    untold = next(
+        answer
+        for answer in model.predictions(other.table)
+        if answer.certainty is None and answer.label != UNKNOWN
+    )
+    assert "f" in untold.no_certainty
+    assert not untold.prediction_set
+
+
 def test_a_certainty_from_few_trials_is_printed_with_its_interval_and_kept(tmp_path):
     model = model_of(bottles(10), "tree")
     for known in (model, kept(model, tmp_path)):

@@ -66,7 +66,7 @@ def trained(name, **config):
     )
     low = SupportClass(least=0.0, probabilities=(0.4, 0.9), rates=(0.3, 0.7), units=30.0)
     of_label = dict.fromkeys(labels, LabelShare(share=0.9, low=0.7, high=1.1))
-    certainty = Certainty(classes=(low, evolve(low, least=4.0)), of_label=of_label)
+    certainty = Certainty(classes=(low, evolve(low, least=4.0)), of_label=of_label, reach=2.0)
     model = evolve(model, sets=sets, certainty=certainty)
     return evolve(model, checkpoints=((0.2, checkpoint_model(model, 0.2, model)),))
 
@@ -167,7 +167,7 @@ def test_what_is_no_strict_json_is_refused(tmp_path, text, says):
         ("certainty.0.probabilities", [0.9, 0.4]),
         ("certainty.1.support", 0.0),
         ("certainty_of_label.bottle:empty", [0.95, 0.9, 1.1]),
-        ("certainty_of_label.bottle:empty", [0.9, 1.2, 1.3]),
+        ("certainty_reach", -1.0),
         ("checkpoints.0.certainty", [{}]),
         ("sets.unknown", 16),
         ("unknown.spread", [1.0, 1.0]),

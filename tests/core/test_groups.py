@@ -135,6 +135,11 @@ def test_noisy_copies_of_every_trial_in_any_order_are_in_groups_of_about_as_many
         for coarse in (single, single.round(1), single.round()):
             alone = table_of(np.arange(150) % 2, coarse)
             assert grouped(alone, NO_COPIES) is alone
+        # Labels of a few trials each that are far from each other are no objects.
+        for each in (4, 6, 10):
+            kinds = np.repeat(np.arange(12), each)
+            apart = table_of(kinds, 6.0 * rng.normal(size=(12, 4))[kinds] + rng.normal(size=(len(kinds), 4)))
+            assert grouped(apart, NO_COPIES) is apart
     assert min(groups) > 30
     assert max(groups) <= 60
     assert max(whole) < 1.5 * 60, "most copies of a trial are in one group"

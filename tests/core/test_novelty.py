@@ -28,12 +28,12 @@ SPAN = novelty_of(table(ROWS), ["bottle", "bottle", "can", "can"])
 
 def test_the_edge_of_the_known_is_three_spreads_outside_a_class():
     assert SPAN.spread == pytest.approx([math.sqrt(2) * 1e-3, math.sqrt(2) * 0.1])
-    assert not SPAN.unlike_rows(table(ROWS)).any()
+    assert not (SPAN.outside(table(ROWS)) > REACH).any()
     assert all(SPAN.unlike(features(*row)) is None for row in ROWS)
     for share in (0.99, 1.01):
         beyond = 0.067 + share * REACH * SPAN.spread[0]
         assert (SPAN.unlike(features(beyond, 0.6)) is not None) is (share > 1.0)
-        assert SPAN.unlike_rows(table([[beyond, 0.6]])).tolist() == [share > 1.0]
+        assert (SPAN.outside(table([[beyond, 0.6]])) > REACH).tolist() == [share > 1.0]
 
 
 def test_the_reason_names_the_feature_the_value_and_the_nearest_class_in_units():
@@ -46,7 +46,7 @@ def test_a_missing_feature_is_not_judged_and_no_feature_at_all_is_unknown():
     assert SPAN.unlike(features(0.058, math.nan)) is None
     assert SPAN.unlike(features(0.030, math.nan)) is not None
     assert SPAN.unlike(features(math.nan, math.nan)).words.endswith(": the recording ended")
-    assert SPAN.unlike_rows(table([[math.nan, math.nan]])).tolist() == [True]
+    assert SPAN.outside(table([[math.nan, math.nan]])).tolist() == [math.inf]
 
 
 def test_trials_without_any_feature_are_known_where_a_class_has_such():

@@ -29,7 +29,8 @@ from graspsense.store.store import Store
 
 def table(*columns, names=("p_first", "f_steady")):
     values = np.column_stack(columns)
-    return FeatureTable(names=names[: values.shape[1]], units=("m", "N")[: values.shape[1]], values=values)
+    units = ("m", "N", "", "")[: values.shape[1]]
+    return FeatureTable(names=tuple(names[: values.shape[1]]), units=units, values=values)
 
 
 def bottles(objects=20, each=4, seed=0, noise=0.1, **more):
@@ -154,6 +155,39 @@ def test_a_trial_unlike_all_training_trials_is_marked_and_one_that_lacks_a_featu
     (lacking,) = model.predict(table([0.06], [np.nan]))
     assert (lacking.low, lacking.high, lacking.unlike) == (None, None, "")
     assert lacking.no_interval
+
+
+def test_intervals_hold_for_new_objects_that_nobody_named_and_are_not_for_those_outside_the_trials():
+    """Five grasps of each object in any order, each with its number measured again."""
+    none = np.empty((2, 0), dtype=np.int64)
+    inside, told = [], []
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        weights, objects = rng.normal(size=4), rng.normal(size=(20, 4))
+        numbers = objects @ weights + rng.normal(size=20)
+        of_object = rng.permutation(np.repeat(np.arange(20), 5))
+        grasps = objects[of_object] + 0.2 * rng.normal(size=(100, 4))
+        measured_again = numbers[of_object] + 0.1 * rng.normal(size=100)
+        trials = Labelled(
+            source="grasps",
+            table=table(*grasps.T, names="abcd"),
+            labels=("",) * 100,
+            value=TargetValue(name="fill", unit="ml", values=tuple(measured_again.tolist())),
+        )
+        model = train_regression("knn", grouped(trials, none), name="m")
+        fresh = rng.normal(size=(200, 4))
+        truth = fresh @ weights + rng.normal(size=200)
+        made = model.predict(table(*(fresh + 0.2 * rng.normal(size=(200, 4))).T, names="abcd"))
+        inside += [
+            answer.low <= number <= answer.high
+            for answer, number in zip(made, truth, strict=True)
+            if answer.low is not None
+        ]
+        told.append(np.mean([answer.low is not None for answer in model.predict(trials.table)]))
+        beyond = model.predict(table(*(fresh + 2.5).T, names="abcd"))
+        assert np.mean([answer.low is None for answer in beyond]) > 0.3
+    assert np.mean(inside) > 0.87
+    assert np.mean(told) == 1.0
 
 
 def test_trials_with_one_finely_measured_number_are_held_out_together_and_levels_and_zeros_are_not():

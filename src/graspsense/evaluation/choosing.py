@@ -168,7 +168,7 @@ def _nested(answers: Mapping[tuple[str, str], _Answers], folds: Folds) -> tuple[
         probabilities=np.array([pooled.probabilities for pooled in outer])[folds, rows],
         scores=np.array([pooled.scores for pooled in outer])[folds, rows],
         support=outer[0].support if alike else np.full(len(folds), np.nan),
-        unlike=np.array([pooled.unlike for pooled in outer])[folds, rows],
+        outside=np.array([pooled.outside for pooled in outer])[folds, rows],
         trained_on=outer[0].trained_on,
         folds=outer[0].folds,
     )

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from graspsense.core.components.roles import Classifier
 from graspsense.core.learn.conformal import scores_of
 from graspsense.core.learn.model import refuse_improbable, refuse_unsupported
-from graspsense.core.learn.novelty import novelty_of
+from graspsense.core.learn.novelty import REACH, novelty_of
 from graspsense.core.values.errors import ComponentFailed, ConfigError, counted
 from graspsense.core.values.features import FeatureTable
 from graspsense.evaluation.folds import Folds
@@ -36,7 +36,7 @@ Groups = Sequence["NDArray[np.int64]"]
 
 @frozen(eq=False)
 class Pooled:
-    """The predictions of all folds, one per trial; `unlike` marks those that the model of their fold calls unknown.
+    """The predictions of all folds, one per trial.
 
     `probabilities` has shape (trials, classes), NaN for a class that is not among the labels of the group of the trial.
     """
@@ -48,7 +48,8 @@ class Pooled:
     """The scores from which prediction sets are made, of the same shape."""
     support: NDArray[np.float64]
     """The number of training trials that each answer rests on; NaN without such a number."""
-    unlike: NDArray[np.bool_]
+    outside: NDArray[np.float64]
+    """How far each trial is outside of those that the model of its fold learned from (`learn.novelty`)."""
     trained_on: float
     """Mean number of training trials per fold."""
     folds: int
@@ -58,6 +59,11 @@ class Pooled:
     def columns(self) -> NDArray[np.int64]:
         """The column of each predicted label."""
         return columns_of(self.predicted, self.classes)
+
+    @property
+    def unlike(self) -> NDArray[np.bool_]:
+        """Which trials the model of their fold calls unknown."""
+        return self.outside > REACH
 
     def right(self, labels: Sequence[str]) -> list[bool]:
         """Return whether each trial is predicted correctly."""
@@ -101,7 +107,7 @@ def cross_validate(
     all_classes = tuple(sorted(set(labels)))
     probabilities = np.full((len(labels), len(all_classes)), np.nan)
     scores = probabilities.copy()
-    unlike = np.zeros(len(labels), dtype=np.bool_)
+    outside = np.zeros(len(labels))
     support = np.full(len(labels), np.nan)
     sizes: list[int] = []
     for rows, fold_of in zip(groups, folds, strict=True):
@@ -122,7 +128,7 @@ def cross_validate(
             novelty = novelty_of(table.rows(training), known)
             tested = table.rows(test)
             scores[np.ix_(test, columns)] = scores_of(shares, novelty.closeness(tested, classes))
-            unlike[test] = novelty.unlike_rows(tested)
+            outside[test] = novelty.outside(tested)
             for i, k in zip(test.tolist(), shares.argmax(axis=1).tolist(), strict=True):
                 predicted[i] = classes[k]
             sizes.append(len(training))
@@ -134,7 +140,7 @@ def cross_validate(
         probabilities=probabilities,
         scores=scores,
         support=support,
-        unlike=unlike,
+        outside=outside,
         trained_on=float(np.mean(sizes)),
         folds=max(int(fold_of.max()) + 1 for fold_of in folds),
     )

@@ -18,6 +18,7 @@ from graspsense.core.learn.conformal import (
     COVERAGE,
     Answers,
     PredictionSets,
+    reach_of,
     scores_of,
     sets_of,
     units_needed,
@@ -26,7 +27,6 @@ from graspsense.core.learn.confounding import confounded
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.model import Model
 from graspsense.core.values.errors import ConfigError
-from graspsense.core.values.features import UNKNOWN
 from graspsense.evaluation.crossval import (
     ClassifierFactory,
     FitRefused,
@@ -117,7 +117,7 @@ def calibrated_by(model: Model, labelled: Labelled) -> Model:
     """
     classes = model.classifier.classes()
     known = labelled.rows(np.flatnonzero([label in classes for label in labelled.labels]))
-    answers, shares = model.answers(known.table)
+    _, shares = model.answers(known.table)
     table = known.table.columns(model.names)
     pooled = Pooled(
         predicted=tuple(classes[k] for k in shares.argmax(axis=1).tolist()),
@@ -125,7 +125,7 @@ def calibrated_by(model: Model, labelled: Labelled) -> Model:
         probabilities=shares,
         scores=scores_of(shares, model.novelty.closeness(table, classes)),
         support=model.support(table),
-        unlike=np.array([answer == UNKNOWN for answer in answers]),
+        outside=model.novelty.outside(table),
         trained_on=float(model.provenance.get("trials", 0)),
         folds=0,
     )
@@ -185,6 +185,7 @@ def _calibration(
         units,
         effect_of(pooled.folds),
     )
+    certainty = evolve(certainty, reach=reach_of(pooled.outside[rows], np.array(units)))
     truth = columns_of(labels, pooled.classes)[rows]
     return certainty, sets_of(_answers(certainty, pooled, rows), truth, pooled.classes, own)
 

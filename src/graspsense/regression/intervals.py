@@ -8,6 +8,7 @@ Boström and U. Johansson, Proc. Mach. Learn. Res. 128 (2020) 24).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -15,7 +16,7 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from graspsense.core.learn.conformal import COVERAGE, calibrated_threshold, units_needed
+from graspsense.core.learn.conformal import COVERAGE, calibrated_threshold, reach_of, units_needed
 from graspsense.core.learn.stored_values import StoredValues
 
 BAND_UNITS: Final = 10
@@ -28,13 +29,15 @@ BAND_SHARE: Final = 0.1
 class PredictionIntervals:
     """Half the width of the 90 % interval in each band of predictions.
 
-    `begins` has the least prediction of each band but the first, rising. Without a width there are no intervals;
-    `reason` then says why.
+    `begins` has the least prediction of each band but the first, rising. They hold for trials that are outside of the
+    training trials by no more than `reach` (`core.learn.novelty`). Without a width there are no intervals; `reason`
+    then says why.
     """
 
     begins: tuple[float, ...] = ()
     half_widths: tuple[float, ...] = ()
     reason: str = ""
+    reach: float = math.inf
 
     def to_json(self) -> dict[str, Any]:
         """Return the intervals as values that JSON represents exactly."""
@@ -43,6 +46,7 @@ class PredictionIntervals:
             "begins": list(self.begins),
             "half_widths": list(self.half_widths),
             "reason": self.reason,
+            **({"reach": self.reach} if math.isfinite(self.reach) else {}),
         }
 
     def half_width(self, predicted: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -54,10 +58,14 @@ class PredictionIntervals:
 
 
 def intervals_of(
-    predicted: NDArray[np.float64], errors: NDArray[np.float64], instances: Sequence[str] | None
+    predicted: NDArray[np.float64],
+    errors: NDArray[np.float64],
+    instances: Sequence[str] | None,
+    outside: NDArray[np.float64] | None = None,
 ) -> PredictionIntervals:
     """Return the intervals that held-out predictions and their errors calibrate.
 
+    `outside` is how far each trial is outside of those that its prediction was learned from, None if that is not known.
     The unit of exchangeability is the instance, as in the prediction sets of labels (`core.learn.conformal`).
     """
     unit = "trials" if instances is None else "instances"
@@ -73,7 +81,8 @@ def intervals_of(
         -calibrated_threshold(-np.abs(errors[rows]), units[rows], COVERAGE)
         for rows in (bands == band for band in range(len(begins) + 1))
     ]
-    return PredictionIntervals(begins=begins, half_widths=tuple(widths))
+    reach = math.inf if outside is None else reach_of(outside, units)
+    return PredictionIntervals(begins=begins, half_widths=tuple(widths), reach=reach)
 
 
 def intervals_from(kept: StoredValues) -> PredictionIntervals:
@@ -85,7 +94,10 @@ def intervals_from(kept: StoredValues) -> PredictionIntervals:
     if bool(len(widths)) == bool(kept.text("reason")):
         raise kept.refusal("half_widths", "there are intervals or a reason for none, not both")
     return PredictionIntervals(
-        begins=tuple(begins.tolist()), half_widths=tuple(widths.tolist()), reason=kept.text("reason")
+        begins=tuple(begins.tolist()),
+        half_widths=tuple(widths.tolist()),
+        reason=kept.text("reason"),
+        reach=kept.number("reach", least=0.0) if "reach" in kept else math.inf,
     )
 
 

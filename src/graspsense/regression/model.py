@@ -100,14 +100,12 @@ class RegressionModel:
         chosen = table.columns(self.table.names)
         values = self.fitted.predict(chosen.values)
         halves = self.intervals.half_width(values)
-        lacking = self.novelty.lacking(chosen)
+        unmeasured = self.novelty.unmeasured(chosen, self.intervals.reach)
         elsewhere = "it was not measured under these settings" if self.differences(provenance) else ""
         made = []
         for i, (value, half) in enumerate(zip(values.tolist(), halves.tolist(), strict=True)):
             unlike = str(getattr(self.novelty.unlike(chosen.row(i)), "words", ""))
-            why = self.intervals.reason or unlike or elsewhere
-            if not why and lacking[i]:
-                why = f"it was measured with trials that have {lacking[i]}"
+            why = self.intervals.reason or unlike or elsewhere or unmeasured[i]
             made.append(
                 PredictedValue(
                     value=value,
@@ -156,7 +154,11 @@ def train_regression(
     try:
         folds = held_out_folds(labelled, min(FOLDS, len(values)), seed)
         predicted = held_out_predictions(estimator, labelled.table.values, values, folds, seed)
-        intervals = intervals_of(predicted, predicted - values, labelled.instances)
+        outside = np.empty(len(values))
+        for fold in np.unique(folds).tolist():
+            known, test = (labelled.table.rows(which) for which in (folds != fold, folds == fold))
+            outside[folds == fold] = _novelty(known).outside(test)
+        intervals = intervals_of(predicted, predicted - values, labelled.instances, outside)
     except ConfigError as error:
         intervals = PredictionIntervals(reason=str(error))
     return RegressionModel(

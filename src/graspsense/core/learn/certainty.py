@@ -12,7 +12,8 @@ of one unit, such as grasps of an object, count as one, or as more where units d
 Kish, Survey Sampling, 1965).
 
 Where labels are not equally frequent, answers with a rare one are right less often than others that are as probable. So
-a rate is multiplied by how often the answers with its label were right, as a share of what their rates promise. Of few
+a rate is multiplied by how often the answers with its label were right, as a share of what their rates promise. Where
+they were right more often than that, it is the wrong ones that are divided, so that no answer becomes certain. Of few
 answers that share is partly luck: it is drawn towards that of all labels as rare, which is drawn towards a half.
 
 The other labels share what remains in proportion to their probabilities. A probability of 0, as trees and nearest
@@ -85,9 +86,10 @@ class SupportClass:
 
 @frozen(kw_only=True)
 class LabelShare:
-    """How often answers with a label are right, as a share of what their rates promise, at most 1.
+    """How often answers with a label are right, as a share of what their rates promise.
 
-    `low` and `high` are the ends of its 95 % interval.
+    A share above 1 is that of the wrong answers that are promised to those that there are. `low` and `high` are the
+    ends of its 95 % interval.
     """
 
     share: float
@@ -95,16 +97,28 @@ class LabelShare:
     high: float
 
 
+def _applied(rate: float, share: float) -> float:
+    """Return the rate of a label with this share, of that of all labels."""
+    return 1.0 - (1.0 - rate) / share if share > 1.0 else rate * share
+
+
+def _share_of(rate: float, promised: float) -> float:
+    """Return the share that makes this rate of the promised one."""
+    return (1.0 - promised) / (1.0 - rate) if rate > promised else rate / promised
+
+
 @frozen(kw_only=True)
 class Certainty:
     """The rates of right answers by support and probability; the classes of support begin with the smallest.
 
     Labels that were too seldom the answer are not in `of_label`: their certainty is not known. None is a model that was
-    measured before these were kept.
+    measured before these were kept. The rates hold for trials that are outside of the training trials by no more than
+    `reach` (`learn.novelty`).
     """
 
     classes: tuple[SupportClass, ...]
     of_label: Mapping[str, LabelShare] | None = None
+    reach: float = math.inf
 
     def class_of(self, support: NDArray[np.float64]) -> NDArray[np.int64]:
         """Return the number of the class of support of each answer. NaN is an answer without support."""
@@ -116,13 +130,8 @@ class Certainty:
         self, probability: NDArray[np.float64], support: NDArray[np.float64], labels: Sequence[str]
     ) -> NDArray[np.float64]:
         """Return the rate of right answers with this probability, support and label; NaN where it is not known."""
-        return self.rate_of_all(probability, support) * [share.share for share in self._of_labels(labels)]
-
-    def rate_of_all(
-        self, probability: NDArray[np.float64], support: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """Return the rate of right answers with this probability and support, of all labels together."""
-        return np.array([rate for rate, _ in self._steps(probability, support)])
+        steps, shares = self._steps(probability, support), self._of_labels(labels)
+        return np.array([_applied(rate, own.share) for (rate, _), own in zip(steps, shares, strict=True)])
 
     def intervals(
         self, probability: NDArray[np.float64], support: NDArray[np.float64], labels: Sequence[str]
@@ -132,8 +141,8 @@ class Certainty:
         return [
             interval
             and (
-                min(interval[0] * of_label.share, rate * of_label.low),
-                min(max(interval[1] * of_label.share, rate * of_label.high), 1.0),
+                min(_applied(interval[0], of_label.share), _applied(rate, of_label.low)),
+                max(_applied(interval[1], of_label.share), _applied(rate, of_label.high)),
             )
             for (rate, interval), of_label in zip(steps, self._of_labels(labels), strict=True)
         ]
@@ -156,9 +165,9 @@ class Certainty:
         unknown = LabelShare(share=math.nan, low=math.nan, high=math.nan)
         return [self.of_label.get(label, unknown) for label in labels]
 
-    def to_json(self) -> list[dict[str, Any]]:
-        """Return the rates as values that JSON represents exactly."""
-        return [
+    def to_json(self) -> dict[str, Any]:
+        """Return its entries in the file of a model, as values that JSON represents exactly."""
+        classes = [
             {
                 "support": support_class.least,
                 "units": support_class.units,
@@ -168,12 +177,19 @@ class Certainty:
             }
             for support_class in self.classes
         ]
+        entries: dict[str, Any] = {"certainty": classes}
+        if self.of_label is not None:
+            shares = {name: [own.low, own.share, own.high] for name, own in self.of_label.items()}
+            entries["certainty_of_label"] = shares
+        return entries | ({"certainty_reach": self.reach} if math.isfinite(self.reach) else {})
 
 
-def certainty_from(kept: Sequence[StoredValues], of_label: StoredValues | None) -> Certainty:
-    """Return the certainty of a stored model from its classes of support and its labels. Raises DataDamaged."""
+def certainty_from(stored: StoredValues) -> Certainty | None:
+    """Return the certainty of a stored model, None if it has none. Raises DataDamaged."""
+    if not stored.has("certainty"):
+        return None
     classes: list[SupportClass] = []
-    for values in kept:
+    for values in stored.tables("certainty"):
         rates = values.numbers("rates", (None,), least=0.0)
         probabilities = values.numbers("probabilities", (len(rates),), least=0.0)
         if not len(rates) or (rates > 1.0).any():
@@ -199,7 +215,11 @@ def certainty_from(kept: Sequence[StoredValues], of_label: StoredValues | None) 
                 intervals=tuple((low, high) for low, high in intervals.tolist()),
             )
         )
-    return Certainty(classes=tuple(classes), of_label=None if of_label is None else _shares_from(of_label))
+    return Certainty(
+        classes=tuple(classes),
+        of_label=_shares_from(stored.table("certainty_of_label")) if "certainty_of_label" in stored else None,
+        reach=stored.number("certainty_reach", least=0.0) if "certainty_reach" in stored else math.inf,
+    )
 
 
 def _shares_from(kept: StoredValues) -> dict[str, LabelShare]:
@@ -207,8 +227,8 @@ def _shares_from(kept: StoredValues) -> dict[str, LabelShare]:
     shares = {}
     for label in kept:
         low, share, high = kept.numbers(label, (3,), least=0.0).tolist()
-        if not low <= share <= min(high, 1.0):
-            raise kept.refusal(label, "its interval does not hold its share, or the share is above 1")
+        if not low <= share <= high:
+            raise kept.refusal(label, "its interval does not hold its share")
         shares[label] = LabelShare(share=share, low=low, high=high)
     return shares
 
@@ -250,7 +270,7 @@ def certainty_of(
             )
         )
     of_all = Certainty(classes=tuple(classes))
-    promised = of_all.rate_of_all(probability, support)
+    promised = of_all.rate(probability, support, labels)
     return evolve(of_all, of_label=_shares(np.array(labels), answers, promised, weights / effect, effect))
 
 
@@ -278,8 +298,11 @@ def _shares(
 
     names, column = np.unique(labels, return_inverse=True)
     units, right_in, promised_in = (
-        np.bincount(column, weights * counts) for counts in (np.ones(len(labels)), right, promised)
+        np.bincount(column, weights * counts).astype(np.float64)
+        for counts in (np.ones(len(labels)), right, promised)
     )
+    # Of all labels together, the rates promise enough: what they were drawn towards guessing is no share of a label.
+    right_in = right_in / max(float(right_in.sum() / promised_in.sum()), 1.0)
     shares = {}
     for k in np.flatnonzero(units * effect >= LABEL_UNITS - _ROUNDING).tolist():
         as_rare = units <= AS_RARE * units[k]
@@ -287,15 +310,14 @@ def _shares(
         if not as_rare.all():
             promised_as_rare = float(promised_in[as_rare].sum())
             usual = (float(right_in[as_rare].sum()) + LABEL_WEIGHT / 2.0) / (promised_as_rare + LABEL_WEIGHT)
-        share = min((right_in[k] + LABEL_WEIGHT * usual) / (promised_in[k] + LABEL_WEIGHT), 1.0)
-        mean = promised_in[k] / units[k]
+        mean = float(promised_in[k] / units[k])
+        rate = mean * (right_in[k] + LABEL_WEIGHT * usual) / (promised_in[k] + LABEL_WEIGHT)
         low, high = (
-            betaincinv(share * mean * (units[k] + 2.0), (1.0 - share * mean) * (units[k] + 2.0), end) / mean
+            betaincinv(rate * (units[k] + 2.0), (1.0 - rate) * (units[k] + 2.0), end)
             for end in (0.025, 0.975)
         )
-        shares[str(names[k])] = LabelShare(
-            share=float(share), low=float(min(low, share)), high=float(max(high, share))
-        )
+        low, share, high = (_share_of(float(end), mean) for end in (min(low, rate), rate, max(high, rate)))
+        shares[str(names[k])] = LabelShare(share=share, low=low, high=high)
     return shares
 
 

@@ -40,6 +40,8 @@ PARTS: Final = 10
 """Parts of each label that are held out, if its trials are in clumps: ten folds."""
 _MOST_REPEATED: Final = 9
 """Largest number of others that are of the same one as a trial: ten grasps of an object are usual."""
+_FEWEST_REPEATED: Final = 6
+"""Trials for each of these others from which on they can be told; each label has half as many groups of them."""
 _GAP: Final = 3.0
 """Standard deviations by which the gap behind these is wider than gaps between other neighbours."""
 
@@ -66,7 +68,7 @@ def parts_of_clumps(values: Values, labels: Sequence[str], copies: Numbers) -> N
     apart[copies[0], copies[1]] = apart[copies[1], copies[0]] = np.inf
     # A coarse feature puts trials on a lattice, and copies lie at equal distances from others: both make gaps.
     fine = all(2 * len(np.unique(column)) > len(values) for column in values.T)
-    repeated = _repeated(apart) if fine and not copies.size else 0
+    repeated = _repeated(apart, np.bincount(codes)[codes]) if fine and not copies.size else 0
     if not repeated and not _in_clumps(values, codes, apart):
         return None
     part_of = np.zeros(len(codes), dtype=np.int64)
@@ -77,20 +79,25 @@ def parts_of_clumps(values: Values, labels: Sequence[str], copies: Numbers) -> N
     return codes * len(codes) + part_of
 
 
-def _repeated(apart: Values) -> int:
-    """Return how many others are of the same one as each trial, by the gap behind them; 0 if there is none."""
-    most = min(_MOST_REPEATED, len(apart) // _FEWEST_CLUMPED)
+def _repeated(apart: Values, of_label: Numbers) -> int:
+    """Return how many others are of the same one as each trial, by the gap behind them; 0 if there is none.
+
+    `of_label` has the number of trials with the label of each one. Labels that are far from each other have a gap too,
+    so that only those count whose trials may be of several.
+    """
     near = np.clip(np.sort(apart, axis=1)[:, : _MOST_REPEATED + 2], NEAREST, 1.0 / NEAREST)
     places = np.arange(1, near.shape[1])
     gaps = places * np.diff(np.log(near), axis=1)
     # Two trials that are next to each other have about the same distances, so that they count as one.
-    wider = [
-        math.sqrt(len(gaps) / 2.0) * beyond.mean() / max(beyond.std(), NEAREST)
-        for beyond in (
-            gaps[:, m - 1] - np.delete(gaps, m - 1, axis=1).mean(axis=1) for m in range(1, most + 1)
+    wider = [0.0]
+    for others in range(1, min(_MOST_REPEATED, len(apart) // _FEWEST_REPEATED) + 1):
+        judged = gaps[of_label >= _FEWEST_REPEATED * (others + 1) // 2]
+        beyond = judged[:, others - 1] - np.delete(judged, others - 1, axis=1).mean(axis=1)
+        wide = len(judged) >= _FEWEST_REPEATED * others
+        wider.append(
+            math.sqrt(len(judged) / 2.0) * beyond.mean() / max(beyond.std(), NEAREST) if wide else 0.0
         )
-    ]
-    return int(np.argmax(wider)) + 1 if wider and max(wider) > _GAP else 0
+    return int(np.argmax(wider)) if max(wider) > _GAP else 0
 
 
 def _in_clumps(values: Values, codes: Numbers, apart: Values) -> bool:

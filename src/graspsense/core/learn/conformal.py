@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 COVERAGE: Final = 0.9
 """Share of the trials whose set shall contain the true label."""
+WITHIN_REACH: Final = 0.98
+"""Share of held-out trials for whose like something is told: of the others, too few show how often they are right."""
 COVERAGES: Final = (0.01, 0.999)
 """The coverages that a stored model may have; each needs a number of units that can be counted."""
 UNITS: Final = ("instances", "sessions", "groups", "trials")
@@ -249,6 +251,11 @@ def sets_of(
         # With a single class, the thresholds of the labels suffice.
         of_support=tuple(of_support) if len(of_support) > 1 else (NEVER_REACHED,),
     )
+
+
+def reach_of(outside: NDArray[np.float64], units: NDArray[np.str_]) -> float:
+    """Return the distance within which nearly all held-out trials were, of those in `outside` (`Novelty.outside`)."""
+    return -calibrated_threshold(-outside, units, WITHIN_REACH)
 
 
 def calibrated_threshold(scores: NDArray[np.float64], units: NDArray[np.str_], coverage: float) -> float:

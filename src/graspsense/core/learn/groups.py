@@ -10,7 +10,8 @@ length is doubled as long as neighbouring blocks are alike.
 
 Clumps: of trials in another order, their distances may tell (`clumps`).
 
-Numbers to predict: trials with the same finely measured number, which chance hardly repeats, are of one object.
+Numbers to predict: trials with the same finely measured number, which chance hardly repeats, are of one object; so are
+clumps of trials with about the same number and features.
 
 Sessions: instances of several classes that are called by the same day or session are no objects of their class.
 """
@@ -27,7 +28,7 @@ import numpy as np
 from attrs import evolve
 
 from graspsense.core.components.caller import option
-from graspsense.core.learn.clumps import NEAREST, PARTS, distances_between, parts_of_clumps
+from graspsense.core.learn.clumps import NEAREST, distances_between, parts_of_clumps
 from graspsense.core.learn.labelled import class_of
 from graspsense.core.values.errors import counted
 
@@ -94,17 +95,20 @@ def grouped(labelled: Labelled, copies: Numbers) -> Labelled:
 
 def _together(labelled: Labelled, copies: Numbers) -> tuple[Numbers, str]:
     """Return the group of each trial, and in words which trials belong together besides copies; empty if none do."""
+    values, labels = _scaled(labelled.table.values), labelled.labels
     if labelled.value is not None:
-        return _of_one_number(np.array(labelled.value.values))
-    length, block_of = _blocks(labelled)
-    if length > 1:
-        words = f"trials of a label that follow each other are more alike than others. Blocks of {length}"
-        return block_of, words
-    values = _scaled(labelled.table.values)
-    part_of = None if len(labelled) > _MOST_TRIALS else parts_of_clumps(values, labelled.labels, copies)
+        group_of, why = _of_one_number(np.array(labelled.value.values))
+        # The number of an object tells as much of which one it is as all features together.
+        number = _scaled(np.array(labelled.value.values)[:, np.newaxis])
+        values, labels = np.column_stack([values, math.sqrt(values.shape[1]) * number]), ("",) * len(labels)
+    else:
+        length, group_of = _blocks(labelled)
+        alike = "trials of a label that follow each other are more alike than others"
+        why = f"{alike}. Blocks of {length}" if length > 1 else ""
+    part_of = None if why or len(labelled) > _MOST_TRIALS else parts_of_clumps(values, labels, copies)
     if part_of is None:
-        return block_of, ""
-    return part_of, f"trials of a label are in clumps that are alike. {PARTS} parts of each label"
+        return group_of, why
+    return part_of, f"trials are in clumps that are alike. {len(np.unique(part_of))} parts of them"
 
 
 def _of_one_number(values: Values) -> tuple[Numbers, str]:

@@ -14,7 +14,7 @@ from graspsense.core.components.entries import TABLE_OF_ROLE
 from graspsense.core.components.setting import CHANGES_NO_RESULT, NAMES_INPUT, settings_marked, worded
 from graspsense.core.learn.certainty import LABEL_UNITS, Certainty, with_certainty
 from graspsense.core.learn.conformal import Answers, PredictionSets, scores_of
-from graspsense.core.learn.novelty import Novelty
+from graspsense.core.learn.novelty import REACH, Novelty
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.features import (
     LARGEST_VALUE,
@@ -180,14 +180,16 @@ class Model:
         """Return predictions with certainty and sets, without reasons; those of unknown trials have no set.
 
         `shares` are the probabilities that the classifier gives. With `elsewhere`, the trials are not of the kind that
-        the model was measured on, and nothing is calibrated; nor is a trial that lacks what all training trials had.
+        the model was measured on, and nothing is calibrated; nor is a trial for which that does not hold.
         """
         classes = self.classifier.classes()
         known = np.array([label != UNKNOWN for label in labels])
         predicted = shares.argmax(axis=1)
         predicted[known] = [classes.index(label) for label in labels if label != UNKNOWN]
         no_certainty = "it was not measured under these settings" if elsewhere else self.no_certainty
-        lacking = self.novelty.lacking(table)
+        unmeasured = self.novelty.unmeasured(
+            table, math.inf if self.certainty is None else self.certainty.reach
+        )
         probabilities, members = shares, np.zeros(shares.shape, dtype=np.bool_)
         intervals: Sequence[tuple[float, float] | None] = [None] * len(table)
         if self.certainty is not None and not no_certainty:
@@ -196,7 +198,7 @@ class Model:
             answered = [classes[k] for k in predicted.tolist()]
             certainty = self.certainty.rate(share, support, answered)
             kept = self.certainty.intervals(share, support, answered)
-            measured = np.array([not names for names in lacking])
+            measured = np.array([not why for why in unmeasured])
             known &= measured
             calibrated = with_certainty(shares, predicted, certainty)
             probabilities = np.where(measured[:, np.newaxis], calibrated, shares)
@@ -218,7 +220,7 @@ class Model:
         made = []
         for i, label in enumerate(labels):
             order = sorted(np.flatnonzero(members[i]), key=lambda k: (k != predicted[i], -scores[i, k]))
-            without = no_certainty or self._why_uncertain(classes[predicted[i]], lacking[i])
+            without = no_certainty or unmeasured[i] or self._why_uncertain(classes[predicted[i]])
             made.append(
                 Prediction(
                     label=label,
@@ -233,10 +235,8 @@ class Model:
             )
         return made
 
-    def _why_uncertain(self, label: str, lacking: str) -> str:
-        """Return why the certainty of this answer to a trial without these features is not known; empty if it is."""
-        if lacking:
-            return f"it was measured with trials that have {lacking}"
+    def _why_uncertain(self, label: str) -> str:
+        """Return why the certainty of answers with this label is not known; empty if it is."""
         if self.certainty is None or self.certainty.of_label is None or label in self.certainty.of_label:
             return ""
         unit = "trials" if self.sets is None else self.sets.unit
@@ -256,7 +256,7 @@ class Model:
         shares = self.classifier.probabilities(_bounded(chosen))
         with self._usable():
             refuse_improbable(shares, len(table), len(self.classifier.classes()))
-        unlike = self.novelty.unlike_rows(chosen).tolist()
+        unlike = (self.novelty.outside(chosen) > REACH).tolist()
         classes = self.classifier.classes()
         # Probabilities that differ by rounding count as equal: the first of them is the answer.
         best = np.argmax(shares >= shares.max(axis=1, keepdims=True) - EQUAL, axis=1).tolist()

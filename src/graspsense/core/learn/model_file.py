@@ -95,17 +95,9 @@ def _learned_as_json(model: Model) -> dict[str, Any]:
     return {
         "unknown": model.novelty.to_json(),
         "sets": None if model.sets is None else model.sets.to_json(),
-        **_certainty_as_json(model.certainty),
+        **({"certainty": None} if model.certainty is None else model.certainty.to_json()),
         "model": model.classifier.to_json(),
     }
-
-
-def _certainty_as_json(certainty: Certainty | None) -> dict[str, Any]:
-    """Return the entries of a certainty in the file of a model."""
-    if certainty is None or certainty.of_label is None:
-        return {"certainty": None if certainty is None else certainty.to_json()}
-    of_label = {name: [share.low, share.share, share.high] for name, share in certainty.of_label.items()}
-    return {"certainty": certainty.to_json(), "certainty_of_label": of_label}
 
 
 def load_model(name: str, plugins: Plugins) -> Model:
@@ -207,10 +199,7 @@ def _learned_from(
     novelty = novelty_from(names, units, stored.table("unknown"))
     if sorted(novelty.classes) != sorted(classifier.classes()):
         raise stored.refusal("unknown.ranges", "they are not those of the labels of the classifier")
-    certainty = None
-    if stored.has("certainty"):
-        of_label = stored.table("certainty_of_label") if "certainty_of_label" in stored else None
-        certainty = certainty_from(stored.tables("certainty"), of_label)
+    certainty = certainty_from(stored)
     return {
         "classifier": classifier,
         "novelty": novelty,

@@ -3,6 +3,8 @@
 For each class and feature, the model has the range of the training trials. A trial is unlike a class if one of its
 features lies outside that range by more than `REACH` times the standard deviation of the feature within classes (pooled
 over the classes). It is *unknown* if it is unlike every class, or has no feature at all. Missing features are ignored.
+
+What was measured on held-out trials holds for those that are no farther outside than nearly all of these were.
 """
 
 from __future__ import annotations
@@ -55,16 +57,26 @@ class Novelty:
     complete: NDArray[np.bool_]
     """Whether each training trial had the feature, shape (features,); False where it is not known."""
 
-    def lacking(self, table: FeatureTable) -> list[str]:
-        """Return for each trial of a table the features that it lacks, in words, although each training trial had them.
+    def unmeasured(self, table: FeatureTable, reach: float) -> list[str]:
+        """Return for each trial of a table why what held-out trials told does not hold for it; empty if it does.
 
-        What was measured with the training trials says nothing of such a trial.
+        It does not if the trial lacks a feature that each training trial had, or is outside by more than `reach`.
         """
-        missing = np.isnan(table.columns(self.names).values) & self.complete
-        return [listed([self.names[f] for f in np.flatnonzero(row)]) if row.any() else "" for row in missing]
+        table = table.columns(self.names)
+        lacking = np.isnan(table.values) & self.complete
+        far = self.outside(table) > reach
+        why = [""] * len(table)
+        for i in np.flatnonzero(lacking.any(axis=1) | far).tolist():
+            if lacking[i].any():
+                names = listed([self.names[f] for f in np.flatnonzero(lacking[i])])
+                why[i] = f"it was measured with trials that have {names}"
+            else:
+                strange = self.unlike(table.row(i), reach)
+                why[i] = f"the trials that it was measured with were closer to those learned from: {strange}"
+        return why
 
-    def unlike(self, features: Features) -> Reason | None:
-        """Return why this trial is unlike every class, or None if it is like one of them."""
+    def unlike(self, features: Features, reach: float = REACH) -> Reason | None:
+        """Return why this trial is outside of every class by more than `reach`, or None if it is not."""
         values = np.array([features[name] for name in self.names])
         if np.isnan(values).all():
             if self.featureless:
@@ -74,7 +86,7 @@ class Novelty:
         outside = self._outside(values)
         worst = _worst(outside)
         k = int(np.argmin(worst))
-        if worst[k] <= REACH:
+        if worst[k] <= reach:
             return None
         if math.isinf(worst[k]):
             return Reason(words="it has none of the features that the training trials had")
@@ -88,12 +100,12 @@ class Novelty:
             features=(feature,),
         )
 
-    def unlike_rows(self, table: FeatureTable) -> NDArray[np.bool_]:
-        """Return for each trial of a table whether it is unlike every class."""
+    def outside(self, table: FeatureTable) -> NDArray[np.float64]:
+        """Return how far each trial of a table is outside of the nearest class, in standard deviations."""
         values = table.columns(self.names).values
-        unlike = self._worst_of(values, self._outside).min(axis=1) > REACH
-        unlike[np.isnan(values).all(axis=1)] = not self.featureless
-        return np.asarray(unlike)
+        outside = self._worst_of(values, self._outside).min(axis=1)
+        outside[np.isnan(values).all(axis=1)] = 0.0 if self.featureless else np.inf
+        return np.asarray(outside)
 
     def closeness(self, table: FeatureTable, classes: Sequence[str]) -> NDArray[np.float64]:
         """Return how close each trial is to the middle of each of these classes, shape (trials, classes).
