@@ -241,7 +241,7 @@ def test_workers_with_other_versions_are_refused(lab, cluster):
     code, _, stderr = lab.run("out", "--executor", f"dask:{address}")
 
     assert code == 2
-    assert "wayward: 0.3 here, not installed" in stderr
+    assert re.search(r"wayward: 0\.3\+[0-9a-f]{8} here, not installed", stderr)
 
 
 def test_no_scheduler_there(lab):
