@@ -29,8 +29,7 @@ class Interrupts:
     and hurry. While `deferred` is set, the first signal is only counted as well. Only the main thread receives
     signals; in other threads this has no effect. A signal that the process ignores stays ignored.
 
-    After `watch`, a tick that does not end raises KeyboardInterrupt too, and `stuck` is True; it is not counted. A tick
-    has begun at `tick_began_s` (monotonic; infinity between the ticks).
+    After `watch`, a tick that does not end raises KeyboardInterrupt too, and `stuck` is True; it is not counted.
     """
 
     def __init__(self, *, deferred: bool = False) -> None:
@@ -38,7 +37,7 @@ class Interrupts:
         self.deferred = deferred
         self._previous: dict[int, Any] = {}
         self.stuck = self._raised = False
-        self.tick_began_s = inf
+        self._tick_began_s = inf
         self._over = threading.Event()
         self._watch: threading.Thread | None = None
 
@@ -67,9 +66,17 @@ class Interrupts:
             self._watch = threading.Thread(target=self._look, name="tick watch", daemon=True)
             self._watch.start()
 
+    def tick_begins(self) -> None:
+        """Note that a tick begins."""
+        self._tick_began_s = time.monotonic()
+
+    def tick_ended(self) -> None:
+        """Note that no tick runs."""
+        self._tick_began_s = inf
+
     def _look(self) -> None:
         while not self._over.wait(STUCK_S / LOOKS):
-            if time.monotonic() - self.tick_began_s > STUCK_S:
+            if time.monotonic() - self._tick_began_s > STUCK_S:
                 self.stuck = True
                 # Also ends a sleep.
                 signal.pthread_kill(threading.main_thread().ident or 0, next(iter(self._previous)))

@@ -327,7 +327,8 @@ class _Grasp:
             # A controller can raise anything; the gripper must still be released and the trace kept.
             ending = Outcome.ABORTED, f"{named(error)}{place_of(error)}"
         finally:
-            self.interrupts.deferred, self.interrupts.tick_began_s = True, inf
+            self.interrupts.deferred = True
+            self.interrupts.tick_ended()
             fault = self._fault()
             self._let_go(opens=not (self.state.done or (fault is not None and fault.relaxes)))
         if ending is None and fault is not None and self.protection is not None:
@@ -379,9 +380,9 @@ class _Grasp:
         most_ticks, losses, interrupts = self._most_ticks(), self.losses, self.interrupts
         while n_ticks < most_ticks:
             n_ticks += 1
-            interrupts.tick_began_s = inf
+            interrupts.tick_ended()
             reading = self._checked(read(timeout_s))
-            interrupts.tick_began_s = time.monotonic()
+            interrupts.tick_begins()
             frame, pads, _ = reading
             self.last = frame
             if self.first_t_s is None:
