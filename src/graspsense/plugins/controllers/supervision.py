@@ -201,7 +201,13 @@ class LawState(NamedTuple):
 
 def law_state(progress: GraspProgress, effort_n: float, events: int) -> LawState:
     """Return the state with this progress."""
-    return LawState(progress.phase, progress.outcome, progress, effort_n, events)
+    return LawState(
+        phase=progress.phase,
+        outcome=progress.outcome,
+        progress=progress,
+        effort_n=effort_n,
+        events=events,
+    )
 
 
 def free_end(params: Any, state: LawState, memory_n: float, effort_n: float, t_s: float) -> LawState:
