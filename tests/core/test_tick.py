@@ -20,7 +20,7 @@ from graspsense.core.values.signals import (
     Phase,
     Reading,
 )
-from graspsense.plugins.controllers.velocity import VelocityState
+from graspsense.plugins.controllers.supervision import LawState
 
 OPENING = Command(EFFORT, -20.0, inf, inf)
 RELAXED = Command(EFFORT, 0.0, inf, inf)
@@ -39,7 +39,7 @@ def law_that_ends_at(t_end, outcome=STEADY):
         phase, ended = (SQUEEZE if t_s >= 1.0 else APPROACH), RUNNING
         if t_s >= t_end:
             phase, ended = HOLD, outcome
-        return CLOSING, VelocityState(phase, ended, None, 0.0)
+        return CLOSING, LawState(phase, ended, None, 0.0)
 
     return step
 
@@ -57,7 +57,7 @@ def walk(
 ):
     """Run so many ticks of 1 ms with a law that ends; return (t, phase, command value) of each and the last state."""
     schedule = Schedule(opens, OPENING, RELAXED, tare_images, hold_s, timeout_s, releases)
-    state = first_state(VelocityState(APPROACH, RUNNING, None, 0.0))
+    state = first_state(LawState(APPROACH, RUNNING, None, 0.0))
     bound, seen = bind(tick, step=law_that_ends_at(t_end, outcome)), []
     for k in range(ticks):
         t = k * 0.001
@@ -115,7 +115,7 @@ def test_where_no_release_is_needed_a_held_grasp_ends_with_its_first_tick_and_an
 
 def test_without_a_controller_it_says_so():
     params = TickParams(Schedule(0, OPENING, RELAXED, 0, 0.0, 1.0), LIMITS, ())
-    state = first_state(VelocityState(APPROACH, RUNNING, None, 0.0))
+    state = first_state(LawState(APPROACH, RUNNING, None, 0.0))
     reading = Reading(Frame(0.0, 0.001, 0.05, *[0.0] * 6, 0), Pads(0.0, 0, (), ()))
     with pytest.raises(TypeError, match="no controller"):
         tick(params, state, reading)

@@ -167,7 +167,8 @@ def test_commands_stay_within_limits_whatever_wire_and_board_do(wires, grasps, s
         assert backend.report()["let_go_after_s"] <= 0.1
         assert ended.reason or ended.outcome != Outcome.DEVICE_LOST
     assert outcomes[twice] >= 2
-    assert outcomes["DEVICE_LOST"] >= 1
+    # A board whose clock is wrong can still be told to open: it ends the grasp, and is not lost.
+    assert (outcomes["DEVICE_LOST"] >= 1) == (faults is random_faults)
 
 
 @every_case(

@@ -67,11 +67,11 @@ class Interrupts:
             self._watch.start()
 
     def tick_begins(self) -> None:
-        """Say that a tick begins."""
+        """Note that a tick begins."""
         self._tick_began_s = time.monotonic()
 
-    def tick_ends(self) -> None:
-        """Say that the tick has ended."""
+    def tick_ended(self) -> None:
+        """Note that no tick runs."""
         self._tick_began_s = inf
 
     def _look(self) -> None:

@@ -157,9 +157,6 @@ def run_grasp(
             if on_open is not None:
                 on_open(info)
             grasp = _Grasp(backend, controller, run, info, sinks, on_event, interrupts)
-            # A program in a debugger stands still too, so only where there is something to hurt.
-            if not info.simulated and not info.harmless:
-                interrupts.watch()
             if watcher is not None:
                 grasp.watch_with(watcher)
             with no_collection():
@@ -311,6 +308,9 @@ class _Grasp:
     def drive(self) -> tuple[Outcome, str]:
         """Run the loop and return the outcome. The gripper was then commanded to open or relax."""
         self._show_device()
+        # A program in a debugger stands still too, so only where there is something to hurt.
+        if not self.info.simulated and not self.info.harmless:
+            self.interrupts.watch()
         try:
             self._loop()
             ending: tuple[Outcome, str] | None = None
@@ -328,7 +328,7 @@ class _Grasp:
             ending = Outcome.ABORTED, f"{named(error)}{place_of(error)}"
         finally:
             self.interrupts.deferred = True
-            self.interrupts.tick_ends()
+            self.interrupts.tick_ended()
             fault = self._fault()
             self._let_go(opens=not (self.state.done or (fault is not None and fault.relaxes)))
         if ending is None and fault is not None and self.protection is not None:
@@ -367,7 +367,7 @@ class _Grasp:
         return "; ".join(filter(None, (reason, closed, lost, *self.failed_sinks)))
 
     def _loop(self) -> None:
-        read, apply, run = self.backend.read, self.backend.apply, self.run
+        apply, run = self.backend.apply, self.run
         step = with_plain_commands(self.step)
         advance = bind(tick, step=step, events_told=events_of(self.step), TickState=maker(TickState))
         params, record = self.params, self.recorder.add
@@ -377,12 +377,10 @@ class _Grasp:
         state, phase, watcher = self.state, self.state.phase, self.state.guard
         images: list[Pads] = []
         newest = n_ticks = 0
-        most_ticks, losses, interrupts = self._most_ticks(), self.losses, self.interrupts
+        most_ticks, losses = self._most_ticks(), self.losses
         while n_ticks < most_ticks:
             n_ticks += 1
-            interrupts.tick_ends()
-            reading = self._checked(read(timeout_s))
-            interrupts.tick_begins()
+            reading = self._read(timeout_s)
             frame, pads, _ = reading
             self.last = frame
             if self.first_t_s is None:
@@ -429,8 +427,11 @@ class _Grasp:
                 return
         raise _Overdue(overdue(run))
 
-    def _checked(self, reading: Reading | None) -> Reading:
-        """Return a reading that came, and that is what the gripper declares."""
+    def _read(self, timeout_s: float) -> Reading:
+        """Return the next reading, with which a tick begins. It came, and is what the gripper declares."""
+        self.interrupts.tick_ended()
+        reading = self.backend.read(timeout_s)
+        self.interrupts.tick_begins()
         if reading is None:
             raise DeviceLost(no_frame(self.run, self.info))
         if problem := self.delivered.problem(reading):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import inf
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal
 
 from attrs import frozen
 
@@ -24,11 +24,13 @@ from graspsense.plugin_api import (
 from graspsense.plugins.controllers.supervision import (
     EVENTS,
     LAW_CHANNELS,
-    GraspProgress,
+    LawState,
     SupervisionConfig,
     events_of,
+    free_end,
     free_limits,
     law_numbers,
+    law_state,
     not_begun,
     supervise,
 )
@@ -109,18 +111,7 @@ def force_numbers(config: ForceLoopConfig, slowest_m_s: float = 0.0) -> dict[str
     return {**numbers, "closed": 1}
 
 
-class ForceState(NamedTuple):
-    """State of the law."""
-
-    phase: int
-    outcome: int
-    progress: GraspProgress
-    effort_n: float
-    events: int = 0
-    """The bits of `EVENTS` in this tick."""
-
-
-def step(params: Any, state: ForceState, reading: Reading) -> tuple[Command, ForceState]:
+def step(params: Any, state: LawState, reading: Reading) -> tuple[Command, LawState]:
     """Close with the probing effort; from contact on, control the force if the loop is closed."""
     frame = reading.frame
     progress = supervise(params, state.progress, frame, state.progress.still)
@@ -130,18 +121,14 @@ def step(params: Any, state: ForceState, reading: Reading) -> tuple[Command, For
     value, limit = effort, inf
     if params.sends == POSITION:
         value, limit = 0.0, effort
-    return Command(params.sends, value, limit, inf), ForceState(
-        phase=progress.phase,
-        outcome=progress.outcome,
-        progress=progress,
-        effort_n=effort,
-        events=events_of(state.progress, progress),
+    return Command(params.sends, value, limit, inf), law_state(
+        progress, effort, events_of(state.progress, progress)
     )
 
 
-def free_begin(params: Any, state: ForceState, frame: Frame) -> tuple[float, FreeLimits]:
-    """Begin free motion, whose effort is constant: its memory is unused."""
-    return 0.0, free_limits(params, state.progress) if params.sends == EFFORT else NOT_FREE
+def free_begin(params: Any, state: LawState, frame: Frame) -> tuple[float, FreeLimits]:
+    """Begin free motion, whose effort is constant, as is its memory."""
+    return state.effort_n, free_limits(params, state.progress) if params.sends == EFFORT else NOT_FREE
 
 
 def free_command(
@@ -149,13 +136,6 @@ def free_command(
 ) -> tuple[float, float]:
     """Return the effort of a tick of free motion."""
     return params.probing_force_n, memory
-
-
-def free_end(params: Any, state: ForceState, memory: float, effort_n: float, t_s: float) -> ForceState:
-    """Return the state after free motion."""
-    return ForceState(
-        phase=state.phase, outcome=state.outcome, progress=state.progress, effort_n=effort_n, events=0
-    )
 
 
 class ForceController(Controller[ForceConfig]):
@@ -184,13 +164,6 @@ class ForceController(Controller[ForceConfig]):
         """Return the numbers of the config, and those of `force_numbers`."""
         return params_of(self.config, **force_numbers(self.config))
 
-    def init(self) -> ForceState:
+    def init(self) -> LawState:
         """Return the state before the first tick."""
-        progress = not_begun()
-        return ForceState(
-            phase=progress.phase,
-            outcome=progress.outcome,
-            progress=progress,
-            effort_n=float(self.config.probing_force_n),
-            events=0,
-        )
+        return law_state(not_begun(), float(self.config.probing_force_n), 0)

@@ -19,6 +19,7 @@ from graspsense.plugin_api import (
     VELOCITY,
     Command,
     Controller,
+    Frame,
     Reading,
     RestState,
     at_rest,
@@ -43,16 +44,16 @@ from graspsense.plugins.controllers.supervision import (
     GraspProgress,
     SupervisionConfig,
     events_of,
+    free_limits,
     not_begun,
     supervise,
 )
 from graspsense.plugins.controllers.velocity import (
     VelocityLoopConfig,
     closing_effort,
-    free_begin,
     free_command,
 )
-from graspsense.simulator_api import FreeMotion, params_of
+from graspsense.simulator_api import NOT_FREE, FreeLimits, FreeMotion, params_of
 
 
 @frozen(kw_only=True, slots=False)
@@ -138,6 +139,11 @@ def own_command(params: Any, phase: int, sent: Raised, effort_n: float) -> Comma
     if phase != APPROACH and not stops and force >= params.probing_force_n:
         force = effort_n
     return Command(POSITION, sent.stop_gap_m if stops else 0.0, force, params.closing_speed_m_s)
+
+
+def free_begin(params: Any, state: HybridState, frame: Frame) -> tuple[float, FreeLimits]:
+    """Begin free motion: its memory is the integral of the velocity loop."""
+    return state.integral_n, free_limits(params, state.progress) if params.sends == EFFORT else NOT_FREE
 
 
 def free_end(params: Any, state: HybridState, integral_n: float, effort_n: float, t_s: float) -> HybridState:

@@ -188,6 +188,33 @@ def not_begun() -> GraspProgress:
     )
 
 
+class LawState(NamedTuple):
+    """State of a law that keeps one effort (N) from tick to tick."""
+
+    phase: int
+    outcome: int
+    progress: GraspProgress
+    effort_n: float
+    events: int = 0
+    """The bits of `EVENTS` in this tick."""
+
+
+def law_state(progress: GraspProgress, effort_n: float, events: int) -> LawState:
+    """Return the state with this progress."""
+    return LawState(
+        phase=progress.phase,
+        outcome=progress.outcome,
+        progress=progress,
+        effort_n=effort_n,
+        events=events,
+    )
+
+
+def free_end(params: Any, state: LawState, memory_n: float, effort_n: float, t_s: float) -> LawState:
+    """Return the state after free motion, whose memory is the effort that the law keeps."""
+    return law_state(state.progress, memory_n, 0)
+
+
 def supervise(params: Any, now: GraspProgress, frame: Frame, still: RestState) -> GraspProgress:
     """Return the progress after this frame; the same object if nothing has changed.
 

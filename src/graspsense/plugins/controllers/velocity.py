@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import inf
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal
 
 from attrs import frozen
 
@@ -25,11 +25,13 @@ from graspsense.plugin_api import (
 from graspsense.plugins.controllers.supervision import (
     EVENTS,
     LAW_CHANNELS,
-    GraspProgress,
+    LawState,
     SupervisionConfig,
     events_of,
+    free_end,
     free_limits,
     law_numbers,
+    law_state,
     not_begun,
     supervise,
 )
@@ -91,40 +93,24 @@ def closing_effort(params: Any, integral_n: float, velocity_m_s: float, dt_s: fl
     return params.velocity_gain_n_s_m * error + integral_n, integral_n
 
 
-class VelocityState(NamedTuple):
-    """State of the law."""
-
-    phase: int
-    outcome: int
-    progress: GraspProgress
-    integral_n: float
-    events: int = 0
-    """The bits of `EVENTS` in this tick."""
-
-
-def step(params: Any, state: VelocityState, reading: Reading) -> tuple[Command, VelocityState]:
-    """Close at the given speed against any resistance."""
+def step(params: Any, state: LawState, reading: Reading) -> tuple[Command, LawState]:
+    """Close at the given speed against any resistance. The law keeps the integral of the velocity loop."""
     frame = reading.frame
     progress = supervise(params, state.progress, frame, state.progress.still)
-    value, integral = closing_effort(params, state.integral_n, frame.velocity_m_s, frame.dt_s)
+    value, integral = closing_effort(params, state.effort_n, frame.velocity_m_s, frame.dt_s)
     speed = inf
     if params.sends == VELOCITY:
         value = -params.closing_speed_m_s
     elif params.sends == POSITION:
         value, speed = 0.0, params.closing_speed_m_s
-    return Command(params.sends, value, inf, speed), VelocityState(
-        phase=progress.phase,
-        outcome=progress.outcome,
-        progress=progress,
-        integral_n=integral,
-        events=events_of(state.progress, progress),
+    return Command(params.sends, value, inf, speed), law_state(
+        progress, integral, events_of(state.progress, progress)
     )
 
 
-def free_begin(params: Any, state: Any, frame: Frame) -> tuple[float, FreeLimits]:
+def free_begin(params: Any, state: LawState, frame: Frame) -> tuple[float, FreeLimits]:
     """Begin free motion: its memory is the integral of the velocity loop."""
-    limits = free_limits(params, state.progress) if params.sends == EFFORT else NOT_FREE
-    return state.integral_n, limits
+    return state.effort_n, free_limits(params, state.progress) if params.sends == EFFORT else NOT_FREE
 
 
 def free_command(
@@ -132,15 +118,6 @@ def free_command(
 ) -> tuple[float, float]:
     """Return the effort and the integral of a tick of free motion."""
     return closing_effort(params, integral_n, velocity_m_s, dt_s)
-
-
-def free_end(
-    params: Any, state: VelocityState, integral_n: float, effort_n: float, t_s: float
-) -> VelocityState:
-    """Return the state after free motion."""
-    return VelocityState(
-        phase=state.phase, outcome=state.outcome, progress=state.progress, integral_n=integral_n, events=0
-    )
 
 
 class VelocityController(Controller[VelocityConfig]):
@@ -169,13 +146,6 @@ class VelocityController(Controller[VelocityConfig]):
         """Return the numbers of the config, and those of `law_numbers`."""
         return params_of(self.config, **law_numbers(float(self.config.closing_speed_m_s)))
 
-    def init(self) -> VelocityState:
+    def init(self) -> LawState:
         """Return the state before the first tick."""
-        progress = not_begun()
-        return VelocityState(
-            phase=progress.phase,
-            outcome=progress.outcome,
-            progress=progress,
-            integral_n=float(self.config.preload_n),
-            events=0,
-        )
+        return law_state(not_begun(), float(self.config.preload_n), 0)
