@@ -32,6 +32,8 @@ HOLES: Final = 0.25
 """Largest share of the time in which samples are missing."""
 LARGEST: Final = 0.5
 """Share of the largest turn from which on turns are compared."""
+DUE: Final = 0.2
+"""Share of the range of a force by which it has to turn where its mean stiffness under a load says so."""
 STEPS: Final = 3.0
 """A turn is larger than so many steps of a coarse signal."""
 
@@ -49,14 +51,12 @@ class _Turns:
     """Where its rate grows."""
 
     @classmethod
-    def of(cls, signal: Numbers, steady: Numbers, n: int) -> _Turns:
+    def measured(cls, signal: Numbers, steady: Numbers, n: int) -> _Turns:
         """Return the turns of a signal over `n` samples; `steady` are its values on the steady clock."""
         low, high = usual_range(signal)
         noise = NOISE * float(np.median(np.abs(np.diff(signal, 2))))
         around = slice(FAR * n, len(steady) - FAR * n)
-        near, far = (
-            (np.roll(steady, m) + np.roll(steady, -m) - 2.0 * steady)[around] for m in (n, FAR * n)
-        )
+        near, far = ((np.roll(steady, m) + np.roll(steady, -m) - 2.0 * steady)[around] for m in (n, FAR * n))
         unknown = max(noise, STEPS * (resolution(signal) or 0.0))
         return cls(high - low, unknown, np.abs(near), np.abs(far), near > 0.0)
 
@@ -82,18 +82,23 @@ def apart(t_s: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
         return
     step_s = max(_period_s(t_s, signal) for signal in (t_s, gap, force))
     n = max(2, round(TURN_S / step_s))
-    if FAR * n * step_s > LONGEST_S or not 2 * FAR * n < (t_s[-1] - t_s[0]) / step_s < (1.0 + HOLES) * len(t_s):
+    if FAR * n * step_s > LONGEST_S or not 2 * FAR * n < (t_s[-1] - t_s[0]) / step_s < (1.0 + HOLES) * len(
+        t_s
+    ):
         return
     clock = np.arange(t_s[0], t_s[-1], step_s)
     steady = np.interp(clock, t_s, force)
-    gaps, forces = _Turns.of(gap, np.interp(clock, t_s, gap), n), _Turns.of(force, steady, n)
+    gaps, forces = _Turns.measured(gap, np.interp(clock, t_s, gap), n), _Turns.measured(force, steady, n)
     loads = steady - usual_range(force)[0] > PART * forces.range
     # A contact is no turn under a load, and a gap need not turn there.
     pressed = (loads & np.roll(loads, n) & np.roll(loads, -n))[FAR * n : -FAR * n]
-    slow = forces.around(n)
+    slow, least = forces.around(n), LARGEST * PART * forces.range
+    # A force that was smoothed over a longer time does not turn at all.
+    due = gaps.far * forces.range / max(float(np.ptp(np.interp(clock, t_s, gap)[loads])), gaps.unknown)
     # Where the fingers begin to open, or meet more than before; their drive can speed up by itself.
-    k = _sharpest(gaps, gaps.up & loads[FAR * n : -FAR * n], slow.far > LARGEST * PART * forces.range)
-    if k is not None and slow.sharp[k] < SHARP * min(gaps.sharp[k], 1.0):
+    slows = gaps.up & loads[FAR * n : -FAR * n]
+    k = _sharpest(gaps, slows, (slow.far > least) | (due > DUE * forces.range))
+    if k is not None and (slow.far[k] < least or slow.sharp[k] < SHARP * min(gaps.sharp[k], 1.0)):
         yield (
             f"the fingers change their speed at once at {clock[k + FAR * n]:.4g} s, under a load, and the rate of the "
             "force changes slowly: was the force smoothed, or is it of another time than the gap? A contact is then "
@@ -101,8 +106,7 @@ def apart(t_s: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
         )
         return
     slow = gaps.around(n)
-    large = forces.near > LARGEST * PART * forces.range
-    k = _sharpest(forces, pressed, large & (slow.far > slow.unknown))
+    k = _sharpest(forces, pressed, (forces.near > least) & (slow.far > slow.unknown))
     if k is not None and slow.sharp[k] < SMOOTH:
         yield (
             f"the rate of the force changes at once at {clock[k + FAR * n]:.4g} s, under a load, and the fingers "
