@@ -112,11 +112,11 @@ def rests_within_a_step(features: Features, recording: Recording) -> bool:
     reached = gap <= p_steady
     if not (delta_t >= 0.0 and reached.any()) or {"t", "gap"} & recording.units.keys():
         return False
-    rest = int(reached.argmax())
-    steps = np.flatnonzero(np.diff(gap[:rest])) + 1
+    resting = int(reached.argmax())
+    steps = np.flatnonzero(np.diff(gap[:resting])) + 1
     last = int(steps[-1]) if len(steps) else 0
-    coarse = rest - last > 1 and gap_resolution(t_s.tolist(), gap.tolist(), rest).step_m > 0.0
-    return coarse and min(float(t_s[rest] - t_s[last]), delta_t) >= UNCERTAIN * delta_t
+    coarse = resting - last > 1 and gap_resolution(t_s.tolist(), gap.tolist(), resting).step_m > 0.0
+    return coarse and min(float(t_s[resting] - t_s[last]), delta_t) >= UNCERTAIN * delta_t
 
 
 def refuse_useless(
