@@ -35,7 +35,7 @@ from graspsense.core.values.signals import (
     event_from_json,
     no_pads,
 )
-from graspsense.core.values.trace import SI_UNITS, Trace, trace_of
+from graspsense.core.values.trace import SI_UNITS, Trace
 from graspsense.recording.layout import (
     EVENT,
     KINDS,
@@ -209,16 +209,7 @@ class RecordedGrasp:
             return self._trace()
 
     def _trace(self) -> Trace:
-        phases, commands = self.ticks["phase"].tolist(), self.ticks["command"].tolist()
-        readings = self.readings()
-        trace = trace_of(
-            [reading.frame for reading in readings],
-            phases,
-            commands,
-            self._images(),
-            self.units,
-            [reading.signals for reading in readings] if further(self.channels) else (),
-        )
+        trace = self._recording().trace(self.ticks["phase"].tolist(), self.ticks["command"].tolist())
         return evolve(trace, events=self.events())
 
     def readings(self) -> tuple[Reading, ...]:

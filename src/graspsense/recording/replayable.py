@@ -21,7 +21,8 @@ from graspsense.core.components.delivered import Delivered
 from graspsense.core.values.channel import FLOATS, Channel
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.mounting import Mounting
-from graspsense.core.values.signals import CHANNELS, Frame, GraspEvent, Image, Reading
+from graspsense.core.values.signals import APPROACH, CHANNELS, Frame, GraspEvent, Image, Reading
+from graspsense.core.values.trace import SI_UNITS, Trace, trace_of
 
 _FRAME: Final = struct.Struct(f"<{len(Frame._fields)}d")
 ALWAYS: Final = frozenset({"gap", "velocity", "force_left", "force_right"})
@@ -58,6 +59,19 @@ class Recording:
         """The numbers of its frames: shape (readings, fields of `Frame`)."""
         rows = [reading.frame for reading in self.readings]
         return np.array(rows, dtype=np.float64).reshape(-1, len(Frame._fields))
+
+    def trace(self, phases: Sequence[int] = (), commands: Sequence[float] = ()) -> Trace:
+        """Return its trace; without phases all of it is in the phase `approach`, as no controller is known."""
+        readings, n = self.readings, len(self.readings)
+        images = {reading.pads.counter: reading.pads for reading in readings if reading.pads.counter}
+        return trace_of(
+            [reading.frame for reading in readings],
+            phases or [APPROACH] * n,
+            commands or [0.0] * n,
+            list(images.values()),
+            {**SI_UNITS, **self.units},
+            [reading.signals for reading in readings] if self.channels else (),
+        )
 
     def columns(self, *names: str) -> NDArray[np.float64]:
         """Return these fields of its frames: shape (fields, readings)."""

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import frozen
 from numpy.typing import NDArray
 
 from graspsense.sources.columns.channel_facts import resolution, usual_range
@@ -40,40 +40,42 @@ STEPS: Final = 3.0
 
 @frozen(eq=False)
 class _Turns:
-    """How a signal turns at each sample of a steady clock, but those near both ends."""
+    """How a signal turns at each sample of a steady clock but those near both ends: up is positive."""
 
     range: float
     unknown: float
     """How far noise and rounding turn it."""
     near: Numbers
     far: Numbers
-    up: NDArray[np.bool_]
-    """Where its rate grows."""
 
     @classmethod
     def measured(cls, signal: Numbers, steady: Numbers, n: int) -> _Turns:
         """Return the turns of a signal over `n` samples; `steady` are its values on the steady clock."""
         low, high = usual_range(signal)
         noise = NOISE * float(np.median(np.abs(np.diff(signal, 2))))
-        around = slice(FAR * n, len(steady) - FAR * n)
-        near, far = ((np.roll(steady, m) + np.roll(steady, -m) - 2.0 * steady)[around] for m in (n, FAR * n))
-        unknown = max(noise, STEPS * (resolution(signal) or 0.0))
-        return cls(high - low, unknown, np.abs(near), np.abs(far), near > 0.0)
+        near, far = (
+            (np.roll(steady, m) + np.roll(steady, -m) - 2.0 * steady)[FAR * n : -FAR * n]
+            for m in (n, FAR * n)
+        )
+        return cls(high - low, max(noise, STEPS * (resolution(signal) or 0.0)), near, far)
 
     @property
     def sharp(self) -> Numbers:
-        """How sharply the signal turns, 0 where it does not."""
-        sharp: Numbers = FAR * self.near / np.where(self.far > 0.0, self.far, np.inf)
+        """How sharply it turns, 0 where it does not."""
+        sharp: Numbers = FAR * np.abs(self.near) / np.where(self.far == 0.0, np.inf, np.abs(self.far))
         return sharp
 
-    def around(self, n: int) -> _Turns:
-        """Return the largest turns within half of `n` samples before and after each."""
-        reach = n // 2 + 1
-        near, far = (
-            np.lib.stride_tricks.sliding_window_view(np.pad(turns, reach, "edge"), 2 * reach + 1).max(axis=1)
-            for turns in (self.near, self.far)
-        )
-        return evolve(self, near=near, far=far)
+    def largest(self, loaded: NDArray[np.bool_], told: NDArray[np.bool_]) -> int | None:
+        """Return the largest sharp turn under a load, of those that tell something, if none under a load is larger."""
+        near = np.abs(self.near)
+        least = max(self.unknown, LARGEST * float(near.max(initial=0.0, where=loaded)))
+        known = loaded & told & (near > least) & (self.sharp > SHARP)
+        return int(np.argmax(near * known)) if known.any() else None
+
+    def around(self, k: int, reach: int) -> tuple[float, float]:
+        """Return the largest turn within so many samples around one over the short time, and over the long one."""
+        part = slice(max(k - reach, 0), k + reach + 1)
+        return float(np.abs(self.near[part]).max()), float(np.abs(self.far[part]).max())
 
 
 def apart(t_s: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
@@ -82,32 +84,33 @@ def apart(t_s: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
         return
     step_s = max(_period_s(t_s, signal) for signal in (t_s, gap, force))
     n = max(2, round(TURN_S / step_s))
-    if FAR * n * step_s > LONGEST_S or not 2 * FAR * n < (t_s[-1] - t_s[0]) / step_s < (1.0 + HOLES) * len(
-        t_s
-    ):
+    rows = (t_s[-1] - t_s[0]) / step_s
+    if FAR * n * step_s > LONGEST_S or not 2 * FAR * n < rows < (1.0 + HOLES) * len(t_s):
         return
     clock = np.arange(t_s[0], t_s[-1], step_s)
-    steady = np.interp(clock, t_s, force)
-    gaps, forces = _Turns.measured(gap, np.interp(clock, t_s, gap), n), _Turns.measured(force, steady, n)
-    loads = steady - usual_range(force)[0] > PART * forces.range
+    widths, loads = np.interp(clock, t_s, gap), np.interp(clock, t_s, force)
+    gaps, forces = _Turns.measured(gap, widths, n), _Turns.measured(force, loads, n)
+    loaded, least = loads - usual_range(force)[0] > PART * forces.range, LARGEST * PART * forces.range
     # A contact is no turn under a load, and a gap need not turn there.
-    pressed = (loads & np.roll(loads, n) & np.roll(loads, -n))[FAR * n : -FAR * n]
-    slow, least = forces.around(n), LARGEST * PART * forces.range
+    pressed = (loaded & np.roll(loaded, n) & np.roll(loaded, -n))[FAR * n : -FAR * n]
     # A force that was smoothed over a longer time does not turn at all.
-    due = gaps.far * forces.range / max(float(np.ptp(np.interp(clock, t_s, gap)[loads])), gaps.unknown)
+    due = gaps.far * forces.range / max(float(np.ptp(widths[loaded])), gaps.unknown)
     # Where the fingers begin to open, or meet more than before; their drive can speed up by itself.
-    slows = gaps.up & loads[FAR * n : -FAR * n]
-    k = _sharpest(gaps, slows, (slow.far > least) | (due > DUE * forces.range))
-    if k is not None and (slow.far[k] < least or slow.sharp[k] < SHARP * min(gaps.sharp[k], 1.0)):
+    k = gaps.largest(
+        (gaps.near > 0.0) & loaded[FAR * n : -FAR * n],
+        (np.abs(forces.far) > least) | (due > DUE * forces.range),
+    )
+    near, far = (0.0, 0.0) if k is None else forces.around(k, n // 2 + 1)
+    if k is not None and (far < least or FAR * near < SHARP * far * min(gaps.sharp[k], 1.0)):
         yield (
             f"the fingers change their speed at once at {clock[k + FAR * n]:.4g} s, under a load, and the rate of the "
             "force changes slowly: was the force smoothed, or is it of another time than the gap? A contact is then "
             "seen too early or too late"
         )
         return
-    slow = gaps.around(n)
-    k = _sharpest(forces, pressed, (forces.near > least) & (slow.far > slow.unknown))
-    if k is not None and slow.sharp[k] < SMOOTH:
+    k = forces.largest(pressed, (np.abs(forces.near) > least) & (np.abs(gaps.far) > gaps.unknown))
+    near, far = (0.0, 0.0) if k is None else gaps.around(k, n // 2 + 1)
+    if k is not None and FAR * near < SMOOTH * far:
         yield (
             f"the rate of the force changes at once at {clock[k + FAR * n]:.4g} s, under a load, and the fingers "
             "change their speed slowly: was the gap smoothed, or is it of another time than the force? A rest is then "
@@ -119,10 +122,3 @@ def _period_s(t_s: Numbers, signal: Numbers) -> float:
     """Return the usual time (s) between two new values of a signal, infinite if it has none."""
     new = np.diff(t_s[np.flatnonzero(np.diff(signal))])
     return float(np.median(new)) if len(new) else np.inf
-
-
-def _sharpest(turns: _Turns, loaded: NDArray[np.bool_], told: NDArray[np.bool_]) -> int | None:
-    """Return the largest sharp turn under a load, of those that tell something, if it is among all the largest."""
-    largest = float(turns.near.max(initial=0.0, where=loaded))
-    known = loaded & told & (turns.near > max(turns.unknown, LARGEST * largest)) & (turns.sharp > SHARP)
-    return int(np.argmax(turns.near * known)) if known.any() else None
