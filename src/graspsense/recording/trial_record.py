@@ -90,9 +90,7 @@ class DeviceRecord:
     @classmethod
     def from_text(cls, text: str) -> DeviceRecord:
         """Return the device that `to_text` wrote. Raises TypeError or ValueError for any other text."""
-        value = json.loads(text)
-        if not isinstance(value, dict):
-            raise TypeError("the description of the gripper is not a table")
+        value = json_table(text)
         texts = {name: str(value.get(name, "")) for name in ("name", "serial", "firmware", "clock")}
         units, notes = value.get("units", {}), value.get("notes", [])
         if not isinstance(units, dict) or not all(isinstance(unit, str) for unit in units.values()):
