@@ -49,7 +49,7 @@ from graspsense.recording.layout import (
     shown_array,
 )
 from graspsense.recording.readable import readable
-from graspsense.recording.replayable import REPLAY_NOTE, Recording
+from graspsense.recording.replayable import REPLAY_NOTE, Recording, trace_of_readings
 from graspsense.recording.trial_record import DeviceRecord, TrialRecord
 
 _KINDS: Final = {kind: np.dtype(name).newbyteorder("<") for kind, name in KINDS.items()}
@@ -209,7 +209,8 @@ class RecordedGrasp:
             return self._trace()
 
     def _trace(self) -> Trace:
-        trace = self._recording().trace(self.ticks["phase"].tolist(), self.ticks["command"].tolist())
+        phases, commands = self.ticks["phase"].tolist(), self.ticks["command"].tolist()
+        trace = trace_of_readings(self.readings(), self.units, phases, commands)
         return evolve(trace, events=self.events())
 
     def readings(self) -> tuple[Reading, ...]:
