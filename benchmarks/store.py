@@ -23,7 +23,7 @@ from graspsense.core.learn.training import train
 from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import create
 from graspsense.recording.recording_info import RecordingInfo
-from graspsense.recording.trial_record import DeviceRecord, FeatureValues, TrialRecord, TrialResult
+from graspsense.recording.trial_record import DeviceRecord, TrialRecord, TrialResult, stored_features
 from graspsense.store.dataset import labelled_store
 from graspsense.store.store import Store
 
@@ -60,8 +60,8 @@ def fill(store: Store, trials: int) -> None:
             device=DeviceRecord(serial=f"S{k % 3}", simulated=True),
             result=TrialResult(
                 outcome="steady" if k % 50 else "slipped",
-                features=FeatureValues(features=FEATURES, values=values),
-                before_contact=FeatureValues(features=BEFORE, values=(0.08, -0.01, 10.0)),
+                features=stored_features(FEATURES, values, {}),
+                before_contact=stored_features(BEFORE, (0.08, -0.01, 10.0), {}),
                 details={"events": ["x" * 60] * 20},
             ),
         )

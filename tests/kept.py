@@ -8,7 +8,7 @@ from attrs import evolve
 from graspsense.core.values.signals import EFFORT, Command, Frame, Pads
 from graspsense.recording.layout import DEVICE, RESULT, START, TICK, pads_numbers, pads_topic
 from graspsense.recording.recording_info import RecordingInfo
-from graspsense.recording.trial_record import DeviceRecord, FeatureValues, TrialRecord, TrialResult
+from graspsense.recording.trial_record import DeviceRecord, TrialRecord, TrialResult, stored_features
 from graspsense.recording.writer import RecordingWriter
 from graspsense.testing.model_gripper import CELLS
 
@@ -65,8 +65,8 @@ def ended(outcome="steady", values=(0.066, 5.5), **more):
     reasons = {name: "not there" for (name, _), value in zip(FEATURES, values, strict=True) if value is None}
     result = TrialResult(
         outcome=outcome,
-        features=FeatureValues(features=FEATURES, values=values, reasons=reasons),
-        before_contact=FeatureValues(features=BEFORE, values=(0.08,)),
+        features=stored_features(FEATURES, values, reasons),
+        before_contact=stored_features(BEFORE, (0.08,), {}),
     )
     return evolve(begun(**more), result=result)
 

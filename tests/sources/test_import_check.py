@@ -72,10 +72,11 @@ def test_check_on_a_bag_shows_a_topic_that_died(tmp_path):
     assert by_name["/hand/force.data"]["age_s"] > 1.5
 
 
-def rests_of(folder, *points):
+def rests_of(folder, *points, step_mm=0.0):
     """Return what a check tells of the rests of a squeeze whose gap (mm) goes through these points (s, mm)."""
     t_s = np.arange(800) * 0.01
     gap_mm = np.interp(t_s, *zip(*points, strict=True))
+    gap_mm = np.round(gap_mm / step_mm) * step_mm if step_mm else gap_mm
     table(folder / "jar_1.csv", {"t": t_s, "pos": gap_mm, "F": np.maximum(2.0 * (50.0 - gap_mm), 0.0)})
     (folder / "m.toml").write_text(PLAIN)
     told = checked(folder / "m.toml")
@@ -90,6 +91,15 @@ def test_a_rest_after_which_the_squeeze_goes_on_is_told(tmp_path):
     assert stuck.startswith("1 of 1 grasp tried")
     assert "controller.rest_window_s" in stuck
     assert rests_of(tmp_path / "resting", (0, 80), (1, 50), (4, 45), (8, 45)) == ""
+
+
+@pytest.mark.slow
+def test_fingers_that_slow_down_within_a_step_of_their_encoder_leave_delta_t_open(tmp_path):
+    """They stop at once, or come to rest within a second at the last tenth of a millimetre."""
+    slows = ((0, 80), (1, 50), (1.5, 49), (2, 48.7), (3, 48.55), (8, 48.55))
+    assert "delta_t" in rests_of(tmp_path / "slows", *slows, step_mm=0.1)
+    assert rests_of(tmp_path / "fine", *slows, step_mm=0.01) == ""
+    assert rests_of(tmp_path / "stops", (0, 80), (1, 50), (1.5, 47), (8, 47), step_mm=0.1) == ""
 
 
 @pytest.mark.parametrize(

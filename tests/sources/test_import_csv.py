@@ -98,9 +98,7 @@ def test_it_is_kept_whole_with_its_label_and_its_features_worked_out_by_hand(squ
         kept = opened.trial(1)
         assert opened.counts() == {("jar:full", "jar#3"): 1}
     assert not kept.summary.simulated
-    features = dict(
-        zip((name for name, _ in kept.result.features.features), kept.result.features.values, strict=True)
-    )
+    features = kept.result.features.as_dict()
     # `squeezing` and `bottle`: contact at 1.0 s and 60 mm, rest at 1.5 s and 54 mm with 8 N.
     assert features["p_first"] == pytest.approx(0.060, abs=1e-5)
     assert features["p_steady"] == pytest.approx(0.054, abs=1e-5)

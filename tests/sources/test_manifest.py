@@ -60,6 +60,25 @@ def pandas_csv(path, columns):
     path.write_text("\n".join(lines) + "\n")
 
 
+@every_case(
+    ("gap", "force", "read_as_they_are"),
+    [
+        ("gap", "force", {"time in s", "gap in m", "force in N"}),
+        ("gap [m]", "force", {"time in s", "force in N"}),
+        ("'gap_mm'*0.001 [m]", "force_n*9.81", {"time in s"}),
+    ],
+)
+def test_quantities_whose_unit_nothing_states_are_named(tmp_path, gap, force, read_as_they_are):
+    m, n = squeezing()
+    columns = {"t": T_S, "gap": m, "force": n, "gap_mm": 1e3 * m, "force_n": n / 9.81}
+    pandas_csv(tmp_path / "cup_1.csv", columns)
+    (kept,) = recordings(
+        tmp_path, f"""files = "{{label}}_1.csv"\ntime = "t"\ngap = "{gap}"\nforce = "{force}" """
+    )
+    (note,) = (note for note in kept.recording.notes if "no unit" in note)
+    assert set(note.partition(": ")[2].split(", ")) == read_as_they_are
+
+
 @every_case("ending", ["npz", "mat"])
 def test_images_and_blocks_of_samples_become_arrays_with_their_shape_and_fast_channels(tmp_path, ending):
     gap, force = squeezing()

@@ -16,10 +16,10 @@ from kept import ended, frame, keep, pads, write_recording
 
 from graspsense.core.settings.selected import select_component
 from graspsense.core.values.errors import ConfigError, PluginUnavailable
+from graspsense.core.values.features import Features
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.evaluation.json_codec import to_json
 from graspsense.recording.recording_info import RecordingInfo
-from graspsense.recording.trial_record import FeatureValues
 from graspsense.sources.importing.import_sources import recordings_to_import
 from graspsense.sources.trial_table.features_csv import read_labelled
 from graspsense.store.changes import set_aside
@@ -169,10 +169,10 @@ def test_a_store_without_labels_says_how_to_get_some(tmp_path):
 
 def a_store_of_everything(folder):
     """Trials of both origins, with times, numbers to predict, one incomplete, one aborted, one with other features."""
-    other = {"features": (("p_other", "m"),), "values": (0.05,)}
+    other = Features(names=("p_other",), values=(0.05,), units=("m",))
     with Store.open(folder) as store:
         trial_id = ended(label="can:full")
-        alone = evolve(trial_id, result=evolve(trial_id.result, features=FeatureValues(**other)))
+        alone = evolve(trial_id, result=evolve(trial_id.result, features=other))
         path = store.new_recording(trial_id.made_at)
         write_recording(path, 5, alone)
         store.add(alone, RecordingInfo.hashed(path, 5, 1))

@@ -41,7 +41,7 @@ def test_a_cut_recording_becomes_a_trial_that_does_not_count(store):
     assert (summary.outcome, summary.complete, summary.label) == ("aborted", False, "can:full_open")
     assert "were recovered" in kept.result.reason
     # Extracted with the settings in the recording.
-    assert kept.result.features.features[0] == ("p_first", "m")
+    assert (kept.result.features.names[0], kept.result.features.units[0]) == ("p_first", "m")
     counters = [reading.pads.counter for reading in read_recorded(kept.recording).readings()]
     assert counters == [pads(k).counter for k in range(recovered.ticks)], "each image is that of its tick"
     with kept.recording.open("rb") as file:  # complete for other readers: it has a summary again

@@ -104,7 +104,7 @@ def test_what_was_felt_and_the_features_are_columns_of_the_episodes(written):
     assert not episodes["graspsense/crushed"].any()
     with Store.read(written[1]) as store:
         features = store.trial(1).result.features
-    for (name, _), value in zip(features.features, features.values, strict=True):
+    for name, value in features.as_dict().items():
         kept = episodes[f"graspsense/feature/{name}"].iloc[0]
         assert np.isnan(kept) if value is None else kept == value
 

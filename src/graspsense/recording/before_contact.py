@@ -107,10 +107,8 @@ def _unmeasured(seen: float) -> Before:
 
 def _features(measured: Any) -> Features:
     seen, *values = measured
-    if seen != FREE:
-        return _missing(_WHY_MISSING[seen])
     lacking = [name for name, value in zip(NAMES, values, strict=True) if math.isnan(value)]
-    reasons = missing(lacking, "the gripper has no such channel")
+    reasons = missing(lacking, _WHY_MISSING[seen])
     return Features(names=NAMES, values=tuple(values), units=_UNITS, reasons=reasons)
 
 
@@ -118,9 +116,5 @@ _WHY_MISSING: Final = {
     NO_APPROACH: "there was no approach",
     SHORT: f"the approach took less than {SPAN_S:g} s",
     TOUCHED: f"a pad felt a force in the first {SPAN_S + GUARD_S:g} s of the approach",
+    FREE: "the gripper has no such channel",
 }
-
-
-def _missing(why: str) -> Features:
-    values = (math.nan,) * len(NAMES)
-    return Features(names=NAMES, values=values, units=_UNITS, reasons=missing(NAMES, why))

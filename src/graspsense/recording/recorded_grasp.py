@@ -35,7 +35,7 @@ from graspsense.core.values.signals import (
     event_from_json,
     no_pads,
 )
-from graspsense.core.values.trace import SI_UNITS, Trace, trace_of
+from graspsense.core.values.trace import SI_UNITS, Trace
 from graspsense.recording.layout import (
     EVENT,
     KINDS,
@@ -49,7 +49,7 @@ from graspsense.recording.layout import (
     shown_array,
 )
 from graspsense.recording.readable import readable
-from graspsense.recording.replayable import REPLAY_NOTE, Recording
+from graspsense.recording.replayable import REPLAY_NOTE, Recording, trace_of_readings
 from graspsense.recording.trial_record import DeviceRecord, TrialRecord
 
 _KINDS: Final = {kind: np.dtype(name).newbyteorder("<") for kind, name in KINDS.items()}
@@ -210,15 +210,7 @@ class RecordedGrasp:
 
     def _trace(self) -> Trace:
         phases, commands = self.ticks["phase"].tolist(), self.ticks["command"].tolist()
-        readings = self.readings()
-        trace = trace_of(
-            [reading.frame for reading in readings],
-            phases,
-            commands,
-            self._images(),
-            self.units,
-            [reading.signals for reading in readings] if further(self.channels) else (),
-        )
+        trace = trace_of_readings(self.readings(), self.units, phases, commands)
         return evolve(trace, events=self.events())
 
     def readings(self) -> tuple[Reading, ...]:

@@ -21,7 +21,8 @@ from graspsense.core.components.delivered import Delivered
 from graspsense.core.values.channel import FLOATS, Channel
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.mounting import Mounting
-from graspsense.core.values.signals import CHANNELS, Frame, GraspEvent, Image, Reading
+from graspsense.core.values.signals import APPROACH, CHANNELS, Frame, GraspEvent, Image, Reading
+from graspsense.core.values.trace import SI_UNITS, Trace, trace_of
 
 _FRAME: Final = struct.Struct(f"<{len(Frame._fields)}d")
 ALWAYS: Final = frozenset({"gap", "velocity", "force_left", "force_right"})
@@ -59,9 +60,25 @@ class Recording:
         rows = [reading.frame for reading in self.readings]
         return np.array(rows, dtype=np.float64).reshape(-1, len(Frame._fields))
 
+    def trace(self) -> Trace:
+        """Return its trace, all in the phase `approach`, because no controller of graspsense is known."""
+        phases = [APPROACH] * len(self.readings)
+        return trace_of_readings(self.readings, {**SI_UNITS, **self.units}, phases, [0.0] * len(phases))
+
     def columns(self, *names: str) -> NDArray[np.float64]:
         """Return these fields of its frames: shape (fields, readings)."""
         return self.frames[:, [Frame._fields.index(name) for name in names]].T
+
+
+def trace_of_readings(
+    readings: Sequence[Reading], units: Mapping[str, str], phases: Sequence[int], commands: Sequence[float]
+) -> Trace:
+    """Return the trace of these readings, with the phase and the command of each."""
+    images = {reading.pads.counter: reading.pads for reading in readings if reading.pads.counter}
+    signals = [reading.signals for reading in readings]
+    return trace_of(
+        [reading.frame for reading in readings], phases, commands, list(images.values()), units, signals
+    )
 
 
 def check_recording(recording: Recording) -> None:

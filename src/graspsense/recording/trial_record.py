@@ -8,8 +8,7 @@ JSON texts are canonical: the same record always gives the same text.
 from __future__ import annotations
 
 import json
-import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from datetime import UTC, datetime
 from math import isnan, nan
 from typing import Any, Final, Literal, TypeVar, get_args
@@ -43,63 +42,6 @@ DETAILS: Final = (
 )
 """Keys of `graspsense run --json` that `TrialResult.details` holds; the others have fields of their own."""
 _OUTCOMES: Final = frozenset(outcome.words for outcome in Outcome)
-
-
-@frozen(kw_only=True)
-class FeatureValues:
-    """The features of one trial: name and unit of each, its value (None if missing), and why values are missing."""
-
-    features: tuple[tuple[str, str], ...]
-    values: tuple[float | None, ...]
-    reasons: Mapping[str, str] = field(factory=dict)
-
-    @classmethod
-    def extracted(cls, features: Features) -> FeatureValues:
-        """Return the values of extracted features."""
-        return cls(
-            features=tuple(zip(features.names, features.units, strict=True)),
-            values=tuple(features.as_dict().values()),
-            reasons=dict(features.reasons),
-        )
-
-    @property
-    def names_text(self) -> str:
-        """Names and units as canonical JSON."""
-        return json_text([list(pair) for pair in self.features])
-
-    def packed(self) -> bytes:
-        """Return the values as little-endian float64, with NaN for a missing value."""
-        return struct.pack(f"<{len(self.values)}d", *(nan if v is None else v for v in self.values))
-
-    def to_text(self) -> str:
-        """Return canonical JSON."""
-        return json_text(
-            {"features": self.features, "values": self.values, "reasons": self.reasons},
-        )
-
-    @classmethod
-    def from_text(cls, text: str) -> FeatureValues:
-        """Return the values that `to_text` wrote. Raises KeyError, TypeError or ValueError for any other text."""
-        value = json.loads(text)
-        return cls.checked(
-            value["features"],
-            tuple(None if v is None else float(v) for v in value["values"]),
-            value["reasons"],
-        )
-
-    @classmethod
-    def unpacked(cls, names_text: str, packed: bytes, reasons: Mapping[str, str]) -> FeatureValues:
-        """Return the values from `names_text` and `packed`. Raises TypeError, ValueError or struct.error."""
-        values = tuple(None if isnan(v) else v for (v,) in struct.iter_unpack("<d", packed))
-        return cls.checked(json.loads(names_text), values, reasons)
-
-    @classmethod
-    def checked(cls, features: Any, values: tuple[float | None, ...], reasons: Any) -> FeatureValues:
-        """Return feature values after checking that there is one value per feature. Raises TypeError, ValueError."""
-        pairs = tuple((str(name), str(unit)) for name, unit in features)
-        if len(pairs) != len(values):
-            raise ValueError(f"{len(pairs)} features and {len(values)} values")
-        return cls(features=pairs, values=values, reasons={str(k): str(v) for k, v in reasons.items()})
 
 
 @frozen(kw_only=True)
@@ -148,9 +90,7 @@ class DeviceRecord:
     @classmethod
     def from_text(cls, text: str) -> DeviceRecord:
         """Return the device that `to_text` wrote. Raises TypeError or ValueError for any other text."""
-        value = json.loads(text)
-        if not isinstance(value, dict):
-            raise TypeError("the description of the gripper is not a table")
+        value = json_table(text)
         texts = {name: str(value.get(name, "")) for name in ("name", "serial", "firmware", "clock")}
         units, notes = value.get("units", {}), value.get("notes", [])
         if not isinstance(units, dict) or not all(isinstance(unit, str) for unit in units.values()):
@@ -180,8 +120,8 @@ class TrialResult:
 
     outcome: str
     reason: str = ""
-    features: FeatureValues
-    before_contact: FeatureValues
+    features: Features
+    before_contact: Features
     details: Mapping[str, Any] = field(factory=dict)
 
     @classmethod
@@ -191,10 +131,8 @@ class TrialResult:
         return cls(
             outcome=trial.outcome.words,
             reason=trial.reason,
-            features=FeatureValues.extracted(trial.features),
-            before_contact=FeatureValues.extracted(
-                before_contact(trial.trace, contact_force_of(trial.run.settings))
-            ),
+            features=trial.features,
+            before_contact=before_contact(trial.trace, contact_force_of(trial.run.settings)),
             details={key: printed[key] for key in DETAILS},
         )
 
@@ -266,8 +204,8 @@ class TrialRecord:
             return {
                 "outcome": self.result.outcome,
                 "reason": self.result.reason,
-                "features": self.result.features.to_text(),
-                "before_contact": self.result.before_contact.to_text(),
+                "features": _features_text(self.result.features),
+                "before_contact": _features_text(self.result.before_contact),
                 "details": json_text(self.result.details),
             }
         raise ValueError(f"the record has no section {name!r}")
@@ -308,6 +246,34 @@ def json_table(text: str) -> dict[str, Any]:
     return value
 
 
+def names_text(features: Features) -> str:
+    """Return names and units of features as canonical JSON."""
+    return json_text([list(pair) for pair in zip(features.names, features.units, strict=True)])
+
+
+def stored_features(names: Any, values: Iterable[float | None], reasons: Mapping[Any, Any]) -> Features:
+    """Return the features of these pairs of name and unit; None and NaN are missing. Raises TypeError, ValueError."""
+    pairs = [(str(name), str(unit)) for name, unit in names]
+    return Features(
+        names=tuple(name for name, _ in pairs),
+        values=tuple(nan if value is None or isnan(value) else float(value) for value in values),
+        units=tuple(unit for _, unit in pairs),
+        reasons={str(name): str(why) for name, why in reasons.items()},
+    )
+
+
+def _features_text(features: Features) -> str:
+    values = [None if isnan(value) else value for value in features.values]
+    names = list(zip(features.names, features.units, strict=True))
+    return json_text({"features": names, "values": values, "reasons": features.reasons})
+
+
+def _features_of(text: str) -> Features:
+    """Return what `_features_text` wrote. Raises KeyError, TypeError or ValueError for any other text."""
+    value = json_table(text)
+    return stored_features(value["features"], value["values"], value["reasons"])
+
+
 def _start(texts: Mapping[str, str]) -> TrialRecord:
     datetime.fromisoformat(texts["made_at"])
     if texts["origin"] not in get_args(Origin):
@@ -329,8 +295,8 @@ def _result(texts: Mapping[str, str]) -> TrialResult:
     return TrialResult(
         outcome=texts["outcome"],
         reason=texts["reason"],
-        features=FeatureValues.from_text(texts["features"]),
-        before_contact=FeatureValues.from_text(texts["before_contact"]),
+        features=_features_of(texts["features"]),
+        before_contact=_features_of(texts["before_contact"]),
         details=json_table(texts["details"]),
     )
 

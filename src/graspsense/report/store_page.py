@@ -183,7 +183,8 @@ def _measurement_sections(
     except (ConfigError, DataDamaged) as error:
         body = paragraph(f"The recording of trial {summary.id} cannot be shown: {error}")
     features = trial.result.features
-    values = features_table(f"Features of trial {summary.id}", features.features, features.values)
+    pairs = tuple(zip(features.names, features.units, strict=True))
+    values = features_table(f"Features of trial {summary.id}", pairs, tuple(features.as_dict().values()))
     warnings = [str(warning) for warning in trial.result.details.get("warnings") or ()]
     body = bullets(warnings, "warning") + pair(body, values)
     sections = [Section(id="grasp", title="One grasp, from the approach to rest", body=body)]

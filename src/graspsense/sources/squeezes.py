@@ -101,7 +101,6 @@ def _of_grasp(grasp: RecordedGrasp, record: TrialRecord, name: str, sha256: str)
 def _of_import(source: str) -> Iterator[RecordedSqueeze]:
     from graspsense.recording.replayable import content_sha256
     from graspsense.sources.importing.import_sources import recordings_to_import
-    from graspsense.sources.recordings.labelled_recordings import trace_of_recording
 
     readable, unreadable = recordings_to_import([source], {}, None)
     if unreadable:
@@ -112,7 +111,7 @@ def _of_import(source: str) -> Iterator[RecordedSqueeze]:
         yield RecordedSqueeze(
             name=imported.name,
             sha256=content_sha256(labelled.recording),
-            trace=trace_of_recording(labelled.recording),
+            trace=labelled.recording.trace(),
             label=labelled.label,
             instance=instance,
             warnings=labelled.notices,

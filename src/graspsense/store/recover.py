@@ -25,7 +25,7 @@ from graspsense.recording.layout import DEVICE, PART, START, TICK
 from graspsense.recording.reader import read_recorded
 from graspsense.recording.recorded_grasp import RecordedGrasp, TopicRows
 from graspsense.recording.recording_info import RecordingInfo
-from graspsense.recording.trial_record import FeatureValues, TrialRecord, TrialResult
+from graspsense.recording.trial_record import TrialRecord, TrialResult
 from graspsense.recording.writer import RecordingWriter
 from graspsense.store.opening import damaged
 from graspsense.store.store import Store, integrity
@@ -207,11 +207,11 @@ def _aborted(grasp: RecordedGrasp, record: TrialRecord) -> TrialResult:
         outcome="aborted",
         reason=why,
         features=_features(trace, record, why),
-        before_contact=FeatureValues.extracted(before_contact(trace, contact_force_of(record.settings))),
+        before_contact=before_contact(trace, contact_force_of(record.settings)),
     )
 
 
-def _features(trace: Trace, record: TrialRecord, why: str) -> FeatureValues:
+def _features(trace: Trace, record: TrialRecord, why: str) -> Features:
     """Extract the features with the feature set that the trial was recorded with, if it is installed."""
     try:
         table = dict(record.settings["features"])
@@ -219,8 +219,8 @@ def _features(trace: Trace, record: TrialRecord, why: str) -> FeatureValues:
         extracted: Features = component.create(build(component, table)).extract(trace)
     except FAILURES as error:
         reason = f"{why}; its features cannot be extracted here: {error}"
-        return FeatureValues(features=(), values=(), reasons={"": reason})
-    return FeatureValues.extracted(extracted)
+        return Features(names=(), values=(), units=(), reasons={"": reason})
+    return extracted
 
 
 def _beside(path: Path) -> Path:

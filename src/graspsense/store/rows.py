@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import json
+import struct
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -10,15 +12,17 @@ from typing import Any, Final
 from attrs import asdict, evolve, fields_dict, frozen
 
 from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.features import Features
 from graspsense.core.values.json_values import json_text
 from graspsense.recording.layout import DEVICE, START
 from graspsense.recording.provenance import recipe
 from graspsense.recording.recording_info import RecordingInfo
 from graspsense.recording.trial_record import (
-    FeatureValues,
     TrialRecord,
     TrialResult,
     json_table,
+    names_text,
+    stored_features,
 )
 
 TRIAL_COLUMNS: Final = (
@@ -147,8 +151,8 @@ def encoded(record: TrialRecord, recording: RecordingInfo, *, complete: bool) ->
             "device": device.label,
             "simulated": int(record.simulated),
             "recipe": _hash(json_text(recipe(record.settings))),
-            "values": result.features.packed(),
-            "before_contact": result.before_contact.packed(),
+            "values": _packed(result.features),
+            "before_contact": _packed(result.before_contact),
             "recording": recording.path.name,
             "recording_sha256": recording.sha256,
             "recording_bytes": recording.size,
@@ -164,8 +168,20 @@ def encoded(record: TrialRecord, recording: RecordingInfo, *, complete: bool) ->
             "details": json_text(result.details),
             "recorder": json_text(recording.counts),
         },
-        feature_set=result.features.names_text,
-        before_set=result.before_contact.names_text,
+        feature_set=names_text(result.features),
+        before_set=names_text(result.before_contact),
+    )
+
+
+def _packed(features: Features) -> bytes:
+    """Return the values as little-endian float64, with NaN for a missing value."""
+    return struct.pack(f"<{len(features.values)}d", *features.values)
+
+
+def _unpacked(names: str, packed: bytes, reasons: Mapping[str, Any]) -> Features:
+    """Return the features of these texts and packed values. Raises TypeError, ValueError or struct.error."""
+    return stored_features(
+        json.loads(names), (value for (value,) in struct.iter_unpack("<d", packed)), reasons
     )
 
 
@@ -183,8 +199,8 @@ def decoded(summary: TrialSummary, row: EncodedRow, recording: Path) -> StoredTr
     result = TrialResult(
         outcome=summary.outcome,
         reason=detail["reason"],
-        features=FeatureValues.unpacked(row.feature_set, trial["values"], json_table(detail["missing"])),
-        before_contact=FeatureValues.unpacked(
+        features=_unpacked(row.feature_set, trial["values"], json_table(detail["missing"])),
+        before_contact=_unpacked(
             row.before_set, trial["before_contact"], json_table(detail["missing_before"])
         ),
         details=json_table(detail["details"]),

@@ -72,10 +72,8 @@ def _grasp(store: Store, number: int) -> StoredGrasp:
         source=str(trial.record.settings.get("gripper", {}).get("recording", "")),
         device=trial.summary.device,
         simulated=trial.summary.simulated,
-        features=dict(
-            zip((name for name, _ in result.features.features), result.features.values, strict=True)
-        ),
-        units=dict(result.features.features),
+        features=result.features.as_dict(),
+        units=dict(zip(result.features.names, result.features.units, strict=True)),
         prediction=details.get("prediction"),
         events=tuple(details.get("events") or ()),
         channels=device.channels if device else (),

@@ -15,7 +15,7 @@ import numpy as np
 import pycatch22
 
 from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, Trace, missing
-from graspsense.plugins.features.contact_curve import contact_curve, samples_of
+from graspsense.plugins.features.contact_curve import contact_curve
 from graspsense.plugins.features.contact_threshold import ContactThreshold
 
 POINTS: Final = 128
@@ -58,8 +58,7 @@ class Catch22Features(FeatureSet[ContactThreshold]):
 
     def extract(self, trace: Trace) -> Features:
         """Return the characteristics; one that pycatch22 does not define for this series is NaN with the reason."""
-        samples = samples_of(trace, self.config.contact_force_n)
-        curve = samples if isinstance(samples, str) else contact_curve(samples, self.config.contact_force_n)
+        curve = contact_curve(trace, self.config.contact_force_n)
         if isinstance(curve, str):
             return self.undefined(curve)
         if np.count_nonzero(curve.t_s <= curve.end_s) < LEAST_SAMPLES:

@@ -58,7 +58,7 @@ class CurveSamples:
     phase: NDArray[np.int64]
 
 
-def samples_of(trace: Trace, contact_force_n: float) -> CurveSamples | str:
+def _samples_of(trace: Trace, contact_force_n: float) -> CurveSamples | str:
     """Return the samples of a trace, or why there are none.
 
     A pad that never feels the contact force (N) before the release is not used, unless no pad feels it.
@@ -122,6 +122,8 @@ class ContactCurve:
     force_n: Floats
     lowest_n: Floats
     pads: Floats
+    samples: CurveSamples
+    """All samples of the trace."""
     contact_gap_m: float
     end_s: float
     released: bool
@@ -165,11 +167,14 @@ class ContactCurve:
         return k, since * (self.force_n[k] + self.half_rise[k] * since)
 
 
-def contact_curve(samples: CurveSamples, contact_force_n: float) -> ContactCurve | str:
-    """Return the curve from the contact on, or why there is no contact.
+def contact_curve(trace: Trace, contact_force_n: float) -> ContactCurve | str:
+    """Return the curve of a trace from the contact on, or why there is no contact.
 
     Contact is the first time at which each pad feels the contact force (N) before the release.
     """
+    samples = _samples_of(trace, contact_force_n)
+    if isinstance(samples, str):
+        return samples
     lowest = samples.pads.min(axis=0)
     touch = (lowest >= contact_force_n) & (samples.phase <= HOLD)
     if not touch.any():
@@ -203,6 +208,7 @@ def contact_curve(samples: CurveSamples, contact_force_n: float) -> ContactCurve
         force_n=force,
         lowest_n=pads.min(axis=0),
         pads=pads,
+        samples=samples,
         contact_gap_m=float(gap[0]),
         end_s=float(t_s[-1] if start is None else t_s[start]),
         released=start is not None,

@@ -26,7 +26,6 @@ from graspsense.plugins.features.contact_curve import (
     contact_curve,
     features_of,
     first_crossing,
-    samples_of,
 )
 from graspsense.plugins.features.contact_threshold import ContactThreshold
 
@@ -161,9 +160,7 @@ class CurveFeatures(FeatureSet[CurveConfig]):
 
     def extract(self, trace: Trace) -> Features:
         """Return the features; one whose stretch the trace lacks is NaN with the reason."""
-        contact_force_n = self.config.contact_force_n
-        samples = samples_of(trace, contact_force_n)
-        curve = samples if isinstance(samples, str) else contact_curve(samples, contact_force_n)
+        curve = contact_curve(trace, self.config.contact_force_n)
         if isinstance(curve, str):
             known = _all(_FEATURES, curve)
         else:

@@ -21,7 +21,6 @@ from graspsense.plugins.features.contact_curve import (
     contact_curve,
     features_of,
     first_crossing,
-    samples_of,
 )
 from graspsense.plugins.features.contact_threshold import ContactThreshold
 
@@ -77,11 +76,14 @@ class QuantileFeatures(FeatureSet[ContactThreshold]):
     def extract(self, trace: Trace) -> Features:
         """Return the quantiles over the contact; all are missing without one."""
         names = [feature.name for feature in self.features]
-        samples = samples_of(trace, self.config.contact_force_n)
-        contact = samples if isinstance(samples, str) else _contact(samples, self.config.contact_force_n)
-        if isinstance(samples, str) or isinstance(contact, str):
-            return features_of(self, dict.fromkeys(names, str(contact)), trace)
-        start_s, end_s = contact
+        contact_force_n = self.config.contact_force_n
+        curve = contact_curve(trace, contact_force_n)
+        if isinstance(curve, str):
+            return features_of(self, dict.fromkeys(names, curve), trace)
+        samples, start_s = curve.samples, float(curve.t_s[0])
+        last = int(np.flatnonzero(curve.lowest_n >= contact_force_n)[-1])
+        lost_s = first_crossing(curve.t_s[last:], -curve.lowest_n[last:], -contact_force_n)
+        end_s = float(curve.t_s[last]) if lost_s is None else lost_s
         values: list[float | str] = [
             float(np.interp(start_s, samples.t_s, samples.gap_m)),
             end_s - start_s,
@@ -92,16 +94,6 @@ class QuantileFeatures(FeatureSet[ContactThreshold]):
         else:
             values += _quantiles(samples, start_s, end_s).tolist()
         return features_of(self, dict(zip(names, values, strict=True)), trace, _OF_GAP)
-
-
-def _contact(samples: CurveSamples, contact_force_n: float) -> tuple[float, float] | str:
-    """Return the first and the last time at which all pads feel the contact force, or why there is none."""
-    curve = contact_curve(samples, contact_force_n)
-    if isinstance(curve, str):
-        return curve
-    last = int(np.flatnonzero(curve.lowest_n >= contact_force_n)[-1])
-    end_s = first_crossing(curve.t_s[last:], -curve.lowest_n[last:], -contact_force_n)
-    return float(curve.t_s[0]), float(curve.t_s[last]) if end_s is None else end_s
 
 
 def _quantiles(samples: CurveSamples, start_s: float, end_s: float) -> Floats:

@@ -25,7 +25,6 @@ from graspsense.recording.recorded_grasp import with_phases_of
 from graspsense.recording.replayable import Recording, content_sha256
 from graspsense.recording.trial_record import TrialRecord
 from graspsense.recording.writer import RecordingWriter
-from graspsense.sources.recordings.labelled_recordings import trace_of_recording
 from graspsense.store.imported_contents import CONTENT, ImportedContents
 from graspsense.store.store import Store
 
@@ -61,7 +60,7 @@ def import_recording(
     about = {CONTENT: sha256, "source": labelled.source}
     record = evolve(record, provenance={**record.provenance, **about})
     trial = grasp_with(settings, plugins, labels=labels)
-    trace = with_phases_of(trace_of_recording(labelled.recording), trial.trace)
+    trace = with_phases_of(labelled.recording.trace(), trial.trace)
     trial = _with_labels(evolve(trial, features=_features(settings, trace, trial)), labelled.recording)
     record = record.with_device(trial.device).with_result(trial)
     path = store.new_recording(record.made_at)

@@ -69,7 +69,7 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
         unit = "" if hand[0].unit == "N" else hand[0].unit
     else:
         left_n, right_n, unit = _sides(available)
-    notes += _folds(manifest)
+    notes += [*_folds(manifest), *_assumed(available)]
     effort, velocity = available.value("effort"), available.value("velocity")
     columns = GraspColumns(
         source=table.source,
@@ -232,6 +232,20 @@ def _folds(manifest: ReadManifest) -> list[str]:
     if not expressions["gap"]:
         notes.append("no gap was recorded: features of the force alone are computed")
     return notes
+
+
+def _assumed(columns: AvailableColumns) -> Iterator[str]:
+    """Yield which quantities are read in SI units although nothing states their unit: numbers alone do not tell it."""
+    read = {}
+    for key in columns.manifest.expressions:
+        quantity, chosen = quantity_of(key), columns.chosen(key)
+        if quantity in QUANTITIES and chosen is not None and columns.has(chosen):
+            named = any(unit_in_name(name, quantity) for name in chosen.columns(tuple(columns)))
+            if not (named or columns.unit(chosen, quantity)):
+                read[key] = next(iter(TO_SI[quantity]))
+    if read:
+        words = listed([f"{key} in {si}" for key, si in read.items()])
+        yield f"no unit is stated, so these are read as they are: {words}"
 
 
 def _has_time(columns: AvailableColumns) -> bool:

@@ -39,7 +39,6 @@ from graspsense.sources.recordings.icub import (
     read_grasp,
     recording_of,
 )
-from graspsense.sources.recordings.labelled_recordings import trace_of_recording
 
 UNRELIABLE: Final = "full_coke"
 """The class whose data the author of the data set calls unreliable in its README."""
@@ -70,7 +69,7 @@ def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = F
         raise error_of_all(unreadable)
     recordings = [recording_of(grasp, path.name) for (path, *_), grasp in known.items()]
     check_recording(recorded_channels(recordings[0]), f"icub:{folder}", features)
-    table = table_of([features.extract(trace_of_recording(recording)) for recording in recordings])
+    table = table_of([features.extract(recording.trace()) for recording in recordings])
     notes = [
         "the data of the iCub hand have no time stamps: times are frame numbers (delta_t is in frames)",
         "metres and newtons are nominal, and relative to the first frame (docs/icub.md)",

@@ -20,8 +20,6 @@ from graspsense.core.learn.labelled import Labelled, class_of
 from graspsense.core.pipeline.wiring import check_recording
 from graspsense.core.values.errors import ConfigError, counted
 from graspsense.core.values.features import Features, FeatureTable, table_of
-from graspsense.core.values.signals import APPROACH
-from graspsense.core.values.trace import SI_UNITS, Trace, trace_of
 from graspsense.recording.before_contact import before_contact
 from graspsense.recording.controls import Controls, controls, without_constant_gap
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
@@ -106,23 +104,9 @@ def _fitted(features: FeatureSet[Any], recordings: Sequence[Recording]) -> tuple
 def _features_of(recording: LabelledRecording, features: FeatureSet[Any]) -> tuple[tuple[Features, Features]]:
     """Return the features of a recording, and those from before contact. Raises WiringError if it lacks a channel."""
     check_recording(recorded_channels(recording.recording), recording.source, features)
-    trace = trace_of_recording(recording.recording)
+    trace = recording.recording.trace()
     with failing_as(f"the feature set {type(features).__name__}"):
         return ((features.extract(trace), before_contact(trace)),)
-
-
-def trace_of_recording(recording: Recording) -> Trace:
-    """Return the trace of a recording, all in the phase `approach`."""
-    readings, n = recording.readings, len(recording.readings)
-    images = {reading.pads.counter: reading.pads for reading in readings if reading.pads.counter}
-    return trace_of(
-        [reading.frame for reading in readings],
-        [APPROACH] * n,
-        [0.0] * n,
-        list(images.values()),
-        {**SI_UNITS, **recording.units},
-        [reading.signals for reading in readings] if recording.channels else (),
-    )
 
 
 def instances_of(facts: Sequence[LabelledRecording]) -> tuple[str, ...] | None:
