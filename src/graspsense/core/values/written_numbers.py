@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Final
 
 from attrs import frozen
 
+from graspsense.core.values.errors import listed
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -34,7 +36,7 @@ _EVERY: Final = POINT | THOUSANDS | COMMA
 _NOTATIONS: Final = (POINT, THOUSANDS, COMMA)
 
 _MISSING_WORDS: Final = frozenset({
-    "", "na", "n/a", "n.a.", "<na>", "nat", "null", "\\n", "none", "?", ".", "-", "--", "---", "\u2013", "\u2014"
+    "", "na", "n/a", "n.a.", "<na>", "nat", "null", "\\n", "none", "?", ".", "-", "--", "---"
 })  # fmt: skip
 _MISSING: Final = re.compile(
     r"[-+]?(?:nan(?:\(\w*\))?|1[.,]#(?:q?nan|ind)\d*)|#[^\W\d][^!?]*[!?]|#[\u00a1\u00bf].*|#n/?[adv]|err:\d{3}",
@@ -44,8 +46,13 @@ _MISSING: Final = re.compile(
 _LONGEST_MISSING: Final = 20
 
 _LOGICAL: Final = {"True": 1.0, "False": 0.0}
-_SIGN, _EXPONENT = "[-+\u2212\u2013]?", "(?:[eEdD][-+]?[0-9]+)?"
-"""Word processors turn a minus into a dash."""
+_PLAIN_SIGNS: Final = {
+    **dict.fromkeys(map(ord, "\u2010\u2011\u2012\u2013\u2014\u2212\ufe63\uff0d"), "-"),
+    **dict.fromkeys(map(ord, "\u00a0\u2007\u2009\u202f"), " "),
+    ord("\u2019"): "'",
+}
+"""Signs and spaces of numbers, as word processors have them."""
+_SIGN, _EXPONENT = "[-+]?", "(?:[eEdD][-+]?[0-9]+)?"
 _WITH_POINT: Final = re.compile(rf"{_SIGN}(?:(?P<whole>[0-9]+)(?:\.[0-9]*)?|\.[0-9]+){_EXPONENT}")
 _WITH_COMMA: Final = re.compile(rf"{_SIGN}[0-9]*,[0-9]+{_EXPONENT}")
 _COMMA_GROUPS: Final = re.compile(
@@ -53,14 +60,14 @@ _COMMA_GROUPS: Final = re.compile(
 )
 """Thousands between commas, also with those of India between them: 1,00,000."""
 _POINT_GROUPS: Final = re.compile(rf"{_SIGN}[1-9][0-9]{{0,2}}(?:\.[0-9]{{3}})+(?:,[0-9]*)?{_EXPONENT}")
-_OTHER_GROUPS: Final = re.compile(
-    rf"{_SIGN}[1-9][0-9]{{0,2}}(?:[ '\u2019\u00a0\u2007\u2009\u202f][0-9]{{3}})+(?:[.,][0-9]*)?{_EXPONENT}"
-)
-_GROUP_SIGNS: Final = re.compile("[ '\u2019\u00a0\u2007\u2009\u202f]")
+_OTHER_GROUPS: Final = re.compile(rf"{_SIGN}[1-9][0-9]{{0,2}}(?:[ '][0-9]{{3}})+(?:[.,][0-9]*)?{_EXPONENT}")
+_GROUP_SIGNS: Final = re.compile("[ ']")
+_ONE_MARK: Final = re.compile(rf"{_SIGN}[1-9][0-9]{{0,2}}[.,][0-9]{{3}}")
+"""A number of three decimals, or one of thousands."""
 _HEXADECIMAL: Final = re.compile("0[xX][0-9a-fA-F]{1,16}")
 _INFINITE: Final = re.compile("[-+]?inf(?:inity)?", re.IGNORECASE)
 _PLAIN: Final = re.compile(r"[0-9+\-.eE]*")
-_TO_PYTHON: Final = str.maketrans("dD\u2212\u2013", "ee--")
+_TO_PYTHON: Final = str.maketrans("dD", "ee")
 
 
 @frozen
@@ -81,13 +88,24 @@ class NotNumbers:
 def is_missing(cell: str) -> bool:
     """Return whether the text of a cell stands for a missing number."""
     return len(cell) <= _LONGEST_MISSING and (
-        cell.lower() in _MISSING_WORDS or _MISSING.fullmatch(cell) is not None
+        plain_text(cell).lower() in _MISSING_WORDS or _MISSING.fullmatch(cell) is not None
     )
 
 
 def is_number(cell: str) -> bool:
     """Return whether a text is a number in any notation."""
-    return _notations(cell) != 0
+    return _notations(plain_text(cell)) != 0
+
+
+def plain_text(cell: str) -> str:
+    r"""Return a number with the signs of ASCII, and without the apostrophe of a spreadsheet or quotes around it.
+
+    >>> plain_text("\u22121\u2019000"), plain_text("'-0.5"), plain_text("12\u202f000")
+    ("-1'000", '-0.5', '12 000')
+    """
+    if not cell.isascii():
+        cell = cell.translate(_PLAIN_SIGNS).strip()
+    return cell.strip("'") if cell.startswith("'") else cell
 
 
 def plain_number(text: str) -> float | None:
@@ -96,7 +114,7 @@ def plain_number(text: str) -> float | None:
     >>> plain_number("2.5e-3"), plain_number("1_000"), plain_number("1,5"), plain_number("inf")
     (0.0025, None, None, None)
     """
-    text = text.strip()
+    text = plain_text(text.strip())
     number = float(text.translate(_TO_PYTHON)) if _WITH_POINT.fullmatch(text) else math.inf
     return number if math.isfinite(number) else None
 
@@ -149,6 +167,7 @@ def columns_of_numbers(
     >>> {name: found.tolist() for name, found in columns_of_numbers({"N": ["0", "1,5"], "mm": ["2", "1.000"]}).items()}
     {'N': [0.0, 1.5], 'mm': [2.0, 1000.0]}
     """
+    columns = {name: _plain_cells(cells) for name, cells in columns.items()}
     fits = {name: _common(cells) for name, cells in columns.items()}
     certain = [fit.notations for fit in fits.values() if isinstance(fit, _Fit)]
     points = any(not notations & COMMA for notations in certain if notations != HEXADECIMAL)
@@ -162,20 +181,40 @@ def columns_of_numbers(
     }
 
 
-def with_three_decimals(columns: Mapping[str, Sequence[str]]) -> list[str]:
-    """Return the columns of decimals that can be thousands, if no number of the file has other decimals.
+def doubts_of_marks(
+    columns: Mapping[str, Sequence[str]], read: Mapping[str, Numbers | NotNumbers], separator: str
+) -> tuple[str, ...]:
+    """Return notes on columns whose numbers of three decimals can be thousands, or the other way round.
 
-    >>> with_three_decimals({"N": ["12.008", "9.500"], "mm": ["4", "5"]}), with_three_decimals({"N": ["12.008", "0.5"]})
-    (['N'], [])
+    Decimals are doubted between semicolons, unless a number of the file has others; thousands, except between commas,
+    where all of a column have three digits behind one sign, so that only other columns tell what it is.
+
+    >>> columns = {"mN": ["12,008", "9,500"], "mm": ["4.5", "5"]}
+    >>> doubts_of_marks(columns, columns_of_numbers(columns), "\\t")
+    ('the sign before three digits in mN is taken for that of thousands. If it is that of decimals, write a point',)
     """
-    names = []
-    for name, cells in columns.items():
-        with_mark = [cell for cell in cells if ("." in cell or "," in cell) and is_number(cell)]
-        commas = with_mark and all(map(_COMMA_GROUPS.fullmatch, with_mark)) and not _tells_thousands(cells)
-        if not (commas or all(map(_POINT_GROUPS.fullmatch, with_mark))):
-            return []
-        names += [name] if with_mark else []
-    return names
+    decimals: list[str] = []
+    thousands: list[str] = []
+    told = separator != ";"
+    for name, cells in columns.items() if separator not in ("", ",") else ():
+        numbers, plain = read[name], [*map(plain_text, cells)]
+        marked = [k for k, cell in enumerate(plain) if ("." in cell or "," in cell) and _notations(cell)]
+        if isinstance(numbers, NotNumbers) or not marked:
+            continue
+        doubtful = all(_ONE_MARK.fullmatch(plain[k]) for k in marked)
+        told |= not doubtful or ("," in plain[marked[0]] and _tells_thousands(plain))
+        if doubtful and abs(numbers[marked[0]]) < _THOUSAND:
+            decimals.append(name)
+        elif doubtful and not (abs(numbers) < _THOUSAND).any():
+            thousands.append(name)
+    return tuple(
+        f"the sign before three digits in {listed(names)} is taken for that of {taken}. {advice}"
+        for names, taken, advice in (
+            ([] if told else decimals, "decimals", "If it separates thousands, leave it out of the numbers"),
+            (thousands, "thousands", "If it is that of decimals, write a point"),
+        )
+        if names
+    )
 
 
 @frozen(eq=False)
@@ -184,6 +223,11 @@ class _Fit:
 
     notations: int
     values: Numbers | None = None
+
+
+def _plain_cells(cells: Sequence[str]) -> Sequence[str]:
+    together = "".join(cells)
+    return cells if together.isascii() and "'" not in together else [*map(plain_text, cells)]
 
 
 def _common(cells: Sequence[str]) -> _Fit | NotNumbers:
@@ -280,7 +324,7 @@ def _tells_thousands(cells: Sequence[str]) -> bool:
     plain = [cell for cell in cells if "," not in cell and not is_missing(cell)]
     return bool(plain) and (
         any(cell.endswith("0") for cell in cells if "," in cell)
-        or any(len(cell.lstrip("+-\u2212\u2013")) == 3 for cell in plain)
+        or any(len(cell.lstrip("+-")) == 3 for cell in plain)
     )
 
 

@@ -17,6 +17,7 @@ from graspsense.core.values.limits import CELLS
 from graspsense.core.values.written_numbers import (
     NotNumbers,
     columns_of_numbers,
+    doubts_of_marks,
     is_missing,
     is_number,
     rows_of_lists,
@@ -100,7 +101,8 @@ def _columns(path: Path, fields: dict[str, str], table: TextTable, *, several: b
         if unit and units[name] in ("", unit):
             texts[name] = cells[name]
             cells[name], units[name] = numbers_in_cells, unit
-    for name, column in columns_of_numbers(cells).items():
+    read = columns_of_numbers(cells)
+    for name, column in read.items():
         if not isinstance(column, NotNumbers):
             numbers[name] = column
             # As numbers `none` and `NA` are missing, and as labels they are not.
@@ -133,6 +135,7 @@ def _columns(path: Path, fields: dict[str, str], table: TextTable, *, several: b
         lines=np.array(table.lines, dtype=np.int64),
         not_numbers=not_numbers,
         notes=table.notes,
+        warnings=doubts_of_marks(cells, read, table.separator),
     )
 
 
