@@ -52,22 +52,35 @@ _PLAIN_SIGNS: Final = {
     ord("\u2019"): "'",
 }
 """Signs and spaces of numbers, as word processors have them."""
-_SIGN, _EXPONENT = "[-+]?", "(?:[eEdD][-+]?[0-9]+)?"
-_WITH_POINT: Final = re.compile(rf"{_SIGN}(?:(?P<whole>[0-9]+)(?:\.[0-9]*)?|\.[0-9]+){_EXPONENT}")
-_WITH_COMMA: Final = re.compile(rf"{_SIGN}[0-9]*,[0-9]+{_EXPONENT}")
-_COMMA_GROUPS: Final = re.compile(
-    rf"{_SIGN}[1-9](?:[0-9]{{0,2}}(?:,[0-9]{{3}})+|[0-9]?(?:,[0-9]{{2}})+,[0-9]{{3}})(?:\.[0-9]*)?{_EXPONENT}"
-)
-"""Thousands between commas, also with those of India between them: 1,00,000."""
-_POINT_GROUPS: Final = re.compile(rf"{_SIGN}[1-9][0-9]{{0,2}}(?:\.[0-9]{{3}})+(?:,[0-9]*)?{_EXPONENT}")
-_OTHER_GROUPS: Final = re.compile(rf"{_SIGN}[1-9][0-9]{{0,2}}(?:[ '][0-9]{{3}})+(?:[.,][0-9]*)?{_EXPONENT}")
-_GROUP_SIGNS: Final = re.compile("[ ']")
-_ONE_MARK: Final = re.compile(rf"{_SIGN}[1-9][0-9]{{0,2}}[.,][0-9]{{3}}")
+
+
+def _form(mark: str, *whole: str) -> re.Pattern[str]:
+    """Return the pattern of numbers with one of these before the mark of decimals; they can be infinite."""
+    digits = rf"(?:{'|'.join(whole)})(?:{mark}[0-9]*)?|{mark}[0-9]+"
+    return re.compile(rf"[-+]?(?:(?:{digits})(?:[ed][-+]?[0-9]+)?|inf(?:inity)?)", re.IGNORECASE)
+
+
+def _groups(mark: str) -> str:
+    return rf"[1-9][0-9]{{0,2}}(?:{mark}[0-9]{{3}})+"
+
+
+_OTHER_GROUPS: Final = _groups("[ ']")
+_INDIAN: Final = "[1-9][0-9]?(?:,[0-9]{2})+,[0-9]{3}"
+"""1,00,000"""
+_FORMS: Final = {
+    POINT: _form(r"\.", "[0-9]+", _OTHER_GROUPS),
+    THOUSANDS: _form(r"\.", "[0-9]{1,3}", _groups(","), _INDIAN),  # 1000 would have a comma
+    COMMA: _form(",(?=[0-9])", "[0-9]+", _OTHER_GROUPS, _groups(r"\.")),
+    HEXADECIMAL: re.compile("0|0x[0-9a-f]{1,16}", re.IGNORECASE),
+}
+_TO_PYTHON: Final = {
+    POINT: str.maketrans("dD", "ee", " '"),
+    THOUSANDS: str.maketrans("dD", "ee", " ',"),
+    COMMA: str.maketrans("dD,", "ee.", " '."),
+}
+_ONE_MARK: Final = re.compile(r"[-+]?[1-9][0-9]{0,2}[.,][0-9]{3}")
 """A number of three decimals, or one of thousands."""
-_HEXADECIMAL: Final = re.compile("0[xX][0-9a-fA-F]{1,16}")
-_INFINITE: Final = re.compile("[-+]?inf(?:inity)?", re.IGNORECASE)
 _PLAIN: Final = re.compile(r"[0-9+\-.eE]*")
-_TO_PYTHON: Final = str.maketrans("dD", "ee")
 
 
 @frozen
@@ -94,7 +107,8 @@ def is_missing(cell: str) -> bool:
 
 def is_number(cell: str) -> bool:
     """Return whether a text is a number in any notation."""
-    return _notations(plain_text(cell)) != 0
+    text = plain_text(cell)
+    return any(form.fullmatch(text) for form in _FORMS.values())
 
 
 def plain_text(cell: str) -> str:
@@ -114,9 +128,9 @@ def plain_number(text: str) -> float | None:
     >>> plain_number("2.5e-3"), plain_number("1_000"), plain_number("1,5"), plain_number("inf")
     (0.0025, None, None, None)
     """
-    text = plain_text(text.strip())
-    number = float(text.translate(_TO_PYTHON)) if _WITH_POINT.fullmatch(text) else math.inf
-    return number if math.isfinite(number) else None
+    text = plain_text(text.strip()).replace("D", "e").replace("d", "e")
+    numbers = _floats([text]) if _PLAIN.fullmatch(text) else None
+    return None if numbers is None or math.isinf(numbers[0]) else float(numbers[0])
 
 
 def number_in(text: str) -> float | None:
@@ -235,11 +249,7 @@ def _common(cells: Sequence[str]) -> _Fit | NotNumbers:
     together = "".join(cells)
     values = _floats(cells) if _PLAIN.fullmatch(together) else None
     if values is not None:
-        grouped = (
-            all("." not in cell or _POINT_GROUPS.fullmatch(cell) for cell in cells)
-            if "." in together
-            else True
-        )
+        grouped = "." not in together or all(map(_FORMS[COMMA].fullmatch, cells))
         return _Fit(POINT | COMMA if grouped else POINT, values)
     common = _EVERY | HEXADECIMAL
     for row, cell in enumerate(cells):
@@ -357,35 +367,9 @@ def _floats(cells: Sequence[str]) -> Numbers | None:
 
 
 def _number(cell: str, notation: int) -> float:
-    if _INFINITE.fullmatch(cell):
-        return float(cell)
-    if _HEXADECIMAL.fullmatch(cell):
-        return float(int(cell, 16))
-    if _OTHER_GROUPS.fullmatch(cell):
-        cell = _GROUP_SIGNS.sub("", cell)
-    if notation == THOUSANDS:
-        cell = cell.replace(",", "")
-    elif notation == COMMA:
-        cell = cell.replace(".", "").replace(",", ".")
-    return float(cell.translate(_TO_PYTHON))
+    return float(int(cell, 16) if notation == HEXADECIMAL else cell.translate(_TO_PYTHON[notation]))
 
 
 def _notations(cell: str) -> int:
     """Return the notations in which a cell is a number."""
-    if _OTHER_GROUPS.fullmatch(cell):
-        return COMMA if "," in cell else POINT if "." in cell else POINT | COMMA
-    if match := _WITH_POINT.fullmatch(cell):
-        forms = POINT
-        if len(match["whole"] or "") <= 3:  # a thousand would have a comma
-            forms |= THOUSANDS
-        if "." not in cell or _POINT_GROUPS.fullmatch(cell):
-            forms |= COMMA
-        return forms | (HEXADECIMAL if cell == "0" else 0)
-    if _HEXADECIMAL.fullmatch(cell):
-        return HEXADECIMAL
-    forms = 0
-    if _WITH_COMMA.fullmatch(cell) or _POINT_GROUPS.fullmatch(cell):
-        forms |= COMMA
-    if _COMMA_GROUPS.fullmatch(cell):
-        forms |= THOUSANDS
-    return forms or (_EVERY if _INFINITE.fullmatch(cell) else 0)
+    return sum(notation for notation, form in _FORMS.items() if form.fullmatch(cell))
