@@ -45,7 +45,7 @@ _MISSING: Final = re.compile(
 """NaN as the libraries of C write it, and the errors of spreadsheets in their languages, such as `#WERT!`."""
 _LONGEST_MISSING: Final = 20
 
-_LOGICAL: Final = {"True": 1.0, "False": 0.0}
+_LOGICAL: Final = {"True": "1", "False": "0"}
 _PLAIN_SIGNS: Final = {
     **dict.fromkeys(map(ord, "\u2010\u2011\u2012\u2013\u2014\u2212\ufe63\uff0d"), "-"),
     **dict.fromkeys(map(ord, "\u00a0\u2007\u2009\u202f"), " "),
@@ -135,20 +135,15 @@ def plain_number(text: str) -> float | None:
 
 def number_in(text: str) -> float | None:
     """Return the finite number that a text on its own is, None if it is none or can be read as two different ones."""
-    cell = text.strip()
-    if not cell or is_missing(cell):
-        return None
-    column = columns_of_numbers({"": [cell]})[""]
+    column = columns_of_numbers({"": [text.strip()]})[""]
     return None if isinstance(column, NotNumbers) or not math.isfinite(column[0]) else float(column[0])
 
 
 def truths(cells: Sequence[str]) -> Numbers | None:
     """Return 1 for each true and 0 for each false, in any case, NaN where missing; None if a cell is another word."""
-    import numpy as np
-
-    values = [_LOGICAL.get(cell.capitalize(), math.nan if is_missing(cell) else None) for cell in cells]
-    known = None not in values and not all(map(is_missing, cells))
-    return np.array(values, dtype=np.float64) if known else None
+    known = [_LOGICAL.get(cell.capitalize(), "") for cell in cells]
+    every = all(word or is_missing(cell) for word, cell in zip(known, cells, strict=True))
+    return _values(known, POINT) if every and any(known) else None
 
 
 def rows_of_lists(cells: Sequence[str]) -> Numbers | None:
@@ -156,18 +151,15 @@ def rows_of_lists(cells: Sequence[str]) -> Numbers | None:
 
     None if a cell is no list of numbers, or has another length than the first one.
     """
-    import numpy as np
-
-    rows: list[list[float | None]] = []
-    for cell in cells:
-        if not (cell.startswith("[") and cell.endswith("]")):
-            return None
-        words = cell[1:-1].replace(",", " ").split()
-        numbers = [_LOGICAL.get(word, math.nan if is_missing(word) else plain_number(word)) for word in words]
-        if None in numbers or not numbers or len(numbers) != len(rows[0] if rows else numbers):
-            return None
-        rows.append(numbers)
-    return np.array(rows, dtype=np.float64) if rows else None
+    if not all(cell.startswith("[") and cell.endswith("]") for cell in cells):
+        return None
+    rows = [cell[1:-1].replace(",", " ").split() for cell in cells]
+    words = [_LOGICAL.get(word.capitalize(), word) for row in rows for word in row]
+    if not words or len(set(map(len, rows))) > 1:
+        return None
+    if not all(_FORMS[POINT].fullmatch(word) or is_missing(word) for word in words):
+        return None
+    return _values(words, POINT).reshape(len(rows), -1)
 
 
 def columns_of_numbers(
