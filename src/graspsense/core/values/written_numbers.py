@@ -129,7 +129,7 @@ def plain_number(text: str) -> float | None:
     (0.0025, None, None, None)
     """
     text = plain_text(text.strip()).replace("D", "e").replace("d", "e")
-    numbers = _floats([text]) if _PLAIN.fullmatch(text) else None
+    numbers = _plain_numbers([text])
     return None if numbers is None or math.isinf(numbers[0]) else float(numbers[0])
 
 
@@ -175,7 +175,7 @@ def columns_of_numbers(
     """
     columns = {name: _plain_cells(cells) for name, cells in columns.items()}
     fits = {name: _common(cells) for name, cells in columns.items()}
-    certain = [fit.notations for fit in fits.values() if isinstance(fit, _Fit)]
+    certain = [fit for fit in fits.values() if isinstance(fit, int)]
     points = any(not notations & COMMA for notations in certain if notations != HEXADECIMAL)
     commas = any(notations == COMMA for notations in certain)
     of_file = (COMMA if commas else 0) | (THOUSANDS if points else 0)
@@ -196,39 +196,31 @@ def doubts_of_marks(
     where all of a column have three digits behind one sign, so that only other columns tell what it is.
 
     >>> columns = {"mN": ["12,008", "9,500"], "mm": ["4.5", "5"]}
-    >>> doubts_of_marks(columns, columns_of_numbers(columns), "\\t")
-    ('the sign before three digits in mN is taken for that of thousands. If it is that of decimals, write a point',)
+    >>> doubts_of_marks(columns, columns_of_numbers(columns), "\\t")  # doctest: +ELLIPSIS
+    ('the sign before three digits in mN is taken for that of thousands. If it is ...',)
     """
-    decimals: list[str] = []
-    thousands: list[str] = []
+    doubtful: dict[str, list[str]] = {"decimals": [], "thousands": []}
     told = separator != ";"
     for name, cells in columns.items() if separator not in ("", ",") else ():
         numbers, plain = read[name], [*map(plain_text, cells)]
         marked = [k for k, cell in enumerate(plain) if ("." in cell or "," in cell) and _notations(cell)]
         if isinstance(numbers, NotNumbers) or not marked:
             continue
-        doubtful = all(_ONE_MARK.fullmatch(plain[k]) for k in marked)
-        told |= not doubtful or ("," in plain[marked[0]] and _tells_thousands(plain))
-        if doubtful and abs(numbers[marked[0]]) < _THOUSAND:
-            decimals.append(name)
-        elif doubtful and not (abs(numbers) < _THOUSAND).any():
-            thousands.append(name)
+        if not all(_ONE_MARK.fullmatch(plain[k]) for k in marked):
+            told = True
+        elif abs(numbers[marked[0]]) < _THOUSAND:
+            doubtful["decimals"].append(name)
+            told |= "," in plain[marked[0]] and _tells_thousands(plain)
+        elif not (abs(numbers) < _THOUSAND).any():
+            doubtful["thousands"].append(name)
+    if told:
+        del doubtful["decimals"]
     return tuple(
-        f"the sign before three digits in {listed(names)} is taken for that of {taken}. {advice}"
-        for names, taken, advice in (
-            ([] if told else decimals, "decimals", "If it separates thousands, leave it out of the numbers"),
-            (thousands, "thousands", "If it is that of decimals, write a point"),
-        )
+        f"the sign before three digits in {listed(names)} is taken for that of {taken}. If it is the other one, write "
+        "numbers with a decimal point, and nothing between thousands"
+        for taken, names in doubtful.items()
         if names
     )
-
-
-@frozen(eq=False)
-class _Fit:
-    """The notations that every cell of a column fits, and the numbers in the notation with points if all are plain."""
-
-    notations: int
-    values: Numbers | None = None
 
 
 def _plain_cells(cells: Sequence[str]) -> Sequence[str]:
@@ -236,13 +228,10 @@ def _plain_cells(cells: Sequence[str]) -> Sequence[str]:
     return cells if together.isascii() and "'" not in together else [*map(plain_text, cells)]
 
 
-def _common(cells: Sequence[str]) -> _Fit | NotNumbers:
+def _common(cells: Sequence[str]) -> int | NotNumbers:
     """Return the notations that every cell fits, or why there is none."""
-    together = "".join(cells)
-    values = _floats(cells) if _PLAIN.fullmatch(together) else None
-    if values is not None:
-        grouped = "." not in together or all(map(_FORMS[COMMA].fullmatch, cells))
-        return _Fit(POINT | COMMA if grouped else POINT, values)
+    if _plain_numbers(cells) is not None:
+        return POINT | COMMA if all(map(_FORMS[COMMA].fullmatch, cells)) else POINT
     common = _EVERY | HEXADECIMAL
     for row, cell in enumerate(cells):
         if is_missing(cell):
@@ -251,7 +240,7 @@ def _common(cells: Sequence[str]) -> _Fit | NotNumbers:
         if not fits:
             return NotNumbers(row, cell, "which is not a number; a missing one is an empty cell")
         common &= fits
-    return _Fit(common) if common else _mixed(cells)
+    return common or _mixed(cells)
 
 
 def _mixed(cells: Sequence[str]) -> NotNumbers:
@@ -267,15 +256,14 @@ def _mixed(cells: Sequence[str]) -> NotNumbers:
     return NotNumbers(row, cells[row], f"which is not a number ({advice})")
 
 
-def _read(cells: Sequence[str], fit: _Fit, of_file: int, *, decimal_commas: bool) -> Numbers | NotNumbers:
+def _read(cells: Sequence[str], common: int, of_file: int, *, decimal_commas: bool) -> Numbers | NotNumbers:
     """Return the numbers; `of_file` holds COMMA and THOUSANDS where other columns prove decimal commas or points."""
-    common = fit.notations
     if common & POINT:
         # `1.500` is 1500 where all other columns have decimal commas, and beside 975 and 1.000.
         grouped = common & COMMA and any("." in cell for cell in cells)
         likely = _nearer(cells, of_file == THOUSANDS) | (of_file & COMMA) if grouped else POINT
         if likely == POINT or (likely == POINT | COMMA and of_file == THOUSANDS):
-            return _values(cells, POINT) if fit.values is None else fit.values
+            return _values(cells, POINT)
         if not of_file & THOUSANDS and (likely == COMMA or of_file):
             return _values(cells, COMMA)
     elif (common == THOUSANDS and of_file & COMMA) or _one_mark_of_two(cells):
@@ -344,16 +332,20 @@ def _one_mark_of_two(cells: Sequence[str]) -> bool:
 def _values(cells: Sequence[str], notation: int) -> Numbers:
     import numpy as np
 
+    if notation == POINT and (plain := _plain_numbers(cells)) is not None:
+        return plain
     numbers = [math.nan if is_missing(cell) else _number(cell, notation) for cell in cells]
     return np.array(numbers, dtype=np.float64)
 
 
-def _floats(cells: Sequence[str]) -> Numbers | None:
+def _plain_numbers(cells: Sequence[str]) -> Numbers | None:
     """Return cells with only digits, signs, points and exponents as numbers; None if one of them is none."""
     import numpy as np
 
     try:
-        return np.array(list(map(float, cells)), dtype=np.float64)
+        return (
+            np.array(list(map(float, cells)), dtype=np.float64) if _PLAIN.fullmatch("".join(cells)) else None
+        )
     except ValueError:
         return None
 
