@@ -216,8 +216,8 @@ def doubts_of_marks(
     if told:
         del doubtful["decimals"]
     return tuple(
-        f"the sign before three digits in {listed(names)} is taken for that of {taken}. If it is the other one, write "
-        "numbers with a decimal point, and nothing between thousands"
+        f"the sign before three digits in {listed(names)} is taken for that of {taken}. If it is not, write a decimal "
+        "point, and nothing between thousands"
         for taken, names in doubtful.items()
         if names
     )

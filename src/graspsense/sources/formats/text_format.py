@@ -5,12 +5,12 @@ A column of times, as ISO 8601 or times of the day, is a column of seconds since
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from graspsense.core.learn.target_value import name_and_unit
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.label_text import is_missing_label
 from graspsense.core.values.limits import CELLS
@@ -150,7 +150,6 @@ def _lists(path: Path, name: str, cells: Sequence[str]) -> Numbers | None:
 
 def _unit_in(heading: str) -> str:
     """Return the unit behind a name: `Load [N]` or `Load (N)`."""
-    unit = name_and_unit(heading)[1]
-    if not unit and heading.endswith(")"):
-        unit = heading[:-1].rpartition("(")[2].strip()
+    match = re.fullmatch(r".*[\[(](.*)[\])]", heading)
+    unit = match[1].strip() if match else ""
     return unit if unit.lower() in UNITS else ""
