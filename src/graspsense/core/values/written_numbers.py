@@ -173,7 +173,7 @@ def columns_of_numbers(
     >>> {name: found.tolist() for name, found in columns_of_numbers({"N": ["0", "1,5"], "mm": ["2", "1.000"]}).items()}
     {'N': [0.0, 1.5], 'mm': [2.0, 1000.0]}
     """
-    columns = {name: _plain_cells(cells) for name, cells in columns.items()}
+    columns = {name: [*map(plain_text, cells)] for name, cells in columns.items()}
     fits = {name: _common(cells) for name, cells in columns.items()}
     certain = [fit for fit in fits.values() if isinstance(fit, int)]
     points = any(not notations & COMMA for notations in certain if notations != HEXADECIMAL)
@@ -221,11 +221,6 @@ def doubts_of_marks(
         for taken, names in doubtful.items()
         if names
     )
-
-
-def _plain_cells(cells: Sequence[str]) -> Sequence[str]:
-    together = "".join(cells)
-    return cells if together.isascii() and "'" not in together else [*map(plain_text, cells)]
 
 
 def _common(cells: Sequence[str]) -> int | NotNumbers:
