@@ -171,7 +171,7 @@ class _Layout:
             self._tell(later, "comments")
         return TextTable(
             names=tuple(" ".join(name.split()) for name in names),  # in quotes, one can have several lines
-            units=tuple((units or [""] * len(names))[: len(names)]),
+            units=tuple(unit.strip("[]()") for unit in (units or [""] * len(names))[: len(names)]),
             columns=tuple(zip(*(row for _, row in rows), strict=True)) if rows else ((),) * len(names),
             lines=tuple(number for number, _ in rows),
             notes=tuple(self.notes),
@@ -291,7 +291,7 @@ class _Layout:
             and {*range(k + 2, data)} <= {*able}
         ]
         names = (with_units or able)[-1]
-        units = _without_brackets(self.rows[names + 1][1]) if with_units else None
+        units = self.rows[names + 1][1] if with_units else None
         if names:
             self._refuse_numbers_before(names)
             skipped = [number for number, _ in self.rows[:names]]
@@ -330,7 +330,7 @@ class _Layout:
         self.notes.append(
             f"the names of the columns are those of the lines {listed([*map(str, lines)])}, joined by _"
         )
-        return names, units and _without_brackets(units), data, lines[-1]
+        return names, units, data, lines[-1]
 
     def _refuse_numbers_before(self, names: int) -> None:
         """Raise DataDamaged if rows of numbers that may be a part of the data come before the row `names`."""
@@ -356,7 +356,7 @@ class _Layout:
         ]
         units = None
         if len(above) > 1 and len(above[-1][1]) == width and _are_units(above[-1][1]):
-            units = _without_brackets(above.pop()[1])
+            units = above.pop()[1]
         # As many words as columns can be a remark.
         for number, cells in above[-1:] if self.separator == " " else reversed(above):
             if len(cells) == width == len(set(cells)) and all(cells) and not any(map(is_number, cells)):
@@ -386,7 +386,7 @@ class _Layout:
         if not again or all(map(is_number, names)):
             return rows
         self._tell(again, "repeated headers")
-        return [row for row in rows if row[0] not in again and _without_brackets(row[1]) != units]
+        return [row for row in rows if row[0] not in again and row[1] != units]
 
     def _without_texts(self, rows: list[Row], width: int) -> list[Row]:
         """Return the rows without lines of text, as a device prints one between its numbers, or several behind them."""
@@ -617,10 +617,6 @@ def _can_be_names(row: Sequence[str], width: int, texts: Sequence[set[str]]) -> 
         and (2 * len(set(named)) > len(named) or _are_units(cells))
         and not any(cell in texts[k] for k, cell in enumerate(cells) if cell)
     )
-
-
-def _without_brackets(units: Sequence[str]) -> list[str]:
-    return [unit.strip("[]()") for unit in units]
 
 
 def _names_all(row: Sequence[str]) -> bool:
