@@ -60,17 +60,14 @@ def _form(mark: str, *whole: str) -> re.Pattern[str]:
     return re.compile(rf"[-+]?(?:(?:{digits})(?:[ed][-+]?[0-9]+)?|inf(?:inity)?)", re.IGNORECASE)
 
 
-def _groups(mark: str) -> str:
-    return rf"[1-9][0-9]{{0,2}}(?:{mark}[0-9]{{3}})+"
-
-
-_OTHER_GROUPS: Final = _groups("[ ']")
+_GROUPS: Final = "[1-9][0-9]{{0,2}}(?:{}[0-9]{{3}})+"
+_OTHER_GROUPS: Final = _GROUPS.format("[ ']")
 _INDIAN: Final = "[1-9][0-9]?(?:,[0-9]{2})+,[0-9]{3}"
 """1,00,000"""
 _FORMS: Final = {
     POINT: _form(r"\.", "[0-9]+", _OTHER_GROUPS),
-    THOUSANDS: _form(r"\.", "[0-9]{1,3}", _groups(","), _INDIAN),  # 1000 would have a comma
-    COMMA: _form(",(?=[0-9])", "[0-9]+", _OTHER_GROUPS, _groups(r"\.")),
+    THOUSANDS: _form(r"\.", "[0-9]{1,3}", _GROUPS.format(","), _INDIAN),  # 1000 would have a comma
+    COMMA: _form(",(?=[0-9])", "[0-9]+", _OTHER_GROUPS, _GROUPS.format(r"\.")),
     HEXADECIMAL: re.compile("0|0x[0-9a-f]{1,16}", re.IGNORECASE),
 }
 _TO_PYTHON: Final = {
@@ -128,8 +125,7 @@ def plain_number(text: str) -> float | None:
     >>> plain_number("2.5e-3"), plain_number("1_000"), plain_number("1,5"), plain_number("inf")
     (0.0025, None, None, None)
     """
-    text = plain_text(text.strip()).replace("D", "e").replace("d", "e")
-    numbers = _plain_numbers([text])
+    numbers = _plain_numbers([plain_text(text.strip()).replace("D", "e").replace("d", "e")])
     return None if numbers is None or math.isinf(numbers[0]) else float(numbers[0])
 
 
@@ -151,15 +147,12 @@ def rows_of_lists(cells: Sequence[str]) -> Numbers | None:
 
     None if a cell is no list of numbers, or has another length than the first one.
     """
-    if not all(cell.startswith("[") and cell.endswith("]") for cell in cells):
-        return None
+    known = all(cell.startswith("[") and cell.endswith("]") for cell in cells)
     rows = [cell[1:-1].replace(",", " ").split() for cell in cells]
     words = [_LOGICAL.get(word.capitalize(), word) for row in rows for word in row]
-    if not words or len(set(map(len, rows))) > 1:
-        return None
-    if not all(_FORMS[POINT].fullmatch(word) or is_missing(word) for word in words):
-        return None
-    return _values(words, POINT).reshape(len(rows), -1)
+    known &= all(_FORMS[POINT].fullmatch(word) or is_missing(word) for word in words)
+    same = len({*map(len, rows)}) == 1 and bool(words)
+    return _values(words, POINT).reshape(len(rows), -1) if known and same else None
 
 
 def columns_of_numbers(

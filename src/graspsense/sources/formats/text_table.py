@@ -692,9 +692,7 @@ def text_of(path: Path) -> str:
         raise DataDamaged(f"{path} is a spreadsheet, an archive or a binary table: save it as CSV in UTF-8")
     if too_large := TEXT_BYTES.exceeded(size):
         raise DataDamaged(f"{path}: {too_large}")
-    text = _decoded(path, data)
-    if not text.isascii():
-        text = _UNSEEN.sub("", text)
+    text = _UNSEEN.sub("", _decoded(path, data))
     if "\0" in text:
         raise DataDamaged(
             f"{path} contains zero bytes: it is not a text file. If a program wrote it as Unicode text, save it as "
