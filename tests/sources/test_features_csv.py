@@ -1,4 +1,5 @@
 import math
+import re
 
 import numpy as np
 import pytest
@@ -195,6 +196,7 @@ HEAD, *TRIALS = GOOD.strip().splitlines()
 ANNOTATED = [f"{line},x" for line in TRIALS]
 STATISTICS = ["mean", "Total", "Average:", "std", "median", "Summe", "Std. Dev."]
 UNEVEN = [f"{'ab'[k % 2]},{k * 0.137 % 1:.3f},{k * k * 0.313 % 7:.3f}" for k in range(8)]
+ZEROS = [re.sub("[^,]*$", ("0.000", "0.812")[k % 4 == 0], line) for k, line in enumerate(UNEVEN)]
 MEANS = [sum(float(line.split(",")[k]) for line in UNEVEN) / 8 for k in (1, 2)]
 OBJECTS = [f"{k},{what},{k * 0.31 % 1:.3f}" for what in ("can", "jar") for k in range(6)]
 
@@ -212,6 +214,9 @@ OBJECTS = [f"{k},{what},{k * 0.31 % 1:.3f}" for what in ("can", "jar") for k in 
         *(([HEAD, *UNEVEN, f"{word},{times * MEANS[0]:.5f},{times * MEANS[1]:.4f}", "b,0.1,0.1"], "abababab")
           for word in ("a", "", "\u5e73\u5747") for times in (1, 8)),
         ([HEAD, *UNEVEN, "b,0.5,2.25"], "ababababb"),
+        # Zeros that are written with three places are no rounded means, and two numbers can be means by chance.
+        ([HEAD, *ZEROS, f"b,{MEANS[0]:.3f},0.000", "a,0.1,0.1"], "ababababba"),
+        ([HEAD, *UNEVEN, f"b,{MEANS[0]:.3f},{MEANS[1]:.2f}", "a,0.1,0.1"], "ababababba"),
         # A trial without values, or with the remark `max`, is one.
         ([f"{HEAD},x", *ANNOTATED[:3], f"{TRIALS[3]},max", "a,,,", "c,,,", "c,,,", *ANNOTATED[4:]], "ababaccabab"),
         # Levels of filling are no quartiles.

@@ -95,12 +95,17 @@ VARIANTS = {
     "MATLAB's dates": stamped(lambda k: noon(k).strftime("%d-%b-%Y %H:%M:%S.%f")),
     "LabVIEW": ["***End_of_Header***", f"{HEADER},Comment", f"{ROWS[0]},start", *ROWS[1:]],
     "a device that tells something": [HEADER, *ROWS[:90], "ERROR: no answer", *ROWS[90:], "End of file"],
+    "a remark with a comma": [HEADER, *ROWS[:90], "// pad moved, twice", *ROWS[90:]],
     "Markdown": [f"| {line.replace(',', ' | ')} |" for line in [HEADER, *ROWS]],
     "a rule below the names": ["t | pos | f1 | f2", "--+-----+----+---", *(row.replace(",", " | ") for row in ROWS)],
     "MATLAB's display": ["  t  pos  f1  f2", "  ___  ___  ___  ___", *(row.replace(",", "   ") for row in ROWS)],
     "an American date": stamped(lambda k: noon(k, 12).strftime("%m/%d/%Y %I:%M:%S.%f %p")),
     "a British date": stamped(lambda k: noon(k, 12).strftime("%d/%m/%Y %H:%M:%S.%f")),
     "a German date": stamped(lambda k: noon(k).strftime("%d.%m.%Y %H:%M:%S.%f")),
+    "a year of two digits": stamped(lambda k: noon(k, 12).strftime("%m/%d/%y %I:%M:%S.%f %p")),
+    "separators behind some rows": [HEADER, *(row + "," * (k % 4) for k, row in enumerate(ROWS))],
+    "marks of writing": [f"\u200b{HEADER}", *(f"\u200e{row}" for row in ROWS)],
+    "names in several lines": ['"t","pos\n","f1",f2', *ROWS],
     "minutes over the hour": stamped(lambda k: noon(k).strftime("%M:%S.%f")),
     "pandas' timedelta": stamped(lambda k: f"0 days 00:00:{0.01 * k:09.6f}"),
     "a Chinese date": stamped(lambda k: noon(k).strftime("%Y/3/3 %H:%M:%S.%f")),
@@ -485,6 +490,16 @@ def test_points_that_can_separate_thousands_are_told_in_a_table_with_semicolons(
         ["what;p;q", *lines, "a;0.5;12.000"],
     ):
         assert not [note for note in trials(tmp_path, others).notes if "thousands" in note]
+
+
+@every_case(("mark", "other"), [(",", "0.5"), (".", "0,5")])
+def test_thousands_that_only_other_columns_tell_are_told(mark, other, tmp_path):
+    lines = [f"{'ab'[k % 2]};{12 + 7 * k % 11}{mark}{107 * k % 900 + 100}" for k in range(12)]
+    labelled = trials(tmp_path, ["what;q;p", *(f"{line};{other}" for line in lines)])
+    assert labelled.table.values[1, 0] == 19207
+    assert [note for note in labelled.notes if "thousands" in note]
+    labelled = trials(tmp_path, ["what;q;p", f"a;975;{other}", *(f"{line};{other}" for line in lines)])
+    assert not [note for note in labelled.notes if "thousands" in note]
 
 
 def test_words_for_a_missing_number_are_labels(tmp_path):

@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Final
 
 from attrs import frozen
 
+from graspsense.core.values.errors import listed
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -34,7 +36,7 @@ _EVERY: Final = POINT | THOUSANDS | COMMA
 _NOTATIONS: Final = (POINT, THOUSANDS, COMMA)
 
 _MISSING_WORDS: Final = frozenset({
-    "", "na", "n/a", "n.a.", "<na>", "nat", "null", "\\n", "none", "?", ".", "-", "--", "---", "\u2013", "\u2014"
+    "", "na", "n/a", "n.a.", "<na>", "nat", "null", "\\n", "none", "?", ".", "-", "--", "---"
 })  # fmt: skip
 _MISSING: Final = re.compile(
     r"[-+]?(?:nan(?:\(\w*\))?|1[.,]#(?:q?nan|ind)\d*)|#[^\W\d][^!?]*[!?]|#[\u00a1\u00bf].*|#n/?[adv]|err:\d{3}",
@@ -43,24 +45,39 @@ _MISSING: Final = re.compile(
 """NaN as the libraries of C write it, and the errors of spreadsheets in their languages, such as `#WERT!`."""
 _LONGEST_MISSING: Final = 20
 
-_LOGICAL: Final = {"True": 1.0, "False": 0.0}
-_SIGN, _EXPONENT = "[-+\u2212\u2013]?", "(?:[eEdD][-+]?[0-9]+)?"
-"""Word processors turn a minus into a dash."""
-_WITH_POINT: Final = re.compile(rf"{_SIGN}(?:(?P<whole>[0-9]+)(?:\.[0-9]*)?|\.[0-9]+){_EXPONENT}")
-_WITH_COMMA: Final = re.compile(rf"{_SIGN}[0-9]*,[0-9]+{_EXPONENT}")
-_COMMA_GROUPS: Final = re.compile(
-    rf"{_SIGN}[1-9](?:[0-9]{{0,2}}(?:,[0-9]{{3}})+|[0-9]?(?:,[0-9]{{2}})+,[0-9]{{3}})(?:\.[0-9]*)?{_EXPONENT}"
-)
-"""Thousands between commas, also with those of India between them: 1,00,000."""
-_POINT_GROUPS: Final = re.compile(rf"{_SIGN}[1-9][0-9]{{0,2}}(?:\.[0-9]{{3}})+(?:,[0-9]*)?{_EXPONENT}")
-_OTHER_GROUPS: Final = re.compile(
-    rf"{_SIGN}[1-9][0-9]{{0,2}}(?:[ '\u2019\u00a0\u2007\u2009\u202f][0-9]{{3}})+(?:[.,][0-9]*)?{_EXPONENT}"
-)
-_GROUP_SIGNS: Final = re.compile("[ '\u2019\u00a0\u2007\u2009\u202f]")
-_HEXADECIMAL: Final = re.compile("0[xX][0-9a-fA-F]{1,16}")
-_INFINITE: Final = re.compile("[-+]?inf(?:inity)?", re.IGNORECASE)
+_LOGICAL: Final = {"True": "1", "False": "0"}
+_PLAIN_SIGNS: Final = {
+    **dict.fromkeys(map(ord, "\u2010\u2011\u2012\u2013\u2014\u2212\ufe63\uff0d"), "-"),
+    **dict.fromkeys(map(ord, "\u00a0\u2007\u2009\u202f"), " "),
+    ord("\u2019"): "'",
+}
+"""Signs and spaces of numbers, as word processors have them."""
+
+
+def _form(mark: str, *whole: str) -> re.Pattern[str]:
+    """Return the pattern of numbers with one of these before the mark of decimals; they can be infinite."""
+    digits = rf"(?:{'|'.join(whole)})(?:{mark}[0-9]*)?|{mark}[0-9]+"
+    return re.compile(rf"[-+]?(?:(?:{digits})(?:[ed][-+]?[0-9]+)?|inf(?:inity)?)", re.IGNORECASE)
+
+
+_GROUPS: Final = "[1-9][0-9]{{0,2}}(?:{}[0-9]{{3}})+"
+_OTHER_GROUPS: Final = _GROUPS.format("[ ']")
+_INDIAN: Final = "[1-9][0-9]?(?:,[0-9]{2})+,[0-9]{3}"
+"""1,00,000"""
+_FORMS: Final = {
+    POINT: _form(r"\.", "[0-9]+", _OTHER_GROUPS),
+    THOUSANDS: _form(r"\.", "[0-9]{1,3}", _GROUPS.format(","), _INDIAN),  # 1000 would have a comma
+    COMMA: _form(",(?=[0-9])", "[0-9]+", _OTHER_GROUPS, _GROUPS.format(r"\.")),
+    HEXADECIMAL: re.compile("0|0x[0-9a-f]{1,16}", re.IGNORECASE),
+}
+_TO_PYTHON: Final = {
+    POINT: str.maketrans("dD", "ee", " '"),
+    THOUSANDS: str.maketrans("dD", "ee", " ',"),
+    COMMA: str.maketrans("dD,", "ee.", " '."),
+}
+_ONE_MARK: Final = re.compile(r"[-+]?[1-9][0-9]{0,2}[.,][0-9]{3}")
+"""A number of three decimals, or one of thousands."""
 _PLAIN: Final = re.compile(r"[0-9+\-.eE]*")
-_TO_PYTHON: Final = str.maketrans("dD\u2212\u2013", "ee--")
 
 
 @frozen
@@ -81,13 +98,25 @@ class NotNumbers:
 def is_missing(cell: str) -> bool:
     """Return whether the text of a cell stands for a missing number."""
     return len(cell) <= _LONGEST_MISSING and (
-        cell.lower() in _MISSING_WORDS or _MISSING.fullmatch(cell) is not None
+        plain_text(cell).lower() in _MISSING_WORDS or _MISSING.fullmatch(cell) is not None
     )
 
 
 def is_number(cell: str) -> bool:
     """Return whether a text is a number in any notation."""
-    return _notations(cell) != 0
+    text = plain_text(cell)
+    return any(form.fullmatch(text) for form in _FORMS.values())
+
+
+def plain_text(cell: str) -> str:
+    r"""Return a number with the signs of ASCII, and without the apostrophe of a spreadsheet or quotes around it.
+
+    >>> plain_text("\u22121\u2019000"), plain_text("'-0.5"), plain_text("12\u202f000")
+    ("-1'000", '-0.5', '12 000')
+    """
+    if not cell.isascii():
+        cell = cell.translate(_PLAIN_SIGNS).strip()
+    return cell.strip("'") if cell.startswith("'") else cell
 
 
 def plain_number(text: str) -> float | None:
@@ -96,27 +125,21 @@ def plain_number(text: str) -> float | None:
     >>> plain_number("2.5e-3"), plain_number("1_000"), plain_number("1,5"), plain_number("inf")
     (0.0025, None, None, None)
     """
-    text = text.strip()
-    number = float(text.translate(_TO_PYTHON)) if _WITH_POINT.fullmatch(text) else math.inf
-    return number if math.isfinite(number) else None
+    numbers = _plain_numbers([plain_text(text.strip()).replace("D", "e").replace("d", "e")])
+    return None if numbers is None or math.isinf(numbers[0]) else float(numbers[0])
 
 
 def number_in(text: str) -> float | None:
     """Return the finite number that a text on its own is, None if it is none or can be read as two different ones."""
-    cell = text.strip()
-    if not cell or is_missing(cell):
-        return None
-    column = columns_of_numbers({"": [cell]})[""]
+    column = columns_of_numbers({"": [text.strip()]})[""]
     return None if isinstance(column, NotNumbers) or not math.isfinite(column[0]) else float(column[0])
 
 
 def truths(cells: Sequence[str]) -> Numbers | None:
     """Return 1 for each true and 0 for each false, in any case, NaN where missing; None if a cell is another word."""
-    import numpy as np
-
-    values = [_LOGICAL.get(cell.capitalize(), math.nan if is_missing(cell) else None) for cell in cells]
-    known = None not in values and not all(map(is_missing, cells))
-    return np.array(values, dtype=np.float64) if known else None
+    known = [_LOGICAL.get(cell.capitalize(), "") for cell in cells]
+    every = all(word or is_missing(cell) for word, cell in zip(known, cells, strict=True))
+    return _values(known, POINT) if every and any(known) else None
 
 
 def rows_of_lists(cells: Sequence[str]) -> Numbers | None:
@@ -124,18 +147,12 @@ def rows_of_lists(cells: Sequence[str]) -> Numbers | None:
 
     None if a cell is no list of numbers, or has another length than the first one.
     """
-    import numpy as np
-
-    rows: list[list[float | None]] = []
-    for cell in cells:
-        if not (cell.startswith("[") and cell.endswith("]")):
-            return None
-        words = cell[1:-1].replace(",", " ").split()
-        numbers = [_LOGICAL.get(word, math.nan if is_missing(word) else plain_number(word)) for word in words]
-        if None in numbers or not numbers or len(numbers) != len(rows[0] if rows else numbers):
-            return None
-        rows.append(numbers)
-    return np.array(rows, dtype=np.float64) if rows else None
+    known = all(cell.startswith("[") and cell.endswith("]") for cell in cells)
+    rows = [cell[1:-1].replace(",", " ").split() for cell in cells]
+    words = [_LOGICAL.get(word.capitalize(), word) for row in rows for word in row]
+    known &= all(_FORMS[POINT].fullmatch(word) or is_missing(word) for word in words)
+    same = len({*map(len, rows)}) == 1 and bool(words)
+    return _values(words, POINT).reshape(len(rows), -1) if known and same else None
 
 
 def columns_of_numbers(
@@ -149,8 +166,9 @@ def columns_of_numbers(
     >>> {name: found.tolist() for name, found in columns_of_numbers({"N": ["0", "1,5"], "mm": ["2", "1.000"]}).items()}
     {'N': [0.0, 1.5], 'mm': [2.0, 1000.0]}
     """
+    columns = {name: [*map(plain_text, cells)] for name, cells in columns.items()}
     fits = {name: _common(cells) for name, cells in columns.items()}
-    certain = [fit.notations for fit in fits.values() if isinstance(fit, _Fit)]
+    certain = [fit for fit in fits.values() if isinstance(fit, int)]
     points = any(not notations & COMMA for notations in certain if notations != HEXADECIMAL)
     commas = any(notations == COMMA for notations in certain)
     of_file = (COMMA if commas else 0) | (THOUSANDS if points else 0)
@@ -162,41 +180,46 @@ def columns_of_numbers(
     }
 
 
-def with_three_decimals(columns: Mapping[str, Sequence[str]]) -> list[str]:
-    """Return the columns of decimals that can be thousands, if no number of the file has other decimals.
+def doubts_of_marks(
+    columns: Mapping[str, Sequence[str]], read: Mapping[str, Numbers | NotNumbers], separator: str
+) -> tuple[str, ...]:
+    """Return notes on columns whose numbers of three decimals can be thousands, or the other way round.
 
-    >>> with_three_decimals({"N": ["12.008", "9.500"], "mm": ["4", "5"]}), with_three_decimals({"N": ["12.008", "0.5"]})
-    (['N'], [])
+    Decimals are doubted between semicolons, unless a number of the file has others; thousands, except between commas,
+    where all of a column have three digits behind one sign, so that only other columns tell what it is.
+
+    >>> columns = {"mN": ["12,008", "9,500"], "mm": ["4.5", "5"]}
+    >>> doubts_of_marks(columns, columns_of_numbers(columns), "\\t")  # doctest: +ELLIPSIS
+    ('the sign before three digits in mN is taken for that of thousands. If it is ...',)
     """
-    names = []
-    for name, cells in columns.items():
-        with_mark = [cell for cell in cells if ("." in cell or "," in cell) and is_number(cell)]
-        commas = with_mark and all(map(_COMMA_GROUPS.fullmatch, with_mark)) and not _tells_thousands(cells)
-        if not (commas or all(map(_POINT_GROUPS.fullmatch, with_mark))):
-            return []
-        names += [name] if with_mark else []
-    return names
+    doubtful: dict[str, list[str]] = {"decimals": [], "thousands": []}
+    told = separator != ";"
+    for name, cells in columns.items() if separator not in ("", ",") else ():
+        numbers, plain = read[name], [*map(plain_text, cells)]
+        marked = [k for k, cell in enumerate(plain) if ("." in cell or "," in cell) and _notations(cell)]
+        if isinstance(numbers, NotNumbers) or not marked:
+            continue
+        if not all(_ONE_MARK.fullmatch(plain[k]) for k in marked):
+            told = True
+        elif abs(numbers[marked[0]]) < _THOUSAND:
+            doubtful["decimals"].append(name)
+            told |= "," in plain[marked[0]] and _tells_thousands(plain)
+        elif not (abs(numbers) < _THOUSAND).any():
+            doubtful["thousands"].append(name)
+    if told:
+        del doubtful["decimals"]
+    return tuple(
+        f"the sign before three digits in {listed(names)} is taken for that of {taken}. If it is not, write a decimal "
+        "point, and nothing between thousands"
+        for taken, names in doubtful.items()
+        if names
+    )
 
 
-@frozen(eq=False)
-class _Fit:
-    """The notations that every cell of a column fits, and the numbers in the notation with points if all are plain."""
-
-    notations: int
-    values: Numbers | None = None
-
-
-def _common(cells: Sequence[str]) -> _Fit | NotNumbers:
+def _common(cells: Sequence[str]) -> int | NotNumbers:
     """Return the notations that every cell fits, or why there is none."""
-    together = "".join(cells)
-    values = _floats(cells) if _PLAIN.fullmatch(together) else None
-    if values is not None:
-        grouped = (
-            all("." not in cell or _POINT_GROUPS.fullmatch(cell) for cell in cells)
-            if "." in together
-            else True
-        )
-        return _Fit(POINT | COMMA if grouped else POINT, values)
+    if _plain_numbers(cells) is not None:
+        return POINT | COMMA if all(map(_FORMS[COMMA].fullmatch, cells)) else POINT
     common = _EVERY | HEXADECIMAL
     for row, cell in enumerate(cells):
         if is_missing(cell):
@@ -205,7 +228,7 @@ def _common(cells: Sequence[str]) -> _Fit | NotNumbers:
         if not fits:
             return NotNumbers(row, cell, "which is not a number; a missing one is an empty cell")
         common &= fits
-    return _Fit(common) if common else _mixed(cells)
+    return common or _mixed(cells)
 
 
 def _mixed(cells: Sequence[str]) -> NotNumbers:
@@ -221,15 +244,14 @@ def _mixed(cells: Sequence[str]) -> NotNumbers:
     return NotNumbers(row, cells[row], f"which is not a number ({advice})")
 
 
-def _read(cells: Sequence[str], fit: _Fit, of_file: int, *, decimal_commas: bool) -> Numbers | NotNumbers:
+def _read(cells: Sequence[str], common: int, of_file: int, *, decimal_commas: bool) -> Numbers | NotNumbers:
     """Return the numbers; `of_file` holds COMMA and THOUSANDS where other columns prove decimal commas or points."""
-    common = fit.notations
     if common & POINT:
         # `1.500` is 1500 where all other columns have decimal commas, and beside 975 and 1.000.
         grouped = common & COMMA and any("." in cell for cell in cells)
         likely = _nearer(cells, of_file == THOUSANDS) | (of_file & COMMA) if grouped else POINT
         if likely == POINT or (likely == POINT | COMMA and of_file == THOUSANDS):
-            return _values(cells, POINT) if fit.values is None else fit.values
+            return _values(cells, POINT)
         if not of_file & THOUSANDS and (likely == COMMA or of_file):
             return _values(cells, COMMA)
     elif (common == THOUSANDS and of_file & COMMA) or _one_mark_of_two(cells):
@@ -280,7 +302,7 @@ def _tells_thousands(cells: Sequence[str]) -> bool:
     plain = [cell for cell in cells if "," not in cell and not is_missing(cell)]
     return bool(plain) and (
         any(cell.endswith("0") for cell in cells if "," in cell)
-        or any(len(cell.lstrip("+-\u2212\u2013")) == 3 for cell in plain)
+        or any(len(cell.lstrip("+-")) == 3 for cell in plain)
     )
 
 
@@ -298,50 +320,28 @@ def _one_mark_of_two(cells: Sequence[str]) -> bool:
 def _values(cells: Sequence[str], notation: int) -> Numbers:
     import numpy as np
 
+    if notation == POINT and (plain := _plain_numbers(cells)) is not None:
+        return plain
     numbers = [math.nan if is_missing(cell) else _number(cell, notation) for cell in cells]
     return np.array(numbers, dtype=np.float64)
 
 
-def _floats(cells: Sequence[str]) -> Numbers | None:
+def _plain_numbers(cells: Sequence[str]) -> Numbers | None:
     """Return cells with only digits, signs, points and exponents as numbers; None if one of them is none."""
     import numpy as np
 
     try:
-        return np.array(list(map(float, cells)), dtype=np.float64)
+        return (
+            np.array(list(map(float, cells)), dtype=np.float64) if _PLAIN.fullmatch("".join(cells)) else None
+        )
     except ValueError:
         return None
 
 
 def _number(cell: str, notation: int) -> float:
-    if _INFINITE.fullmatch(cell):
-        return float(cell)
-    if _HEXADECIMAL.fullmatch(cell):
-        return float(int(cell, 16))
-    if _OTHER_GROUPS.fullmatch(cell):
-        cell = _GROUP_SIGNS.sub("", cell)
-    if notation == THOUSANDS:
-        cell = cell.replace(",", "")
-    elif notation == COMMA:
-        cell = cell.replace(".", "").replace(",", ".")
-    return float(cell.translate(_TO_PYTHON))
+    return float(int(cell, 16) if notation == HEXADECIMAL else cell.translate(_TO_PYTHON[notation]))
 
 
 def _notations(cell: str) -> int:
     """Return the notations in which a cell is a number."""
-    if _OTHER_GROUPS.fullmatch(cell):
-        return COMMA if "," in cell else POINT if "." in cell else POINT | COMMA
-    if match := _WITH_POINT.fullmatch(cell):
-        forms = POINT
-        if len(match["whole"] or "") <= 3:  # a thousand would have a comma
-            forms |= THOUSANDS
-        if "." not in cell or _POINT_GROUPS.fullmatch(cell):
-            forms |= COMMA
-        return forms | (HEXADECIMAL if cell == "0" else 0)
-    if _HEXADECIMAL.fullmatch(cell):
-        return HEXADECIMAL
-    forms = 0
-    if _WITH_COMMA.fullmatch(cell) or _POINT_GROUPS.fullmatch(cell):
-        forms |= COMMA
-    if _COMMA_GROUPS.fullmatch(cell):
-        forms |= THOUSANDS
-    return forms or (_EVERY if _INFINITE.fullmatch(cell) else 0)
+    return sum(notation for notation, form in _FORMS.items() if form.fullmatch(cell))

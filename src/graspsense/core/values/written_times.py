@@ -16,7 +16,7 @@ Numbers = NDArray[np.float64]
 
 _TIME: Final = re.compile(
     r"(?:(?P<year>[0-9]{4})[-/]?(?P<month>[0-9]{2}|(?<=[-/])[0-9])[-/]?(?P<day>[0-9]{2}|(?<=[-/])[0-9])[T ]"
-    r"|(?P<a>[0-9]{1,2})(?P<mark>[./-])(?P<b>[0-9]{1,2})(?P=mark)(?P<c>[0-9]{4}),? |[0-9]+ days?,? )?"
+    r"|(?P<a>[0-9]{1,2})(?P<mark>[./-])(?P<b>[0-9]{1,2})(?P=mark)(?P<c>[0-9]{4}|[0-9]{2}),? |[0-9]+ days?,? )?"
     r"(?P<hour>[0-9]{1,2}):?(?P<minute>[0-9]{2}):?(?P<second>[0-9]{2}(?:[.,][0-9]{1,9}|:[0-9]{3,9})?)"
     r"(?: ?(?P<half>[AP])\.?M\.?)? ?(?P<zone>Z|[-+][0-9]{2}:?[0-9]{2}|)",
     re.IGNORECASE,
@@ -77,7 +77,7 @@ def _time(match: re.Match[str], *, month_first: bool) -> datetime:
     """Return the time that a text is, of any day if it names none. Raises ValueError."""
     year, month, day = match["year"] or "1970", match["month"] or "01", match["day"] or "01"
     if match["c"]:
-        year, month, day = match["c"], match["b"], match["a"]
+        year, month, day = f"20{match['c']}"[-4:], match["b"], match["a"]
         if month_first and match["mark"] != ".":
             month, day = day, month
     hour = int(match["hour"])

@@ -58,7 +58,7 @@ def words_of(name: str) -> tuple[str, ...]:
     >>> words_of("Grip_forceLeft (N)"), words_of("F1pdc")
     (('grip', 'force', 'left', 'n'), ('f', 'pdc'))
     """
-    return tuple(word.lower() for word in re.findall(r"[A-Z]?[a-z\u00b5]+|[A-Z]+(?![a-z])", name))
+    return tuple(word.lower() for word in re.findall(r"[A-Z]?[a-z\u00b5]+|[A-Z]+(?![a-z])|#", name))
 
 
 def _with_words(names: Iterable[str], words: Set[str]) -> list[str]:

@@ -34,9 +34,16 @@ def signals_in_ticks(channels: Sequence[Channel], series: Sequence[Sequence[Any]
 def values_in_ticks(
     times: Numbers, sampled_s: Numbers | None, values: NDArray[Any], channel: Channel
 ) -> list[Any]:
-    """Return the value of a further channel in each tick, from what was sampled at `sampled_s`; None for each tick."""
+    """Return the value of a further channel in each tick, from what was sampled at `sampled_s`; None for each tick.
+
+    Of a fast channel, a tick then has several samples. Those that are NaN at its end were not taken.
+    """
     if isinstance(channel, FastChannel):
-        return sample_blocks(times, times if sampled_s is None else sampled_s, values, channel)
+        if sampled_s is None:
+            ticks = values.reshape(len(times), channel.samples, -1)
+            taken = np.isfinite(ticks[:, ::-1]).any(axis=2).cumsum(axis=1)[:, ::-1] > 0
+            sampled_s, values = np.repeat(times, taken.sum(axis=1)), ticks[taken]
+        return sample_blocks(times, sampled_s, values, channel)
     nothing: Any = nan
     rows: list[Any]
     if isinstance(channel, TactileArray):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.errors import DataDamaged, counted
 from graspsense.core.values.fingers import FingerForce, opposed_forces
-from graspsense.core.values.signals import NO_PADS, Frame, GraspEvent, Phase, Reading, Samples
+from graspsense.core.values.signals import NO_PADS, Frame, GraspEvent, Phase, Reading
 from graspsense.recording.replayable import Recording
 from graspsense.sources.columns.fast_samples import most_in_a_tick, signals_in_ticks, values_in_ticks
 from graspsense.sources.formats.table import Numbers
@@ -480,9 +480,7 @@ def _readings(
     times = columns.t_s.tolist()
     every = (*columns.scalars.values(), *columns.arrays.values())
     series = [
-        _blocks(times, values, channel)
-        if isinstance(channel, FastChannel) and channel.name not in columns.times
-        else values_in_ticks(columns.t_s, columns.times.get(channel.name), values, channel)
+        values_in_ticks(columns.t_s, columns.times.get(channel.name), values, channel)
         for channel, values in zip(channels, every, strict=True)
     ]
     frames = zip(
@@ -491,14 +489,3 @@ def _readings(
     )  # fmt: skip
     signals = signals_in_ticks(channels, series, n)
     return [Reading(Frame(*frame), NO_PADS, own) for frame, own in zip(frames, signals, strict=True)]
-
-
-def _blocks(times: Sequence[float], values: Numbers, channel: FastChannel) -> list[Samples]:
-    """Return the samples of each tick. Rows of NaN at the end of a tick stand for samples that were not taken."""
-    blocks, taken = [], 0
-    for t_s, tick in zip(times, values.reshape(len(times), channel.samples, -1), strict=True):
-        known = np.flatnonzero(np.isfinite(tick).any(axis=1))
-        new = int(known[-1]) + 1 if len(known) else 0
-        taken += new
-        blocks.append(Samples(t_s, taken, new, tuple(map(tuple, tick.tolist()))))
-    return blocks

@@ -23,9 +23,9 @@ from graspsense.core.values.nominal import splits_of, value_name
 from graspsense.core.values.written_numbers import (
     NotNumbers,
     columns_of_numbers,
+    doubts_of_marks,
     is_missing,
     is_number,
-    with_three_decimals,
 )
 from graspsense.core.values.written_times import seconds_since_first
 from graspsense.sources.formats.text_table import (
@@ -91,13 +91,9 @@ class CsvColumns:
             )
         if renamed:
             self.notes += (f"named here, as columns of one name or of none: {listed(renamed)}",)
-        if table.separator == ";" and (doubtful := with_three_decimals(self.cells)):
-            self.notes += (
-                f"the sign before three digits in {listed(doubtful)} is taken for that of decimals. If it separates "
-                "thousands, leave it out of the numbers",
-            )
-        self._decimal_commas = table.separator == ";"
         self.levels: dict[str, tuple[str, ...]] = {}
+        self._decimal_commas = table.separator == ";"
+        self.notes += doubts_of_marks(self.cells, self._read_numbers(), table.separator)
 
     def __len__(self) -> int:
         """Return the number of rows."""

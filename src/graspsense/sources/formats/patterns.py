@@ -25,6 +25,10 @@ _TEMPLATE: Final = re.compile(r"\{(?P<name>\w+)(?P<digits>:d)?\}|(?P<deep>\*\*/)
 _UNSUPPORTED: Final = re.compile(r"\\[1-9]|\(\?P=|\(\?<?[=!]|\(\?>|[*+?}]\+")
 
 
+_OPTIONS: Final = re2.Options()
+_OPTIONS.log_errors = False
+
+
 class PatternError(ValueError):
     """A pattern that cannot be used, with the reason."""
 
@@ -46,7 +50,7 @@ def _check_length(text: str) -> None:
 
 def _compiled(text: str) -> re.Pattern[str]:
     try:
-        compiled: re.Pattern[str] = re2.compile(text, _options())
+        compiled: re.Pattern[str] = re2.compile(text, _OPTIONS)
     except (re2.error, UnicodeEncodeError) as error:
         said = error.args[0] if error.args else ""
         words = said.decode(errors="replace") if isinstance(said, bytes) else str(error)
@@ -134,12 +138,6 @@ def file_template(text: str) -> FileTemplate:
             pieces.append(("", "(?:.+/)?" if match["deep"] else "[^/]*" if match["any"] else "[^/]"))
     pieces.append(("", re2.escape(text[end:])))
     return FileTemplate(text, tuple(pieces), _compiled(_joined(pieces, {})))
-
-
-def _options() -> re2.Options:
-    options = re2.Options()
-    options.log_errors = False
-    return options
 
 
 def _joined(pieces: list[tuple[str, str]] | tuple[tuple[str, str], ...], known: Mapping[str, str]) -> str:

@@ -75,25 +75,21 @@ def _collected(
     DataDamaged.
     """
     topics = {name.partition(".")[0] for name in used if re.match(r"/[^.*?]+\.", name)}
-    parts: dict[str, dict[str, tuple[Messages, list[dict[str, Any]]]]] = {}
+    came: dict[str, list[tuple[str, int, int, dict[str, Any]]]] = {}
     kept = Unpacked(path)
     for topic, recorded_ns, message in _messages(path, topics):
-        numbers, names = dict(numbers_in(message, "")), _names_in(message)
+        numbers = dict(numbers_in(message, ""))
         kept.add(sum(_NUMBER_BYTES + 8 * np.size(column) for column in numbers.values()))
-        came, rows = parts.setdefault(topic, {}).setdefault(names, (Messages(), []))
-        came.add(recorded_ns, stamp_ns(message))
-        rows.append(numbers)
+        came.setdefault(topic, []).append((_names_in(message), recorded_ns, stamp_ns(message), numbers))
     values: dict[str, list[dict[str, Any]]] = {}
     times: dict[str, Messages] = {}
-    for topic, by_names in parts.items():
+    for topic, messages in came.items():
         # A driver can send a first message without names.
-        divided = 1 < sum(map(bool, by_names)) <= MOST_NAMES
-        for names, (came, rows) in by_names.items():
+        divided = 1 < len({names for names, *_ in messages if names}) <= MOST_NAMES
+        for names, recorded_ns, stamped_ns, numbers in messages:
             part = f"{topic}.{names}" if divided and names else topic
-            values.setdefault(part, []).extend({f"{part}{k}": row[k] for k in row} for row in rows)
-            of_part = times.setdefault(part, Messages())
-            of_part.recorded_ns.extend(came.recorded_ns)
-            of_part.stamped_ns.extend(came.stamped_ns)
+            values.setdefault(part, []).append({f"{part}{k}": value for k, value in numbers.items()})
+            times.setdefault(part, Messages()).add(recorded_ns, stamped_ns)
     values = {topic: value for topic, value in values.items() if value[0]}
     wanted = [topic for topic in values if any(name.startswith(f"{topic}.") for name in used)]
     values = {topic: values[topic] for topic in wanted or values}

@@ -5,18 +5,19 @@ A column of times, as ISO 8601 or times of the day, is a column of seconds since
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from graspsense.core.learn.target_value import name_and_unit
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.label_text import is_missing_label
 from graspsense.core.values.limits import CELLS
 from graspsense.core.values.written_numbers import (
     NotNumbers,
     columns_of_numbers,
+    doubts_of_marks,
     is_missing,
     is_number,
     rows_of_lists,
@@ -100,7 +101,8 @@ def _columns(path: Path, fields: dict[str, str], table: TextTable, *, several: b
         if unit and units[name] in ("", unit):
             texts[name] = cells[name]
             cells[name], units[name] = numbers_in_cells, unit
-    for name, column in columns_of_numbers(cells).items():
+    read = columns_of_numbers(cells)
+    for name, column in read.items():
         if not isinstance(column, NotNumbers):
             numbers[name] = column
             # As numbers `none` and `NA` are missing, and as labels they are not.
@@ -133,6 +135,7 @@ def _columns(path: Path, fields: dict[str, str], table: TextTable, *, several: b
         lines=np.array(table.lines, dtype=np.int64),
         not_numbers=not_numbers,
         notes=table.notes,
+        warnings=doubts_of_marks(cells, read, table.separator),
     )
 
 
@@ -147,7 +150,6 @@ def _lists(path: Path, name: str, cells: Sequence[str]) -> Numbers | None:
 
 def _unit_in(heading: str) -> str:
     """Return the unit behind a name: `Load [N]` or `Load (N)`."""
-    unit = name_and_unit(heading)[1]
-    if not unit and heading.endswith(")"):
-        unit = heading[:-1].rpartition("(")[2].strip()
+    match = re.fullmatch(r".*[\[(](.*)[\])]", heading)
+    unit = match[1].strip() if match else ""
     return unit if unit.lower() in UNITS else ""

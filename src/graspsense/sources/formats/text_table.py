@@ -21,7 +21,13 @@ from attrs import frozen
 
 from graspsense.core.values.errors import ConfigError, DataDamaged, listed
 from graspsense.core.values.limits import CELLS, COLUMNS, LINE_CHARACTERS, TEXT_BYTES
-from graspsense.core.values.written_numbers import NotNumbers, columns_of_numbers, is_missing, is_number
+from graspsense.core.values.written_numbers import (
+    NotNumbers,
+    columns_of_numbers,
+    is_missing,
+    is_number,
+    plain_text,
+)
 from graspsense.recording.readable import not_opened, readable, refuse_devices
 from graspsense.recording.unpacked import Unpacked
 
@@ -45,6 +51,8 @@ UNITS: Final = frozenset((
 """What stands in a line of units, in small letters."""
 _SINGLE_UNITS: Final = frozenset("smgNVACK%\u00b0")
 """Units of one sign behind a number: in the other case, or as `12-`, it can be a factor or a sign of its own."""
+_UNSEEN: Final = re.compile("[\u200b\u200e\u200f\u202a-\u202e\u2060\u2066-\u2069\ufeff]")
+"""Marks that nothing shows: the order of bytes, also in the middle of files that were joined, and of writing."""
 _LINE_ENDS: Final = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
 """The characters at which `str.splitlines` divides a text."""
 _SEPARATORS: Final = (";", "\t", ",", "|", " ", "  ")
@@ -162,8 +170,8 @@ class _Layout:
         if later := [number for number, _ in self.comments if rows and number > rows[0][0]]:
             self._tell(later, "comments")
         return TextTable(
-            names=tuple(names),
-            units=tuple((units or [""] * len(names))[: len(names)]),
+            names=tuple(" ".join(name.split()) for name in names),  # in quotes, one can have several lines
+            units=tuple(unit.strip("[]()") for unit in (units or [""] * len(names))[: len(names)]),
             columns=tuple(zip(*(row for _, row in rows), strict=True)) if rows else ((),) * len(names),
             lines=tuple(number for number, _ in rows),
             notes=tuple(self.notes),
@@ -283,7 +291,7 @@ class _Layout:
             and {*range(k + 2, data)} <= {*able}
         ]
         names = (with_units or able)[-1]
-        units = _without_brackets(self.rows[names + 1][1]) if with_units else None
+        units = self.rows[names + 1][1] if with_units else None
         if names:
             self._refuse_numbers_before(names)
             skipped = [number for number, _ in self.rows[:names]]
@@ -322,7 +330,7 @@ class _Layout:
         self.notes.append(
             f"the names of the columns are those of the lines {listed([*map(str, lines)])}, joined by _"
         )
-        return names, units and _without_brackets(units), data, lines[-1]
+        return names, units, data, lines[-1]
 
     def _refuse_numbers_before(self, names: int) -> None:
         """Raise DataDamaged if rows of numbers that may be a part of the data come before the row `names`."""
@@ -348,7 +356,7 @@ class _Layout:
         ]
         units = None
         if len(above) > 1 and len(above[-1][1]) == width and _are_units(above[-1][1]):
-            units = _without_brackets(above.pop()[1])
+            units = above.pop()[1]
         # As many words as columns can be a remark.
         for number, cells in above[-1:] if self.separator == " " else reversed(above):
             if len(cells) == width == len(set(cells)) and all(cells) and not any(map(is_number, cells)):
@@ -378,7 +386,7 @@ class _Layout:
         if not again or all(map(is_number, names)):
             return rows
         self._tell(again, "repeated headers")
-        return [row for row in rows if row[0] not in again and _without_brackets(row[1]) != units]
+        return [row for row in rows if row[0] not in again and row[1] != units]
 
     def _without_texts(self, rows: list[Row], width: int) -> list[Row]:
         """Return the rows without lines of text, as a device prints one between its numbers, or several behind them."""
@@ -386,7 +394,7 @@ class _Layout:
         numeric = _numeric_columns(sample, width)
         rises = 0 in numeric and _rise([row[0] for row in sample if is_number(row[0])])
         behind = takewhile(lambda row: _is_text_behind(row[1], width, numeric, rises=rises), reversed(rows))
-        texts = {number for number, row in rows if len(row) == 1 < width and not is_number(row[0])}
+        texts = {number for number, row in rows if len(row) < width and not any(map(is_number, row))}
         texts |= {number for number, _ in behind}
         if not 0 < len(texts) <= max(_FEW_BEFORE, _MOST_BEFORE * len(rows)):
             return rows
@@ -394,19 +402,11 @@ class _Layout:
         return [row for row in rows if row[0] not in texts]
 
     def _without_blank_end(self, names: list[str], rows: list[Row]) -> tuple[list[str], list[Row]]:
-        """Return names and rows without a last column that a separator at the end of the lines makes."""
+        """Return names and rows without the last columns that separators at the end of lines make."""
         n = len(names)
-        if rows and all(len(row) == n + 1 and not row[-1] for _, row in rows):
-            return names, [(number, row[:-1]) for number, row in rows]
-        while (
-            len(names) > 1
-            and not names[-1]
-            and all(len(row) < len(names) or not row[len(names) - 1] for _, row in rows)
-        ):
-            names = names[:-1]
-        if len(names) < n:
-            rows = [(number, row[: len(names)] if len(row) <= n else row) for number, row in rows]
-        return names, rows
+        while n > 1 and not names[n - 1] and not any(any(row[n - 1 :]) for _, row in rows):
+            n -= 1
+        return names[:n], [(number, row if any(row[n:]) else row[:n]) for number, row in rows]
 
     def _without_cut(self, rows: list[Row], width: int, ended: bool) -> list[Row]:
         """Return the rows without a last one that was cut off while it was written."""
@@ -613,14 +613,10 @@ def _can_be_names(row: Sequence[str], width: int, texts: Sequence[set[str]]) -> 
     return (
         width - 1 <= len(cells) <= width
         and len(named) >= max(len(cells) - 1, 1)
-        and not any(is_number(cell) or (is_missing(cell) and cell.strip("-.?\u2013\u2014")) for cell in named)
+        and not any(is_number(cell) or (is_missing(cell) and plain_text(cell).strip("-.?")) for cell in named)
         and (2 * len(set(named)) > len(named) or _are_units(cells))
         and not any(cell in texts[k] for k, cell in enumerate(cells) if cell)
     )
-
-
-def _without_brackets(units: Sequence[str]) -> list[str]:
-    return [unit.strip("[]()") for unit in units]
 
 
 def _names_all(row: Sequence[str]) -> bool:
@@ -696,7 +692,7 @@ def text_of(path: Path) -> str:
         raise DataDamaged(f"{path} is a spreadsheet, an archive or a binary table: save it as CSV in UTF-8")
     if too_large := TEXT_BYTES.exceeded(size):
         raise DataDamaged(f"{path}: {too_large}")
-    text = _decoded(path, data).replace("\ufeff", "")  # also of files that were joined
+    text = _UNSEEN.sub("", _decoded(path, data))
     if "\0" in text:
         raise DataDamaged(
             f"{path} contains zero bytes: it is not a text file. If a program wrote it as Unicode text, save it as "

@@ -20,6 +20,7 @@ from graspsense.core.components.caller import option
 from graspsense.core.learn.confounding import LEAST_LINES, says_the_label
 from graspsense.core.values.errors import counted, listed
 from graspsense.core.values.features import LARGEST_VALUE
+from graspsense.sources.columns.column_guess import words_of
 from graspsense.sources.trial_table.identifiers import (
     TIMES,
     are_even,
@@ -30,7 +31,6 @@ from graspsense.sources.trial_table.identifiers import (
     is_count,
     is_time,
     name_objects,
-    words_in,
 )
 
 if TYPE_CHECKING:
@@ -206,7 +206,7 @@ def _of_numbers(name: str, unit: str, values: Numbers, labels: Sequence[str]) ->
         yield "order"
     if of_time and (_is_named_as_time(name) or can_be_days(values)):
         yield "time"
-    if differs and (_OF_A_SESSION & set(words_in(name)) or unit in _TEMPERATURES):
+    if differs and (_OF_A_SESSION & set(words_of(name)) or unit in _TEMPERATURES):
         yield "session"
     if of_time and passes_without_a_gap(values, labels):
         yield "without a gap"
@@ -380,7 +380,7 @@ def _numbers(columns: CsvColumns, names: Sequence[str]) -> dict[str, Numbers]:
 
 
 def _is_named_as_time(name: str) -> bool:
-    words = set(words_in(name))
+    words = set(words_of(name))
     return bool(_TIME_NAMES & words) and words <= _TIME_NAMES | _OF_TIMES
 
 

@@ -21,6 +21,7 @@ import numpy as np
 from graspsense.core.learn.confounding import LEAST_LINES
 from graspsense.core.learn.groups import cells_in_range
 from graspsense.core.values.features import LARGEST_VALUE
+from graspsense.sources.columns.column_guess import words_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -119,7 +120,7 @@ def names_a_recording(name: str) -> bool:
     >>> names_a_recording("session_id"), names_a_recording("trial"), names_a_recording("robot_force")
     (True, True, False)
     """
-    words = set(words_in(name))
+    words = set(words_of(name))
     return bool(words & _OF_RECORDINGS) and words <= _OF_RECORDINGS | _NUMBERED
 
 
@@ -131,7 +132,7 @@ def groups_trials(name: str, values: Sequence[str], instances: Sequence[str] | N
     counts = Counter(filter(None, values))
     pairs = {pair for pair in zip(values, instances or range(len(values)), strict=True) if pair[0]}
     several = len(pairs) > len(counts) > 1 and min(counts.values()) > 1
-    return several and names_a_recording(name) and not _DIVISIONS & set(words_in(name))
+    return several and names_a_recording(name) and not _DIVISIONS & set(words_of(name))
 
 
 def identifies(
@@ -159,7 +160,7 @@ def identifies(
     hashed = whole and column.max() >= _HASHED and bool((column % 1000.0).any())
     if (hashed or cells <= 2.0 * len(values_of)) and name_objects(column.tolist(), known):
         return NUMBER_OBJECTS
-    named = bool(_NAMES & set(words_in(name)))
+    named = bool(_NAMES & set(words_of(name)))
     orders = (given, None if order is None else np.array(order)[given])
     if (whole or named) and any(lines is not None and _begins_anew(column, lines) for lines in orders):
         return "follow the order of the lines as a counter or a time does"
@@ -219,11 +220,6 @@ def is_count(unit: str) -> bool:
 def is_time(unit: str) -> bool:
     """Return whether this is a unit of time. Only words can have capitals: S is not the second."""
     return unit in TIMES or (len(unit) > len("min") and unit.lower() in TIMES)
-
-
-def words_in(name: str) -> list[str]:
-    """Return the words of a name such as `trial_id` or `trialId` in lower case."""
-    return [word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|#", name)]
 
 
 def _is_calendar(column: NDArray[np.float64]) -> bool:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Container
-from decimal import Decimal
+from collections.abc import Container, Sequence
+from decimal import Decimal, InvalidOperation
 from itertools import takewhile
 from typing import TYPE_CHECKING, Final
 
@@ -36,7 +36,9 @@ _MOST_LAST: Final = 20
 """Most lines of statistics at the end."""
 _ENOUGH_COLUMNS: Final = 20
 _BY_CHANCE: Final = 1e-4
-"""Probability of drawn numbers to be a mean, as far as they are written, below which they are one."""
+"""Probability of drawn numbers to be a mean, as far as they are written, below which they are one,"""
+_COMPARED: Final = 200
+"""and that of numbers whose line has only texts of other lines is so many times less: so many lines are compared."""
 _ON_GRID: Final = 1e-6
 _ROUNDING: Final = 1e-9
 """Relative error of a mean that is written with all its digits."""
@@ -79,36 +81,55 @@ def without_summaries(columns: CsvColumns) -> None:
 def _computed(columns: CsvColumns) -> range:
     """Return the last lines where a mean or the sum of the lines above them begins, as no trial has by chance."""
     read = {name: columns.numbers_or_none(name) for name in columns.names}
-    finite = [values for values in read.values() if values is not None and not np.isinf(values).any()]
-    numbers, n = np.array(finite[:_ENOUGH_COLUMNS]).T, len(columns)
+    finite = [name for name, values in read.items() if values is not None and not np.isinf(values).any()]
+    finite, n = finite[:_ENOUGH_COLUMNS], len(columns)
+    numbers = np.array([read[name] for name in finite]).T
     texts = [columns.cells[name] for name, values in read.items() if values is None]
+
+    def is_of(lines: Sequence[int], i: int) -> bool:
+        named = any(cells[i] not in cells[:i] for cells in texts)
+        places = [
+            _places(columns.cells[name][i], number) for name, number in zip(finite, numbers[i], strict=True)
+        ]
+        chance = _chance_of_mean_or_sum(numbers[lines], numbers[i], np.array(places, dtype=np.float64))
+        return chance < (_BY_CHANCE if named else _BY_CHANCE / _COMPARED)
 
     def is_computed(i: int) -> bool:
         alike = ([k for k in range(i) if cells[k] == cells[i]] for cells in texts)
-        return any(_is_mean_or_sum(numbers[lines], numbers[i]) for lines in (range(i), *alike))
+        return any(is_of(lines, i) for lines in (range(i), *alike))
 
     able = range(n - 1, max(n // 2, n - _MOST_LAST) - 1, -1) if finite else range(0)
-    begins = (k for k in able if any(_is_mean_or_sum(numbers[:k], row) for row in numbers[k:]))
+    begins = (k for k in able if any(is_of(range(k), i) for i in range(k, n)))
     begin = next(begins, n)
     while begin - 1 in able and is_computed(begin - 1):
         begin -= 1
     return range(begin, n)
 
 
-def _is_mean_or_sum(lines: Numbers, line: Numbers) -> bool:
-    """Return whether all numbers of a line are the means, or all the sums, of several lines, and not by chance."""
+def _places(cell: str, number: float) -> int:
+    """Return the decimal places with which a number is written; those that it needs where its text has other signs."""
+    try:
+        written = Decimal(cell.replace(",", "."))
+    except InvalidOperation:
+        written = Decimal(repr(float(number))).normalize()
+    return max(0, -int(written.as_tuple().exponent)) if written.is_finite() else 0
+
+
+def _chance_of_mean_or_sum(lines: Numbers, line: Numbers, places: Numbers) -> float:
+    """Return the probability that drawn numbers are the means, or the sums, of several lines; 1 if these are not.
+
+    They are written with so many decimal places.
+    """
     if len(lines) < LEAST_LINES:
-        return False
+        return 1.0
     used = ~np.isnan(line) & ~np.isnan(lines).any(axis=0)
     used &= lines.max(axis=0) > lines.min(axis=0)
     lines, line = lines[:, used], line[used]
-    # The zeros at the end of a whole number are written, and not rounded.
-    digits = [min(0, int(Decimal(repr(number)).normalize().as_tuple().exponent)) for number in line.tolist()]
-    errors = np.maximum(_ROUNDING * np.abs(line), 0.5 * 10.0 ** np.array(digits, dtype=np.float64))
+    errors = np.maximum(_ROUNDING * np.abs(line), 0.5 * 10.0 ** -places[used])
     if not any(
         (np.abs(line - statistic(lines, axis=0)) <= 1.001 * errors).all() for statistic in (np.mean, np.sum)
     ):
-        return False
+        return 1.0
     chance = 1.0
     for number, error, values in zip(line.tolist(), errors.tolist(), lines.T, strict=True):
         step, span = resolution(values) or math.inf, float(np.ptp(values))
@@ -116,7 +137,7 @@ def _is_mean_or_sum(lines: Numbers, line: Numbers) -> bool:
         # A mean has more digits than the trials, and a sum is larger. Another number may be equal to a trial's.
         alike = abs(place - round(place)) < _ON_GRID and values.min() <= number <= values.max()
         chance *= min(1.0, (step if alike else 2.0 * error) / span / float(np.std(values / span)))
-    return chance < _BY_CHANCE
+    return chance
 
 
 def _word(cell: str) -> str:
