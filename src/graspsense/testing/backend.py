@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
 import time
 from contextlib import closing, nullcontext, suppress
-from math import isfinite, isnan, nan
+from math import inf, isfinite, isnan, nan
 from statistics import fmean, median
 from typing import Any, Final
 
@@ -47,7 +48,17 @@ LONGEST_OPEN_S: Final = 10.0
 def describes_itself(subject: Subject) -> None:
     """`open` returns a DeviceInfo with a name, a rate and limits above zero, of the right types."""
     info = subject.session.info
-    demand(bool(info.name), "DeviceInfo has no name: say what the gripper is")
+    demand(
+        bool(info.name.strip()) and info.name.isprintable(),
+        f"DeviceInfo has the name {info.name!r}: say in one line what the gripper is",
+    )
+    gripper = subject.create()
+    for name in ("least_force_n", "least_speed_m_s", "least_step_m", "command_delay_s"):
+        least = getattr(gripper, name)
+        demand(
+            type(least) in (float, int) and 0.0 <= least < inf,
+            f"{name} is {least!r}: give a number in SI units, 0 where there is no such limit",
+        )
     demand(
         info.clock in ("virtual", "device"),
         f"clock is {info.clock!r}: 'device' where a read waits for the gripper, 'virtual' where apply-then-read "
@@ -217,6 +228,12 @@ def objects_can_be_grasped(subject: Subject) -> None:
     names = [name for kind in kinds for name in kind.full_names]
     twice = {name for name in names if names.count(name) > 1}
     demand(not twice, f"objects() gives {', '.join(sorted(twice))} twice: give each full name once")
+    unusable = [name for name in names if not re.fullmatch(r"[^\s:#,]+(:[^\s:#,]+)?", name)]
+    demand(
+        not unusable,
+        f"objects() gives {unusable!r}, which can be no labels: write names and states without spaces and without the "
+        "characters : # ,",
+    )
     for kind in kinds:
         name = kind.full_names[0]
         with (

@@ -44,6 +44,15 @@ TICKS: Final = 4000
 LONGEST_S: Final = 60.0
 GREATEST: Final = {VELOCITY: 5.0, POSITION: 0.5}
 """The greatest rate of a gap (m/s) and the greatest gap (m) that make sense."""
+LATE_S: Final = 4096.0
+"""The time at the first tick of a gripper whose clock has run for an hour."""
+SAME_LENGTH: Final = 0.02
+"""Relative difference in length of two grasps that differ by rounding."""
+ASKED: Final = (
+    *("asked_force_n", "gentlest_force_n", "asked_speed_m_s", "asked_step_m", "asked_interval_s"),
+    "contact_force_n",
+)
+"""The methods by which a law says what it asks of a gripper."""
 FORCES: Final = slice(5, 9)
 """The forces of a frame, on pads and edges."""
 
@@ -71,15 +80,20 @@ def ticks_of(subject: Subject, object_name: str = "a soft object") -> list[Tick]
 
 
 def fresh_ticks(
-    subject: Subject, object_name: str = "a soft object", channels: Any = None, from_tick: int = 0
+    subject: Subject,
+    object_name: str = "a soft object",
+    channels: Any = None,
+    from_tick: int = 0,
+    first_t_s: float = 0.0,
 ) -> list[Tick]:
-    """Return the same ticks as `ticks_of`, computed again.
+    """Return the same ticks as `ticks_of`, computed again, the first of them at the time `first_t_s`.
 
     Before tick `from_tick`, if given, the state is rebuilt from plain numbers.
     """
     law = subject.create()
     step, params, state = type(law).step, law.params(), law.init()
     gripper = model_gripper(_all_channels(subject) if channels is None else channels, object_name)
+    gripper.first_t_s = first_t_s
     gripper.open(0)
     gripper.tare([])
     ticks: list[Tick] = []
@@ -322,6 +336,18 @@ def requires_what_it_reads(subject: Subject) -> None:
     )
 
 
+def independent_of_the_start_of_the_clock(subject: Subject) -> None:
+    """On a gripper whose clock has run for an hour, a grasp takes as long and ends as on a new one."""
+    early, late = ticks_of(subject), fresh_ticks(subject, first_t_s=LATE_S)
+    demand(
+        abs(len(late) - len(early)) <= SAME_LENGTH * len(early)
+        and late[-1].after.outcome == early[-1].after.outcome,
+        f"a grasp whose first frame is of {LATE_S:g} s ends as {late[-1].after.outcome} after {len(late)} ticks, and "
+        f"one from 0 s on as {early[-1].after.outcome} after {len(early)}: keep the time of the first frame in the "
+        "state, and use differences of times",
+    )
+
+
 def handles_frames_of_nan(subject: Subject) -> None:
     """A frame of NaN does not raise, and gives a command."""
     law = subject.create()
@@ -336,6 +362,12 @@ def handles_frames_of_nan(subject: Subject) -> None:
 def says_what_it_asks_for(subject: Subject) -> None:
     """`asked_force_n` and `asked_speed_m_s` say the force of the squeeze and the speed that it commands, if any."""
     law = subject.create()
+    for name in ASKED:
+        number = getattr(law, name)()
+        demand(
+            number is None or (type(number) in (float, int) and 0.0 <= number < inf),
+            f"{name} returns {number!r}: return a number in SI units, or None",
+        )
     forces, speeds = [], []
     for tick in (tick for thing in OBJECTS for tick in ticks_of(subject, thing)):
         kind, value, effort_limit_n, speed_limit_m_s = tick.command

@@ -56,6 +56,9 @@ class ModelGripper(SensorBackend[None]):
     Between its fingers is an object of width `width_m` (0: nothing) and stiffness `stiffness_n_m`.
     """
 
+    first_t_s = 0.0
+    """The time (s) of its first tick."""
+
     def __init__(self, channels: frozenset[str | Channel], width_m: float, stiffness_n_m: float) -> None:
         super().__init__(None)
         declared = [channel for channel in channels if isinstance(channel, Channel)]
@@ -94,7 +97,7 @@ class ModelGripper(SensorBackend[None]):
         del timeout_s
         force = self._force()
         frame = Frame(
-            t_s=self._ticks * DT_S,
+            t_s=self.first_t_s + self._ticks * DT_S,
             dt_s=DT_S,
             gap_m=self._gap,
             velocity_m_s=self._speed,

@@ -316,8 +316,9 @@ class _Grasp:
         except KeyboardInterrupt:
             self.interrupted = True
             ending = Outcome.ABORTED, "interrupted"
-        except FAILURES as error:
-            # A controller can raise anything; the gripper must still be released and the trace kept.
+        except BaseException as error:
+            # A controller or a driver can raise anything, also the CancelledError of an asynchronous one: the gripper
+            # must still be released and the trace kept.
             ending = Outcome.ABORTED, f"{named(error)}{place_of(error)}"
         finally:
             self.interrupts.deferred = True
@@ -585,9 +586,9 @@ class _Grasp:
         try:
             if opens and self.info.opening is not None and self.last is not None:
                 left = self._opened(self.info.opening, self.last)
-        except (KeyboardInterrupt, *FAILURES):
+        except BaseException:
             pass
-        with suppress(KeyboardInterrupt, *FAILURES):
+        with suppress(BaseException):
             self.backend.apply(self.info.relaxed)
         if self.info.opening is None or self.last is None:
             return

@@ -91,7 +91,9 @@ class HookCalls:
         """Turn whatever a plugin raises in this hook into a warning, the first time that it does."""
         try:
             yield
-        except FAILURES as error:
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # also the CancelledError of asyncio, which is no Exception
             if hook not in self._warned:
                 self._warned.add(hook)
                 _log.warning(

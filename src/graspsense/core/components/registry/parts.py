@@ -116,7 +116,9 @@ class Declared(ABC, Generic[EntryT]):
             module = importlib.import_module(path)
             if hasattr(module, name):
                 return getattr(module, name)
-        except FAILURES as error:  # the import of a third party's module can raise anything
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # the import of a third party's module can raise anything
             raise self._unavailable(f"{type(error).__name__}: {error}") from error
         near = suggestion(name, dir(module))
         raise self._unavailable(f"{path} has no {name!r}" + (near and f".{near}"))

@@ -231,7 +231,9 @@ class Plugins:
                 plugin, cost = imported(source)
                 check_api(plugin, source)
                 calls, components, resources = self._registered(plugin, source)
-        except FAILURES as error:
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # also that of a compiled extension which panics, and is no Exception
             if self._strict:
                 error.add_note(
                     f"while loading {source.entry_point} of {source.distribution} {source.version}"
