@@ -132,7 +132,7 @@ def separates_separable_trials(subject: Subject) -> None:
         right = sum(a == b for a, b in zip(said, labels, strict=True)) / len(labels)
         demand(
             right >= LEAST_RIGHT,
-            f"{100 * right:.0f} % of the training trials are predicted correctly by {', '.join(trials.names)}: {advice}",
+            f"{100 * right:.0f} % of the training trials are right, by {', '.join(trials.names)}: {advice}",
         )
 
 

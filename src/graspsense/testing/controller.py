@@ -123,7 +123,7 @@ def fresh_ticks(
 
 def _demand_command(command: Any) -> None:
     demand(
-        isinstance(command, tuple) and len(command) == len(Command._fields),
+        isinstance(command, Command),
         f"step returned {command!r} as the command: return graspsense.plugin_api.Command(kind, value, effort limit, "
         "speed limit)",
     )
@@ -132,6 +132,11 @@ def _demand_command(command: Any) -> None:
         f"the kind of a command is {command[0]!r} ({type(command[0]).__name__}): use the integers EFFORT, VELOCITY, "
         "POSITION, FORCE of plugin_api",
     )
+    for name, number in zip(Command._fields[1:], command[1:], strict=True):
+        demand(
+            type(number) is float,
+            f"{name} of a command is {number!r} of type {type(number).__name__}: write a float",
+        )
 
 
 def _all_channels(subject: Subject) -> set[str | Channel]:
@@ -246,17 +251,7 @@ def types_do_not_change(subject: Subject) -> None:
 
 def commands_are_numbers(subject: Subject) -> None:
     """Every command is a Command with an integer kind and three floats."""
-    for tick in ticks_of(subject):
-        command = tick.command
-        demand(
-            isinstance(command, Command), f"step returned {command!r}: return graspsense.plugin_api.Command"
-        )
-        for name in ("value", "effort_limit_n", "speed_limit_m_s"):
-            number = getattr(command, name)
-            demand(
-                type(number) is float,
-                f"{name} of a command is {number!r} of type {type(number).__name__}: write a float",
-            )
+    ticks_of(subject)
 
 
 def commands_are_of_declared_kinds(subject: Subject) -> None:

@@ -45,21 +45,11 @@ def plugins_load(package: Package) -> None:
     for status in package.statuses:
         demand(
             status.state == "loaded",
-            f"{status.entry_point} = {status.module} is {status.state}: {status.reason}{_place(status.traceback)}"
+            f"{status.entry_point} = {status.module} is {status.state}: {status.reason}"
             + (f"\n    {ADVICE_ON_IMPORTS}" if "ModuleNotFoundError" in status.reason else "")
             + names,
         )
     demand(not old, f"it imports what is elsewhere now{names}")
-
-
-def _place(traceback: str) -> str:
-    """Return the last place of a traceback within the files of the plugin, in words."""
-    own = [
-        (path, line)
-        for path, line in re.findall(r'File "([^"<]+)", line (\d+)', traceback)
-        if not {"graspsense", "attr", "pluggy", "importlib"} & set(Path(path).parts)
-    ]
-    return f"\n    in {own[-1][0]}, line {own[-1][1]}" if own else ""
 
 
 def plugin_modules_are_light(package: Package) -> None:

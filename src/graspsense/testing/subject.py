@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import os
+import pickle
 import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import cached_property
-from importlib import import_module
 from typing import Any
 
-from attrs import asdict, define, field
+from attrs import define, evolve, field
 
-from graspsense.core.components.channels import as_json, from_json
-from graspsense.core.components.entries import ROLES, Feature, Role
 from graspsense.core.components.registry import Component, Plugins, PluginStatus, Resource, canonical
 from graspsense.core.settings.selected import build
 from graspsense.testing.checks import CheckFailed
@@ -91,36 +88,23 @@ class Package:
 def elsewhere(subject: Subject, what: Callable[[Subject], str]) -> str:
     """Return what a module function gives in a fresh interpreter, at another time of the day and of other hashes."""
     code = (
-        "import json, sys; given = json.load(sys.stdin); sys.path[:] = given.pop('path')"
-        "; from graspsense.testing.subject import answer; answer(**given)"
+        "import pickle, sys; sys.path[:] = pickle.load(sys.stdin.buffer)"
+        "; subject, what = pickle.load(sys.stdin.buffer); sys.stdout.write('\\n' + what(subject))"
     )
-    entry = asdict(subject.entry, recurse=False)
-    listed: dict[str, Callable[[Any], Any]] = {"requires": as_json, "features": asdict}
-    entry |= {name: [plain(part) for part in entry[name]] for name, plain in listed.items() if name in entry}
-    given = {"role": subject.role, "entry": entry, "keys": dict(subject.keys), "path": sys.path}
+    declared = evolve(subject.component, entry=subject.entry)
+    given = Subject(component=declared, keys=dict(subject.keys))
     ran = subprocess.run(
         [sys.executable, "-P", "-c", code],
-        input=json.dumps({**given, "what": [what.__module__, what.__name__]}),
+        input=pickle.dumps(sys.path) + pickle.dumps((given, what)),
         env={**os.environ, "PYTHONHASHSEED": "77", "TZ": "ELSEWHERE-13"},
         capture_output=True,
-        text=True,
         check=False,
     )
     if ran.returncode:
-        raise CheckFailed(f"it fails in a fresh interpreter: {ran.stderr.strip()[-300:]}")
-    return ran.stdout.rpartition("\n")[2]
-
-
-def answer(role: Role, entry: dict[str, Any], keys: Mapping[str, Any], what: Sequence[str]) -> None:
-    """Print what `elsewhere` was asked for; it made the arguments."""
-    listed: dict[str, Callable[[Any], Any]] = {
-        "requires": from_json,
-        "features": lambda given: Feature(**given),
-    }
-    entry |= {name: tuple(map(made, entry[name])) for name, made in listed.items() if name in entry}
-    component = Component(ROLES[role].entry(**entry), "elsewhere", "0")
-    text = getattr(import_module(what[0]), what[1])(Subject(component=component, keys=keys))
-    sys.stdout.write("\n" + text)
+        raise CheckFailed(
+            f"it fails in a fresh interpreter: {ran.stderr.decode(errors='replace').strip()[-300:]}"
+        )
+    return ran.stdout.decode().rpartition("\n")[2]
 
 
 def package_of(

@@ -21,7 +21,7 @@ from graspsense.core.components import hookspecs
 from graspsense.core.components.firstparty import DISTRIBUTION
 from graspsense.core.components.registry.discovery import PluginSource
 from graspsense.core.components.registry.parts import PluginStatus
-from graspsense.core.values.errors import FAILURES, suggestion
+from graspsense.core.values.errors import suggestion
 from graspsense.core.values.printable import printable
 
 TRACE_VARIABLE: Final = "GRASPSENSE_TRACE_PLUGINS"

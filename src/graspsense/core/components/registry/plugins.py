@@ -56,7 +56,7 @@ from graspsense.core.components.registry.parts import (
     Resource,
     canonical,
 )
-from graspsense.core.values.errors import FAILURES, PluginUnavailable, UnknownName, suggestion
+from graspsense.core.values.errors import FAILURES, PluginUnavailable, UnknownName, place_of, suggestion
 
 if TYPE_CHECKING:
     from graspsense.core.values.signals import GraspEvent
@@ -239,7 +239,7 @@ class Plugins:
                     f"while loading {source.entry_point} of {source.distribution} {source.version}"
                 )
                 raise
-            broken = _status(source, "broken", error_text(error))
+            broken = _status(source, "broken", f"{error_text(error)}{place_of(error)}")
             self._statuses.append(evolve(broken, traceback="".join(traceback.format_exception(error))))
             return
         status = evolve(
