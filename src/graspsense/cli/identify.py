@@ -9,7 +9,7 @@ from typing import Any
 import click
 from attrs import asdict
 
-from graspsense.cli.options import keys_option
+from graspsense.cli.options import keys_option, pipeline_option
 from graspsense.cli.output import check_outputs, echo_found, echo_json, file_to_write_as
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import named_source
@@ -48,12 +48,7 @@ from graspsense.report.write import write_html
     "--page", metavar="FILE.html", callback=file_to_write_as(".html"), help="Write the report page."
 )
 @click.option("--overwrite", is_flag=True, help="Replace the files of --out and --page if they exist.")
-@click.option(
-    "--pipeline",
-    metavar="NAME|FILE",
-    default="default",
-    help="Pipeline with the simulated gripper.  [default: default]",
-)
+@pipeline_option("Pipeline with the simulated gripper.  [default: default]")
 @click.option("--gripper", metavar="NAME", help="Another simulated gripper. (gripper.type)")
 @keys_option("Set a key: -o gripper.pad_stiffness_n_m=inf for rigid fingertips.")
 @click.option(

@@ -21,8 +21,8 @@ from graspsense.cli.terminal import (
     echo_entries,
     echo_entry,
     echo_table,
-    outcome_style,
     prediction_style,
+    state_style,
     talk,
     warn,
 )
@@ -132,7 +132,11 @@ def run(
     film = _film(picture, video, viewer)
     sinks: tuple[Sink, ...] = film if as_json else (LiveRows(), *film)
     with shown_live(live, save) as shown:
-        trial, interrupted, kept = _performed(settings, (*sinks, *shown.sinks), save, label, changed)
+        sinks = (*sinks, *shown.sinks)
+        if save is None:
+            trial, interrupted, kept = (*grasped(settings, sinks), None)
+        else:
+            trial, interrupted, kept = _kept(save, label, settings, sinks, changed=changed)
         if drawn is not None:
             talk(f"seed {drawn}, drawn for this trial; --seed {drawn} repeats the grasp")
         shown.finished(trial, save)
@@ -146,15 +150,6 @@ def run(
             draw_grasp(trial, Path(plot))
         _write_film(film, save, kept)
     finish(trial, interrupted, "" if kept is None else kept["problem"])
-
-
-def _performed(
-    settings: Settings, sinks: Sequence[Sink], save: str | None, label: str | None, changed: bool
-) -> Ended:
-    """Grasp, and return the trial, whether it was interrupted, and its place in a store if it is saved."""
-    if save is None:
-        return (*grasped(settings, sinks), None)
-    return _kept(save, label, settings, sinks, changed=changed)
 
 
 def _run_beside(
@@ -360,7 +355,7 @@ def print_trial(trial: Trial, *, events: bool = True) -> None:
     """Print outcome, features, events, prediction, and what qualifies them."""
     echo()
     reason = f": {trial.reason}" if trial.reason else ""
-    echo_entry("outcome", f"{trial.outcome.words}{reason}", outcome_style(trial.outcome.words))
+    echo_entry("outcome", f"{trial.outcome.words}{reason}", state_style(trial.outcome.words))
     echo_entries("warning", trial.warnings, Style.CAUTION)
     features = trial.features
     rows, more = features.shown()

@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
-from graspsense.cli.options import SEED, dashed, force_option, keys_option, refuse_typed, typed
+from graspsense.cli.options import (
+    SEED,
+    dashed,
+    force_option,
+    keys_option,
+    pipeline_option,
+    refuse_typed,
+    typed,
+)
 from graspsense.cli.output import file_to_write
 from graspsense.cli.progress import ProgressLine
 from graspsense.core.components.entries import TABLE_OF_ROLE
@@ -86,9 +94,7 @@ _OPTIONS: Final = (
         show_default=True,
         help="simulated: grasp each instance in all of its states, or in one only.",
     ),
-    click.option(
-        "--pipeline", metavar="NAME|FILE", default="default", help="simulated: pipeline.  [default: default]"
-    ),
+    pipeline_option("simulated: pipeline.  [default: default]"),
     click.option("--gripper", metavar="NAME", help="simulated: another simulated gripper. (gripper.type)"),
     click.option(
         "--only",

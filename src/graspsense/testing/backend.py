@@ -6,7 +6,7 @@ import json
 import re
 import time
 from contextlib import closing, nullcontext, suppress
-from math import inf, isfinite, isnan, nan
+from math import isfinite, isnan, nan
 from statistics import fmean, median
 from typing import Any, Final
 
@@ -52,13 +52,6 @@ def describes_itself(subject: Subject) -> None:
         bool(info.name.strip()) and info.name.isprintable(),
         f"DeviceInfo has the name {info.name!r}: say in one line what the gripper is",
     )
-    gripper = subject.create()
-    for name in ("least_force_n", "least_speed_m_s", "least_step_m", "command_delay_s"):
-        least = getattr(gripper, name)
-        demand(
-            type(least) in (float, int) and 0.0 <= least < inf,
-            f"{name} is {least!r}: give a number in SI units, 0 where there is no such limit",
-        )
     demand(
         info.clock in ("virtual", "device"),
         f"clock is {info.clock!r}: 'device' where a read waits for the gripper, 'virtual' where apply-then-read "

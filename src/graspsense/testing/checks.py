@@ -118,6 +118,8 @@ def _leaving_nothing() -> Iterator[None]:
         )
     changed = [name for name, value in _process_state().items() if value != earlier[name]]
     os.chdir(earlier["the working folder"])
+    if "the handler of Ctrl-C" in changed:
+        signal.signal(signal.SIGINT, earlier["the handler of Ctrl-C"])
     demand(
         not changed,
         f"it changes {', '.join(changed)} for the whole process: give it back, or work without it (a context as "

@@ -217,11 +217,15 @@ def finds_features_by_their_names(subject: Subject) -> None:
 
 
 def handles_missing_values(subject: Subject) -> None:
-    """It handles NaN in training and prediction, a feature without values, and a trial without values."""
+    """It handles NaN in training and prediction, a feature without values or with one alone, a trial without values."""
     table, labels = sample_table(missing=True)
-    bare = table.values.copy()
-    bare[:, 1] = math.nan
-    for what, values in (("some values missing", table.values), ("a whole feature missing", bare)):
+    bare, constant = table.values.copy(), table.values.copy()
+    bare[:, 1], constant[:, 1] = math.nan, 0.05
+    for what, values in (
+        ("some values missing", table.values),
+        ("a whole feature missing", bare),
+        ("a feature that is the same in all trials", constant),
+    ):
         fitted = _fitted(subject, evolve(table, values=values), labels)
         nothing = evolve(table, values=np.full((1, len(table.names)), math.nan))
         for asked in (table, nothing):

@@ -375,9 +375,11 @@ def says_what_it_asks_for(subject: Subject) -> None:
         ("speed", "m/s", law.asked_speed_m_s(), speeds, 1.0 + 1e-9),
     ):
         most = max((limit for limit in commanded if limit < inf), default=0.0)
+        if most == 0.0:
+            continue
         name = f"asked_{what}_{unit.replace('/', '_').lower()}"
         demand(
-            most == 0.0 or asked is not None,
+            asked is not None,
             f"it commands a {what} of {most:g} {unit}, and {name} returns None: return that {what}, so that a gripper "
             "that cannot do as little is refused before it moves",
         )
@@ -387,7 +389,7 @@ def says_what_it_asks_for(subject: Subject) -> None:
         )
         fits = asked is None or (most <= margin * asked if what == "force" else asked <= margin * extreme)
         demand(
-            most == 0.0 or fits,
+            fits,
             f"{name} returns {asked} {unit}, and it commands {extreme:g} {unit}: return the {what} that it commands",
         )
 

@@ -29,7 +29,7 @@ from graspsense.core.values.errors import GraspsenseError
 from graspsense.testing.checks import Check, CheckFailed, CheckSkipped, demand, raises_nothing
 from graspsense.testing.component import ADVICE_ON_IMPORTS
 from graspsense.testing.samples import a_trial, an_event
-from graspsense.testing.subject import Package
+from graspsense.testing.subject import Package, printed_afresh
 
 OBSERVERS: Final = ("graspsense_run_starting", "graspsense_grasp_event", "graspsense_run_finished")
 PROBE_S: Final = 1.0
@@ -57,23 +57,19 @@ def plugin_modules_are_light(package: Package) -> None:
     code = (
         "import json, sys\n"
         "import graspsense.core.components.registry as p\n"
-        "found = p.installed()\n"
-        "mine = [s for s in found.statuses if s.distribution == sys.argv[1]]\n"
-        "took = max([s.import_s for s in mine] or [0.0])\n"
-        "print(json.dumps({'heavy': sorted(p.HEAVY & set(sys.modules)), 'took': took}))"
+        "name = sys.stdin.read()\n"
+        "took = [s.import_s for s in p.installed().statuses if s.distribution == name]\n"
+        "print(json.dumps({'heavy': sorted(p.HEAVY & set(sys.modules)), 'took': max(took, default=0.0)}))"
     )
-    environ = {**os.environ, "PYTHONPATH": os.pathsep.join(place for place in sys.path if place)}
-    environ |= {"GRASPSENSE_PLUGINS": package.distribution}
-    environ.pop("GRASPSENSE_TRACE_PLUGINS", None)
-    ran = subprocess.run(
-        [sys.executable, "-P", "-c", code, package.distribution],
-        env=environ,
-        capture_output=True,
-        text=True,
-        check=False,
+    listed = json.loads(
+        printed_afresh(
+            code,
+            given=package.distribution.encode(),
+            PYTHONPATH=os.pathsep.join(place for place in sys.path if place),
+            GRASPSENSE_PLUGINS=package.distribution,
+            GRASPSENSE_TRACE_PLUGINS="",
+        )
     )
-    demand(ran.returncode == 0, f"listing it in a fresh interpreter failed: {ran.stderr.strip()[-300:]}")
-    listed = json.loads(ran.stdout.splitlines()[-1])
     demand(
         not listed["heavy"],
         f"listing it imports {', '.join(listed['heavy'])}: in the module of the entry point import "

@@ -87,24 +87,30 @@ class Package:
 
 def elsewhere(subject: Subject, what: Callable[[Subject], str]) -> str:
     """Return what a module function gives in a fresh interpreter, at another time of the day and of other hashes."""
-    code = (
-        "import pickle, sys; sys.path[:] = pickle.load(sys.stdin.buffer)"
-        "; subject, what = pickle.load(sys.stdin.buffer); sys.stdout.write('\\n' + what(subject))"
-    )
     declared = evolve(subject.component, entry=subject.entry)
     given = Subject(component=declared, keys=dict(subject.keys))
+    return printed_afresh(
+        "import pickle, sys; sys.path[:] = pickle.load(sys.stdin.buffer)"
+        "; subject, what = pickle.load(sys.stdin.buffer); print('\\n' + what(subject))",
+        given=pickle.dumps(sys.path) + pickle.dumps((given, what)),
+        PYTHONHASHSEED="77",
+        TZ="ELSEWHERE-13",
+    )
+
+
+def printed_afresh(code: str, *, given: bytes = b"", **environ: str) -> str:
+    """Return the last line that this code prints in a fresh interpreter, which reads `given`. Raises CheckFailed."""
     ran = subprocess.run(
         [sys.executable, "-P", "-c", code],
-        input=pickle.dumps(sys.path) + pickle.dumps((given, what)),
-        env={**os.environ, "PYTHONHASHSEED": "77", "TZ": "ELSEWHERE-13"},
+        input=given,
+        env={**os.environ, **environ},
         capture_output=True,
         check=False,
     )
     if ran.returncode:
-        raise CheckFailed(
-            f"it fails in a fresh interpreter: {ran.stderr.decode(errors='replace').strip()[-300:]}"
-        )
-    return ran.stdout.decode().rpartition("\n")[2]
+        failed = ran.stderr.decode(errors="replace").strip()[-300:]
+        raise CheckFailed(f"it fails in a fresh interpreter: {failed}")
+    return ran.stdout.decode().splitlines()[-1]
 
 
 def package_of(

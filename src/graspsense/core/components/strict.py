@@ -28,12 +28,19 @@ LEAST_LIKENESS: Final = 0.7
 _LONGEST_KEY: Final = 100
 
 
-def key_paths(declarations: Mapping[str, Mapping[str, Any]], table: str) -> Iterator[str]:
-    """Yield the dotted path of each key that `keys_of` declares, also in its tables: `gripper.faults.drop`."""
+def all_keys(
+    declarations: Mapping[str, Mapping[str, Any]], table: str = ""
+) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield each key that `keys_of` declares, also in its tables: its dotted path, and what it declares."""
     for key, declaration in declarations.items():
         path = f"{table}.{key}" if table else key
-        yield path
-        yield from key_paths(declaration.get("keys", {}), path)
+        yield path, declaration
+        yield from all_keys(declaration.get("keys", {}), path)
+
+
+def key_paths(declarations: Mapping[str, Mapping[str, Any]], table: str) -> Iterator[str]:
+    """Yield the dotted path of each key that `keys_of` declares, also in its tables: `gripper.faults.drop`."""
+    return (path for path, _ in all_keys(declarations, table))
 
 
 def nearest_path(wrong: str, known: Iterable[str]) -> str:
