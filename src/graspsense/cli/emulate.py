@@ -7,7 +7,7 @@ import select
 import sys
 import time
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import click
 
@@ -17,10 +17,8 @@ from graspsense.cli.terminal import talk
 from graspsense.core.components.entries import EmulatorEntry
 from graspsense.core.components.registry import installed
 from graspsense.core.control.garbage_collection import present_objects_kept
+from graspsense.core.drivers.emulated_serial import EmulatedDevice
 from graspsense.core.values.errors import ConfigError, ExitCode, suggestion
-
-if TYPE_CHECKING:
-    from graspsense.core.drivers.emulated_serial import EmulatedDevice
 
 LOOK_S: Final = 0.5
 """How often it is looked whether the device still runs."""
@@ -62,7 +60,7 @@ def emulate(
     backend = f"{emulator.distribution}/{emulator.entry.backend or emulator.name}"
     options = (*GRIPPER_ALONE, *emulator.entry.options, *asked["options"])
     settings = settings_of(**{**asked, "gripper": backend, "options": options})
-    device: EmulatedDevice = emulator.load()(settings.gripper.config, wire, settings.run.seed)
+    device = emulator.made(EmulatedDevice, settings.gripper.config, wire, settings.run.seed)
     try:
         with present_objects_kept():
             device.tell("plug")

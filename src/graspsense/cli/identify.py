@@ -84,11 +84,11 @@ def identify(
     check_outputs(out, page, overwrite=overwrite, sources=sources)
     flags = [Flag("--gripper", "gripper.type", gripper)] if gripper else []
     settings = resolve(pipeline, options=options, flags=flags, force=force)
-    identifier = installed().resource(IdentifierEntry, settings.gripper.component.name).load()
+    identifier = installed().resource(IdentifierEntry, settings.gripper.component.name)
     squeezes = recorded_squeezes(sources, name)
     with ProgressLine() as progress:
         block = recorded_squeezes(blocks) if blocks else ()
-        result = identifier(settings.gripper.config, squeezes, progress, block)
+        result = identifier.made(Identification, settings.gripper.config, squeezes, progress, block)
     refused = result.refusals if not force else ()
     if not refused:
         write_or_replace(Path(out), result.scene.encode())

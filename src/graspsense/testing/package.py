@@ -20,7 +20,14 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import unquote, urlparse
 
-from graspsense.core.components.entries import ConformanceCheckEntry, ExperimentKindEntry, PipelineEntry
+import click
+
+from graspsense.core.components.entries import (
+    CommandEntry,
+    ConformanceCheckEntry,
+    ExperimentKindEntry,
+    PipelineEntry,
+)
 from graspsense.core.components.moved_names import new_form
 from graspsense.core.components.registry import SLOW_IMPORT_S, Resource
 from graspsense.core.pipeline.wiring import check as check_wiring
@@ -87,7 +94,12 @@ def everything_declared_loads(package: Package) -> None:
         if resource.is_file:
             resource.file()
         for part in resource.targets:
-            resource.load(part)
+            loaded = resource.load(part)
+            what = "a click command" if isinstance(resource.entry, CommandEntry) else "a function or a class"
+            demand(
+                callable(loaded) and (what != "a click command" or isinstance(loaded, click.Command)),
+                f"{getattr(resource.entry, part)}, `{part}` of {resource.qualified}, is {loaded!r:.60}: name {what}",
+            )
         if isinstance(resource.entry, ExperimentKindEntry):
             for part in {"keys", "result"} & set(resource.targets):
                 resource.class_of_kind(part)

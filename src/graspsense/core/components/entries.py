@@ -354,15 +354,15 @@ class ExperimentEntry(_FileEntry):
 class FoundDevice:
     """A device that a probe found: its backend, its serial number, and whether it can be opened."""
 
-    backend: str
+    backend: str = field(validator=instance_of(str))
     """The sensor backend that drives the device."""
-    serial: str
+    serial: str = field(validator=optional(instance_of(str)))
     """The serial number of the device."""
-    where: str
+    where: str = field(validator=instance_of(str))
     """Where it is connected, as in `/dev/hidraw0`."""
     ready: bool
     """Whether it can be opened now."""
-    advice: str = ""
+    advice: str = field(default="", validator=instance_of(str))
     """What to do if it cannot be opened."""
 
 

@@ -50,6 +50,7 @@ _ADVICE = {
 
 
 EntryT = TypeVar("EntryT", bound=ComponentEntry | ResourceEntry)
+MadeT = TypeVar("MadeT")
 
 
 def canonical(distribution: str) -> str:
@@ -298,6 +299,18 @@ class Resource(Declared[EntryT]):
     def load(self, part: str = "target") -> Any:
         """Import and return what this field of an entry names. Raises PluginUnavailable."""
         return self._import(getattr(self.entry, part))
+
+    def made(self, kind: type[MadeT], *given: Any) -> MadeT:
+        """Call its function and return what it made of these values.
+
+        Raises PluginUnavailable if it cannot be imported, ComponentFailed for a value of another kind.
+        """
+        made = self.load()(*given)
+        if not isinstance(made, kind):
+            raise ComponentFailed(
+                f"{self.kind} {self.qualified} returned a value of type {type(made).__name__}: return {kind.__name__}"
+            )
+        return made
 
     def class_of_kind(self, part: str) -> Any:
         """Import and return the class that a kind of experiment names as its `keys` or its `result`.
