@@ -744,9 +744,6 @@ hand(
 )
 
 
-hand(GRASPED, "can be no labels", objects=lambda self: (ObjectKind(name="paper cup"),))
-
-
 @mutant("opens-and-closes-in-time", "raise NoDevice where nothing answers")
 class SlowToOpen(Hand):
     def open(self, seed):

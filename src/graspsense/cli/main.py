@@ -22,14 +22,7 @@ from graspsense.cli.terminal import Style, echo, echo_as_it_is, has_colour, resu
 from graspsense.core.compiling.compile_notice import tell_compiling
 from graspsense.core.components.caller import command_line
 from graspsense.core.grasp.interrupts import ended_like_ctrl_c
-from graspsense.core.values.errors import (
-    ExitCode,
-    GraspsenseError,
-    PluginUnavailable,
-    exits_raise,
-    named,
-    place_of,
-)
+from graspsense.core.values.errors import ExitCode, GraspsenseError, PluginUnavailable, exits_raise
 
 PROGRAM: Final = "graspsense"
 COMPLETION_VARIABLE: Final = "_GRASPSENSE_COMPLETE"
@@ -224,9 +217,10 @@ class _Notes:
 
 def _plugin_exit(error: SystemExit) -> PluginUnavailable:
     """Return the error for a plugin that tried to end the program in the middle of one of our commands."""
+    *_, last = traceback.extract_tb(error.__traceback__)
     unusable = PluginUnavailable(
-        f"a plugin tried to end the program: {named(error)}{place_of(error)}. Correct the plugin, or choose another "
-        "component"
+        f"a plugin tried to end the program: SystemExit: {error.code} in {last.name}, {last.filename}:{last.lineno}. "
+        "Correct the plugin, or choose another component"
     )
     unusable.__cause__ = error
     return unusable

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import time
 from contextlib import closing, nullcontext, suppress
 from math import isfinite, isnan, nan
@@ -221,12 +220,6 @@ def objects_can_be_grasped(subject: Subject) -> None:
     names = [name for kind in kinds for name in kind.full_names]
     twice = {name for name in names if names.count(name) > 1}
     demand(not twice, f"objects() gives {', '.join(sorted(twice))} twice: give each full name once")
-    unusable = [name for name in names if not re.fullmatch(r"[^\s:#,]+(:[^\s:#,]+)?", name)]
-    demand(
-        not unusable,
-        f"objects() gives {unusable!r}, which can be no labels: write names and states without spaces and without the "
-        "characters : # ,",
-    )
     for kind in kinds:
         name = kind.full_names[0]
         with (

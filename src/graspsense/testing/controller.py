@@ -22,6 +22,7 @@ from graspsense.core.grasp.runner import run_uninterrupted
 from graspsense.core.values.channel import Channel
 from graspsense.core.values.signals import (
     APPROACH,
+    CHANNEL_OF_FIELD,
     EFFORT,
     FORCE,
     HOLD,
@@ -37,7 +38,7 @@ from graspsense.core.values.signals import (
     no_pads,
 )
 from graspsense.testing.checks import CheckFailed, demand, raises_nothing
-from graspsense.testing.model_gripper import CELLS, CHANNELS_OF_FIELD, OBJECTS, model_gripper
+from graspsense.testing.model_gripper import CELLS, OBJECTS, model_gripper
 from graspsense.testing.subject import Subject
 
 TICKS: Final = 4000
@@ -140,7 +141,7 @@ def _demand_command(command: Any) -> None:
 
 
 def _all_channels(subject: Subject) -> set[str | Channel]:
-    return {*CHANNELS_OF_FIELD.values(), "pads", *further(subject.entry.requires)}
+    return {*CHANNEL_OF_FIELD.values(), "pads", *further(subject.entry.requires)}
 
 
 def _made_again(value: Any) -> Any:

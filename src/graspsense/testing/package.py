@@ -22,12 +22,7 @@ from urllib.parse import unquote, urlparse
 
 import click
 
-from graspsense.core.components.entries import (
-    CommandEntry,
-    ConformanceCheckEntry,
-    ExperimentKindEntry,
-    PipelineEntry,
-)
+from graspsense.core.components.entries import ConformanceCheckEntry, ExperimentKindEntry, PipelineEntry
 from graspsense.core.components.moved_names import new_form
 from graspsense.core.components.registry import SLOW_IMPORT_S, Resource
 from graspsense.core.pipeline.wiring import check as check_wiring
@@ -95,7 +90,7 @@ def everything_declared_loads(package: Package) -> None:
             resource.file()
         for part in resource.targets:
             loaded = resource.load(part)
-            what = "a click command" if isinstance(resource.entry, CommandEntry) else "a function or a class"
+            what = "a click command" if resource.kind == "command" else "a function or a class"
             demand(
                 callable(loaded) and (what != "a click command" or isinstance(loaded, click.Command)),
                 f"{getattr(resource.entry, part)}, `{part}` of {resource.qualified}, is {loaded!r:.60}: name {what}",
