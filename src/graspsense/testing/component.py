@@ -70,7 +70,7 @@ def settings_have_types(subject: Subject) -> None:
 
 def settings_declare_their_meaning(subject: Subject) -> None:
     """Every key declares its meaning with `setting`, and its unit if its name ends in one."""
-    for key, declaration in all_keys(keys_of(subject.component.config_class())):
+    for key, declaration in all_keys(keys_of(subject.component.config_class())).items():
         where, name = f"key {key!r}", key.rpartition(".")[2]
         demand(
             bool(declaration["meaning"]),

@@ -356,7 +356,7 @@ def handles_frames_of_nan(subject: Subject) -> None:
 
 
 def says_what_it_asks_for(subject: Subject) -> None:
-    """`asked_force_n` and `asked_speed_m_s` say the force of the squeeze and the speed that it commands, if any."""
+    """What it asks for are numbers; the force of the squeeze and the speed are those that it commands, if any."""
     law = subject.create()
     for name in ASKED:
         number = getattr(law, name)()

@@ -356,7 +356,7 @@ class FoundDevice:
 
     backend: str = field(validator=instance_of(str))
     """The sensor backend that drives the device."""
-    serial: str = field(validator=optional(instance_of(str)))
+    serial: str
     """The serial number of the device."""
     where: str = field(validator=instance_of(str))
     """Where it is connected, as in `/dev/hidraw0`."""

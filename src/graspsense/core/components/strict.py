@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 import types
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from difflib import SequenceMatcher
 from enum import Enum
 from pathlib import Path
@@ -28,19 +28,13 @@ LEAST_LIKENESS: Final = 0.7
 _LONGEST_KEY: Final = 100
 
 
-def all_keys(
-    declarations: Mapping[str, Mapping[str, Any]], table: str = ""
-) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Yield each key that `keys_of` declares, also in its tables: its dotted path, and what it declares."""
+def all_keys(declarations: Mapping[str, Mapping[str, Any]], table: str = "") -> dict[str, Mapping[str, Any]]:
+    """Return what `keys_of` gives by the dotted path of each key, also in its tables: `gripper.faults.drop`."""
+    found: dict[str, Mapping[str, Any]] = {}
     for key, declaration in declarations.items():
         path = f"{table}.{key}" if table else key
-        yield path, declaration
-        yield from all_keys(declaration.get("keys", {}), path)
-
-
-def key_paths(declarations: Mapping[str, Mapping[str, Any]], table: str) -> Iterator[str]:
-    """Yield the dotted path of each key that `keys_of` declares, also in its tables: `gripper.faults.drop`."""
-    return (path for path, _ in all_keys(declarations, table))
+        found |= {path: declaration, **all_keys(declaration.get("keys", {}), path)}
+    return found
 
 
 def nearest_path(wrong: str, known: Iterable[str]) -> str:

@@ -194,6 +194,10 @@ def table_of(rows: Iterable[Features]) -> FeatureTable:
     return collected.table()
 
 
+def _texts(items: Iterable[str]) -> tuple[str, ...]:
+    return tuple(items)
+
+
 def _reasons(items: Iterable[Reason | str]) -> tuple[Reason, ...]:
     return tuple(item if isinstance(item, Reason) else Reason(words=item) for item in items)
 
@@ -221,10 +225,10 @@ class Prediction:
     label: str
     probabilities: Mapping[str, float]
     because: tuple[Reason, ...] = field(converter=_reasons)
-    warnings: tuple[str, ...] = field(default=(), converter=tuple)
+    warnings: tuple[str, ...] = field(default=(), converter=_texts)
     model: str = ""
     support: tuple[float, float] | None = None
-    prediction_set: tuple[str, ...] = field(default=(), converter=tuple)
+    prediction_set: tuple[str, ...] = field(default=(), converter=_texts)
     coverage: float | None = None
     calibrated: bool = False
     no_certainty: str = ""
