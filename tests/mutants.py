@@ -56,7 +56,7 @@ from graspsense.plugin_api import (
     signal_type,
 )
 from graspsense.simulator_api import CompiledFeatures, FreeLimits, FreeMotion
-from graspsense.testing.gentle import GentleState, step
+from graspsense.testing.laws import GentleState, step
 
 
 @dataclass

@@ -60,10 +60,7 @@ def emulate(
     backend = f"{emulator.distribution}/{emulator.entry.backend or emulator.name}"
     options = (*GRIPPER_ALONE, *emulator.entry.options, *asked["options"])
     settings = settings_of(**{**asked, "gripper": backend, "options": options})
-    device = emulator.made(
-        EmulatedDevice,  # type: ignore[type-abstract]
-        *(settings.gripper.config, wire, settings.run.seed),
-    )
+    device: EmulatedDevice = emulator.made(EmulatedDevice, settings.gripper.config, wire, settings.run.seed)
     try:
         with present_objects_kept():
             device.tell("plug")

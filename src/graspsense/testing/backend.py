@@ -34,7 +34,7 @@ from graspsense.testing.checks import (
     leaving_no_thread,
     raises_nothing,
 )
-from graspsense.testing.gentle import EFFORT_N, FORCE_N, REST_S, GentleController, kind_of
+from graspsense.testing.laws import EFFORT_N, FORCE_N, REST_S, GentleController, kind_of
 from graspsense.testing.session import TIMEOUT_S, description, next_reading, opened, readings_of
 from graspsense.testing.subject import Subject
 

@@ -17,8 +17,7 @@ from graspsense.core.grasp.wrapped_gripper import WrappedGripper
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.signals import EFFORT, FORCE, Command, Outcome, Pads, Reading
 from graspsense.testing.checks import CheckSkipped, demand
-from graspsense.testing.gentle import GentleController, kind_of
-from graspsense.testing.hostile import HOSTILE, HostileController
+from graspsense.testing.laws import HOSTILE, GentleController, HostileController, kind_of
 from graspsense.testing.subject import Subject
 
 RUN: Final = RunConfig(grasp_timeout_s=1.0, opening_timeout_s=1.0)

@@ -50,7 +50,6 @@ _ADVICE = {
 
 
 EntryT = TypeVar("EntryT", bound=ComponentEntry | ResourceEntry)
-MadeT = TypeVar("MadeT")
 
 
 def canonical(distribution: str) -> str:
@@ -117,9 +116,7 @@ class Declared(ABC, Generic[EntryT]):
             module = importlib.import_module(path)
             if hasattr(module, name):
                 return getattr(module, name)
-        except KeyboardInterrupt:
-            raise
-        except BaseException as error:  # the import of a third party's module can raise anything
+        except FAILURES as error:  # the import of a third party's module can raise anything
             raise self._unavailable(f"{type(error).__name__}: {error}") from error
         near = suggestion(name, dir(module))
         raise self._unavailable(f"{path} has no {name!r}" + (near and f".{near}"))
@@ -300,7 +297,7 @@ class Resource(Declared[EntryT]):
         """Import and return what this field of an entry names. Raises PluginUnavailable."""
         return self._import(getattr(self.entry, part))
 
-    def made(self, kind: type[MadeT], *given: Any) -> MadeT:
+    def made(self, kind: type, *given: Any) -> Any:
         """Call its function and return what it made of these values.
 
         Raises PluginUnavailable if it cannot be imported, ComponentFailed for a value of another kind.
