@@ -167,7 +167,9 @@ def run_grasp(
         # The trace must survive a backend that fails on closing.
         try:
             backend.close()
-        except FAILURES as error:
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
             reason = f"the gripper could not be closed: {named(error)} ({reason or outcome.words})"
             outcome = Outcome.ABORTED
         # After closing, so that the report covers it.
@@ -196,7 +198,9 @@ def _report_of(backend: SensorBackend[Any]) -> dict[str, Any]:
     """Return the report of a gripper, or why it has none."""
     try:
         return dict(backend.report())
-    except FAILURES as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         return {"report_failed": named(error)}
 
 
