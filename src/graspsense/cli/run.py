@@ -124,8 +124,9 @@ def run(
     if dry_run:
         _say_what_would_be_done(settings, as_json)
         return
-    if label is not None and save is None:
-        raise click.UsageError("--label goes with a trial that is kept: add --save DIR")
+    if (label is not None or changed) and save is None:
+        given = "--changed" if label is None else "--label"
+        raise click.UsageError(f"{given} goes with a trial that is kept: add --save DIR")
     if beside is not None:
         _run_beside(settings, beside, save, label, as_json)
         return

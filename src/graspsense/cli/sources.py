@@ -225,10 +225,10 @@ def trials_of(
     values = {
         **{key: given[key] for key in _SAME_KEYS},
         "source": source,
-        "columns": _names(given["features"]),
-        "before": _names(given["before"]),
+        "columns": _names("features", given),
+        "before": _names("before", given),
         "value": given["target_value"],
-        "objects": _names(given["objects"]),
+        "objects": _names("objects", given),
         "checkpoints_s": tuple(checkpoints_s),
     }
     try:
@@ -357,8 +357,14 @@ def _alone(table: str, name: str, given: Mapping[str, Any], source: str) -> Sele
     return SelectedComponent(component, build(component, values, force=given["force"]))
 
 
-def _names(text: str | tuple[str, ...] | None) -> tuple[str, ...]:
-    """Return the names in an option, or those that a model has."""
-    if isinstance(text, tuple):
-        return text
-    return tuple(name.strip() for name in text.split(",") if name.strip()) if text else ()
+def _names(option: str, given: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the names in an option, or those that a model has. Raises UsageError for an option without any."""
+    text = given[option]
+    if text is None or isinstance(text, tuple):
+        return text or ()
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    if not names:
+        raise click.UsageError(
+            f"{dashed(option)} {text!r} has no name: leave it out, or give names with commas"
+        )
+    return names
