@@ -27,6 +27,7 @@ from graspsense.core.settings.layers import Flag, Merged, option_layers, typed_p
 from graspsense.core.settings.resolved import Settings, default_paths, resolve
 from graspsense.core.settings.selected import SelectedComponent, build
 from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.printable import printable
 from graspsense.store.opening import STORE, as_source, store_folder
 
 if TYPE_CHECKING:
@@ -289,7 +290,10 @@ def detector_of(source: str, given: Mapping[str, Any]) -> SelectedComponent:
 
 
 def command_line(without: Sequence[str], command: str = "") -> str:
-    """Return the command that is running, or another one with its arguments, without some of its options."""
+    """Return the command that is running, or another one with its arguments, without some of its options.
+
+    Bytes in it that are not text, as of the name of a file, are written as in JSON, so that it can be stored.
+    """
     context = click.get_current_context()
     words = ["graspsense", command or str(context.info_name)]
     by_user = set(typed()).difference(without)
@@ -304,7 +308,7 @@ def command_line(without: Sequence[str], command: str = "") -> str:
         else:
             for each in value if param.multiple else [value]:
                 words += [param.opts[0], str(each)]
-    return shlex.join(words)
+    return printable(shlex.join(words))
 
 
 def _refuse_misplaced(kind: str) -> None:
