@@ -290,10 +290,7 @@ def detector_of(source: str, given: Mapping[str, Any]) -> SelectedComponent:
 
 
 def command_line(without: Sequence[str], command: str = "") -> str:
-    """Return the command that is running, or another one with its arguments, without some of its options.
-
-    Bytes in it that are not text, as of the name of a file, are written as in JSON, so that it can be stored.
-    """
+    """Return the command that is running, or another one with its arguments, without some options, as printable."""
     context = click.get_current_context()
     words = ["graspsense", command or str(context.info_name)]
     by_user = set(typed()).difference(without)
