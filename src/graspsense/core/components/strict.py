@@ -30,11 +30,11 @@ _LONGEST_KEY: Final = 100
 
 def all_keys(declarations: Mapping[str, Mapping[str, Any]], table: str = "") -> dict[str, Mapping[str, Any]]:
     """Return what `keys_of` gives by the dotted path of each key, also in its tables: `gripper.faults.drop`."""
-    found: dict[str, Mapping[str, Any]] = {}
+    declared_keys: dict[str, Mapping[str, Any]] = {}
     for key, declaration in declarations.items():
         path = f"{table}.{key}" if table else key
-        found |= {path: declaration, **all_keys(declaration.get("keys", {}), path)}
-    return found
+        declared_keys |= {path: declaration, **all_keys(declaration.get("keys", {}), path)}
+    return declared_keys
 
 
 def nearest_path(wrong: str, known: Iterable[str]) -> str:
