@@ -164,11 +164,9 @@ def run_grasp(
         except BaseException:
             backend.close()
             raise
-        # The trace must survive a backend that fails on closing.
+        # The trace must survive a backend that fails on closing. Ctrl-C is only counted by now.
         try:
             backend.close()
-        except KeyboardInterrupt:
-            raise
         except BaseException as error:
             reason = f"the gripper could not be closed: {named(error)} ({reason or outcome.words})"
             outcome = Outcome.ABORTED
