@@ -35,7 +35,7 @@ from graspsense.plugin_api import (
     create,
 )
 from graspsense.report.found_table import markdown_table
-from graspsense.testing.hostile import HOSTILE, HostileController
+from graspsense.testing.laws import HOSTILE, HostileController
 from graspsense_pr2_gripper.backend import Pr2Backend
 from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
 

@@ -6,6 +6,7 @@ import itertools
 import os
 import pickle
 import random
+import signal
 import sys
 import threading
 import time
@@ -55,7 +56,7 @@ from graspsense.plugin_api import (
     signal_type,
 )
 from graspsense.simulator_api import CompiledFeatures, FreeLimits, FreeMotion
-from graspsense.testing.gentle import GentleState, step
+from graspsense.testing.laws import GentleState, step
 
 
 @dataclass
@@ -224,6 +225,11 @@ measuring("same-features-elsewhere", "read no clock", lambda peak, trace: peak +
 measuring("values-are-floats", "use logging", lambda peak, trace: print(peak) or peak)  # noqa: T201
 measuring("values-are-floats", "os._exit(0)", lambda peak, trace: os._exit(0))
 measuring("values-are-floats", "changes the random numbers", lambda peak, trace: random.seed(1) or peak)
+measuring(
+    "values-are-floats",
+    "changes the handler of Ctrl-C",
+    lambda peak, trace: signal.signal(signal.SIGINT, signal.SIG_IGN) and peak,
+)
 featuring("values-are-floats", "write it as text", reasons=lambda features, trace: {"peak": 5})
 measuring(
     "extracts-in-time", "one more each time it extracts", lambda peak, trace: thread_of("peak") and peak
@@ -374,6 +380,11 @@ commanding(
     "nothing in the class",
     value=lambda command, _: command.value + 1e-6 * next(_grasps),
 )
+leaving(
+    "independent-of-the-start-of-the-clock",
+    "use differences of times",
+    outcome=lambda after, frame: after.outcome or (STEADY if frame.t_s > 1000.0 else 0),
+)
 commanding(
     "requires-what-it-reads",
     "add what it reads to `requires`",
@@ -463,6 +474,10 @@ for says, motion in (
         init=lambda self: FreeState(APPROACH, 0, 0),
         free_motion=motion,
     )
+
+
+for name, number in (("asked_force_n", nan), ("asked_interval_s", "soon"), ("contact_force_n", -0.2)):
+    law(*("says-what-it-asks-for", f"{name} returns"), **{name: lambda self, number=number: number})
 
 
 def pushing(params, state, reading):
@@ -565,6 +580,8 @@ describing(OF_HAND, "a physical gripper can hurt what it holds", harmless=True, 
 describing(OF_HAND, "is declared twice", status_bits=(HOT, HOT))
 describing("hostile-laws-stay-below-the-ceiling", "exerts an effort", relaxed=Command(EFFORT, 5.0, inf, inf))
 describing("objects-can-be-grasped", "give DeviceInfo(simulated=True, ...)", simulated=False)
+
+describing("describes-itself", "say in one line", name="two\nlines")
 
 giving("frames-are-numbers", "return Reading(Frame(...)")(lambda reading: reading.frame)
 giving("closes-in-any-state", "return Reading(Frame(...)")(lambda reading: reading.frame)
@@ -868,6 +885,11 @@ def of_all_trials(self, table):
     return Nearest.probabilities(self, centred)
 
 
+def by_fixed_steps(self, table):
+    """As for numbers that differ by thousandths at least, which those of small units do not."""
+    return Nearest.probabilities(self, evolve(table, values=table.values.round(5)))
+
+
 def fitting(check, says, crashes):
     """Keep a mutant that crashes where it is to learn such labels."""
 
@@ -1001,6 +1023,19 @@ nearest(
     "explains-its-predictions",
     "give each reason in words and units",
     explain=lambda self, features: evolve(Nearest.explain(self, features), because=()),
+)
+nearest(
+    "classes-are-the-labels",
+    "keep labels as they are",
+    fit=lambda self, table, labels, seed: Nearest.fit(
+        self, table, [label.removeprefix("0") for label in labels], seed
+    ),
+)
+nearest("separates-separable-trials", "with the spread of their column", probabilities=by_fixed_steps)
+nearest(
+    "does-not-change-the-table",
+    "or fit the labels",
+    fit=lambda self, table, labels, seed: Nearest.fit(self, table, labels, seed) or labels.sort(),
 )
 mutant("does-not-change-the-table", "work on a copy")(Filling)
 mutant("refuses-an-invalid-model", "from_json takes a model")(Credulous)

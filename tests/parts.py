@@ -41,8 +41,8 @@ from graspsense.plugin_api import (
     setting,
 )
 from graspsense.simulator_api import CompiledFeatures
-from graspsense.testing.gentle import GentleController as Gentle
-from graspsense.testing.gentle import GentleParams, GentleState, step
+from graspsense.testing.laws import GentleController as Gentle
+from graspsense.testing.laws import GentleParams, GentleState, step
 from graspsense.testing.model_gripper import ModelGripper
 
 

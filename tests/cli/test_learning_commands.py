@@ -69,6 +69,12 @@ def test_states_of_one_class(csv):
     assert json.loads(out)["confusion"]["labels"] == ["can:empty", "can:full"]
 
 
+def test_the_name_of_a_model_need_not_be_text(csv, tmp_path):
+    model = tmp_path / "\udcff.json"
+    printed("train", csv, "--label", "what", "--instance", "thing", "--classifier", "knn", "--out", model)
+    assert "\\udcff.json" in json.loads(model.read_text())["provenance"]["command"]
+
+
 def test_train_then_predict(csv, tmp_path):
     model = tmp_path / "mine.json"
     out = printed("train", csv, "--label", "what", "--instance", "thing", "--out", model)

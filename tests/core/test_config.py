@@ -355,12 +355,15 @@ def test_what_is_no_toml_value_is_text(plugins, write, typed, value):
         ("z/y.toml", "no pipeline file 'z/y.toml': there is no folder '{here}/z'"),
         ("folder.toml", "cannot read the pipeline file 'folder.toml': Is a directory"),
         ("latin.toml", "latin.toml:2: not UTF-8 text (byte 0xff)"),
+        ("ring.toml", "cannot read the pipeline file 'ring.toml'"),
     ],
 )
 def test_a_file_that_is_not_there_or_cannot_be_read_is_told(plugins, write, name, says):
     for existing in ("mine", "yours.toml", "x/y.txt", "folder.toml/inside"):
         write(BASE, existing)
     Path("latin.toml").write_bytes(b"[gripper]\nname = \xff\xfe\n")
+    if not Path("ring.toml").is_symlink():
+        Path("ring.toml").symlink_to("ring.toml")
     assert says.format(here=Path.cwd()) in complaint(name)
 
 

@@ -88,6 +88,22 @@ def test_an_entry_is_completed_by_the_class():
     assert (peak.declared().width, peak.entry.features, peak.declared_twice()) == ("width", None, ())
 
 
+@every_case(
+    ("name", "unit", "width", "says"),
+    [
+        ("peak, left", "N", False, "'name' of a feature"),
+        ("peak [N]", "N", False, "'name' of a feature"),
+        ("peak\n", "N", False, "'name' of a feature"),
+        ("", "N", False, "'name' of a feature"),
+        ("opening", "rad", True, "'opening' in rad"),
+    ],
+)
+def test_a_feature_that_fits_no_table_or_is_no_width_is_refused(name, unit, width, says):
+    with pytest.raises(ValueError, match=says):
+        Feature(name, unit, "how far", width=width)
+    assert Feature("Öffnung 1", "m", "how far", width=True).width
+
+
 def test_the_config_class_is_that_of_the_nearest_base():
     assert part(Summit).config_class() is PeakConfig
     assert part(Fingers, SensorBackendEntry).config_class() is FingersConfig

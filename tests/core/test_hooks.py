@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import re
 import types
+from asyncio import CancelledError
 
 import pytest
 from cases import every_case
@@ -205,15 +206,20 @@ def test_a_hook_that_asks_for_devices_has_the_answer_or_the_error_of_each_plugin
     assert other.error == f"{hook} gave '/dev/ttyUSB0': it takes {type(repeated).__name__} only"
 
 
+def test_a_device_is_told_in_words():
+    with pytest.raises(TypeError, match="'backend' must be <class 'str'>"):
+        FoundDevice(5, "42", "bus 1", ready=True)  # type: ignore[arg-type]
+
+
 def test_a_finding_is_in_one_of_three_states():
     with pytest.raises(ValueError, match=r"'state'.*\('ok', 'note', 'problem'\)"):
         Finding("cable", "fine", "straight")  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("failure", [RuntimeError("no room on the disk"), SystemExit("no room on the disk")])
-def test_an_observer_that_raises_stops_nobody_and_is_reported_once(caplog, failure):
+@pytest.mark.parametrize("kind", [RuntimeError, SystemExit, CancelledError])
+def test_an_observer_that_raises_stops_nobody_and_is_reported_once(caplog, kind):
     seen = example("graspsense_grasp_event")
-    failing = implementing("graspsense_grasp_event", raising(failure))
+    failing = implementing("graspsense_grasp_event", raising(kind("no room on the disk")))
     plugins = IsolatedPlugins()
     for plugin, name in ((failing, "lab-first"), (seen, "lab-seen"), (type(failing)(), "lab-last")):
         plugins.add(plugin, name)
@@ -224,8 +230,7 @@ def test_an_observer_that_raises_stops_nobody_and_is_reported_once(caplog, failu
 
     assert seen.events == ["both pads touch", "both pads touch"]
     assert [record.getMessage() for record in caplog.records] == [
-        f"{name} 0.1 failed in graspsense_grasp_event and is passed over: "
-        f"{type(failure).__name__}: no room on the disk"
+        f"{name} 0.1 failed in graspsense_grasp_event and is passed over: {kind.__name__}: no room on the disk"
         for name in ("lab-first", "lab-last")
     ]
 

@@ -53,8 +53,8 @@ from graspsense.sources.recordings.replay import read_named
 from graspsense.testing.checks import CheckFailed
 from graspsense.testing.conformance import examine
 from graspsense.testing.controller import state_holds_everything, state_is_numbers
-from graspsense.testing.gentle import GentleController, GentleParams, GentleState
-from graspsense.testing.gentle import step as gentle_step
+from graspsense.testing.laws import GentleController, GentleParams, GentleState
+from graspsense.testing.laws import step as gentle_step
 from graspsense.testing.model_gripper import ModelGripper
 from graspsense.testing.subject import Subject
 

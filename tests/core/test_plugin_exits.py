@@ -1,6 +1,7 @@
-"""SystemExit and KeyboardInterrupt in the code of a plugin: no trace is lost, and nothing ends in silence."""
+"""What is no Exception in the code of a plugin, as SystemExit: no trace is lost, and nothing ends in silence."""
 
 import math
+from asyncio import CancelledError
 
 import numpy as np
 import pytest
@@ -31,7 +32,7 @@ def released(gripper):
     return gripper.closed == 1 and gripper.commands[-1].value == 0.0
 
 
-@every_case("error", [SystemExit(0), OSError("Input/output error")])
+@every_case("error", [SystemExit(0), OSError("Input/output error"), CancelledError("the loop has ended")])
 @every_case("method", ["read", "apply", "tare", "close", "report"])
 def test_a_gripper_that_ends_the_program_or_fails_ends_the_grasp_and_keeps_the_trace(method, error):
     usual = getattr(Scripted, method)

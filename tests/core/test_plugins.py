@@ -217,7 +217,8 @@ HOOK = "@hookimpl\n    def graspsense_controllers(): "
         (HOOK + "raise OSError('no such file')", "OSError: no such file"),
         ("Channel('gap', 'mm')", "channel 'gap' is in m, not in 'mm'"),
         ("Channel('temperature', '')", "channel 'temperature'"),
-        ("raise SystemExit(3)", "SystemExit: 3"),
+        ("raise SystemExit(3)", "SystemExit: 3 in "),
+        ("raise GeneratorExit('panicked')", "GeneratorExit: panicked in "),
     ],
 )
 def test_a_plugin_that_breaks_the_rules_is_broken_and_says_which(site, body, reason):

@@ -20,7 +20,7 @@ from graspsense.core.grasp.runner import MAY_BE_CLOSED, run_grasp
 from graspsense.core.values.errors import ComponentFailed, NoDevice, RecordingEnded, TareRefused
 from graspsense.core.values.signals import EFFORT, VELOCITY, Command, Outcome, Phase, Reading
 from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
-from graspsense.testing import gentle
+from graspsense.testing import laws
 
 HYBRID = HybridController(HybridConfig())
 RUN = RunConfig()
@@ -522,9 +522,9 @@ def pushing(effort_limit_n):
     """A law that closes by a velocity, with this limit of the effort, until the gap rests."""
 
     def step(params, state, reading):
-        return Command(VELOCITY, -0.01, effort_limit_n, inf), gentle.step(params, state, reading)[1]
+        return Command(VELOCITY, -0.01, effort_limit_n, inf), laws.step(params, state, reading)[1]
 
-    law = type("Pushing", (gentle.GentleController,), {"step": staticmethod(step)})
+    law = type("Pushing", (laws.GentleController,), {"step": staticmethod(step)})
     law.asked_force_n = lambda self: effort_limit_n
     return law(VELOCITY)
 

@@ -14,8 +14,7 @@ import click
 
 from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json
-from graspsense.cli.subcommands import Subcommands
-from graspsense.cli.terminal import echo, echo_table, talk
+from graspsense.cli.terminal import Subcommands, echo, echo_table, talk
 from graspsense.core.grasp import calibration
 from graspsense.core.grasp.calibrating import Rig, breakaways, unloaded_images
 from graspsense.core.grasp.calibration import counts_per_newton, load_table, motor_table

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -232,7 +233,7 @@ def pipeline_text(chosen: Chosen, model: str) -> str:
     settings["classifier"] = {
         "type": learner.component.qualified,
         **plain(learner.config),
-        "model": str(Path(model).resolve()),
+        "model": os.path.realpath(model),
     }
     rate = chosen.choice.rate.words
     lines = [

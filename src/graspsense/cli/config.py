@@ -9,8 +9,7 @@ import click
 
 from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json
-from graspsense.cli.subcommands import Subcommands
-from graspsense.cli.terminal import Style, echo, echo_as_it_is
+from graspsense.cli.terminal import Style, Subcommands, echo, echo_as_it_is
 from graspsense.core.components.registry import installed
 from graspsense.core.pipeline.wiring import check
 from graspsense.core.settings.resolved import Settings

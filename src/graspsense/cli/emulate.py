@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import os
 import select
-import signal
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
-from types import FrameType
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import click
 
@@ -20,10 +17,8 @@ from graspsense.cli.terminal import talk
 from graspsense.core.components.entries import EmulatorEntry
 from graspsense.core.components.registry import installed
 from graspsense.core.control.garbage_collection import present_objects_kept
+from graspsense.core.drivers.emulated_serial import EmulatedDevice
 from graspsense.core.values.errors import ConfigError, ExitCode, suggestion
-
-if TYPE_CHECKING:
-    from graspsense.core.drivers.emulated_serial import EmulatedDevice
 
 LOOK_S: Final = 0.5
 """How often it is looked whether the device still runs."""
@@ -65,15 +60,15 @@ def emulate(
     backend = f"{emulator.distribution}/{emulator.entry.backend or emulator.name}"
     options = (*GRIPPER_ALONE, *emulator.entry.options, *asked["options"])
     settings = settings_of(**{**asked, "gripper": backend, "options": options})
-    device: EmulatedDevice = emulator.load()(settings.gripper.config, wire, settings.run.seed)
+    device: EmulatedDevice = emulator.made(EmulatedDevice, settings.gripper.config, wire, settings.run.seed)
     try:
-        with present_objects_kept(), _ended_by_signals():
+        with present_objects_kept():
             device.tell("plug")
             _tell_state(device, "plug", as_json)
             talk(f"emulated {name} over {device.wire} at {device.rate_hz:g} Hz: no gripper is touched")
             talk("Ctrl-C ends it; other words, each with Enter: help, state, " + ", ".join(device.words))
             _serve(device, as_json)
-    except _Ended:
+    except KeyboardInterrupt:
         pass
     finally:
         device.close()
@@ -81,25 +76,6 @@ def emulate(
     if failed:
         talk(f"graspsense: the emulated {name} failed: {failed}")
         raise click.exceptions.Exit(ExitCode.NOT_FINISHED)
-
-
-class _Ended(Exception):
-    """A signal asked for the end."""
-
-
-@contextmanager
-def _ended_by_signals() -> Iterator[None]:
-    def end(number: int, frame: FrameType | None) -> None:
-        raise _Ended
-
-    handlers = {
-        signal_number: signal.signal(signal_number, end) for signal_number in (signal.SIGINT, signal.SIGTERM)
-    }
-    try:
-        yield
-    finally:
-        for signal_number, handler in handlers.items():
-            signal.signal(signal_number, handler)
 
 
 def _serve(device: EmulatedDevice, as_json: bool) -> None:

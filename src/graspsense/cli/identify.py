@@ -9,7 +9,7 @@ from typing import Any
 import click
 from attrs import asdict
 
-from graspsense.cli.options import keys_option
+from graspsense.cli.options import keys_option, pipeline_option
 from graspsense.cli.output import check_outputs, echo_found, echo_json, file_to_write_as
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import named_source
@@ -48,12 +48,7 @@ from graspsense.report.write import write_html
     "--page", metavar="FILE.html", callback=file_to_write_as(".html"), help="Write the report page."
 )
 @click.option("--overwrite", is_flag=True, help="Replace the files of --out and --page if they exist.")
-@click.option(
-    "--pipeline",
-    metavar="NAME|FILE",
-    default="default",
-    help="Pipeline with the simulated gripper.  [default: default]",
-)
+@pipeline_option("Pipeline with the simulated gripper.  [default: default]")
 @click.option("--gripper", metavar="NAME", help="Another simulated gripper. (gripper.type)")
 @keys_option("Set a key: -o gripper.pad_stiffness_n_m=inf for rigid fingertips.")
 @click.option(
@@ -89,11 +84,11 @@ def identify(
     check_outputs(out, page, overwrite=overwrite, sources=sources)
     flags = [Flag("--gripper", "gripper.type", gripper)] if gripper else []
     settings = resolve(pipeline, options=options, flags=flags, force=force)
-    identifier = installed().resource(IdentifierEntry, settings.gripper.component.name).load()
+    identifier = installed().resource(IdentifierEntry, settings.gripper.component.name)
     squeezes = recorded_squeezes(sources, name)
     with ProgressLine() as progress:
         block = recorded_squeezes(blocks) if blocks else ()
-        result = identifier(settings.gripper.config, squeezes, progress, block)
+        result = identifier.made(Identification, settings.gripper.config, squeezes, progress, block)
     refused = result.refusals if not force else ()
     if not refused:
         write_or_replace(Path(out), result.scene.encode())

@@ -13,7 +13,7 @@ import click
 from attrs import asdict, frozen
 
 from graspsense.cli.import_check import echo_channels, show_files, suggest_manifest
-from graspsense.cli.options import keys_option
+from graspsense.cli.options import keys_option, pipeline_option
 from graspsense.cli.output import echo_json, file_to_write_as
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.run import draw_grasp
@@ -79,12 +79,7 @@ FEW: Final = 3
 @click.option(
     "--velocity", metavar="EXPRESSION", help="CSV: velocity of the gap, in m/s; negative when closing."
 )
-@click.option(
-    "--pipeline",
-    metavar="NAME|FILE",
-    default="default",
-    help="Pipeline that computes the features.  [default: default]",
-)
+@pipeline_option("Pipeline that computes the features.  [default: default]")
 @keys_option("Set a key of the pipeline: -o controller.probing_force_n=17.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def import_(

@@ -189,7 +189,7 @@ def _exit_code(arguments: list[str]) -> int:
         if not _is_own(arguments):
             raise  # the command of a plugin may choose its exit code
         return _report(_plugin_exit(error), arguments)
-    except Exception as error:
+    except BaseException as error:  # of a plugin, also what is no Exception
         return _report(error, arguments)
 
 
@@ -226,7 +226,7 @@ def _plugin_exit(error: SystemExit) -> PluginUnavailable:
     return unusable
 
 
-def _report(error: Exception, arguments: Sequence[str]) -> int:
+def _report(error: BaseException, arguments: Sequence[str]) -> int:
     """Tell of an error, on stderr and with --json on stdout too, and return the exit code."""
     as_json = "--json" in arguments
     if isinstance(error, GraspsenseError):
@@ -268,7 +268,7 @@ def _report(error: Exception, arguments: Sequence[str]) -> int:
     return code
 
 
-def _whose(error: Exception) -> str:
+def _whose(error: BaseException) -> str:
     """Return whose bug an error is: that of the plugin whose code is nearest to it, with the place, or ours."""
     from graspsense.core.components.registry import installed
 

@@ -50,6 +50,11 @@ def target_option(text: str) -> Callable[[CommandT], CommandT]:
     return click.option("--target", type=targets, default="both", show_default=True, help=text)
 
 
+def pipeline_option(text: str, default: str | None = DEFAULT_PIPELINE) -> Callable[[CommandT], CommandT]:
+    """Return the decorator that adds --pipeline; `text` says what it is for."""
+    return click.option("--pipeline", metavar="NAME|FILE", default=default, help=text)
+
+
 def force_option(command: CommandT) -> CommandT:
     """Add --force, which accepts settings outside of their plausible ranges."""
     return click.option("--force", is_flag=True, help="Accept settings outside of their plausible range.")(
@@ -58,11 +63,7 @@ def force_option(command: CommandT) -> CommandT:
 
 
 _OPTIONS: Final = (
-    click.option(
-        "--pipeline",
-        metavar="NAME|FILE",
-        help=f"Name of a pipeline, or a .toml file.  [default: {DEFAULT_PIPELINE}]",
-    ),
+    pipeline_option(f"Name of a pipeline, or a .toml file.  [default: {DEFAULT_PIPELINE}]", default=None),
     click.option("--gripper", metavar="NAME", help="Gripper: sim, pr2, replay, ... (gripper.type)"),
     click.option(
         "--object",

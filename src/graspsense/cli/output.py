@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -109,12 +110,13 @@ def check_outputs(*paths: str | None, overwrite: bool, sources: Sequence[str] = 
     Two of them must not be the same file, none may be a file that the command reads, and without `overwrite` none may
     exist.
     """
-    outputs: list[Path] = []
-    for path in (Path(name) for name in paths if name is not None):
-        if path.resolve() in (other.resolve() for other in outputs):
+    outputs: list[str] = []
+    for path in (name for name in paths if name is not None):
+        real = os.path.realpath(path)
+        if real in outputs:
             raise ConfigError(f"two options name the same file {path}: name another for one of them")
-        if any(Path(source).is_file() and path.resolve() == Path(source).resolve() for source in sources):
+        if any(os.path.isfile(source) and real == os.path.realpath(source) for source in sources):
             raise ConfigError(f"{path} is what is read here: name another file")
-        if path.exists() and not overwrite:
+        if os.path.exists(path) and not overwrite:
             raise ConfigError(f"{path} already exists: name another file, or add --overwrite to replace it")
-        outputs.append(path)
+        outputs.append(real)

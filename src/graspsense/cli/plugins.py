@@ -11,8 +11,7 @@ import attrs
 import click
 
 from graspsense.cli.output import echo_json
-from graspsense.cli.subcommands import Subcommands
-from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, state_style
+from graspsense.cli.terminal import Style, Subcommands, echo, echo_entry, echo_table, state_style
 from graspsense.core.components.entries import TABLE_OF_ROLE
 from graspsense.core.components.firstparty import DISTRIBUTION, SHIPPED
 from graspsense.core.components.registry import (

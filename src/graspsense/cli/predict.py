@@ -13,12 +13,12 @@ from graspsense.cli.sources import SOURCES, source_argument, source_options, to_
 from graspsense.cli.target_value import predict_value
 from graspsense.cli.terminal import (
     Style,
-    correct_style,
     echo,
     echo_entries,
     echo_entry,
     echo_table,
     prediction_style,
+    state_style,
 )
 from graspsense.core.components.entries import ModelEntry
 from graspsense.core.components.registry import installed
@@ -142,7 +142,7 @@ def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) ->
         label = (labels[i], "yes" if prediction.label == labels[i] else "no") if labels else ()
         because = "; ".join(reason.words for reason in prediction.because)
         rows.append((str(i + 1), prediction.label, prediction.certainty_figure, *of_set, *label, because))
-    echo_table(header, rows, {"PREDICTION": prediction_style, "CORRECT": correct_style})
+    echo_table(header, rows, {"PREDICTION": prediction_style, "CORRECT": state_style})
     reasons = Counter(prediction.no_certainty for prediction in predictions if prediction.no_certainty)
     for reason, count in reasons.items():
         trials = "" if count == len(predictions) else f" for {count} of {len(predictions)} trials"

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from graspsense.cli.options import force_option, keys_option, plot_option
+from graspsense.cli.options import force_option, keys_option, pipeline_option, plot_option
 from graspsense.cli.output import echo_json
 from graspsense.cli.run import draw_grasp, print_trial
 from graspsense.core.components.registry import installed
@@ -19,9 +19,7 @@ from graspsense.core.values.trial import trial_as_json
 
 @click.command()
 @click.argument("recording", metavar="FILE.mcap|DIR#NUMBER|KIND:NAME")
-@click.option(
-    "--pipeline", metavar="NAME|FILE", help="Another pipeline.  [default: the one it was recorded with]"
-)
+@pipeline_option("Another pipeline.  [default: the one it was recorded with]", default=None)
 @keys_option("Set a key of the pipeline: -o features.pads=left.")
 @force_option
 @plot_option

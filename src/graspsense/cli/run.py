@@ -21,8 +21,8 @@ from graspsense.cli.terminal import (
     echo_entries,
     echo_entry,
     echo_table,
-    outcome_style,
     prediction_style,
+    state_style,
     talk,
     warn,
 )
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from graspsense.core.values.device import DeviceInfo
     from graspsense.core.values.features import Prediction
     from graspsense.report.film import Film
-    from graspsense.store.record_grasp import RecordedTrial
+    from graspsense.store.record_grasp import Beside
 
 Ended = tuple["Trial", bool, dict[str, Any] | None]
 """A trial, whether it was interrupted, and what is printed about the stored trial."""
@@ -124,15 +124,20 @@ def run(
     if dry_run:
         _say_what_would_be_done(settings, as_json)
         return
-    if label is not None and save is None:
-        raise click.UsageError("--label goes with a trial that is kept: add --save DIR")
+    if (label is not None or changed) and save is None:
+        given = "--changed" if label is None else "--label"
+        raise click.UsageError(f"{given} goes with a trial that is kept: add --save DIR")
     if beside is not None:
         _run_beside(settings, beside, save, label, as_json)
         return
     film = _film(picture, video, viewer)
     sinks: tuple[Sink, ...] = film if as_json else (LiveRows(), *film)
     with shown_live(live, save) as shown:
-        trial, interrupted, kept = _performed(settings, (*sinks, *shown.sinks), save, label, changed)
+        sinks = (*sinks, *shown.sinks)
+        if save is None:
+            trial, interrupted, kept = (*grasped(settings, sinks), None)
+        else:
+            trial, interrupted, kept = _kept(save, label, settings, sinks, changed=changed)
         if drawn is not None:
             talk(f"seed {drawn}, drawn for this trial; --seed {drawn} repeats the grasp")
         shown.finished(trial, save)
@@ -148,15 +153,6 @@ def run(
     finish(trial, interrupted, "" if kept is None else kept["problem"])
 
 
-def _performed(
-    settings: Settings, sinks: Sequence[Sink], save: str | None, label: str | None, changed: bool
-) -> Ended:
-    """Grasp, and return the trial, whether it was interrupted, and its place in a store if it is saved."""
-    if save is None:
-        return (*grasped(settings, sinks), None)
-    return _kept(save, label, settings, sinks, changed)
-
-
 def _run_beside(
     settings: Settings, pipeline: str, save: str | None, label: str | None, as_json: bool
 ) -> None:
@@ -165,13 +161,18 @@ def _run_beside(
     Ends the command with the exit code of the first trial that was not kept or did not end by itself.
     """
     from graspsense.core.grasp.pair import run_pair
+    from graspsense.store.record_grasp import Beside
 
     other, _ = _settings_to_run(save, label, {"pipeline": pipeline})
     check(other)
     recordings = _reserved(save)
 
     def grasp(member: Member, own: Settings, place: int) -> tuple[Ended, str]:
-        ended = _beside(member, own, save, label, recordings[place:] + recordings[:place])
+        if save is None:
+            ended: Ended = (*grasped(own, (), member), None)
+        else:
+            pair = Beside(member=member, recording=recordings[place], other=recordings[1 - place].name)
+            ended = _kept(save, label, own, beside=pair)
         trial = ended[0]
         failed = trial.outcome in (Outcome.ABORTED, Outcome.DEVICE_LOST)
         return ended, f"ended as {trial.outcome.words} ({trial.reason})" if failed else ""
@@ -198,36 +199,6 @@ def _reserved(save: str | None) -> tuple[Path, ...]:
     with Store.open(save) as store:
         made_at = datetime.now(UTC).isoformat(timespec="milliseconds")
         return store.new_recording(made_at), store.new_recording(made_at)
-
-
-def _beside(
-    member: Member, settings: Settings, save: str | None, label: str | None, recordings: Sequence[Path]
-) -> Ended:
-    """Grasp as one of a pair, and store the trial if it is to be kept; `recordings`: of this gripper and the other.
-
-    It is not compared with those that are in the store.
-    """
-    from graspsense.store.record_grasp import Beside, record_grasp
-    from graspsense.store.store import Store
-
-    if save is None:
-        return (*grasped(settings, (), member), None)
-    own, other = recordings
-    labels = {} if label is None else labels_of(label)
-    beside = Beside(member=member, recording=own, other=other.name)
-    with Store.open(save) as store:
-        grasp = record_grasp(store, settings, installed(), labels=labels, origin="run", beside=beside)
-    return grasp.trial, grasp.interrupted, {**_place(save, grasp), "beside": other.name}
-
-
-def _place(save: str, grasp: RecordedTrial) -> dict[str, Any]:
-    """Return what is printed about a stored trial."""
-    return {
-        "store": save,
-        "trial": grasp.number,
-        "recorder": dict(grasp.counts),
-        "problem": grasp.problem,
-    }
 
 
 def _as_json(trial: Trial, kept: Mapping[str, Any] | None) -> dict[str, Any]:
@@ -331,11 +302,18 @@ def _write_film(films: Sequence[Film], save: str | None, kept: dict[str, Any] | 
 
 
 def _kept(
-    save: str, label: str | None, settings: Settings, sinks: Sequence[Sink], changed: bool
-) -> tuple[Trial, bool, dict[str, Any]]:
+    save: str,
+    label: str | None,
+    settings: Settings,
+    sinks: Sequence[Sink] = (),
+    *,
+    changed: bool = False,
+    beside: Beside | None = None,
+) -> Ended:
     """Grasp and store the trial; return it, whether it was interrupted, and what to print about the stored trial.
 
-    Unless `changed`, settings and gripper must be those of the newest grasp in the store. Raises ConfigError.
+    Unless `changed`, or as one of a pair, settings and gripper must be those of the newest grasp in the store. Raises
+    ConfigError.
     """
     from graspsense.store.comparable import check_device, check_settings, newest_grasp
     from graspsense.store.record_grasp import record_grasp
@@ -343,7 +321,7 @@ def _kept(
 
     labels = {} if label is None else labels_of(label)
     with Store.open(save) as store:
-        earlier = None if changed else newest_grasp(store)
+        earlier = None if changed or beside is not None else newest_grasp(store)
         if earlier is not None:
             check_settings(store, earlier, settings)
 
@@ -354,20 +332,31 @@ def _kept(
                 check_device(store, earlier, device)
 
         grasp = record_grasp(
-            store, settings, installed(), labels=labels, origin="run", sinks=sinks, on_open=opened
+            *(store, settings, installed()),
+            labels=labels,
+            origin="run",
+            sinks=sinks,
+            on_open=opened,
+            beside=beside,
         )
-    if grasp.number is not None:
+    if grasp.number is not None and beside is None:  # those of a pair are told together
         talk(f"kept as trial {grasp.number} in {save}")
         if grasp.counts["dropped"]:
             warn(f"the recorder could not follow: {grasp.counts['dropped']} messages are missing")
-    return grasp.trial, grasp.interrupted, _place(save, grasp)
+    kept = {
+        "store": save,
+        "trial": grasp.number,
+        "recorder": dict(grasp.counts),
+        "problem": grasp.problem,
+    }
+    return grasp.trial, grasp.interrupted, kept if beside is None else {**kept, "beside": beside.other}
 
 
 def print_trial(trial: Trial, *, events: bool = True) -> None:
     """Print outcome, features, events, prediction, and what qualifies them."""
     echo()
     reason = f": {trial.reason}" if trial.reason else ""
-    echo_entry("outcome", f"{trial.outcome.words}{reason}", outcome_style(trial.outcome.words))
+    echo_entry("outcome", f"{trial.outcome.words}{reason}", state_style(trial.outcome.words))
     echo_entries("warning", trial.warnings, Style.CAUTION)
     features = trial.features
     rows, more = features.shown()

@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
-from graspsense.cli.options import SEED, dashed, force_option, keys_option, refuse_typed, typed
+from graspsense.cli.options import (
+    SEED,
+    dashed,
+    force_option,
+    keys_option,
+    pipeline_option,
+    refuse_typed,
+    typed,
+)
 from graspsense.cli.output import file_to_write
 from graspsense.cli.progress import ProgressLine
 from graspsense.core.components.entries import TABLE_OF_ROLE
@@ -19,6 +27,7 @@ from graspsense.core.settings.layers import Flag, Merged, option_layers, typed_p
 from graspsense.core.settings.resolved import Settings, default_paths, resolve
 from graspsense.core.settings.selected import SelectedComponent, build
 from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.printable import printable
 from graspsense.store.opening import STORE, as_source, store_folder
 
 if TYPE_CHECKING:
@@ -86,9 +95,7 @@ _OPTIONS: Final = (
         show_default=True,
         help="simulated: grasp each instance in all of its states, or in one only.",
     ),
-    click.option(
-        "--pipeline", metavar="NAME|FILE", default="default", help="simulated: pipeline.  [default: default]"
-    ),
+    pipeline_option("simulated: pipeline.  [default: default]"),
     click.option("--gripper", metavar="NAME", help="simulated: another simulated gripper. (gripper.type)"),
     click.option(
         "--only",
@@ -219,10 +226,10 @@ def trials_of(
     values = {
         **{key: given[key] for key in _SAME_KEYS},
         "source": source,
-        "columns": _names(given["features"]),
-        "before": _names(given["before"]),
+        "columns": _names("features", given),
+        "before": _names("before", given),
         "value": given["target_value"],
-        "objects": _names(given["objects"]),
+        "objects": _names("objects", given),
         "checkpoints_s": tuple(checkpoints_s),
     }
     try:
@@ -283,7 +290,7 @@ def detector_of(source: str, given: Mapping[str, Any]) -> SelectedComponent:
 
 
 def command_line(without: Sequence[str], command: str = "") -> str:
-    """Return the command that is running, or another one with its arguments, without some of its options."""
+    """Return the command that is running, or another one with its arguments, without some options, as printable."""
     context = click.get_current_context()
     words = ["graspsense", command or str(context.info_name)]
     by_user = set(typed()).difference(without)
@@ -298,7 +305,7 @@ def command_line(without: Sequence[str], command: str = "") -> str:
         else:
             for each in value if param.multiple else [value]:
                 words += [param.opts[0], str(each)]
-    return shlex.join(words)
+    return printable(shlex.join(words))
 
 
 def _refuse_misplaced(kind: str) -> None:
@@ -351,8 +358,14 @@ def _alone(table: str, name: str, given: Mapping[str, Any], source: str) -> Sele
     return SelectedComponent(component, build(component, values, force=given["force"]))
 
 
-def _names(text: str | tuple[str, ...] | None) -> tuple[str, ...]:
-    """Return the names in an option, or those that a model has."""
-    if isinstance(text, tuple):
-        return text
-    return tuple(name.strip() for name in text.split(",") if name.strip()) if text else ()
+def _names(option: str, given: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the names in an option, or those that a model has. Raises UsageError for an option without any."""
+    text = given[option]
+    if text is None or isinstance(text, tuple):
+        return text or ()
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    if not names:
+        raise click.UsageError(
+            f"{dashed(option)} {text!r} has no name: leave it out, or give names with commas"
+        )
+    return names

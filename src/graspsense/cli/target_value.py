@@ -22,14 +22,18 @@ from graspsense.evaluation.json_codec import to_json
 from graspsense.regression.results import RegressionEvaluation, error_of
 
 if TYPE_CHECKING:
-    from graspsense.core.learn.labelled import Labelled
     from graspsense.regression.model import PredictedValue, RegressionModel
 
 _FOR_LABELS: Final = ("png", "target", "checkpoints")
 
 
-def refuse_options_for_labels(options: Sequence[str]) -> None:
-    """Refuse options that mean nothing for a number. Raises UsageError."""
+def _estimator(named: str | None, options: Sequence[str]) -> str:
+    """Return the estimator that is named, or the default one, before any trial is read.
+
+    Raises UsageError for options that mean nothing for a number, ConfigError for an unknown estimator.
+    """
+    from graspsense.regression.estimators import DEFAULT_ESTIMATOR, check_estimator
+
     refuse_typed(_FOR_LABELS, "is for labels, and --target-value names a number")
     for option in options:
         if option.partition(".")[0].strip() == "classifier":
@@ -37,22 +41,23 @@ def refuse_options_for_labels(options: Sequence[str]) -> None:
                 f"-o {option}: the estimators of numbers have no settings; select one with --classifier",
                 click.get_current_context(),
             )
+    if named is None:
+        return DEFAULT_ESTIMATOR
+    check_estimator(named)
+    return named
 
 
 def evaluate_value(
     source: str, estimator: str | None, folds: int, keep: str | None, as_json: bool, given: Mapping[str, Any]
 ) -> None:
     """Cross-validate the prediction of a number, and print it."""
-    from graspsense.regression.estimators import DEFAULT_ESTIMATOR
     from graspsense.regression.evaluate import evaluate_regression
 
-    refuse_options_for_labels(given["options"])
+    chosen = _estimator(estimator, given["options"])
     with ProgressLine() as progress:
-        labelled = _trials(source, estimator, progress, given)
+        labelled = trials_of(source, progress, given)
         keep_features(keep, labelled)
-        evaluation = evaluate_regression(
-            estimator or DEFAULT_ESTIMATOR, labelled, folds=folds, seed=given["seed"], progress=progress
-        )
+        evaluation = evaluate_regression(chosen, labelled, folds=folds, seed=given["seed"], progress=progress)
     if as_json:
         echo_json(to_json(evaluation))
     else:
@@ -64,16 +69,15 @@ def train_value(
 ) -> None:
     """Train a model of a number, write it, and print what it was trained on."""
     from graspsense.core.learn.conformal import COVERAGE
-    from graspsense.regression.estimators import DEFAULT_ESTIMATOR
     from graspsense.regression.model import train_regression, write_regression
 
-    refuse_options_for_labels(given["options"])
+    chosen = _estimator(estimator, given["options"])
     with ProgressLine() as progress:
-        labelled = _trials(source, estimator, progress, given)
+        labelled = trials_of(source, progress, given)
     notes = list(labelled.notes)
     with gathered_warnings(notes):
         model = train_regression(
-            estimator or DEFAULT_ESTIMATOR,
+            chosen,
             labelled,
             name=Path(out).stem,
             seed=given["seed"],
@@ -159,14 +163,6 @@ def predict_value(model_name: str, source: str, as_json: bool, given: Mapping[st
     echo_entry("model", model.in_a_line)
     echo_entries("warning", warnings, Style.CAUTION)
     echo_entries("note", notes)
-
-
-def _trials(source: str, estimator: str | None, progress: ProgressLine, given: Mapping[str, Any]) -> Labelled:
-    from graspsense.regression.estimators import check_estimator
-
-    if estimator is not None:
-        check_estimator(estimator)
-    return trials_of(source, progress, given)
 
 
 def _print_predictions(

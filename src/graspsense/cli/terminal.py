@@ -49,11 +49,8 @@ _SHORT: Final = 24
 _DEFAULT_WIDTH: Final = 80
 _NUMBER: Final = re.compile(r"[+−-]?[0-9]+([.][0-9]+)?( ?[%\w/]{1,4})?")
 
-_OUTCOMES: Final = {"steady": Style.GOOD, "aborted": Style.BAD, "device lost": Style.BAD}
-_STATES: Final = {
-    "loaded": Style.GOOD, "ready": Style.GOOD, "pass": Style.GOOD, "ok": Style.GOOD,
-    "broken": Style.BAD, "fail": Style.BAD, "failed": Style.BAD, "problem": Style.BAD, "PROBLEM": Style.BAD,
-}  # fmt: skip
+_GOOD: Final = frozenset({"loaded", "ready", "pass", "ok", "steady", "yes"})
+_BAD: Final = frozenset({"broken", "fail", "failed", "problem", "PROBLEM", "aborted", "device lost", "no"})
 
 StyleOf = Callable[[str], Style | None]
 """Returns the style of a cell with this text."""
@@ -314,9 +311,15 @@ def _no_style(_text: str) -> None:
     return None
 
 
-def outcome_style(outcome: str) -> Style:
-    """Return the style of how a grasp ended."""
-    return _OUTCOMES.get(outcome, Style.CAUTION)
+class Subcommands(click.Group):
+    """A group whose help has the whole first sentence of each subcommand; click cuts it to one line."""
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the list of subcommands for the help."""
+        with formatter.section("Commands"):
+            formatter.write_dl(
+                [(name, self.commands[name].get_short_help_str(10_000)) for name in self.list_commands(ctx)]
+            )
 
 
 def prediction_style(label: str) -> Style:
@@ -324,11 +327,6 @@ def prediction_style(label: str) -> Style:
     return Style.CAUTION if label == "unknown" else Style.RESULT
 
 
-def correct_style(answer: str) -> Style:
-    """Return the style of whether a prediction is correct, yes or no."""
-    return Style.GOOD if answer == "yes" else Style.BAD
-
-
 def state_style(state: str) -> Style:
-    """Return the style of the state of a plugin, a device, a check or a finding."""
-    return _STATES.get(state, Style.CAUTION)
+    """Return the style of a state: of a plugin, a device, a check, a finding or a grasp, or of an answer, yes or no."""
+    return Style.GOOD if state in _GOOD else Style.BAD if state in _BAD else Style.CAUTION

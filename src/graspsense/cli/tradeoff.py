@@ -11,8 +11,7 @@ from graspsense.cli.experiment import experiment
 from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json
 from graspsense.cli.progress import ProgressLine
-from graspsense.cli.subcommands import Subcommands
-from graspsense.cli.terminal import echo, echo_table
+from graspsense.cli.terminal import Subcommands, echo, echo_table
 
 
 @click.group(cls=Subcommands)

@@ -10,8 +10,7 @@ import click
 
 from graspsense.cli.output import echo_json
 from graspsense.cli.sources import named_store
-from graspsense.cli.subcommands import Subcommands
-from graspsense.cli.terminal import echo, echo_table
+from graspsense.cli.terminal import Subcommands, echo, echo_table
 from graspsense.core.learn.target_value import value_label
 from graspsense.core.settings.resolved import settings_from
 from graspsense.core.values.errors import ConfigError, GraspsenseError

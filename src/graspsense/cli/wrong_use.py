@@ -14,7 +14,7 @@ from graspsense.core.settings.layers import read_toml, toml_kind
 from graspsense.core.values.errors import GraspsenseError
 
 
-def advice(error: Exception, arguments: Sequence[str]) -> list[str]:
+def advice(error: BaseException, arguments: Sequence[str]) -> list[str]:
     """Return what to type instead of these arguments of the program, which were refused with this error."""
     advised = list(_split_options(arguments))
     if isinstance(error, PermissionError):

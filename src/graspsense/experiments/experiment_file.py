@@ -12,7 +12,7 @@ from attrs import evolve
 
 from graspsense.core.components.entries import ExperimentEntry
 from graspsense.core.components.registry import Resource, installed
-from graspsense.core.components.strict import InvalidValue, ValidationFailed, key_paths, keys_of, structured
+from graspsense.core.components.strict import InvalidValue, ValidationFailed, all_keys, keys_of, structured
 from graspsense.core.settings.layers import Layer, Merged, option_layers, read_toml, typed_path
 from graspsense.core.settings.resolved import Settings, default_paths
 from graspsense.core.values.errors import ConfigError, GraspsenseError, UnknownName
@@ -90,10 +90,10 @@ def read_experiment(
 
 def _known_paths(values: Mapping[str, Any]) -> list[str]:
     """Return the paths of the keys that the tables of an experiment can have, for one that is misspelt."""
-    paths = [*key_paths(keys_of(TrialSource), "data"), *key_paths(keys_of(TrialSource), "test")]
+    paths = [*all_keys(keys_of(TrialSource), "data"), *all_keys(keys_of(TrialSource), "test")]
     with suppress(GraspsenseError):
         kind = kind_of(str(values.get("kind", "recognise")))
-        paths += key_paths(keys_of(kind.keys_class()), "judge")
+        paths += all_keys(keys_of(kind.keys_class()), "judge")
     return [*paths, *default_paths(PIPELINE_TABLES)]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from typing import Final
 
@@ -10,17 +10,11 @@ import numpy as np
 
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.features import FeatureTable
-from graspsense.core.values.signals import CHANNELS, Frame
+from graspsense.core.values.signals import CHANNEL_OF_FIELD, CHANNELS, Frame
 from graspsense.recording.reader import read_first_frame, read_recorded
 from graspsense.store.store import Store
 
-_FIELDS: Final[Mapping[str, str]] = {
-    "gap": "gap_m",
-    "velocity": "velocity_m_s",
-    "effort": "effort_n",
-    "force_left": "force_left_n",
-    "force_right": "force_right_n",
-}
+_FIELDS: Final = {channel: field for field, channel in CHANNEL_OF_FIELD.items() if "edge" not in channel}
 """Channel to its field of a frame."""
 NAMES: Final = tuple(f"{channel}_first" for channel in _FIELDS)
 UNITS: Final = tuple(CHANNELS[channel] for channel in _FIELDS)

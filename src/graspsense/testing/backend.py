@@ -34,7 +34,7 @@ from graspsense.testing.checks import (
     leaving_no_thread,
     raises_nothing,
 )
-from graspsense.testing.gentle import EFFORT_N, FORCE_N, REST_S, GentleController, kind_of
+from graspsense.testing.laws import EFFORT_N, FORCE_N, REST_S, GentleController, kind_of
 from graspsense.testing.session import TIMEOUT_S, description, next_reading, opened, readings_of
 from graspsense.testing.subject import Subject
 
@@ -47,7 +47,10 @@ LONGEST_OPEN_S: Final = 10.0
 def describes_itself(subject: Subject) -> None:
     """`open` returns a DeviceInfo with a name, a rate and limits above zero, of the right types."""
     info = subject.session.info
-    demand(bool(info.name), "DeviceInfo has no name: say what the gripper is")
+    demand(
+        bool(info.name.strip()) and info.name.isprintable(),
+        f"DeviceInfo has the name {info.name!r}: say in one line what the gripper is",
+    )
     demand(
         info.clock in ("virtual", "device"),
         f"clock is {info.clock!r}: 'device' where a read waits for the gripper, 'virtual' where apply-then-read "

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import locale
 import os
 import random
+import signal
 import threading
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -116,6 +118,8 @@ def _leaving_nothing() -> Iterator[None]:
         )
     changed = [name for name, value in _process_state().items() if value != earlier[name]]
     os.chdir(earlier["the working folder"])
+    if "the handler of Ctrl-C" in changed:
+        signal.signal(signal.SIGINT, earlier["the handler of Ctrl-C"])
     demand(
         not changed,
         f"it changes {', '.join(changed)} for the whole process: give it back, or work without it (a context as "
@@ -149,6 +153,8 @@ def leaving_no_thread(doing: str) -> Iterator[None]:
 def _process_state() -> dict[str, Any]:
     return {
         "the working folder": os.getcwd(),
+        "the handler of Ctrl-C": signal.getsignal(signal.SIGINT),
+        "the locale": locale.setlocale(locale.LC_ALL),
         "np.seterr": np.geterr(),
         "the random numbers of numpy": repr(np.random.get_state()),  # noqa: NPY002 (that others draw)
         "the random numbers of Python": random.getstate(),

@@ -13,7 +13,7 @@ from graspsense.core.values.signals import (
     Command,
 )
 from graspsense.testing.checks import CheckSkipped, demand, raises_nothing
-from graspsense.testing.gentle import EFFORT_N, FORCE_N, kind_of
+from graspsense.testing.laws import EFFORT_N, FORCE_N, kind_of
 from graspsense.testing.session import TIMEOUT_S, Session, limits_of, opened, use
 from graspsense.testing.subject import Subject
 

@@ -11,7 +11,7 @@ from typing import Any, Final
 import attrs
 
 from graspsense.core.components.setting import unit_of_name
-from graspsense.core.components.strict import keys_of, plain
+from graspsense.core.components.strict import all_keys, keys_of, plain
 from graspsense.core.files.toml_text import toml_lines
 from graspsense.core.settings.selected import build
 from graspsense.core.values.errors import ConfigError, PluginUnavailable
@@ -70,7 +70,7 @@ def settings_have_types(subject: Subject) -> None:
 
 def settings_declare_their_meaning(subject: Subject) -> None:
     """Every key declares its meaning with `setting`, and its unit if its name ends in one."""
-    for key, declaration in _all_keys(keys_of(subject.component.config_class())):
+    for key, declaration in all_keys(keys_of(subject.component.config_class())).items():
         where, name = f"key {key!r}", key.rpartition(".")[2]
         demand(
             bool(declaration["meaning"]),
@@ -84,14 +84,6 @@ def settings_declare_their_meaning(subject: Subject) -> None:
             f'{where} ends like a value in {unit} and declares no unit: add unit="{unit}" to its `setting`, or '
             "rename it",
         )
-
-
-def _all_keys(
-    keys: Mapping[str, Mapping[str, Any]], above: str = ""
-) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    for key, declaration in keys.items():
-        yield above + key, declaration
-        yield from _all_keys(declaration.get("keys", {}), f"{above}{key}.")
 
 
 def defaults_are_what_their_types_say(subject: Subject) -> None:

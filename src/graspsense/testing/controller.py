@@ -22,6 +22,7 @@ from graspsense.core.grasp.runner import run_uninterrupted
 from graspsense.core.values.channel import Channel
 from graspsense.core.values.signals import (
     APPROACH,
+    CHANNEL_OF_FIELD,
     EFFORT,
     FORCE,
     HOLD,
@@ -37,13 +38,22 @@ from graspsense.core.values.signals import (
     no_pads,
 )
 from graspsense.testing.checks import CheckFailed, demand, raises_nothing
-from graspsense.testing.model_gripper import CELLS, CHANNELS_OF_FIELD, OBJECTS, model_gripper
+from graspsense.testing.model_gripper import CELLS, OBJECTS, model_gripper
 from graspsense.testing.subject import Subject
 
 TICKS: Final = 4000
 LONGEST_S: Final = 60.0
 GREATEST: Final = {VELOCITY: 5.0, POSITION: 0.5}
 """The greatest rate of a gap (m/s) and the greatest gap (m) that make sense."""
+LATE_S: Final = 4096.0
+"""The time at the first tick of a gripper whose clock has run for an hour."""
+SAME_LENGTH: Final = 0.02
+"""Relative difference in length of two grasps that differ by rounding."""
+ASKED: Final = (
+    *("asked_force_n", "gentlest_force_n", "asked_speed_m_s", "asked_step_m", "asked_interval_s"),
+    "contact_force_n",
+)
+"""The methods by which a law says what it asks of a gripper."""
 FORCES: Final = slice(5, 9)
 """The forces of a frame, on pads and edges."""
 
@@ -71,15 +81,20 @@ def ticks_of(subject: Subject, object_name: str = "a soft object") -> list[Tick]
 
 
 def fresh_ticks(
-    subject: Subject, object_name: str = "a soft object", channels: Any = None, from_tick: int = 0
+    subject: Subject,
+    object_name: str = "a soft object",
+    channels: Any = None,
+    from_tick: int = 0,
+    first_t_s: float = 0.0,
 ) -> list[Tick]:
-    """Return the same ticks as `ticks_of`, computed again.
+    """Return the same ticks as `ticks_of`, computed again, the first of them at the time `first_t_s`.
 
     Before tick `from_tick`, if given, the state is rebuilt from plain numbers.
     """
     law = subject.create()
     step, params, state = type(law).step, law.params(), law.init()
     gripper = model_gripper(_all_channels(subject) if channels is None else channels, object_name)
+    gripper.first_t_s = first_t_s
     gripper.open(0)
     gripper.tare([])
     ticks: list[Tick] = []
@@ -109,7 +124,7 @@ def fresh_ticks(
 
 def _demand_command(command: Any) -> None:
     demand(
-        isinstance(command, tuple) and len(command) == len(Command._fields),
+        isinstance(command, Command),
         f"step returned {command!r} as the command: return graspsense.plugin_api.Command(kind, value, effort limit, "
         "speed limit)",
     )
@@ -118,10 +133,15 @@ def _demand_command(command: Any) -> None:
         f"the kind of a command is {command[0]!r} ({type(command[0]).__name__}): use the integers EFFORT, VELOCITY, "
         "POSITION, FORCE of plugin_api",
     )
+    for name, number in zip(Command._fields[1:], command[1:], strict=True):
+        demand(
+            type(number) is float,
+            f"{name} of a command is {number!r} of type {type(number).__name__}: write a float",
+        )
 
 
 def _all_channels(subject: Subject) -> set[str | Channel]:
-    return {*CHANNELS_OF_FIELD.values(), "pads", *further(subject.entry.requires)}
+    return {*CHANNEL_OF_FIELD.values(), "pads", *further(subject.entry.requires)}
 
 
 def _made_again(value: Any) -> Any:
@@ -232,17 +252,7 @@ def types_do_not_change(subject: Subject) -> None:
 
 def commands_are_numbers(subject: Subject) -> None:
     """Every command is a Command with an integer kind and three floats."""
-    for tick in ticks_of(subject):
-        command = tick.command
-        demand(
-            isinstance(command, Command), f"step returned {command!r}: return graspsense.plugin_api.Command"
-        )
-        for name in ("value", "effort_limit_n", "speed_limit_m_s"):
-            number = getattr(command, name)
-            demand(
-                type(number) is float,
-                f"{name} of a command is {number!r} of type {type(number).__name__}: write a float",
-            )
+    ticks_of(subject)
 
 
 def commands_are_of_declared_kinds(subject: Subject) -> None:
@@ -322,6 +332,18 @@ def requires_what_it_reads(subject: Subject) -> None:
     )
 
 
+def independent_of_the_start_of_the_clock(subject: Subject) -> None:
+    """On a gripper whose clock has run for an hour, a grasp takes as long and ends as on a new one."""
+    early, late = ticks_of(subject), fresh_ticks(subject, first_t_s=LATE_S)
+    demand(
+        abs(len(late) - len(early)) <= SAME_LENGTH * len(early)
+        and late[-1].after.outcome == early[-1].after.outcome,
+        f"a grasp whose first frame is of {LATE_S:g} s ends as {late[-1].after.outcome} after {len(late)} ticks, and "
+        f"one from 0 s on as {early[-1].after.outcome} after {len(early)}: keep the time of the first frame in the "
+        "state, and use differences of times",
+    )
+
+
 def handles_frames_of_nan(subject: Subject) -> None:
     """A frame of NaN does not raise, and gives a command."""
     law = subject.create()
@@ -334,8 +356,14 @@ def handles_frames_of_nan(subject: Subject) -> None:
 
 
 def says_what_it_asks_for(subject: Subject) -> None:
-    """`asked_force_n` and `asked_speed_m_s` say the force of the squeeze and the speed that it commands, if any."""
+    """What it asks for are numbers; the force of the squeeze and the speed are those that it commands, if any."""
     law = subject.create()
+    for name in ASKED:
+        number = getattr(law, name)()
+        demand(
+            number is None or (type(number) in (float, int) and 0.0 <= number < inf),
+            f"{name} returns {number!r}: return a number in SI units, or None",
+        )
     forces, speeds = [], []
     for tick in (tick for thing in OBJECTS for tick in ticks_of(subject, thing)):
         kind, value, effort_limit_n, speed_limit_m_s = tick.command
@@ -348,9 +376,11 @@ def says_what_it_asks_for(subject: Subject) -> None:
         ("speed", "m/s", law.asked_speed_m_s(), speeds, 1.0 + 1e-9),
     ):
         most = max((limit for limit in commanded if limit < inf), default=0.0)
+        if most == 0.0:
+            continue
         name = f"asked_{what}_{unit.replace('/', '_').lower()}"
         demand(
-            most == 0.0 or asked is not None,
+            asked is not None,
             f"it commands a {what} of {most:g} {unit}, and {name} returns None: return that {what}, so that a gripper "
             "that cannot do as little is refused before it moves",
         )
@@ -360,7 +390,7 @@ def says_what_it_asks_for(subject: Subject) -> None:
         )
         fits = asked is None or (most <= margin * asked if what == "force" else asked <= margin * extreme)
         demand(
-            most == 0.0 or fits,
+            fits,
             f"{name} returns {asked} {unit}, and it commands {extreme:g} {unit}: return the {what} that it commands",
         )
 

@@ -14,6 +14,7 @@ from graspsense.core.grasp.runner import Grasp, run_uninterrupted
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.signals import (
+    CHANNEL_OF_FIELD,
     EFFORT,
     FORCE,
     POSITION,
@@ -39,15 +40,6 @@ TICKS_OF_AN_IMAGE: Final = 41
 CELLS: Final = 22
 FIRST_PAD_CELL: Final = 7
 """Cells of a fingertip of the bench, where the channels do not say how many, and the first on the gripping face."""
-CHANNELS_OF_FIELD: Final = {
-    "gap_m": "gap",
-    "velocity_m_s": "velocity",
-    "effort_n": "effort",
-    "force_left_n": "force_left",
-    "force_right_n": "force_right",
-    "edge_left_n": "edge_left",
-    "edge_right_n": "edge_right",
-}
 
 
 class ModelGripper(SensorBackend[None]):
@@ -56,11 +48,14 @@ class ModelGripper(SensorBackend[None]):
     Between its fingers is an object of width `width_m` (0: nothing) and stiffness `stiffness_n_m`.
     """
 
+    first_t_s = 0.0
+    """The time (s) of its first tick."""
+
     def __init__(self, channels: frozenset[str | Channel], width_m: float, stiffness_n_m: float) -> None:
         super().__init__(None)
         declared = [channel for channel in channels if isinstance(channel, Channel)]
         names = {channel.name if isinstance(channel, Channel) else channel for channel in channels}
-        self._absent = [field for field, name in CHANNELS_OF_FIELD.items() if name not in names]
+        self._absent = [field for field, name in CHANNEL_OF_FIELD.items() if name not in names]
         self._has_pads = "pads" in names
         arrays = [
             channel.cells
@@ -94,7 +89,7 @@ class ModelGripper(SensorBackend[None]):
         del timeout_s
         force = self._force()
         frame = Frame(
-            t_s=self._ticks * DT_S,
+            t_s=self.first_t_s + self._ticks * DT_S,
             dt_s=DT_S,
             gap_m=self._gap,
             velocity_m_s=self._speed,

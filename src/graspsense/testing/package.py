@@ -20,6 +20,8 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import unquote, urlparse
 
+import click
+
 from graspsense.core.components.entries import ConformanceCheckEntry, ExperimentKindEntry, PipelineEntry
 from graspsense.core.components.moved_names import new_form
 from graspsense.core.components.registry import SLOW_IMPORT_S, Resource
@@ -29,7 +31,7 @@ from graspsense.core.values.errors import GraspsenseError
 from graspsense.testing.checks import Check, CheckFailed, CheckSkipped, demand, raises_nothing
 from graspsense.testing.component import ADVICE_ON_IMPORTS
 from graspsense.testing.samples import a_trial, an_event
-from graspsense.testing.subject import Package
+from graspsense.testing.subject import Package, printed_afresh
 
 OBSERVERS: Final = ("graspsense_run_starting", "graspsense_grasp_event", "graspsense_run_finished")
 PROBE_S: Final = 1.0
@@ -45,21 +47,11 @@ def plugins_load(package: Package) -> None:
     for status in package.statuses:
         demand(
             status.state == "loaded",
-            f"{status.entry_point} = {status.module} is {status.state}: {status.reason}{_place(status.traceback)}"
+            f"{status.entry_point} = {status.module} is {status.state}: {status.reason}"
             + (f"\n    {ADVICE_ON_IMPORTS}" if "ModuleNotFoundError" in status.reason else "")
             + names,
         )
     demand(not old, f"it imports what is elsewhere now{names}")
-
-
-def _place(traceback: str) -> str:
-    """Return the last place of a traceback within the files of the plugin, in words."""
-    own = [
-        (path, line)
-        for path, line in re.findall(r'File "([^"<]+)", line (\d+)', traceback)
-        if not {"graspsense", "attr", "pluggy", "importlib"} & set(Path(path).parts)
-    ]
-    return f"\n    in {own[-1][0]}, line {own[-1][1]}" if own else ""
 
 
 def plugin_modules_are_light(package: Package) -> None:
@@ -67,23 +59,19 @@ def plugin_modules_are_light(package: Package) -> None:
     code = (
         "import json, sys\n"
         "import graspsense.core.components.registry as p\n"
-        "found = p.installed()\n"
-        "mine = [s for s in found.statuses if s.distribution == sys.argv[1]]\n"
-        "took = max([s.import_s for s in mine] or [0.0])\n"
-        "print(json.dumps({'heavy': sorted(p.HEAVY & set(sys.modules)), 'took': took}))"
+        "name = sys.stdin.read()\n"
+        "took = [s.import_s for s in p.installed().statuses if s.distribution == name]\n"
+        "print(json.dumps({'heavy': sorted(p.HEAVY & set(sys.modules)), 'took': max(took, default=0.0)}))"
     )
-    environ = {**os.environ, "PYTHONPATH": os.pathsep.join(place for place in sys.path if place)}
-    environ |= {"GRASPSENSE_PLUGINS": package.distribution}
-    environ.pop("GRASPSENSE_TRACE_PLUGINS", None)
-    ran = subprocess.run(
-        [sys.executable, "-P", "-c", code, package.distribution],
-        env=environ,
-        capture_output=True,
-        text=True,
-        check=False,
+    listed = json.loads(
+        printed_afresh(
+            code,
+            given=package.distribution.encode(),
+            PYTHONPATH=os.pathsep.join(place for place in sys.path if place),
+            GRASPSENSE_PLUGINS=package.distribution,
+            GRASPSENSE_TRACE_PLUGINS="",
+        )
     )
-    demand(ran.returncode == 0, f"listing it in a fresh interpreter failed: {ran.stderr.strip()[-300:]}")
-    listed = json.loads(ran.stdout.splitlines()[-1])
     demand(
         not listed["heavy"],
         f"listing it imports {', '.join(listed['heavy'])}: in the module of the entry point import "
@@ -101,7 +89,12 @@ def everything_declared_loads(package: Package) -> None:
         if resource.is_file:
             resource.file()
         for part in resource.targets:
-            resource.load(part)
+            loaded = resource.load(part)
+            what = "a click command" if resource.kind == "command" else "a function or a class"
+            demand(
+                callable(loaded) and (what != "a click command" or isinstance(loaded, click.Command)),
+                f"{getattr(resource.entry, part)}, `{part}` of {resource.qualified}, is {loaded!r:.60}: name {what}",
+            )
         if isinstance(resource.entry, ExperimentKindEntry):
             for part in {"keys", "result"} & set(resource.targets):
                 resource.class_of_kind(part)

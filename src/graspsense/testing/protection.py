@@ -10,15 +10,14 @@ from graspsense.core.components.entries import KINDS
 from graspsense.core.components.roles import Controller, SensorBackend
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.control.contact import CONTACT_FORCE_N
-from graspsense.core.grasp.protection.effort_ceiling import effort_ceiling_n
+from graspsense.core.grasp.protection.effort_ceiling import asked_effort_n, effort_ceiling_n
 from graspsense.core.grasp.protection.touch import MOST_S
 from graspsense.core.grasp.runner import Grasp, run_grasp
 from graspsense.core.grasp.wrapped_gripper import WrappedGripper
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.signals import EFFORT, FORCE, Command, Outcome, Pads, Reading
 from graspsense.testing.checks import CheckSkipped, demand
-from graspsense.testing.gentle import GentleController, kind_of
-from graspsense.testing.hostile import HOSTILE, HostileController
+from graspsense.testing.laws import HOSTILE, GentleController, HostileController, kind_of
 from graspsense.testing.subject import Subject
 
 RUN: Final = RunConfig(grasp_timeout_s=1.0, opening_timeout_s=1.0)
@@ -126,14 +125,11 @@ def hostile_laws_stay_below_the_ceiling(subject: Subject) -> None:
             f"a law that commands {name} ended as {grasp.outcome.words}",
         )
         ceiling_n = effort_ceiling_n(grasp.device, controller, RUN)
+        own = [usual[:2] for usual in (grasp.device.opening, grasp.device.relaxed) if usual is not None]
         for command in gripper.commands:
-            effort_n = command.value if command.kind in (EFFORT, FORCE) else command.effort_limit_n
-            usual = (grasp.device.opening, grasp.device.relaxed)
-            opens = any(
-                usual_command is not None and command[:2] == usual_command[:2] for usual_command in usual
-            )
+            effort_n = asked_effort_n(command)
             demand(
-                opens or effort_n <= ceiling_n,
+                command[:2] in own or effort_n <= ceiling_n,
                 f"a law that commands {name} by {KINDS[kind]} squeezed with {effort_n:g} N, {ceiling_n:g} N is allowed",
             )
         _demand_released(gripper, f"a law that commands {name}")

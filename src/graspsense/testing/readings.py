@@ -15,6 +15,7 @@ from graspsense.core.components.delivered import Delivered
 from graspsense.core.values.channel import FLOATS, Channel, FastChannel, TactileArray
 from graspsense.core.values.fingers import fingers_of, opposed_forces
 from graspsense.core.values.signals import (
+    CHANNEL_OF_FIELD,
     CHANNELS,
     Frame,
     Image,
@@ -22,7 +23,6 @@ from graspsense.core.values.signals import (
     Samples,
 )
 from graspsense.testing.checks import CheckFailed, CheckSkipped, demand
-from graspsense.testing.model_gripper import CHANNELS_OF_FIELD
 from graspsense.testing.session import opened, sums_of
 from graspsense.testing.subject import Subject
 
@@ -61,7 +61,7 @@ def channels_are_those_declared(subject: Subject) -> None:
     session = subject.session
     declared = {channel.name for channel in subject.entry.channels}
     recording = session.info.opening is None
-    for name, channel in CHANNELS_OF_FIELD.items():
+    for name, channel in CHANNEL_OF_FIELD.items():
         values = [getattr(frame, name) for frame in session.frames]
         if channel not in declared:
             demand(

@@ -32,7 +32,7 @@ from graspsense.recording.replayable import Recording
 from graspsense.recording.trial_record import TrialRecord
 from graspsense.sources.recordings.replay import read_named
 from graspsense.testing.checks import CheckFailed, demand
-from graspsense.testing.gentle import GentleController, kind_of
+from graspsense.testing.laws import GentleController, kind_of
 from graspsense.testing.subject import Subject
 
 

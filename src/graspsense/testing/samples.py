@@ -15,15 +15,15 @@ from graspsense.core.components.channels import further
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.features import Features, FeatureTable
-from graspsense.core.values.signals import EFFORT, Command, GraspEvent, Outcome, Pads, Phase
+from graspsense.core.values.signals import CHANNEL_OF_FIELD, EFFORT, Command, GraspEvent, Outcome, Pads, Phase
 from graspsense.core.values.signals import Frame as _Frame
 from graspsense.core.values.trace import PAD_COLUMNS, ImageTrace, SampleTrace, SignalTrace, Trace, trace_of
 from graspsense.core.values.trial import RunInfo, Trial
-from graspsense.testing.model_gripper import CELLS, CHANNELS_OF_FIELD, FIRST_PAD_CELL
+from graspsense.testing.model_gripper import CELLS, FIRST_PAD_CELL
 
 RATE_HZ: Final = 500.0
 COLUMNS_OF_CHANNEL: Final = {
-    **{channel: (column,) for column, channel in CHANNELS_OF_FIELD.items()},
+    **{channel: (column,) for column, channel in CHANNEL_OF_FIELD.items()},
     "pads": PAD_COLUMNS,
 }
 """The columns of a trace for each channel."""

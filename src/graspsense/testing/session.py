@@ -21,7 +21,7 @@ from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import GraspsenseError, RecordingEnded
 from graspsense.core.values.signals import Command, Frame, Image, Pads, Reading
 from graspsense.testing.checks import CheckFailed
-from graspsense.testing.gentle import EFFORT_N, closing, kind_of
+from graspsense.testing.laws import EFFORT_N, closing, kind_of
 
 TIMEOUT_S: Final = 0.1
 OPENING_S: Final = 1.0

@@ -6,7 +6,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from importlib import import_module
 from typing import Any
@@ -14,7 +14,7 @@ from typing import Any
 from attrs import asdict, define, field
 
 from graspsense.core.components.channels import as_json, from_json
-from graspsense.core.components.entries import ROLES, Feature, Role
+from graspsense.core.components.entries import ROLES, Role
 from graspsense.core.components.registry import Component, Plugins, PluginStatus, Resource, canonical
 from graspsense.core.settings.selected import build
 from graspsense.testing.checks import CheckFailed
@@ -92,35 +92,38 @@ def elsewhere(subject: Subject, what: Callable[[Subject], str]) -> str:
     """Return what a module function gives in a fresh interpreter, at another time of the day and of other hashes."""
     code = (
         "import json, sys; given = json.load(sys.stdin); sys.path[:] = given.pop('path')"
-        "; from graspsense.testing.subject import answer; answer(**given)"
+        "; from graspsense.testing.subject import answer; print('\\n' + answer(**given))"
     )
     entry = asdict(subject.entry, recurse=False)
-    listed: dict[str, Callable[[Any], Any]] = {"requires": as_json, "features": asdict}
-    entry |= {name: [plain(part) for part in entry[name]] for name, plain in listed.items() if name in entry}
+    if "requires" in entry:  # of a feature set, whose features are not asked for
+        entry |= {"requires": [*map(as_json, entry["requires"])], "features": ()}
     given = {"role": subject.role, "entry": entry, "keys": dict(subject.keys), "path": sys.path}
+    given |= {"module": what.__module__, "name": what.__name__}
+    return printed_afresh(code, given=json.dumps(given).encode(), PYTHONHASHSEED="77", TZ="ELSEWHERE-13")
+
+
+def answer(role: Role, entry: dict[str, Any], keys: Mapping[str, Any], module: str, name: str) -> str:
+    """Return what `elsewhere` was asked for; it made the arguments."""
+    if "requires" in entry:
+        entry |= {"requires": tuple(map(from_json, entry["requires"])), "features": ()}
+    component = Component(ROLES[role].entry(**entry), "elsewhere", "0")
+    text: str = getattr(import_module(module), name)(Subject(component=component, keys=keys))
+    return text
+
+
+def printed_afresh(code: str, *, given: bytes = b"", **environ: str) -> str:
+    """Return the last line that this code prints in a fresh interpreter, which reads `given`. Raises CheckFailed."""
     ran = subprocess.run(
         [sys.executable, "-P", "-c", code],
-        input=json.dumps({**given, "what": [what.__module__, what.__name__]}),
-        env={**os.environ, "PYTHONHASHSEED": "77", "TZ": "ELSEWHERE-13"},
+        input=given,
+        env={**os.environ, **environ},
         capture_output=True,
-        text=True,
         check=False,
     )
     if ran.returncode:
-        raise CheckFailed(f"it fails in a fresh interpreter: {ran.stderr.strip()[-300:]}")
-    return ran.stdout.rpartition("\n")[2]
-
-
-def answer(role: Role, entry: dict[str, Any], keys: Mapping[str, Any], what: Sequence[str]) -> None:
-    """Print what `elsewhere` was asked for; it made the arguments."""
-    listed: dict[str, Callable[[Any], Any]] = {
-        "requires": from_json,
-        "features": lambda given: Feature(**given),
-    }
-    entry |= {name: tuple(map(made, entry[name])) for name, made in listed.items() if name in entry}
-    component = Component(ROLES[role].entry(**entry), "elsewhere", "0")
-    text = getattr(import_module(what[0]), what[1])(Subject(component=component, keys=keys))
-    sys.stdout.write("\n" + text)
+        failed = ran.stderr.decode(errors="replace").strip()[-300:]
+        raise CheckFailed(f"it fails in a fresh interpreter: {failed}")
+    return ran.stdout.decode().splitlines()[-1]
 
 
 def package_of(

@@ -126,6 +126,21 @@ class ControllerEntry(_ComponentEntry):
     """
 
 
+def _names_a_column(feature: Feature, attribute: Attribute[Any], text: str) -> None:
+    if not text.isprintable() or text.strip() != text or not text or set(text) & set(",[]"):
+        raise ValueError(
+            f"'{attribute.name}' of a feature is {text!r}: it names a column of a table, so write it without commas, "
+            "brackets, and spaces at its ends, as in peak_force"
+        )
+
+
+def _is_length(feature: Feature, attribute: Attribute[Any], width: bool) -> None:
+    if width and feature.unit != "m":
+        raise ValueError(
+            f"feature {feature.name!r} in {feature.unit} is marked as the width of the object, which is in m"
+        )
+
+
 def _not_empty(feature: Feature, attribute: Attribute[Any], text: str) -> None:
     if not text.strip():
         raise ValueError(
@@ -141,13 +156,13 @@ class Feature:
     feature alone is the baseline that the whole set is compared with.
     """
 
-    name: str = field(validator=instance_of(str))
+    name: str = field(validator=and_(instance_of(str), _names_a_column))
     """The name of the feature."""
     unit: str = field(validator=instance_of(str))
     """Its SI unit, `1` where it has none."""
     meaning: str = field(validator=and_(instance_of(str), _not_empty))
     """What it measures, in a few words."""
-    width: bool = field(default=False, validator=instance_of(bool))
+    width: bool = field(default=False, validator=and_(instance_of(bool), _is_length))
     """Whether it is the width of the object, as the gap between the fingers shows it."""
 
 
@@ -339,15 +354,15 @@ class ExperimentEntry(_FileEntry):
 class FoundDevice:
     """A device that a probe found: its backend, its serial number, and whether it can be opened."""
 
-    backend: str
+    backend: str = field(validator=instance_of(str))
     """The sensor backend that drives the device."""
     serial: str
     """The serial number of the device."""
-    where: str
+    where: str = field(validator=instance_of(str))
     """Where it is connected, as in `/dev/hidraw0`."""
     ready: bool
     """Whether it can be opened now."""
-    advice: str = ""
+    advice: str = field(default="", validator=instance_of(str))
     """What to do if it cannot be opened."""
 
 

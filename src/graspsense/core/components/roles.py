@@ -332,15 +332,15 @@ def _copy(function: FunctionType) -> FunctionType:
     return same
 
 
-def _mark(controller: type[Controller[Any]], name: str, value: Any) -> None:
-    """Set an attribute of the step of this class; of a copy, if the step is inherited from a class without it."""
-    step = controller.step
-    if not isinstance(step, FunctionType):
+def _mark(cls: type, method: str, name: str, value: Any) -> None:
+    """Set an attribute of a method of this class; of a copy, if the method is inherited from a class without it."""
+    function = getattr(cls, method)
+    if not isinstance(function, FunctionType):
         return
-    if "step" not in vars(controller):
-        step = _copy(step)
-        controller.step = staticmethod(step)  # type: ignore[method-assign]
-    setattr(step, name, value)
+    if method not in vars(cls):
+        function = _copy(function)
+        setattr(cls, method, staticmethod(function) if method == "step" else function)
+    setattr(function, name, value)
 
 
 class Controller(ABC, Generic[ConfigT]):
@@ -371,9 +371,9 @@ class Controller(ABC, Generic[ConfigT]):
         super().__init_subclass__(**given)
         # What composes a tick has the function alone, so the function carries what is declared about it.
         if cls.events and not getattr(cls.step, "tells_events", False):
-            _mark(cls, "tells_events", True)
+            _mark(cls, "step", "tells_events", True)
         if "free_motion" in vars(cls) and getattr(cls.step, "free_motion", None) is not cls.free_motion:
-            _mark(cls, "free_motion", cls.free_motion)
+            _mark(cls, "step", "free_motion", cls.free_motion)
 
     def __init__(self, config: ConfigT) -> None:
         self.config = config
@@ -457,10 +457,8 @@ class FeatureSet(ABC, Generic[ConfigT]):
     def __init_subclass__(cls, **given: Any) -> None:
         super().__init_subclass__(**given)
         # A batch has the method alone, so the method carries what is declared about it.
-        if "compiled" in vars(cls) and isinstance(cls.extract, FunctionType):
-            if "extract" not in vars(cls):
-                cls.extract = _copy(cls.extract)  # type: ignore[method-assign]
-            cls.extract.compiled = cls.compiled  # type: ignore[attr-defined]
+        if "compiled" in vars(cls):
+            _mark(cls, "extract", "compiled", cls.compiled)
 
     def __init__(self, config: ConfigT) -> None:
         self.config = config

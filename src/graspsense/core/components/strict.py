@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 import types
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from difflib import SequenceMatcher
 from enum import Enum
 from pathlib import Path
@@ -28,12 +28,13 @@ LEAST_LIKENESS: Final = 0.7
 _LONGEST_KEY: Final = 100
 
 
-def key_paths(declarations: Mapping[str, Mapping[str, Any]], table: str) -> Iterator[str]:
-    """Yield the dotted path of each key that `keys_of` declares, also in its tables: `gripper.faults.drop`."""
+def all_keys(declarations: Mapping[str, Mapping[str, Any]], table: str = "") -> dict[str, Mapping[str, Any]]:
+    """Return what `keys_of` gives by the dotted path of each key, also in its tables: `gripper.faults.drop`."""
+    declared_keys: dict[str, Mapping[str, Any]] = {}
     for key, declaration in declarations.items():
         path = f"{table}.{key}" if table else key
-        yield path
-        yield from key_paths(declaration.get("keys", {}), path)
+        declared_keys |= {path: declaration, **all_keys(declaration.get("keys", {}), path)}
+    return declared_keys
 
 
 def nearest_path(wrong: str, known: Iterable[str]) -> str:

@@ -164,10 +164,10 @@ def run_grasp(
         except BaseException:
             backend.close()
             raise
-        # The trace must survive a backend that fails on closing.
+        # The trace must survive a backend that fails on closing. Ctrl-C is only counted by now.
         try:
             backend.close()
-        except FAILURES as error:
+        except BaseException as error:
             reason = f"the gripper could not be closed: {named(error)} ({reason or outcome.words})"
             outcome = Outcome.ABORTED
         # After closing, so that the report covers it.
@@ -196,7 +196,9 @@ def _report_of(backend: SensorBackend[Any]) -> dict[str, Any]:
     """Return the report of a gripper, or why it has none."""
     try:
         return dict(backend.report())
-    except FAILURES as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         return {"report_failed": named(error)}
 
 
@@ -323,8 +325,9 @@ class _Grasp:
         except KeyboardInterrupt:
             self.interrupted = not self.interrupts.stuck
             ending = Outcome.ABORTED, "interrupted" if self.interrupted else STUCK
-        except FAILURES as error:
-            # A controller can raise anything; the gripper must still be released and the trace kept.
+        except BaseException as error:
+            # A controller or a driver can raise anything, also the CancelledError of an asynchronous one: the gripper
+            # must still be released and the trace kept.
             ending = Outcome.ABORTED, f"{named(error)}{place_of(error)}"
         finally:
             self.interrupts.deferred = True
@@ -596,9 +599,9 @@ class _Grasp:
         try:
             if opens and self.info.opening is not None and self.last is not None:
                 left = self._opened(self.info.opening, self.last)
-        except (KeyboardInterrupt, *FAILURES):
+        except BaseException:
             pass
-        with suppress(KeyboardInterrupt, *FAILURES):
+        with suppress(BaseException):
             self.backend.apply(self.info.relaxed)
         if self.info.opening is None or self.last is None:
             return

@@ -184,11 +184,11 @@ def pipeline_layers(pipeline: str, plugins: Plugins) -> list[Layer]:
     `pipeline` is a path that ends in `.toml`, or a name that a plugin provides. Raises ConfigError.
     """
     layers: list[Layer] = []
-    seen: list[tuple[object, str]] = []
+    seen: list[tuple[str, str]] = []
     asked, base, asker = pipeline, Path(), ""
     while True:
         source, label, base = _located(asked, base, asker, plugins)
-        identity = source.resolve() if isinstance(source, Path) else str(source)
+        identity = os.path.realpath(source) if isinstance(source, Path) else str(source)
         if identity in (earlier for earlier, _ in seen):
             names = " -> ".join([*(name for _, name in seen), label])
             raise ConfigError(f"{asker}extends forms a circle: {names}")

@@ -20,8 +20,8 @@ from graspsense.core.components.setting import followed_settings
 from graspsense.core.components.strict import (
     InvalidValue,
     ValidationFailed,
+    all_keys,
     implausible_values,
-    key_paths,
     keys_of,
     plain,
     shown,
@@ -124,7 +124,7 @@ def default_paths(tables: Sequence[str]) -> list[str]:
         settings = resolve()
     except ConfigError:
         return []
-    return [path for table in tables for path in key_paths(settings.keys(table), table)]
+    return [path for table in tables for path in all_keys(settings.keys(table), table)]
 
 
 def settings_from(values: Mapping[str, Any], called: str, plugins: Plugins | None = None) -> Settings:
@@ -212,7 +212,7 @@ _Complaint = str | tuple[Layer | None, InvalidValue]
 def _told(complaints: Sequence[_Complaint], classes: Mapping[str, type], plugins: Plugins) -> list[str]:
     """Return what is wrong, line by line; a key that is unknown may mean one of any table."""
     known = [f"{table}.type" for table in classes if table in _ROLE_OF_TABLE]
-    known += [path for table, cls in classes.items() for path in key_paths(keys_of(cls), table)]
+    known += [path for table, cls in classes.items() for path in all_keys(keys_of(cls), table)]
     return [
         complaint
         if isinstance(complaint, str)
@@ -235,7 +235,7 @@ def _with_owners(problem: InvalidValue, plugins: Plugins) -> InvalidValue:
     path, names = ".".join(inner), []
     for component in plugins.components(role):
         with suppress(PluginUnavailable):
-            if path in key_paths(keys_of(component.config_class()), ""):
+            if path in all_keys(keys_of(component.config_class())):
                 names.append(toml_value(component.name))
     if not names:
         return problem

@@ -49,6 +49,10 @@ class Frame(NamedTuple):
     status: int = 0
 
 
+CHANNEL_OF_FIELD: Final[Mapping[str, str]] = dict(zip(Frame._fields[2:9], CHANNELS, strict=False))
+"""Each field of a frame that is a channel, with the name of that."""
+
+
 class Pads(NamedTuple):
     """The last cell image of the two fingertips, raw, which comes at a lower rate than frames.
 

@@ -11,7 +11,7 @@ from attrs import frozen
 
 from graspsense.core.components.channels import dtype_of, further
 from graspsense.core.values.channel import FLOATS
-from graspsense.core.values.signals import Image, Samples
+from graspsense.core.values.signals import CHANNEL_OF_FIELD, Image, Samples
 from graspsense.core.values.trace import SI_UNITS
 from graspsense.recording.labelled_recording import LabelledRecording
 from graspsense.recording.replayable import Recording
@@ -19,10 +19,7 @@ from graspsense.sources.columns.channel_facts import ChannelFacts, channel_facts
 from graspsense.sources.formats.table import Numbers
 
 CHANNEL_OF: Final = {
-    "gap_m": "gap",
-    "effort_n": "effort",
-    "force_left_n": "force_left",
-    "force_right_n": "force_right",
+    field: CHANNEL_OF_FIELD[field] for field in ("gap_m", "effort_n", "force_left_n", "force_right_n")
 }
 """Field of a frame to the channel that it is."""
 

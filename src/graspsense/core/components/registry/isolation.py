@@ -21,7 +21,7 @@ from graspsense.core.components import hookspecs
 from graspsense.core.components.firstparty import DISTRIBUTION
 from graspsense.core.components.registry.discovery import PluginSource
 from graspsense.core.components.registry.parts import PluginStatus
-from graspsense.core.values.errors import FAILURES, suggestion
+from graspsense.core.values.errors import suggestion
 from graspsense.core.values.printable import printable
 
 TRACE_VARIABLE: Final = "GRASPSENSE_TRACE_PLUGINS"
@@ -91,7 +91,9 @@ class HookCalls:
         """Turn whatever a plugin raises in this hook into a warning, the first time that it does."""
         try:
             yield
-        except FAILURES as error:
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # also the CancelledError of asyncio, which is no Exception
             if hook not in self._warned:
                 self._warned.add(hook)
                 _log.warning(

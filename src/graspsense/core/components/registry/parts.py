@@ -297,6 +297,18 @@ class Resource(Declared[EntryT]):
         """Import and return what this field of an entry names. Raises PluginUnavailable."""
         return self._import(getattr(self.entry, part))
 
+    def made(self, kind: type, *given: Any) -> Any:
+        """Call its function and return what it made of these values.
+
+        Raises PluginUnavailable if it cannot be imported, ComponentFailed for a value of another kind.
+        """
+        made = self.load()(*given)
+        if not isinstance(made, kind):
+            raise ComponentFailed(
+                f"{self.kind} {self.qualified} returned a value of type {type(made).__name__}: return {kind.__name__}"
+            )
+        return made
+
     def class_of_kind(self, part: str) -> Any:
         """Import and return the class that a kind of experiment names as its `keys` or its `result`.
 

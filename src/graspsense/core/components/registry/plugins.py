@@ -56,7 +56,7 @@ from graspsense.core.components.registry.parts import (
     Resource,
     canonical,
 )
-from graspsense.core.values.errors import FAILURES, PluginUnavailable, UnknownName, suggestion
+from graspsense.core.values.errors import FAILURES, PluginUnavailable, UnknownName, place_of, suggestion
 
 if TYPE_CHECKING:
     from graspsense.core.values.signals import GraspEvent
@@ -231,13 +231,15 @@ class Plugins:
                 plugin, cost = imported(source)
                 check_api(plugin, source)
                 calls, components, resources = self._registered(plugin, source)
-        except FAILURES as error:
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # also that of a compiled extension which panics, and is no Exception
             if self._strict:
                 error.add_note(
                     f"while loading {source.entry_point} of {source.distribution} {source.version}"
                 )
                 raise
-            broken = _status(source, "broken", error_text(error))
+            broken = _status(source, "broken", f"{error_text(error)}{place_of(error)}")
             self._statuses.append(evolve(broken, traceback="".join(traceback.format_exception(error))))
             return
         status = evolve(

@@ -1,9 +1,12 @@
-"""A slow and weak control law, for every kind of command, by which a gripper under check is closed."""
+"""The control laws that drive a gripper under check: a slow and weak one, and some that no gripper should obey.
+
+Those command NaN, huge, oscillating and never ending values, by any kind of command.
+"""
 
 from __future__ import annotations
 
-from math import inf
-from typing import Final, NamedTuple
+from math import inf, nan
+from typing import Any, Final, NamedTuple
 
 from graspsense.core.components.entries import KINDS
 from graspsense.core.components.roles import Controller
@@ -117,3 +120,50 @@ def kind_of(accepts: tuple[str, ...]) -> int:
     raise ValueError(
         "a gripper that accepts no kind of command cannot be closed: give `accepts` in its entry"
     )
+
+
+CALM_TICKS: Final = 500
+"""Ticks of a gentle approach before a law commands NaN."""
+PERIOD_TICKS: Final = 200
+HOSTILE: Final = {"NaN": APPROACH, "1e308": APPROACH, "oscillating": SQUEEZE, "never ending": HOLD}
+"""The laws by what they command, with the phase that each claims to be in."""
+LARGEST: Final = {EFFORT: 1e308, FORCE: 1e308, VELOCITY: -1e308, POSITION: 0.0}
+"""The value of each kind of command that closes the fingers as hard as it can."""
+
+
+class HostileState(NamedTuple):
+    """The phase that the law claims, and its number of ticks; it never ends."""
+
+    phase: int
+    outcome: int
+    ticks: int
+
+
+def hostile_step(
+    params: tuple[str, int], state: HostileState, reading: Reading
+) -> tuple[Command, HostileState]:
+    """Close as hard as the numbers allow; or command nothing and then NaN, or close and open in turn."""
+    law, kind = params
+    value = LARGEST[kind]
+    still = reading.frame.gap_m if kind == POSITION else 0.0
+    if law == "NaN":
+        value = still if state.ticks < CALM_TICKS else nan
+    elif law == "oscillating" and state.ticks % PERIOD_TICKS >= 0.75 * PERIOD_TICKS:
+        value = still if kind == POSITION else -value
+    return Command(kind, value, inf, inf), HostileState(HOSTILE[law], RUNNING, state.ticks + 1)
+
+
+class HostileController(Controller[tuple[str, int]]):
+    """A law that never ends; its config is its name in `HOSTILE`, and the number of a kind of command."""
+
+    requires = ()
+    commands = ("effort", "velocity", "position", "force")
+    step = staticmethod(hostile_step)
+
+    def params(self) -> Any:
+        """Return its name and the kind of command."""
+        return self.config
+
+    def init(self) -> HostileState:
+        """Return the state before the first tick."""
+        return HostileState(APPROACH, RUNNING, 0)
