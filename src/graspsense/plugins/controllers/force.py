@@ -127,7 +127,7 @@ def step(params: Any, state: LawState, reading: Reading) -> tuple[Command, LawSt
 
 
 def free_begin(params: Any, state: LawState, frame: Frame) -> tuple[float, FreeLimits]:
-    """Begin free motion, whose effort is constant, as is its memory."""
+    """Begin free motion: its memory is the effort, which is constant."""
     return state.effort_n, free_limits(params, state.progress) if params.sends == EFFORT else NOT_FREE
 
 
@@ -135,7 +135,7 @@ def free_command(
     params: Any, memory: float, gap_m: float, velocity_m_s: float, dt_s: float
 ) -> tuple[float, float]:
     """Return the effort of a tick of free motion."""
-    return params.probing_force_n, memory
+    return params.probing_force_n, params.probing_force_n
 
 
 class ForceController(Controller[ForceConfig]):
