@@ -114,8 +114,8 @@ def test_the_list_says_what_is_to_be_done(home, site):
         "and imports numpy. Its author: name classes by import strings",
         "lab-sleepy: slow: importing lab_sleepy_plugin waits for 0.7 s. Its author: wait for a device",
         "GRASPSENSE_PLUGINS names lab-loud, and no plugin of that distribution is installed. Did you mean 'lab-old'",
-        "lab-broken: broken: ModuleNotFoundError: No module named 'no_such_driver'; `graspsense plugins show "
-        "lab-broken` has the whole of it, `graspsense plugins disable lab-broken` leaves it out",
+        "lab-broken: broken: ModuleNotFoundError: No module named 'no_such_driver'",
+        "; `graspsense plugins show lab-broken` has the whole of it, `graspsense plugins disable lab-broken` leaves it",
     ):
         assert words in said
 
