@@ -77,7 +77,7 @@ DEEPEST_M: Final = 1e-3
 TOUCH_N: Final = 0.1
 """Force on both fingers from which on the motion of the scene begins: less may be the palm that swings."""
 UNFELT_N: Final = 1.0
-"""A thing that is squeezed by more, while both fingers feel less than `TOUCH_N`, is touched beside what measures."""
+"""A thing that is squeezed by more, before a finger has felt `TOUCH_N`, is touched beside what measures."""
 MANY: Final = 256
 """Errors of the forces that are drawn at once."""
 MOST_KNOWN: Final = 16
@@ -339,9 +339,9 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         velocity = (measured_m - self._measured_m) / tick_s
         self._measured_m = measured_m
         left, right = self._forces.forces_n()
-        if data.ncon and max(left, right) < TOUCH_N:
-            self._check_felt()
         self._greatest_n = max(self._greatest_n, left, right)
+        if data.ncon and self._greatest_n < TOUCH_N:
+            self._check_felt()
         t_s = self._ticks * tick_s
         if self._motion.moves:
             self._motion.set(data, t_s, touched=min(left, right) > TOUCH_N)
