@@ -1,6 +1,7 @@
 """Grasps with grippers that MuJoCo models describe, checked against what the mechanics give by hand. Simulated."""
 
 import os
+import tomllib
 
 import pytest
 from cases import every_case
@@ -328,3 +329,25 @@ def test_a_model_without_opposed_fingers_gets_no_gripper_file(tmp_path, monkeypa
     assert made.returncode == 2
     assert "opposed" in made.stderr
     assert not (tmp_path / "lab-hand.toml").exists()
+
+
+def test_the_points_of_the_gap_face_each_other_also_where_closed_fingers_pass(tmp_path, monkeypatch):
+    """Two jaws whose tips are pads 4 mm thick, with a touch sensor in each, which motors push through each other."""
+    monkeypatch.chdir(tmp_path)
+    bodies = sensors = motors = ""
+    for side, place in (("l", -0.04), ("r", 0.04)):
+        axis = -place / abs(place)
+        bodies += (
+            f'<body name="tip_{side}" pos="{place} 0 0"><joint name="{side}" type="slide" axis="{axis} 0 0" '
+            f'range="0 0.045" damping="20"/><geom type="box" size="0.002 0.01 0.01" mass="0.1"/>'
+            f'<site name="{side}" type="box" size="0.004 0.01 0.01"/></body>'
+        )
+        sensors += f'<touch name="touch_{side}" site="{side}"/>'
+        motors += f'<motor name="push_{side}" joint="{side}" ctrlrange="-40 40"/>'
+    (tmp_path / "jaws.xml").write_text(
+        f"<mujoco><worldbody>{bodies}</worldbody><actuator>{motors}</actuator><sensor>{sensors}</sensor></mujoco>"
+    )
+    assert "passed each other" in new_file("jaws.xml").stdout
+    file = tomllib.loads((tmp_path / "lab-hand.toml").read_text())
+    assert [file["gap"][side][0]["at"][0] for side in ("left", "right")] == [0.002, -0.002]
+    assert "touch_l" in (tmp_path / "lab-hand.toml").read_text()

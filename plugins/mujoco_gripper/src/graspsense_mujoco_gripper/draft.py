@@ -46,14 +46,15 @@ class Draft:
 
 @frozen
 class _Closing:
-    """The actuators that close, their controls, the bodies of both fingers, their nearest points while closed."""
+    """The actuators that close with their controls (open, closed), and the bodies of both fingers.
 
-    actuators: tuple[str, ...]
-    open: tuple[float, ...]
-    closed: tuple[float, ...]
+    `points` are the nearest of closed fingers; where these have passed each other, of open ones.
+    """
+
+    actuators: dict[str, tuple[float, float]]
     fingers: tuple[tuple[int, ...], tuple[int, ...]]
     points: tuple[Floats, ...]
-    overlap_m: float
+    overlap: str
 
 
 def drafted(name: str, folder: Path) -> Draft:
@@ -66,9 +67,9 @@ def drafted(name: str, folder: Path) -> Draft:
     if radian:
         lines.append('angle = "radian"')
     lines += [
-        f"actuators = {json.dumps(closing.actuators)}",
-        f"open = {[round(value, 6) for value in closing.open]}",
-        f"closed = {[round(value, 6) for value in closing.closed]}",
+        f"actuators = {json.dumps(list(closing.actuators))}",
+        f"open = {[round(pair[0], 6) for pair in closing.actuators.values()]}",
+        f"closed = {[round(pair[1], 6) for pair in closing.actuators.values()]}",
         "",
         "# The nearest points of the fingers: correct them if things are held elsewhere.",
         "[gap]",
@@ -81,7 +82,8 @@ def drafted(name: str, folder: Path) -> Draft:
         lines.append(f"{side} = [{', '.join(places)}]")
     for side, bodies in zip(("left", "right"), closing.fingers, strict=True):
         lines += ["", f"[{side}]", f"bodies = {json.dumps([model.body(k).name for k in bodies])}"]
-    sensors = [model.sensor(k).name for k in range(model.nsensor) if model.sensor_type[k] in FURTHER]
+    # An enumerated value of MuJoCo equals a number of Python, and none of numpy.
+    sensors = [model.sensor(k).name for k, kind in enumerate(model.sensor_type.tolist()) if kind in FURTHER]
     lines += [f"# A sensor of the model: {sensor}" for sensor in sensors]
     left = ["speed_limit_m_s, where it is not 0.1 m/s"]
     if not all(
@@ -91,10 +93,10 @@ def drafted(name: str, folder: Path) -> Draft:
         left.append("effort_limit_n: the actuators have no limits")
     if sensors:
         left.append("sensor of a finger, or channels: the forces are those of the contacts until then")
-    if closing.overlap_m > LEAST_CHANGE_M:
+    if closing.overlap:
         left.append(
-            f"the points of the gap: closed, the geoms of the fingers overlap by {closing.overlap_m * 1e3:.0f} mm. "
-            "Where they are hulls of meshes, name the geoms that touch, with only_fingers = true"
+            f"the points of the gap: closed, the geoms of the fingers {closing.overlap}. Limit what closes them; where "
+            "they are hulls of meshes, name the geoms that touch, with only_fingers = true"
         )
     fingers = [", ".join(model.body(k).name for k in bodies) for bodies in closing.fingers]
     decided = (
@@ -144,16 +146,19 @@ def _closing(model: mujoco.MjModel) -> _Closing:
             "no actuator changes the distance of two fingers: the model has no two opposed fingers. Name them in a "
             "gripper file by hand"
         )
-    closed = [closers[k][1] if k in closers else relaxed[k] for k in range(model.nu)]
-    total_m, points = _nearest(model, _moved(model, closed), fingers)
-    return _Closing(
-        tuple(model.actuator(k).name for k in closers),
-        tuple(pair[0] for pair in closers.values()),
-        tuple(pair[1] for pair in closers.values()),
-        fingers,
-        points,
-        max(-total_m / len(points), 0.0),
+    opened, closed = (
+        _moved(model, [closers.get(k, (rest, rest))[end] for k, rest in enumerate(relaxed)]) for end in (0, 1)
     )
+    total_m, points = _nearest(model, closed, fingers)
+    overlap_m = -total_m / len(points)
+    overlap = f"overlap by {overlap_m * 1e3:.0f} mm" if overlap_m > LEAST_CHANGE_M else ""
+    across = [
+        _place(model, data, *fingers[1]) - _place(model, data, *fingers[0]) for data in (opened, closed)
+    ]
+    if across[0] @ across[1] < 0.0:
+        # What was the far side of a finger is now the near one.
+        overlap, points = "have passed each other", _nearest(model, opened, fingers)[1]
+    return _Closing({model.actuator(k).name: pair for k, pair in closers.items()}, fingers, points, overlap)
 
 
 def _ends(model: mujoco.MjModel, actuator: int) -> tuple[float, float]:
@@ -216,10 +221,7 @@ def _opposed(
         return (tips[0],), (opposed,)
     if len(tips) == 2:
         return (tips[0],), (tips[1],)
-    places = [
-        np.mean([data.geom_xpos[g] for g in _geoms(model, k)], axis=0) for data in (low, high) for k in tips
-    ]
-    moves = np.array(places[: len(tips)]) - np.array(places[len(tips) :])
+    moves = np.array([_place(model, low, k) - _place(model, high, k) for k in tips])
     same = [float(move @ moves[0]) > 0.0 for move in moves]
     left = tuple(k for k, together in zip(tips, same, strict=True) if together)
     right = tuple(k for k, together in zip(tips, same, strict=True) if not together)
@@ -229,6 +231,11 @@ def _opposed(
             "opposed fingers"
         )
     return left, right
+
+
+def _place(model: mujoco.MjModel, data: mujoco.MjData, *bodies: int) -> Floats:
+    """Return the mean place of the geoms of these bodies that touch."""
+    return np.asarray(np.mean([data.geom_xpos[g] for body in bodies for g in _geoms(model, body)], axis=0))
 
 
 def _nearest(
