@@ -63,6 +63,14 @@ WIDTHS = [[0.018499999999999999, np.nan]] * 4 + [[0.019000000000000003, np.nan]]
 FEW_VALUES = without(measured(60, 4), slice(20))
 FEW_VALUES[:10, 0] = np.arange(10) % 3
 
+GAPS_M, FALLS_M = DRAWN.integers(600, 640, 30) * 9e-5, DRAWN.integers(20, 60, 30) * 9e-5
+STIFF = np.arange(30) % 2 == 0
+QUANTISED = np.stack(
+    [GAPS_M, GAPS_M - np.where(STIFF, 0.0, FALLS_M), np.where(STIFF, 0.0, FALLS_M * 150), FALLS_M / GAPS_M],
+    axis=1,
+)
+"""Gaps in steps of an encoder: an object that does not yield has the first one twice, no duration and no speed."""
+
 
 @every_case(
     ("values", "labels", "content", "kept", "said", "not_said"),
@@ -91,6 +99,8 @@ FEW_VALUES[:10, 0] = np.arange(10) % 3
             "copies",
             None,
         ),
+        # Also where what chance makes equal is only that of some of the trials.
+        (without(QUANTISED, STIFF, 3), None, None, 30, "by chance", "copies"),
         # Coarse features that are equal by chance: counts, marks on a scale, a width in whole millimetres, ticks of an
         # encoder, on and off.
         *(

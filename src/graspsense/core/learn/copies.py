@@ -150,13 +150,15 @@ def _originals(table: FeatureTable, content: Sequence[str] | None) -> tuple[NDAr
     equal = [by_row.setdefault(row.tobytes(), i) if known[i].any() else i for i, row in enumerate(values)]
     repeated = [i for i, k in enumerate(equal) if same[i] != same[k] and not _known_to_differ(content, i, k)]
     sure: list[int] = []
-    if repeated:
-        distinct = values[np.unique(equal)]
-        by_column = [_is_measured(column, len(repeated)) for column in distinct.T]
-        measured = np.array(by_column, dtype=np.bool_)
-        sure = [i for i in repeated if (measured & known[i]).any()]
-        if not sure and not _can_be_chance(distinct, len(repeated)):
-            sure = repeated
+    first = np.unique(equal)
+    for given in np.unique(known[repeated], axis=0):
+        # What is left of trials that lack the same features, as those of stiff objects do, can have few values.
+        alike = [i for i in repeated if (known[i] == given).all()]
+        like = first[(known[first] == given).all(axis=1)]
+        distinct = values[like if len(like) >= _FEW else first]
+        measured = [_is_measured(column, len(alike)) for column in distinct.T]
+        if (given & measured).any() or not _can_be_chance(distinct, len(alike)):
+            sure += alike
     pairs = [*enumerate(same), *((i, equal[i]) for i in sure)]
     families = joined(np.array(pairs, dtype=np.int64).T, len(table))
     return _best_of(families, known.sum(axis=1).tolist()), len(repeated) - len(sure)
