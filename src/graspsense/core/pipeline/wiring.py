@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from typing import Any
 
 from attrs import asdict, frozen
@@ -33,7 +34,7 @@ def check(settings: Settings) -> None:
         head = (
             "the components do not fit together" if len(misfits) > 1 else "two components do not fit together"
         )
-        advice = [*_pipelines_of(settings.gripper.component), _fitting(settings)]
+        advice = [*_pipelines_of(settings.gripper.component), *_fitting(settings)]
         raise WiringError("\n  ".join([f"{head}:", *misfits, *advice]))
     if too_small := [*_too_small(settings)]:
         raise WiringError("\n  ".join(["the gripper cannot do as little as is asked:", *too_small]))
@@ -104,34 +105,39 @@ def _pipelines_of(gripper: Component) -> Iterator[str]:
             yield f"A pipeline for this gripper is installed: {option('pipeline', pipeline.name)}"
 
 
-def _fitting(settings: Settings) -> str:
-    """Return which installed grippers offer what the controller and the features need, with their default settings."""
-    users = (settings.controller, settings.features)
-    fitting = [
-        gripper.qualified
-        for gripper in installed().components("sensor-backend")
-        if gripper.qualified != settings.gripper.component.qualified and _offers(gripper, users)
-    ]
+def _fitting(settings: Settings) -> Iterator[str]:
+    """Yield which installed components to choose instead of those that do not fit, with their default settings."""
+    gripper, users = settings.gripper, (settings.controller, settings.features)
     needed = " and ".join(_named(user.component) for user in users)
-    if not fitting:
-        return f"No other installed gripper offers what {needed} need"
-    return f"Installed grippers that offer what {needed} need: {', '.join(sorted(fitting))}"
+    yield f"Choose a gripper for {needed}: {_others(gripper, lambda other: all(_fit(other, user) for user in users))}"
+    for user in users:
+        if not _fit(gripper, user):
+            yield (
+                f"Or choose {user.component.table}.type for {_named(gripper.component)}: "
+                f"{_others(user, lambda other: _fit(gripper, other))}"
+            )
 
 
-def _offers(gripper: Component, users: tuple[SelectedComponent, SelectedComponent]) -> bool:
-    try:
-        chosen = select_component("sensor-backend", gripper.qualified)
-        misfits = [misfit for user in users for misfit in _channel_misfits(chosen, user)]
-    except GraspsenseError:
-        return False  # it cannot be told without its driver or its settings
-    law, accepted = users[0].declared, set(chosen.declared.accepts)
-    # What a law with alternatives sends follows from the gripper.
-    fits = (
-        bool(accepted & {*law.commands, *law.alternatives})
-        if law.alternatives
-        else accepted >= {*law.commands}
-    )
-    return fits and not misfits
+def _others(chosen: SelectedComponent, fits: Callable[[SelectedComponent], bool]) -> str:
+    role, names = chosen.component.role, []
+    for component in installed().components(role):
+        # It cannot be told without its driver or its settings.
+        with suppress(GraspsenseError):
+            if component.qualified != chosen.component.qualified and fits(
+                select_component(role, component.qualified)
+            ):
+                names.append(component.qualified)
+    return ", ".join(sorted(names)) or "none is installed"
+
+
+def _fit(gripper: SelectedComponent, user: SelectedComponent) -> bool:
+    """Return whether a gripper has the channels, and takes the commands; what a law sends can follow from it."""
+    taken = True
+    if user.component.role == "controller":
+        accepted, law = set(gripper.declared.accepts), user.declared
+        sent = {*law.commands, *(law.alternatives or ())}
+        taken = bool(accepted & sent) if law.alternatives else accepted >= sent
+    return taken and not [*_channel_misfits(gripper, user)]
 
 
 @frozen
@@ -155,13 +161,10 @@ def _user(part: SelectedComponent | FeatureSet[Any]) -> _User:
 
 def _channel_misfits(gripper: SelectedComponent, user: SelectedComponent) -> Iterator[str]:
     given = {channel.name: channel for channel in gripper.declared.channels}
-    provider, choose = _named(gripper.component), _choose(gripper.component, user.component)
     hint = ""
     if gripper.component.channels_vary():
-        choose += f", or other settings of [{gripper.component.table}]: its channels depend on them"
-        hint = " with these settings"
-    for misfit in _misfits_of(_user(user), given, provider, hint):
-        yield f"{misfit}. {choose}"
+        hint = f" with these settings of [{gripper.component.table}]"
+    yield from _misfits_of(_user(user), given, _named(gripper.component), hint)
 
 
 def _misfits_of(user: _User, given: Mapping[str, Channel], provider: str, hint: str = "") -> Iterator[str]:
@@ -244,10 +247,10 @@ def _command_misfits(gripper: SelectedComponent, controller: SelectedComponent) 
                 if law.alternatives
                 else []
             )
-            instead = f"Try -o controller.sends={fits[0]}. " if fits else ""
+            instead = f". Try -o controller.sends={fits[0]}" if fits else ""
             yield (
                 f"{_named(controller.component)} commands {kind}, which {_named(gripper.component)} does not take "
-                f"(it takes: {kinds}). {instead}{_choose(gripper.component, controller.component)}"
+                f"(it takes: {kinds}){instead}"
             )
 
 
@@ -258,7 +261,3 @@ def _named(component: Component) -> str:
 def _described(channel: Channel) -> str:
     rate = f" at {channel.rate_hz:g} Hz or more" if channel.rate_hz else ""
     return f"{channel.name!r} in {channel.unit}{rate}"
-
-
-def _choose(gripper: Component, user: Component) -> str:
-    return f"Choose another {gripper.table}.type or {user.table}.type (graspsense plugins list)"
