@@ -75,7 +75,7 @@ HELPERS = {
 }
 GRIPPER_EXAMPLE = (
     "- [A gripper on a network socket](../tcp_gripper.md) has an example with a fake server, the options of the "
-    "conformance checks, and what to do with a single force sensor."
+    "conformance checks, and what to do with a gripper that closes by itself, or has one force sensor or none."
 )
 FASTER: dict[str, tuple[str, str, Any, tuple[str, ...]]] = {
     "controller": ("Free motion in closed form", "free_motion", free_motion, ("FreeMotion", "FreeLimits")),
@@ -404,9 +404,8 @@ def _attributes(base: Any, declared: Sequence[str]) -> list[str]:
         return []
     lines = ["## What the class declares", "", "| attribute | type | meaning |", "|---|---|---|"]
     for name, (kind, text) in _docstrings(base).items():
-        if kind.startswith("ClassVar"):
-            kind = kind.removeprefix("ClassVar[").removesuffix("]")
-            lines.append(f"| `{name}` | {_cell(kind)} | {_cell(_in_a_line(text))} |")
+        kind = kind.removeprefix("ClassVar[").removesuffix("]" * kind.startswith("ClassVar"))
+        lines.append(f"| `{name}` | {_cell(kind)} | {_cell(_in_a_line(text))} |")
     for name in declared:
         if isinstance(value := vars(base).get(name), property):
             kind = str(inspect.signature(value.fget).return_annotation)  # type: ignore[arg-type]

@@ -218,8 +218,8 @@ def _print(evaluation: Evaluation) -> None:
     echo_entry("features", ", ".join(name for name, _ in evaluation.features))
     echo_entry(
         "unknown",
-        f"{evaluation.unknown.words} would be called unknown (false alarms: their labels are known), "
-        "and hardly more by a model that is trained on all trials",
+        f"{evaluation.unknown.words} would be called unknown (false alarms: their labels are known); "
+        "by a model that is trained on all trials, as many or fewer",
     )
     _print_doubt(evaluation)
     echo_entries("note", evaluation.notes)

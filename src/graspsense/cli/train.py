@@ -247,7 +247,7 @@ def _say_trained(out: str, model: Model) -> None:
             echo_entry(
                 "unknown",
                 f"{100 * unknown / trials:.1f} % ({unknown} of {trials}) of the held-out trials are called unknown "
-                "(false alarms); of new trials it will be hardly more, since this model is trained on all of them",
+                "(false alarms); of new trials as many or fewer will be, since this model is trained on all of them",
             )
     if model.holds_for.endswith("sessions"):
         echo_entry(

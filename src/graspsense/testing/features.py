@@ -128,7 +128,7 @@ def a_whole_grasp_has_features(subject: Subject) -> None:
     demand(
         any(value == value for value in features.values),
         f"every feature is missing on a whole grasp: {dict(features.reasons)}. A grasp approaches at 10 mm/s, touches "
-        "at 60 mm, is squeezed by 4 mm to 16 N, held and released",
+        "at 60 mm, is squeezed by 4 mm to 16 N, held and released; each further channel goes from 0 to 16, in any unit",
     )
 
 

@@ -130,7 +130,8 @@ def _doubt(trace: Trace, effort_n: NDArray[np.float64], contact_n: float) -> str
     falls = np.flatnonzero(eases[: max(stop - contact, 0)])
     fallen_m = float(gaps[0] - gaps[falls[-1]]) if len(falls) else 0.0
     if max(eased_m, fallen_m) >= TRAVEL_M:
-        return f"{where} and falls again, while the fingers move on by {max(eased_m, fallen_m) * 1e3:.1f} mm"
+        moved = f"while the fingers move on by {max(eased_m, fallen_m) * 1e3:.1f} mm"
+        return f"{where} and falls again, {moved}. Free fingers need less than features.contact_effort_n"
     flat = _is_flat(trace, effort_n, contact, stop, contact_n)
     return f"{where} and does not rise, while the fingers move on" if flat else ""
 
@@ -146,7 +147,8 @@ def _after_stop(trace: Trace, effort_n: NDArray[np.float64], config: WithoutPads
         return ""
     return (
         f"contact not certain: the effort is {effort_n[contact]:.1f} N only after the fingers had stopped at "
-        f"{trace.gap_m[stop] * 1e3:.1f} mm; it was at its limit from the beginning, or its scale is wrong"
+        f"{trace.gap_m[stop] * 1e3:.1f} mm; it was at its limit from the beginning, its scale is wrong, or "
+        f"features.contact_effort_n ({config.contact_effort_n:g} N) is above the force of the approach"
     )
 
 
