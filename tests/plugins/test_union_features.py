@@ -1,14 +1,18 @@
 """The union of feature sets: its values are those of the sets, its names are distinct, and it refuses wrong lists."""
 
 import math
+import sys
 
 import pytest
 from cases import every_case
+from parts import NoKeys, offering
 
-from graspsense.core.components.registry import installed
+from graspsense.core.components.registry import IsolatedPlugins, installed
 from graspsense.core.values.errors import ConfigError, UnknownName
-from graspsense.plugin_api import create
+from graspsense.plugin_api import Channel, Feature, FeatureSet, FeatureSetEntry, create
 from graspsense.testing.samples import squeeze
+
+HERE = sys.modules[__name__]
 
 
 def union(**settings):
@@ -51,3 +55,22 @@ def test_it_declares_the_features_of_its_sets_and_one_width():
 def test_a_list_that_cannot_be_united_is_refused(sets, error, says):
     with pytest.raises(error, match=says):
         union(sets=sets).extract(squeeze())
+
+
+class Palm(FeatureSet[NoKeys]):
+    """A set that relies on the channel that it declares."""
+
+    requires = (Channel("palm", "N"),)
+    features = (Feature("palm_force", "N", "largest force of the palm"),)
+
+    def extract(self, trace):
+        return self.result({"palm_force": trace.signals["palm"].max()})
+
+
+def test_a_set_whose_channel_is_not_there_has_no_features_and_the_others_have_theirs(monkeypatch):
+    palm = FeatureSetEntry(name="palm", target=f"{__name__}:Palm", summary="the palm")
+    monkeypatch.setitem(sys.modules, __name__, HERE)
+    with IsolatedPlugins(offering(palm)):
+        features = union(sets=("chitta", "palm")).extract(squeeze())
+    assert "palm" in features.reasons["palm_force"]
+    assert features["p_first"] == pytest.approx(0.06, abs=1e-3)

@@ -21,6 +21,7 @@ from graspsense.plugin_api import (
     Trace,
     create,
     setting,
+    signal_type,
 )
 from graspsense.plugins.features.contact_threshold import RestThresholds
 
@@ -65,13 +66,16 @@ class UnionFeatures(FeatureSet[UnionConfig]):
         return tuple(features.values())
 
     def extract(self, trace: Trace) -> Features:
-        """Return the features of all sets."""
+        """Return the features of all sets. One that lacks a further channel is not asked: it may rely on it."""
         names: dict[str, None] = {}
         values: list[float] = []
         units: list[str] = []
         reasons: dict[str, str] = {}
         for set_name, part in self._parts.items():
-            features = part.extract(trace)
+            further = signal_type(part.requires)._fields  # type: ignore[attr-defined]
+            lacking = [name for name in further if name not in trace.signals]
+            why = f"no channel {', '.join(lacking)}"
+            features = part.undefined(why, trace.units) if lacking else part.extract(trace)
             own = {name: _distinct(name, set_name, names) for name in features.names}
             names |= dict.fromkeys(own.values())
             values += features.values
