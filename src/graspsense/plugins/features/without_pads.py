@@ -84,8 +84,7 @@ class WithoutPads(FeatureSet[WithoutPadsConfig]):
         ).extract(evolve(trace, force_left_n=effort_n, force_right_n=effort_n))
         names = [feature.name for feature in self.features]
         reasons = {name: six.reasons[name] for name in names if name in six.reasons}
-        doubt = _doubt(trace, effort_n, config.contact_effort_n) or _after_stop(trace, effort_n, config)
-        if doubt:
+        if doubt := _doubt(trace, effort_n, config):
             # The rest of the hold does not depend on the contact.
             holds = bool((trace.phase == HOLD).any())
             reasons |= {name: doubt for name in names if not (holds and name == "p_steady")}
@@ -109,20 +108,21 @@ def _without_start(
     return np.concatenate([np.minimum(effort_n[:end], 0.0), effort_n[end:]])
 
 
-def _doubt(trace: Trace, effort_n: NDArray[np.float64], contact_n: float) -> str:
-    """Return why the effort does not tell the contact: the fingers moved on without a resistance; empty if it does.
+def _doubt(trace: Trace, effort_n: NDArray[np.float64], config: WithoutPadsConfig) -> str:
+    """Return why the effort does not tell the contact; empty if it does.
 
-    From a contact on the effort stays above the threshold and rises, or the fingers slow down.
+    The fingers moved on without a resistance: from a contact on the effort stays above the threshold and rises, or the
+    fingers slow down. Or it comes too late: they had already stopped at the object.
     """
-    if len(trace) == 0:
-        return ""
-    contact = int(np.argmax(trace.closing & (effort_n >= contact_n)))
-    if not effort_n[contact] >= contact_n:
+    contact_n = config.contact_effort_n
+    contact = int(np.argmax(trace.closing & (effort_n >= contact_n))) if len(trace) else 0
+    if len(trace) == 0 or not effort_n[contact] >= contact_n:
         return ""
     squeezed = np.flatnonzero(trace.phase > APPROACH)
     stop = int(squeezed[0]) if len(squeezed) else len(trace) - 1
     gaps = trace.gap_m[contact:]
-    where = f"contact not certain: the effort is {effort_n[contact]:.1f} N at {gaps[0] * 1e3:.1f} mm"
+    effort = f"contact not certain: the effort is {effort_n[contact]:.1f} N"
+    where = f"{effort} at {gaps[0] * 1e3:.1f} mm"
     if not len(squeezed) and trace.gap_m[0] - np.min(gaps) < START_M:
         return f"{where}, and the fingers had not moved"
     eases = (trace.closing & (effort_n < contact_n))[contact:]
@@ -132,23 +132,16 @@ def _doubt(trace: Trace, effort_n: NDArray[np.float64], contact_n: float) -> str
     if max(eased_m, fallen_m) >= TRAVEL_M:
         moved = f"while the fingers move on by {max(eased_m, fallen_m) * 1e3:.1f} mm"
         return f"{where} and falls again, {moved}. Free fingers need less than features.contact_effort_n"
-    flat = _is_flat(trace, effort_n, contact, stop, contact_n)
-    return f"{where} and does not rise, while the fingers move on" if flat else ""
-
-
-def _after_stop(trace: Trace, effort_n: NDArray[np.float64], config: WithoutPadsConfig) -> str:
-    """Return why a contact is too late: the fingers had already stopped at the object; empty if it is not."""
-    contact = int(np.argmax(trace.closing & (effort_n >= config.contact_effort_n))) if len(trace) else 0
-    stop = int(np.argmax(trace.phase > APPROACH)) if len(trace) else 0
-    if stop == 0 or contact < stop:
-        return ""
-    window = trace.t_s[: stop + 1] >= trace.t_s[stop] - config.rest_window_s
-    if not np.ptp(trace.gap_m[: stop + 1][window]) <= config.rest_speed_m_s * config.rest_window_s:
+    if _is_flat(trace, effort_n, contact, stop, contact_n):
+        return f"{where} and does not rise, while the fingers move on"
+    before = trace.gap_m[: stop + 1][trace.t_s[: stop + 1] >= trace.t_s[stop] - config.rest_window_s]
+    stopped = contact >= stop > 0 and len(squeezed)
+    if not (stopped and np.ptp(before) <= config.rest_speed_m_s * config.rest_window_s):
         return ""
     return (
-        f"contact not certain: the effort is {effort_n[contact]:.1f} N only after the fingers had stopped at "
-        f"{trace.gap_m[stop] * 1e3:.1f} mm; it was at its limit from the beginning, its scale is wrong, or "
-        f"features.contact_effort_n ({config.contact_effort_n:g} N) is above the force of the approach"
+        f"{effort} only after the fingers had stopped at {trace.gap_m[stop] * 1e3:.1f} mm; it was at its limit from "
+        f"the beginning, its scale is wrong, or features.contact_effort_n ({contact_n:g} N) is above the force of the "
+        "approach"
     )
 
 
