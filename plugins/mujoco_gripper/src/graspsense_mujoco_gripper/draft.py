@@ -74,38 +74,36 @@ def drafted(name: str, folder: Path) -> Draft:
         "# The nearest points of the fingers: correct them if things are held elsewhere.",
         "[gap]",
     ]
-    points = iter(closing.points)
-    for side, bodies in zip(("left", "right"), closing.fingers, strict=True):
-        places = [
-            f'{{ body = "{model.body(k).name}", at = {next(points).round(5).tolist()} }}' for k in bodies
-        ]
+    left, right = ([model.body(k).name for k in bodies] for bodies in closing.fingers)
+    points, fingers = iter(closing.points), {"left": left, "right": right}
+    for side, bodies in fingers.items():
+        places = [f'{{ body = "{body}", at = {next(points).round(5).tolist()} }}' for body in bodies]
         lines.append(f"{side} = [{', '.join(places)}]")
-    for side, bodies in zip(("left", "right"), closing.fingers, strict=True):
-        lines += ["", f"[{side}]", f"bodies = {json.dumps([model.body(k).name for k in bodies])}"]
+    for side, bodies in fingers.items():
+        lines += ["", f"[{side}]", f"bodies = {json.dumps(bodies)}"]
     # An enumerated value of MuJoCo equals a number of Python, and none of numpy.
     sensors = [model.sensor(k).name for k, kind in enumerate(model.sensor_type.tolist()) if kind in FURTHER]
     lines += [f"# A sensor of the model: {sensor}" for sensor in sensors]
-    left = ["speed_limit_m_s, where it is not 0.1 m/s"]
+    unclear = ["speed_limit_m_s, where it is not 0.1 m/s"]
     if not all(
         model.actuator(actuator).forcelimited or model.actuator(actuator).ctrllimited
         for actuator in closing.actuators
     ):
-        left.append("effort_limit_n: the actuators have no limits")
+        unclear.append("effort_limit_n: the actuators have no limits")
     if sensors:
-        left.append("sensor of a finger, or channels: the forces are those of the contacts until then")
+        unclear.append("sensor of a finger, or channels: the forces are those of the contacts until then")
     if closing.overlap:
-        left.append(
+        unclear.append(
             f"the points of the gap: closed, the geoms of the fingers {closing.overlap}. Limit what closes them; where "
             "they are hulls of meshes, name the geoms that touch, with only_fingers = true"
         )
-    fingers = [", ".join(model.body(k).name for k in bodies) for bodies in closing.fingers]
     decided = (
         *(["angles in radians: the ranges of the joints are too small for degrees"] if radian else []),
         f"actuators that close: {', '.join(closing.actuators)}",
-        f"left finger: {fingers[0]}; right finger: {fingers[1]}",
+        f"left finger: {', '.join(left)}; right finger: {', '.join(right)}",
         f"sensors: {', '.join(sensors) or 'none'}",
     )
-    return Draft("\n".join(lines) + "\n", decided, tuple(left))
+    return Draft("\n".join(lines) + "\n", decided, tuple(unclear))
 
 
 def _model(path: Path) -> tuple[mujoco.MjModel, bool]:
@@ -222,9 +220,8 @@ def _opposed(
     if len(tips) == 2:
         return (tips[0],), (tips[1],)
     moves = np.array([_place(model, low, k) - _place(model, high, k) for k in tips])
-    same = [float(move @ moves[0]) > 0.0 for move in moves]
-    left = tuple(k for k, together in zip(tips, same, strict=True) if together)
-    right = tuple(k for k, together in zip(tips, same, strict=True) if not together)
+    left = tuple(k for k, move in zip(tips, moves, strict=True) if move @ moves[0] > 0.0)
+    right = tuple(k for k in tips if k not in left)
     if not right:
         raise ConfigError(
             f"the bodies {', '.join(model.body(k).name for k in left)} all move in one direction: the model has no two "

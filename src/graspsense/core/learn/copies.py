@@ -60,8 +60,7 @@ def without_copies(labelled: Labelled) -> Labelled:
     if by_chance:
         notes.append(
             f"{counted(by_chance, 'trial has', 'trials have')} exactly the features of another one. They count, "
-            "because features that are "
-            "counted or rounded can be equal by chance: make sure that no trial is in the data twice"
+            "since counted or rounded features can be equal by chance: make sure that no trial is in the data twice"
         )
     kept = np.flatnonzero(original == np.arange(len(labelled)))
     if len(left_out):

@@ -132,12 +132,16 @@ def _others(chosen: SelectedComponent, fits: Callable[[SelectedComponent], bool]
 
 def _fit(gripper: SelectedComponent, user: SelectedComponent) -> bool:
     """Return whether a gripper has the channels, and takes the commands; what a law sends can follow from it."""
-    taken = True
-    if user.component.role == "controller":
-        accepted, law = set(gripper.declared.accepts), user.declared
-        sent = {*law.commands, *(law.alternatives or ())}
-        taken = bool(accepted & sent) if law.alternatives else accepted >= sent
-    return taken and not [*_channel_misfits(gripper, user)]
+    law = user.declared if user.component.role == "controller" else None
+    taken = not law or _choices(gripper, user) or {*gripper.declared.accepts} >= {*law.commands}
+    return bool(taken) and not [*_channel_misfits(gripper, user)]
+
+
+def _choices(gripper: SelectedComponent, user: SelectedComponent) -> list[str]:
+    """Return the kinds of command that this gripper takes, of those among which a law has a choice."""
+    law = user.declared
+    kinds = (*law.commands, *law.alternatives) if law.alternatives else ()
+    return [kind for kind in kinds if kind in gripper.declared.accepts]
 
 
 @frozen
@@ -240,17 +244,11 @@ def _command_misfits(gripper: SelectedComponent, controller: SelectedComponent) 
     accepted = gripper.declared.accepts
     for kind in sent_kinds(controller):
         if kind not in accepted:
-            kinds = ", ".join(accepted) or "none"
-            law = controller.declared
-            fits = (
-                [name for name in (*law.commands, *law.alternatives) if name in accepted]
-                if law.alternatives
-                else []
-            )
-            instead = f". Try -o controller.sends={fits[0]}" if fits else ""
+            choices = _choices(gripper, controller)
+            instead = f". Try -o controller.sends={choices[0]}" if choices else ""
             yield (
                 f"{_named(controller.component)} commands {kind}, which {_named(gripper.component)} does not take "
-                f"(it takes: {kinds}){instead}"
+                f"(it takes: {', '.join(accepted) or 'none'}){instead}"
             )
 
 

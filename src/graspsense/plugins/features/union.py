@@ -98,9 +98,8 @@ class UnionFeatures(FeatureSet[UnionConfig]):
 
     def _with_thresholds(self, part: FeatureSet[Any]) -> FeatureSet[Any]:
         """Return a set with those thresholds of this one that it has."""
-        own = {
-            name: getattr(self.config, name) for name in THRESHOLDS if name in fields_dict(type(part.config))
-        }
+        shared = [name for name in THRESHOLDS if name in fields_dict(type(part.config))]
+        own = {name: getattr(self.config, name) for name in shared}
         return type(part)(evolve(part.config, **own)) if own else part
 
 
