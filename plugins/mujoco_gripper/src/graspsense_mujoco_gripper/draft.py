@@ -145,7 +145,7 @@ def _closing(model: mujoco.MjModel) -> _Closing:
             "gripper file by hand"
         )
     opened, closed = (
-        _moved(model, [closers.get(k, (rest, rest))[end] for k, rest in enumerate(relaxed)]) for end in (0, 1)
+        _moved(model, [closers.get(k, (idle, idle))[end] for k, idle in enumerate(relaxed)]) for end in (0, 1)
     )
     total_m, points = _nearest(model, closed, fingers)
     overlap_m = -total_m / len(points)

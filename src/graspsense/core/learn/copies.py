@@ -149,12 +149,12 @@ def _originals(table: FeatureTable, content: Sequence[str] | None) -> tuple[NDAr
     equal = [by_row.setdefault(row.tobytes(), i) if known[i].any() else i for i, row in enumerate(values)]
     repeated = [i for i, k in enumerate(equal) if same[i] != same[k] and not _known_to_differ(content, i, k)]
     sure: list[int] = []
-    first = np.unique(equal)
+    unique = np.unique(equal)
     for given in np.unique(known[repeated], axis=0):
         # What is left of trials that lack the same features, as those of stiff objects do, can have few values.
         alike = [i for i in repeated if (known[i] == given).all()]
-        like = first[(known[first] == given).all(axis=1)]
-        distinct = values[like if len(like) >= _FEW else first]
+        like = unique[(known[unique] == given).all(axis=1)]
+        distinct = values[like if len(like) >= _FEW else unique]
         measured = [_is_measured(column, len(alike)) for column in distinct.T]
         if (given & measured).any() or not _can_be_chance(distinct, len(alike)):
             sure += alike

@@ -134,9 +134,9 @@ def _doubt(trace: Trace, effort_n: NDArray[np.float64], config: WithoutPadsConfi
         return f"{where} and falls again, {moved}. Free fingers need less than features.contact_effort_n"
     if _is_flat(trace, effort_n, contact, stop, contact_n):
         return f"{where} and does not rise, while the fingers move on"
-    before = trace.gap_m[: stop + 1][trace.t_s[: stop + 1] >= trace.t_s[stop] - config.rest_window_s]
+    window_gaps = trace.gap_m[: stop + 1][trace.t_s[: stop + 1] >= trace.t_s[stop] - config.rest_window_s]
     stopped = contact >= stop > 0 and len(squeezed)
-    if not (stopped and np.ptp(before) <= config.rest_speed_m_s * config.rest_window_s):
+    if not (stopped and np.ptp(window_gaps) <= config.rest_speed_m_s * config.rest_window_s):
         return ""
     return (
         f"{effort} only after the fingers had stopped at {trace.gap_m[stop] * 1e3:.1f} mm; it was at its limit from "
