@@ -229,10 +229,14 @@ def test_a_grasp_that_is_interrupted_while_the_fingers_open_keeps_its_outcome(ti
 
 
 def test_a_step_that_fails_or_returns_no_command_is_named_with_what_it_returns():
-    lost = run_grasp(
-        Scripted(squeezing, bottle), law(lambda command, state: (command, state._replace(phase=99)), 1), RUN
-    )
-    assert (lost.outcome, "the phase 99" in lost.reason) == (Outcome.ABORTED, True)
+    # A phase that there is not, and those of the runner.
+    for phase in (99, int(Phase.OPENING), int(Phase.TARING), int(Phase.RELEASE)):
+
+        def changed(command, state, phase=phase):
+            return command, state._replace(phase=phase)
+
+        lost = run_grasp(Scripted(squeezing, bottle), law(changed, 1), RUN)
+        assert (lost.outcome, f"the phase {phase}" in lost.reason) == (Outcome.ABORTED, True)
     for act, error in ((fail, "ZeroDivisionError"), (lambda command, state: command, "ValueError")):
         grasp = run_grasp(Scripted(squeezing, bottle), law(act, 900), RUN)
         assert grasp.outcome is Outcome.ABORTED

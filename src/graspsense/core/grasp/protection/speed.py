@@ -182,7 +182,7 @@ class GapJump:
             told_m_s = min(told_m_s, self._measured_m_s(frame.velocity_m_s))
         against = step_m * self._direction > 0.0
         allowed_m = JUMP_M + (told_m_s * frame.dt_s if against else JUMP * told_m_s * elapsed_s)
-        if not abs(step_m) > allowed_m:
+        if frame.dt_s < 0.0 or not abs(step_m) > allowed_m:
             self.step_m = 0.0
             return None
         self.step_m = step_m
