@@ -41,13 +41,13 @@ class LibfrankaLink:
         self._text = b""
         self._reader = ReadingThread(self._read, name="Franka Hand")
         try:
-            first = self.newest(timeout_s)
-            if first is None:
+            state = self.newest(timeout_s)
+            if state is None:
                 raise HandGone(f"no state came within {timeout_s:g} s")
         except BaseException:
             self.close()
             raise
-        self.first = first
+        self.first = state
 
     def newest(self, timeout_s: float) -> HandState | None:
         """Return the newest state that was not returned yet, None if none comes in time. Raises HandGone."""

@@ -29,8 +29,11 @@ OPENS_FREELY: Final = 0.25
 AT_LIMIT: Final = 0.6
 """Share of the largest effort of an approach from which on it says nothing of a free motion."""
 SATURATED: Final = 0.05
-"""Share of the limit of a command by which an effort at this limit differs from it. Fingers that mostly move with as
-much as they may do not reach their speed, or push something, and do not tell what a free motion takes."""
+"""Share of the limit of a command by which an effort at this limit differs from it."""
+MOST_CLOSING: Final = 0.75
+MOST_OPENING: Final = 0.5
+"""Shares of a motion at the limit from which on it does not tell what a free one takes: fingers that mostly move with
+as much as they may do not reach their speed, or push something."""
 DIFFERS_N: Final = 3.0
 DIFFERS_SHARE: Final = 0.15
 """By how much free motions to both sides may differ, at least and as a share of the largest effort in the closing."""
@@ -122,7 +125,10 @@ class ReportedEffort:
 
         Its zero has drifted, or its scale has changed. An effort has a sign if it has been below zero in the release.
         """
-        closing, opening = free_efforts(self._closing), free_efforts(self._opening)
+        closing, opening = (
+            free_efforts(self._closing, MOST_CLOSING),
+            free_efforts(self._opening, MOST_OPENING),
+        )
         if min(len(closing), len(opening)) < FEWEST:
             return None
         if np.min(opening) < -ALLOWED_N:
@@ -141,8 +147,8 @@ class ReportedEffort:
         )
 
 
-def free_efforts(moving: list[tuple[float, float]]) -> NDArray[np.float64]:
-    """Return the efforts of a motion, none if more than half of them are at the limits that are given with them (N)."""
+def free_efforts(moving: list[tuple[float, float]], most: float) -> NDArray[np.float64]:
+    """Return the efforts of a motion, none if more than this share are at the limits that come with them (N)."""
     efforts, limits = np.reshape(moving, (-1, 2)).T
     at_limit = np.abs(np.abs(efforts) - limits) <= SATURATED * limits
-    return efforts if 2 * at_limit.sum() <= len(efforts) else efforts[:0]
+    return efforts if at_limit.sum() <= most * len(efforts) else efforts[:0]
