@@ -125,10 +125,8 @@ class ReportedEffort:
 
         Its zero has drifted, or its scale has changed. An effort has a sign if it has been below zero in the release.
         """
-        closing, opening = (
-            free_efforts(self._closing, MOST_CLOSING),
-            free_efforts(self._opening, MOST_OPENING),
-        )
+        closing = free_efforts(self._closing, MOST_CLOSING)
+        opening = free_efforts(self._opening, MOST_OPENING)
         if min(len(closing), len(opening)) < FEWEST:
             return None
         if np.min(opening) < -ALLOWED_N:
