@@ -208,7 +208,7 @@ def spin(*values):
 @every_case("hangs", [lambda *values: Event().wait(), spin])
 @every_case("after", [900, 1100])
 def test_a_step_that_never_ends_is_ended_and_the_fingers_are_opened(monkeypatch, hangs, after):
-    monkeypatch.setattr(interrupts, "STUCK_S", 0.1)
+    monkeypatch.setattr(interrupts, "STUCK_S", 0.5)
     gripper = Scripted(squeezing, bottle)
     grasp = run_grasp(gripper, law(hangs, after), RUN)
     assert (grasp.outcome, "did not end" in grasp.reason, grasp.interrupted) == (
