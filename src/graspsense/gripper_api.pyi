@@ -23,6 +23,7 @@ from graspsense.core.drivers.emulated_body import BackendWithEmulator as Backend
 from graspsense.core.drivers.emulated_body import EmulatorSettings as EmulatorSettings
 from graspsense.core.drivers.emulated_body import opened_body as opened_body
 from graspsense.core.drivers.emulated_body import own_keys_first as own_keys_first
+from graspsense.core.drivers.emulated_body import LockStepDevice as LockStepDevice
 from graspsense.core.drivers.emulated_body import EmulatedFingers as EmulatedFingers
 from graspsense.core.drivers.emulated_body import FingerTarget as FingerTarget
 from graspsense.core.drivers.emulated_body import finger_target as finger_target

@@ -125,6 +125,8 @@ def grasp_with(effort):
         (lambda effort_n, t: effort_n + 0.3 * (-1) ** round(t * RATE_HZ), set()),
         # They open with all that they may, and do not reach their speed.
         (lambda effort_n, t: effort_n if effort_n > 0.0 else -19.5, set()),
+        # They push something through most of the approach with all that they may.
+        (lambda effort_n, t: (11.0 if t < 0.2 else 19.5) if effort_n == 4.0 else effort_n, set()),
         (lambda effort_n, t: effort_n if effort_n > 0.0 else -15.0, {"effort not as before"}),
         (lambda effort_n, t: -effort_n, {"effort has the wrong sign"}),
         (lambda effort_n, t: 0.0, {"effort stuck"}),

@@ -169,7 +169,9 @@ def test_no_number_of_a_controller_passes_the_limits(command):
     assert max(float.__float__(commanded.value) for commanded in squeezed) <= 100.0
 
 
-@every_case("command", ["20", *(Command(EFFORT, value, math.inf, math.inf) for value in (None, [20.0]))])
+@every_case(
+    "command", ["20", *(Command(EFFORT, value, math.inf, math.inf) for value in (None, [20.0], "20"))]
+)
 def test_a_command_that_is_not_made_of_numbers_aborts_the_grasp(command):
     gripper = Scripted(squeezing, bottle)
     grasp = run_grasp(gripper, law(lambda usual, state: (command, state), 1100), RUN)

@@ -208,7 +208,7 @@ def spin(*values):
 @every_case("hangs", [lambda *values: Event().wait(), spin])
 @every_case("after", [900, 1100])
 def test_a_step_that_never_ends_is_ended_and_the_fingers_are_opened(monkeypatch, hangs, after):
-    monkeypatch.setattr(interrupts, "STUCK_S", 0.1)
+    monkeypatch.setattr(interrupts, "STUCK_S", 0.5)
     gripper = Scripted(squeezing, bottle)
     grasp = run_grasp(gripper, law(hangs, after), RUN)
     assert (grasp.outcome, "did not end" in grasp.reason, grasp.interrupted) == (
@@ -229,10 +229,14 @@ def test_a_grasp_that_is_interrupted_while_the_fingers_open_keeps_its_outcome(ti
 
 
 def test_a_step_that_fails_or_returns_no_command_is_named_with_what_it_returns():
-    lost = run_grasp(
-        Scripted(squeezing, bottle), law(lambda command, state: (command, state._replace(phase=99)), 1), RUN
-    )
-    assert (lost.outcome, "the phase 99" in lost.reason) == (Outcome.ABORTED, True)
+    # A phase that there is not, and those of the runner.
+    for phase in (99, int(Phase.OPENING), int(Phase.TARING), int(Phase.RELEASE)):
+
+        def changed(command, state, phase=phase):
+            return command, state._replace(phase=phase)
+
+        lost = run_grasp(Scripted(squeezing, bottle), law(changed, 1), RUN)
+        assert (lost.outcome, f"the phase {phase}" in lost.reason) == (Outcome.ABORTED, True)
     for act, error in ((fail, "ZeroDivisionError"), (lambda command, state: command, "ValueError")):
         grasp = run_grasp(Scripted(squeezing, bottle), law(act, 900), RUN)
         assert grasp.outcome is Outcome.ABORTED

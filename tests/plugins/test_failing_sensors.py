@@ -55,6 +55,8 @@ def half_the_time(frame, start):
         (ALL, lambda frame, start: {"gap_m": nan}, 0.0, {"fingers not open"}),
         (ALL, lambda frame, start: {"gap_m": 0.0}, MOVES_S, {"gap jumps"}),
         (ALL, lambda frame, start: {"gap_m": frame.gap_m - 0.02}, 0.0, {"opened to another width"}),
+        # While the fingers still open: too little for another width.
+        (SERVOS, lambda frame, start: {"gap_m": frame.gap_m - 0.0042}, 0.05, {"gap jumps"}),
         (ALL, half, 0.0, {"gap and velocity disagree"}),
         (ALL, half_the_time, 0.0, {"clock slow"}),
         (SERVOS, lambda frame, start: {"effort_n": nan}, MOVES_S, {"effort absent"}),

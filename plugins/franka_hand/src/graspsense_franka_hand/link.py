@@ -8,7 +8,6 @@ import os
 import select
 import subprocess
 import sys
-import time
 from contextlib import suppress
 from typing import Final, final
 
@@ -42,10 +41,13 @@ class LibfrankaLink:
         self._text = b""
         self._reader = ReadingThread(self._read, name="Franka Hand")
         try:
-            self.first = self._first(timeout_s)
+            state = self.newest(timeout_s)
+            if state is None:
+                raise HandGone(f"no state came within {timeout_s:g} s")
         except BaseException:
             self.close()
             raise
+        self.first = state
 
     def newest(self, timeout_s: float) -> HandState | None:
         """Return the newest state that was not returned yet, None if none comes in time. Raises HandGone."""
@@ -72,13 +74,6 @@ class LibfrankaLink:
             self._process.wait()
         self._reader.close()
         self._process.stdout.close()
-
-    def _first(self, timeout_s: float) -> HandState:
-        until_s = time.monotonic() + timeout_s
-        while time.monotonic() < until_s:
-            if (state := self.newest(until_s - time.monotonic())) is not None:
-                return state
-        raise HandGone(f"no state came within {timeout_s:g} s")
 
     def _read(self) -> HandState | None:
         assert self._process.stdout is not None

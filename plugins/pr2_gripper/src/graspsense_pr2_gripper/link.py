@@ -87,13 +87,13 @@ class Link(ABC):
         try:
             self.transport.write(report)
         except TransportGone as gone:
-            self._lose(gone)
-            raise DeviceLost(self.gone) from gone
+            raise self._loss(gone) from gone
 
-    def _lose(self, why: TransportGone | Restarted) -> None:
-        """Set why the device counts as lost."""
+    def _loss(self, why: TransportGone | Restarted) -> DeviceLost:
+        """Set why the device counts as lost, and return the error that tells it."""
         self.reachable = self.reachable and not isinstance(why, TransportGone)
         self.gone = f"the PR2 gripper is gone ({why}): check its cable and power, then `graspsense devices`"
+        return DeviceLost(self.gone)
 
 
 @final
@@ -120,8 +120,7 @@ class LockStepLink(Link):
                 if newest is not None:
                     return newest
         except (TransportGone, Restarted) as gone:
-            self._lose(gone)
-            raise DeviceLost(self.gone) from gone
+            raise self._loss(gone) from gone
         return None
 
     def close(self) -> bool:
@@ -177,8 +176,7 @@ class ThreadedLink(Link):
                 return None
             return self._arrival(report, host_s)
         except (TransportGone, Restarted) as gone:
-            self._lose(gone)
-            raise DeviceLost(self.gone) from gone
+            raise self._loss(gone) from gone
 
     def _in_time(self, report: InputReport, host_s: float) -> bool:
         """Return whether a report is new enough to be acted on."""

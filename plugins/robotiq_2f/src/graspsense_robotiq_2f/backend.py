@@ -296,15 +296,10 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
             if status_of(link.exchange(stop)).go:
                 raise NoReply("it does not say that it stops")
 
-        try:
-            with suppress(NoReply):
-                self._polling.tried(told, NoReply)
-        except OSError:
-            return False
-        finally:
-            with suppress(OSError):
-                link.close()
-        return True
+        is_there = self._polling.told(told, NoReply)
+        with suppress(OSError):
+            link.close()
+        return is_there
 
     def _exchange(self, request: Request) -> Status:
         link = self._link

@@ -205,12 +205,7 @@ class So101Backend(BackendWithEmulator[So101Config]):
         with suppress(NoStatusPacket, OSError):
             position = motor_state(bus.read(motor, *STATE)).position
         stop = request.staying_at(position).written()
-        try:
-            with suppress(NoStatusPacket):
-                self._polling.tried(lambda: bus.write(motor, STATE[0], stop), NoStatusPacket, OSError)
-        except OSError:
-            return False
-        return True
+        return self._polling.told(lambda: bus.write(motor, STATE[0], stop), NoStatusPacket)
 
     def _state(self) -> MotorState:
         return motor_state(self._tried(lambda bus: bus.read(self.config.motor, *STATE)))

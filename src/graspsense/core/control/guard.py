@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable
-from math import inf
+from math import fsum, inf
 from typing import Any, NamedTuple
 
 from graspsense.core.control.contact import either_touches
@@ -153,4 +153,5 @@ def _integer(value: Any) -> int:
 
 def _number(value: Any) -> float:
     # The method of float itself, since that of a subclass can return anything.
-    return float.__float__(value) if isinstance(value, float) else float(value)
+    # Not `float`, which takes text for a number too.
+    return float.__float__(value) if isinstance(value, float) else fsum((value,))

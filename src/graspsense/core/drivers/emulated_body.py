@@ -91,6 +91,25 @@ def _unopened(body: str, settings: Mapping[str, Any], scene: str | None) -> Sens
     return backend
 
 
+class LockStepDevice:
+    """An emulated gripper in this process, as the clock of its driver: its time passes only while somebody waits.
+
+    `body` is what its fingers move, as `opened_body` gives it.
+    """
+
+    def __init__(self, body: SensorBackend[Any]) -> None:
+        self.body = body
+        self._now_s = 0.0
+
+    def monotonic(self) -> float:
+        """Return the time (s) of the gripper."""
+        return self._now_s
+
+    def sleep(self, seconds: float) -> None:
+        """Let this time pass."""
+        self._now_s += seconds
+
+
 EmulatorSettingsT = TypeVar("EmulatorSettingsT", bound=EmulatorSettings)
 
 
@@ -98,11 +117,11 @@ class BackendWithEmulator(SensorBackend[EmulatorSettingsT]):
     """A backend whose gripper is real, or emulated, as `where` of its settings says."""
 
     _emulated: Any = None
-    """The gripper that is emulated in this process, once it is open; it has a `body_report`."""
+    """The `LockStepDevice` that is emulated in this process, once it is open."""
 
     def report(self) -> Mapping[str, float | int | str | bool]:
         """Return what the body of the emulated gripper knows; nothing for a real one."""
-        return {} if self._emulated is None else self._emulated.body_report
+        return {} if self._emulated is None else self._emulated.body.report()
 
     def emulation(self) -> Mapping[str, Any]:
         """Return the settings with which a dry run emulates a real gripper."""

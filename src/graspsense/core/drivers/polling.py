@@ -64,6 +64,15 @@ class Polling:
             self.repeated += 1
         return exchange()
 
+    def told(self, exchange: Callable[[], object], *no_reply: type[Exception]) -> bool:
+        """Try an exchange that needs no reply; return whether the connection is there (no OSError)."""
+        try:
+            with suppress(*no_reply):
+                self.tried(exchange, *no_reply, OSError)
+        except OSError:
+            return False
+        return True
+
     def frame(self, gap_m: float, effort_n: float = nan, status: int = 0) -> Frame:
         """Return the frame of what was asked after `wait` and has come now; the pads have no force."""
         now_s = self._clock.monotonic()

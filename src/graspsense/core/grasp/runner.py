@@ -53,6 +53,7 @@ from graspsense.core.values.faults import LIMITED, Fault, faults_among
 from graspsense.core.values.features import Prediction
 from graspsense.core.values.signals import (
     APPROACH,
+    CLOSING,
     HOLD,
     NO_GAP,
     RUNNING,
@@ -121,7 +122,7 @@ def ended_by_itself(stopped: int, outcome: int) -> tuple[Outcome, str]:
     `stopped`: that of the guard (`GuardState`); `outcome`: that of the controller.
     """
     if stopped:
-        return Outcome.ABORTED, "the controller commanded NaN, so the guard stopped the grasp"
+        return Outcome.ABORTED, NO_COMMAND
     try:
         return Outcome(outcome), ""
     except ValueError:
@@ -230,6 +231,10 @@ def _announce(
             backend.see(sink)
 
 
+NO_COMMAND: Final = (
+    "the controller commanded NaN, a limit below 0, a kind that there is not, or a position without end, so the guard "
+    "stopped the grasp"
+)
 MOSTLY: Final = 0.1
 """Share of the commands of a squeeze from which on it is not the one that the controller commanded."""
 UNHEARD_S: Final = 1.0
@@ -398,7 +403,7 @@ class _Grasp:
             if not same_phase:
                 if phase == TARING and not self._tared(images, frame):
                     return
-                self.state = state = self._known(state, frame)
+                self.state = state = self._known(phase, state, frame)
                 phase, newest = state.phase, pads.counter
                 self._event(frame.t_s, Phase(phase), Phase(phase).name.lower())
             if state.guard is not watcher:
@@ -441,9 +446,13 @@ class _Grasp:
             raise _NotDelivered(f"{self.info.name} delivered what it does not declare: {problem}")
         return reading
 
-    def _known(self, state: TickState, frame: Frame) -> TickState:
-        """Return a state whose phase exists. Raises StepFailed, after which the gripper releases."""
-        if state.phase in _PHASES:
+    def _known(self, earlier: int, state: TickState, frame: Frame) -> TickState:
+        """Return a state whose phase exists. Raises StepFailed, after which the gripper releases.
+
+        While the fingers close, it is one of those that a controller has: the runner opens them and ends the grasp.
+        """
+        closes = earlier in CLOSING and state.law.outcome == RUNNING
+        if state.phase in (CLOSING if closes else _PHASES):
             return state
         self.state = stopped(self.params.schedule, state, frame)
         raise StepFailed(f"the controller gave the phase {state.phase}: it has APPROACH, SQUEEZE and HOLD")
@@ -515,7 +524,7 @@ class _Grasp:
     def _guard_event(self, frame: Frame, earlier: GuardState, now: GuardState) -> GuardState:
         """Log an action of the guard at its first time, and return its state."""
         if now.stopped and not earlier.stopped:
-            self._event(frame.t_s, Phase(self.state.phase), "guard: the controller commanded NaN")
+            self._event(frame.t_s, Phase(self.state.phase), f"guard: {NO_COMMAND}")
         elif now.acted and not earlier.acted:
             self._event(frame.t_s, Phase(self.state.phase), "guard: a command was limited")
         return now

@@ -199,6 +199,8 @@ SQUEEZE: Final = 3
 """Both pads touch, and the fingers still move."""
 HOLD: Final = 4
 """The fingers are at rest on the object."""
+CLOSING: Final = (APPROACH, SQUEEZE, HOLD)
+"""The phases of a law, in which the fingers may press something."""
 
 RUNNING: Final = 0
 """The grasp goes on; every other outcome ends it."""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import final
 
+from graspsense.gripper_api import LockStepDevice
 from graspsense_franka_hand import orders, protocol
 from graspsense_franka_hand.config import FrankaConfig
 from graspsense_franka_hand.emulator.hand import TEMPERATURE_C, FrankaHand
@@ -14,13 +14,13 @@ _COMMANDS = {orders.GRASP: protocol.GRASP, orders.MOVE: protocol.MOVE, orders.ST
 
 
 @final
-class LockStepHand:
+class LockStepHand(LockStepDevice):
     """An emulated hand of these settings. Raises HandGone if it gives no state, ConfigError for its body."""
 
     def __init__(self, config: FrankaConfig, seed: int) -> None:
         self._faults = config.faults
         self.hand = FrankaHand(config, seed)
-        self._now_s = 0.0
+        super().__init__(self.hand.fingers.body)
         self._done = 0
         self._refused = ""
         try:
@@ -33,11 +33,6 @@ class LockStepHand:
             self.hand.close()
             raise
         self.first = state
-
-    @property
-    def body_report(self) -> Mapping[str, float | int | str | bool]:
-        """What the body knows."""
-        return self.hand.fingers.body.report()
 
     def newest(self, timeout_s: float) -> HandState | None:
         """Return the state one period later. Raises HandGone."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Final, final
 
+from graspsense.gripper_api import LockStepDevice
 from graspsense_robotiq_2f.config import RobotiqConfig
 from graspsense_robotiq_2f.emulator.fingertips import EmulatedFingertips, emulated_boards
 from graspsense_robotiq_2f.emulator.hand import Hand
@@ -19,33 +20,20 @@ STEP_S: Final = 0.001
 
 
 @final
-class LockStepGripper:
+class LockStepGripper(LockStepDevice):
     """A gripper of these settings, as the link to it and as the clock. Raises ConfigError for an unfit body."""
 
     def __init__(self, config: RobotiqConfig, seed: int) -> None:
         self._config = config
         self._hand = Hand(config, seed)
-        self._now_s = 0.0
+        super().__init__(self._hand.fingers.body)
         count = config.tactile_ports.count("emulated")
         self._boards = emulated_boards(count, lambda: self._hand.fingers.forces_n, self.monotonic, seed)
-
-    @property
-    def body_report(self) -> Mapping[str, float | int | str | bool]:
-        """What the body knows."""
-        return self._hand.fingers.body.report()
 
     @property
     def stroke_m(self) -> float:
         """How wide it opens (m): not wider than its body."""
         return self._hand.fingers.stroke_m
-
-    def monotonic(self) -> float:
-        """Return the time (s) of the gripper."""
-        return self._now_s
-
-    def sleep(self, seconds: float) -> None:
-        """Let this time pass."""
-        self._now_s += seconds
 
     def exchange(self, values: Sequence[int]) -> list[int]:
         """Write the output registers and return the input registers. Raises NoReply, OSError."""

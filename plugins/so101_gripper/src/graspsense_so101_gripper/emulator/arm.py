@@ -35,6 +35,7 @@ class EmulatedArm(EmulatedSerial):
     def __init__(self, config: So101Config, wire: str, seed: int) -> None:
         super().__init__(wire, config.faults)
         self._gripper = GripperMotor(config, seed)
+        self.body = self._gripper.fingers.body
         self._others = {
             number: EmulatedMotor(number, MODEL_NUMBER) for number in MOTORS if number != config.motor
         }
@@ -42,11 +43,6 @@ class EmulatedArm(EmulatedSerial):
         next(iter(self._others.values())).put("torque_enable", 1)
         self._requests_of_bus = Requests({**self._others, config.motor: self._gripper})
         self._active_since_s = inf
-
-    @property
-    def body_report(self) -> Mapping[str, float | int | str | bool]:
-        """What the body knows."""
-        return self._gripper.fingers.body.report()
 
     @property
     def words(self) -> Mapping[str, str]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Final, final
 
+from graspsense.gripper_api import LockStepDevice
 from graspsense_so101_gripper.config import So101Config
 from graspsense_so101_gripper.emulator.arm import EmulatedArm
 
@@ -13,7 +13,7 @@ EXCHANGE_S: Final = 0.001
 
 
 @final
-class LockStepBus:
+class LockStepBus(LockStepDevice):
     """The bus of an arm with these settings, as a line for `ServoBus` and as the clock. Raises ConfigError for a body.
 
     What it sends are the packets of the bus, as on a serial port.
@@ -22,22 +22,10 @@ class LockStepBus:
     def __init__(self, config: So101Config, seed: int) -> None:
         self.is_using = False
         self.arm = EmulatedArm(config, "", seed)
+        super().__init__(self.arm.body)
         self._timeout_s = config.reply_timeout_s
-        self._now_s = self._until_s = self._due_s = 0.0
+        self._until_s = self._due_s = 0.0
         self._coming: list[tuple[float, bytes]] = []
-
-    @property
-    def body_report(self) -> Mapping[str, float | int | str | bool]:
-        """What the body knows."""
-        return self.arm.body_report
-
-    def monotonic(self) -> float:
-        """Return the time (s) of the arm."""
-        return self._now_s
-
-    def sleep(self, seconds: float) -> None:
-        """Let this time pass."""
-        self._now_s += seconds
 
     def clearPort(self) -> None:  # noqa: N802
         """Forget what came before the next request."""

@@ -10,6 +10,7 @@ from math import nan
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from graspsense.core.grasp.protection.effort_ceiling import asked_effort_n
 from graspsense.core.grasp.protection.motor import ALLOWED_N, MOVES_M_S, direction_of, lasting
@@ -28,8 +29,11 @@ OPENS_FREELY: Final = 0.25
 AT_LIMIT: Final = 0.6
 """Share of the largest effort of an approach from which on it says nothing of a free motion."""
 SATURATED: Final = 0.05
-"""Share of the limit of a command by which an effort at this limit differs from it. Fingers that mostly open with as
-much as they may do not reach their speed, and do not tell what a free motion takes."""
+"""Share of the limit of a command by which an effort at this limit differs from it."""
+MOST_CLOSING: Final = 0.75
+MOST_OPENING: Final = 0.5
+"""Shares of a motion at the limit from which on it does not tell what a free one takes: fingers that mostly move with
+as much as they may do not reach their speed, or push something."""
 DIFFERS_N: Final = 3.0
 DIFFERS_SHARE: Final = 0.15
 """By how much free motions to both sides may differ, at least and as a share of the largest effort in the closing."""
@@ -48,10 +52,9 @@ class ReportedEffort:
         self._changed = False
         self._has_own_loop = self._has_wrong_sign = False
         self._most_n = self._most_approach_n = 0.0
-        self._approach_n: list[float] = []
-        self._release_n: list[float] = []
-        self._saturated = 0
-        """How many of those of the release are at the limit of their command."""
+        self._closing: list[tuple[float, float]] = []
+        self._opening: list[tuple[float, float]] = []
+        """The effort of each frame in motion, of the approach and of the release, with the limit of its command (N)."""
 
     def apply(self, frame: Frame, command: Command) -> None:
         """Take the command that is applied after this frame. The motor is compared with one of an effort elsewhere."""
@@ -63,19 +66,15 @@ class ReportedEffort:
         """Take the frame of a tick and return what its effort shows."""
         if phase < APPROACH:
             return None
-        moves = self._has_own_loop and abs(frame.velocity_m_s) > MOVES_M_S
-        if phase == Phase.RELEASE:
+        opens = phase == Phase.RELEASE
+        if self._has_own_loop and (opens or phase == APPROACH) and abs(frame.velocity_m_s) > MOVES_M_S:
+            (self._opening if opens else self._closing).append((frame.effort_n, self._limit_n))
+        if opens:
             self._changed = self._changed or frame.effort_n != self._effort_n
-            if moves:
-                self._release_n.append(frame.effort_n)
-                off_n = abs(abs(frame.effort_n) - self._limit_n)
-                self._saturated += off_n <= SATURATED * self._limit_n
             return None
         self._most_n = max(self._most_n, frame.effort_n)
         if phase == APPROACH:
             self._most_approach_n = self._most_n
-            if moves:
-                self._approach_n.append(frame.effort_n)
         if frame.effort_n != self._effort_n:
             self._effort_n, self._since_s = frame.effort_n, frame.t_s
         self._gap_m = frame.gap_m
@@ -107,9 +106,9 @@ class ReportedEffort:
         """Return the fault of an effort that scatters from frame to frame."""
         scatter_n = max(
             (
-                float(np.median(np.abs(np.diff(efforts))))
-                for efforts in (self._approach_n, self._release_n)
-                if len(efforts) >= FEWEST
+                float(np.median(np.abs(np.diff(moving, axis=0)[:, 0])))
+                for moving in (self._closing, self._opening)
+                if len(moving) >= FEWEST
             ),
             default=nan,
         )
@@ -126,8 +125,9 @@ class ReportedEffort:
 
         Its zero has drifted, or its scale has changed. An effort has a sign if it has been below zero in the release.
         """
-        closing, opening = np.array(self._approach_n), np.array(self._release_n)
-        if min(len(closing), len(opening)) < FEWEST or 2 * self._saturated > len(opening):
+        closing = free_efforts(self._closing, MOST_CLOSING)
+        opening = free_efforts(self._opening, MOST_OPENING)
+        if min(len(closing), len(opening)) < FEWEST:
             return None
         if np.min(opening) < -ALLOWED_N:
             opening = -opening
@@ -143,3 +143,10 @@ class ReportedEffort:
             "drifts or its scale has changed, so that a contact found by it is uncertain; check the current or load "
             "sensor",
         )
+
+
+def free_efforts(moving: list[tuple[float, float]], most: float) -> NDArray[np.float64]:
+    """Return the efforts of a motion, none if more than this share are at the limits that come with them (N)."""
+    efforts, limits = np.reshape(moving, (-1, 2)).T
+    at_limit = np.abs(np.abs(efforts) - limits) <= SATURATED * limits
+    return efforts if at_limit.sum() <= most * len(efforts) else efforts[:0]

@@ -14,11 +14,11 @@ from graspsense.core.grasp.protection.effort_ceiling import asked_effort_n
 from graspsense.core.values.faults import Fault
 from graspsense.core.values.signals import (
     APPROACH,
+    CLOSING,
     EFFORT,
     FORCE,
     HOLD,
     POSITION,
-    SQUEEZE,
     VELOCITY,
     Command,
     Frame,
@@ -173,7 +173,7 @@ class Motor:
         least, most = min(efforts), max(efforts)
         # One command of another kind makes the sum no number.
         if sum(efforts) != sum(efforts):
-            return self._beyond_limit(frame) if phase in (APPROACH, SQUEEZE, HOLD) else None
+            return self._beyond_limit(frame) if phase in CLOSING else None
         return self._answer(frame, least, most) or (
             self._off(frame, 0.5 * (least + most)) if phase == HOLD else None
         )

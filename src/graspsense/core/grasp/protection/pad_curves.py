@@ -15,7 +15,7 @@ import numpy as np
 from graspsense.core.grasp.protection.cells import DOUBT, FEWEST_IMAGES, MOST_NOISY, frozen
 from graspsense.core.grasp.protection.pad_forces import FREE_SHARE, HELD_S
 from graspsense.core.values.faults import Fault
-from graspsense.core.values.signals import APPROACH, HOLD, SQUEEZE, Frame, Phase, Reading
+from graspsense.core.values.signals import APPROACH, CLOSING, HOLD, Frame, Phase, Reading
 
 LATE_S: Final = 0.02
 LATE_PERIODS: Final = 1.25
@@ -260,7 +260,7 @@ class PadCurves:
         gaps.append((frame.t_s, frame.gap_m))
         while len(gaps) > 1 and gaps[1][0] <= frame.t_s - self._late_s:
             gaps.popleft()
-        closing = phase in (APPROACH, SQUEEZE, HOLD)
+        closing = phase in CLOSING
         late = self._late_gap.see(frame, phase)
         if late is not None or not self._is_new(reading):
             return [] if late is None else [late]

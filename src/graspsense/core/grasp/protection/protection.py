@@ -38,6 +38,7 @@ from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.faults import LIMITED, Fault
 from graspsense.core.values.signals import (
     APPROACH,
+    CLOSING,
     EFFORT,
     FORCE,
     HOLD,
@@ -49,8 +50,6 @@ from graspsense.core.values.signals import (
 )
 
 RELEASE: Final = int(Phase.RELEASE)
-CLOSING: Final = (APPROACH, SQUEEZE, HOLD)
-"""The phases in which the fingers may press something."""
 
 
 class Protection:
@@ -164,8 +163,7 @@ class Protection:
         last_phase, self._phase = self._phase, phase
         if phase != APPROACH and last_phase == APPROACH:
             self.side_impact = self._drift.side_impact(reading)
-        if phase >= APPROACH:
-            self._see(jump)
+        self._see(jump)
         closing = phase in CLOSING
         if closing:
             self._see(self._gap_speed.see(frame))

@@ -10,7 +10,7 @@ from operator import or_
 from typing import Final
 
 from graspsense.core.values.faults import Fault, StatusBit
-from graspsense.core.values.signals import APPROACH, HOLD, SQUEEZE, Frame, Reading
+from graspsense.core.values.signals import CLOSING, Frame, Reading
 
 STANDS_S: Final = 0.1
 """Time, counted in frames of the declared rate, for which the clock of the gripper may stand still."""
@@ -87,7 +87,7 @@ class Reports:
     def see(self, reading: Reading, phase: int) -> Fault | None:
         """Take the reading of a tick and return a fault that it shows."""
         frame, pads, _ = reading
-        closing = phase in (APPROACH, SQUEEZE, HOLD)
+        closing = phase in CLOSING
         if frame.dt_s > 0.0:
             self._stands = 0
         else:
@@ -229,7 +229,7 @@ class StatusWatch:
         status = frame.status
         if not status or not self._bits:
             return []
-        closing = phase in (APPROACH, SQUEEZE, HOLD)
+        closing = phase in CLOSING
         faults: list[Fault] = []
         for i, bit in enumerate(self._bits):
             if status & bit.mask:

@@ -175,13 +175,15 @@ class GapJump:
 
     def see(self, frame: Frame) -> Fault | None:
         """Take the frame of a tick; return the jump that it shows."""
-        step_m, elapsed_s = frame.gap_m - self._gap_m, frame.dt_s + self._dt_s
-        self._gap_m, self._dt_s = frame.gap_m, frame.dt_s
+        # A clock that goes back has a fault of its own.
+        dt_s = max(frame.dt_s, 0.0)
+        step_m, elapsed_s = frame.gap_m - self._gap_m, dt_s + self._dt_s
+        self._gap_m, self._dt_s = frame.gap_m, dt_s
         told_m_s = max(self._told_m_s)
         if self._effort:
             told_m_s = min(told_m_s, self._measured_m_s(frame.velocity_m_s))
         against = step_m * self._direction > 0.0
-        allowed_m = JUMP_M + (told_m_s * frame.dt_s if against else JUMP * told_m_s * elapsed_s)
+        allowed_m = JUMP_M + (told_m_s * dt_s if against else JUMP * told_m_s * elapsed_s)
         if not abs(step_m) > allowed_m:
             self.step_m = 0.0
             return None

@@ -20,12 +20,10 @@ from graspsense.core.grasp.protection.motor import RecentMean
 from graspsense.core.grasp.protection.pad_forces import FREE_SHARE
 from graspsense.core.values.faults import Fault
 from graspsense.core.values.signals import (
-    APPROACH,
+    CLOSING,
     EFFORT,
     FORCE,
-    HOLD,
     POSITION,
-    SQUEEZE,
     VELOCITY,
     Command,
     Frame,
@@ -135,7 +133,7 @@ class Touch:
 
     def see(self, frame: Frame, phase: int, asked: Command) -> Fault | None:
         """Take the frame of a tick and the command that the controller asks for; return a fault."""
-        if phase not in (APPROACH, SQUEEZE, HOLD):
+        if phase not in CLOSING:
             return None
         if self._start_gap_m != self._start_gap_m:
             self._start_gap_m = frame.gap_m
