@@ -10,8 +10,10 @@ from __future__ import annotations
 import csv
 import json
 import re
+import unicodedata
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from itertools import chain, takewhile
 from operator import itemgetter, lt
 from pathlib import Path
@@ -69,6 +71,13 @@ SPREADSHEETS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"PAR1", b"ARROW1")
 """The first bytes of a ZIP file, as which spreadsheets are saved, of those of old programs, and of Apache's tables."""
 _CODE_PAGES: Final = ("cp1252", "cp1250", "iso8859-1", "iso8859-15")
 """They agree on degrees, micro and the letters of several languages."""
+_ENCODINGS: Final = ("cp1252", "cp1250", "cp1251", "koi8-r", "cp1253", "cp1254", "cp1255", "cp1256", "cp850",
+                     "mac-roman", "shift_jis", "gb18030", "big5", "euc-kr")  # fmt: skip
+"""Further ones in which a file can be; which it is, its reader sees."""
+_SHOWN_BYTES: Final = 60
+_SAMPLED_BYTES: Final = 100_000
+_ZEROS: Final = 10
+"""One byte of so many is zero, at every second place only, in UTF-16 of a table."""
 _SHOWN_AS_IT_IS: Final = re.compile(r'(^|[;,\t])="')
 _WITH_UNIT: Final = re.compile(r"(.*[0-9.])\s*([^\s0-9]+)")
 _SAMPLED: Final = 400
@@ -158,7 +167,7 @@ class _Layout:
         rows = self.rows[begin:]
         rows = self._without_repeats(rows, names, units)
         rows = self._without_texts(rows, len(names))
-        if _begin_with_numbers_of_rows(rows, len(names) + 1):
+        if _begin_with_names_of_rows(rows, len(names) + 1):
             names, units = ["", *names], ["", *units] if units else None
         names, rows = self._without_blank_end(names, rows)
         rows = self._without_cut(rows, len(names), ended)
@@ -306,7 +315,8 @@ class _Layout:
 
         pandas writes each level of its names in a line, and a spreadsheet a merged cell once, with blanks behind it.
         """
-        written = [row for row in self.rows[:data] if len(row[1]) == width and sum(map(bool, row[1])) > 1]
+        above = [row for row in self.rows[:data] if len(row[1]) == width]
+        written = [row for row in above if sum(map(bool, row[1])) > 1 or (row[1][0] and row is above[-1])]
         units = written.pop()[1] if written and _are_units(written[-1][1]) else None
         levels = [list(row) for _, row in written]
         has_first = any(row[0] for row in levels)
@@ -448,10 +458,18 @@ def _with_remarks(rows: list[Row]) -> list[Row]:
     return [(number, [*row, ""] if len(row) == width - 1 else row) for number, row in rows]
 
 
-def _begin_with_numbers_of_rows(rows: Sequence[Row], width: int) -> bool:
-    """Return whether all rows have so many cells, and number themselves in the first: R writes no name for it."""
-    counter, n = [row[0] for _, row in rows if len(row) == width], len(rows)
-    return n > 1 and counter in ([*map(str, range(n))], [*map(str, range(1, n + 1))])
+def _begin_with_names_of_rows(rows: Sequence[Row], width: int) -> bool:
+    """Return whether all rows have so many cells, and number or name themselves in the first, which R does not name.
+
+    Numbers that R has sorted are in another order; from the last to the first, they can be measured.
+    """
+    names, n = [row[0] for _, row in rows if len(row) == width], len(rows)
+    if not any(map(is_number, names)):
+        return len(set(names)) == n > _FEW_BEFORE
+    return n > 1 and any(
+        sorted(counter) == sorted(names) and counter[::-1] != names
+        for counter in ([*map(str, range(n))], [*map(str, range(1, n + 1))])
+    )
 
 
 def numbers_with_unit(cells: Sequence[str]) -> tuple[Sequence[str], str]:
@@ -692,11 +710,12 @@ def text_of(path: Path) -> str:
         raise DataDamaged(f"{path} is a spreadsheet, an archive or a binary table: save it as CSV in UTF-8")
     if too_large := TEXT_BYTES.exceeded(size):
         raise DataDamaged(f"{path}: {too_large}")
-    text = _UNSEEN.sub("", _decoded(path, data))
-    if "\0" in text:
+    text = _UNSEEN.sub("", _decoded(path, data)).rstrip("\0")
+    before, zero, _ = text.partition("\0")
+    if zero:
         raise DataDamaged(
-            f"{path} contains zero bytes: it is not a text file. If a program wrote it as Unicode text, save it as "
-            "UTF-8"
+            f"{path}, line {before.count(chr(10)) + 1} has zero bytes. If a part of the file was not written, leave "
+            "them out, and the lines that are not whole; else it is not a text file"
         )
     return text
 
@@ -706,18 +725,16 @@ def _decoded(path: Path, data: bytes) -> str:
 
     Raises DataDamaged.
     """
-    unicode = json.detect_encoding(data)
-    if not unicode.startswith("utf-8"):
-        try:
-            return data.decode(unicode)
-        except UnicodeDecodeError as error:
-            if unicode in ("utf-16", "utf-32"):  # without a mark, it only looked so
-                raise DataDamaged(
-                    f"{path} begins as {unicode.upper()}, and is none: {error.reason}. Save it as UTF-8"
-                ) from None
+    unicode = _unicode(data)
+    if unicode == "utf-8-sig":
+        data = data.rstrip(b"\0\xff")  # the part of a card that a logger did not fill
     try:
-        return data.decode("utf-8-sig")
+        return data.decode(unicode)
     except UnicodeDecodeError as error:
+        if unicode != "utf-8-sig":
+            raise DataDamaged(
+                f"{path} begins as {unicode.upper()}, and is none: {error.reason}. Save it as UTF-8"
+            ) from None
         apart = re.sub(rb"(?<=\d)\x92(?=\d{3})", b"'", data)  # thousands, as Windows has them in Switzerland
         texts = {apart.decode(code_page, "replace") for code_page in _CODE_PAGES}
         if len(texts) == 1:
@@ -725,5 +742,30 @@ def _decoded(path: Path, data: bytes) -> str:
         line = data.count(b"\n", 0, error.start) + 1
         raise DataDamaged(
             f"{path}, line {line}: byte 0x{data[error.start]:02x} is not UTF-8, and other encodings read the file in "
-            "different ways: save it as UTF-8"
+            f"different ways, here as {_readings(data, error.start)}. Save it as UTF-8: iconv -f ENCODING -t UTF-8 FILE"
         ) from None
+
+
+def _unicode(data: bytes) -> str:
+    """Return the encoding that the first bytes tell, or the zeros beside digits, signs and ends of lines."""
+    encoding = json.detect_encoding(data)
+    if encoding == "utf-8":
+        sample = data.rstrip(b"\0")[:_SAMPLED_BYTES]
+        zeros = [sample[k::2].count(0) * _ZEROS > len(sample) for k in (0, 1)]
+        encoding = {(False, True): "utf-16-le", (True, False): "utf-16-be"}.get(tuple(zeros), encoding)
+    return encoding.replace("utf-8-sig", "utf-8").replace("utf-8", "utf-8-sig")
+
+
+def _readings(data: bytes, place: int) -> str:
+    """Return how several encodings read the cell in which this byte is."""
+    begin = max(data.rfind(sign, 0, place) for sign in (b"\n", b"\r", b"\t", b",", b";")) + 1
+    cell = re.split(rb"[\n\r\t,;]", data[begin : begin + _SHOWN_BYTES])[0].strip(b"\"' ")
+    readings: dict[str, str] = {}
+    for encoding in _ENCODINGS:
+        with suppress(UnicodeDecodeError):
+            reading = cell.decode(encoding)
+            letters = re.sub(r"[^\w]|[\d_]", "", reading)
+            scripts = {unicodedata.name(letter, "").split()[0] for letter in letters}
+            if len(scripts) == 1 and all(sign.isascii() or sign in letters for sign in reading):
+                readings.setdefault(reading, encoding)
+    return listed([f"{reading} ({encoding})" for reading, encoding in readings.items()])

@@ -51,10 +51,17 @@ _OF_TIMES: Final = TIMES | {
 _OF_A_SESSION: Final = frozenset({
     "temperature", "temp", "humidity", "battery", "batt", "vbat", "baseline", "zero", "initial", "start", "before"
 })  # fmt: skip
+_OF_A_RESULT: Final = frozenset({
+    "score", "certainty", "random", "round", "run", "try", "iteration", "cycle", "series", "block", "group",
+    "set", "usage", "phase", "no", "id", "nr",
+})  # fmt: skip
+"""What can number or divide the trials, or be a result, where a name has no other words."""
 _TEMPERATURES: Final = frozenset({"C", "\u00b0C", "degC"})
 """What can be the same, or drift, in a whole session; by the name of a column, or by its unit."""
 _OFTEN: Final = 3
 """Lines with the same value from which on it may stand for something else than a measurement."""
+_FROM_ZERO: Final = 0.15
+"""Distance from zero of the nearest value, as a share of the range of all, from which on a zero is no measurement."""
 _LONE: Final = 100.0
 """How many times the span of all others a single value is away from them, if it is no measurement."""
 _BY_CHANCE: Final = 1e-4
@@ -115,6 +122,10 @@ _DOUBTS: Final[Mapping[str, tuple[str, str]]] = {
     "session": (
         "it is from before the contact, or can drift in a session, by its name or unit",
         _RECORDED,
+    ),
+    "result": (
+        "its name can be that of a number of the trial, or of a result",
+        "If it was not measured in the grasp, it can reveal the labels: ",
     ),
     "without a gap": (
         "its values pass from label to label without a gap or an overlap, as those of a clock or a counter do",
@@ -187,6 +198,8 @@ def not_held_out(columns: CsvColumns, names: Sequence[str], instances: Sequence[
 def _of_recording(columns: CsvColumns, name: str, labels: Sequence[str]) -> Iterator[str]:
     """Yield why the texts of a column may tell of labels, devices or objects."""
     cells, is_number = columns.cells[name], is_count(columns.units[name])
+    if is_number and set(words_of(name)) <= _OF_A_RESULT and words_of(name):
+        yield "result"
     if says_the_label(cells, labels):
         yield "same"
         return
@@ -424,7 +437,7 @@ def stand_in_of(known: Numbers) -> float | None:
     """Return the value that several lines have and that is farther from all others than these are from each other.
 
     Or a single one that is a hundred times as far. Or the one that is repeated by far more often than any other one,
-    where the others hardly repeat. A zero can be measured so often.
+    where the others hardly repeat. A zero can be measured so often, unless no other value comes near to it.
     """
     if len(known) < 2 * LEAST_LINES:
         return None
@@ -436,7 +449,9 @@ def stand_in_of(known: Numbers) -> float | None:
         return None
     span = float(others.max() - others.min()) * (1.0 if times >= _OFTEN else _LONE)
     far = value < others.min() - span or value > others.max() + span
-    stuck = times >= _OFTEN and value != 0.0 and times >= LEAST_LINES and _mostly_different(others)
+    apart = value != 0.0 or float(np.abs(others).min()) > _FROM_ZERO * float(np.ptp(others))
+    often = times >= (LEAST_LINES if value else _OFTEN)
+    stuck = often and apart and _mostly_different(others)
     return float(value) if far or stuck else None
 
 

@@ -26,7 +26,9 @@ from graspsense.sources.columns.column_guess import words_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_COUNTED: Final = frozenset({"", "1", "-", "#", "count", "counts", "nr", "no", "id", "index", "none", "n/a"})
+_COUNTED: Final = frozenset(
+    {"", "1", "-", "#", "%", "count", "counts", "nr", "no", "id", "index", "none", "n/a"}
+)
 """What stands in the place of a unit for numbers without one."""
 TIMES: Final = frozenset({
     "s", "sec", "secs", "second", "seconds", "ms", "msec", "us", "µs", "ns", "min", "mins", "minute", "minutes",
@@ -38,21 +40,23 @@ _NAMES: Final = frozenset({
     "epoch", "nummer", "versuch", "messung", "zeile", "datei", "sitzung", "datum", "zeit", "uhrzeit", "essai",
     "fichier", "heure", "numero", "prueba", "archivo", "fecha", "hora"
 })  # fmt: skip
-_OF_RECORDINGS: Final = frozenset({
-    "session", "operator", "experimenter", "person", "participant", "subject", "user", "robot", "host", "lab", "site",
-    "seed", "batch", "lot", "weekday", "day", "doy", "week", "month", "year", "date", "datetime", "trial", "fold",
-    "split", "file", "filename", "uid", "uuid", "pred", "prediction", "predicted", "proba", "probability", "confidence",
-    "sitzung", "bediener", "proband", "datum", "wochentag", "tag", "versuch", "datei", "fichier", "jour", "fecha",
-})  # fmt: skip
-"""What a recording is known by, and what a model said of it; no gripper measures it."""
 _DIVISIONS: Final = frozenset({
-    "seed", "trial", "fold", "split", "uid", "uuid", "pred", "prediction", "predicted", "proba", "probability",
-    "confidence",
+    "seed", "trial", "fold", "kfold", "split", "cv", "is", "train", "training", "test", "testing", "validation", "holdout",
+    "subset", "partition", "rep", "repeat", "repetition", "replicate", "attempt", "take", "uid", "uuid", "crc", "checksum",
+    "chk", "hash", "md", "sha", "pred", "prediction", "predicted", "proba", "probability", "confidence", "logit",
+    "likelihood",
 })  # fmt: skip
-"""Those that tell nothing of what was the same for several recordings."""
-_NUMBERED: Final = frozenset(
-    {"id", "no", "nr", "num", "number", "index", "idx", "name", "code", "of", "the", "random"}
-)
+"""What trials are told apart and divided by, and what a model said of them."""
+_OF_RECORDINGS: Final = _DIVISIONS | {
+    "session", "operator", "experimenter", "person", "participant", "subject", "user", "robot", "host", "lab", "site",
+    "batch", "lot", "weekday", "day", "doy", "week", "month", "year", "date", "datetime", "file", "filename",
+    "sitzung", "bediener", "proband", "datum", "wochentag", "tag", "versuch", "datei", "fichier", "jour", "fecha",
+}  # fmt: skip
+"""These, and what was the same for several recordings; no gripper measures it."""
+_NUMBERED: Final = frozenset({
+    "id", "no", "nr", "num", "number", "index", "idx", "name", "code", "of", "the", "random", "in", "for", "used", "set",
+    "data", "dataset", "val", "k", "mask", "flag", "block", "int", "hex",
+})  # fmt: skip
 _FOLLOWS: Final = 0.95
 """Rank correlation with the lines, within each label, of a counter or a clock."""
 _DRIFTS: Final = 0.7
