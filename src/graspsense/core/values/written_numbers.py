@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 import re
-import unicodedata
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
@@ -49,30 +48,15 @@ _LONGEST_MISSING: Final = 20
 
 _LOGICAL: Final = {"True": "1", "False": "0"}
 
-
-class _PlainSigns(dict[int, str | int]):
-    """The signs of ASCII for those of word processors, of other scripts and of full width, and for their digits."""
-
-    def __missing__(self, code: int) -> str | int:
-        self[code] = str(unicodedata.decimal(chr(code), chr(code)))
-        return self[code]
-
-
-_PLAIN_SIGNS: Final = _PlainSigns(
-    {
-        ord(sign): plain
-        for plain, signs in {
-            "-": "\u2010\u2011\u2012\u2013\u2014\u2212\u2796\ufe63\uff0d",
-            "+": "\uff0b",
-            " ": "\u00a0\u2007\u2008\u2009\u200a\u202f\u3000",
-            "'": "\u00b4\u02bc\u2018\u2019\u2032\u066c\uff07",
-            ".": "\u00b7\u066b\uff0e",
-            ",": "\uff0c",
-            "~": "\u2248",
-        }.items()
-        for sign in signs
-    }
-)
+_PLAIN_SIGNS: Final = {
+    **{zero + digit: str(digit) for zero in map(ord, "٠۰०০๐０") for digit in range(10)},
+    **dict.fromkeys(map(ord, "\u2010\u2011\u2012\u2013\u2014\u2212\u2796\ufe63\uff0d"), "-"),
+    **dict.fromkeys(map(ord, "\u00a0\u2007\u2008\u2009\u200a\u202f\u3000"), " "),
+    **dict.fromkeys(map(ord, "\u00b4\u02bc\u2018\u2019\u2032\u066c\uff07"), "'"),
+    **dict.fromkeys(map(ord, "\u00b7\u066b\uff0e"), "."),
+    **str.maketrans("\uff0b\uff0c\u2248", "+,~"),
+}
+"""Digits of other scripts and of full width, and signs and spaces of numbers as word processors have them."""
 _ABOUT: Final = re.compile(r"~ ?(?=[-+.\d])|(?<=[\d.]) ?(?:\u00b1|\+/?-) ?[\d.,]+")
 """What says that a number is rounded, before it, and how uncertain it is, behind it."""
 

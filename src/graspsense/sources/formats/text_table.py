@@ -13,7 +13,6 @@ import re
 import unicodedata
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
 from itertools import chain, takewhile
 from operator import itemgetter, lt
 from pathlib import Path
@@ -69,11 +68,12 @@ _KINDS: Final = frozenset(("continuous", "c", "discrete", "d", "string", "s", "t
 _SEPARATOR_LINE: Final = re.compile(r'"?sep=([;,\t|])"?\s*')
 SPREADSHEETS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"PAR1", b"ARROW1")
 """The first bytes of a ZIP file, as which spreadsheets are saved, of those of old programs, and of Apache's tables."""
-_CODE_PAGES: Final = ("cp1252", "cp1250", "iso8859-1", "iso8859-15")
-"""They agree on degrees, micro and the letters of several languages."""
-_ENCODINGS: Final = ("cp1252", "cp1250", "cp1251", "koi8-r", "cp1253", "cp1254", "cp1255", "cp1256", "cp850",
-                     "mac-roman", "shift_jis", "gb18030", "big5", "euc-kr")  # fmt: skip
-"""Further ones in which a file can be; which it is, its reader sees."""
+_CODE_PAGES: Final = (
+    "cp1252", "cp1250", "iso8859-1", "iso8859-15", "cp1251", "koi8-r", "cp1253", "cp1254", "cp1255", "cp1256", "cp850",
+    "mac-roman", "shift_jis", "gb18030", "big5", "euc-kr",
+)  # fmt: skip
+_OF_EUROPE: Final = 4
+"""The first ones agree on degrees, micro and the letters of several languages."""
 _SHOWN_BYTES: Final = 60
 _SAMPLED_BYTES: Final = 100_000
 _ZEROS: Final = 10
@@ -736,7 +736,7 @@ def _decoded(path: Path, data: bytes) -> str:
                 f"{path} begins as {unicode.upper()}, and is none: {error.reason}. Save it as UTF-8"
             ) from None
         apart = re.sub(rb"(?<=\d)\x92(?=\d{3})", b"'", data)  # thousands, as Windows has them in Switzerland
-        texts = {apart.decode(code_page, "replace") for code_page in _CODE_PAGES}
+        texts = {apart.decode(code_page, "replace") for code_page in _CODE_PAGES[:_OF_EUROPE]}
         if len(texts) == 1:
             return texts.pop()
         line = data.count(b"\n", 0, error.start) + 1
@@ -761,11 +761,10 @@ def _readings(data: bytes, place: int) -> str:
     begin = max(data.rfind(sign, 0, place) for sign in (b"\n", b"\r", b"\t", b",", b";")) + 1
     cell = re.split(rb"[\n\r\t,;]", data[begin : begin + _SHOWN_BYTES])[0].strip(b"\"' ")
     readings: dict[str, str] = {}
-    for encoding in _ENCODINGS:
-        with suppress(UnicodeDecodeError):
-            reading = cell.decode(encoding)
-            letters = re.sub(r"[^\w]|[\d_]", "", reading)
-            scripts = {unicodedata.name(letter, "").split()[0] for letter in letters}
-            if len(scripts) == 1 and all(sign.isascii() or sign in letters for sign in reading):
-                readings.setdefault(reading, encoding)
-    return listed([f"{reading} ({encoding})" for reading, encoding in readings.items()])
+    for code_page in _CODE_PAGES:
+        reading = cell.decode(code_page, "replace")
+        letters = [letter for letter in reading if letter.isalpha()]
+        scripts = {unicodedata.name(letter, "").split()[0] for letter in letters}
+        if len(scripts) == 1 and all(sign.isascii() or sign in letters for sign in reading):
+            readings.setdefault(reading, code_page)
+    return listed([f"{reading} ({code_page})" for reading, code_page in readings.items()])

@@ -51,11 +51,6 @@ _OF_TIMES: Final = TIMES | {
 _OF_A_SESSION: Final = frozenset({
     "temperature", "temp", "humidity", "battery", "batt", "vbat", "baseline", "zero", "initial", "start", "before"
 })  # fmt: skip
-_OF_A_RESULT: Final = frozenset({
-    "score", "certainty", "random", "round", "run", "try", "iteration", "cycle", "series", "block", "group",
-    "set", "usage", "phase", "no", "id", "nr",
-})  # fmt: skip
-"""What can number or divide the trials, or be a result, where a name has no other words."""
 _TEMPERATURES: Final = frozenset({"C", "\u00b0C", "degC"})
 """What can be the same, or drift, in a whole session; by the name of a column, or by its unit."""
 _OFTEN: Final = 3
@@ -122,10 +117,6 @@ _DOUBTS: Final[Mapping[str, tuple[str, str]]] = {
     "session": (
         "it is from before the contact, or can drift in a session, by its name or unit",
         _RECORDED,
-    ),
-    "result": (
-        "its name can be that of a number of the trial, or of a result",
-        "If it was not measured in the grasp, it can reveal the labels: ",
     ),
     "without a gap": (
         "its values pass from label to label without a gap or an overlap, as those of a clock or a counter do",
@@ -198,8 +189,6 @@ def not_held_out(columns: CsvColumns, names: Sequence[str], instances: Sequence[
 def _of_recording(columns: CsvColumns, name: str, labels: Sequence[str]) -> Iterator[str]:
     """Yield why the texts of a column may tell of labels, devices or objects."""
     cells, is_number = columns.cells[name], is_count(columns.units[name])
-    if is_number and set(words_of(name)) <= _OF_A_RESULT and words_of(name):
-        yield "result"
     if says_the_label(cells, labels):
         yield "same"
         return

@@ -42,20 +42,21 @@ _NAMES: Final = frozenset({
 })  # fmt: skip
 _DIVISIONS: Final = frozenset({
     "seed", "trial", "fold", "kfold", "split", "cv", "is", "train", "training", "test", "testing", "validation", "holdout",
-    "subset", "partition", "rep", "repeat", "repetition", "replicate", "attempt", "take", "uid", "uuid", "crc", "checksum",
-    "chk", "hash", "md", "sha", "pred", "prediction", "predicted", "proba", "probability", "confidence", "logit",
-    "likelihood",
+    "subset", "partition", "rep", "repeat", "repetition", "replicate", "attempt", "try", "take", "iteration", "random",
+    "uid", "uuid", "crc", "checksum", "chk", "hash", "md", "sha", "pred", "prediction", "predicted", "proba",
+    "probability", "confidence", "certainty", "score", "logit", "likelihood",
 })  # fmt: skip
 """What trials are told apart and divided by, and what a model said of them."""
 _OF_RECORDINGS: Final = _DIVISIONS | {
     "session", "operator", "experimenter", "person", "participant", "subject", "user", "robot", "host", "lab", "site",
-    "batch", "lot", "weekday", "day", "doy", "week", "month", "year", "date", "datetime", "file", "filename",
-    "sitzung", "bediener", "proband", "datum", "wochentag", "tag", "versuch", "datei", "fichier", "jour", "fecha",
+    "batch", "lot", "block", "series", "group", "round", "run", "cycle", "weekday", "day", "doy", "week", "month", "year",
+    "date", "datetime", "file", "filename", "sitzung", "bediener", "proband", "datum", "wochentag", "tag", "versuch",
+    "datei", "fichier", "jour", "fecha",
 }  # fmt: skip
 """These, and what was the same for several recordings; no gripper measures it."""
 _NUMBERED: Final = frozenset({
-    "id", "no", "nr", "num", "number", "index", "idx", "name", "code", "of", "the", "random", "in", "for", "used", "set",
-    "data", "dataset", "val", "k", "mask", "flag", "block", "int", "hex",
+    "id", "no", "nr", "num", "number", "index", "idx", "name", "code", "of", "the", "in", "for", "used", "set", "data",
+    "dataset", "val", "k", "mask", "flag", "int", "hex",
 })  # fmt: skip
 _FOLLOWS: Final = 0.95
 """Rank correlation with the lines, within each label, of a counter or a clock."""
