@@ -36,7 +36,7 @@ _EVERY: Final = POINT | THOUSANDS | COMMA
 _NOTATIONS: Final = (POINT, THOUSANDS, COMMA)
 
 _MISSING_WORDS: Final = frozenset({
-    "", "na", "n/a", "n.a.", "<na>", "nat", "null", "\\n", "none", "?", ".", "-", "--", "---", "<missing>", "<undefined>",
+    "", "na", "n/a", "n.a.", "<na>", "<missing>", "<undefined>", "nat", "null", "\\n", "none", "?", "."
 })  # fmt: skip
 _MISSING: Final = re.compile(
     r"[-+]?(?:nan(?:\(\w*\))?|1[.,]#(?:q?nan|ind)\d*)|#[^\W\d][^!?]*[!?]|#[\u00a1\u00bf].*|#n/?[adv]|err:\d{3}|\.[a-z]",
@@ -54,7 +54,7 @@ _PLAIN_SIGNS: Final = {
     **dict.fromkeys(map(ord, "\u00a0\u2007\u2008\u2009\u200a\u202f\u3000"), " "),
     **dict.fromkeys(map(ord, "\u00b4\u02bc\u2018\u2019\u2032\u066c\uff07"), "'"),
     **dict.fromkeys(map(ord, "\u00b7\u066b\uff0e"), "."),
-    **str.maketrans("\uff0b\uff0c\u2248", "+,~"),
+    **dict(zip(map(ord, "\uff0b\uff0c\u2248"), "+,~", strict=True)),
 }
 """Digits of other scripts and of full width, and signs and spaces of numbers as word processors have them."""
 _ABOUT: Final = re.compile(r"~ ?(?=[-+.\d])|(?<=[\d.]) ?(?:\u00b1|\+/?-) ?[\d.,]+")
@@ -106,7 +106,7 @@ class NotNumbers:
 def is_missing(cell: str) -> bool:
     """Return whether the text of a cell stands for a missing number."""
     return len(cell) <= _LONGEST_MISSING and (
-        plain_text(cell).lower() in _MISSING_WORDS or _MISSING.fullmatch(cell) is not None
+        plain_text(cell).lower().strip("-") in _MISSING_WORDS or _MISSING.fullmatch(cell) is not None
     )
 
 
@@ -121,24 +121,14 @@ def plain_text(cell: str) -> str:
 
     Nor does it have the apostrophe of a spreadsheet or quotes around it.
 
-    >>> plain_text("\u22121\u2019000"), plain_text("'-0.5"), plain_text("12\u202f000"), plain_text("~\uff11.5 \u00b1 0.2")
-    ("-1'000", '-0.5', '12 000', '1.5')
+    >>> [*map(plain_text, ("\u22121\u2019000", "'-0.5", "12\u202f000", "~\uff11.5 \u00b1 0.2"))]
+    ["-1'000", '-0.5', '12 000', '1.5']
     """
     if not cell.isascii():
         cell = cell.translate(_PLAIN_SIGNS).strip()
     if "~" in cell or "\u00b1" in cell or "+" in cell:
         cell = _ABOUT.sub("", cell)
     return cell.strip("'") if cell.startswith("'") else cell
-
-
-def plain_number(text: str) -> float | None:
-    """Return the finite number that a text with a decimal point is, None if it is none.
-
-    >>> plain_number("2.5e-3"), plain_number("1_000"), plain_number("1,5"), plain_number("inf")
-    (0.0025, None, None, None)
-    """
-    numbers = _plain_numbers([plain_text(text.strip()).replace("D", "e").replace("d", "e")])
-    return None if numbers is None or math.isinf(numbers[0]) else float(numbers[0])
 
 
 def number_in(text: str) -> float | None:

@@ -20,7 +20,7 @@ from typing import Any, Final
 
 from attrs import frozen
 
-from graspsense.core.values.errors import ConfigError, DataDamaged, listed
+from graspsense.core.values.errors import DataDamaged, listed
 from graspsense.core.values.limits import CELLS, COLUMNS, LINE_CHARACTERS, TEXT_BYTES
 from graspsense.core.values.written_numbers import (
     NotNumbers,
@@ -29,7 +29,7 @@ from graspsense.core.values.written_numbers import (
     is_number,
     plain_text,
 )
-from graspsense.recording.readable import not_opened, readable, refuse_devices
+from graspsense.recording.readable import readable, refuse_devices
 from graspsense.recording.unpacked import Unpacked
 
 LONGEST_NAME: Final = 500
@@ -472,24 +472,24 @@ def _begin_with_names_of_rows(rows: Sequence[Row], width: int) -> bool:
     )
 
 
-def numbers_with_unit(cells: Sequence[str]) -> tuple[Sequence[str], str]:
-    """Return the numbers and the unit of cells such as `12.3 N`; the cells, and no unit, if they have not all the same.
+def numbers_with_unit(cells: Sequence[str], of_column: str = "") -> tuple[Sequence[str], str]:
+    """Return the numbers and the unit of cells such as `12.3 N`, if all have the same, and that of the column if known.
 
-    >>> numbers_with_unit(["12.3 N", "", "4N"]), numbers_with_unit(["12 mm", "1 m"])
-    ((['12.3', '', '4'], 'N'), (['12 mm', '1 m'], ''))
+    Else they are the cells, and the unit of the column.
+
+    >>> numbers_with_unit(["12.3 N", "", "4N"]), numbers_with_unit(["12 mm", "1 m"]), numbers_with_unit(["1 m"], "mm")
+    ((['12.3', '', '4'], 'N'), (['12 mm', '1 m'], ''), (['1 m'], 'mm'))
     """
     numbers, unit = [], ""
     for cell in cells:
-        if is_missing(cell):
-            numbers.append(cell)
-            continue
-        match = _WITH_UNIT.fullmatch(cell)
-        if match is None or match[2] != (unit or match[2]) or not is_number(match[1]):
-            return cells, ""
-        numbers.append(match[1])
-        unit = match[2]
+        match = None if is_missing(cell) else _WITH_UNIT.fullmatch(cell)
+        if match and match[2] == (unit or of_column or match[2]) and is_number(match[1]):
+            unit = match[2]
+        elif not is_missing(cell):
+            return cells, of_column
+        numbers.append(match[1] if match else cell)
     known = unit.lower() in UNITS if len(unit) > 1 else unit in _SINGLE_UNITS
-    return (numbers, unit) if known else (cells, "")
+    return (numbers, unit) if known else (cells, of_column)
 
 
 def _json_table(path: Path, lines: Sequence[Line], ended: bool) -> TextTable:
@@ -694,14 +694,9 @@ def text_of(path: Path) -> str:
     """
     refuse_devices(path)
     most = TEXT_BYTES.most
-    try:
-        with path.open("rb") as file:
-            data = file.read(most + 1)
-            size = len(data) if len(data) <= most else max(path.stat().st_size, len(data))
-    except OSError as error:
-        raise not_opened(path, error) from error
-    except ValueError as error:
-        raise ConfigError(f"{path} cannot be read: {error}") from error
+    with readable(path), path.open("rb") as file:
+        data = file.read(most + 1)
+        size = len(data) if len(data) <= most else max(path.stat().st_size, len(data))
     if data.startswith(b"\x1f\x8b"):
         with readable(path, "a file compressed by gzip"):
             data = Unpacked(path).unpack("gzip", data)
@@ -749,11 +744,11 @@ def _decoded(path: Path, data: bytes) -> str:
 def _unicode(data: bytes) -> str:
     """Return the encoding that the first bytes tell, or the zeros beside digits, signs and ends of lines."""
     encoding = json.detect_encoding(data)
-    if encoding == "utf-8":
-        sample = data.rstrip(b"\0")[:_SAMPLED_BYTES]
-        zeros = [sample[k::2].count(0) * _ZEROS > len(sample) for k in (0, 1)]
-        encoding = {(False, True): "utf-16-le", (True, False): "utf-16-be"}.get(tuple(zeros), encoding)
-    return encoding.replace("utf-8-sig", "utf-8").replace("utf-8", "utf-8-sig")
+    sample = data.rstrip(b"\0")[:_SAMPLED_BYTES]
+    even, odd = (sample[k::2].count(0) * _ZEROS > len(sample) for k in (0, 1))
+    if not encoding.startswith("utf-8"):
+        return encoding
+    return "utf-8-sig" if even == odd else "utf-16-le" if odd else "utf-16-be"
 
 
 def _readings(data: bytes, place: int) -> str:

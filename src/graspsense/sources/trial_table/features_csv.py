@@ -21,7 +21,7 @@ from graspsense.core.files.whole_file import write_or_replace
 from graspsense.core.learn.confounding import LEAST_LINES
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.target_value import TargetValue
-from graspsense.core.values.errors import ConfigError, DataDamaged, counted, listed
+from graspsense.core.values.errors import ConfigError, DataDamaged, listed
 from graspsense.core.values.features import UNKNOWN, FeatureTable
 from graspsense.core.values.label_text import is_missing_label, label_text
 from graspsense.core.values.nominal import splits_of
@@ -84,7 +84,7 @@ def read_labelled(
         export.keep_complete_trials(label if value is None else None, notes)
         features = features or export.features
     elif isinstance(columns, ArffColumns) and value is None:
-        notes += columns.without_label(label)
+        notes += columns.without_label(label or "")
     target = None if value is None else _target(columns, value, export, notes)
     labels = _labels(columns, label, notes, required=target is None)
     ranks, no_order = export.order() if export and order is None else (_ranks(columns, order, notes), "")
@@ -207,12 +207,10 @@ def _target(columns: CsvColumns, value: str, export: ExportedTable | None, notes
     """Keep the lines that have the number to predict, and return the numbers. Raises ConfigError, DataDamaged."""
     name = value if export is None or value in columns.cells else f"{VALUE}{value}"
     columns.column(name, "the number to predict")
-    having = [i for i, number in enumerate(columns.numbers(name)) if not math.isnan(number)]
-    if not having:
+    having = [not math.isnan(number) for number in columns.numbers(name)]
+    if not any(having):
         raise DataDamaged(f"{columns.path}: no line has a {value}")
-    if len(having) < len(columns):
-        notes.append(f"{counted(len(columns) - len(having), 'trial')} left out: no {value}")
-        columns.keep(having)
+    notes += columns.keep_where(having, f"no {value}")
     return TargetValue(name=value, unit=columns.units[name], values=tuple(columns.numbers(name)))
 
 

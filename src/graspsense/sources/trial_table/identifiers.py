@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _COUNTED: Final = frozenset(
-    {"", "1", "-", "#", "%", "count", "counts", "nr", "no", "id", "index", "none", "n/a"}
+    ("", "1", "-", "#", "%", "count", "counts", "nr", "no", "id", "index", "none", "n/a")
 )
 """What stands in the place of a unit for numbers without one."""
 TIMES: Final = frozenset({
@@ -41,17 +41,17 @@ _NAMES: Final = frozenset({
     "fichier", "heure", "numero", "prueba", "archivo", "fecha", "hora"
 })  # fmt: skip
 _DIVISIONS: Final = frozenset({
-    "seed", "trial", "fold", "kfold", "split", "cv", "is", "train", "training", "test", "testing", "validation", "holdout",
-    "subset", "partition", "rep", "repeat", "repetition", "replicate", "attempt", "try", "take", "iteration", "random",
-    "uid", "uuid", "crc", "checksum", "chk", "hash", "md", "sha", "pred", "prediction", "predicted", "proba",
+    "seed", "trial", "fold", "kfold", "split", "cv", "is", "train", "training", "test", "testing", "validation",
+    "holdout", "subset", "partition", "rep", "repeat", "repetition", "replicate", "attempt", "try", "take", "iteration",
+    "random", "uid", "uuid", "crc", "checksum", "chk", "hash", "md", "sha", "pred", "prediction", "predicted", "proba",
     "probability", "confidence", "certainty", "score", "logit", "likelihood",
 })  # fmt: skip
 """What trials are told apart and divided by, and what a model said of them."""
 _OF_RECORDINGS: Final = _DIVISIONS | {
     "session", "operator", "experimenter", "person", "participant", "subject", "user", "robot", "host", "lab", "site",
-    "batch", "lot", "block", "series", "group", "round", "run", "cycle", "weekday", "day", "doy", "week", "month", "year",
-    "date", "datetime", "file", "filename", "sitzung", "bediener", "proband", "datum", "wochentag", "tag", "versuch",
-    "datei", "fichier", "jour", "fecha",
+    "batch", "lot", "block", "series", "group", "round", "run", "cycle", "weekday", "day", "doy", "week", "month",
+    "year", "date", "datetime", "file", "filename", "sitzung", "bediener", "proband", "datum", "wochentag", "tag",
+    "versuch", "datei", "fichier", "jour", "fecha",
 }  # fmt: skip
 """These, and what was the same for several recordings; no gripper measures it."""
 _NUMBERED: Final = frozenset({
