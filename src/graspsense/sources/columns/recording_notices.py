@@ -515,9 +515,8 @@ def _gap_leaps(t_s: Numbers, gap: Numbers) -> Iterator[str]:
                 f"the gap jumps by {steps[k] * 1e3:.3g} mm within {seconds * 1e3:.3g} ms (at {t_s[k + 1]:.4g} s), "
                 "as no finger does: is it a glitch, or did its sensor stop before?"
             )
-    if (
-        LEAP * steps.min(initial=np.inf, where=steps > 0.0) < steps.max()
-    ):  # the steps of a coarse gap are alike
+    # The steps of a coarse gap are alike.
+    if LEAP * steps.min(initial=np.inf, where=steps > 0.0) < steps.max():
         yield from _seldom("the gap", t_s, gap, PART)
 
 

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Sequence
 from copy import copy
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Self
+from typing import Final, Self
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from graspsense.core.values.written_numbers import (
     is_number,
 )
 from graspsense.core.values.written_times import seconds_since_first
+from graspsense.sources.formats.table import Numbers
 from graspsense.sources.formats.text_table import (
     INDEX,
     distinct_names,
@@ -35,9 +36,6 @@ from graspsense.sources.formats.text_table import (
     read_lines,
     table_of,
 )
-
-if TYPE_CHECKING:
-    from graspsense.core.values.written_numbers import Numbers
 
 _INDEXES: Final = (INDEX, "Unnamed: 0")
 """The second is the name that pandas gives such a column when it reads it again."""

@@ -54,8 +54,6 @@ _SINGLE_UNITS: Final = frozenset("smgNVACK%\u00b0")
 """Units of one sign behind a number: in the other case, or as `12-`, it can be a factor or a sign of its own."""
 _UNSEEN: Final = re.compile("[\u200b\u200e\u200f\u202a-\u202e\u2060\u2066-\u2069\ufeff]")
 """Marks that nothing shows: the order of bytes, also in the middle of files that were joined, and of writing."""
-_LINE_ENDS: Final = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
-"""The characters at which `str.splitlines` divides a text."""
 _SEPARATORS: Final = (";", "\t", ",", "|", " ", "  ")
 """The last ones stand for any number of spaces, and for two or more, where names have spaces."""
 _COMMENTS: Final = ("#", "%")
@@ -75,14 +73,14 @@ _CODE_PAGES: Final = (
 _OF_EUROPE: Final = 4
 """The first ones agree on degrees, micro and the letters of several languages."""
 _SHOWN_BYTES: Final = 60
-_SAMPLED_BYTES: Final = 100_000
 _ZEROS: Final = 10
 """One byte of so many is zero, at every second place only, in UTF-16 of a table."""
 _SHOWN_AS_IT_IS: Final = re.compile(r'(^|[;,\t])="')
 _WITH_UNIT: Final = re.compile(r"(.*[0-9.])\s*([^\s0-9]+)")
 _SAMPLED: Final = 400
 """Lines from which the separator and the kinds of the columns are found."""
-_SAMPLED_CELLS: Final = 100_000
+_SAMPLED_SIZE: Final = 100_000
+"""Cells of these lines, and bytes from which the encoding is found."""
 _FEW_BEFORE: Final = 4
 _MOST_BEFORE: Final = 0.1
 """Lines of numbers before the names, and their share of those after them, beyond which they can be data."""
@@ -114,7 +112,7 @@ def read_lines(path: Path) -> tuple[list[Line], bool]:
     Raises ConfigError, TooLarge, DataDamaged.
     """
     text = text_of(path)
-    if too_many := CELLS.exceeded(sum(map(text.count, _LINE_ENDS))):
+    if too_many := CELLS.exceeded(text.count("\n") + text.count("\r")):
         raise DataDamaged(f"{path}: {too_many}")
     lines = list(enumerate(re.split("\r\n|[\r\n]", text), 1))
     for number, line in lines:
@@ -221,7 +219,7 @@ class _Layout:
         if len(self.rows[0][1]) == 1 < width:
             divided = self._cells(self.rows[0][1][0], width)
             self.rows[0] = (self.rows[0][0], divided if len(divided) == width else self.rows[0][1])
-        sample = sample[: max(2, _SAMPLED_CELLS // width)]
+        sample = sample[: max(2, _SAMPLED_SIZE // width)]
         numeric = _numeric_columns(sample, width)
         data = next((k for k, (_, row) in enumerate(self.rows) if _is_data(row, width, numeric)), None)
         data = self._without_kinds(data, numeric)
@@ -744,7 +742,7 @@ def _decoded(path: Path, data: bytes) -> str:
 def _unicode(data: bytes) -> str:
     """Return the encoding that the first bytes tell, or the zeros beside digits, signs and ends of lines."""
     encoding = json.detect_encoding(data)
-    sample = data.rstrip(b"\0")[:_SAMPLED_BYTES]
+    sample = data.rstrip(b"\0")[:_SAMPLED_SIZE]
     even, odd = (sample[k::2].count(0) * _ZEROS > len(sample) for k in (0, 1))
     if not encoding.startswith("utf-8"):
         return encoding

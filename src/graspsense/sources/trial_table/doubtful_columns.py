@@ -34,13 +34,10 @@ from graspsense.sources.trial_table.identifiers import (
 )
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from graspsense.core.learn.target_value import TargetValue
     from graspsense.core.values.features import FeatureTable
     from graspsense.sources.formats.csv_columns import CsvColumns
-
-    Numbers = NDArray[np.float64]
+    from graspsense.sources.formats.table import Numbers
 
 _TIME_NAMES: Final = frozenset({
     "t", "time", "elapsed", "clock", "hour", "hours", "minute", "minutes", "timestamp"

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -42,7 +42,7 @@ from graspsense.sources.trial_table.summary_lines import without_summaries
 from graspsense.store.export_table import VALUE
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from graspsense.sources.formats.table import Numbers
 
 SMALL: Final = 1e-3
 """A column that varies by less than this has few values that differ by J48's 1e-5."""
@@ -107,7 +107,10 @@ def read_labelled(
         labels=tuple(labels),
         instances=instances,
         no_instances=f"no column names the instance ({option('instance', 'COLUMN')})",
-        **_recording(columns, instance, others),
+        sessions=instance is not None and groups_trials(instance, columns.texts(instance)),
+        recorded_with={
+            name: texts for name in others if groups_trials(name, texts := tuple(columns.texts(name)))
+        },
         order=ranks,
         no_order=no_order,
         **_controls(table, columns, known_before, export),
@@ -126,15 +129,6 @@ def _opened(
     label = label or columns.default_label or ("label" if export is not None else None)
     columns.take_words_as_missing([name for name in columns.names if name not in {label, *others}])
     return columns, export, label
-
-
-def _recording(columns: CsvColumns, instance: str | None, others: Sequence[str]) -> dict[str, Any]:
-    """Return whether the instances are sessions, and what else of the recording is in the columns `others`."""
-    grouping = [name for name in others if groups_trials(name, columns.texts(name))]
-    return {
-        "sessions": instance is not None and groups_trials(instance, columns.texts(instance)),
-        "recorded_with": {name: tuple(columns.texts(name)) for name in grouping},
-    }
 
 
 def _object_column(
@@ -160,9 +154,27 @@ def _object_column(
 def _identifying(
     columns: CsvColumns, labels: Sequence[str], ranks: Sequence[int] | None, lines: Sequence[int]
 ) -> Callable[[str], str]:
-    """Return `_identified` of these lines, which computes the answer for a column once."""
-    ranks_once = None if ranks is None else [ranks[i] for i in lines]
-    return cache(partial(_identified, columns.rows(lines), [labels[i] for i in lines], ranks_once))
+    """Return a function that says how a column identifies trials in these lines; empty if it can be a feature.
+
+    It raises DataDamaged.
+    """
+    columns, labels = columns.rows(lines), [labels[i] for i in lines]
+    order = None if ranks is None else [ranks[i] for i in lines]
+
+    @cache
+    def identified(name: str) -> str:
+        if columns.is_nominal(name):
+            why = text_identifies(columns.texts(name), labels)
+        else:
+            values = columns.numbers(name)
+            why = identifies(name, columns.units[name], values, labels, order)
+            if not why and _loses_digits(columns.cells[name], values):
+                why = "differ in their last digits alone, which are rounding (subtract an offset)"
+        if not why and names_a_recording(name):
+            return "tell of the recording and not of the grasp, by their name"
+        return why
+
+    return identified
 
 
 def _refuse_long_form(columns: CsvColumns) -> None:
@@ -280,20 +292,6 @@ def _ranks(columns: CsvColumns, order: str | None, notes: list[str]) -> tuple[in
     return tuple(np.argsort(np.argsort(values, kind="stable"), kind="stable").tolist())
 
 
-def _identified(columns: CsvColumns, labels: Sequence[str], order: Sequence[int] | None, name: str) -> str:
-    """Return how a column identifies trials, empty if it can be a feature. Raises DataDamaged."""
-    if columns.is_nominal(name):
-        why = text_identifies(columns.texts(name), labels)
-    else:
-        values = columns.numbers(name)
-        why = identifies(name, columns.units[name], values, labels, order)
-        if not why and _loses_digits(columns.cells[name], values):
-            why = "differ in their last digits alone, which are rounding (subtract an offset)"
-    if not why and names_a_recording(name):
-        return "tell of the recording and not of the grasp, by their name"
-    return why
-
-
 def _loses_digits(cells: Sequence[str], values: Sequence[float]) -> bool:
     """Return whether different whole numbers are the same number, or all numbers are but for rounding."""
     known = np.array([value for value in values if value == value])
@@ -382,6 +380,6 @@ def _note_uninformative_columns(path: Path, table: FeatureTable, notes: list[str
         raise DataDamaged(f"{path}: no feature has any value: {listed(blank)}")
 
 
-def _span(values: NDArray[np.float64]) -> float:
+def _span(values: Numbers) -> float:
     """Return the difference of the largest and the smallest value; infinite where it is too large for a number."""
     return float(values.max()) - float(values.min())

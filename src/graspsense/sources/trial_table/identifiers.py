@@ -93,10 +93,6 @@ OF_OBJECTS: Final = (NAME_OBJECTS, NUMBER_OBJECTS)
 """How the values of a column identify trials that are of the same object."""
 _MOST_VALUES: Final = 1.0 / 3.0
 """Share of different texts from which on they are no values of a nominal feature."""
-_DATE_TEXT: Final = re.compile(
-    r"(?=.*\d)(\d{1,4}([-./])\d{1,2}\2\d{1,4})?[T ]?(\d{1,2}(:\d{2}){1,2}(\.\d+)?)?( ?Z| ?[+-]\d\d:?\d\d)?"
-)
-"""A date or a time of day, as 2026-11-26, 26.11.2026 14:03 or 14:03:22."""
 _LONG_WORDS: Final = (
     "(mon|tues?|wed(nes)?|thu(rs)?|fri|sat(ur)?|sun)(day)?|(lun|mar|mer(cre)?|jeu|ven(dre)?)(di)?|sam(edi)?|dim(anche)?|"
     "(mon|diens|donners|frei|sams|sonn)tag|mittwoch|jan(uary?)?|jänner|feb(ruary?)?|mar(ch)?|mär(z)?|apr(il)?|may|mai|"
@@ -104,10 +100,11 @@ _LONG_WORDS: Final = (
 )
 _WORDS_OF_DATES: Final = re.compile(f"{_LONG_WORDS}|mo|di|mi|do|fr|sa|so")
 """Days of the week and months, alone."""
-_WORDED_DATE: Final = re.compile(
+_DATE_TEXT: Final = re.compile(
+    r"(?=.*\d)(\d{1,4}([-./])\d{1,2}\2\d{1,4})?[t ]?(\d{1,2}(:\d{2}){1,2}(\.\d+)?)?( ?z| ?[+-]\d\d:?\d\d)?|"
     rf"(?=.*\d)(?=.*({_LONG_WORDS}|[ap]\.?m))({_LONG_WORDS}|\d+(st|nd|rd|th)?|[ap]\.?m\.?|utc|gmt|[-\s.,:/_+])+"
 )
-"""A date or a time with such words, as 26 Nov 2026 or 2:03 pm."""
+"""A date or a time of day in small letters, as 2026-11-26, 26.11.2026 14:03, 14:03:22, 26 nov 2026 or 2:03 pm."""
 _DAY_FORMS: Final = ("%Y%m%d", "%d%m%Y", "%m%d%Y", "%y%m%d")
 _DATES: Final = (*_DAY_FORMS, "%y%m%d%H%M", "%Y%m%d%H%M", "%y%m%d%H%M%S", "%Y%m%d%H%M%S")
 _CLOCK_VALUES: Final = (10, 15)
@@ -197,11 +194,8 @@ def text_identifies(texts: Sequence[str], labels: Sequence[str]) -> str:
     if counts.keys() <= set(labels):
         return "are the labels, as those of a prediction are"
     lower = [text.lower() for text in counts]
-    if (
-        all(map(_DATE_TEXT.fullmatch, counts))
-        or all(map(_WORDED_DATE.fullmatch, lower))
-        or (len(counts) > 2 and all(map(_WORDS_OF_DATES.fullmatch, lower)))
-    ):
+    of_words = len(counts) > 2 and all(map(_WORDS_OF_DATES.fullmatch, lower))
+    if of_words or all(map(_DATE_TEXT.fullmatch, lower)):
         return "are dates or times"
     values, own = [text for text, _ in given], [label for _, label in given]
     numbered = all(re.search(r"\d", text) for text in counts)
