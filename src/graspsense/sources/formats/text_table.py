@@ -319,6 +319,7 @@ class _Layout:
         levels = [list(row) for _, row in written]
         has_first = any(row[0] for row in levels)
         named = any(_names_all(row) and (row[0] or not has_first) for row in levels)
+        named &= len(levels) < 3 or any(levels[-1][1:])  # else pandas names the index below its levels
         if len(levels) < 2 or named or any(map(is_number, chain(*levels))):
             return None
         *upper, lowest = levels
