@@ -705,10 +705,10 @@ def text_of(path: Path) -> str:
     if too_large := TEXT_BYTES.exceeded(size):
         raise DataDamaged(f"{path}: {too_large}")
     text = _UNSEEN.sub("", _decoded(path, data)).rstrip("\0")
-    before, zero, _ = text.partition("\0")
+    beginning, zero, _ = text.partition("\0")
     if zero:
         raise DataDamaged(
-            f"{path}, line {before.count(chr(10)) + 1} has zero bytes. If a part of the file was not written, leave "
+            f"{path}, line {beginning.count(chr(10)) + 1} has zero bytes. If a part of the file was not written, leave "
             "them out, and the lines that are not whole; else it is not a text file"
         )
     return text

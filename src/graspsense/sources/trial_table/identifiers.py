@@ -41,9 +41,9 @@ _NAMES: Final = frozenset({
     "fichier", "heure", "numero", "prueba", "archivo", "fecha", "hora"
 })  # fmt: skip
 _DIVISIONS: Final = frozenset({
-    "seed", "trial", "fold", "kfold", "split", "cv", "is", "train", "training", "test", "testing", "validation",
+    "seed", "trial", "fold", "kfold", "split", "is", "train", "training", "test", "testing", "validation",
     "holdout", "subset", "partition", "rep", "repeat", "repetition", "replicate", "attempt", "try", "take", "iteration",
-    "random", "uid", "uuid", "crc", "checksum", "chk", "hash", "md", "sha", "pred", "prediction", "predicted", "proba",
+    "random", "uid", "uuid", "crc", "checksum", "chk", "hash", "sha", "pred", "prediction", "predicted", "proba",
     "probability", "confidence", "certainty", "score", "logit", "likelihood",
 })  # fmt: skip
 """What trials are told apart and divided by, and what a model said of them."""
@@ -56,7 +56,7 @@ _OF_RECORDINGS: Final = _DIVISIONS | {
 """These, and what was the same for several recordings; no gripper measures it."""
 _NUMBERED: Final = frozenset({
     "id", "no", "nr", "num", "number", "index", "idx", "name", "code", "of", "the", "in", "for", "used", "set", "data",
-    "dataset", "val", "k", "mask", "flag", "int", "hex",
+    "dataset", "val", "k", "cv", "md", "mask", "flag", "int", "hex",
 })  # fmt: skip
 _FOLLOWS: Final = 0.95
 """Rank correlation with the lines, within each label, of a counter or a clock."""
