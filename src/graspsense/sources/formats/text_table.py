@@ -743,10 +743,10 @@ def _decoded(path: Path, data: bytes) -> str:
 def _unicode(data: bytes) -> str:
     """Return the encoding that the first bytes tell, or the zeros beside digits, signs and ends of lines."""
     encoding = json.detect_encoding(data)
+    if encoding not in ("utf-8", "utf-16-le", "utf-16-be"):
+        return encoding
     sample = data.rstrip(b"\0")[:_SAMPLED_SIZE]
     even, odd = (sample[k::2].count(0) * _ZEROS > len(sample) for k in (0, 1))
-    if not encoding.startswith("utf-8"):
-        return encoding
     return "utf-8-sig" if even == odd else "utf-16-le" if odd else "utf-16-be"
 
 

@@ -203,9 +203,11 @@ def _of_numbers(name: str, unit: str, values: Numbers, labels: Sequence[str]) ->
     of_time, differs = is_count(unit) or is_time(unit), differs_by_label(values, labels)
     if (differs or are_in_blocks(labels)) and follow_lines(values, labels):
         yield "order"
-    if of_time and (_is_named_as_time(name) or can_be_days(values)):
+    words = set(words_of(name))
+    named_as_time = _TIME_NAMES & words and words <= _TIME_NAMES | _OF_TIMES
+    if of_time and (named_as_time or can_be_days(values)):
         yield "time"
-    if differs and (_OF_A_SESSION & set(words_of(name)) or unit in _TEMPERATURES):
+    if differs and (_OF_A_SESSION & words or unit in _TEMPERATURES):
         yield "session"
     if of_time and passes_without_a_gap(values, labels):
         yield "without a gap"
@@ -376,11 +378,6 @@ def _numbers(columns: CsvColumns, names: Sequence[str]) -> dict[str, Numbers]:
     """Return these columns of numbers, without those that are too large to learn from."""
     numbers = {name: np.array(columns.numbers(name)) for name in names}
     return {name: values for name, values in numbers.items() if not (np.abs(values) > LARGEST_VALUE).any()}
-
-
-def _is_named_as_time(name: str) -> bool:
-    words = set(words_of(name))
-    return bool(_TIME_NAMES & words) and words <= _TIME_NAMES | _OF_TIMES
 
 
 @np.errstate(over="ignore")  # of differences and ratios of numbers that no sensor gives

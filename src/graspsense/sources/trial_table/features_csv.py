@@ -107,10 +107,8 @@ def read_labelled(
         labels=tuple(labels),
         instances=instances,
         no_instances=f"no column names the instance ({option('instance', 'COLUMN')})",
-        sessions=instance is not None and groups_trials(instance, columns.texts(instance)),
-        recorded_with={
-            name: texts for name in others if groups_trials(name, texts := tuple(columns.texts(name)))
-        },
+        sessions=bool(_sessions(columns, [instance] if instance else [])),
+        recorded_with=_sessions(columns, others),
         order=ranks,
         no_order=no_order,
         **_controls(table, columns, known_before, export),
@@ -129,6 +127,12 @@ def _opened(
     label = label or columns.default_label or ("label" if export is not None else None)
     columns.take_words_as_missing([name for name in columns.names if name not in {label, *others}])
     return columns, export, label
+
+
+def _sessions(columns: CsvColumns, names: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Return the texts of those of these columns that name sessions, operators or devices."""
+    texts = {name: tuple(columns.texts(name)) for name in names}
+    return {name: values for name, values in texts.items() if groups_trials(name, values)}
 
 
 def _object_column(
