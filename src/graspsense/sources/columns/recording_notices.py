@@ -202,10 +202,9 @@ def _of_sensor(force: _Force) -> Iterator[str]:
         yield f"{force.what} does not change during the recording: is it another column, or did its sensor stop?"
     elif len(force) >= FEWEST and (held := _held(force.n)) is not None:
         begin, end = held
-        to_end = "its last value to the end"
-        repeats = (
-            to_end if end == len(force) else f"one value from {force.t[begin]:.4g} to {force.when(end - 1)}"
-        )
+        repeats = "its last value to the end"
+        if end < len(force):
+            repeats = f"one value from {force.t[begin]:.4g} to {force.when(end - 1)}"
         yield (
             f"{force.what} repeats {repeats}, although it varied before: did its sensor stop, or is it "
             "at the end of its range?"
