@@ -8,7 +8,7 @@ from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.core.values.written_numbers import NotNumbers, columns_of_numbers, number_in, plain_number
+from graspsense.core.values.written_numbers import NotNumbers, columns_of_numbers, number_in
 
 
 def numbers(*cells, **others):
@@ -41,6 +41,11 @@ def numbers(*cells, **others):
         (["1,00,000", "12,34,567.5", "250"], [100000, 1234567.5, 250]),
         (["inf", "-Infinity"], [math.inf, -math.inf]),
         (["0x7D0", "0", "", "0Xff"], [2000, 0, math.nan, 255]),
+        (["1", "\u0661\u066b\u0665", "\uff0d\uff12\uff0e\uff15", "\u0967\u0968"], [1, 1.5, -2.5, 12]),
+        (["1\u02bc250.5", "1\u3000250", "12\u00b75"], [1250.5, 1250, 12.5]),
+        (["12.5 \u00b1 0.2", "~13", "\u2248 14.5", "9+/-1", "- 0.5"], [12.5, 13, 14.5, 9, -0.5]),
+        (["(1,250.5)", "2,000.0", "(0.5)"], [-1250.5, 2000, -0.5]),
+        (["<undefined>", ".a", "1"], [math.nan, math.nan, 1]),
     ],
 )
 def test_a_column_has_one_notation(cells, values):
@@ -54,7 +59,9 @@ def test_a_column_has_one_notation(cells, values):
         (["1,5", "2.5", "3,25", "4,5"], 1),
         (["1", "2", "1_0"], 2),
         (["1", "0x10"], 1),
-        (["1", "\u0661"], 1),
+        (["1", "<8"], 1),
+        (["(1.5)", "(2)"], 0),
+        (["1", "1.5 (0.2)"], 1),
         (["1", "12 N"], 1),
         (["1,2,3"], 0),
         (["1,0,000"], 0),
@@ -107,6 +114,5 @@ def test_thousands_are_never_read_as_ones(values):
 
 
 def test_a_number_on_its_own():
-    read = [number_in(text) for text in ("0,5", "1.5", "1,000", "x", "nan", "inf", "")]
-    assert read == [0.5, 1.5, None, None, None, None, None]
-    assert [plain_number(text) for text in ("1.5", " 2 ", "0,5", "1_0")] == [1.5, 2.0, None, None]
+    read = [number_in(text) for text in ("0,5", "1.5", "1,000", "1_0", "x", "nan", "inf", "")]
+    assert read == [0.5, 1.5, *[None] * 6]

@@ -187,6 +187,11 @@ NAMED = {
     # Texts, although some have digits alone.
     "hash": [f"{(i + 1) * 2654435761 % 2**32:08x}" for i in range(N - 2)] + ["12345678", "1234e567"],
     "trial_id": range(N)[::-1],
+    "cv_fold": [i % 5 for i in range(N)],
+    "is_train": [int(i * 7 % 10 < 8) for i in range(N)],
+    "CRC-32": [(i + 1) * 2654435761 % 2**32 for i in range(N)],
+    "rep_no": [i % 10 for i in range(N)],
+    "progress [%]": [round(100 * i / N, 1) for i in range(N)],
 }
 
 
@@ -233,6 +238,7 @@ DOUBTFUL = {
     "fewer digits for a label": ("x", [*NOISE[:30], *map(round, NOISE[30:])]),
     "measured once for each object": ("weight [g]", [98.0 + 0.37 * (i // 5) for i in range(N)]),
     "a number for what is missing": ("x", [value if i % 4 else -999 for i, value in enumerate(NOISE)]),
+    "a zero for what is missing": ("f [N]", [value if i % 6 else 0.0 for i, value in enumerate(NOISE)]),
     "a sensor that was stuck with one label": ("f [N]", [*[3.217] * 30, *NOISE[30:]]),
     "the end of a range": ("f [N]", [min(value, 6.5) for value in NOISE]),
     "a temperature that drifts": ("T [C]", 21.0 + 0.05 * np.arange(N) + 0.05 * RNG.normal(size=N)),
@@ -282,6 +288,8 @@ def test_what_drifts_is_told_in_the_order_of_recording(tmp_path):
     [
         *((heading, NOISE) for heading in ("robot_force", "day_temperature", "number", "rise_time [s]")),
         ("gap_at_start [m]", [0.0797] * N),
+        # Slips are often zero.
+        ("slip [mm]", [max(value - 6.0, 0.0) for value in NOISE]),
         # A setting that all labels have.
         ("level [N]", [5 + 5 * ((i % 2) != (i % 9 == 0)) for i in range(N)]),
         # No two units have a ratio that is beyond every number.

@@ -172,6 +172,13 @@ def test_the_numbers_of_rows_that_r_writes_without_a_name_are_the_index(tmp_path
     path.write_text("\n".join([f"{quote}what{quote} {quote}peak{quote}", *lines, ""]))
     trials = read_labelled(path, "what")
     assert (trials.labels, trials.table.names) == (("a", "b") * 10, ("peak",))
+    names = [f"{quote}can {k}{line[line.index(' ') - len(quote) :]}" for k, line in enumerate(lines)]
+    for sorted_by_r in (
+        lines[1::2] + lines[::2],
+        names if quote else [name.replace("can ", "can") for name in names],
+    ):
+        path.write_text("\n".join([f"{quote}what{quote} {quote}peak{quote}", *sorted_by_r, ""]))
+        assert read_labelled(path, "what").table.names == ("peak",)
     path.write_text("\n".join([f"{quote}what{quote} {quote}peak{quote}", *lines[::-1], ""]))
     with pytest.raises(DataDamaged):  # these can be measured, and the name of another column missing
         read_labelled(path, "what")
@@ -185,6 +192,15 @@ def test_the_numbers_of_rows_that_r_writes_without_a_name_are_the_index(tmp_path
             b"x;y\n1\x92250.5;1\n975.0;2\n",
             {"x": [1250.5, 975.0], "y": [1.0, 2.0]},
         ),  # the apostrophes of Windows
+        # UTF-16 without a mark, and what a logger did not fill.
+        *(
+            ("ж;y\n0.5;0\n1.5;1\n".encode(code), {"ж": [0.5, 1.5], "y": [0.0, 1.0]})
+            for code in ("utf-16-le", "utf-16-be")
+        ),
+        *(
+            (b"y,z\n0.5,0\n1.5,1\n" + 512 * end, {"y": [0.5, 1.5], "z": [0.0, 1.0]})
+            for end in (b"\0", b"\xff")
+        ),
         # A sign or a factor behind a number is no unit.
         *((f"x,y\n0.5{sign},0\n1.5{sign},1\n".encode(), {"y": [0.0, 1.0]}) for sign in ("-", "k", "M")),
     ],
@@ -195,6 +211,31 @@ def test_the_columns_of_numbers_are_known(content, numbers, tmp_path):
     (table,) = read_text(path)
     assert {name: column.tolist() for name, column in table.numbers.items()} == numbers
     assert "x" not in table.units
+
+
+@every_case(
+    ("text", "encoding"),
+    [
+        ("банка", "cp1251"),
+        ("βάζο", "cp1253"),
+        ("słoik", "cp1250"),
+        ("缶詰", "shift_jis"),
+        ("Gläser", "cp850"),
+    ],
+)
+def test_the_encodings_in_which_a_file_can_be_are_shown_by_a_text_of_it(text, encoding, tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_bytes(f"what,y\ncan,0.5\n{text},1.5\n".encode(encoding))
+    with pytest.raises(DataDamaged, match="line 3") as refused:
+        read_text(path)
+    assert f"{text} ({encoding})" in str(refused.value)
+
+
+def test_zero_bytes_between_the_lines_are_told_with_the_line(tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_bytes(b"x,y\n0.5,0\n" + bytes(512) + b"1.5,1\n")
+    with pytest.raises(DataDamaged, match="line 3"):
+        read_text(path)
 
 
 def test_compressed_text_and_json_lines_are_read(tmp_path):
@@ -429,6 +470,8 @@ def test_a_table_of_trials_is_read_by_the_same_rules(lines, tmp_path):
         ["what,pad,pad", ",p,q", *TRIALS],
         [",what,pad,pad", ",,p,q", *(f"{k},{trial}" for k, trial in enumerate(TRIALS))],
         ["what,pad,", ",p,q", ",N,N", *TRIALS],
+        [",pad,pad", ",p,q", "what,,", *TRIALS],
+        ["channel,pad,pad", "stat,p,q", "what,,", *TRIALS],
     ],
 )
 def test_names_in_several_lines_are_joined(lines, tmp_path):

@@ -124,21 +124,10 @@ def load_trials(
 
 
 _NO_SOURCES: Final = {
-    (
-        ".npz",
-        ".parquet",
-        ".json",
-    ): "is not read as a table of trials: write the table as FILE.csv. If it is of a "
-    "store, name the store as store:DIR",
-    (
-        ".mcap",
-        ".bag",
-        ".db3",
-        ".npy",
-        ".mat",
-        ".h5",
-    ): "is a recording, not a source of labelled trials: graspsense "
-    "import {source} --save DIR --label CLASS:STATE makes a trial of it",
+    ".npz .parquet .pq .json": "is not read as a table of trials: write the table as FILE.csv. If it is of a store, "
+    "name the store as store:DIR",
+    ".mcap .bag .db3 .npy .mat .h5 .hdf5": "is a recording, not a source of labelled trials: graspsense import "
+    "{source} --save DIR --label CLASS:STATE makes a trial of it",
 }
 """Endings of files that are no source of trials, and what to do with them."""
 
@@ -148,7 +137,7 @@ def kind_of(source: str) -> Kind:
     if source == SIMULATED or source.startswith(IDENTIFIED):
         return "simulated"
     for endings, why in _NO_SOURCES.items():
-        if source.lower().endswith(endings) and Path(source).is_file():
+        if source.lower().endswith(tuple(endings.split())) and Path(source).is_file():
             raise ConfigError(f"{source} {why.format(source=source)}")
     if source.lower().endswith(".toml") and Path(source).is_file():
         kind = toml_kind(read_toml(Path(source), source, "TOML").values)

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from graspsense.core.values.errors import counted
-from graspsense.core.values.written_numbers import plain_number
+from graspsense.core.values.written_numbers import number_in
 
 RECORDED_AT: Final = "recorded_at"
 """Key of the labels of an imported trial: the time at which it was recorded, in ISO 8601."""
@@ -28,7 +28,7 @@ def order_recorded(
     """
     stated = [_labels(text) for text in labels]
     if set(origins) == {"import"} and all(ORDER in label and RECORDED_AT not in label for label in stated):
-        numbers = [plain_number(str(label[ORDER])) for label in stated]
+        numbers = [number_in(str(label[ORDER])) for label in stated]
         known = [number for number in numbers if number is not None]
         if len(known) == len(numbers):
             return _positions(known), ""

@@ -12,7 +12,7 @@ from typing import Final
 from attrs import frozen
 
 from graspsense.core.values.errors import ConfigError, suggestion
-from graspsense.core.values.written_numbers import plain_number
+from graspsense.core.values.written_numbers import number_in
 
 RESERVED: Final = ("label", "instance", "order", "recorded_at", "operator")
 """Labels of a trial that are not numbers to predict."""
@@ -95,4 +95,4 @@ def values_of_labels(name: str, labels: Sequence[Mapping[str, str]], where: str)
 
 def number_of(cell: object) -> float | None:
     """Return the finite number that a text is, or None."""
-    return plain_number(str(cell))
+    return number_in(str(cell))

@@ -9,8 +9,8 @@ from typing import Final
 
 from graspsense.core.values.errors import listed
 
-MISSING_LABELS: Final = frozenset({"", "nan", "?"})
-"""What stands for a missing label. `none`, `null` and `NA` are labels."""
+MISSING_LABELS: Final = frozenset({"", "nan", "?", "<missing>", "<undefined>"})
+"""What stands for a missing label, the last two in MATLAB. `none`, `null` and `NA` are labels."""
 _WHOLE: Final = re.compile(r"(?<![^:#])([-+]?[0-9]+)[.,]0+(?![^:#])")
 _SCIENTIFIC: Final = re.compile(r"[-+]?[0-9]\.[0-9]+[eE][-+]0[0-9]")
 

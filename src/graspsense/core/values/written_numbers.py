@@ -36,28 +36,36 @@ _EVERY: Final = POINT | THOUSANDS | COMMA
 _NOTATIONS: Final = (POINT, THOUSANDS, COMMA)
 
 _MISSING_WORDS: Final = frozenset({
-    "", "na", "n/a", "n.a.", "<na>", "nat", "null", "\\n", "none", "?", ".", "-", "--", "---"
+    "", "na", "n/a", "n.a.", "<na>", "<missing>", "<undefined>", "nat", "null", "\\n", "none", "?", "."
 })  # fmt: skip
 _MISSING: Final = re.compile(
-    r"[-+]?(?:nan(?:\(\w*\))?|1[.,]#(?:q?nan|ind)\d*)|#[^\W\d][^!?]*[!?]|#[\u00a1\u00bf].*|#n/?[adv]|err:\d{3}",
+    r"[-+]?(?:nan(?:\(\w*\))?|1[.,]#(?:q?nan|ind)\d*)|#[^\W\d][^!?]*[!?]|#[\u00a1\u00bf].*|#n/?[adv]|err:\d{3}|\.[a-z]",
     re.IGNORECASE,
 )
-"""NaN as the libraries of C write it, and the errors of spreadsheets in their languages, such as `#WERT!`."""
+"""NaN as the libraries of C write it, the errors of spreadsheets in their languages, such as `#WERT!`, and `.a` of
+Stata."""
 _LONGEST_MISSING: Final = 20
 
 _LOGICAL: Final = {"True": "1", "False": "0"}
+
 _PLAIN_SIGNS: Final = {
-    **dict.fromkeys(map(ord, "\u2010\u2011\u2012\u2013\u2014\u2212\ufe63\uff0d"), "-"),
-    **dict.fromkeys(map(ord, "\u00a0\u2007\u2009\u202f"), " "),
-    ord("\u2019"): "'",
+    **{zero + digit: str(digit) for zero in map(ord, "٠۰०০๐０") for digit in range(10)},
+    **dict.fromkeys(map(ord, "\u2010\u2011\u2012\u2013\u2014\u2212\u2796\ufe63\uff0d"), "-"),
+    **dict.fromkeys(map(ord, "\u00a0\u2007\u2008\u2009\u200a\u202f\u3000"), " "),
+    **dict.fromkeys(map(ord, "\u00b4\u02bc\u2018\u2019\u2032\u066c\uff07"), "'"),
+    **dict.fromkeys(map(ord, "\u00b7\u066b\uff0e"), "."),
+    **dict(zip(map(ord, "\uff0b\uff0c\u2248"), "+,~", strict=True)),
 }
-"""Signs and spaces of numbers, as word processors have them."""
+"""Digits of other scripts and of full width, and signs and spaces of numbers as word processors have them."""
+_ABOUT: Final = re.compile(r"~ ?(?=[-+.\d])|(?<=[\d.]) ?(?:\u00b1|\+/?-) ?[\d.,]+")
+"""What says that a number is rounded, before it, and how uncertain it is, behind it."""
 
 
 def _form(mark: str, *whole: str) -> re.Pattern[str]:
     """Return the pattern of numbers with one of these before the mark of decimals; they can be infinite."""
     digits = rf"(?:{'|'.join(whole)})(?:{mark}[0-9]*)?|{mark}[0-9]+"
-    return re.compile(rf"[-+]?(?:(?:{digits})(?:[ed][-+]?[0-9]+)?|inf(?:inity)?)", re.IGNORECASE)
+    number = rf"(?:(?:{digits})(?:[ed][-+]?[0-9]+)?|inf(?:inity)?)"
+    return re.compile(rf"[-+]? ?{number}|\({number}\)", re.IGNORECASE)  # (0.5), as accountants write -0.5
 
 
 _GROUPS: Final = "[1-9][0-9]{{0,2}}(?:{}[0-9]{{3}})+"
@@ -71,11 +79,11 @@ _FORMS: Final = {
     HEXADECIMAL: re.compile("0|0x[0-9a-f]{1,16}", re.IGNORECASE),
 }
 _TO_PYTHON: Final = {
-    POINT: str.maketrans("dD", "ee", " '"),
-    THOUSANDS: str.maketrans("dD", "ee", " ',"),
-    COMMA: str.maketrans("dD,", "ee.", " '."),
+    POINT: str.maketrans("dD(", "ee-", " ')"),
+    THOUSANDS: str.maketrans("dD(", "ee-", " '),"),
+    COMMA: str.maketrans("dD,(", "ee.-", " ')."),
 }
-_ONE_MARK: Final = re.compile(r"[-+]?[1-9][0-9]{0,2}[.,][0-9]{3}")
+_ONE_MARK: Final = re.compile(r"[-+(]? ?[1-9][0-9]{0,2}[.,][0-9]{3}\)?")
 """A number of three decimals, or one of thousands."""
 _PLAIN: Final = re.compile(r"[0-9+\-.eE]*")
 
@@ -98,7 +106,7 @@ class NotNumbers:
 def is_missing(cell: str) -> bool:
     """Return whether the text of a cell stands for a missing number."""
     return len(cell) <= _LONGEST_MISSING and (
-        plain_text(cell).lower() in _MISSING_WORDS or _MISSING.fullmatch(cell) is not None
+        plain_text(cell).lower().strip("-") in _MISSING_WORDS or _MISSING.fullmatch(cell) is not None
     )
 
 
@@ -109,24 +117,18 @@ def is_number(cell: str) -> bool:
 
 
 def plain_text(cell: str) -> str:
-    r"""Return a number with the signs of ASCII, and without the apostrophe of a spreadsheet or quotes around it.
+    r"""Return a number with the signs and digits of ASCII, and without what says how exact it is.
 
-    >>> plain_text("\u22121\u2019000"), plain_text("'-0.5"), plain_text("12\u202f000")
-    ("-1'000", '-0.5', '12 000')
+    Nor does it have the apostrophe of a spreadsheet or quotes around it.
+
+    >>> [*map(plain_text, ("\u22121\u2019000", "'-0.5", "12\u202f000", "~\uff11.5 \u00b1 0.2"))]
+    ["-1'000", '-0.5', '12 000', '1.5']
     """
     if not cell.isascii():
         cell = cell.translate(_PLAIN_SIGNS).strip()
+    if "~" in cell or "\u00b1" in cell or "+" in cell:
+        cell = _ABOUT.sub("", cell)
     return cell.strip("'") if cell.startswith("'") else cell
-
-
-def plain_number(text: str) -> float | None:
-    """Return the finite number that a text with a decimal point is, None if it is none.
-
-    >>> plain_number("2.5e-3"), plain_number("1_000"), plain_number("1,5"), plain_number("inf")
-    (0.0025, None, None, None)
-    """
-    numbers = _plain_numbers([plain_text(text.strip()).replace("D", "e").replace("d", "e")])
-    return None if numbers is None or math.isinf(numbers[0]) else float(numbers[0])
 
 
 def number_in(text: str) -> float | None:
@@ -228,6 +230,11 @@ def _common(cells: Sequence[str]) -> int | NotNumbers:
         if not fits:
             return NotNumbers(row, cell, "which is not a number; a missing one is an empty cell")
         common &= fits
+    bracketed = [cell.startswith("(") for cell in cells if not is_missing(cell)]
+    if bracketed and all(bracketed):
+        return NotNumbers(
+            0, cells[0], "and all cells stand in parentheses: leave these out, or write a minus sign"
+        )
     return common or _mixed(cells)
 
 

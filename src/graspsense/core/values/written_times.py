@@ -21,10 +21,8 @@ _TIME: Final = re.compile(
     r"(?: ?(?P<half>[AP])\.?M\.?)? ?(?P<zone>Z|[-+][0-9]{2}:?[0-9]{2}|)",
     re.IGNORECASE,
 )
-_MONTH: Final = re.compile(
-    r"(?<=\d)[- ](jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec)[a-z]*[- ]", re.IGNORECASE
-)
 _MONTHS: Final = ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"]
+_MONTH: Final = re.compile(rf"(?<=\d)[- ]({'|'.join(_MONTHS)})[a-z]*[- ]", re.IGNORECASE)
 _MINUTES: Final = re.compile(r"[0-5]?[0-9]:[0-5][0-9][.,][0-9]{1,9}")
 """Minutes and seconds; without a fraction they can be hours and minutes."""
 _DAY_S: Final = 86_400.0

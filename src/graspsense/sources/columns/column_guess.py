@@ -248,9 +248,8 @@ def _forces(table: ColumnTable, names: Sequence[str]) -> Iterator[Guess]:
 
 def _forces_of_cells(table: ColumnTable, cells: Mapping[str, Sequence[str]]) -> Iterator[Guess]:
     """Yield the forces of sensors with many cells, each a group of columns, and the channels that keep them."""
-    unit = _force(table, "force", [name for names in cells.values() for name in names], "").value.rpartition(
-        " "
-    )[2]
+    names = [name for names in cells.values() for name in names]
+    unit = _force(table, "force", names, "").value.rpartition(" ")[2]
     patterns = [f"'{pattern}'" for pattern in cells]
     said = f"{len(cells)} groups of cells: say which are which side"
     if len(patterns) == 1:

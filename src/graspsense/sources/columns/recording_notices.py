@@ -202,10 +202,9 @@ def _of_sensor(force: _Force) -> Iterator[str]:
         yield f"{force.what} does not change during the recording: is it another column, or did its sensor stop?"
     elif len(force) >= FEWEST and (held := _held(force.n)) is not None:
         begin, end = held
-        to_end = "its last value to the end"
-        repeats = (
-            to_end if end == len(force) else f"one value from {force.t[begin]:.4g} to {force.when(end - 1)}"
-        )
+        repeats = "its last value to the end"
+        if end < len(force):
+            repeats = f"one value from {force.t[begin]:.4g} to {force.when(end - 1)}"
         yield (
             f"{force.what} repeats {repeats}, although it varied before: did its sensor stop, or is it "
             "at the end of its range?"
@@ -515,9 +514,8 @@ def _gap_leaps(t_s: Numbers, gap: Numbers) -> Iterator[str]:
                 f"the gap jumps by {steps[k] * 1e3:.3g} mm within {seconds * 1e3:.3g} ms (at {t_s[k + 1]:.4g} s), "
                 "as no finger does: is it a glitch, or did its sensor stop before?"
             )
-    if (
-        LEAP * steps.min(initial=np.inf, where=steps > 0.0) < steps.max()
-    ):  # the steps of a coarse gap are alike
+    # The steps of a coarse gap are alike.
+    if LEAP * steps.min(initial=np.inf, where=steps > 0.0) < steps.max():
         yield from _seldom("the gap", t_s, gap, PART)
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Final
 
 from graspsense.core.learn.target_value import name_and_unit
-from graspsense.core.values.errors import DataDamaged, counted, listed
+from graspsense.core.values.errors import DataDamaged, listed
 from graspsense.core.values.limits import CELLS
 from graspsense.sources.formats.csv_columns import CsvColumns
 from graspsense.sources.formats.text_table import check_columns, read_lines
@@ -25,6 +25,11 @@ _ESCAPED: Final = {"n": "\n", "t": "\t", "r": "\r"}
 _NUMBERS: Final = frozenset({"numeric", "real", "integer"})
 _TEXTS: Final = frozenset({"string", "date"})
 _SHOWN: Final = 40
+_Token = tuple[str, bool]
+"""A word, and whether it is quoted."""
+_OPEN: Final = ("{", False)
+_CLOSE: Final = ("}", False)
+_MISSING: Final = ("?", False)
 
 
 class ArffColumns(CsvColumns):
@@ -58,18 +63,11 @@ class ArffColumns(CsvColumns):
         self.cells = {name: [row[k] for row in self._rows] for k, name in enumerate(self.names)}
         self.default_label = self.names[-1] if self.names[-1] in self.levels else None  # the class attribute
 
-    def without_label(self, label: str | None) -> list[str]:
+    def without_label(self, label: str) -> list[str]:
         """Leave out the rows whose class is missing, as Weka does, and return notes on what is not used."""
         notes = ["the weights of the rows are not used"] if self.weighted else []
-        having = (
-            [i for i, text in enumerate(self.texts(label)) if text]
-            if label is not None and label in self.cells
-            else []
-        )
-        if 0 < len(having) < len(self):
-            notes.append(f"{counted(len(self) - len(having), 'trial')} left out: no {label}")
-            self.keep(having)
-        return notes
+        having = [text != "" for text in self.texts(label)] if label in self.cells else []
+        return notes + (self.keep_where(having, f"no {label}") if any(having) else [])
 
     def is_missing_text(self, cell: str) -> bool:
         """Return whether a text is missing: only `?` is, which is kept as an empty one."""
@@ -83,9 +81,9 @@ class ArffColumns(CsvColumns):
         if not name or name in self.units:
             raise self._damaged(f"attribute {name!r} has no name, or that of another one")
         kind = tokens[1][0].lower()
-        if tokens[1] == ("{", False):
+        if tokens[1] == _OPEN:
             values = [value for value, _ in tokens[2:-1]]
-            if tokens[-1] != ("}", False) or not values or len(set(values)) < len(values):
+            if tokens[-1] != _CLOSE or not values or len(set(values)) < len(values):
                 raise self._damaged(f"the values of {name!r} need braces, and each of them is there once")
             self.levels[name] = tuple(values)
         elif kind in _TEXTS:
@@ -101,16 +99,11 @@ class ArffColumns(CsvColumns):
 
     def _take_row(self, line: str) -> None:
         tokens = list(self._tokens(line))
-        braces = [k for k, token in enumerate(tokens) if token == ("{", False)]
-        if braces and braces[0] == 0:
-            end = tokens.index(("}", False)) if ("}", False) in tokens else len(tokens)
-            cells, weight = self._sparse(tokens[1:end]), tokens[end + 1 :]
-        else:
-            end = braces[0] if braces else len(tokens)
-            cells, weight = (
-                ["" if token == ("?", False) else token[0] for token in tokens[:end]],
-                tokens[end:],
-            )
+        sparse = tokens[:1] == [_OPEN]
+        last = _CLOSE if sparse else _OPEN  # behind which there can be a weight
+        end = tokens.index(last) if last in tokens else len(tokens)
+        given = self._sparse(tokens[1:end]) if sparse else tokens[:end]
+        cells, weight = ["" if token == _MISSING else token[0] for token in given], tokens[end + sparse :]
         self.weighted = self.weighted or bool(weight)
         if len(cells) != len(self.names):
             raise self._damaged(f"{len(cells)} values, but the header declares {len(self.names)} attributes")
@@ -123,16 +116,16 @@ class ArffColumns(CsvColumns):
         self._rows.append(cells)
         self.lines.append(self._line)
 
-    def _sparse(self, tokens: Sequence[tuple[str, bool]]) -> list[str]:
+    def _sparse(self, tokens: Sequence[_Token]) -> list[_Token]:
         """Return the cells of a sparse row: what it leaves out is 0, or the first value of a nominal attribute."""
-        cells = [next(iter(self.levels[name]), "") if name in self.levels else "0" for name in self.names]
-        for (place, _), (cell, quoted) in zip(tokens[::2], tokens[1::2], strict=False):
+        cells = [(next(iter(self.levels.get(name, ("0",))), ""), True) for name in self.names]
+        for (place, _), cell in zip(tokens[::2], tokens[1::2], strict=False):
             if not place.isdecimal() or len(place) > len(str(len(cells))) or int(place) >= len(cells):
                 raise self._damaged(f"{place[:_SHOWN]!r} is not the number of an attribute, counted from 0")
-            cells[int(place)] = "" if cell == "?" and not quoted else cell
+            cells[int(place)] = cell
         return cells
 
-    def _tokens(self, text: str) -> Iterator[tuple[str, bool]]:
+    def _tokens(self, text: str) -> Iterator[_Token]:
         """Yield the words of a line, and whether each is quoted, up to a comment."""
         place, text = 0, text.rstrip(" \t,")
         while place < len(text):

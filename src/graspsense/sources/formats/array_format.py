@@ -182,9 +182,8 @@ def _of_arrays(path: Path, arrays: Arrays, rows: int = 0) -> ColumnTable:
         if rows not in (array.shape[0], array.shape[-1]):
             continue
         values = np.asarray(array if array.shape[0] == rows else np.moveaxis(array, -1, 0), dtype=np.float64)
-        if (
-            values.ndim > 2
-        ):  # cells in rows and columns, each with its components if there are four dimensions
+        if values.ndim > 2:
+            # Cells in rows and columns, each with its components if there are four dimensions.
             cells = values.shape[1:] if values.ndim == 4 and values.shape[3] in (2, 3) else ()
             shapes[name] = cells or (values.shape[1], int(np.prod(values.shape[2:])))
         values = values.reshape(rows, -1)

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Sequence
 from copy import copy
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Self
+from typing import Final, Self
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from graspsense.core.values.written_numbers import (
     is_number,
 )
 from graspsense.core.values.written_times import seconds_since_first
+from graspsense.sources.formats.table import Numbers
 from graspsense.sources.formats.text_table import (
     INDEX,
     distinct_names,
@@ -35,9 +36,6 @@ from graspsense.sources.formats.text_table import (
     read_lines,
     table_of,
 )
-
-if TYPE_CHECKING:
-    from graspsense.core.values.written_numbers import Numbers
 
 _INDEXES: Final = (INDEX, "Unnamed: 0")
 """The second is the name that pandas gives such a column when it reads it again."""
@@ -83,7 +81,7 @@ class CsvColumns:
                 renamed.append(name)
             self.names.append(name)
             self.cells[name] = [text_of_cell(cell) for cell in column]
-            self.units[name] = unit or unit_of_line or numbers_with_unit(self.cells[name])[1]
+            self.units[name] = numbers_with_unit(self.cells[name], unit or unit_of_line)[1]
         if 2 * len(renamed) > len(self.names):
             raise DataDamaged(
                 f"{path}: most columns have the name of another one, or none, in line {table.named_in}: a table of "
@@ -172,9 +170,7 @@ class CsvColumns:
         return 2 * sum(map(is_number, given)) >= len(given) > 0
 
     def _without_unit(self, name: str) -> Sequence[str]:
-        """Return the cells of a column, without a unit that stands in each of them and is that of the column."""
-        cells, unit = numbers_with_unit(self.cells[name])
-        return cells if unit == self.units.get(name, "") else self.cells[name]
+        return numbers_with_unit(self.cells[name], self.units.get(name, ""))[0]
 
     def is_blank(self, name: str) -> bool:
         """Return whether every cell of a column is missing."""
@@ -201,6 +197,13 @@ class CsvColumns:
         if name not in self.cells or not self.is_nominal(name):
             return [name]
         return [value_name(name, value) for value in self.values_of(name)]
+
+    def keep_where(self, wanted: Sequence[bool], why: str) -> list[str]:
+        """Remove the other rows, which are trials, and return a note that says why, if there are any."""
+        rows = [i for i, is_wanted in enumerate(wanted) if is_wanted]
+        left_out = len(self) - len(rows)
+        self.keep(rows)
+        return [f"{counted(left_out, 'trial')} left out: {why}"] if left_out else []
 
     def keep(self, rows: Sequence[int]) -> None:
         """Remove all rows but these."""

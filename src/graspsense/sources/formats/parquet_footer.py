@@ -19,7 +19,7 @@ _END_BYTES: Final = 8
 _DEEPEST: Final = 32
 _OBJECT_BYTES: Final = 32
 """Bytes that a byte of the footer becomes in memory, at most about."""
-_STOP, _TRUE, _FALSE, _BYTE, _DOUBLE, _BINARY, _LIST, _SET, _MAP, _STRUCT = 0, 1, 2, 3, 7, 8, 9, 10, 11, 12
+_STOP, _TRUE, _FALSE, _BYTE, _DOUBLE, _BINARY, _LIST, _SET, _STRUCT = 0, 1, 2, 3, 7, 8, 9, 10, 12
 _ROWS, _ROW_GROUPS = 3, 4
 _COLUMNS, _COLUMN = 1, 3
 _VALUES, _UNPACKED_BYTES = 5, 6
@@ -74,12 +74,6 @@ class _Compact:
             if size > len(self.data):
                 raise ValueError(f"a list of its footer has {size} items")
             return [self._item(head & 15, depth) for _ in range(size)]
-        if kind == _MAP:
-            size = self._varint()
-            if size > len(self.data):
-                raise ValueError(f"a map of its footer has {size} items")
-            kinds = self._byte() if size else 0
-            return [(self._item(kinds >> 4, depth), self._item(kinds & 15, depth)) for _ in range(size)]
         if kind == _BINARY:
             return self._skip(self._varint())
         if kind == _DOUBLE:

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Final
 
 from graspsense.core.values.errors import ConfigError
-from graspsense.recording.readable import refuse_devices
 from graspsense.sources.formats.array_format import ARRAY_SUFFIXES, read_arrays
 from graspsense.sources.formats.table import ColumnTable, TableRules
 from graspsense.sources.formats.text_table import JSON_LINES, text_suffix
@@ -22,7 +21,6 @@ def raw_tables(path: Path, rules: TableRules | None = None) -> list[ColumnTable]
 
     With rules, a file without an ending is a text. Raises ConfigError, PluginUnavailable, TooLarge, DataDamaged.
     """
-    refuse_devices(path)
     suffix, given = path.suffix.lower(), rules or TableRules()
     if path.is_dir() or suffix in BAG_SUFFIXES:
         from graspsense.sources.formats.ros_format import read_bag, read_topics

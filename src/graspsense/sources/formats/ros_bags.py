@@ -165,9 +165,8 @@ def _is_sqlite(file: Path) -> bool:
 def _refuse_views(source: str | Path, content: bytes | None = None) -> None:
     """Raise DataDamaged if a SQLite file, or this content of one, has anything but plain tables and indices."""
     if content is None:
-        connection = sqlite3.connect(
-            f"file:{quote(str(Path(source).absolute()))}?mode=ro&immutable=1", uri=True
-        )
+        uri = f"file:{quote(str(Path(source).absolute()))}?mode=ro&immutable=1"
+        connection = sqlite3.connect(uri, uri=True)
     else:
         connection = sqlite3.connect(":memory:")
         connection.deserialize(content)

@@ -97,10 +97,9 @@ def _columns(path: Path, fields: dict[str, str], table: TextTable, *, several: b
     seconds: dict[str, str] = {}
     units = {name: _unit_in(name) or unit for name, unit in zip(cells, table.units, strict=True)}
     for name in cells:
-        numbers_in_cells, unit = numbers_with_unit(cells[name])
-        if unit and units[name] in ("", unit):
-            texts[name] = cells[name]
-            cells[name], units[name] = numbers_in_cells, unit
+        plain, units[name] = numbers_with_unit(cells[name], units[name])
+        if plain is not cells[name]:
+            texts[name], cells[name] = cells[name], plain
     read = columns_of_numbers(cells)
     for name, column in read.items():
         if not isinstance(column, NotNumbers):

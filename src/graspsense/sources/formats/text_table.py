@@ -10,6 +10,7 @@ from __future__ import annotations
 import csv
 import json
 import re
+import unicodedata
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain, takewhile
@@ -19,7 +20,7 @@ from typing import Any, Final
 
 from attrs import frozen
 
-from graspsense.core.values.errors import ConfigError, DataDamaged, listed
+from graspsense.core.values.errors import DataDamaged, listed
 from graspsense.core.values.limits import CELLS, COLUMNS, LINE_CHARACTERS, TEXT_BYTES
 from graspsense.core.values.written_numbers import (
     NotNumbers,
@@ -28,7 +29,7 @@ from graspsense.core.values.written_numbers import (
     is_number,
     plain_text,
 )
-from graspsense.recording.readable import not_opened, readable, refuse_devices
+from graspsense.recording.readable import readable, refuse_devices
 from graspsense.recording.unpacked import Unpacked
 
 LONGEST_NAME: Final = 500
@@ -53,8 +54,6 @@ _SINGLE_UNITS: Final = frozenset("smgNVACK%\u00b0")
 """Units of one sign behind a number: in the other case, or as `12-`, it can be a factor or a sign of its own."""
 _UNSEEN: Final = re.compile("[\u200b\u200e\u200f\u202a-\u202e\u2060\u2066-\u2069\ufeff]")
 """Marks that nothing shows: the order of bytes, also in the middle of files that were joined, and of writing."""
-_LINE_ENDS: Final = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
-"""The characters at which `str.splitlines` divides a text."""
 _SEPARATORS: Final = (";", "\t", ",", "|", " ", "  ")
 """The last ones stand for any number of spaces, and for two or more, where names have spaces."""
 _COMMENTS: Final = ("#", "%")
@@ -67,13 +66,21 @@ _KINDS: Final = frozenset(("continuous", "c", "discrete", "d", "string", "s", "t
 _SEPARATOR_LINE: Final = re.compile(r'"?sep=([;,\t|])"?\s*')
 SPREADSHEETS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"PAR1", b"ARROW1")
 """The first bytes of a ZIP file, as which spreadsheets are saved, of those of old programs, and of Apache's tables."""
-_CODE_PAGES: Final = ("cp1252", "cp1250", "iso8859-1", "iso8859-15")
-"""They agree on degrees, micro and the letters of several languages."""
+_CODE_PAGES: Final = (
+    "cp1252", "cp1250", "iso8859-1", "iso8859-15", "cp1251", "koi8-r", "cp1253", "cp1254", "cp1255", "cp1256", "cp850",
+    "mac-roman", "shift_jis", "gb18030", "big5", "euc-kr",
+)  # fmt: skip
+_OF_EUROPE: Final = 4
+"""The first ones agree on degrees, micro and the letters of several languages."""
+_SHOWN_BYTES: Final = 60
+_ZEROS: Final = 10
+"""One byte of so many is zero, at every second place only, in UTF-16 of a table."""
 _SHOWN_AS_IT_IS: Final = re.compile(r'(^|[;,\t])="')
 _WITH_UNIT: Final = re.compile(r"(.*[0-9.])\s*([^\s0-9]+)")
 _SAMPLED: Final = 400
 """Lines from which the separator and the kinds of the columns are found."""
-_SAMPLED_CELLS: Final = 100_000
+_SAMPLED_SIZE: Final = 100_000
+"""Cells of these lines, and bytes from which the encoding is found."""
 _FEW_BEFORE: Final = 4
 _MOST_BEFORE: Final = 0.1
 """Lines of numbers before the names, and their share of those after them, beyond which they can be data."""
@@ -105,7 +112,7 @@ def read_lines(path: Path) -> tuple[list[Line], bool]:
     Raises ConfigError, TooLarge, DataDamaged.
     """
     text = text_of(path)
-    if too_many := CELLS.exceeded(sum(map(text.count, _LINE_ENDS))):
+    if too_many := CELLS.exceeded(text.count("\n") + text.count("\r")):
         raise DataDamaged(f"{path}: {too_many}")
     lines = list(enumerate(re.split("\r\n|[\r\n]", text), 1))
     for number, line in lines:
@@ -158,7 +165,7 @@ class _Layout:
         rows = self.rows[begin:]
         rows = self._without_repeats(rows, names, units)
         rows = self._without_texts(rows, len(names))
-        if _begin_with_numbers_of_rows(rows, len(names) + 1):
+        if _begin_with_names_of_rows(rows, len(names) + 1):
             names, units = ["", *names], ["", *units] if units else None
         names, rows = self._without_blank_end(names, rows)
         rows = self._without_cut(rows, len(names), ended)
@@ -212,7 +219,7 @@ class _Layout:
         if len(self.rows[0][1]) == 1 < width:
             divided = self._cells(self.rows[0][1][0], width)
             self.rows[0] = (self.rows[0][0], divided if len(divided) == width else self.rows[0][1])
-        sample = sample[: max(2, _SAMPLED_CELLS // width)]
+        sample = sample[: max(2, _SAMPLED_SIZE // width)]
         numeric = _numeric_columns(sample, width)
         data = next((k for k, (_, row) in enumerate(self.rows) if _is_data(row, width, numeric)), None)
         data = self._without_kinds(data, numeric)
@@ -306,11 +313,13 @@ class _Layout:
 
         pandas writes each level of its names in a line, and a spreadsheet a merged cell once, with blanks behind it.
         """
-        written = [row for row in self.rows[:data] if len(row[1]) == width and sum(map(bool, row[1])) > 1]
+        above = [row for row in self.rows[:data] if len(row[1]) == width]
+        written = [row for row in above if sum(map(bool, row[1])) > 1 or (row[1][0] and row is above[-1])]
         units = written.pop()[1] if written and _are_units(written[-1][1]) else None
         levels = [list(row) for _, row in written]
         has_first = any(row[0] for row in levels)
         named = any(_names_all(row) and (row[0] or not has_first) for row in levels)
+        named &= len(levels) < 3 or any(levels[-1][1:])  # else pandas names the index below its levels
         if len(levels) < 2 or named or any(map(is_number, chain(*levels))):
             return None
         *upper, lowest = levels
@@ -448,30 +457,38 @@ def _with_remarks(rows: list[Row]) -> list[Row]:
     return [(number, [*row, ""] if len(row) == width - 1 else row) for number, row in rows]
 
 
-def _begin_with_numbers_of_rows(rows: Sequence[Row], width: int) -> bool:
-    """Return whether all rows have so many cells, and number themselves in the first: R writes no name for it."""
-    counter, n = [row[0] for _, row in rows if len(row) == width], len(rows)
-    return n > 1 and counter in ([*map(str, range(n))], [*map(str, range(1, n + 1))])
+def _begin_with_names_of_rows(rows: Sequence[Row], width: int) -> bool:
+    """Return whether all rows have so many cells, and number or name themselves in the first, which R does not name.
+
+    Numbers that R has sorted are in another order; from the last to the first, they can be measured.
+    """
+    names, n = [row[0] for _, row in rows if len(row) == width], len(rows)
+    if not any(map(is_number, names)):
+        return len(set(names)) == n > _FEW_BEFORE
+    return n > 1 and any(
+        sorted(counter) == sorted(names) and counter[::-1] != names
+        for counter in ([*map(str, range(n))], [*map(str, range(1, n + 1))])
+    )
 
 
-def numbers_with_unit(cells: Sequence[str]) -> tuple[Sequence[str], str]:
-    """Return the numbers and the unit of cells such as `12.3 N`; the cells, and no unit, if they have not all the same.
+def numbers_with_unit(cells: Sequence[str], of_column: str = "") -> tuple[Sequence[str], str]:
+    """Return the numbers and the unit of cells such as `12.3 N`, if all have the same, and that of the column if known.
 
-    >>> numbers_with_unit(["12.3 N", "", "4N"]), numbers_with_unit(["12 mm", "1 m"])
-    ((['12.3', '', '4'], 'N'), (['12 mm', '1 m'], ''))
+    Else they are the cells, and the unit of the column.
+
+    >>> numbers_with_unit(["12.3 N", "", "4N"]), numbers_with_unit(["12 mm", "1 m"]), numbers_with_unit(["1 m"], "mm")
+    ((['12.3', '', '4'], 'N'), (['12 mm', '1 m'], ''), (['1 m'], 'mm'))
     """
     numbers, unit = [], ""
     for cell in cells:
-        if is_missing(cell):
-            numbers.append(cell)
-            continue
-        match = _WITH_UNIT.fullmatch(cell)
-        if match is None or match[2] != (unit or match[2]) or not is_number(match[1]):
-            return cells, ""
-        numbers.append(match[1])
-        unit = match[2]
+        match = None if is_missing(cell) else _WITH_UNIT.fullmatch(cell)
+        if match and match[2] == (unit or of_column or match[2]) and is_number(match[1]):
+            unit = match[2]
+        elif not is_missing(cell):
+            return cells, of_column
+        numbers.append(match[1] if match else cell)
     known = unit.lower() in UNITS if len(unit) > 1 else unit in _SINGLE_UNITS
-    return (numbers, unit) if known else (cells, "")
+    return (numbers, unit) if known else (cells, of_column)
 
 
 def _json_table(path: Path, lines: Sequence[Line], ended: bool) -> TextTable:
@@ -676,14 +693,9 @@ def text_of(path: Path) -> str:
     """
     refuse_devices(path)
     most = TEXT_BYTES.most
-    try:
-        with path.open("rb") as file:
-            data = file.read(most + 1)
-            size = len(data) if len(data) <= most else max(path.stat().st_size, len(data))
-    except OSError as error:
-        raise not_opened(path, error) from error
-    except ValueError as error:
-        raise ConfigError(f"{path} cannot be read: {error}") from error
+    with readable(path), path.open("rb") as file:
+        data = file.read(most + 1)
+        size = len(data) if len(data) <= most else max(path.stat().st_size, len(data))
     if data.startswith(b"\x1f\x8b"):
         with readable(path, "a file compressed by gzip"):
             data = Unpacked(path).unpack("gzip", data)
@@ -692,11 +704,12 @@ def text_of(path: Path) -> str:
         raise DataDamaged(f"{path} is a spreadsheet, an archive or a binary table: save it as CSV in UTF-8")
     if too_large := TEXT_BYTES.exceeded(size):
         raise DataDamaged(f"{path}: {too_large}")
-    text = _UNSEEN.sub("", _decoded(path, data))
-    if "\0" in text:
+    text = _UNSEEN.sub("", _decoded(path, data)).rstrip("\0")
+    beginning, zero, _ = text.partition("\0")
+    if zero:
         raise DataDamaged(
-            f"{path} contains zero bytes: it is not a text file. If a program wrote it as Unicode text, save it as "
-            "UTF-8"
+            f"{path}, line {beginning.count(chr(10)) + 1} has zero bytes. If a part of the file was not written, leave "
+            "them out, and the lines that are not whole; else it is not a text file"
         )
     return text
 
@@ -706,24 +719,46 @@ def _decoded(path: Path, data: bytes) -> str:
 
     Raises DataDamaged.
     """
-    unicode = json.detect_encoding(data)
-    if not unicode.startswith("utf-8"):
-        try:
-            return data.decode(unicode)
-        except UnicodeDecodeError as error:
-            if unicode in ("utf-16", "utf-32"):  # without a mark, it only looked so
-                raise DataDamaged(
-                    f"{path} begins as {unicode.upper()}, and is none: {error.reason}. Save it as UTF-8"
-                ) from None
+    unicode = _unicode(data)
+    if unicode == "utf-8-sig":
+        data = data.rstrip(b"\0\xff")  # the part of a card that a logger did not fill
     try:
-        return data.decode("utf-8-sig")
+        return data.decode(unicode)
     except UnicodeDecodeError as error:
+        if unicode != "utf-8-sig":
+            raise DataDamaged(
+                f"{path} begins as {unicode.upper()}, and is none: {error.reason}. Save it as UTF-8"
+            ) from None
         apart = re.sub(rb"(?<=\d)\x92(?=\d{3})", b"'", data)  # thousands, as Windows has them in Switzerland
-        texts = {apart.decode(code_page, "replace") for code_page in _CODE_PAGES}
+        texts = {apart.decode(code_page, "replace") for code_page in _CODE_PAGES[:_OF_EUROPE]}
         if len(texts) == 1:
             return texts.pop()
         line = data.count(b"\n", 0, error.start) + 1
         raise DataDamaged(
             f"{path}, line {line}: byte 0x{data[error.start]:02x} is not UTF-8, and other encodings read the file in "
-            "different ways: save it as UTF-8"
+            f"different ways, here as {_readings(data, error.start)}. Save it as UTF-8: iconv -f ENCODING -t UTF-8 FILE"
         ) from None
+
+
+def _unicode(data: bytes) -> str:
+    """Return the encoding that the first bytes tell, or the zeros beside digits, signs and ends of lines."""
+    encoding = json.detect_encoding(data)
+    if encoding not in ("utf-8", "utf-16-le", "utf-16-be"):
+        return encoding
+    sample = data.rstrip(b"\0")[:_SAMPLED_SIZE]
+    even, odd = (sample[k::2].count(0) * _ZEROS > len(sample) for k in (0, 1))
+    return "utf-8-sig" if even == odd else "utf-16-le" if odd else "utf-16-be"
+
+
+def _readings(data: bytes, place: int) -> str:
+    """Return how several encodings read the cell in which this byte is."""
+    begin = max(data.rfind(sign, 0, place) for sign in (b"\n", b"\r", b"\t", b",", b";")) + 1
+    cell = re.split(rb"[\n\r\t,;]", data[begin : begin + _SHOWN_BYTES])[0].strip(b"\"' ")
+    readings: dict[str, str] = {}
+    for code_page in _CODE_PAGES:
+        reading = cell.decode(code_page, "replace")
+        letters = [letter for letter in reading if letter.isalpha()]
+        scripts = {unicodedata.name(letter, "").split()[0] for letter in letters}
+        if len(scripts) == 1 and all(sign.isascii() or sign in letters for sign in reading):
+            readings.setdefault(reading, code_page)
+    return listed([f"{reading} ({code_page})" for reading, code_page in readings.items()])

@@ -34,13 +34,10 @@ from graspsense.sources.trial_table.identifiers import (
 )
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from graspsense.core.learn.target_value import TargetValue
     from graspsense.core.values.features import FeatureTable
     from graspsense.sources.formats.csv_columns import CsvColumns
-
-    Numbers = NDArray[np.float64]
+    from graspsense.sources.formats.table import Numbers
 
 _TIME_NAMES: Final = frozenset({
     "t", "time", "elapsed", "clock", "hour", "hours", "minute", "minutes", "timestamp"
@@ -55,6 +52,8 @@ _TEMPERATURES: Final = frozenset({"C", "\u00b0C", "degC"})
 """What can be the same, or drift, in a whole session; by the name of a column, or by its unit."""
 _OFTEN: Final = 3
 """Lines with the same value from which on it may stand for something else than a measurement."""
+_FROM_ZERO: Final = 0.15
+"""Distance from zero of the nearest value, as a share of the range of all, from which on a zero is no measurement."""
 _LONE: Final = 100.0
 """How many times the span of all others a single value is away from them, if it is no measurement."""
 _BY_CHANCE: Final = 1e-4
@@ -204,9 +203,11 @@ def _of_numbers(name: str, unit: str, values: Numbers, labels: Sequence[str]) ->
     of_time, differs = is_count(unit) or is_time(unit), differs_by_label(values, labels)
     if (differs or are_in_blocks(labels)) and follow_lines(values, labels):
         yield "order"
-    if of_time and (_is_named_as_time(name) or can_be_days(values)):
+    words = set(words_of(name))
+    named_as_time = _TIME_NAMES & words and words <= _TIME_NAMES | _OF_TIMES
+    if of_time and (named_as_time or can_be_days(values)):
         yield "time"
-    if differs and (_OF_A_SESSION & set(words_of(name)) or unit in _TEMPERATURES):
+    if differs and (_OF_A_SESSION & words or unit in _TEMPERATURES):
         yield "session"
     if of_time and passes_without_a_gap(values, labels):
         yield "without a gap"
@@ -379,11 +380,6 @@ def _numbers(columns: CsvColumns, names: Sequence[str]) -> dict[str, Numbers]:
     return {name: values for name, values in numbers.items() if not (np.abs(values) > LARGEST_VALUE).any()}
 
 
-def _is_named_as_time(name: str) -> bool:
-    words = set(words_of(name))
-    return bool(_TIME_NAMES & words) and words <= _TIME_NAMES | _OF_TIMES
-
-
 @np.errstate(over="ignore")  # of differences and ratios of numbers that no sensor gives
 def _mixed(numbers: dict[str, Numbers]) -> list[str]:
     """Return notes on columns in which a number stands for something else, or whose unit changes."""
@@ -424,7 +420,7 @@ def stand_in_of(known: Numbers) -> float | None:
     """Return the value that several lines have and that is farther from all others than these are from each other.
 
     Or a single one that is a hundred times as far. Or the one that is repeated by far more often than any other one,
-    where the others hardly repeat. A zero can be measured so often.
+    where the others hardly repeat. A zero can be measured so often, unless no other value comes near to it.
     """
     if len(known) < 2 * LEAST_LINES:
         return None
@@ -436,7 +432,9 @@ def stand_in_of(known: Numbers) -> float | None:
         return None
     span = float(others.max() - others.min()) * (1.0 if times >= _OFTEN else _LONE)
     far = value < others.min() - span or value > others.max() + span
-    stuck = times >= _OFTEN and value != 0.0 and times >= LEAST_LINES and _mostly_different(others)
+    apart = value != 0.0 or float(np.abs(others).min()) > _FROM_ZERO * float(np.ptp(others))
+    often = times >= (LEAST_LINES if value else _OFTEN)
+    stuck = often and apart and _mostly_different(others)
     return float(value) if far or stuck else None
 
 

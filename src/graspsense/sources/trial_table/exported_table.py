@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from attrs import evolve
 
-from graspsense.core.values.errors import DataDamaged, counted
+from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.label_text import is_missing_label
 from graspsense.sources.formats.csv_columns import CsvColumns
 from graspsense.store.export_table import ABOUT, ABOUT_BEFORE, BEFORE, FIRST, VALUE
@@ -36,27 +36,24 @@ class ExportedTable:
         none is left.
         """
         columns = self.columns
-        rows = list(range(len(columns)))
         if label is not None:
-            cells = columns.column(label, "the label")
-            rows = _kept(rows, [not is_missing_label(cell) for cell in cells], "they have no label", notes)
+            labelled = [not is_missing_label(cell) for cell in columns.column(label, "the label")]
+            notes += columns.keep_where(labelled, "they have no label")
         ended = [outcome not in NOT_ENDED for outcome in columns.cells["outcome"]]
-        rows = _kept(rows, ended, "they did not end by themselves", notes)
+        notes += columns.keep_where(ended, "they did not end by themselves")
         if "complete" in self.about:
-            whole = [cell != "0" for cell in columns.cells["complete"]]
-            rows = _kept(rows, whole, "they are incomplete", notes)
-        if not rows:
+            notes += columns.keep_where(
+                [cell != "0" for cell in columns.cells["complete"]], "they are incomplete"
+            )
+        if not len(columns):
             raise DataDamaged(f"{columns.path} has no labelled trial that ended by itself")
-        if "feature_set" in self.about:
-            sets = columns.cells["feature_set"]
-            newest = [feature_set == sets[rows[-1]] for feature_set in sets]
-            several = len({sets[i] for i in rows}) > 1
-            rows = _kept(rows, newest, "their features differ from those of the newest trial", notes)
-            columns.keep(rows)
-            if several:
-                self.features = [name for name in self.features if not columns.is_blank(name)]
-        else:
-            columns.keep(rows)
+        if "feature_set" in self.about and len(set(columns.cells["feature_set"])) > 1:
+            newest = [
+                feature_set == columns.cells["feature_set"][-1]
+                for feature_set in columns.cells["feature_set"]
+            ]
+            notes += columns.keep_where(newest, "their features differ from those of the newest trial")
+            self.features = [name for name in self.features if not columns.is_blank(name)]
 
     def order(self) -> tuple[tuple[int, ...] | None, str]:
         """Return the position of each trial in the order of recording, or None with the reason."""
@@ -94,11 +91,3 @@ def exported(columns: CsvColumns) -> ExportedTable | None:
         if tuple(columns.names[: len(about)]) == about:
             return ExportedTable(columns, about)
     return None
-
-
-def _kept(rows: list[int], wanted: Sequence[bool], why: str, notes: list[str]) -> list[int]:
-    """Return the rows that are wanted, with a note on the others."""
-    kept = [i for i in rows if wanted[i]]
-    if len(kept) < len(rows):
-        notes.append(f"{counted(len(rows) - len(kept), 'trial')} left out: {why}")
-    return kept

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from graspsense.core.files.whole_file import write_or_replace
 from graspsense.core.learn.confounding import LEAST_LINES
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.target_value import TargetValue
-from graspsense.core.values.errors import ConfigError, DataDamaged, counted, listed
+from graspsense.core.values.errors import ConfigError, DataDamaged, listed
 from graspsense.core.values.features import UNKNOWN, FeatureTable
 from graspsense.core.values.label_text import is_missing_label, label_text
 from graspsense.core.values.nominal import splits_of
@@ -42,7 +42,7 @@ from graspsense.sources.trial_table.summary_lines import without_summaries
 from graspsense.store.export_table import VALUE
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from graspsense.sources.formats.table import Numbers
 
 SMALL: Final = 1e-3
 """A column that varies by less than this has few values that differ by J48's 1e-5."""
@@ -84,7 +84,7 @@ def read_labelled(
         export.keep_complete_trials(label if value is None else None, notes)
         features = features or export.features
     elif isinstance(columns, ArffColumns) and value is None:
-        notes += columns.without_label(label)
+        notes += columns.without_label(label or "")
     target = None if value is None else _target(columns, value, export, notes)
     labels = _labels(columns, label, notes, required=target is None)
     ranks, no_order = export.order() if export and order is None else (_ranks(columns, order, notes), "")
@@ -107,7 +107,8 @@ def read_labelled(
         labels=tuple(labels),
         instances=instances,
         no_instances=f"no column names the instance ({option('instance', 'COLUMN')})",
-        **_recording(columns, instance, others),
+        sessions=bool(_sessions(columns, [instance] if instance else [])),
+        recorded_with=_sessions(columns, others),
         order=ranks,
         no_order=no_order,
         **_controls(table, columns, known_before, export),
@@ -128,13 +129,10 @@ def _opened(
     return columns, export, label
 
 
-def _recording(columns: CsvColumns, instance: str | None, others: Sequence[str]) -> dict[str, Any]:
-    """Return whether the instances are sessions, and what else of the recording is in the columns `others`."""
-    grouping = [name for name in others if groups_trials(name, columns.texts(name))]
-    return {
-        "sessions": instance is not None and groups_trials(instance, columns.texts(instance)),
-        "recorded_with": {name: tuple(columns.texts(name)) for name in grouping},
-    }
+def _sessions(columns: CsvColumns, names: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Return the texts of those of these columns that name sessions, operators or devices."""
+    texts = {name: tuple(columns.texts(name)) for name in names}
+    return {name: values for name, values in texts.items() if groups_trials(name, values)}
 
 
 def _object_column(
@@ -160,9 +158,27 @@ def _object_column(
 def _identifying(
     columns: CsvColumns, labels: Sequence[str], ranks: Sequence[int] | None, lines: Sequence[int]
 ) -> Callable[[str], str]:
-    """Return `_identified` of these lines, which computes the answer for a column once."""
-    ranks_once = None if ranks is None else [ranks[i] for i in lines]
-    return cache(partial(_identified, columns.rows(lines), [labels[i] for i in lines], ranks_once))
+    """Return a function that says how a column identifies trials in these lines; empty if it can be a feature.
+
+    It raises DataDamaged.
+    """
+    columns, labels = columns.rows(lines), [labels[i] for i in lines]
+    order = None if ranks is None else [ranks[i] for i in lines]
+
+    @cache
+    def identified(name: str) -> str:
+        if columns.is_nominal(name):
+            why = text_identifies(columns.texts(name), labels)
+        else:
+            values = columns.numbers(name)
+            why = identifies(name, columns.units[name], values, labels, order)
+            if not why and _loses_digits(columns.cells[name], values):
+                why = "differ in their last digits alone, which are rounding (subtract an offset)"
+        if not why and names_a_recording(name):
+            return "tell of the recording and not of the grasp, by their name"
+        return why
+
+    return identified
 
 
 def _refuse_long_form(columns: CsvColumns) -> None:
@@ -207,12 +223,10 @@ def _target(columns: CsvColumns, value: str, export: ExportedTable | None, notes
     """Keep the lines that have the number to predict, and return the numbers. Raises ConfigError, DataDamaged."""
     name = value if export is None or value in columns.cells else f"{VALUE}{value}"
     columns.column(name, "the number to predict")
-    having = [i for i, number in enumerate(columns.numbers(name)) if not math.isnan(number)]
-    if not having:
+    having = [not math.isnan(number) for number in columns.numbers(name)]
+    if not any(having):
         raise DataDamaged(f"{columns.path}: no line has a {value}")
-    if len(having) < len(columns):
-        notes.append(f"{counted(len(columns) - len(having), 'trial')} left out: no {value}")
-        columns.keep(having)
+    notes += columns.keep_where(having, f"no {value}")
     return TargetValue(name=value, unit=columns.units[name], values=tuple(columns.numbers(name)))
 
 
@@ -280,20 +294,6 @@ def _ranks(columns: CsvColumns, order: str | None, notes: list[str]) -> tuple[in
     if any(math.isnan(value) for value in values):
         raise DataDamaged(f"{columns.path}: a cell of the column {order!r} (the order) is empty")
     return tuple(np.argsort(np.argsort(values, kind="stable"), kind="stable").tolist())
-
-
-def _identified(columns: CsvColumns, labels: Sequence[str], order: Sequence[int] | None, name: str) -> str:
-    """Return how a column identifies trials, empty if it can be a feature. Raises DataDamaged."""
-    if columns.is_nominal(name):
-        why = text_identifies(columns.texts(name), labels)
-    else:
-        values = columns.numbers(name)
-        why = identifies(name, columns.units[name], values, labels, order)
-        if not why and _loses_digits(columns.cells[name], values):
-            why = "differ in their last digits alone, which are rounding (subtract an offset)"
-    if not why and names_a_recording(name):
-        return "tell of the recording and not of the grasp, by their name"
-    return why
 
 
 def _loses_digits(cells: Sequence[str], values: Sequence[float]) -> bool:
@@ -384,6 +384,6 @@ def _note_uninformative_columns(path: Path, table: FeatureTable, notes: list[str
         raise DataDamaged(f"{path}: no feature has any value: {listed(blank)}")
 
 
-def _span(values: NDArray[np.float64]) -> float:
+def _span(values: Numbers) -> float:
     """Return the difference of the largest and the smallest value; infinite where it is too large for a number."""
     return float(values.max()) - float(values.min())

@@ -26,7 +26,9 @@ from graspsense.sources.columns.column_guess import words_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_COUNTED: Final = frozenset({"", "1", "-", "#", "count", "counts", "nr", "no", "id", "index", "none", "n/a"})
+_COUNTED: Final = frozenset(
+    ("", "1", "-", "#", "%", "count", "counts", "nr", "no", "id", "index", "none", "n/a")
+)
 """What stands in the place of a unit for numbers without one."""
 TIMES: Final = frozenset({
     "s", "sec", "secs", "second", "seconds", "ms", "msec", "us", "µs", "ns", "min", "mins", "minute", "minutes",
@@ -38,21 +40,24 @@ _NAMES: Final = frozenset({
     "epoch", "nummer", "versuch", "messung", "zeile", "datei", "sitzung", "datum", "zeit", "uhrzeit", "essai",
     "fichier", "heure", "numero", "prueba", "archivo", "fecha", "hora"
 })  # fmt: skip
-_OF_RECORDINGS: Final = frozenset({
-    "session", "operator", "experimenter", "person", "participant", "subject", "user", "robot", "host", "lab", "site",
-    "seed", "batch", "lot", "weekday", "day", "doy", "week", "month", "year", "date", "datetime", "trial", "fold",
-    "split", "file", "filename", "uid", "uuid", "pred", "prediction", "predicted", "proba", "probability", "confidence",
-    "sitzung", "bediener", "proband", "datum", "wochentag", "tag", "versuch", "datei", "fichier", "jour", "fecha",
-})  # fmt: skip
-"""What a recording is known by, and what a model said of it; no gripper measures it."""
 _DIVISIONS: Final = frozenset({
-    "seed", "trial", "fold", "split", "uid", "uuid", "pred", "prediction", "predicted", "proba", "probability",
-    "confidence",
+    "seed", "trial", "fold", "kfold", "split", "is", "train", "training", "test", "testing", "validation",
+    "holdout", "subset", "partition", "rep", "repeat", "repetition", "replicate", "attempt", "try", "take", "iteration",
+    "random", "uid", "uuid", "crc", "checksum", "chk", "hash", "sha", "pred", "prediction", "predicted", "proba",
+    "probability", "confidence", "certainty", "score", "logit", "likelihood",
 })  # fmt: skip
-"""Those that tell nothing of what was the same for several recordings."""
-_NUMBERED: Final = frozenset(
-    {"id", "no", "nr", "num", "number", "index", "idx", "name", "code", "of", "the", "random"}
-)
+"""What trials are told apart and divided by, and what a model said of them."""
+_OF_RECORDINGS: Final = _DIVISIONS | {
+    "session", "operator", "experimenter", "person", "participant", "subject", "user", "robot", "host", "lab", "site",
+    "batch", "lot", "block", "series", "group", "round", "run", "cycle", "weekday", "day", "doy", "week", "month",
+    "year", "date", "datetime", "file", "filename", "sitzung", "bediener", "proband", "datum", "wochentag", "tag",
+    "versuch", "datei", "fichier", "jour", "fecha",
+}  # fmt: skip
+"""These, and what was the same for several recordings; no gripper measures it."""
+_NUMBERED: Final = frozenset({
+    "id", "no", "nr", "num", "number", "index", "idx", "name", "code", "of", "the", "in", "for", "used", "set", "data",
+    "dataset", "val", "k", "cv", "md", "mask", "flag", "int", "hex",
+})  # fmt: skip
 _FOLLOWS: Final = 0.95
 """Rank correlation with the lines, within each label, of a counter or a clock."""
 _DRIFTS: Final = 0.7
@@ -88,10 +93,6 @@ OF_OBJECTS: Final = (NAME_OBJECTS, NUMBER_OBJECTS)
 """How the values of a column identify trials that are of the same object."""
 _MOST_VALUES: Final = 1.0 / 3.0
 """Share of different texts from which on they are no values of a nominal feature."""
-_DATE_TEXT: Final = re.compile(
-    r"(?=.*\d)(\d{1,4}([-./])\d{1,2}\2\d{1,4})?[T ]?(\d{1,2}(:\d{2}){1,2}(\.\d+)?)?( ?Z| ?[+-]\d\d:?\d\d)?"
-)
-"""A date or a time of day, as 2026-11-26, 26.11.2026 14:03 or 14:03:22."""
 _LONG_WORDS: Final = (
     "(mon|tues?|wed(nes)?|thu(rs)?|fri|sat(ur)?|sun)(day)?|(lun|mar|mer(cre)?|jeu|ven(dre)?)(di)?|sam(edi)?|dim(anche)?|"
     "(mon|diens|donners|frei|sams|sonn)tag|mittwoch|jan(uary?)?|jänner|feb(ruary?)?|mar(ch)?|mär(z)?|apr(il)?|may|mai|"
@@ -99,10 +100,11 @@ _LONG_WORDS: Final = (
 )
 _WORDS_OF_DATES: Final = re.compile(f"{_LONG_WORDS}|mo|di|mi|do|fr|sa|so")
 """Days of the week and months, alone."""
-_WORDED_DATE: Final = re.compile(
+_DATE_TEXT: Final = re.compile(
+    r"(?=.*\d)(\d{1,4}([-./])\d{1,2}\2\d{1,4})?[t ]?(\d{1,2}(:\d{2}){1,2}(\.\d+)?)?( ?z| ?[+-]\d\d:?\d\d)?|"
     rf"(?=.*\d)(?=.*({_LONG_WORDS}|[ap]\.?m))({_LONG_WORDS}|\d+(st|nd|rd|th)?|[ap]\.?m\.?|utc|gmt|[-\s.,:/_+])+"
 )
-"""A date or a time with such words, as 26 Nov 2026 or 2:03 pm."""
+"""A date or a time of day in small letters, as 2026-11-26, 26.11.2026 14:03, 14:03:22, 26 nov 2026 or 2:03 pm."""
 _DAY_FORMS: Final = ("%Y%m%d", "%d%m%Y", "%m%d%Y", "%y%m%d")
 _DATES: Final = (*_DAY_FORMS, "%y%m%d%H%M", "%Y%m%d%H%M", "%y%m%d%H%M%S", "%Y%m%d%H%M%S")
 _CLOCK_VALUES: Final = (10, 15)
@@ -192,11 +194,8 @@ def text_identifies(texts: Sequence[str], labels: Sequence[str]) -> str:
     if counts.keys() <= set(labels):
         return "are the labels, as those of a prediction are"
     lower = [text.lower() for text in counts]
-    if (
-        all(map(_DATE_TEXT.fullmatch, counts))
-        or all(map(_WORDED_DATE.fullmatch, lower))
-        or (len(counts) > 2 and all(map(_WORDS_OF_DATES.fullmatch, lower)))
-    ):
+    of_words = len(counts) > 2 and all(map(_WORDS_OF_DATES.fullmatch, lower))
+    if of_words or all(map(_DATE_TEXT.fullmatch, lower)):
         return "are dates or times"
     values, own = [text for text, _ in given], [label for _, label in given]
     numbered = all(re.search(r"\d", text) for text in counts)

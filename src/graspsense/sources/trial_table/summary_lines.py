@@ -18,11 +18,8 @@ from graspsense.sources.columns.channel_facts import resolution
 from graspsense.sources.formats.text_table import numbers_with_unit
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from graspsense.sources.formats.csv_columns import CsvColumns
-
-    Numbers = NDArray[np.float64]
+    from graspsense.sources.formats.table import Numbers
 
 _STATISTICS: Final = frozenset({
     "mean", "means", "average", "averages", "avg", "median", "mode", "sum", "total", "totals", "grand total",
