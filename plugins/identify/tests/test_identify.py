@@ -15,11 +15,11 @@ from graspsense_identify.fit import fit
 from graspsense_identify.forward import RIGID_PADS, ForwardModel
 from graspsense_identify.fracture import explained_falls, fracture_of
 from graspsense_identify.laws import memories, scale_of, static_candidates
+from graspsense_identify.parts import parts_of
 from graspsense_identify.prepare import _smooth_course, prepared
 from graspsense_identify.refuse import shows_memory
 from graspsense_identify.run import _looks_wrong, _own_settings, _ready, _used
 from graspsense_identify.share import Shares
-from graspsense_identify.spread import refits
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.pads import PadCompliance
 from graspsense_sim_gripper.scene.spec import parse_scene
@@ -174,10 +174,10 @@ def test_without_one_object_the_common_stiffness_is_the_mean_of_the_others():
     squeezes = [ready(lambda closure, k=k: force(closure, k)) for k in (900.0, 1200.0, 1000.0, 800.0, 1100.0)]
     law = static_candidates(scale_of(squeezes))[2]
     model = ForwardModel(pads=RIGID_PADS)
-    again = refits(fit(model, law, squeezes), np.random.default_rng(0), has_lag=False)
+    again = parts_of(fit(model, law, squeezes))
 
     # Where it stayed that of all objects, the jackknife would find too little scatter between them.
-    assert np.mean(np.log([refit.factors for refit in again.fits]), axis=1) == pytest.approx(0.0, abs=1e-9)
+    assert np.mean(np.log([part.fitted.factors for part in again.parts]), axis=1) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_breaks_give_the_force_of_the_fracture_with_its_spread_and_what_is_left():

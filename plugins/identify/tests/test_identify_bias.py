@@ -12,6 +12,7 @@ from graspsense_identify.fit import fit
 from graspsense_identify.forward import RIGID_PADS, ForwardModel
 from graspsense_identify.interval import interval_of_mean, normal, student
 from graspsense_identify.laws import scale_of, static_candidates
+from graspsense_identify.parts import parts_of
 from graspsense_identify.prepare import prepared
 from graspsense_identify.share import measured_share
 from graspsense_identify.spread import _scale_errors, at_least, uncertainty
@@ -71,7 +72,7 @@ def test_a_stiffness_that_the_fit_leaves_out_has_an_interval_in_proportion_to_th
     fitted = fit(ForwardModel(pads=RIGID_PADS), cubic, [squeeze])
     none = evolve(fitted, values=(1e-3, fitted.values[1]))
     # The linearised change of the logarithm is thousands of times 1.
-    assert 1.0 < uncertainty(none).high[0] < 100.0
+    assert 1.0 < uncertainty(none, parts_of(none)).high[0] < 100.0
 
 
 @every_case("squeezes", [2, 3, 10])

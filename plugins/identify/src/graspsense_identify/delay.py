@@ -22,10 +22,10 @@ from graspsense.simulator_api import IdentifiedParameter, Undetermined
 from graspsense_identify.choose import LEAST_GAIN, Choice
 from graspsense_identify.fit import Fitted, in_threads, information
 from graspsense_identify.interval import identified, normal
+from graspsense_identify.parts import has_objects, parts_of
 from graspsense_identify.prepare import MAX_LAG_S
 from graspsense_identify.refuse import shows_memory
 from graspsense_identify.share import Shares
-from graspsense_identify.spread import has_objects, refits
 
 EVIDENCE: Final = 5.0
 """The logarithm of the Bayes factor (Schwarz's approximation) from which on a lag is taken for real."""
@@ -160,9 +160,9 @@ def delay_of(fitted: Fitted, settings_s: float, lag: Lag) -> Delay:
     if not shows_memory(fitted.squeezes):
         return Delay(settings_s=settings_s, used_s=used_s)
     lagging = fitted.refitted(has_lag=True)
-    again = refits(lagging, np.random.default_rng(0), has_lag=True)
-    lags = np.array([fitted.lag_s for fitted in again.fits])
-    scattered = again.factor * math.sqrt(again.scale * float(np.sum((lags - lags.mean()) ** 2)))
+    again = parts_of(lagging, has_lag=True)
+    lags = np.array([[part.fitted.lag_s] for part in again.parts])
+    scattered = again.factor * math.sqrt(float(again.covariance(lags)[0, 0]))
     # Where the motion does not show a lag, the fits stay where they begin and do not scatter.
     random = max(scattered, normal() * lagging.lag_error_s)
     half = math.hypot(random, normal() * max(lag.error_s, PATH_ERROR_S))

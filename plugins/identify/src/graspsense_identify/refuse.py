@@ -10,12 +10,15 @@ import numpy as np
 
 from graspsense.simulator_api import SqueezeFit, Undetermined, repeatability
 from graspsense_identify.fit import Fitted
-from graspsense_identify.held_out import CONFIRMS
 from graspsense_identify.laws import MAXWELL, SNAP
+from graspsense_identify.parts import LEAST_INSTANCES
 from graspsense_identify.prepare import BREAK_SHARE, Squeeze
 from graspsense_identify.share import Shares
-from graspsense_identify.spread import LEAST_INSTANCES, Uncertainty
+from graspsense_identify.spread import Uncertainty
 
+CONFIRMS: Final = 0.1
+"""A held-out squeeze that is predicted to this share of its peak confirms the object, and so does one that is predicted
+as closely as the squeezes are alike (`repeatability`)."""
 LEAST_HOLD_S: Final = 0.2
 """A shorter hold shows no relaxation."""
 SPEED_RATIO: Final = 2.0

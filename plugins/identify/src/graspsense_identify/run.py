@@ -15,14 +15,15 @@ from attrs import evolve, fields_dict
 from graspsense.plugin_api import ConfigError
 from graspsense.simulator_api import Identification, IdentifiedParameter, RecordedSqueeze, SqueezeFit
 from graspsense_identify.block import lag_of_block, with_fingertips_of_block
+from graspsense_identify.checks import predictive_checks
 from graspsense_identify.choose import choose
 from graspsense_identify.delay import Delay, Lag, Timed, delay_of, lag_of, with_delay
 from graspsense_identify.fit import Fitted
 from graspsense_identify.forward import ForwardModel, path_forces
 from graspsense_identify.fracture import explained_falls, fracture_of, not_broken, of_whole_objects
-from graspsense_identify.held_out import held_out_errors, predictive_checks
 from graspsense_identify.interval import identified, identified_mean
 from graspsense_identify.laws import scale_of
+from graspsense_identify.parts import parts_of
 from graspsense_identify.prepare import NoSqueeze, Squeeze, prepared
 from graspsense_identify.refuse import refusals, shows_memory, undetermined
 from graspsense_identify.share import WHOLE, Shares, measured_shares
@@ -76,13 +77,16 @@ def identify(
     used, delay = with_delay(timed, lag_of, shown)
     progress("computing intervals", 0, 1)
     chosen, shares = used.choice, used.shares
-    fitted, intervals = chosen.fitted, _uncertainty(used, delay)
+    fitted = chosen.fitted
+    lag_error_s = math.hypot(used.lag.error_s, delay.error_s)
+    parts = parts_of(fitted, has_lag=lag_error_s > 0.0)
+    intervals = uncertainty(fitted, parts, shares.error / math.sqrt(len(fitted.squeezes)), lag_error_s)
     fracture = fracture_of(fitted, shares.scatter)
     values, parameters = _values(fitted, intervals, shares)
     parameters += delay.parameters
     parameters += fracture.parameters
     open_ = [*delay.undetermined, *undetermined(fitted, intervals, shares), *fracture.undetermined]
-    fits, held_out = _fits(fitted), held_out_errors(fitted)
+    fits, held_out = _fits(fitted), parts.squeeze_errors
     result = Identification(
         label=next((squeeze.label for squeeze in recorded if squeeze.label), ""),
         scene="",
@@ -150,13 +154,6 @@ def _looks_wrong(squeezes: Sequence[RecordedSqueeze]) -> list[str]:
             f"the largest force is {1e3 * strongest:.3g} mN, as if the forces were in another unit than N"
         )
     return wrong
-
-
-def _uncertainty(used: Timed, delay: Delay) -> Uncertainty:
-    """Return the uncertainty of the chosen fit."""
-    fitted = used.choice.fitted
-    scale = used.shares.error / math.sqrt(len(fitted.squeezes))
-    return uncertainty(fitted, scale, math.hypot(used.lag.error_s, delay.error_s))
 
 
 def _ready(
