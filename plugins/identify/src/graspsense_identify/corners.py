@@ -46,10 +46,6 @@ MOVING_SHARE: Final = 0.3
 """Where the gap changes by at least this share of its largest change between measurements, the fingers move."""
 LEAST_FALLING: Final = 2
 """Samples on the falling part of a snap-through that determine its line."""
-MEAN_OVER_CORNER: Final = 0.015
-"""Rms error of the mean over a sample in which the law has a corner, over the change of its slope and the distance
-between samples: `Squeeze.at_samples` knows the forces at the ends and in the middle only. The rms is over corners that
-lie anywhere in the sample."""
 
 
 class _Load(NamedTuple):
@@ -162,7 +158,7 @@ def corner_errors(fitted: Fitted) -> Floats:
     moving = np.concatenate([way[way > MOVING_SHARE * np.max(way)] for way in ways])
     share = math.sqrt(1.0 / 6.0)
     if _on_falling_part(fitted, values["snap.critical_m"], values["snap.fall_m"]) >= LEAST_FALLING:
-        share = MEAN_OVER_CORNER if any(np.any(squeeze.averaged_s2 > 0.0) for squeeze in squeezes) else 0.0
+        share = 0.0
     error_m = share * float(np.median(moving)) / math.sqrt(len(squeezes))
     errors = {
         "snap.critical_m": error_m,

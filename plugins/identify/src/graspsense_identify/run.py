@@ -25,7 +25,7 @@ from graspsense_identify.interval import identified, identified_mean
 from graspsense_identify.laws import scale_of
 from graspsense_identify.parts import parts_of
 from graspsense_identify.prepare import NoSqueeze, Squeeze, prepared
-from graspsense_identify.refuse import refusals, shows_memory, undetermined
+from graspsense_identify.refuse import PADS_DIFFER, refusals, shows_memory, undetermined
 from graspsense_identify.share import WHOLE, Shares, measured_shares
 from graspsense_identify.spread import Uncertainty, uncertainty
 from graspsense_identify.write import scene_text
@@ -33,8 +33,6 @@ from graspsense_sim_gripper.run.identification import CELLS, SimConfig, drive_an
 
 Progress = Callable[[str, int, int], None]
 
-PADS_DIFFER: Final = 0.2
-"""Share of the largest force by which the forces on both pads may differ without a note."""
 WEAK_N: Final = 0.1
 """A largest force below this one is more likely in another unit than that of so weak a squeeze."""
 MAX_SQUEEZES: Final = 30
@@ -178,6 +176,14 @@ def _ready(
             ready[i] = prepare(squeeze, may_break=squeeze.name not in whole)
         except NoSqueeze as refusal:
             refused.append(refusal)
+    alike = {i: squeeze for i, squeeze in ready.items() if squeeze.pad_difference <= PADS_DIFFER}
+    if alike:
+        refused += [
+            NoSqueeze(f"{squeeze.name}: the forces on its pads differ, and those of other recordings do not")
+            for i, squeeze in ready.items()
+            if i not in alike
+        ]
+        ready = alike
     if not ready:
         raise NoSqueeze("\n  ".join((str(refused[0]), *_looks_wrong(squeezes))))
     kept = list(ready)
@@ -192,13 +198,6 @@ def _ready(
     ready = {kept[k]: squeeze for k, squeeze in unbroken.items()}
     kept = list(ready)
     notes += [f"left out: {refusal}" for refusal in refused]
-    apart = max(squeeze.pad_difference for squeeze in ready.values())
-    if apart > PADS_DIFFER:
-        notes.append(
-            f"the forces on the two pads differ by up to {100 * apart:.0f} % of the largest force. If the object is "
-            "fixed off the centre, one finger touches it before the other, and the chosen terms are wrong: centre it, "
-            "or let it stand free"
-        )
     shares = WHOLE
     if has_cells:
         shares = measured_shares(config, [squeezes[i].trace for i in kept], list(ready.values()))

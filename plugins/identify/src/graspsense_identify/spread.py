@@ -78,11 +78,14 @@ def uncertainty(
     scattered = parts.covariance(np.log([part.fitted.values for part in parts.parts]))
     linear = linear_covariance(fitted, PATH_FORCE_ERROR)
     covariance = at_least(scattered, linear * (normal() / factor) ** 2)
-    own = _scale_errors(fitted, force_scale) + PATH_ERROR**2 * np.eye(len(fitted.values))
+    # An error of the scale of the force is common to all squeezes, so that none of them shows it.
+    scaled = force_scale * np.array([parameter.is_force for parameter in fitted.candidate.free])
+    own = np.outer(scaled, scaled) + PATH_ERROR**2 * np.eye(len(fitted.values))
     own += np.diag(corner_errors(fitted) ** 2)
     if lag_error_s > 0.0:
         later = [squeeze.delayed(lag_error_s) for squeeze in fitted.squeezes]
-        own += _of_shift(fitted, evolve(fitted, squeezes=later))
+        shift = np.log(evolve(fitted, squeezes=later).refitted().values) - np.log(fitted.values)
+        own += np.outer(shift, shift)
     covariance = covariance + own * (normal() / factor) ** 2
     spread = np.sqrt(np.diag(covariance))
     best = np.array(fitted.values)
@@ -120,31 +123,6 @@ def at_least(covariance: Floats, other: Floats) -> Floats:
     own = np.sqrt(np.maximum(np.diag(covariance), np.diag(other)))
     ratio = own / np.sqrt(np.diag(both))
     return both * np.outer(ratio, ratio)
-
-
-def _of_shift(fitted: Fitted, shifted: Fitted) -> Floats:
-    """Return the covariance of the logarithms of an error whose standard deviation leads to other squeezes or laws.
-
-    `shifted`: where the fit to these starts.
-    """
-    shift = np.log(shifted.refitted().values) - np.log(fitted.values)
-    return np.outer(shift, shift)
-
-
-def _scale_errors(fitted: Fitted, force_scale: float) -> Floats:
-    """Return the covariance of the logarithms that an error of the scale of the force causes.
-
-    It is common to all squeezes, so that none of them shows it. Through compliant fingertips, it changes lengths, too.
-    """
-    if force_scale == 0.0:
-        return np.zeros((len(fitted.values), len(fitted.values)))
-    more = math.exp(force_scale)
-    stronger = [evolve(squeeze, force_n=more * squeeze.force_n) for squeeze in fitted.squeezes]
-    scaled = [
-        value * more if parameter.is_force else value
-        for parameter, value in zip(fitted.candidate.free, fitted.values, strict=True)
-    ]
-    return _of_shift(fitted, evolve(fitted, values=tuple(scaled), squeezes=stronger))
 
 
 def _components(values: Floats, names: Sequence[str]) -> Components:
