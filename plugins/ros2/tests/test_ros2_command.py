@@ -12,14 +12,13 @@ from itertools import product
 import pytest
 from cases import every_case
 from commands import refused
-from robots import OPTIONS
+from robots import OPTIONS, PATIENCE_S
 
 from graspsense_ros2.command import ACTION, GRASP, GRIPPER_COMMAND, TRIGGER
 from graspsense_ros2.message_types import decode, encode
 from graspsense_ros2.node import ServiceFailed
 from graspsense_ros2.zenoh_node import ZenohNode
 
-PATIENCE_S = 60.0
 CANCEL = "action_msgs/srv/CancelGoal"
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
 OPEN_M = 0.085

@@ -14,10 +14,10 @@ def grasp(on_event=None, *options):
 
 
 def undisturbed(*options):
-    """Return a grasp in which no frame was lost, or the third one: a machine that is held up loses some."""
-    for _ in range(3):
+    """Return a grasp in which this process was not held up: one that is loses frames, and its clock jumps."""
+    for _ in range(10):
         trial = grasp(None, *options)
-        if trial.outcome == Outcome.STEADY or "lost:" not in trial.reason:
+        if not any(word in trial.reason for word in ("lost:", "clock jumps")):
             break
     return trial
 

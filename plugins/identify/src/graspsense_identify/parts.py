@@ -109,8 +109,8 @@ def parts_of(fitted: Fitted, most: int = MAX_PARTS, *, has_lag: bool = False) ->
     def without(k: int) -> Part:
         is_out = number == k
         if len(squeezes) == 1:
-            rest, stretch = (evolve(fitted, squeezes=[squeezes[0].only(own)]) for own in (~is_out, is_out))
-            return Part(rest.refitted(has_lag=has_lag), stretch, ())
+            others, stretch = (evolve(fitted, squeezes=[squeezes[0].only(own)]) for own in (~is_out, is_out))
+            return Part(others.refitted(has_lag=has_lag), stretch, ())
         places = tuple(np.flatnonzero(is_out).tolist())
         others = fitted.part(np.flatnonzero(~is_out).tolist())
         return Part(others.refitted(has_lag=has_lag), fitted.part(places), places)

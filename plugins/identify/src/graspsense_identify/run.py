@@ -17,7 +17,7 @@ from graspsense.simulator_api import Identification, IdentifiedParameter, Record
 from graspsense_identify.block import lag_of_block, with_fingertips_of_block
 from graspsense_identify.checks import predictive_checks
 from graspsense_identify.choose import choose
-from graspsense_identify.delay import Delay, Lag, Timed, delay_of, lag_of, with_delay
+from graspsense_identify.delay import PATH_ERROR_S, Delay, Timed, delay_of, lag_of, with_delay
 from graspsense_identify.fit import Fitted
 from graspsense_identify.forward import ForwardModel, path_forces
 from graspsense_identify.fracture import explained_falls, fracture_of, not_broken, of_whole_objects
@@ -64,19 +64,19 @@ def identify(
     recorded = _used(_distinct(squeezes, notes), notes)
     notes += _looks_wrong(recorded)
 
-    def timed(lag: Lag) -> Timed:
-        used, said = _timed(config, model, recorded, lag, progress)
-        notes.extend(() if lag.lag_s else said)
+    def timed(lag_s: float) -> Timed:
+        used, said = _timed(config, model, recorded, lag_s, progress)
+        notes.extend(() if lag_s else said)
         return used
 
     def shown(used: Timed) -> Delay:
-        return delay_of(used.choice.fitted, config.force_delay_s, used.lag)
+        return delay_of(used.choice.fitted, config.force_delay_s, used.lag_s)
 
     used, delay = with_delay(timed, lag_of, shown)
     progress("computing intervals", 0, 1)
     chosen, shares = used.choice, used.shares
     fitted = chosen.fitted
-    lag_error_s = math.hypot(used.lag.error_s, delay.error_s)
+    lag_error_s = math.hypot(PATH_ERROR_S if used.lag_s else 0.0, delay.error_s)
     parts = parts_of(fitted, has_lag=lag_error_s > 0.0)
     intervals = uncertainty(fitted, parts, shares.error / math.sqrt(len(fitted.squeezes)), lag_error_s)
     fracture = fracture_of(fitted, shares.scatter)
@@ -106,7 +106,7 @@ def _timed(
     config: SimConfig,
     model: ForwardModel,
     recorded: Sequence[RecordedSqueeze],
-    lag: Lag,
+    lag_s: float,
     progress: Progress,
 ) -> tuple[Timed, list[str]]:
     """Return the choice for squeezes whose force lags like this, and notes on them.
@@ -117,13 +117,13 @@ def _timed(
     whole, has_cells = set[str](), _has_cells(config, recorded)
     while True:
         notes: list[str] = []
-        ready, shares = _ready(config, recorded, notes, has_cells, lag.lag_s, whole)
+        ready, shares = _ready(config, recorded, notes, has_cells, lag_s, whole)
         choice = choose(
             model, ready, scale_of(ready), shows_memory(ready), partial(progress, "fitting candidates")
         )
         explained = explained_falls(choice.fitted)
         if not explained:
-            return Timed(shares, choice, lag), notes
+            return Timed(shares, choice, lag_s), notes
         whole |= explained
 
 
