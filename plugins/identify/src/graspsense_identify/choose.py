@@ -107,7 +107,8 @@ def choose(
 def _is_damped_by_branch(fitted: Fitted) -> bool:
     """Return whether its branch relaxes between two measurements, as a damper does: `loss` says so by one number."""
     free = fitted.candidate.free
-    return any(parameter.name == "tau_s" and fitted.at_bound(i) for i, parameter in enumerate(free))
+    shortest = zip(free, fitted.values, strict=True)
+    return any(parameter.name == "tau_s" and value < 1.02 * parameter.low for parameter, value in shortest)
 
 
 def _adds_nothing(fitted: Fitted, fits: Sequence[Fitted]) -> bool:
@@ -158,7 +159,7 @@ def _score(
         more = "more parameters, " if len(fitted.values) > len(best.fitted.values) else ""
         verdict = f"{more}error {100.0 * (own.error / best.error - 1.0):+.0f} %"
     elif fitted not in fits:
-        verdict = "its branch relaxes between two measurements, or after the last: a loss, or a spring"
+        verdict = "its branch relaxes between two measurements: a loss"
     elif _adds_nothing(fitted, fits):
         verdict = "fits no better than with fewer terms"
     else:

@@ -377,7 +377,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         """Raise DeviceLost where the thing is squeezed, and no finger feels it, or not all of it."""
         if self._greatest_n >= self._most_n:
             raise DeviceLost(
-                f"a finger feels {self._greatest_n:.3g} N, and its sensor has a cutoff of {self._most_n:.3g} N "
+                f"a finger feels {self._greatest_n:.3g} N, and a sensor has a cutoff of {self._most_n:.3g} N "
                 "in the model. Raise it, or grasp with less force"
             )
         squeeze_n = self._forces.squeeze_n() if isinstance(self._forces, ForceGauge) else 0.0
