@@ -141,11 +141,21 @@ def test_recordings_whose_pads_differ_are_left_out_and_a_scene_of_only_such_ones
     assert what_is_not_determined(with_right_pad(1.0, noise_n=0.8)) == set()
 
 
-@every_case(("stiffnesses", "told"), [((1000.0, 1100.0, 900.0), False), ((1000.0, 2000.0, 4000.0) * 2, True)])
-def test_recordings_of_different_objects_given_as_one_are_refused(stiffnesses, told):
+@every_case(
+    ("stiffnesses", "scale", "told"),
+    [
+        ((1000.0, 1100.0, 900.0), 1.0, False),
+        ((1000.0, 2000.0, 4000.0) * 2, 1.0, True),
+        ((1000.0,) * 3, 1.5, True),
+    ],
+)
+def test_recordings_of_different_objects_or_units_given_as_one_are_refused(stiffnesses, scale, told):
     config = SimConfig(sensor="ideal", pad_stiffness_n_m=float("inf"))
-    squeezes = [recorded(lambda closure, k=k: k * closure) for k in stiffnesses]
-    result = identify(config, squeezes, lambda *_: None)
+    first, *others = [recorded(lambda closure, k=k: k * closure) for k in stiffnesses]
+    first = evolve(first, trace=evolve(first.trace, gap_m=scale * first.trace.gap_m))
+    # Copies would be left out.
+    others = [evolve(own, trace=evolve(own.trace, t_s=own.trace.t_s + i)) for i, own in enumerate(others)]
+    result = identify(config, [first, *others], lambda *_: None)
     assert any(open_.in_scene and "kind of object" in open_.what for open_ in result.undetermined) == told
 
 

@@ -165,7 +165,7 @@ def _spreads(uncertainty: Uncertainty, squeezes: Sequence[Squeeze]) -> Iterator[
             reason=f"the recordings are of {objects}",
             remedy=f"record {LEAST_INSTANCES} objects or more, labelled cup#1, cup#2, cup#3",
         )
-    depth_m = max(squeeze.depth_m for squeeze in squeezes)
+    depth_m = float(np.median([squeeze.depth_m for squeeze in squeezes]))
     if uncertainty.stiffness.whole > ONE_KIND or uncertainty.width_m.whole > depth_m:
         yield Undetermined(
             what="whether the recordings are of one kind of object, in one unit",
