@@ -25,6 +25,8 @@ OPTIONS = (
 
 PATIENCE_S = 300.0
 """What a test waits for comes within this time, or not at all."""
+TRIES = 10
+"""A grasp is tried so often: that of a machine that is held up loses frames, and is aborted."""
 
 
 class Robot:
@@ -40,7 +42,11 @@ class Robot:
         self.process.stdin.write(name + "\n")
         self.process.stdin.flush()
 
+    def end(self):
+        """End the robot, and return what it printed."""
+        self.process.kill()
+        return self.process.communicate()[0]
+
     def goals(self):
         """End the robot, and return its goals."""
-        self.process.kill()
-        return [json.loads(line) for line in self.process.communicate()[0].splitlines()]
+        return [json.loads(line) for line in self.end().splitlines()]
