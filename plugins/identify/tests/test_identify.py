@@ -151,11 +151,11 @@ def test_recordings_whose_pads_differ_are_left_out_and_a_scene_of_only_such_ones
 )
 def test_recordings_of_different_objects_or_units_given_as_one_are_refused(stiffnesses, scale, told):
     config = SimConfig(sensor="ideal", pad_stiffness_n_m=float("inf"))
-    first, *others = [recorded(lambda closure, k=k: k * closure) for k in stiffnesses]
-    first = evolve(first, trace=evolve(first.trace, gap_m=scale * first.trace.gap_m))
+    scaled, *others = [recorded(lambda closure, k=k: k * closure) for k in stiffnesses]
+    scaled = evolve(scaled, trace=evolve(scaled.trace, gap_m=scale * scaled.trace.gap_m))
     # Copies would be left out.
     others = [evolve(own, trace=evolve(own.trace, t_s=own.trace.t_s + i)) for i, own in enumerate(others)]
-    result = identify(config, [first, *others], lambda *_: None)
+    result = identify(config, [scaled, *others], lambda *_: None)
     assert any(open_.in_scene and "kind of object" in open_.what for open_ in result.undetermined) == told
 
 
